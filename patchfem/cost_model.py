@@ -64,7 +64,7 @@ CONDENSE_ENTRY_SECONDS = 1.38e-8  # per entry of the factors
 CONDENSE_OPERATION_SECONDS = 1.22e-11  # per floating-point operation
 
 # lists of bonds, which are passed through once or more in a step
-# per strip and pass, by the form of the list (`friction.bonds.list_numbers`)
+# per strip and pass, by the form of the list (`friction.bonds.list_forms_kernels`)
 STRIP_SECONDS = (3e-10, 3e-9, 2e-9, 3e-9)
 ANY_ORDER_STRIP_SECONDS = 2.5e-8  # per strip and pass of an order that needs a power
 PASS_SECONDS = 1.5e-7  # per pass besides its strips

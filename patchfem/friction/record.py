@@ -1,4 +1,4 @@
-"""From the keys of [friction] to the law object: the record in `effects` names the module of every law."""
+"""Law objects from the keys of [friction]; the record of a law in `effects` names its module."""
 
 from importlib import import_module
 from math import inf
@@ -7,29 +7,52 @@ from ..effects import LAWS, law_has_trait
 
 
 def law_from(friction, load: float = 1.0):
-    """The law object of a [friction] table, for laws that need no other numbers than its keys.
+    """Return the law object of a [friction] table, for laws that its keys define completely.
 
-    friction: the table in SI units; load [N] on the whole contact, to which a stiffness in the table refers. See
-    `protocol` for what the object can do.
+    Parameters
+    ----------
+    friction : table
+        Keys in SI units.
+    load : float
+        Load [N] on the whole contact, to which a stiffness in the table refers.
+
+    Returns
+    -------
+    object
+        A law as in `protocol`.
     """
     return import_module(LAWS[friction.law].module).from_keys(friction, load)
 
 
 def held_stiffness(friction, load: float) -> float:
-    """Tangential stiffness [N/m] of a law under a load [N] while nothing slips: infinite where it sticks rigidly, 0
-    where it creeps."""
+    """Return the tangential stiffness [N/m] of a law under a load [N] before slip.
+
+    It is infinite for a law that sticks rigidly, and 0 for a law that creeps.
+    """
     if law_has_trait(friction.law, "creeps"):
         return 0.0
     if law_has_trait(friction.law, "bonds"):
         return friction.static * load / friction.bond_length
     if law_has_trait(friction.law, "averaged"):
         return inf
-    one = law_from(friction, load).element(load)
-    return one.limit / one.length if one.length else inf
+    element = law_from(friction, load).element(load)
+    return element.limit / element.length if element.length else inf
 
 
-def loop_from(friction, load: float, slide: float) -> tuple | None:
-    """(force at the turns [N], area [J]) of the steady loop of a law under a load [N] at an amplitude of its slide [m],
-    of laws that know it in closed form, else None."""
-    known = getattr(import_module(LAWS[friction.law].module), "loop_from_keys", None)
-    return None if known is None else known(friction, load, slide)
+def loop_from(friction, load: float, amplitude: float) -> tuple | None:
+    """Return the steady loop of a law in closed form, None if the law has no closed form.
+
+    Parameters
+    ----------
+    friction : table
+        Keys in SI units.
+    load, amplitude : float
+        Load [N], amplitude of the relative displacement [m].
+
+    Returns
+    -------
+    peak, area : float
+        Force at the reversals [N] and area of the loop [J].
+    """
+    loop_from_keys = getattr(import_module(LAWS[friction.law].module), "loop_from_keys", None)
+    return None if loop_from_keys is None else loop_from_keys(friction, load, amplitude)

@@ -1,25 +1,35 @@
-"""Jumps over many cycles of wear: each as long as the tolerance allows, or as many as are asked for."""
+"""Jumps over many cycles of wear: each as long as the tolerance allows, or a given number of equal ones."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .depth import jump, rates
+from .depth import solve_jump, wear_rates
 
-GROW, SHRINK, SAFETY = 4.0, 0.2, 0.9  # of a jump against the one before it
-FIRST = 1e-3  # share of all cycles in the first automatic jump
-LEAST = 1e-9  # share of all cycles that a jump may fall to
-ORDER = 2
+MAX_GROWTH = 4.0  # largest ratio of a jump to the jump before it
+MIN_REDUCTION = 0.2  # smallest ratio of a repeated jump to the rejected one
+SAFETY = 0.9  # factor on the length that would just meet the tolerance
+FIRST_JUMP = 1e-3  # length of the first automatic jump as a fraction of all cycles
+MIN_JUMP = 1e-9  # smallest length of a jump as a fraction of all cycles
+ORDER = 2  # order of `depth.solve_jump`
+RICHARDSON = 2**ORDER - 1  # divisor of the difference between one jump and two halves of it
+MIN_ERROR = 1e-9  # error over tolerance below which a jump grows no further
+MIN_DEPTH = 1e-300  # depth [m] that keeps quotients finite before anything is worn
+SHAKEDOWN_DEPTH = 1e-3  # wear of a jump over the whole depth below which the change of the path is compared with the depth
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Wearing:
-    """The question of a wear run: how the pieces press and slide, and what they lose.
+class WearProblem:
+    """How the pieces press and slide, and what they lose.
 
-    press(worn, softening) -> contact forces (m,) [N], as `depth.jump` wants it; path(worn) -> slip path (m,) [m] of
-    one cycle, the same array object as long as wear does not change it; area (m,) [m2]; coefficient [m2/N]; cycles:
-    all of them. Of a patch in strips all (m,) are (s, m).
+    - press: `press(worn, softening)`, as `depth.solve_jump` takes it
+    - path: `path(worn)` returns the slip path (m,) [m] of one cycle; the same array object while wear does not change it
+    - area: areas (m,) [m2] of the nodes
+    - coefficient: wear coefficient [m2/N]
+    - cycles: number of all cycles
+
+    In a patch that is divided into strips all (m,) are (s, m).
     """
 
     press: Callable
@@ -30,13 +40,17 @@ class Wearing:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Worn:
-    """The state of a wear run after `cycle` cycles.
+class WearState:
+    """State of a wear run.
 
-    depth (m,) [m] and force (m,) [N] then; path (m,) [m]: slip path of the next cycle; trend (m,): change of the path
-    per cycle over the last jump; length [cycles]: of the next automatic jump; rough (m,) [m]: the depth by the same
-    jumps undivided; strayed [m]: sum of what the slip path's change within the jumps may have cost; used (m,) [m]:
-    slip path that the last jump took.
+    - cycle: number of cycles since the start
+    - depth, force: worn depth (m,) [m] and contact forces (m,) [N]
+    - path: slip path (m,) [m] of the next cycle
+    - trend: change (m,) [m] of the slip path per cycle over the last jump
+    - length: length of the next automatic jump in cycles
+    - rough: worn depth (m,) [m] by the same jumps without halving
+    - strayed: sum [m] of the errors from the change of the slip path within the jumps
+    - used: slip path (m,) [m] that the last jump took
     """
 
     cycle: float
@@ -51,112 +65,156 @@ class Worn:
 
     @property
     def error(self) -> float:
-        """Error [m] of the depth by the length of the jumps: what halving them all has changed, and `strayed`."""
+        """Error [m] of the depth from the length of the jumps: the change by halving all of them, and `strayed`."""
         return float(np.abs(self.depth - self.rough).max()) + self.strayed
 
 
-def start(asked: Wearing, depth=None) -> Worn:
-    """The state before any wear but the depth (m,) [m] that was worn before."""
-    zero = np.zeros_like(asked.area)
-    depth = zero if depth is None else depth
-    return Worn(
-        0.0,
-        depth,
-        asked.press(depth, zero),
-        asked.path(depth),
-        zero,
-        FIRST * asked.cycles,
-        depth,
-        0.0,
-        zero,
-    )
+def start_wear(problem: WearProblem, depth=None) -> WearState:
+    """Return the state at the start.
 
+    Parameters
+    ----------
+    problem : WearProblem
+    depth : (m,) array, optional
+        Depth [m] that was worn before.
 
-def after(
-    asked: Wearing, state: Worn, tolerance: float, count: int | None = None, until: float = np.inf
-) -> Worn:
-    """The state one jump later, at most after `until` cycles.
-
-    count: how many equal jumps there are; None: the jump is as long as the tolerance allows. Its error is the
-    difference between one jump and two halves of it, over 3: of the depth against the largest depth, and of the
-    contact forces against the load. Two halves are kept. The slip path is carried forward by its trend to the middle
-    of the jump; where the path at the end differs, the halves are done again with the mean of both ends, and a third of
-    the difference counts as error (Milne's device); as this error is not damped, it is held against the wear of the
-    jump alone.
+    Returns
+    -------
+    WearState
     """
-    end = min(asked.cycles, until)
-    left = end - state.cycle
-    length = min(asked.cycles / count if count else state.length, left)
-    length = left if left - length < 1e-9 * asked.cycles else length
-    while True:
-        found, miss = _halved(
-            asked,
-            state,
-            np.maximum(state.path + 0.5 * length * state.trend, 0.0),
-            length,
-            tolerance,
-        )
-        if count or miss <= 1 or length <= LEAST * asked.cycles:
-            found, miss = _corrected(asked, state, found, miss, length, tolerance)
-            if count or miss <= 1 or length <= LEAST * asked.cycles:
-                break
-        length *= max(SHRINK, SAFETY * miss ** (-1 / (ORDER + 1)))
-    grown = length * min(GROW, SAFETY * max(miss, 1e-9) ** (-1 / (ORDER + 1)))
-    return replace(found, cycle=end if length == left else found.cycle, length=grown)
-
-
-def _corrected(
-    asked: Wearing, state: Worn, found: Worn, miss: float, length: float, tolerance: float
-) -> tuple:
-    """(state, error over what the tolerance allows) with the slip path at the end of a jump taken into account."""
-    path = asked.path(found.depth)
-    if path is state.path:
-        return found, miss
-    again, miss = _halved(asked, state, (state.path + path) / 2, length, tolerance)
-    # path f: the mean of both ends misses h^3/12 f'', the trend of a jump of length k before it (h/6 + k/4) h^2 f'' the
-    # other way; so 1/(3 + 3 k/h) of their difference is the error, 1/3 of it never less
-    shift = float(np.abs(again.depth - found.depth).max()) / 3
-    # little is worn in shakedown
-    worn = max(float((again.depth - state.depth).max()), 1e-3 * float(again.depth.max()))
-    here = shift / max(tolerance * worn, 1e-300)
-    return replace(
-        again, path=path, trend=(path - state.path) / length, strayed=state.strayed + shift
-    ), max(miss, here)
-
-
-def _halved(asked: Wearing, state: Worn, path, length: float, tolerance: float) -> tuple:
-    """(state after a jump in two halves along a given slip path, its error over what the tolerance allows)."""
-    rate = rates(asked.coefficient, path, asked.area)
-    once, least = jump(asked.press, state.depth, rate, length)
-    half, _ = jump(asked.press, state.depth, rate, length / 2)
-    depth, force = jump(asked.press, half, rate, length / 2)
-    rough, _ = (
-        jump(asked.press, state.rough, rate, length)
-        if state.rough is not state.depth
-        else (once, least)
+    zero = np.zeros_like(problem.area)
+    depth = zero if depth is None else depth
+    return WearState(
+        cycle=0.0,
+        depth=depth,
+        force=problem.press(depth, zero),
+        path=problem.path(depth),
+        trend=zero,
+        length=FIRST_JUMP * problem.cycles,
+        rough=depth,
+        strayed=0.0,
+        used=zero,
     )
-    found = replace(
+
+
+def take_jump(
+    problem: WearProblem,
+    state: WearState,
+    tolerance: float,
+    count: int | None = None,
+    until: float = np.inf,
+) -> WearState:
+    """Return the state after the next jump.
+
+    The error of a jump is the difference between one jump and two halves of it, over 3: that of the depth relative to
+    the largest depth, and that of the contact forces relative to the load. The two halves are kept. The slip path is
+    extrapolated by its trend to the middle of the jump. Where the path at the end differs, the halves are solved again
+    with the mean of both ends, and a third of the difference counts as error (Milne's device); since this error is not
+    damped, it is compared with the wear of the jump alone.
+
+    Parameters
+    ----------
+    problem : WearProblem
+    state : WearState
+    tolerance : float
+        Relative tolerance of depth and forces.
+    count : int, optional
+        Number of equal jumps over all cycles; by default a jump is as long as the tolerance allows.
+    until : float
+        Cycle beyond which the jump does not go.
+
+    Returns
+    -------
+    WearState
+    """
+    end = min(problem.cycles, until)
+    remaining = end - state.cycle
+    length = min(problem.cycles / count if count else state.length, remaining)
+    if remaining - length < 1e-9 * problem.cycles:
+        length = remaining
+    while True:
+        path = np.maximum(state.path + 0.5 * length * state.trend, 0.0)
+        after, error = _take_halves(problem, state, path, length, tolerance)
+        is_forced = count or length <= MIN_JUMP * problem.cycles
+        if is_forced or error <= 1:
+            after, error = _correct_path(problem, state, after, error, length, tolerance)
+            if is_forced or error <= 1:
+                break
+        length *= max(MIN_REDUCTION, SAFETY * error ** (-1 / (ORDER + 1)))
+    growth = min(MAX_GROWTH, SAFETY * max(error, MIN_ERROR) ** (-1 / (ORDER + 1)))
+    cycle = end if length == remaining else after.cycle
+    return replace(after, cycle=cycle, length=length * growth)
+
+
+def _correct_path(
+    problem: WearProblem,
+    state: WearState,
+    after: WearState,
+    error: float,
+    length: float,
+    tolerance: float,
+) -> tuple:
+    """Repeat a jump with the slip path at its end taken into account; return the state and its error over tolerance."""
+    path = problem.path(after.depth)
+    if path is state.path:
+        return after, error
+    again, error = _take_halves(problem, state, (state.path + path) / 2, length, tolerance)
+    # With h the length of this jump, k of the one before and f the path: the mean of both ends misses h^3/12 f'', and
+    # the trend misses (h/6 + k/4) h^2 f'' with the other sign. So the error is 1/(3 + 3 k/h) of their difference, and
+    # never more than a third of it.
+    path_error = float(np.abs(again.depth - after.depth).max()) / 3
+    worn = float((again.depth - state.depth).max())
+    scale = max(worn, SHAKEDOWN_DEPTH * float(again.depth.max()))
+    corrected = replace(
+        again,
+        path=path,
+        trend=(path - state.path) / length,
+        strayed=state.strayed + path_error,
+    )
+    return corrected, max(error, path_error / max(tolerance * scale, MIN_DEPTH))
+
+
+def _take_halves(
+    problem: WearProblem, state: WearState, path, length: float, tolerance: float
+) -> tuple:
+    """Take a jump in two halves along a given slip path; return the state and its error over tolerance."""
+    rate = wear_rates(problem.coefficient, path, problem.area)
+    whole, whole_force = solve_jump(problem.press, state.depth, rate, length)
+    half, _ = solve_jump(problem.press, state.depth, rate, length / 2)
+    depth, force = solve_jump(problem.press, half, rate, length / 2)
+    rough = whole
+    if state.rough is not state.depth:
+        rough, _ = solve_jump(problem.press, state.rough, rate, length)
+    after = replace(
         state, cycle=state.cycle + length, depth=depth, force=force, rough=rough, used=path
     )
-    scale, load = 2**ORDER - 1, float(force.sum())
-    miss = float(np.abs(depth - once).max()) / scale / _allowed(found, tolerance)
-    return found, max(
-        miss, float(np.abs(force - least).sum()) / scale / (tolerance * load) if load > 0 else 0.0
-    )
+    depth_limit = tolerance * max(float(depth.max()), MIN_DEPTH)
+    depth_error = float(np.abs(depth - whole).max()) / RICHARDSON / depth_limit
+    load = float(force.sum())
+    if load <= 0:
+        return after, max(depth_error, 0.0)
+    force_error = float(np.abs(force - whole_force).sum()) / RICHARDSON / (tolerance * load)
+    return after, max(depth_error, force_error)
 
 
-def _allowed(found: Worn, tolerance: float) -> float:
-    return tolerance * max(float(found.depth.max()), 1e-300)
+def replay_jumps(press: Callable, area, coefficient: float, legs, depth) -> np.ndarray:
+    """Return the worn depth on other nodes by the jumps of an earlier run.
 
+    Parameters
+    ----------
+    press, area, coefficient : callable, (m,) array, float
+        As in `WearProblem`.
+    legs : sequence of (float, (m,) array)
+        Cycles, and slip path [m] on these nodes, of every jump.
+    depth : (m,) array
+        Depth [m] that was worn before.
 
-def replayed(press: Callable, area, coefficient: float, legs, depth) -> np.ndarray:
-    """Worn depth (m,) [m] on other nodes by the jumps of an earlier run.
-
-    press and area (m,) [m2] as in `Wearing`; legs: (cycles, slip path (m,) [m] on these nodes) of every jump; depth
-    (m,) [m]: worn before.
+    Returns
+    -------
+    (m,) array
     """
     for cycles, path in legs:
-        rate = rates(coefficient, path, area)
+        rate = wear_rates(coefficient, path, area)
         for _ in range(2):
-            depth, _ = jump(press, depth, rate, cycles / 2)
+            depth, _ = solve_jump(press, depth, rate, cycles / 2)
     return depth

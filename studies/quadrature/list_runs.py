@@ -7,6 +7,7 @@ import numpy as np
 
 from patchfem.dynamics.march.models import list_model, load_kernels
 from patchfem.friction.bonds.list_numbers import cutoff, status_of
+from patchfem.friction.bonds.list_rows_kernels import N_ROWS, STATUS
 from patchfem.friction.bonds.parameters import Bonds
 
 ROOM = 200_000  # strips of a list that keeps every bond
@@ -27,7 +28,7 @@ def along(law, path, dt, tail, merge, repeats=1) -> tuple:
     """(forces at the samples, microseconds per step, longest list) of one engine."""
     model = list_model(law, 1.0, cutoff(law.order, tail) if tail else np.inf, merge)
     if not merge:
-        model.fields.update(bondlist=np.zeros((10, ROOM)), status=status_of(ROOM))
+        model.fields.update(bondlist=np.zeros((N_ROWS, ROOM)), status=status_of(ROOM))
     loops, best = load_kernels(), np.inf
     for _ in range(repeats):
         contact = model.build()
@@ -36,4 +37,4 @@ def along(law, path, dt, tail, merge, repeats=1) -> tuple:
         bad = loops.follow_path(path, dt, model.kind, contact, 1e-11, energies, forces)
         best = min(best, process_time() - begin)
         assert bad == 0
-    return forces[:, 0], 1e6 * best / (path.size - 1), int(contact.status[10])
+    return forces[:, 0], 1e6 * best / (path.size - 1), int(contact.status[STATUS.max_strips])

@@ -24,7 +24,7 @@ from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve
 from patchfem.scene.scene import loads
 from patchfem.slip.shear_modes import jenkins_set
-from patchfem.wear.jumps import Wearing, after
+from patchfem.wear.jumps import WearProblem, take_jump
 from patchfem.wear.jumps import start as unworn
 
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
@@ -222,11 +222,11 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
         slips = (limit > 0) & (shear > limit * (1 - 1e-9))
         return np.where(slips, 4 * np.abs(slide - pair.tangential @ shear), 0.0)
 
-    asked = Wearing(press, path, area, 1e-13, 1e9)
+    asked = WearProblem(press, path, area, 1e-13, 1e9)
     state, count = unworn(asked), 0
     at_first = state.path @ state.force
     while state.cycle < asked.cycles:
-        state, count = after(asked, state, 1e-2), count + 1
+        state, count = take_jump(asked, state, 1e-2), count + 1
     inside = np.abs(x) < stick
     assert count < 60
     assert (state.path[inside] == 0).all() and not state.depth[inside].any()

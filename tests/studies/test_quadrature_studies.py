@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from patchfem.friction.bonds.engines import MERGING
+from patchfem.friction.bonds.engines import MERGE_ERROR_GROWING
 
 
 def study(name: str):
@@ -25,7 +25,7 @@ def check(rows):
         if row.engine == "truncated":
             assert row.error <= row.value
         if row.engine == "merged":
-            assert row.error <= MERGING[1] * row.value**2 + 1e-6
+            assert row.error <= MERGE_ERROR_GROWING * row.value**2 + 1e-6
             assert row.strips <= 8 / row.value + 300
 
 

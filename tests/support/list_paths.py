@@ -8,7 +8,8 @@ from scipy.special import gamma
 
 from patchfem.dynamics.interfaces.arrays import BondList
 from patchfem.friction.bonds import list_kernels
-from patchfem.friction.bonds.list_numbers import law_numbers, share_table, status_of
+from patchfem.friction.bonds.list_numbers import gamma_table, law_numbers, now_of, status_of
+from patchfem.friction.bonds.list_rows_kernels import N_ROWS, STATUS
 from patchfem.friction.bonds.quadrature import cutoff
 from patchfem.friction.laws.stretch import growth_numbers
 
@@ -30,14 +31,14 @@ class Listed(NamedTuple):
 def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
     """A list before any slide, as the functions of `list_kernels` take it."""
     numbers = law_numbers(law, cutoff(law.order, tail) if tail else np.inf, merge)
-    now = np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0])
+    now = now_of(law)
     return BondList(
         np.ones(1),
-        np.zeros((10, capacity)),
+        np.zeros((N_ROWS, capacity)),
         now,
         status_of(capacity),
         numbers,
-        share_table(law),
+        gamma_table(law),
         growth_numbers(law),
         np.zeros(2),
         np.ones(1),
@@ -53,7 +54,7 @@ def follow_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
         mean = list_kernels.list_mean(dq, held, v, dt)
         ahead = list_kernels.list_force(dq, held, v, dt)
         assert list_kernels.list_step(dq, held, v, v, dt)
-        rows.append((mean, status[5], ahead, status[4]))
+        rows.append((mean, status[STATUS.force], ahead, status[STATUS.energy]))
     return Listed(*np.array(rows).T, status)
 
 

@@ -11,8 +11,8 @@ from wear_forms import even_wear_pressure, worn_crown_half_width, worn_pad_fract
 from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact.unilateral import solve_forces
 from patchfem.elasticity.elasticity import assemble, interface_compliance
-from patchfem.wear.depth import jump, rates
-from patchfem.wear.jumps import Wearing, after, start
+from patchfem.wear.depth import solve_jump, wear_rates
+from patchfem.wear.jumps import WearProblem, start_wear, take_jump
 
 LOAD, KAPPA, PATH = 116.0, 1e-14, 40e-6
 
@@ -53,7 +53,7 @@ def flat():
     """Flat bare blocks: (press, compliance, area, rate of even slip, critical jump)."""
     pair = bare_pair(32)
     area, c = pair.interface.weight, np.array(pair.normal)
-    rate = rates(KAPPA, np.full(area.size, PATH), area)
+    rate = wear_rates(KAPPA, np.full(area.size, PATH), area)
     return (
         pressing(c, pair.interface.x, np.zeros(area.size)),
         c,
@@ -65,9 +65,9 @@ def flat():
 
 def evolved(asked, tolerance=1e-3, count=None):
     """(last state, number of jumps) of a whole wear run."""
-    state, jumps = start(asked), 0
+    state, jumps = start_wear(asked), 0
     while state.cycle < asked.cycles:
-        state, jumps = after(asked, state, tolerance, count), jumps + 1
+        state, jumps = take_jump(asked, state, tolerance, count), jumps + 1
     return state, jumps
 
 
@@ -77,7 +77,7 @@ def test_exact_volume_and_no_checkerboard_at_any_jump(multiple):
     depth = np.zeros(area.size)
     before = np.diff(press(depth, depth) / area, 2)
     for count in range(1, 11):
-        depth, force = jump(press, depth, rate, multiple * critical)
+        depth, force = solve_jump(press, depth, rate, multiple * critical)
         volume = worn_volume(KAPPA, LOAD, PATH * multiple * critical * count)
         assert depth @ area == pytest.approx(volume, rel=1e-12)
         assert np.abs(np.diff(force / area, 2)).max() <= 2 * np.abs(before).max()
@@ -105,7 +105,7 @@ def test_order_two_against_the_exact_transient_of_a_punch():
     for count in (8, 16, 32):
         depth = zero
         for _ in range(count):
-            depth, force = jump(press, depth, rate, cycles / count)
+            depth, force = solve_jump(press, depth, rate, cycles / count)
         errors.append(np.abs(force - exact).max() / exact.max())
     assert errors[-1] < 2e-5
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2, abs=0.1)
@@ -116,10 +116,10 @@ def test_order_a_jump_grows_as_its_true_error_allows():
     press, c, area, rate, critical = flat()
     tolerance = 1e-7
     path = np.full(area.size, PATH)
-    asked = Wearing(press, lambda worn: path, area, KAPPA, 100 * critical)
-    before = after(asked, start(asked), tolerance)
+    asked = WearProblem(press, lambda worn: path, area, KAPPA, 100 * critical)
+    before = take_jump(asked, start_wear(asked), tolerance)
     for _ in range(5):
-        state = after(asked, before, tolerance)
+        state = take_jump(asked, before, tolerance)
         length = state.cycle - before.cycle
         exact = before.depth + punch_transient(before.force, c, rate, length)[0]
         error = np.abs(state.depth - exact).max() / state.depth.max()
@@ -132,9 +132,13 @@ def test_exact_pressure_times_path_is_even_under_uneven_slip():
     pair = bare_pair(32)
     x, area, width = pair.interface.x, pair.interface.weight, pair.interface.width
     path = PATH * (1.5 + x / x[-1])
-    press, rate, depth = pressing(np.array(pair.normal), x, 0 * x), rates(KAPPA, path, area), 0 * x
+    press, rate, depth = (
+        pressing(np.array(pair.normal), x, 0 * x),
+        wear_rates(KAPPA, path, area),
+        0 * x,
+    )
     for _ in range(60):
-        depth, force = jump(press, depth, rate, 1e7)
+        depth, force = solve_jump(press, depth, rate, 1e7)
     assert force / area == pytest.approx(
         even_wear_pressure(LOAD / width, path, area / width), rel=1e-11
     )
@@ -146,9 +150,9 @@ def test_exact_tilted_pad_on_springs():
     x = (np.arange(count) + 0.5) / count * length - length / 2
     area = np.full(count, length / count * width)
     press = pressing(np.diag(1 / (stiffness * area)), x, angle * x)
-    rate, depth, cycles = rates(KAPPA, np.full(count, PATH), area), np.zeros(count), 0.0
+    rate, depth, cycles = wear_rates(KAPPA, np.full(count, PATH), area), np.zeros(count), 0.0
     for step in (2e5, 4e5, 8e5, 1e6):
-        depth, force = jump(press, depth, rate, step)
+        depth, force = solve_jump(press, depth, rate, step)
         cycles += step
         exact = worn_pad_fraction(KAPPA, LOAD / width, PATH * cycles, angle, length, stiffness)
         assert np.mean(force > 0) == pytest.approx(exact, abs=1.0 / count)
@@ -160,7 +164,7 @@ def crowned(cells=100, radius=0.05):
     pair = coated_pair(cells)
     x, area = pair.interface.x, pair.interface.weight
     even = np.full(x.size, PATH)
-    return Wearing(
+    return WearProblem(
         pressing(np.array(pair.normal), x, x**2 / 2 / radius),
         lambda worn: even,
         area,
@@ -198,7 +202,7 @@ def test_exact_worn_hertz_contact_at_two_paths():
     for alone, wide, peak in ((2.207, 2.315, 1.060), (3.891, 3.959, 1.023)):
         path = (alone * half) ** 3 / (1.5 * radius * line)
         assert worn_crown_half_width(1.0, line, path, radius) == pytest.approx(alone * half)
-        state, _ = evolved(Wearing(press, lambda worn: even, area, 1.0, path), 3e-3)
+        state, _ = evolved(WearProblem(press, lambda worn: even, area, 1.0, path), 3e-3)
         # an edge lies somewhere in the cell behind its last node
         found = np.ptp(x[state.force > 0]) / 2 + half / 20
         assert found / half == pytest.approx(wide, abs=0.05)
@@ -207,5 +211,5 @@ def test_exact_worn_hertz_contact_at_two_paths():
 
 def test_exact_wear_coefficient_zero_changes_nothing():
     asked = crowned(40)
-    still, _ = evolved(Wearing(asked.press, asked.path, asked.area, 0.0, 1000.0))
+    still, _ = evolved(WearProblem(asked.press, asked.path, asked.area, 0.0, 1000.0))
     assert not still.depth.any() and still.error == 0.0

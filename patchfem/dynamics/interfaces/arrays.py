@@ -112,8 +112,8 @@ class Climbing(namedtuple("Climbing", ("flank", "now_at", "share", *Rub._fields)
 
 
 class BondList(NamedTuple):
-    """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (10, capacity), now (6,), status (16,),
-    law (24,), table (k,) as in friction.bonds.list_kernels; growth (6,) of eq. 2.10; last (2,) slide increments [m];
+    """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (9, capacity), now (6,), status (16,),
+    law (24,), table (k,) as in friction.bonds.list_rows_kernels; growth (6,) of eq. 2.10; last (2,) slide increments [m];
     bound (1,): largest force [N]."""
 
     force: np.ndarray
@@ -148,7 +148,7 @@ class ShearedLists(
 ):
     """Points (m,) behind shear modes of which each is a list of bonds, `shear_list_kernels`.
 
-    bondlist (10, m capacity): the lists beside each other; nows (m, 6), statuses (m, 16): of each, and now, status of the
+    bondlist (9, m capacity): the lists beside each other; nows (m, 6), statuses (m, 16): of each, and now, status of the
     one that is looked at; law, table: as of `BondList`; time (1,): length of the step [s]; the rest is as of `Sheared`,
     weight (m,) the friction limits [N] and the first four rows of points as `shear_lists_kernels` has them. pressed
     (2, m): nodal forces at both ends of the step [N], over those of the limits in the row LOAD of points, (2, 0) where

@@ -6,8 +6,9 @@ The functions are those that `march.loop_kernels` asks of every contact.
 import numpy as np
 
 from ...compiled.jit import njit
+from ...friction.bonds.list_forms_kernels import MOMENTS, POWER
 from ...friction.bonds.list_kernels import list_force, list_mean, list_slope, list_step
-from ...friction.bonds.list_sum_kernels import MOMENTS, POWER
+from ...friction.bonds.list_rows_kernels import LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..modal_kernels import narrowed
 
@@ -19,9 +20,10 @@ OWED = 1e-4  # bond lengths at the friction limit: the most that a list of stret
 def answer(dq, c, v0, dt):
     """(path-mean weight [1], its slope over dq [1/m]) of a list over dq [m]; the slope of a law other than that of
     MOMENTS is that of a mean whose force depends on the slide alone, and may be below 0."""
-    if c.law[1] == MOMENTS:
-        return list_slope(dq, c, v0, dt)
-    mean, short = list_mean(dq, c, v0, dt), SHORT * c.law[2]
+    if c.law[LAW.form] == MOMENTS:
+        mean, slope = list_slope(dq, c, v0, dt)
+        return mean, slope
+    mean, short = list_mean(dq, c, v0, dt), SHORT * c.law[LAW.length]
     if abs(dq) > short:
         return mean, (list_force(dq, c, v0, dt) - mean) / dq
     return mean, (list_force(short, c, v0, dt) - list_force(-short, c, v0, dt)) / (4 * short)
@@ -32,7 +34,7 @@ def pulled(dq, c, v0, dt):
     """(path-mean force [N], its slope over dq [N/m]) of a bond list over dq [m]; a slope of 0 stands for an unknown
     one."""
     scale = c.force[0]
-    if c.law[1] == MOMENTS:
+    if c.law[LAW.form] == MOMENTS:
         force, slope = list_slope(dq, c, v0, dt)
         return scale * force, scale * slope
     return scale * list_mean(dq, c, v0, dt), 0.0
@@ -42,7 +44,7 @@ def pulled(dq, c, v0, dt):
 def solve(free, beta, q, v, dt, c, goal):
     """(dq, path-mean force, iterations) of a step with dq = free - beta force, by secants; iterations < 0 when it
     failed."""
-    here, gain = 2 * c.last[0] - c.last[1], 1 + beta * c.force[0] / c.law[2]
+    here, gain = 2 * c.last[0] - c.last[1], 1 + beta * c.force[0] / c.law[LAW.length]
     low, high, last, last_miss = -np.inf, np.inf, here, 0.0
     for count in range(1, 300):
         force = pulled(here, c, v, dt)[0]
@@ -73,32 +75,35 @@ def commit(dq, force, q, v0, v1, dt, c):
     """
     c.last[1] = c.last[0]
     c.last[0] = dq
-    before = c.status[4]
+    before = c.status[STATUS.energy]
     ok = list_step(dq, c, v0, v1, dt)
     return booked(force * dq, before, c.force[0], c), ok
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def booked(work, before, limit, c):
-    """Book a step of the list c: its work [J] that is not stored; before: `counters[4]` before it, limit: mu_s N [N]."""
-    net = work - limit * (c.status[4] - before)
-    if c.law[1] <= POWER and limit > 0:
-        owed = c.status[11] - net / limit
-        c.status[11] = min(max(owed, 0.0), OWED * c.law[2])
-        net = limit * (c.status[11] - owed)
+    """Add the work [J] of a step that is not stored to the energies of the list c; return it.
+
+    `before` is the energy in its status before the step, `limit` the friction limit mu_s N [N].
+    """
+    net = work - limit * (c.status[STATUS.energy] - before)
+    if c.law[LAW.form] <= POWER and limit > 0:
+        owed = c.status[STATUS.owed] - net / limit
+        c.status[STATUS.owed] = min(max(owed, 0.0), OWED * c.law[LAW.length])
+        net = limit * (c.status[STATUS.owed] - owed)
     if net < 0:
-        c.status[6] -= net
+        c.status[STATUS.created] -= net
     else:
-        c.status[7] += net
+        c.status[STATUS.dissipated] += net
     return net
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) of the list as it stands at the slide q [m]."""
-    force = c.force[0] * c.status[5]
+    force = c.force[0] * c.status[STATUS.force]
     return (
         force,
-        c.force[0] * (c.status[4] - c.status[11]),
-        q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q,
+        c.force[0] * (c.status[STATUS.energy] - c.status[STATUS.owed]),
+        q - force * c.law[LAW.length] / c.force[0] if c.force[0] > 0 else q,
     )

@@ -9,6 +9,7 @@ the holder since the start [m].
 
 from ...compiled.jit import njit
 from ...friction.bonds.list_kernels import list_step
+from ...friction.bonds.list_rows_kernels import CLOCK, LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from . import shear_solve_kernels as solver
 from .list_kernels import booked
@@ -48,11 +49,11 @@ def commit(dq, force, q, v0, v1, dt, c):
     c.flow[SLID] += dq
     for j in range(int(c.count[0])):
         look_at(j, c)
-        xi, energy = points[SLIDE, j], c.status[4]
+        xi, energy = points[SLIDE, j], c.status[STATUS.energy]
         speed = abs(xi) / dt
         fine = list_step(xi, c, speed, speed, dt) and fine
         if changes:
-            c.nows[j, 0] = c.now[0]
+            c.nows[j, CLOCK.displacement] = c.now[CLOCK.displacement]
             if borne(j, c) <= 0.0:
                 lift(c.status)
         booked(points[FORCE, j] * xi, energy, c.weight[j], c)
@@ -67,8 +68,9 @@ def commit(dq, force, q, v0, v1, dt, c):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def lift(status):
     """Break all bonds of a list."""
-    status[0] = status[1] = status[12]
-    status[2] = status[3] = status[4] = status[5] = status[15] = 0.0
+    status[STATUS.head] = status[STATUS.end] = status[STATUS.room_start]
+    status[STATUS.n_spread] = status[STATUS.n_after_merge] = 0.0
+    status[STATUS.energy] = status[STATUS.force] = status[STATUS.initial_pressure] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -78,7 +80,7 @@ def stored(c):
     for k in range(c.b.size):
         energy += 0.5 * c.kappa[k] * c.b[k] ** 2
     for j in range(int(c.count[0])):
-        energy += c.weight[j] * (c.statuses[j, 4] - c.statuses[j, 11])
+        energy += c.weight[j] * (c.statuses[j, STATUS.energy] - c.statuses[j, STATUS.owed])
     return energy
 
 
@@ -90,13 +92,13 @@ def state(c, q, v):
         slip = 0.0
         for j in range(int(c.count[0])):
             here = c.weight[j] * borne(j, c)
-            force += c.weight[j] * c.statuses[j, 5]
-            slip += here * c.nows[j, 0]
+            force += c.weight[j] * c.statuses[j, STATUS.force]
+            slip += here * c.nows[j, CLOCK.displacement]
             total += here
-        return force, stored(c), (slip - c.law[2] * force) / total if total > 0 else q
+        return force, stored(c), (slip - c.law[LAW.length] * force) / total if total > 0 else q
     for k in range(c.b.size):
         slip -= c.drag[MEAN, k + 1] * c.b[k]
     for j in range(int(c.count[0])):
-        force += c.weight[j] * c.statuses[j, 5]
+        force += c.weight[j] * c.statuses[j, STATUS.force]
         total += c.weight[j]
-    return force, stored(c), slip - c.law[2] * force / total if total > 0 else q
+    return force, stored(c), slip - c.law[LAW.length] * force / total if total > 0 else q

@@ -9,6 +9,7 @@ the mean speed of the last one, slide and force of the trial before, nan before 
 import numpy as np
 
 from ...compiled.jit import njit
+from ...friction.bonds.list_rows_kernels import CLOCK, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .list_kernels import answer
 from .shear_points_kernels import FORCE, LOAD, SLIDE, SLOPE
@@ -69,7 +70,7 @@ def varies(c):
 def borne(j, c):
     """Pressure of point j as it stands, after the step where the load changes."""
     if c.pattern.shape[1] > 0:
-        return pressure_at(c.places[j] + c.nows[j, 0], c.pattern)
+        return pressure_at(c.places[j] + c.nows[j, CLOCK.displacement], c.pattern)
     return c.pressed[1, j] / c.points[LOAD, j] if c.pressed.shape[1] > 0 else 1.0
 
 
@@ -82,12 +83,14 @@ def begin(dt, c):
         c.points[TRIED, j] = np.nan
     if c.pattern.shape[1] > 0:
         for j in range(int(c.count[0])):
-            c.statuses[j, 14] = pressure_at(
-                c.places[j] + c.nows[j, 0] + 0.5 * c.points[SLIDE, j], c.pattern
+            c.statuses[j, STATUS.pressure] = pressure_at(
+                c.places[j] + c.nows[j, CLOCK.displacement] + 0.5 * c.points[SLIDE, j], c.pattern
             )
     elif c.pressed.shape[1] > 0:
         for j in range(int(c.count[0])):
-            c.statuses[j, 14] = 0.5 * (c.pressed[0, j] + c.pressed[1, j]) / c.points[LOAD, j]
+            c.statuses[j, STATUS.pressure] = (
+                0.5 * (c.pressed[0, j] + c.pressed[1, j]) / c.points[LOAD, j]
+            )
 
 
 @njit(
@@ -98,7 +101,9 @@ def respond(kind, ending, c):
     points, dt, force = c.points, c.time[0], 0.0
     for j in range(int(c.count[0])):
         xi, status = points[SLIDE, j], c.statuses[j]
-        if status[14] == 0.0 and status[15] == 0.0 and status[0] == status[1]:  # nothing presses
+        is_empty = status[STATUS.head] == status[STATUS.end]
+        is_unpressed = status[STATUS.pressure] == 0.0 and status[STATUS.initial_pressure] == 0.0
+        if is_empty and is_unpressed:
             points[FORCE, j] = points[SLOPE, j] = 0.0
             continue
         look_at(j, c)

@@ -9,9 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Missing
+from ...friction.bonds.list_rows_kernels import N_ROWS, STATUS
 
 MOST_STRIPS = 2_000_000  # entries of a list of bonds, beyond which a run is refused
-ENTRY = 80  # bytes of one
+ENTRY = 8 * N_ROWS  # bytes of one
 CURE = 'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
 
 
@@ -30,7 +31,8 @@ def keep(contact, *others) -> Kept | None:
         return None
     fields = {name: array.copy() for name, array in contact._asdict().items() if name != "bondlist"}
     entries = [
-        contact.bondlist[:, head:end].copy() for head, end in _statuses(contact)[:, :2].astype(int)
+        contact.bondlist[:, head:end].copy()
+        for head, end in _statuses(contact)[:, [STATUS.head, STATUS.end]].astype(int)
     ]
     return Kept(entries, fields, tuple(array.copy() for array in others))
 
@@ -63,8 +65,9 @@ def lengthened(contact, kept: Kept, place: str, *others):
     capacity = min(2 * have, MOST_STRIPS) // len(statuses)
     wider = np.zeros((rows, capacity * len(statuses)))
     for j, (status, entries) in enumerate(zip(statuses, kept.entries)):
-        status[12], status[13] = j * capacity, (j + 1) * capacity
-        status[0], status[1] = j * capacity, j * capacity + entries.shape[1]
+        status[STATUS.room_start] = status[STATUS.head] = j * capacity
+        status[STATUS.room_end] = (j + 1) * capacity
+        status[STATUS.end] = j * capacity + entries.shape[1]
         wider[:, j * capacity : j * capacity + entries.shape[1]] = entries
     return found._replace(bondlist=wider)
 

@@ -11,6 +11,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ...compiled import load
 from ...core import ModalBasis, Outcome, Response, SineDrive
 from ...formatting import format_length
+from ...friction.bonds.list_rows_kernels import STATUS
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import stored_samples_per_cycle
 from ..checkpoint import Samples, slot_of
@@ -849,11 +850,11 @@ class Run:
         }
         if hasattr(self.contact, "status"):
             status = getattr(self.contact, "statuses", self.contact.status[None])
-            created, dissipated, substeps = map(float, status[:, 6:9].sum(axis=0))
+            totals = status.sum(axis=0)
             book |= {
-                "created": created,
-                "dissipated": dissipated,
-                "substeps": substeps,
-                "strips": float(status[:, 10].max()),
+                "created": float(totals[STATUS.created]),
+                "dissipated": float(totals[STATUS.dissipated]),
+                "substeps": float(totals[STATUS.n_extra]),
+                "strips": float(status[:, STATUS.max_strips].max()),
             }
         return book

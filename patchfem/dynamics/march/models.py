@@ -8,6 +8,7 @@ import numpy as np
 
 from ...compiled import load
 from ...friction.bonds import list_numbers as numbers
+from ...friction.bonds.list_rows_kernels import CLOCK, N_ROWS, STATUS
 from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import bonds_of, growth_numbers, points_element
@@ -98,12 +99,18 @@ class ContactModel:
             # as if all bonds of a point were stretched alike
             load, share = (
                 contact.points[4],
-                contact.statuses[:, 5],
+                contact.statuses[:, STATUS.force],
             )
             here = load * pressures_of(contact)
             return {
                 "bonds": np.stack(
-                    [here, self.length * load * share, share, contact.nows[:, 0], 0 * share]
+                    [
+                        here,
+                        self.length * load * share,
+                        share,
+                        contact.nows[:, CLOCK.displacement],
+                        0 * share,
+                    ]
                 ),
                 "b": contact.b.copy(),
             }
@@ -200,18 +207,18 @@ def lists_model(
     )
     capacity = min(
         numbers.capacity(law, reach, merge),
-        MOST_AT_FIRST + numbers.STRIP * int(min(reach, numbers.NOTHING_LEFT)),
+        MOST_AT_FIRST + numbers.STRIPS_PER_LENGTH * int(min(reach, numbers.MAX_DAMAGE)),
     )
     fields = arrays.sheared(limit, law.length, growth_numbers(law), shape, stiffness)
     fields["points"][4], fields["drag"][2, 1:] = sigma, shape.T @ limit / limit.sum()
     fields |= {
-        "bondlist": np.zeros((10, limit.size * capacity)),
+        "bondlist": np.zeros((N_ROWS, limit.size * capacity)),
         "status": numbers.status_of(capacity),
         "time": np.ones(1),
         "statuses": numbers.status_of(capacity, limit.size),
         "now": numbers.now_of(law),
         "nows": np.tile(numbers.now_of(law), (limit.size, 1)),
-        "table": numbers.share_table(law),
+        "table": numbers.gamma_table(law),
         "law": numbers.law_numbers(law, reach, merge, WIDE),
         "pressed": np.zeros((2, 0)),
         "pattern": np.zeros((2, 0)),
@@ -220,7 +227,8 @@ def lists_model(
     if under is not None:
         at_first = under.pop("at first")
         fields |= under
-        fields["statuses"][:, 14:] = at_first[:, None]
+        fields["statuses"][:, STATUS.pressure] = at_first
+        fields["statuses"][:, STATUS.initial_pressure] = at_first
         limit = limit * at_first
     return ContactModel(
         f"{HERE}.shear_list_kernels",
@@ -254,7 +262,9 @@ def pressures_of(contact) -> np.ndarray:
     """Pressures (m,) of the points of a `ShearedLists` as they stand, over those of their limits."""
     if contact.pattern.size:
         x, pressure = contact.pattern
-        return np.interp(contact.places + contact.nows[:, 0], x, pressure, left=0.0, right=0.0)
+        return np.interp(
+            contact.places + contact.nows[:, CLOCK.displacement], x, pressure, left=0.0, right=0.0
+        )
     return (
         contact.pressed[1] / contact.points[4]
         if contact.pressed.size
@@ -270,11 +280,11 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
     capacity = numbers.capacity(law, reach, merge)
     fields = {
         "force": [limit],
-        "bondlist": np.zeros((10, capacity)),
+        "bondlist": np.zeros((N_ROWS, capacity)),
         "now": numbers.now_of(law),
         "status": numbers.status_of(capacity),
         "law": numbers.law_numbers(law, reach, merge),
-        "table": numbers.share_table(law),
+        "table": numbers.gamma_table(law),
         "growth": growth_numbers(law),
         "last": np.zeros(2),
         "bound": [(1 + law.initial) * limit],

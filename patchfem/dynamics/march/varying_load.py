@@ -14,6 +14,7 @@ from ...compiled import load as compiled
 from ...contact.contact_sets import ContactSets, sides
 from ...core import ModalBasis, PatchfemError, Response
 from ...effects import not_supported_message
+from ...friction.bonds.list_rows_kernels import STATUS
 from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.stretch import growth_numbers
 from ...friction.laws.tanh import Rate
@@ -382,7 +383,10 @@ class VaryingLoadRun(Run):
         found = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
         c = self.contact
         if self.model.law.kind == LISTS:  # as if all bonds of a point were stretched alike
-            force, law = self.model.law.static * c.points[4] * c.statuses[:, 5], self.model.law
+            force, law = (
+                self.model.law.static * c.points[4] * c.statuses[:, STATUS.force],
+                self.model.law,
+            )
             found = {
                 "b": c.b.copy(),
                 "memory": np.stack([nodal, law.length / law.static * force, 0 * nodal]),

@@ -1,10 +1,10 @@
-"""The sum over bonds of eq. 2.17 and its engines.
+"""Sum over bonds of eq. 2.17, and its engines.
 
-In: bond parameters, slide and pressure. Out: traction and energies. Read `parameters`, then `recursion`, which is exact
-for stretch with p = 1, then `quadrature`, the plain sum for every order and reading over the `strips` of a path. Both
-are NumPy and serve a line and a plane alike.
+In: bond parameters, relative displacement and pressure. Out: traction and energies. Read `parameters`, then
+`recursion`, which is exact for the stretch reading with p = 1, then `quadrature`, the direct sum for every order and
+reading over the `strips` of a path. These are NumPy, along a line and in a plane alike.
 
-Compiled, along a line: `point_kernels` is the recursion, `list_kernels` the sum as one list of strips. Direct,
-truncated and merged are settings of that list, chosen by error and cost in `engines`: `list_numbers` holds them,
-`list_sum_kernels` its sums, `list_merge_kernels` its merging.
+Compiled, along a line: `point_kernels` has the recursion, `list_kernels` the sum as one list of strips. `engines`
+chooses between them by error and cost. `list_numbers` makes the arrays of a list, whose positions `list_rows_kernels`
+names; `list_sum_kernels` has its sums, `list_merge_kernels` joins its strips.
 """

@@ -1,36 +1,51 @@
-"""Which engine sums eq. 2.17 and with which settings, from the tolerance and the cost.
+"""Choice of the engine that sums eq. 2.17, and of its settings, from the tolerance and the cost.
 
-There are two: the recursion, exact for stretch with p = 1 alone, and the list of strips (`list_kernels`) for every law.
-The list has two settings, the tail that its cut-off may lose and the width up to which it merges strips; `direct`,
-`truncated` and `merged` name which of them are used. What is cheapest depends on the law, the strokes and the steps.
+There are two: the recursion, exact for the stretch reading with p = 1 alone, and the list of strips (`list_kernels`)
+for every law. The list has two settings, the fraction of the friction limit that its cut-off may lose and the width up
+to which it merges strips; `direct`, `truncated` and `merged` say which of them are used. Which one is cheapest depends
+on the law, the strokes and the steps.
 """
 
 from dataclasses import dataclass
 from math import ceil, inf, sqrt
 
 from ... import cost_model
-from .list_numbers import AGED, MOMENTS, POWER, SHARES, cutoff, form_of
+from .list_forms_kernels import MAX_STRIP, MOMENTS, POWER, PRINTED, PRINTED_GROWING
+from .list_numbers import MAX_DAMAGE, cutoff, form_of
 from .parameters import Bonds
 
-# (drops old strips, joins them)
-LISTS = {
+LISTS = {  # settings of a list: whether it drops old strips, whether it merges strips
     "direct": (False, False),
     "truncated": (True, False),
     "merged": (True, True),
 }
 ENGINES = (*LISTS, "recursion")
-# bounds of the error over merge width squared (test_merge_bounds): lengths that stay, stretch
-# with growth, the print with growth, the print of order < 1
-MERGING = (0.25, 1.0, 6.0, 1.0)
-YOUNG = 3e-4  # error of merging growing bonds of order < 0 besides, at any width: of bonds that form at a reversal
-# over the list in a step of the rig: three for each of the two or three trial increments
-PASSES = 9
+# bounds of the error of merging over the square of its width, which test_merge_bounds measures
+MERGE_ERROR_CONSTANT = 0.25  # constant bond length
+MERGE_ERROR_GROWING = 1.0  # stretch reading with growing bonds
+MERGE_ERROR_PRINTED_GROWING = 6.0  # printed law with growing bonds
+MERGE_ERROR_PRINTED_FRACTIONAL = 1.0  # printed law with a constant bond length and an order below 1
+NEGATIVE_ORDER_ERROR = (
+    3e-4  # error of merging growing bonds with p < 0 at any width: bonds that form at a reversal
+)
+PASSES_PER_STEP = (
+    9  # evaluations of the list in a step of a rig: three for each of two or three trial increments
+)
+MAX_TAIL = 1e-6  # largest fraction of the friction limit that the cut-off may lose
+MAX_MERGE_WIDTH = 0.02  # largest width in bond lengths of merged strips
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """An engine and its parameters. tail: what the cut-off may lose, merge: width [eps_0], error: bound of all over the
-    friction limit, strips: expected length of the list, seconds: per step."""
+    """Engine and its settings.
+
+    - engine: name of the engine
+    - tail: fraction of the friction limit that the cut-off may lose
+    - merge: width [eps_0] up to which strips are merged
+    - error: bound of the whole error over the friction limit
+    - strips: expected length of the list
+    - seconds: CPU seconds per step
+    """
 
     engine: str
     tail: float
@@ -40,11 +55,11 @@ class Choice:
     seconds: float
 
     def reach(self, order: float) -> float:
-        """Age [bond lengths] from which bonds of this order are left out; inf where none is."""
+        """Return the age [bond lengths] beyond which bonds of this order are dropped; inf if none are."""
         return cutoff(order, self.tail) if self.tail > 0 else inf
 
-    def said(self) -> str:
-        """One line for a plan: engine, length of the list, cost per step, settings and bound of the error."""
+    def describe(self) -> str:
+        """Return a line for a plan: engine, length of the list, cost per step, settings and bound of the error."""
         if self.engine == "recursion":
             return f"recursion, exact, computing time {1e6 * self.seconds:.2g} us per time step"
         parts = [
@@ -59,7 +74,7 @@ class Choice:
 
 
 def impossible(engine: str, reading: str, order: float) -> str:
-    """Why an engine cannot sum such a law and what can; empty where it can."""
+    """Return why an engine cannot sum a law, and which one can; "" if it can."""
     if engine == "recursion" and (reading != "stretch" or order != 1):
         return 'works only with reading = "stretch" and order = 1; use "auto" or "merged"'
     return ""
@@ -74,64 +89,101 @@ def choose(
     tail: float | None = None,
     merge: float | None = None,
 ) -> Choice:
-    """The cheapest engine whose error bound meets a tenth of the tolerance.
+    """Choose the cheapest engine whose error bound meets a tenth of the tolerance.
 
-    stroke: path between reversals [eps_0]; steps: steps per stroke; engine, tail, merge: pinned unless "auto", None.
-    ValueError for an engine that cannot sum the law.
+    Parameters
+    ----------
+    law : Bonds
+    tolerance : float
+        Relative tolerance of the run.
+    stroke, steps : float
+        Path between two reversals [eps_0], and steps on it.
+    engine : str
+        Engine that must be used, or "auto".
+    tail, merge : float, optional
+        Settings that must be used.
+
+    Returns
+    -------
+    Choice
+
+    Raises
+    ------
+    ValueError
+        If the engine cannot sum the law.
     """
     reason = impossible(engine, law.reading, law.order)
     if reason:
         raise ValueError(f"{engine} {reason}")
     if engine == "recursion" or (engine == "auto" and form_of(law) == MOMENTS):
         return Choice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION_STEP_SECONDS)
-    cut = tail if tail is not None else min(1e-3 * tolerance, 1e-6)
-    width = merge if merge is not None else min(0.02, sqrt(0.09 * tolerance / _merging(law)))
-    found = {
-        name: _priced(law, name, cut * drops, width * joins, stroke, steps)
-        for name, (drops, joins) in LISTS.items()
+    if tail is None:
+        tail = min(1e-3 * tolerance, MAX_TAIL)
+    width = merge
+    if width is None:
+        width = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / _merge_error_factor(law)))
+    choices = {
+        name: _estimate(law, name, tail * drops, width * merges, stroke, steps)
+        for name, (drops, merges) in LISTS.items()
     }
     if engine != "auto":
-        return found[engine]
+        return choices[engine]
     if merge is not None:
-        return found["merged" if merge > 0 else "truncated"]
-    fit = [
-        choice for choice in found.values() if choice.tail > 0 and choice.error <= 0.1 * tolerance
+        return choices["merged" if merge > 0 else "truncated"]
+    accurate = [
+        choice for choice in choices.values() if choice.tail > 0 and choice.error <= 0.1 * tolerance
     ]
-    return min(fit or [found["truncated"]], key=lambda choice: choice.seconds)
+    return min(accurate or [choices["truncated"]], key=lambda choice: choice.seconds)
 
 
-def _merging(law: Bonds) -> float:
-    """Bound of the error of merging over the square of its width."""
+def _merge_error_factor(law: Bonds) -> float:
+    """Return the bound of the error of merging over the square of its width."""
     form = form_of(law)
-    return MERGING[
-        2 if form == AGED else 1 if law.grows else 3 if form == SHARES and law.order < 1 else 0
-    ]
+    if form == PRINTED_GROWING:
+        return MERGE_ERROR_PRINTED_GROWING
+    if law.grows:
+        return MERGE_ERROR_GROWING
+    if form == PRINTED and law.order < 1:
+        return MERGE_ERROR_PRINTED_FRACTIONAL
+    return MERGE_ERROR_CONSTANT
 
 
-def _priced(
+def _estimate(
     law: Bonds, name: str, tail: float, merge: float, stroke: float, steps: float
 ) -> Choice:
-    """The list with these settings, 0 where one is not used."""
-    form, reach = form_of(law), cutoff(law.order, tail) if tail > 0 else 745.0
-    each = stroke / max(steps, 1)
-    pieces = max(1.0, each / 0.25)
-    strips = min(reach, 745.0) / max(each, 1e-12) * pieces
-    if form == SHARES:
+    """Estimate length, cost and error of a list with these settings; a setting of 0 is not used."""
+    increment = stroke / max(steps, 1)
+    strips = _expected_strips(law, tail, merge, stroke, increment)
+    seconds_per_strip = cost_model.STRIP_SECONDS[int(form_of(law))]
+    if form_of(law) in (POWER, PRINTED) and law.order not in (0, 1, 2):
+        seconds_per_strip = cost_model.ANY_ORDER_STRIP_SECONDS
+    panels = 1 if increment <= 1 else 2 + ceil(increment).bit_length()
+    # a long increment takes five Gauss points per panel instead of the two values of Simpson's rule
+    factor = 1 if increment <= 0.1 else 5 / 2 * panels
+    pass_seconds = cost_model.PASS_SECONDS + seconds_per_strip * strips
+    seconds = cost_model.LIST_STEP_SECONDS + PASSES_PER_STEP * pass_seconds * factor
+    error = tail
+    if merge > 0 and form_of(law) != MOMENTS:
+        error += _merge_error_factor(law) * merge**2
+        if form_of(law) == PRINTED_GROWING and law.order < 0:
+            error += NEGATIVE_ORDER_ERROR
+    return Choice(name, tail, merge, error, strips, seconds)
+
+
+def _expected_strips(
+    law: Bonds, tail: float, merge: float, stroke: float, increment: float
+) -> float:
+    """Estimate the number of strips in a list, for strokes and increments in bond lengths."""
+    form = form_of(law)
+    reach = cutoff(law.order, tail) if tail > 0 else MAX_DAMAGE
+    strips = min(reach, MAX_DAMAGE) / max(increment, 1e-12) * max(1.0, increment / MAX_STRIP)
+    if form == PRINTED:
         strips = reach / stroke + 2
-    elif form == AGED:
+    elif form == PRINTED_GROWING:
         strips *= 2
     if merge > 0:
-        strips = min(
-            strips, 5 / merge + 20 + 2 * min(reach / stroke, 50) + (180 if form == AGED else 0)
-        )
-    cost = cost_model.STRIP_SECONDS[int(form)]
-    if form in (POWER, SHARES) and law.order not in (0, 1, 2):
-        cost = cost_model.ANY_ORDER_STRIP_SECONDS
-    panels = 1 if each <= 1 else 2 + ceil(each).bit_length()
-    seconds = cost_model.LIST_STEP_SECONDS + PASSES * (cost_model.PASS_SECONDS + cost * strips) * (
-        1 if each <= 0.1 else 5 / 2 * panels
-    )
-    error = tail
-    if merge > 0 and form != MOMENTS:
-        error += _merging(law) * merge**2 + (YOUNG if form == AGED and law.order < 0 else 0.0)
-    return Choice(name, tail, merge, error, strips, seconds)
+        merged = 5 / merge + 20 + 2 * min(reach / stroke, 50)
+        if form == PRINTED_GROWING:
+            merged += 180
+        strips = min(strips, merged)
+    return strips

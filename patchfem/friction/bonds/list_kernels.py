@@ -1,405 +1,737 @@
-"""The list of bonds, compiled: force along a straight increment, its path mean, and the step that keeps the list.
+"""Compiled list of strips of bonds (eq. 2.17): force after an increment, its path mean, and the committed step.
 
 One list sums eq. 2.17 along a line for every order and reading. Two numbers of `list_numbers.law_numbers` make the
-engines of `accuracy.quadrature` of it: the cut-off that drops old strips (`truncated`) and the width up to which
-`list_merge_kernels` joins neighbours (`merged`); with neither it keeps every bond (`direct`).
+engines of `accuracy.quadrature` of it: the cut-off that drops old strips (`truncated`), and the width up to which
+`list_merge_kernels` joins neighbours (`merged`); without both the list keeps every bond (`direct`).
 
-c: a named tuple with the arrays of a list, such as `dynamics.interfaces.arrays.BondList`: bondlist (10, capacity), the
-rows of `list_sum_kernels`; law (24,) of `list_numbers.law_numbers`; growth (6,) of eq. 2.10; table (k,) of
-`list_numbers.share_table`; now (6,): q, path, damage, growth J, mature length, ref; status (16,): first strip, end,
-spread ones, length after the last merge, stored energy [m], force [1], created and dissipated [m], pieces beyond one
-per step, strips merged although their places differ, largest length, energy owed [m] (`dynamics.interfaces`), first and
-last entry + 1 of its room in the array, which several lists may share, pressure under which bonds form, and that which
-the first bonds formed under, over that of the friction limit.
+`bond_list` is a named tuple with the arrays of a list, such as `dynamics.interfaces.arrays.BondList`: the arrays
+`bondlist` (N_ROWS, capacity), `law` (24,), `now` (6,) and `status` (16,), whose positions `list_rows_kernels` names, the
+`growth` (6,) of eq. 2.10 and the `table` (k,) of `list_numbers.gamma_table`. A force is per friction limit mu_s N, a
+stored energy too. `increment` is a straight increment [m] from the present state, `v0` the velocity [m/s] at its start
+and `dt` its duration [s]; both set the growth of bonds.
 """
 
-from math import ceil, exp, expm1
+from math import exp, expm1
+from typing import NamedTuple
 
 import numpy as np
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
-from .list_math_kernels import fexp, flog, share
-from .list_merge_kernels import merge
-from .list_sum_kernels import (
-    AGED,
-    FIRST,
+from .list_forms_kernels import (
+    GAUSS_1,
+    GAUSS_2,
+    GAUSS_FIVE,
+    MAX_STRIP,
     MOMENTS,
     POWER,
-    SECOND,
-    SHARES,
-    aged_sums,
-    first_bonds,
-    first_mean,
-    formed,
-    moments_of,
-    power_sums,
-    shares_sums,
+    PRINTED,
+    PRINTED_GROWING,
+)
+from .list_math_kernels import fexp, flog, share
+from .list_merge_kernels import merge
+from .list_rows_kernels import (
+    CLOCK,
+    GROWING_ROW,
+    LAW,
+    MOMENT,
+    POWER_ROW,
+    PRINTED_ROW,
+    STATUS,
+    STRIP,
+)
+from .list_sum_kernels import (
+    MIN_LENGTH,
+    BondSum,
+    Mature,
+    Range,
+    average_initial,
+    formed_force,
+    sum_growing,
+    sum_initial,
+    sum_moments,
+    sum_powers,
+    sum_printed,
 )
 from .point_kernels import bond_mean, grow
 
-PIECE = 0.25  # longest strip in bond lengths
-# two Gauss points a strip then sum growing bonds to 1e-6 (test_exact_direct_of_growing_bonds_is_the_sum_by_hand)
-GROWN = 0.5  # most growth J of one strip of growing bonds
-MOST_GROWN = 16  # strips of a step for its growth alone: after a long rest J has no bound
-SLIGHT = 1e-9  # share of the limit that a step's bonds may miss for strips that are too few: the error falls with the
-# fourth power of their number, and once they are grown nothing of it is left
-TOUCH = 1e-6  # of an increment, within which it touches the place of the first bonds
-LEAST_BALANCED = 1e-3  # increment in bond lengths below which a difference of energies is no better than the force
-LEAST_WIDE = 1e-6  # the same behind shear, where a solve does not find a step that ends at a change of the rule
+# two Gauss points per strip then sum growing bonds to 1e-6 (test_exact_direct_of_growing_bonds_is_the_sum_by_hand)
+MAX_GROWTH = 0.5  # largest growth J in a strip of growing bonds
+MAX_GROWTH_STRIPS = (
+    16  # strips of an increment for its growth alone, because J has no bound after a long rest
+)
+# the error falls with the fourth power of the number of strips, and vanishes once the bonds are grown
+GROWTH_TOLERANCE = 1e-9  # fraction of the friction limit that the bonds of an increment may miss
+PLACE_TOLERANCE = (
+    1e-6  # fraction of an increment within which it touches the place of the initial bonds
+)
+MIN_BALANCED = 1e-3  # increment in bond lengths below which a difference of energies has more round-off than the force
+MIN_BALANCED_SPREAD = (
+    1e-6  # the same for spread initial bonds, where a solve needs a force without jumps
+)
+MAX_SIMPSON = 0.1  # increment in bond lengths up to which Simpson's rule is exact enough
+MAX_SIMPSON_FRACTIONAL = 0.03  # the same with an order below 1
+MAX_PANEL = 0.5  # longest first panel of five Gauss points, in bond lengths
+MAX_EXPONENT = 300.0  # exponent of the scaled numbers beyond which they are rescaled; exp(709) is the largest number
+MAX_SERIES = 1e-2  # path in bond lengths up to which the moments of new bonds are power series
+N_STRIPS_OF_MERGE = (
+    12  # strips beyond a fifth of the list by which it grows before it is merged again
+)
+
+
+class Advance(NamedTuple):
+    """Clocks of a list after an increment, and the bond length [m] half way along it."""
+
+    displacement: float
+    path: float
+    damage: float
+    growth: float
+    length: float
+    middle_length: float
+
+
+class Formation(NamedTuple):
+    """Straight increment [m] on which bonds form under a relative pressure; the reference is that of scaled numbers."""
+
+    increment: float
+    before: Advance
+    after: Advance
+    pressure: float
+    reference: float
+
+
+class Pieces(NamedTuple):
+    """Number of strips of equal length that an increment is divided into, and number of those before the cut-off."""
+
+    count: float
+    kept: float
+
+
+class MeanForce(NamedTuple):
+    """Path-mean force [1] of an increment and its derivative over the increment [1/m]."""
+
+    mean: float
+    slope: float
+
+
+class MomentsOfStrip(NamedTuple):
+    """Weight [bond lengths], distance of the centre from the end [bond lengths] and variance [bond lengths squared]."""
+
+    weight: float
+    distance: float
+    variance: float
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _after(dq, now, growth, v0, v1, dt):
-    """(q, path, damage, J, mature length, length half way) after the increment."""
-    eps, more = grow(now[4], v0, v1, abs(dq), dt, growth)
-    middle, _ = grow(now[4], v0, (v0 + v1) / 2, abs(dq) / 2, dt / 2, growth)
-    return now[0] + dq, now[1] + abs(dq), now[2] + abs(dq) / middle, now[3] + more, eps, middle
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def goal_length(before, after, more):
-    """Length that 2.10 tends to in a step that multiplies the distance to it by exp(-more)."""
-    rest = -expm1(-more)
-    return after if rest == 0 else before + (after - before) / rest
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _pieces(size, eps, more, law):
-    """(strips that a step is cut into, strips of it that still count)."""
-    count = max(1.0, size / (PIECE * eps))
-    if law[1] == AGED:
-        share = (size / law[2]) ** (1 + min(law[0], 0.0))
-        count = max(count, min(more / GROWN, MOST_GROWN, (share / SLIGHT) ** 0.25))
-    count = ceil(count)
-    kept = min(count, 1 + ceil(count * (law[6] / (size / eps if law[1] < SHARES else size))))
-    return count, kept
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _young(size, before, after, more, middle, law):
-    """Weight of the growing bonds that form in one increment."""
-    goal = goal_length(before, after, more)
-    count, kept = _pieces(size, middle, more, law)
-    total = 0.0
-    for piece in range(int(kept)):
-        for half in range(2):
-            back = (piece + (FIRST if half == 0 else SECOND)) / count
-            own = max(-goal * expm1(-back * more), 1e-9 * after)
-            x = back * size / own
-            total += fexp(law[0] * flog(x) - x)
-    return total * law[4] * size / (2 * count * law[2])
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def list_state(dq, c, v0, dt):
-    """(force weight [1], energy in the bonds that were there [m]) after the straight increment dq.
-
-    Friction force = mu_s N * weight. Energy: the force of each bond over its own stretch at frozen damage.
-    """
-    q, path, damage, _, _, _ = _after(dq, c.now, c.growth, v0, v0, dt)
-    first, stored = first_bonds(q, path, damage, c.law)
-    force, energy = later_state(dq, c, v0, dt)
-    return c.status[15] * first + force, c.status[15] * stored + energy
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def later_state(dq, c, v0, dt):
-    """`list_state` without the first bonds."""
-    bonds, status, now, law = c.bondlist, c.status, c.now, c.law
-    q, path, damage, age, eps, middle = _after(dq, now, c.growth, v0, v0, dt)
-    head, end, many, p, coarse = (
-        int(status[0]),
-        int(status[1]),
-        int(status[2]),
-        law[0],
-        law[5] * law[2],
+def _advance(increment, clocks, growth, v0, v1, dt):
+    """Return the clocks after an increment at velocities from v0 to v1."""
+    path = abs(increment)
+    before = clocks[CLOCK.length]
+    length, exponent = grow(before, v0, v1, path, dt, growth)
+    middle, _ = grow(before, v0, (v0 + v1) / 2, path / 2, dt / 2, growth)
+    return Advance(
+        clocks[CLOCK.displacement] + increment,
+        clocks[CLOCK.path] + path,
+        clocks[CLOCK.damage] + path / middle,
+        clocks[CLOCK.growth] + exponent,
+        length,
+        middle,
     )
-    size, young, force, energy = abs(dq), 0.0, 0.0, 0.0
-    if law[1] == MOMENTS:
-        _, z, s2 = moments_of(q, exp(now[5] - damage), bonds, head, end)
-        force += z / law[2]
-        energy += s2 / (2 * law[2])
-    elif law[1] == POWER:
-        f, g = power_sums(q, damage, bonds, head, many, end, p, coarse, law[8:24])
-        scale = law[4] / law[2] * exp(now[5] - damage)
-        force += scale * f
-        energy += scale * g / (p + 1)
-    elif law[1] == SHARES:
-        f, g = shares_sums(q, path, bonds, head, many, end, p, law[2], c.table, law[4])
-        force += f
-        energy += g
-    else:
-        f, g = aged_sums(q, path, exp(now[5] - age), eps, bonds, head, many, end, p, coarse)
-        force += law[4] / law[2] * f
-        energy += law[4] / law[2] * g
-    if size > 0:
-        if law[1] == AGED:
-            young = _young(size, now[4], eps, age - now[3], middle, law)
-        else:
-            young = formed(size, middle if law[1] <= POWER else law[2], law)
-    return force + np.copysign(status[14] * young, dq), energy
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def list_force(dq, c, v0, dt):
-    """Weight [1] of the list after the straight increment dq: friction force = mu_s N * weight.
+def target_length(before, after, exponent):
+    """Return the length that eq. 2.10 tends to in a step that multiplies the distance to it by exp(-exponent).
+
+    Parameters
+    ----------
+    before, after, exponent : float
+        Bond lengths [m] at the ends of the step, growth J in it.
+
+    Returns
+    -------
+    float
+    """
+    fraction = -expm1(-exponent)
+    return after if fraction == 0 else before + (after - before) / fraction
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _divide(path, eps, growth, law):
+    """Return the number of strips of an increment, for its path [m] in bond lengths eps [m] and its growth J."""
+    count = max(1.0, path / (MAX_STRIP * eps))
+    if law[LAW.form] == PRINTED_GROWING:
+        limit = (path / law[LAW.length]) ** (1 + min(law[LAW.order], 0.0))
+        needed = (limit / GROWTH_TOLERANCE) ** 0.25
+        count = max(count, min(growth / MAX_GROWTH, MAX_GROWTH_STRIPS, needed))
+    count = np.ceil(count)
+    clock = path / eps if law[LAW.form] < PRINTED else path
+    return Pieces(count, min(count, 1 + np.ceil(count * (law[LAW.cutoff] / clock))))
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _formed_growing_force(path, before, after, law):
+    """Return the force of the growing bonds that form on an increment, from the clocks before and after it."""
+    growth = after.growth - before[CLOCK.growth]
+    target = target_length(before[CLOCK.length], after.length, growth)
+    pieces = _divide(path, after.middle_length, growth, law)
+    total = 0.0
+    for piece in range(int(pieces.kept)):
+        for point in range(2):
+            fraction = (piece + (GAUSS_1 if point == 0 else GAUSS_2)) / pieces.count
+            length = max(-target * expm1(-fraction * growth), MIN_LENGTH * after.length)
+            x = fraction * path / length
+            total += fexp(law[LAW.order] * flog(x) - x)
+    return total * law[LAW.inverse_gamma] * path / (2 * pieces.count * law[LAW.length])
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def sum_list(increment, bond_list, v0, dt):
+    """Return force and stored energy after an increment.
+
+    The energy is that of the bonds that were there: the force of each over its own stretch at frozen damage.
+
+    Parameters
+    ----------
+    increment, bond_list, v0, dt : float, BondList, float, float
+        As in the docstring of the module.
+
+    Returns
+    -------
+    BondSum
+        Force [1] and energy [m] per friction limit.
+    """
+    after = _advance(increment, bond_list.now, bond_list.growth, v0, v0, dt)
+    initial = sum_initial(after.displacement, after.path, after.damage, bond_list.law)
+    formed = _sum_strips(increment, bond_list, v0, dt)
+    pressure = bond_list.status[STATUS.initial_pressure]
+    return BondSum(
+        pressure * initial.force + formed.force, pressure * initial.energy + formed.energy
+    )
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _sum_strips(increment, bond_list, v0, dt):
+    """Return `sum_list` without the initial bonds."""
+    bonds = bond_list.bondlist
+    status = bond_list.status
+    clocks = bond_list.now
+    law = bond_list.law
+    form = law[LAW.form]
+    after = _advance(increment, clocks, bond_list.growth, v0, v0, dt)
+    head = int(status[STATUS.head])
+    strips = Range(head, head + int(status[STATUS.n_spread]), int(status[STATUS.end]))
+    eps0 = law[LAW.length]
+    reference = clocks[CLOCK.reference]
+    force = 0.0
+    energy = 0.0
+    if form == MOMENTS:
+        scale = exp(reference - after.damage)
+        moments = sum_moments(after.displacement, scale, bonds, strips)
+        force += moments.z / eps0
+        energy += moments.s2 / (2 * eps0)
+    elif form == POWER:
+        total = sum_powers(after.displacement, after.damage, bonds, strips, law)
+        factor = law[LAW.inverse_gamma] / eps0 * exp(reference - after.damage)
+        force += factor * total.force
+        energy += factor * total.energy / (law[LAW.order] + 1)
+    elif form == PRINTED:
+        total = sum_printed(after.displacement, after.path, bonds, strips, law, bond_list.table)
+        force += total.force
+        energy += total.energy
+    else:
+        mature = Mature(after.length, exp(reference - after.growth))
+        total = sum_growing(after.displacement, after.path, mature, bonds, strips, law)
+        factor = law[LAW.inverse_gamma] / eps0
+        force += factor * total.force
+        energy += factor * total.energy
+    path = abs(increment)
+    formed = 0.0
+    if path > 0:
+        if form == PRINTED_GROWING:
+            formed = _formed_growing_force(path, clocks, after, law)
+        else:
+            formed = formed_force(path, after.middle_length if form <= POWER else eps0, law)
+    return BondSum(force + np.copysign(status[STATUS.pressure] * formed, increment), energy)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def list_force(increment, bond_list, v0, dt):
+    """Return the force [1] after an increment; the friction force is mu_s N times it.
 
     Twin: `quadrature.Quadrature`.
+
+    Parameters
+    ----------
+    increment, bond_list, v0, dt : float, BondList, float, float
+        As in the docstring of the module.
+
+    Returns
+    -------
+    float
     """
-    return list_state(dq, c, v0, dt)[0]
+    return sum_list(increment, bond_list, v0, dt).force
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def list_energy(dq, c, v0, dt):
-    """Energy [m] of all bonds, those of the increment too, after the straight increment dq in the stretch reading."""
-    middle = _after(dq, c.now, c.growth, v0, v0, dt)[5]
-    young = middle * middle / c.law[2] * share(c.law[0] + 1, abs(dq) / middle)
-    return c.status[14] * young + list_state(dq, c, v0, dt)[1]
+def list_energy(increment, bond_list, v0, dt):
+    """Return the energy [m] of all bonds after an increment, also of those that form on it; stretch reading.
 
+    Parameters
+    ----------
+    increment, bond_list, v0, dt : float, BondList, float, float
+        As in the docstring of the module.
 
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _force(dq, c, v0, dt):
-    """The force that means are taken of: without the first bonds in the print, whose mean is closed."""
-    return later_state(dq, c, v0, dt)[0] if c.law[1] >= SHARES else list_force(dq, c, v0, dt)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _panel(energy, low, high, dq, c, v0, dt):
-    """Integral of the force, or of the energy, over a share of the increment by five Gauss points."""
-    out = 0.0
-    for y, w in (
-        (-0.906179845938664, 0.23692688505618908),
-        (-0.5384693101056831, 0.47862867049936647),
-        (0.0, 0.5688888888888889),
-        (0.5384693101056831, 0.47862867049936647),
-        (0.906179845938664, 0.23692688505618908),
-    ):
-        part = low + (high - low) * (1 + y) / 2
-        if energy:
-            out += w / 2 * list_energy(part * dq, c, v0, part * dt)
-        else:
-            out += w / 2 * _force(part * dq, c, v0, part * dt)
-    return (high - low) * out
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def list_mean(dq, c, v0, dt):
-    """Path-mean weight over the increment.
-
-    Stretch reading of order 1: closed. Of another order: what damage takes, the share dR/eps of the stored energy, and
-    the gain of that energy, so that no step creates any (twin: `quadrature.Quadrature.step`). Printed law: the mean of
-    the force, that of the first bonds closed. Other integrals by Simpson's rule where the increment is short (its first
-    value is known), by five Gauss points up to half a bond length, beyond it by such panels that double. In the stretch
-    reading an increment that touches the place of the first bonds takes Gauss points as well: their force may jump
-    there, and its value at the place itself is that of neither side.
+    Returns
+    -------
+    float
     """
-    status, now, law = c.status, c.now, c.law
-    if dq == 0:
-        return status[5]
-    if law[1] == MOMENTS:
-        return list_slope(dq, c, v0, dt)[0]
-    size = abs(dq) / now[4]
-    low, high = min(now[0], now[0] + dq), max(now[0], now[0] + dq)
-    touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
-    # there no change of the rule either
-    touched = (touched and law[1] < SHARES) or (law[7] > 0 and law[0] < 1)
-    least = LEAST_BALANCED if law[7] == 0 else LEAST_WIDE
-    short = (
-        status[1] > status[0]
-        and size <= (0.1 if law[0] >= 1 else 0.03)
-        and law[0] >= 0
-        and not touched
+    law = bond_list.law
+    eps = _advance(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
+    formed = eps * eps / law[LAW.length] * share(law[LAW.order] + 1, abs(increment) / eps)
+    return (
+        bond_list.status[STATUS.pressure] * formed + sum_list(increment, bond_list, v0, dt).energy
     )
-    # the force of the first bonds turns within the increment
-    kinked = low <= 0.0 <= high and law[3] > 0 and law[0] < 1
-    if law[1] == POWER and (size > least or kinked):
-        gain = list_energy(dq, c, v0, dt) - status[4]
-        middle = _after(dq, now, c.growth, v0, v0, dt)[5]
-        spent = _path_mean(True, short, gain + status[4], dq, c, v0, dt)
-        return (spent * abs(dq) / middle + gain) / dq
-    last = 0.0
-    if short:
-        last = _force(dq, c, v0, dt)
-    mean = _path_mean(False, short, last, dq, c, v0, dt)
-    return mean + status[15] * first_mean(dq, now[0], now[1], law) if law[1] >= SHARES else mean
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _path_mean(energy, short, last, dq, c, v0, dt):
-    """Path mean of the force, or of the energy, over the increment; last: its value at the end of a short one."""
-    if short:
-        if energy:
-            half = list_energy(0.5 * dq, c, v0, 0.5 * dt)
-            return (c.status[4] + 4 * half + last) / 6
-        half, before = _force(0.5 * dq, c, v0, 0.5 * dt), c.status[5]
-        if c.law[1] >= SHARES:
-            before -= c.status[15] * first_bonds(c.now[0], c.now[1], c.now[2], c.law)[0]
-        return (before + 4 * half + last) / 6
-    size = abs(dq) / c.now[4]
-    if size <= 0.5:
-        return _panel(energy, 0.0, 1.0, dq, c, v0, dt)
-    low, high, out = 0.0, 0.5 / size, 0.0
+def _integrand(is_energy, increment, bond_list, v0, dt):
+    """Return what is averaged over an increment: the energy, or the force.
+
+    The force of the printed law is without the initial bonds, whose mean has a closed form.
+    """
+    if is_energy:
+        return list_energy(increment, bond_list, v0, dt)
+    if bond_list.law[LAW.form] >= PRINTED:
+        return _sum_strips(increment, bond_list, v0, dt).force
+    return list_force(increment, bond_list, v0, dt)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def list_mean(increment, bond_list, v0, dt):
+    """Return the path-mean force [1] of an increment.
+
+    - Stretch reading, p = 1: closed form, `list_slope`.
+    - Stretch reading, other orders: from the energy balance, so that no step creates energy. Damage takes the part
+      dR/eps of the stored energy; the mean is the sum of this loss and of the gain of energy over the increment.
+    - Printed law: mean of the force, to which the initial bonds contribute a closed form.
+
+    Parameters
+    ----------
+    increment, bond_list, v0, dt : float, BondList, float, float
+        As in the docstring of the module.
+
+    Returns
+    -------
+    float
+    """
+    status = bond_list.status
+    clocks = bond_list.now
+    law = bond_list.law
+    form = law[LAW.form]
+    if increment == 0:
+        return status[STATUS.force]
+    if form == MOMENTS:
+        return list_slope(increment, bond_list, v0, dt).mean
+    is_short = _suits_simpson(increment, bond_list)
+    if form == POWER and _needs_energy_balance(increment, bond_list):
+        return _mean_from_energy(is_short, increment, bond_list, v0, dt)
+    if is_short:
+        last = _integrand(False, increment, bond_list, v0, dt)
+        mean = _average_by_simpson(False, last, increment, bond_list, v0, dt)
+    else:
+        mean = _average_by_gauss(False, increment, bond_list, v0, dt)
+    if form == POWER:
+        return mean
+    initial = average_initial(increment, clocks[CLOCK.displacement], clocks[CLOCK.path], law)
+    return mean + status[STATUS.initial_pressure] * initial
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _suits_simpson(increment, bond_list):
+    """Return whether Simpson's rule is exact enough: a short increment of a smooth force whose first value is known.
+
+    In the stretch reading, and where the initial bonds are spread, an increment that touches the place of the initial
+    bonds is not: their force may jump there, and its value at the place itself is that of neither side.
+    """
+    status = bond_list.status
+    clocks = bond_list.now
+    law = bond_list.law
+    p = law[LAW.order]
+    start = clocks[CLOCK.displacement]
+    low = min(start, start + increment)
+    high = max(start, start + increment)
+    margin = PLACE_TOLERANCE * abs(increment)
+    touches_place = low <= margin and high >= -margin
+    has_jump = law[LAW.form] < PRINTED
+    has_turn = law[LAW.half_width] > 0 and p < 1
+    limit = MAX_SIMPSON if p >= 1 else MAX_SIMPSON_FRACTIONAL
+    return (
+        status[STATUS.end] > status[STATUS.head]
+        and abs(increment) / clocks[CLOCK.length] <= limit
+        and p >= 0
+        # the rule must not change with the place of spread bonds
+        and not ((touches_place and has_jump) or has_turn)
+    )
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _needs_energy_balance(increment, bond_list):
+    """Return whether the mean comes from the energy: not for a tiny increment, except across the initial bonds."""
+    clocks = bond_list.now
+    law = bond_list.law
+    start = clocks[CLOCK.displacement]
+    end = start + increment
+    crosses_place = min(start, end) <= 0.0 <= max(start, end)
+    has_jump = law[LAW.initial] > 0 and law[LAW.order] < 1
+    smallest = MIN_BALANCED if law[LAW.half_width] == 0 else MIN_BALANCED_SPREAD
+    is_large = abs(increment) / clocks[CLOCK.length] > smallest
+    return is_large or (crosses_place and has_jump)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _mean_from_energy(is_short, increment, bond_list, v0, dt):
+    """Return the path-mean force from the energy balance: what damage takes and what the bonds gain."""
+    last = list_energy(increment, bond_list, v0, dt)
+    gain = last - bond_list.status[STATUS.energy]
+    eps = _advance(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
+    if is_short:
+        stored = _average_by_simpson(True, last, increment, bond_list, v0, dt)
+    else:
+        stored = _average_by_gauss(True, increment, bond_list, v0, dt)
+    return (stored * abs(increment) / eps + gain) / increment
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _average_by_simpson(is_energy, last, increment, bond_list, v0, dt):
+    """Average the energy or the force over an increment by Simpson's rule, from its value at the end."""
+    first = _first_integrand(is_energy, bond_list)
+    middle = _integrand(is_energy, 0.5 * increment, bond_list, v0, 0.5 * dt)
+    return (first + 4 * middle + last) / 6
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _average_by_gauss(is_energy, increment, bond_list, v0, dt):
+    """Average the energy or the force over an increment by panels of five Gauss points that double in length."""
+    path = abs(increment) / bond_list.now[CLOCK.length]
+    if path <= MAX_PANEL:
+        return _integrate_panel(is_energy, (0.0, 1.0), increment, bond_list, v0, dt)
+    low = 0.0
+    high = MAX_PANEL / path
+    total = 0.0
     while low < 1:
+        # the last two panels become one
         high = 1.0 if high > 0.75 else high
-        out += _panel(energy, low, high, dq, c, v0, dt)
-        low, high = high, 2 * high
-    return out
+        total += _integrate_panel(is_energy, (low, high), increment, bond_list, v0, dt)
+        low = high
+        high = 2 * high
+    return total
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def list_slope(dq, c, v0, dt):
-    """(path-mean weight [1], its derivative over dq [1/m]) of an increment, exact in the stretch reading of order 1.
+def _first_integrand(is_energy, bond_list):
+    """Return `_integrand` of the present state, which the status of the list has."""
+    status = bond_list.status
+    clocks = bond_list.now
+    if is_energy:
+        return status[STATUS.energy]
+    if bond_list.law[LAW.form] < PRINTED:
+        return status[STATUS.force]
+    initial = sum_initial(
+        clocks[CLOCK.displacement], clocks[CLOCK.path], clocks[CLOCK.damage], bond_list.law
+    )
+    return status[STATUS.force] - status[STATUS.initial_pressure] * initial.force
 
-    dq [m]; c: the list; v0 [m/s], dt [s] set the bond length of the step. Friction force = mu_s N * weight.
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _integrate_panel(is_energy, span, increment, bond_list, v0, dt):
+    """Integrate over the part of an increment between two fractions of it, by five Gauss points."""
+    low, high = span
+    total = 0.0
+    for point, weight in GAUSS_FIVE:
+        fraction = low + (high - low) * (1 + point) / 2
+        value = _integrand(is_energy, fraction * increment, bond_list, v0, fraction * dt)
+        total += weight / 2 * value
+    return (high - low) * total
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def list_slope(increment, bond_list, v0, dt):
+    """Return the path-mean force and its derivative in the stretch reading with p = 1, in closed form.
+
+    Parameters
+    ----------
+    increment, bond_list, v0, dt : float, BondList, float, float
+        As in the docstring of the module.
+
+    Returns
+    -------
+    MeanForce
     """
-    status, now, law = c.status, c.now, c.law
-    m, z, _ = moments_of(now[0], exp(now[5] - now[2]), c.bondlist, int(status[0]), int(status[1]))
-    first = status[15] * law[3] * exp(-now[2])
-    middle, _ = grow(now[4], v0, v0, abs(dq) / 2, dt / 2, c.growth)
-    mean, slope = bond_mean(m + first, z + first * now[0], dq, status[14], middle)
-    return mean / law[2], slope / law[2]
+    status = bond_list.status
+    clocks = bond_list.now
+    law = bond_list.law
+    displacement = clocks[CLOCK.displacement]
+    damage = clocks[CLOCK.damage]
+    head = int(status[STATUS.head])
+    strips = Range(head, head, int(status[STATUS.end]))
+    scale = exp(clocks[CLOCK.reference] - damage)
+    moments = sum_moments(displacement, scale, bond_list.bondlist, strips)
+    initial = status[STATUS.initial_pressure] * law[LAW.initial] * exp(-damage)
+    path = abs(increment)
+    middle, _ = grow(clocks[CLOCK.length], v0, v0, path / 2, dt / 2, bond_list.growth)
+    mean, slope = bond_mean(
+        moments.m + initial,
+        moments.z + initial * displacement,
+        increment,
+        status[STATUS.pressure],
+        middle,
+    )
+    return MeanForce(mean / law[LAW.length], slope / law[LAW.length])
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def list_step(dq, c, v0, v1, dt):
-    """Commit an increment: append its strips, drop strips beyond the cut-off, merge now and then; False without room.
+def list_step(increment, bond_list, v0, v1, dt):
+    """Move a list over an increment: append its strips, drop those beyond the cut-off, merge from time to time.
 
-    dq [m]; c: the list, changed in place; v0, v1: speeds [m/s] at the ends of the step of dt [s]. The energy it stores
-    and the force after the step stand in `status`.
+    Force and energy after the step are written into the status.
+
+    Parameters
+    ----------
+    increment : float
+        Increment [m].
+    bond_list : BondList
+        As in the docstring of the module, changed in place.
+    v0, v1, dt : float
+        Velocities [m/s] at the ends of the step, and its duration [s].
+
+    Returns
+    -------
+    bool
+        False if the array of strips is full.
     """
-    bonds, status, now, law = c.bondlist, c.status, c.now, c.law
-    before, place, way, harm, age = now[4], now[0], now[1], now[2], now[3]
-    q, path, damage, grown, eps, middle = _after(dq, now, c.growth, v0, v1, dt)
-    now[0], now[1], now[2], now[3], now[4] = q, path, damage, grown, eps
-    _rescale(bonds, status, now, law)
-    size, done = abs(dq), True
-    if size > 0 and status[14] > 0:
-        done = _append(dq, place, way, harm, before, grown - age, middle, bonds, status, now, law)
-    if size > 0:
-        _cut(bonds, status, now, law)
-        # a merge passes over the whole list: wait until it has grown by a fifth
-        if law[5] > 0 and status[1] - status[0] > 1.2 * status[3] + 12:
-            merge(bonds, status, now, law)
-    status[5], status[4] = list_state(0.0, c, 0.0, 0.0)
-    status[10] = max(status[10], status[1] - status[0])
-    return done
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _rescale(bonds, status, now, law):
-    """Move the reference of the scaled numbers before they overflow."""
-    if law[1] == SHARES:
-        return
-    exponent = now[3] if law[1] == AGED else now[2]
-    if exponent - now[5] < 300:  # exp(300) = 1e130; the range of numbers ends at exp(709)
-        return
-    less = exp(now[5] - exponent)
-    for k in range(int(status[0]), int(status[1])):
-        bonds[5, k] *= less
-        bonds[6, k] *= less
-    now[5] = exponent
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _append(dq, place, way, harm, before, more, middle, bonds, status, now, law):
-    """Strips of the increment dq that began at `place`; False when there is no room."""
-    mode, size, end, dense = law[1], abs(dq), int(status[1]), status[14]
-    if (
-        mode == SHARES
-        and end > status[0] + status[2]
-        and (bonds[1, end - 1] - bonds[0, end - 1]) * dq > 0
-        and bonds[9, end - 1] == way
-        and bonds[5, end - 1] == dense
-    ):
-        k = end - 1
-        bonds[1, k] = now[0]
-        bonds[2, k] = bonds[9, k] = now[1]
-        bonds[3, k] += size
-        bonds[8, k] = bonds[3, k]
-        bonds[4, k] = dense * bonds[3, k]
-        return True
-    count, kept = (1, 1) if mode == SHARES else _pieces(size, middle, more, law)
-    if mode == MOMENTS:
-        count = kept = 1
-    status[8] += count - 1
-    capacity = min(int(status[13]), bonds.shape[1])
-    if end + kept > capacity:
-        end = _pack(bonds, status)
-        if end + kept > capacity:
-            return False
-    goal = goal_length(before, now[4], more)
-    for piece in range(int(kept) - 1, -1, -1):
-        near, far = piece / count, (piece + 1) / count
-        bonds[0, end], bonds[1, end] = now[0] - far * dq, now[0] - near * dq
-        bonds[7, end] = 1.0
-        bonds[8, end], bonds[9, end] = size / count, now[1] - near * size
-        bonds[2, end], bonds[3, end], bonds[4, end] = (
-            bonds[9, end],
-            bonds[8, end],
-            dense * bonds[8, end],
+    bonds = bond_list.bondlist
+    status = bond_list.status
+    clocks = bond_list.now
+    law = bond_list.law
+    before = Advance(
+        clocks[CLOCK.displacement],
+        clocks[CLOCK.path],
+        clocks[CLOCK.damage],
+        clocks[CLOCK.growth],
+        clocks[CLOCK.length],
+        0.0,
+    )
+    after = _advance(increment, clocks, bond_list.growth, v0, v1, dt)
+    clocks[CLOCK.displacement] = after.displacement
+    clocks[CLOCK.path] = after.path
+    clocks[CLOCK.damage] = after.damage
+    clocks[CLOCK.growth] = after.growth
+    clocks[CLOCK.length] = after.length
+    _rescale(bonds, status, clocks, law)
+    has_room = True
+    if increment != 0 and status[STATUS.pressure] > 0:
+        formation = Formation(
+            increment, before, after, status[STATUS.pressure], clocks[CLOCK.reference]
         )
-        bonds[5, end] = dense
-        if mode == MOMENTS:
-            _as_moments(bonds, end, dq, middle, now)
-            bonds[5, end] *= dense
-        elif mode == POWER:
-            span = (now[2] - harm) / count
-            bonds[2, end], bonds[3, end] = now[2] - near * (now[2] - harm), span
-            bonds[4, end] = dense * (size / count * middle ** (-law[0]))
-            bonds[5, end] = 0.5 * bonds[4, end] * exp(bonds[2, end] - FIRST * span - now[5])
-            bonds[6, end] = 0.5 * bonds[4, end] * exp(bonds[2, end] - SECOND * span - now[5])
-        elif mode == AGED:
-            for half in range(2):
-                back = (piece + (FIRST if half == 0 else SECOND)) / count
-                # mature length there, times exp(J there - ref): own = mature - exp(ref - J) times this
-                bonds[5 + half, end] = goal * exp(now[3] - back * more - now[5]) + (
-                    before - goal
-                ) * exp(now[3] - more - now[5])
+        has_room = _append(formation, bond_list)
+    if increment != 0:
+        _drop_old_strips(bonds, status, clocks, law)
+        n_strips = status[STATUS.end] - status[STATUS.head]
+        # a merge visits the whole list, so it waits until the list has grown by a fifth
+        has_grown = n_strips > 1.2 * status[STATUS.n_after_merge] + N_STRIPS_OF_MERGE
+        if law[LAW.merge_width] > 0 and has_grown:
+            merge(bonds, status, clocks, law)
+    total = sum_list(0.0, bond_list, 0.0, 0.0)
+    status[STATUS.force] = total.force
+    status[STATUS.energy] = total.energy
+    n_strips = status[STATUS.end] - status[STATUS.head]
+    status[STATUS.max_strips] = max(status[STATUS.max_strips], n_strips)
+    return has_room
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _rescale(bonds, status, clocks, law):
+    """Move the reference of the scaled numbers before they overflow."""
+    form = law[LAW.form]
+    if form == PRINTED:
+        return
+    clock = clocks[CLOCK.growth] if form == PRINTED_GROWING else clocks[CLOCK.damage]
+    if clock - clocks[CLOCK.reference] < MAX_EXPONENT:
+        return
+    factor = exp(clocks[CLOCK.reference] - clock)
+    for k in range(int(status[STATUS.head]), int(status[STATUS.end])):
+        if form == MOMENTS:
+            bonds[MOMENT.weight, k] *= factor
+        elif form == POWER:
+            bonds[POWER_ROW.weight_1, k] *= factor
+            bonds[POWER_ROW.weight_2, k] *= factor
+        else:
+            bonds[GROWING_ROW.length_1, k] *= factor
+            bonds[GROWING_ROW.length_2, k] *= factor
+    clocks[CLOCK.reference] = clock
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _append(formation, bond_list):
+    """Append the strips of an increment, the oldest first; return False if there is no room."""
+    increment, before, after, pressure, _ = formation
+    bonds = bond_list.bondlist
+    status = bond_list.status
+    law = bond_list.law
+    form = law[LAW.form]
+    path = abs(increment)
+    if form == PRINTED and _extend_last_strip(formation, bonds, status):
+        return True
+    pieces = Pieces(1.0, 1.0)
+    if form == POWER or form == PRINTED_GROWING:
+        pieces = _divide(path, after.middle_length, after.growth - before.growth, law)
+    count = pieces.count
+    status[STATUS.n_extra] += count - 1
+    end = int(status[STATUS.end])
+    capacity = min(int(status[STATUS.room_end]), bonds.shape[1])
+    if end + pieces.kept > capacity:
+        end = _pack(bonds, status)
+        if end + pieces.kept > capacity:
+            return False
+    for piece in range(int(pieces.kept) - 1, -1, -1):
+        near = piece / count
+        far = (piece + 1) / count
+        bonds[STRIP.start, end] = after.displacement - far * increment
+        bonds[STRIP.end, end] = after.displacement - near * increment
+        bonds[STRIP.covered, end] = path / count
+        bonds[STRIP.path, end] = after.path - near * path
+        bonds[STRIP.clock, end] = bonds[STRIP.path, end]
+        bonds[STRIP.clock_width, end] = bonds[STRIP.covered, end]
+        bonds[STRIP.weight, end] = pressure * bonds[STRIP.covered, end]
+        if form == MOMENTS:
+            _write_moments(formation, bonds, end)
+        elif form == POWER:
+            _write_powers(near, count, formation, law[LAW.order], bonds, end)
+        elif form == PRINTED:
+            bonds[PRINTED_ROW.pressure, end] = pressure
+        else:
+            _write_start_lengths(piece, count, formation, bonds, end)
         end += 1
-    status[1] = end
+    status[STATUS.end] = end
     return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _as_moments(bonds, k, dq, eps, now):
-    """Weight, centre and variance of the bonds of one increment that survive it, exact at a constant length."""
-    x, g = abs(dq) / eps, np.copysign(1.0, dq)
-    if x < 1e-2:
-        zero = x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5))))
-        first = x * (1 / 2 - x / 12 * (1 - x * x / 60))
-        spread = x * x / 12 * (1 - x * x / 20)
-    else:
-        e = exp(-x)
-        zero = -expm1(-x)
-        first = 1 - x * e / zero
-        spread = max(1 - x * x * e / (zero * zero), 0.0)
-    bonds[0, k] = now[0] - g * eps * first
-    bonds[1, k] = eps * eps * spread
-    bonds[5, k] = zero * exp(now[2] - now[5])
+def _extend_last_strip(formation, bonds, status):
+    """Extend the last strip by an increment of the same direction and pressure; return whether it could.
+
+    The sum in the form PRINTED is exact for strips of any length.
+    """
+    increment, before, after, pressure, _ = formation
+    k = int(status[STATUS.end]) - 1
+    if k < status[STATUS.head] + status[STATUS.n_spread]:
+        return False
+    has_same_direction = (bonds[STRIP.end, k] - bonds[STRIP.start, k]) * increment > 0
+    is_adjacent = bonds[STRIP.path, k] == before.path
+    if not (has_same_direction and is_adjacent and bonds[PRINTED_ROW.pressure, k] == pressure):
+        return False
+    bonds[STRIP.end, k] = after.displacement
+    bonds[STRIP.clock, k] = after.path
+    bonds[STRIP.path, k] = after.path
+    bonds[STRIP.clock_width, k] += abs(increment)
+    bonds[STRIP.covered, k] = bonds[STRIP.clock_width, k]
+    bonds[STRIP.weight, k] = pressure * bonds[STRIP.clock_width, k]
+    return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _cut(bonds, status, now, law):
-    """Pass over the strips older than the cut-off."""
-    head, end = int(status[0]), int(status[1])
+def _write_powers(near, count, formation, p, bonds, k):
+    """Write the damage and the scaled weights of a strip in the form POWER; near: fraction at which it ends."""
+    increment, before, after, pressure, reference = formation
+    damage = after.damage - before.damage
+    clock = after.damage - near * damage
+    width = damage / count
+    weight = pressure * (abs(increment) / count * after.middle_length ** (-p))
+    bonds[STRIP.clock, k] = clock
+    bonds[STRIP.clock_width, k] = width
+    bonds[STRIP.weight, k] = weight
+    bonds[POWER_ROW.weight_1, k] = 0.5 * weight * exp(clock - GAUSS_1 * width - reference)
+    bonds[POWER_ROW.weight_2, k] = 0.5 * weight * exp(clock - GAUSS_2 * width - reference)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _write_start_lengths(piece, count, formation, bonds, k):
+    """Write the scaled starting lengths of a strip of growing bonds.
+
+    They are the mature length at the Gauss points, times exp(J there - reference): a bond there later has the length
+    of mature bonds less exp(reference - J) times this number.
+    """
+    before = formation.before
+    after = formation.after
+    reference = formation.reference
+    growth = after.growth - before.growth
+    target = target_length(before.length, after.length, growth)
+    start = (before.length - target) * exp(after.growth - growth - reference)
+    for point in range(2):
+        fraction = (piece + (GAUSS_1 if point == 0 else GAUSS_2)) / count
+        length = target * exp(after.growth - fraction * growth - reference) + start
+        bonds[GROWING_ROW.length_1 + point, k] = length
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _write_moments(formation, bonds, k):
+    """Write centre, variance and scaled weight of the bonds of an increment that survive it."""
+    increment, _, after, pressure, reference = formation
+    eps = after.middle_length
+    direction = np.copysign(1.0, increment)
+    moments = _surviving_moments(abs(increment) / eps)
+    bonds[MOMENT.centre, k] = after.displacement - direction * eps * moments.distance
+    bonds[MOMENT.variance, k] = eps * eps * moments.variance
+    bonds[MOMENT.weight, k] = moments.weight * exp(after.damage - reference) * pressure
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _surviving_moments(x):
+    """Return the moments of bonds of constant length that formed on a path x and decay by exp(-x) over it."""
+    if x < MAX_SERIES:
+        return MomentsOfStrip(
+            x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5)))),
+            x * (1 / 2 - x / 12 * (1 - x * x / 60)),
+            x * x / 12 * (1 - x * x / 20),
+        )
+    decay = exp(-x)
+    weight = -expm1(-x)
+    return MomentsOfStrip(
+        weight, 1 - x * decay / weight, max(1 - x * x * decay / (weight * weight), 0.0)
+    )
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _drop_old_strips(bonds, status, clocks, law):
+    """Move the head of the list beyond the strips that are older than the cut-off."""
+    form = law[LAW.form]
+    head = int(status[STATUS.head])
+    end = int(status[STATUS.end])
     while head < end:
-        old = (now[1] - bonds[9, head]) if law[1] >= SHARES else now[2] - bonds[2, head]
-        if law[1] == MOMENTS:
-            old = (now[1] - bonds[9, head]) / law[2]
-        if old <= law[6]:
+        path = clocks[CLOCK.path] - bonds[STRIP.path, head]
+        if form == MOMENTS:
+            age = path / law[LAW.length]
+        elif form == POWER:
+            age = clocks[CLOCK.damage] - bonds[STRIP.clock, head]
+        else:
+            age = path
+        if age <= law[LAW.cutoff]:
             break
         head += 1
-        status[2] = max(status[2] - 1, 0.0)
-    status[0] = head
+        status[STATUS.n_spread] = max(status[STATUS.n_spread] - 1, 0.0)
+    status[STATUS.head] = head
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _pack(bonds, status):
-    """Move the list to the front of its room; returns its end."""
-    head, end, front = int(status[0]), int(status[1]), int(status[12])
+    """Move the list to the start of its room; return its end."""
+    head = int(status[STATUS.head])
+    end = int(status[STATUS.end])
+    room_start = int(status[STATUS.room_start])
     for i in range(bonds.shape[0]):
         for k in range(head, end):
-            bonds[i, k - head + front] = bonds[i, k]
-    status[0], status[1] = front, end - head + front
-    return end - head + front
+            bonds[i, k - head + room_start] = bonds[i, k]
+    status[STATUS.head] = room_start
+    status[STATUS.end] = end - head + room_start
+    return end - head + room_start

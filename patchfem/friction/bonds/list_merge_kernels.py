@@ -1,224 +1,296 @@
-"""Merging a list of strips: neighbours join while they stay narrow for their age, so that the list stays short however
-long the run, small the strokes or fine the steps. First moments stay, the error falls with the square of the width."""
+"""Merging of strips of bonds: neighbours join while they stay narrow for their age.
+
+The list then stays short however long the run, however small the strokes and however fine the steps. First moments are
+kept, so the error falls with the square of the width.
+"""
 
 from math import exp
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
+from .list_forms_kernels import GAUSS_1, GAUSS_2, MOMENTS, POWER, PRINTED, PRINTED_GROWING
 from .list_math_kernels import fexp, flog
-from .list_sum_kernels import AGED, FIRST, MOMENTS, POWER, SECOND, SHARES, start_length
+from .list_rows_kernels import (
+    CLOCK,
+    GROWING_ROW,
+    LAW,
+    MOMENT,
+    POWER_ROW,
+    PRINTED_ROW,
+    STATUS,
+    STRIP,
+)
+from .list_sum_kernels import start_length
 
-GONE = 1e-8  # share of a bond length that was there when a bond formed
-MOST_AGED = 0.1  # widest growth J across one strip of growing bonds
-MOST_YOUNGER = 0.1  # share that the last bond of a strip may be shorter than its first
+MAX_START_LENGTH = 1e-8  # starting length over bond length, below which nothing is left of it
+MAX_GROWTH_SPAN = 0.1  # largest range of the growth J of a merged strip of growing bonds
+MAX_SHORTENING = (
+    0.1  # largest fraction by which the last bond of a merged strip is shorter than its first
+)
+MAX_RANGE_MISMATCH = 1e-3  # mismatch over width, below which two ranges count as the same
+MAX_AGE = 200.0  # age in bond lengths up to which the permitted width grows, which keeps it finite
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def merge(bonds, status, now, law):
-    """Join neighbours while they stay narrower than delta eps_0 exp(R/3 eps_0): of one pass of the slide end to end,
-    or of several passes over the same places, taken as spread evenly over them and, of those, oldest first."""
-    head, end = int(status[0]), int(status[1])
-    many, out, delta, eps0 = 0, head, law[5], law[2]
-    old_many = int(status[2])
-    for k in range(head, end):
-        age = (now[1] - bonds[9, k]) / eps0
-        limit = delta * eps0 * exp(min(age / 3, 200.0))
-        spread = k < head + old_many
+def merge(bonds, status, clocks, law):
+    """Merge neighbouring strips that are narrower than merge_width eps_0 exp(R/3 eps_0) together.
+
+    Two strips of one pass join end to end. Strips of several passes over the same range become one spread strip, the
+    oldest first.
+
+    Parameters
+    ----------
+    bonds : (N_ROWS, capacity) array
+        Array of strips, changed in place.
+    status, clocks, law : (16,), (6,), (24,) array
+        As `STATUS`, `CLOCK` and `LAW` name them; the status is changed in place.
+    """
+    head = int(status[STATUS.head])
+    n_spread_before = int(status[STATUS.n_spread])
+    n_spread = 0
+    out = head
+    for k in range(head, int(status[STATUS.end])):
+        was_spread = k < head + n_spread_before
         if k > head:
             last = out - 1
-            joint = bonds[8, last] + bonds[8, k]
-            narrow = joint <= limit and (law[1] != AGED or _evenly_aged(bonds, last, k, now))
-            if narrow and law[1] == MOMENTS:
+            is_last_spread = last < head + n_spread
+            is_first_unspread = last == head + n_spread
+            width = _max_width(k, bonds, clocks, law)
+            is_narrow = bonds[STRIP.covered, last] + bonds[STRIP.covered, k] <= width
+            if law[LAW.form] == PRINTED_GROWING:
+                is_narrow = is_narrow and _have_similar_lengths(bonds, last, k, clocks)
+            if is_narrow and law[LAW.form] == MOMENTS:
                 _join_moments(bonds, last, k)
                 continue
-            if (
-                narrow
-                and not spread
-                and last >= head + many
-                and bonds[1, last] == bonds[0, k]
-                and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) > 0
-                and (law[1] != SHARES or bonds[5, last] != bonds[5, k])
-                and (
-                    law[1] == AGED
-                    or (law[1] == POWER and law[0] >= 1.0)
-                    or _as_dense(bonds, last, k, limit, eps0)
-                )
-            ):
-                _join_ends(bonds, last, k, now, law)
+            can_join_ends = is_narrow and not was_spread and not is_last_spread
+            if can_join_ends and _are_end_to_end(bonds, last, k, width, law):
+                _join_ends(bonds, last, k, clocks, law)
                 continue
-            grown = law[1] != AGED or _gone(bonds, k, now)
-            if law[1] == SHARES or (law[1] == AGED and law[0] < 1):
-                grown = grown and _even(bonds, last, k, now, law)
-            if (
-                narrow
-                and grown
-                and last <= head + many
-                and _alike(
-                    bonds, last, k, delta * delta * delta * eps0 * exp(min(age, 200.0)), status
-                )
-            ):
-                if last == head + many:
+            is_even = _is_evenly_weighted(bonds, last, k, clocks, law)
+            can_spread = is_narrow and is_even and (is_last_spread or is_first_unspread)
+            if can_spread and _have_same_range(bonds, last, k, clocks, law, status):
+                if is_first_unspread:
                     _spread(bonds, last, law)
-                    many += 1
-                _join_spread(bonds, last, k, spread, now, law)
+                    n_spread += 1
+                _join_spread(bonds, last, k, was_spread, clocks, law)
                 continue
-            if (
-                last == head + many
-                and bonds[8, last] <= 0.5 * limit
-                and grown
-                and (bonds[1, last] - bonds[0, last]) * (bonds[1, k] - bonds[0, k]) < 0
-                and law[1] != MOMENTS
-            ):
+            if is_first_unspread and is_even and _ends_a_narrow_pass(bonds, last, k, width, law):
                 _spread(bonds, last, law)
-                many += 1
+                n_spread += 1
         if out != k:
             for i in range(bonds.shape[0]):
                 bonds[i, out] = bonds[i, k]
-        if spread and out == head + many:
-            many += 1
+        if was_spread and out == head + n_spread:
+            n_spread += 1
         out += 1
-    status[1], status[2], status[3] = out, many, out - head
+    status[STATUS.end] = out
+    status[STATUS.n_spread] = n_spread
+    status[STATUS.n_after_merge] = out - head
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _gone(bonds, k, now):
-    """Whether nothing is left of the starting lengths of a strip."""
-    return exp(now[5] - now[3]) * start_length(0.0, bonds[5, k], bonds[6, k]) <= GONE * now[4]
+def _max_width(k, bonds, clocks, law):
+    """Return the largest width [m] of a merged strip that ends with strip k."""
+    age = (clocks[CLOCK.path] - bonds[STRIP.path, k]) / law[LAW.length]
+    return law[LAW.merge_width] * law[LAW.length] * exp(min(age / 3, MAX_AGE))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _even(bonds, i, k, now, law):
-    """Whether the bonds of two strips together weigh alike over them, or so little that it does not matter.
+def _step(bonds, k):
+    """Return the signed width [m] of a strip."""
+    return bonds[STRIP.end, k] - bonds[STRIP.start, k]
 
-    Of a fractional order the weight R^p of young bonds is far from even, of full length or not: taken as even, it moves
-    the share joint/(near + joint) of their part ((near + joint)^(p + 1) - near^(p + 1))/Gamma(p + 1) of the friction
-    limit.
-    """
-    p, near, joint = law[0], (now[1] - bonds[9, k]) / law[2], (bonds[8, i] + bonds[8, k]) / law[2]
-    if p == 0.0:
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _are_end_to_end(bonds, i, k, width, law):
+    """Return whether two strips lie end to end in one direction and have densities that can be joined."""
+    form = law[LAW.form]
+    if bonds[STRIP.end, i] != bonds[STRIP.start, k] or _step(bonds, i) * _step(bonds, k) <= 0:
+        return False
+    if form == PRINTED and bonds[PRINTED_ROW.pressure, i] == bonds[PRINTED_ROW.pressure, k]:
+        return False
+    if form == PRINTED_GROWING or (form == POWER and law[LAW.order] >= 1.0):
         return True
+    return _have_similar_density(bonds, i, k, width, law[LAW.length])
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _ends_a_narrow_pass(bonds, i, k, width, law):
+    """Return whether strip i is narrow and the direction changes behind it, so that a pass over it will follow."""
+    is_narrow = bonds[STRIP.covered, i] <= 0.5 * width
+    return is_narrow and law[LAW.form] != MOMENTS and _step(bonds, i) * _step(bonds, k) < 0
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _is_full_grown(bonds, k, clocks):
+    """Return whether nothing is left of the starting lengths of a strip."""
+    start = start_length(0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k])
+    scale = exp(clocks[CLOCK.reference] - clocks[CLOCK.growth])
+    return scale * start <= MAX_START_LENGTH * clocks[CLOCK.length]
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _is_evenly_weighted(bonds, i, k, clocks, law):
+    """Return whether the weight of two strips is even over them, or so small that this does not matter.
+
+    With a fractional order the weight R^p of young bonds is far from even: taken as even, it moves the fraction
+    joint/(near + joint) of their part ((near + joint)^(p + 1) - near^(p + 1))/Gamma(p + 1) of the friction limit.
+    """
+    p = law[LAW.order]
+    form = law[LAW.form]
+    if form == PRINTED_GROWING and not _is_full_grown(bonds, k, clocks):
+        return False
+    depends_on_path = form == PRINTED or (form == PRINTED_GROWING and p < 1)
+    if not depends_on_path or p == 0.0:
+        return True
+    near = (clocks[CLOCK.path] - bonds[STRIP.path, k]) / law[LAW.length]
+    joint = (bonds[STRIP.covered, i] + bonds[STRIP.covered, k]) / law[LAW.length]
     far = near + joint
-    part = law[4] * (fexp((p + 1) * flog(far)) - fexp((p + 1) * flog(near)))
-    return abs(p) * part * joint <= law[5] * law[5] * far
+    part = law[LAW.inverse_gamma] * (fexp((p + 1) * flog(far)) - fexp((p + 1) * flog(near)))
+    return abs(p) * part * joint <= law[LAW.merge_width] * law[LAW.merge_width] * far
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _as_dense(bonds, i, k, limit, eps0):
-    """Whether two strips that lie end to end weigh nearly alike per path.
+def _have_similar_density(bonds, i, k, width, eps0):
+    """Return whether two strips that lie end to end have nearly the same weight per path.
 
-    Where the bond length changes they do not, by 1/eps^p: joined, the share |more - less|/4 of their weight moves over,
-    and of an order below 1 that counts in full once the slide is back among them, at u = 0.
+    Where the bond length changes they differ by 1/eps^p. When they join, a quarter of the relative difference of their
+    weights moves; with an order below 1 this counts in full once the displacement is back among them, at u = 0.
     """
-    left, right = bonds[4, i] * bonds[8, k], bonds[4, k] * bonds[8, i]
-    return abs(left - right) * (bonds[8, i] + bonds[8, k]) * eps0 <= limit * limit * (left + right)
+    left = bonds[STRIP.weight, i] * bonds[STRIP.covered, k]
+    right = bonds[STRIP.weight, k] * bonds[STRIP.covered, i]
+    joint = bonds[STRIP.covered, i] + bonds[STRIP.covered, k]
+    return abs(left - right) * joint * eps0 <= width * width * (left + right)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _evenly_aged(bonds, i, k, now):
-    """Whether the starting lengths of two strips together are gone, or span less than MOST_AGED e-folds while the bonds
-    themselves differ by less than the share MOST_YOUNGER in length."""
-    if _gone(bonds, k, now):
+def _have_similar_lengths(bonds, i, k, clocks):
+    """Return whether the growing bonds of two strips have similar lengths, or nothing is left of the growth."""
+    if _is_full_grown(bonds, k, clocks):
         return True
-    young, old = (
-        start_length(0.0, bonds[5, k], bonds[6, k]),
-        start_length(1.0, bonds[5, i], bonds[6, i]),
-    )
-    left = exp(now[5] - now[3])
-    return young <= exp(MOST_AGED) * old and now[4] - left * young >= (1 - MOST_YOUNGER) * (
-        now[4] - left * old
-    )
+    young = start_length(0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k])
+    old = start_length(1.0, bonds[GROWING_ROW.length_1, i], bonds[GROWING_ROW.length_2, i])
+    scale = exp(clocks[CLOCK.reference] - clocks[CLOCK.growth])
+    young_length = clocks[CLOCK.length] - scale * young
+    old_length = clocks[CLOCK.length] - scale * old
+    return young <= exp(MAX_GROWTH_SPAN) * old and young_length >= (1 - MAX_SHORTENING) * old_length
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _alike(bonds, i, k, most, status):
-    """Whether two strips cover the same places closely enough to be spread over their mean range."""
-    low, high = min(bonds[0, i], bonds[1, i]), max(bonds[0, i], bonds[1, i])
-    low2, high2 = min(bonds[0, k], bonds[1, k]), max(bonds[0, k], bonds[1, k])
-    miss = abs(low - low2) + abs(high - high2)
-    wide = max(high, high2) - min(low, low2)
-    joint = bonds[8, i] + bonds[8, k]
-    if miss <= 1e-3 * wide:
+def _have_same_range(bonds, i, k, clocks, law, status):
+    """Return whether two strips cover nearly the same range, so that both can be spread over their mean range."""
+    low_i = min(bonds[STRIP.start, i], bonds[STRIP.end, i])
+    high_i = max(bonds[STRIP.start, i], bonds[STRIP.end, i])
+    low_k = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
+    high_k = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
+    mismatch = abs(low_i - low_k) + abs(high_i - high_k)
+    width = max(high_i, high_k) - min(low_i, low_k)
+    if mismatch <= MAX_RANGE_MISMATCH * width:
         return True
-    if joint * miss <= most * wide:
-        status[9] += 1
+    joint = bonds[STRIP.covered, i] + bonds[STRIP.covered, k]
+    merge_width = law[LAW.merge_width]
+    age = (clocks[CLOCK.path] - bonds[STRIP.path, k]) / law[LAW.length]
+    cubic = merge_width * merge_width * merge_width * law[LAW.length] * exp(min(age, MAX_AGE))
+    if joint * mismatch <= cubic * width:
+        status[STATUS.n_unlike] += 1
         return True
     return False
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_moments(bonds, i, k):
-    a, b = bonds[5, i], bonds[5, k]
-    total = a + b
+    """Add strip k to strip i, both known by weight, centre and variance."""
+    weight_i = bonds[MOMENT.weight, i]
+    weight_k = bonds[MOMENT.weight, k]
+    total = weight_i + weight_k
     if total > 0:
-        gap = bonds[0, k] - bonds[0, i]
-        bonds[1, i] = (a * bonds[1, i] + b * bonds[1, k]) / total + a * b * gap * gap / (
-            total * total
-        )
-        bonds[0, i] += b / total * gap
-    bonds[5, i] = total
-    _join_clock(bonds, i, k)
+        gap = bonds[MOMENT.centre, k] - bonds[MOMENT.centre, i]
+        within = (
+            weight_i * bonds[MOMENT.variance, i] + weight_k * bonds[MOMENT.variance, k]
+        ) / total
+        bonds[MOMENT.variance, i] = within + weight_i * weight_k * gap * gap / (total * total)
+        bonds[MOMENT.centre, i] += weight_k / total * gap
+    bonds[MOMENT.weight, i] = total
+    _join_clocks(bonds, i, k)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _join_clock(bonds, i, k):
-    bonds[3, i] += bonds[3, k]
-    bonds[4, i] += bonds[4, k]
-    bonds[8, i] += bonds[8, k]
-    bonds[2, i], bonds[9, i] = bonds[2, k], bonds[9, k]
+def _join_clocks(bonds, i, k):
+    """Add the weight and the path of strip k to strip i, which then ends when strip k ended."""
+    bonds[STRIP.clock_width, i] += bonds[STRIP.clock_width, k]
+    bonds[STRIP.weight, i] += bonds[STRIP.weight, k]
+    bonds[STRIP.covered, i] += bonds[STRIP.covered, k]
+    bonds[STRIP.clock, i] = bonds[STRIP.clock, k]
+    bonds[STRIP.path, i] = bonds[STRIP.path, k]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _join_ends(bonds, i, k, now, law):
-    """Two strips of one pass, end to end; their first moments stay."""
-    left, right = bonds[3, i], bonds[3, k]
-    if law[1] == AGED:
-        c0 = _aged_at(FIRST * (left + right), left, right, bonds, i, k, now)
-        c1 = _aged_at(SECOND * (left + right), left, right, bonds, i, k, now)
-    bonds[1, i] = bonds[1, k]
-    _join_clock(bonds, i, k)
-    if law[1] == AGED:
-        bonds[5, i], bonds[6, i] = c0, c1
-    elif law[1] == SHARES:
-        bonds[5, i] = bonds[4, i] / bonds[3, i]
+def _join_ends(bonds, i, k, clocks, law):
+    """Join two strips of one pass that lie end to end; their first moments are kept."""
+    form = law[LAW.form]
+    if form == PRINTED_GROWING:
+        length_1 = _joint_start_length(GAUSS_1, bonds, i, k, clocks)
+        length_2 = _joint_start_length(GAUSS_2, bonds, i, k, clocks)
+    bonds[STRIP.end, i] = bonds[STRIP.end, k]
+    _join_clocks(bonds, i, k)
+    if form == PRINTED_GROWING:
+        bonds[GROWING_ROW.length_1, i] = length_1
+        bonds[GROWING_ROW.length_2, i] = length_2
+    elif form == PRINTED:
+        bonds[PRINTED_ROW.pressure, i] = bonds[STRIP.weight, i] / bonds[STRIP.clock_width, i]
     else:
-        for half in range(2):
-            part = FIRST if half == 0 else SECOND
-            bonds[5 + half, i] = 0.5 * bonds[4, i] * exp(bonds[2, i] - part * bonds[3, i] - now[5])
+        weight = 0.5 * bonds[STRIP.weight, i]
+        clock = bonds[STRIP.clock, i]
+        width = bonds[STRIP.clock_width, i]
+        reference = clocks[CLOCK.reference]
+        bonds[POWER_ROW.weight_1, i] = weight * exp(clock - GAUSS_1 * width - reference)
+        bonds[POWER_ROW.weight_2, i] = weight * exp(clock - GAUSS_2 * width - reference)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _aged_at(back, left, right, bonds, i, k, now):
-    """Scaled starting length at `back` [m] from the end of two strips, zero once it is gone from both."""
-    if _gone(bonds, k, now):
+def _joint_start_length(gauss, bonds, i, k, clocks):
+    """Return the scaled starting length at a Gauss point of two joined strips, 0 once nothing is left of it."""
+    if _is_full_grown(bonds, k, clocks):
         return 0.0
-    j, part = (k, back / right) if back <= right else (i, (back - right) / left)
-    return start_length(part, bonds[5, j], bonds[6, j])
+    width_i = bonds[STRIP.clock_width, i]
+    width_k = bonds[STRIP.clock_width, k]
+    place = gauss * (width_i + width_k)
+    j = k if place <= width_k else i
+    fraction = place / width_k if place <= width_k else (place - width_k) / width_i
+    return start_length(fraction, bonds[GROWING_ROW.length_1, j], bonds[GROWING_ROW.length_2, j])
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _spread(bonds, k, law):
-    """Take a strip of one pass as spread evenly over its places."""
-    low, high = min(bonds[0, k], bonds[1, k]), max(bonds[0, k], bonds[1, k])
-    bonds[0, k], bonds[1, k], bonds[7, k] = low, high, 0.0
-    if law[1] == POWER:
-        bonds[5, k] += bonds[6, k]
-        bonds[6, k] = 0.0
+    """Turn a strip of one pass into one that is spread evenly over its range."""
+    low = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
+    high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
+    bonds[STRIP.start, k] = low
+    bonds[STRIP.end, k] = high
+    if law[LAW.form] == POWER:
+        bonds[POWER_ROW.weight_1, k] += bonds[POWER_ROW.weight_2, k]
+        bonds[POWER_ROW.weight_2, k] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _join_spread(bonds, i, k, spread, now, law):
-    """Add strip k to the spread strip i: mean range by the path covered."""
-    a, b = bonds[8, i], bonds[8, k]
-    low, high = min(bonds[0, k], bonds[1, k]), max(bonds[0, k], bonds[1, k])
-    bonds[0, i] = (a * bonds[0, i] + b * low) / (a + b)
-    bonds[1, i] = (a * bonds[1, i] + b * high) / (a + b)
-    if law[1] == POWER:
-        bonds[5, i] += bonds[5, k] + (0.0 if spread else bonds[6, k])
-    elif law[1] == AGED:
-        left, right = bonds[3, i], bonds[3, k]
-        c0 = _aged_at(FIRST * (left + right), left, right, bonds, i, k, now)
-        bonds[6, i] = _aged_at(SECOND * (left + right), left, right, bonds, i, k, now)
-        bonds[5, i] = c0
-    _join_clock(bonds, i, k)
-    if law[1] == SHARES:
-        bonds[5, i] = bonds[4, i] / bonds[3, i]
+def _join_spread(bonds, i, k, was_spread, clocks, law):
+    """Add strip k to the spread strip i, over their mean range weighted with the path covered."""
+    form = law[LAW.form]
+    path_i = bonds[STRIP.covered, i]
+    path_k = bonds[STRIP.covered, k]
+    total = path_i + path_k
+    low = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
+    high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
+    bonds[STRIP.start, i] = (path_i * bonds[STRIP.start, i] + path_k * low) / total
+    bonds[STRIP.end, i] = (path_i * bonds[STRIP.end, i] + path_k * high) / total
+    if form == POWER:
+        second = 0.0 if was_spread else bonds[POWER_ROW.weight_2, k]
+        bonds[POWER_ROW.weight_1, i] += bonds[POWER_ROW.weight_1, k] + second
+    elif form == PRINTED_GROWING:
+        length_1 = _joint_start_length(GAUSS_1, bonds, i, k, clocks)
+        length_2 = _joint_start_length(GAUSS_2, bonds, i, k, clocks)
+        bonds[GROWING_ROW.length_1, i] = length_1
+        bonds[GROWING_ROW.length_2, i] = length_2
+    _join_clocks(bonds, i, k)
+    if form == PRINTED:
+        bonds[PRINTED_ROW.pressure, i] = bonds[STRIP.weight, i] / bonds[STRIP.clock_width, i]

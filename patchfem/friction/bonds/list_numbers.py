@@ -1,95 +1,136 @@
-"""The numbers of a compiled bond list: which sum its law needs, cut-off, merge width, room."""
+"""Arrays of a compiled list of bonds: numbers of the law, clocks, status and table (see `list_rows_kernels`)."""
 
 from math import ceil, gamma
 
 import numpy as np
 
+from .list_forms_kernels import MOMENTS, POWER, PRINTED, PRINTED_GROWING
+from .list_rows_kernels import LAW, STATUS, ListStatus
 from .parameters import Bonds
 
-MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0  # forms of the sum, as in list_sum_kernels
-NOTHING_LEFT = 745.0  # damage beyond which exp(-damage) is zero
-STRIP = 4  # strips per bond length of a step, at most
-NODES = 1 / 32  # of the table of P(p + 1, x)
+MAX_DAMAGE = 745.0  # damage beyond which exp(-damage) is zero
+STRIPS_PER_LENGTH = 4  # largest number of strips of an increment per bond length
+TABLE_STEPS = 32  # nodes of the table of P(p + 1, x) per unit of x
+N_NODES = 4  # Gauss-Jacobi points of the form POWER
+N_LAW_NUMBERS = 24  # numbers of a law, with the points and weights of two powers
+N_WORK_STRIPS = 64  # strips of a list beside those of an increment
+N_UNMERGED = 20_000  # strips that a list has room for at first if none are merged
 
 
 def form_of(law: Bonds) -> float:
-    """Form of the sum over bonds that a law needs: MOMENTS, POWER, SHARES or AGED of `list_sum_kernels`."""
+    """Return the form of the sum over bonds that a law needs, see `list_rows_kernels`."""
     if law.reading == "stretch":
         return MOMENTS if law.order == 1 else POWER
-    return AGED if law.grows else SHARES
+    return PRINTED_GROWING if law.grows else PRINTED
 
 
 def cutoff(order: float, tail: float) -> float:
-    """Path R/eps [1] beyond which all older bonds together carry at most the share `tail` of the friction limit.
+    """Return the path R/eps [1] beyond which all older bonds carry the fraction `tail` of the friction limit.
 
-    It solves Q(p + 1, R/eps) = tail; order: p > -1, tail in (0, 1).
+    It solves Q(p + 1, R/eps) = tail, with Q the regularised upper incomplete gamma function and p > -1.
     """
     from scipy.special import gammainccinv
 
     return float(gammainccinv(order + 1, tail))
 
 
-def law_numbers(law: Bonds, reach: float, merge: float, wide: float = 0.0) -> np.ndarray:
-    """(24,): order, form, eps_0, m_0, 1/Gamma(p + 1), merge width, cut-off on the clock of the form, half the width of
-    the first bonds, Gauss points and weights in (0, 1) with |u|^p and with |u|^(p + 1) as their weight.
+def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0) -> np.ndarray:
+    """Return the numbers of a law at the positions of `LAW`.
 
-    reach: cut-off in bond lengths of path; of the stretch reading in units of damage; wide [bond lengths]: over which
-    the first bonds lie to both sides, where a force that jumps at their place has no step that ends in the jump.
+    Parameters
+    ----------
+    law : Bonds
+    reach : float
+        Cut-off in bond lengths of path; in the stretch reading in units of damage.
+    merge : float
+        Largest width of a merged strip of age 0 in bond lengths; 0 merges nothing.
+    half_width : float
+        Half the width in bond lengths over which the initial bonds are spread. A force that jumps at one place has no
+        step that ends in the jump.
+
+    Returns
+    -------
+    (24,) array
     """
     form = form_of(law)
-    out = np.zeros(24)
-    reach = min(reach, NOTHING_LEFT)
-    out[:7] = (
-        law.order,
-        form,
-        law.length,
-        law.initial,
-        1 / gamma(law.order + 1),
-        merge,
-        reach * (law.length if form >= SHARES else 1.0),
-    )
-    out[7] = wide * law.length
+    numbers = np.zeros(N_LAW_NUMBERS)
+    numbers[LAW.order] = law.order
+    numbers[LAW.form] = form
+    numbers[LAW.length] = law.length
+    numbers[LAW.initial] = law.initial
+    numbers[LAW.inverse_gamma] = 1 / gamma(law.order + 1)
+    numbers[LAW.merge_width] = merge
+    numbers[LAW.cutoff] = min(reach, MAX_DAMAGE) * (law.length if form >= PRINTED else 1.0)
+    numbers[LAW.half_width] = half_width * law.length
     if form == POWER:
-        from scipy.special import roots_jacobi
+        rules = _jacobi_rule(law.order), _jacobi_rule(law.order + 1)
+        numbers[LAW.nodes :] = np.concatenate(rules)
+    return numbers
 
-        for at, power in ((8, law.order), (16, law.order + 1)):
-            x, w = roots_jacobi(4, 0.0, power)
-            out[at : at + 4], out[at + 4 : at + 8] = (1 + x) / 2, w / 2 ** (power + 1)
-    return out
+
+def _jacobi_rule(power: float) -> np.ndarray:
+    """Return Gauss-Jacobi points in (0, 1), then their weights, for integrals of t^power times a smooth function."""
+    from scipy.special import roots_jacobi
+
+    x, weights = roots_jacobi(N_NODES, 0.0, power)
+    return np.concatenate([(1 + x) / 2, weights / 2 ** (power + 1)])
 
 
 def status_of(capacity: int, count: int | None = None) -> np.ndarray:
-    """The status (16,) of an empty list in an array of `capacity` entries; (count, 16) of lists one after the other."""
-    out = np.zeros((count or 1, 16))
-    out[:, 12] = out[:, 0] = out[:, 1] = capacity * np.arange(count or 1)
-    out[:, 13] = out[:, 12] + capacity
-    out[:, 14:] = 1.0
-    return out if count else out[0]
+    """Return the status of an empty list with room for `capacity` strips.
+
+    Parameters
+    ----------
+    capacity : int
+    count : int, optional
+        Number of lists that lie one behind the other in one array.
+
+    Returns
+    -------
+    (16,) array, or (count, 16) array
+    """
+    status = np.zeros((count or 1, len(ListStatus._fields)))
+    start = capacity * np.arange(count or 1)
+    for position in (STATUS.room_start, STATUS.head, STATUS.end):
+        status[:, position] = start
+    status[:, STATUS.room_end] = start + capacity
+    status[:, STATUS.pressure] = 1.0
+    status[:, STATUS.initial_pressure] = 1.0
+    return status if count else status[0]
 
 
 def now_of(law: Bonds) -> np.ndarray:
-    """The clocks (6,) of a list before any slide."""
+    """Return the clocks (6,) of a list before any motion."""
     return np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0])
 
 
-def share_table(law: Bonds) -> np.ndarray:
-    """P(p + 1, x) (k,) [1] at multiples x of 1/32 for `list_math_kernels.tabled`; empty where a closed form serves.
+def gamma_table(law: Bonds) -> np.ndarray:
+    """Return P(p + 1, x) (k,) at multiples x of 1/32 for `list_math_kernels.tabled`.
 
-    It ends at x = 60 + 4 p, where P is 1 to the last digit.
+    The table is empty if P has a closed form. It ends at x = 60 + 4 p, where P is 1 to the last digit.
     """
-    if form_of(law) != SHARES or law.order in (0, 1, 2):
+    if form_of(law) != PRINTED or law.order in (0, 1, 2):
         return np.zeros(0)
     from scipy.special import gammainc
 
-    return gammainc(law.order + 1, NODES * np.arange(32 * ceil(60 + 4 * law.order)))
+    n_nodes = TABLE_STEPS * ceil(60 + 4 * law.order)
+    return gammainc(law.order + 1, np.arange(n_nodes) / TABLE_STEPS)
 
 
 def capacity(law: Bonds, reach: float, merge: float) -> int:
-    """Strips to allocate for a list: those that merging leaves, those of one longest step and some to work with.
+    """Return the number of strips to allocate: those after a merge, those of a long step, and some to work with.
 
-    reach: cut-off in bond lengths of path or in units of damage; merge: width in bond lengths, 0 without merging.
+    Parameters
+    ----------
+    law : Bonds
+    reach, merge : float
+        As in `law_numbers`.
+
+    Returns
+    -------
+    int
     """
-    step = STRIP * ceil(min(reach, NOTHING_LEFT)) + 64
+    step = STRIPS_PER_LENGTH * ceil(min(reach, MAX_DAMAGE)) + N_WORK_STRIPS
     if merge > 0:
         return 4 * step + ceil(16 / merge)
-    return 4 * step + 20_000
+    return 4 * step + N_UNMERGED

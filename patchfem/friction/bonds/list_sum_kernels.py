@@ -1,83 +1,136 @@
-"""Compiled sums over a list of strips of bonds (eq. 2.17): force and stored energy at one place of a rigid slide.
+"""Compiled sums over a list of strips of bonds (eq. 2.17): force and stored energy at one relative displacement.
 
-Forms of the sum, `law[1]`: MOMENTS stretch with p = 1 (three sums, exact), POWER stretch of any order, SHARES the
-printed law at constant bond length (differences of P(p + 1, R/eps), exact), AGED the printed law with growing bonds.
-
-Rows of `bonds` (10, capacity): 0, 1 place at the start and at the end of the strip (MOMENTS: centre, variance);
-2, 3 clock at its end and width on the clock (stretch: damage; report: path); 4 weight (POWER: path/eps^p; else path)
-times the pressure that it formed under, over that of the friction limit; 5, 6 at its two Gauss points: scaled weight
-(stretch; MOMENTS: one scaled weight) or scaled starting length (AGED); of SHARES 5 is that pressure;
-7 one pass of the slide (1) or several over the same range of places (0, uniform over it); 8, 9 path covered, path at
-its end. Scaled: times exp(clock - ref), so that ageing multiplies the whole sum by one number.
+Each form of the sum has a function: `sum_moments` and `sum_powers` for the stretch reading, `sum_printed` and
+`sum_growing` for the printed law; `sum_initial` adds the bonds that were there at the start. The arrays are described
+in `list_rows_kernels`. In a strip u is the relative displacement since a bond formed, R the path since then.
 """
 
 from math import exp
+from typing import NamedTuple
 
 import numpy as np
 from numba import uint64
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
+from .list_forms_kernels import GAUSS_1, GAUSS_2, POWER
 from .list_math_kernels import FASTMATH_FLAGS, fexp, flog, share, tabled
+from .list_rows_kernels import GROWING_ROW, LAW, MOMENT, POWER_ROW, PRINTED_ROW, STRIP
 
-MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0
-SPROUTING = 0.05  # length of the last bond over that of the first of a strip, below which all of them are growing
-AT_PLACE = 1e-14  # of the path: a slide as near to a place is at it
-# two Gauss points, seen from the end of a strip
-FIRST, SECOND = (
-    0.21132486540518713,
-    0.7886751345948129,
+MIN_GROWING_RATIO = (
+    0.05  # last over first bond length of a strip, below which all of its bonds are growing
 )
+AT_PLACE = 1e-14  # displacement over path, below which the displacement is at the place of the initial bonds
+MIN_LENGTH = (
+    1e-9  # smallest length of a growing bond over that of mature bonds, which keeps R/length finite
+)
+MIN_PATH = 1e-300  # smallest path [m] since a bond formed, which keeps its logarithm finite
+MIN_SPREAD = 1e-4  # width over distance below which a spread strip acts like a single place
+
+
+class BondSum(NamedTuple):
+    """Sums over bonds of force and of stored energy; the units depend on the form of the sum."""
+
+    force: float
+    energy: float
+
+
+class Moments(NamedTuple):
+    """Sums over bonds of the weight, the weight times u and the weight times u^2, of eq. 2.17 with p = 1."""
+
+    m: float
+    z: float
+    s2: float
+
+
+class Mature(NamedTuple):
+    """Length [m] of mature bonds now, and exp(reference - J), which undoes the scale of the starting lengths."""
+
+    length: float
+    scale: float
+
+
+class Range(NamedTuple):
+    """Strips of a list: those from `head` to `first` are spread, those from `first` to `end` have one pass each."""
+
+    head: int
+    first: int
+    end: int
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def moments_of(q, scale, bonds, head, end):
-    """(sum k, sum k u, sum k u^2) [m, m2, m3] of strips in MOMENTS form, k the weight without the factor 1/eps_0.
+def sum_moments(displacement, scale, bonds, strips):
+    """Sum the moments of strips in the form MOMENTS; 0.3 ns per strip.
 
-    q [m]: slide now; scale: exp(ref - damage); bonds: list, its strips head to end. Cost: 0.3 ns per strip.
+    Parameters
+    ----------
+    displacement : float
+        Relative displacement [m] now.
+    scale : float
+        exp(reference - damage), which undoes the scale of the weights.
+    bonds : (N_ROWS, capacity) array
+        Array of strips.
+    strips : Range
+        Strips that are summed.
+
+    Returns
+    -------
+    Moments
+        Sums [m], [m2], [m3] of weights without the factor 1/eps_0.
     """
-    m, z, s2 = 0.0, 0.0, 0.0
-    for k in range(uint64(head), uint64(end)):
-        u, w = q - bonds[0, k], bonds[5, k]
-        m += w
-        z += w * u
-        s2 += w * (u * u + bonds[1, k])
-    return m * scale, z * scale, s2 * scale
+    m = 0.0
+    z = 0.0
+    s2 = 0.0
+    for k in range(uint64(strips.head), uint64(strips.end)):
+        u = displacement - bonds[MOMENT.centre, k]
+        weight = bonds[MOMENT.weight, k]
+        m += weight
+        z += weight * u
+        s2 += weight * (u * u + bonds[MOMENT.variance, k])
+    return Moments(m * scale, z * scale, s2 * scale)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _powers(q, bonds, first, end, p):
-    """Sums of w |u|^p sgn u and of w |u|^(p + 1) over both Gauss points of strips that one pass left."""
-    force, energy = 0.0, 0.0
+def _sum_gauss_powers(displacement, bonds, first, end, p):
+    """Sum w |u|^p sgn u and w |u|^(p + 1) over both Gauss points of strips of one pass."""
+    force = 0.0
+    energy = 0.0
     if p == 0.0:
         for k in range(uint64(first), uint64(end)):
-            b = bonds[1, k]
-            step = b - bonds[0, k]
-            u, v = q - b + FIRST * step, q - b + SECOND * step
-            force += np.copysign(bonds[5, k], u) + np.copysign(bonds[6, k], v)
-            energy += bonds[5, k] * abs(u) + bonds[6, k] * abs(v)
+            place = bonds[STRIP.end, k]
+            step = place - bonds[STRIP.start, k]
+            u_1 = displacement - place + GAUSS_1 * step
+            u_2 = displacement - place + GAUSS_2 * step
+            weight_1 = bonds[POWER_ROW.weight_1, k]
+            weight_2 = bonds[POWER_ROW.weight_2, k]
+            force += np.copysign(weight_1, u_1) + np.copysign(weight_2, u_2)
+            energy += weight_1 * abs(u_1) + weight_2 * abs(u_2)
     elif p == 2.0:
         for k in range(uint64(first), uint64(end)):
-            b = bonds[1, k]
-            step = b - bonds[0, k]
-            u, v = q - b + FIRST * step, q - b + SECOND * step
-            f, g = bonds[5, k] * u * u, bonds[6, k] * v * v
-            force += np.copysign(f, u) + np.copysign(g, v)
-            energy += f * abs(u) + g * abs(v)
+            place = bonds[STRIP.end, k]
+            step = place - bonds[STRIP.start, k]
+            u_1 = displacement - place + GAUSS_1 * step
+            u_2 = displacement - place + GAUSS_2 * step
+            force_1 = bonds[POWER_ROW.weight_1, k] * u_1 * u_1
+            force_2 = bonds[POWER_ROW.weight_2, k] * u_2 * u_2
+            force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
+            energy += force_1 * abs(u_1) + force_2 * abs(u_2)
     else:
         for k in range(uint64(first), uint64(end)):
-            b = bonds[1, k]
-            step = b - bonds[0, k]
-            u, v = q - b + FIRST * step, q - b + SECOND * step
-            f, g = bonds[5, k] * fexp(p * flog(abs(u))), bonds[6, k] * fexp(p * flog(abs(v)))
-            force += np.copysign(f, u) + np.copysign(g, v)
-            energy += f * abs(u) + g * abs(v)
-    return force, energy
+            place = bonds[STRIP.end, k]
+            step = place - bonds[STRIP.start, k]
+            u_1 = displacement - place + GAUSS_1 * step
+            u_2 = displacement - place + GAUSS_2 * step
+            force_1 = bonds[POWER_ROW.weight_1, k] * fexp(p * flog(abs(u_1)))
+            force_2 = bonds[POWER_ROW.weight_2, k] * fexp(p * flog(abs(u_2)))
+            force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
+            energy += force_1 * abs(u_1) + force_2 * abs(u_2)
+    return BondSum(force, energy)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _reach_in(size, slope, nodes, p):
-    """Integral from 0 to size of t^p exp(slope t), by four points with t^p as their weight."""
+def _integrate_jacobi(size, slope, nodes, p):
+    """Integrate t^p exp(slope t) from 0 to size by four Gauss-Jacobi points with the weight t^p."""
     if size <= 0:
         return 0.0
     total = 0.0
@@ -87,340 +140,573 @@ def _reach_in(size, slope, nodes, p):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _beside_turn(q, a, b, dl, w0, p, odd, nodes):
-    """One strip near u = 0, the power integrated from u = 0 where it bends: each side by the difference of two."""
-    step = b - a
-    slope = dl / step
-    low, high = min(a, b), max(a, b)
-    behind = _reach_in(q - low, -slope, nodes, p) - _reach_in(q - high, -slope, nodes, p)
-    ahead = _reach_in(high - q, slope, nodes, p) - _reach_in(low - q, slope, nodes, p)
-    front = 2 * w0 / abs(step) * exp(slope * (q - b + FIRST * step))
-    return front * (behind - ahead if odd else behind + ahead)
+def _integrate_power_strip(displacement, bonds, k, p, nodes, is_force):
+    """Integrate |u|^p over a strip near u = 0: each side as a difference of two integrals that begin at u = 0."""
+    start = bonds[STRIP.start, k]
+    end = bonds[STRIP.end, k]
+    step = end - start
+    slope = bonds[STRIP.clock_width, k] / step
+    low = min(start, end)
+    high = max(start, end)
+    behind = _integrate_jacobi(displacement - low, -slope, nodes, p)
+    behind -= _integrate_jacobi(displacement - high, -slope, nodes, p)
+    ahead = _integrate_jacobi(high - displacement, slope, nodes, p)
+    ahead -= _integrate_jacobi(low - displacement, slope, nodes, p)
+    density = 2 * bonds[POWER_ROW.weight_1, k] / abs(step)
+    density *= exp(slope * (displacement - end + GAUSS_1 * step))
+    return density * (behind - ahead if is_force else behind + ahead)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def spread_over(q, a, b, p):
-    """Means of |u|^p sgn u and of |u|^(p + 1) over places uniform between a < b."""
-    wide, middle = b - a, q - (a + b) / 2
+def average_spread(displacement, low, high, p):
+    """Average |u|^p sgn u and |u|^(p + 1) over bonds that are spread evenly over a range of places.
+
+    Parameters
+    ----------
+    displacement, low, high : float
+        Relative displacement now, ends of the range [m], low < high.
+    p : float
+        Exponent.
+
+    Returns
+    -------
+    BondSum
+    """
+    width = high - low
+    middle = displacement - (low + high) / 2
     if p == 0.0:
-        far = abs(middle)
-        if 2 * far >= wide:
-            return np.sign(middle), far
-        return 2 * middle / wide, wide / 4 + middle * middle / wide
-    if wide < 1e-4 * abs(middle) or wide == 0:
-        f = fexp(p * flog(abs(middle)))
-        return f * np.sign(middle), f * abs(middle)
-    u, v = q - a, q - b
-    f, g = fexp((p + 1) * flog(abs(u))), fexp((p + 1) * flog(abs(v)))
-    return (f - g) / ((p + 1) * wide), (f * u - g * v) / ((p + 2) * wide)
+        distance = abs(middle)
+        if 2 * distance >= width:
+            return BondSum(np.sign(middle), distance)
+        return BondSum(2 * middle / width, width / 4 + middle * middle / width)
+    if width < MIN_SPREAD * abs(middle) or width == 0:
+        power = fexp(p * flog(abs(middle)))
+        return BondSum(power * np.sign(middle), power * abs(middle))
+    u = displacement - low
+    v = displacement - high
+    power_u = fexp((p + 1) * flog(abs(u)))
+    power_v = fexp((p + 1) * flog(abs(v)))
+    force = (power_u - power_v) / ((p + 1) * width)
+    return BondSum(force, (power_u * u - power_v * v) / ((p + 2) * width))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def sloped_over(q, a, b, w0, w1, p):
-    """Sums of w |u|^p sgn u and of w |u|^(p + 1) over places from a to b whose weight is linear between them.
+def sum_linear_density(displacement, start, end, weights, p):
+    """Sum w |u|^p sgn u and w |u|^(p + 1) over a strip whose density is linear from its start to its end.
 
-    w0, w1: weights at the two Gauss points, seen from b. Where u has one sign they are those of the Gauss points for
-    p = 0, so nothing jumps as the slide q reaches the strip.
+    Where u has one sign the sums for p = 0 are those of the Gauss points, so nothing jumps as the displacement
+    reaches the strip.
+
+    Parameters
+    ----------
+    displacement, start, end : float
+        Relative displacement now, ends of the strip [m].
+    weights : (float, float)
+        Weights at both Gauss points.
+    p : float
+        Exponent.
+
+    Returns
+    -------
+    BondSum
     """
-    step, total = b - a, w0 + w1
-    u, v = q - b, q - a
-    f, g = fexp((p + 1) * flog(abs(u))), fexp((p + 1) * flog(abs(v)))
-    # means of |u|^p sgn u, |u|^(p + 1)
-    odd, even = (
-        (g - f) / ((p + 1) * step),
-        (g * v - f * u) / ((p + 2) * step),
-    )
-    third = (g * v * v - f * u * u) / ((p + 3) * step)  # of |u|^(p + 1) u
-    slope = 2 * (w1 - w0) / ((SECOND - FIRST) * step)
-    middle = total - slope * 0.5 * (u + v)
-    return middle * odd + slope * even, middle * even + slope * third
+    weight_1, weight_2 = weights
+    step = end - start
+    u = displacement - end
+    v = displacement - start
+    power_u = fexp((p + 1) * flog(abs(u)))
+    power_v = fexp((p + 1) * flog(abs(v)))
+    # averages of |u|^p sgn u, of |u|^(p + 1) and of |u|^(p + 1) u
+    odd = (power_v - power_u) / ((p + 1) * step)
+    even = (power_v * v - power_u * u) / ((p + 2) * step)
+    third = (power_v * v * v - power_u * u * u) / ((p + 3) * step)
+    slope = 2 * (weight_2 - weight_1) / ((GAUSS_2 - GAUSS_1) * step)
+    middle = (weight_1 + weight_2) - slope * 0.5 * (u + v)
+    return BondSum(middle * odd + slope * even, middle * even + slope * third)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def power_sums(q, damage, bonds, head, many, end, p, coarse, nodes):
-    """Scaled (sum w |u|^p sgn u, sum w |u|^(p + 1)) over strips in POWER form; the first `many` are spread.
+def sum_powers(displacement, damage, bonds, strips, law):
+    """Sum |u|^p over strips in the form POWER (eq. 2.17, stretch reading).
 
-    coarse: strips with u = 0 inside are taken as spread evenly over their places where they are narrower than
-    coarse exp(age/3) [m], as merging does; 0 for none.
+    Two Gauss points per strip are exact enough away from u = 0. A strip near u = 0 is integrated from there; if it is
+    as narrow for its age as a merged strip, its density is taken as linear.
+
+    Parameters
+    ----------
+    displacement, damage : float
+        Relative displacement [m] and damage [1] now.
+    bonds, strips : array, Range
+        Array of strips, and those that are summed.
+    law : (24,) array
+        Numbers of `LAW`.
+
+    Returns
+    -------
+    BondSum
+        Scaled sums of w |u|^p sgn u and of w |u|^(p + 1).
     """
-    first = head + many
-    force, energy = _powers(q, bonds, first, end, p)
-    smooth = p == 3.0
-    # fractional powers are singular at u = 0, and two Gauss points feel that outside the strip as well
-    near = 1.0 if p == 0.0 or p == 2.0 else 5.0
-    for k in range(end if smooth else first, end):
-        a, b = bonds[0, k], bonds[1, k]
-        if abs(2 * q - a - b) > near * abs(b - a):
+    p = law[LAW.order]
+    merge_width = law[LAW.merge_width] * law[LAW.length]
+    nodes = law[LAW.nodes :]
+    total = _sum_gauss_powers(displacement, bonds, strips.first, strips.end, p)
+    force = total.force
+    energy = total.energy
+    is_polynomial = p == 3.0
+    # fractional powers are singular at u = 0, which two Gauss points feel outside the strip as well
+    reach = 1.0 if p == 0.0 or p == 2.0 else 5.0
+    for k in range(strips.end if is_polynomial else strips.first, strips.end):
+        start = bonds[STRIP.start, k]
+        end = bonds[STRIP.end, k]
+        width = abs(end - start)
+        if abs(2 * displacement - start - end) > reach * width:
             continue
-        narrow = abs(b - a) <= coarse * fexp((damage - bonds[2, k]) / 3)
-        if narrow and p >= 1:
+        is_narrow = width <= merge_width * fexp((damage - bonds[STRIP.clock, k]) / 3)
+        if is_narrow and p >= 1:
             continue
-        less, lower = _powers(q, bonds, k, k + 1, p)
-        if narrow:
-            more, higher = sloped_over(q, a, b, bonds[5, k], bonds[6, k], p)
+        gauss = _sum_gauss_powers(displacement, bonds, k, k + 1, p)
+        if is_narrow:
+            weights = (bonds[POWER_ROW.weight_1, k], bonds[POWER_ROW.weight_2, k])
+            exact = sum_linear_density(displacement, start, end, weights, p)
         else:
-            more = _beside_turn(q, a, b, bonds[3, k], bonds[5, k], p, True, nodes)
-            higher = _beside_turn(q, a, b, bonds[3, k], bonds[5, k], p + 1, False, nodes[8:])
-        force += more - less
-        energy += higher - lower
-    for k in range(head, first):
-        f, g = spread_over(q, bonds[0, k], bonds[1, k], p)
-        force += bonds[5, k] * f
-        energy += bonds[5, k] * g
-    return force, energy
+            exact = BondSum(
+                _integrate_power_strip(displacement, bonds, k, p, nodes, True),
+                _integrate_power_strip(displacement, bonds, k, p + 1, nodes[8:], False),
+            )
+        force += exact.force - gauss.force
+        energy += exact.energy - gauss.energy
+    for k in range(strips.head, strips.first):
+        average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], p)
+        force += bonds[POWER_ROW.weight_1, k] * average.force
+        energy += bonds[POWER_ROW.weight_1, k] * average.energy
+    return BondSum(force, energy)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _shares_closed(q, path, bonds, first, end, p, eps0):
-    """Force and energy [m] of strips of one pass for p = 0, 1, 2; S = 1 - (1 + ..) exp(-x), lever (p + 1) S - x phi."""
-    force, energy = 0.0, 0.0
-    one, two = min(p, 1.0), max(p - 1, 0.0) * 0.5
-    top = 1.0 - one  # x phi = exp(-x) x (top + one x (1 - t2) + two x x)
-    mid, most = one * (1.0 if p == 1.0 else 0.0), two
-    for k in range(uint64(first), uint64(end)):
-        b = bonds[1, k]
-        step = b - bonds[0, k]
-        g = np.copysign(1.0, step)
-        near = path - bonds[2, k]
-        turn = min(max(g * (b - q), 0.0), abs(step))
-        x, y, z = near / eps0, (near + turn) / eps0, (near + abs(step)) / eps0
-        ex, ey, ez = fexp(-x), fexp(-y), fexp(-z)
-        sx, sy = (1 + one * x * (1 + two * x)) * ex, (1 + one * y * (1 + two * y)) * ey
-        sz = (1 + one * z * (1 + two * z)) * ez
-        share = 2 * sy - sx - sz
-        dense = bonds[5, k]
-        lx, ly = ex * x * (top + x * (mid + x * most)), ey * y * (top + y * (mid + y * most))
-        lever = (p + 1) * share + 2 * ly - lx - ez * z * (top + z * (mid + z * most))
-        force += dense * (g * share)
-        energy += dense * (g * (q - b - g * near) * share + eps0 * lever)
-    return force, energy
+def _sum_closed_printed(displacement, path, bonds, strips, law):
+    """Sum strips of one pass in the form PRINTED for p = 0, 1 or 2, where P(p + 1, x) is elementary.
 
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def shares_sums(q, path, bonds, head, many, end, p, eps0, table, norm):
-    """(force [1], energy [m]) per unit mu_s N of the printed law (2.17) at constant bond length, exact.
-
-    q, path [m]: slide and path now; bonds: list, its strips head to end, the first `many` spread; p: order; eps0 [m];
-    table, norm: as `tabled` takes them. Strips of one pass are split where the stretch u changes sign.
+    With S(x) = 1 - P(p + 1, x) the integral of y phi(y) from 0 to x is (p + 1) (1 - S(x)) - x phi(x).
     """
-    first = head + many
-    force, energy = 0.0, 0.0
-    if p == 0.0 or p == 1.0 or p == 2.0:
-        force, energy = _shares_closed(q, path, bonds, first, end, p, eps0)
-    else:
-        before, lever = -1.0, 0.0
-        for k in range(end - 1, first - 1, -1):
-            step = bonds[1, k] - bonds[0, k]
-            g = np.copysign(1.0, step)
-            near = path - bonds[2, k]
-            turn = min(max(g * (bonds[1, k] - q), 0.0), abs(step))
-            x, y, z = near / eps0, (near + turn) / eps0, (near + abs(step)) / eps0
-            if before < 0:
-                before = tabled(p, x, table, norm)
-                lever = _lever(p, x, before, norm)
-            sx, lx = before, lever
-            before = tabled(p, z, table, norm)
-            lever = _lever(p, z, before, norm)
-            sy, ly = (sx, lx) if turn == 0 else (before, lever)
-            if 0 < turn < abs(step):
-                sy = tabled(p, y, table, norm)
-                ly = _lever(p, y, sy, norm)
-            share = before - 2 * sy + sx
-            force += bonds[5, k] * (g * share)
-            energy += bonds[5, k] * (
-                g * (q - bonds[1, k] - g * near) * share + eps0 * (lever - 2 * ly + lx)
-            )
-    for k in range(head, first):
-        near = path - bonds[2, k]
-        part, far = spread_over(q, bonds[0, k], bonds[1, k], 0.0)
-        own = bonds[5, k] * (
-            tabled(p, (near + bonds[3, k]) / eps0, table, norm)
-            - tabled(p, near / eps0, table, norm)
-        )
-        force += part * own
-        energy += far * own
-    return force, energy
+    p = law[LAW.order]
+    eps0 = law[LAW.length]
+    force = 0.0
+    energy = 0.0
+    # coefficients of S(x) = (1 + linear x (1 + quadratic x)) exp(-x) and of x phi(x)
+    linear = min(p, 1.0)
+    quadratic = max(p - 1, 0.0) * 0.5
+    phi_0 = 1.0 - linear
+    phi_1 = linear * (1.0 if p == 1.0 else 0.0)
+    phi_2 = quadratic
+    for k in range(uint64(strips.first), uint64(strips.end)):
+        place = bonds[STRIP.end, k]
+        step = place - bonds[STRIP.start, k]
+        direction = np.copysign(1.0, step)
+        near = path - bonds[STRIP.clock, k]
+        turn = min(max(direction * (place - displacement), 0.0), abs(step))
+        # path since the bonds at the end, at u = 0 and at the start of the strip formed
+        x = near / eps0
+        y = (near + turn) / eps0
+        z = (near + abs(step)) / eps0
+        exp_x = fexp(-x)
+        exp_y = fexp(-y)
+        exp_z = fexp(-z)
+        s_x = (1 + linear * x * (1 + quadratic * x)) * exp_x
+        s_y = (1 + linear * y * (1 + quadratic * y)) * exp_y
+        s_z = (1 + linear * z * (1 + quadratic * z)) * exp_z
+        signed = 2 * s_y - s_x - s_z
+        pressure = bonds[PRINTED_ROW.pressure, k]
+        density_x = exp_x * x * (phi_0 + x * (phi_1 + x * phi_2))
+        density_y = exp_y * y * (phi_0 + y * (phi_1 + y * phi_2))
+        density_z = exp_z * z * (phi_0 + z * (phi_1 + z * phi_2))
+        lever = (p + 1) * signed + 2 * density_y - density_x - density_z
+        offset = direction * (displacement - place - direction * near)
+        force += pressure * (direction * signed)
+        energy += pressure * (offset * signed + eps0 * lever)
+    return BondSum(force, energy)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _lever(p, x, s, norm):
-    """Integral from 0 to x of y phi(y): (p + 1) P(p + 1, x) - x phi(x), s = P(p + 1, x)."""
+def _sum_tabled_printed(displacement, path, bonds, strips, law, table):
+    """Sum strips of one pass in the form PRINTED for any order, by the table of P(p + 1, x)."""
+    p = law[LAW.order]
+    eps0 = law[LAW.length]
+    inverse_gamma = law[LAW.inverse_gamma]
+    force = 0.0
+    energy = 0.0
+    # values at the start of the strip are those at the end of the strip before, which is visited next
+    last = -1.0
+    last_lever = 0.0
+    for k in range(strips.end - 1, strips.first - 1, -1):
+        place = bonds[STRIP.end, k]
+        step = place - bonds[STRIP.start, k]
+        direction = np.copysign(1.0, step)
+        near = path - bonds[STRIP.clock, k]
+        turn = min(max(direction * (place - displacement), 0.0), abs(step))
+        x = near / eps0
+        z = (near + abs(step)) / eps0
+        if last < 0:
+            last = tabled(p, x, table, inverse_gamma)
+            last_lever = _integrate_lever(p, x, last, inverse_gamma)
+        p_x = last
+        lever_x = last_lever
+        last = tabled(p, z, table, inverse_gamma)
+        last_lever = _integrate_lever(p, z, last, inverse_gamma)
+        p_y = p_x if turn == 0 else last
+        lever_y = lever_x if turn == 0 else last_lever
+        if 0 < turn < abs(step):
+            y = (near + turn) / eps0
+            p_y = tabled(p, y, table, inverse_gamma)
+            lever_y = _integrate_lever(p, y, p_y, inverse_gamma)
+        signed = last - 2 * p_y + p_x
+        lever = last_lever - 2 * lever_y + lever_x
+        pressure = bonds[PRINTED_ROW.pressure, k]
+        offset = direction * (displacement - place - direction * near)
+        force += pressure * (direction * signed)
+        energy += pressure * (offset * signed + eps0 * lever)
+    return BondSum(force, energy)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def sum_printed(displacement, path, bonds, strips, law, table):
+    """Sum strips of the printed law at a constant bond length (eq. 2.17), exactly.
+
+    A strip of one pass is split where u changes its sign.
+
+    Parameters
+    ----------
+    displacement, path : float
+        Relative displacement and path [m] now.
+    bonds, strips : array, Range
+        Array of strips, and those that are summed.
+    law : (24,) array
+        Numbers of `LAW`.
+    table : (k,) array
+        As `list_math_kernels.tabled` takes it.
+
+    Returns
+    -------
+    BondSum
+        Force [1] and energy [m] per friction limit.
+    """
+    p = law[LAW.order]
+    eps0 = law[LAW.length]
+    inverse_gamma = law[LAW.inverse_gamma]
+    if p == 0.0 or p == 1.0 or p == 2.0:
+        total = _sum_closed_printed(displacement, path, bonds, strips, law)
+    else:
+        total = _sum_tabled_printed(displacement, path, bonds, strips, law, table)
+    force = total.force
+    energy = total.energy
+    for k in range(strips.head, strips.first):
+        near = path - bonds[STRIP.clock, k]
+        average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], 0.0)
+        older = tabled(p, (near + bonds[STRIP.clock_width, k]) / eps0, table, inverse_gamma)
+        younger = tabled(p, near / eps0, table, inverse_gamma)
+        carried = bonds[PRINTED_ROW.pressure, k] * (older - younger)
+        force += average.force * carried
+        energy += average.energy * carried
+    return BondSum(force, energy)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _integrate_lever(p, x, gamma_p, inverse_gamma):
+    """Integrate y phi(y) from 0 to x: (p + 1) P(p + 1, x) - x phi(x), with gamma_p = P(p + 1, x)."""
     if x <= 0:
         return 0.0
-    return (p + 1) * s - norm * fexp((p + 1) * flog(x) - x)
+    return (p + 1) * gamma_p - inverse_gamma * fexp((p + 1) * flog(x) - x)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _aged(q, path, psi, length, bonds, first, end, p):
-    """Sums over both Gauss points of W/2 f(R/own), own = length - psi c, times sgn u and times |u| [m]."""
-    force, energy, least = 0.0, 0.0, 1e-9 * length
+def _sum_gauss_growing(displacement, path, mature, bonds, first, end, p):
+    """Sum W/2 f(R/length) sgn u, and the same times |u|, over both Gauss points of strips of growing bonds."""
+    force = 0.0
+    energy = 0.0
+    min_length = MIN_LENGTH * mature.length
     if p == 1.0:
         for k in range(uint64(first), uint64(end)):
-            b, wide, near = bonds[1, k], bonds[3, k], path - bonds[2, k]
-            step = b - bonds[0, k]
-            u, v = q - b + FIRST * step, q - b + SECOND * step
-            x = (near + FIRST * wide) / max(length - psi * bonds[5, k], least)
-            y = (near + SECOND * wide) / max(length - psi * bonds[6, k], least)
-            f, g = bonds[4, k] * x * fexp(-x), bonds[4, k] * y * fexp(-y)
-            force += np.copysign(f, u) + np.copysign(g, v)
-            energy += f * abs(u) + g * abs(v)
+            place = bonds[STRIP.end, k]
+            width = bonds[STRIP.clock_width, k]
+            near = path - bonds[STRIP.clock, k]
+            step = place - bonds[STRIP.start, k]
+            u_1 = displacement - place + GAUSS_1 * step
+            u_2 = displacement - place + GAUSS_2 * step
+            length_1 = max(
+                mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length
+            )
+            length_2 = max(
+                mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length
+            )
+            x_1 = (near + GAUSS_1 * width) / length_1
+            x_2 = (near + GAUSS_2 * width) / length_2
+            force_1 = bonds[STRIP.weight, k] * x_1 * fexp(-x_1)
+            force_2 = bonds[STRIP.weight, k] * x_2 * fexp(-x_2)
+            force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
+            energy += force_1 * abs(u_1) + force_2 * abs(u_2)
     else:
         for k in range(uint64(first), uint64(end)):
-            b, wide, near = bonds[1, k], bonds[3, k], path - bonds[2, k]
-            step = b - bonds[0, k]
-            u, v = q - b + FIRST * step, q - b + SECOND * step
-            x = max(near + FIRST * wide, 1e-300) / max(length - psi * bonds[5, k], least)
-            y = max(near + SECOND * wide, 1e-300) / max(length - psi * bonds[6, k], least)
-            f, g = bonds[4, k] * fexp(p * flog(x) - x), bonds[4, k] * fexp(p * flog(y) - y)
-            force += np.copysign(f, u) + np.copysign(g, v)
-            energy += f * abs(u) + g * abs(v)
-    return 0.5 * force, 0.5 * energy
+            place = bonds[STRIP.end, k]
+            width = bonds[STRIP.clock_width, k]
+            near = path - bonds[STRIP.clock, k]
+            step = place - bonds[STRIP.start, k]
+            u_1 = displacement - place + GAUSS_1 * step
+            u_2 = displacement - place + GAUSS_2 * step
+            length_1 = max(
+                mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length
+            )
+            length_2 = max(
+                mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length
+            )
+            x_1 = max(near + GAUSS_1 * width, MIN_PATH) / length_1
+            x_2 = max(near + GAUSS_2 * width, MIN_PATH) / length_2
+            force_1 = bonds[STRIP.weight, k] * fexp(p * flog(x_1) - x_1)
+            force_2 = bonds[STRIP.weight, k] * fexp(p * flog(x_2) - x_2)
+            force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
+            energy += force_1 * abs(u_1) + force_2 * abs(u_2)
+    return BondSum(0.5 * force, 0.5 * energy)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def start_length(part, c0, c1):
-    """Scaled length that the bonds at a place of a strip started with, log-linear between its two Gauss points.
+def start_length(fraction, length_1, length_2):
+    """Interpolate the scaled length that the bonds of a strip started with, log-linearly between its Gauss points.
 
-    part [1]: the place as a share of the strip, from its end; c0, c1: the values at the Gauss points, 0 once they are
-    gone.
+    Parameters
+    ----------
+    fraction : float
+        Place as a fraction of the strip from its end.
+    length_1, length_2 : float
+        Values at the Gauss points, 0 once nothing is left of them.
+
+    Returns
+    -------
+    float
     """
-    rise = (part - FIRST) / (SECOND - FIRST)
-    return c0 * exp(rise * (flog(c1) - flog(c0))) if c0 > 1e-300 and c1 > 1e-300 else max(c0, c1)
+    if length_1 > MIN_PATH and length_2 > MIN_PATH:
+        rise = (fraction - GAUSS_1) / (GAUSS_2 - GAUSS_1)
+        return length_1 * exp(rise * (flog(length_2) - flog(length_1)))
+    return max(length_1, length_2)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def own_length(part, psi, length, c0, c1):
-    """Bond length [m] at a place of a strip: length - psi start_length, at least 1e-9 length.
-
-    part [1]: as in `start_length`; psi: factor that undoes the scale; length [m]: mature bond length now.
-    """
-    return max(length - psi * start_length(part, c0, c1), 1e-9 * length)
+def _bond_length(fraction, mature, bonds, k):
+    """Return the bond length [m] at a place of a strip: it approaches that of mature bonds (eq. 2.10)."""
+    start = start_length(fraction, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k])
+    return max(mature.length - mature.scale * start, MIN_LENGTH * mature.length)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _bends(p):
-    """Whether R^p is too steep at R = 0, or bends too sharply there, for two Gauss points in R."""
+def _is_steep(p):
+    """Return whether R^p is singular at R = 0, or curves too sharply there, for two Gauss points in R."""
     return p < 2 and p != np.floor(p)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p):
-    """One strip of growing bonds with u = 0 inside, or near the present with a fractional p: two points on each side of
-    u = 0.
+def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
+    """Integrate a strip of growing bonds on each side of u = 0 by two Gauss points.
 
-    A young bond has own proportional to R, so that (R/own)^p is smooth and the points are Gauss's in R. Where the bonds
-    grew at rest instead, R^p is steep towards R = 0 and the points are Gauss's in R^(p + 1), which takes it in exactly.
+    The length of a young bond is proportional to R, so (R/length)^p is smooth and the points are those of R. Where the
+    bonds grew at rest instead, R^p is steep towards R = 0; the points are then those of R^(p + 1), which is exact.
     """
-    step, near, force, energy = b - a, max(path - at, 0.0), 0.0, 0.0
-    turn = min(max((b - q) / step, 0.0), 1.0)
-    steep = False
-    if _bends(p):
-        last, first = own_length(0.0, psi, length, c0, c1), own_length(1.0, psi, length, c0, c1)
-        steep = last > SPROUTING * first and near * first < 0.5 * (near + wide) * last
+    start = bonds[STRIP.start, k]
+    end = bonds[STRIP.end, k]
+    width = bonds[STRIP.clock_width, k]
+    step = end - start
+    near = max(path - bonds[STRIP.clock, k], 0.0)
+    force = 0.0
+    energy = 0.0
+    turn = min(max((end - displacement) / step, 0.0), 1.0)
+    is_steep = False
+    if _is_steep(p):
+        last = _bond_length(0.0, mature, bonds, k)
+        first = _bond_length(1.0, mature, bonds, k)
+        grew_at_rest = last > MIN_GROWING_RATIO * first
+        is_steep = grew_at_rest and near * first < 0.5 * (near + width) * last
     for side in range(2):
-        low, high = (0.0, turn) if side == 0 else (turn, 1.0)
+        low = 0.0 if side == 0 else turn
+        high = turn if side == 0 else 1.0
         if high <= low:
             continue
-        for half in range(2):
-            share = FIRST if half == 0 else SECOND
-            part = low + share * (high - low)
-            weight = 0.5 * (high - low) * wide
-            if steep:
-                start, end = (near + low * wide) ** (p + 1), (near + high * wide) ** (p + 1)
-                place = (start + share * (end - start)) ** (1 / (p + 1))
-                part = (place - near) / wide
-                weight = 0.5 * (end - start) / (p + 1) * place ** (-p)
-            x = max(near + part * wide, 1e-300) / own_length(part, psi, length, c0, c1)
-            f = weight * fexp(p * flog(x) - x)
-            u = q - b + part * step
-            force += np.copysign(f, u)
-            energy += f * abs(u)
-    return force, energy
+        for point in range(2):
+            gauss = GAUSS_1 if point == 0 else GAUSS_2
+            fraction = low + gauss * (high - low)
+            weight = 0.5 * (high - low) * width
+            if is_steep:
+                power_low = (near + low * width) ** (p + 1)
+                power_high = (near + high * width) ** (p + 1)
+                place = (power_low + gauss * (power_high - power_low)) ** (1 / (p + 1))
+                fraction = (place - near) / width
+                weight = 0.5 * (power_high - power_low) / (p + 1) * place ** (-p)
+            x = max(near + fraction * width, MIN_PATH) / _bond_length(fraction, mature, bonds, k)
+            carried = weight * fexp(p * flog(x) - x)
+            u = displacement - end + fraction * step
+            force += np.copysign(carried, u)
+            energy += carried * abs(u)
+    density = bonds[STRIP.weight, k] / width
+    return BondSum(density * force, density * energy)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
-    """Sums of path f(R/own) sgn u [m] and of the same times |u| [m2] over strips of growing bonds of the printed law.
+def _spread_growing_strip(displacement, path, mature, bonds, k, p):
+    """Take a strip of growing bonds as spread evenly over its places, each bond with the age that it has."""
+    low = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
+    high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
+    average = average_spread(displacement, low, high, 0.0)
+    # beyond the strip all directions agree, so the sum is what the bonds carry
+    beyond = high + bonds[STRIP.clock_width, k]
+    carried = _sum_gauss_growing(beyond, path, mature, bonds, k, k + 1, p).force
+    return BondSum(average.force * carried, average.energy * carried)
 
-    The factor 1/(eps_0 Gamma(p + 1)) is left out. psi, length: as in `own_length`; coarse [m]: as in `power_sums`;
-    bonds: list, its strips head to end, the first `many` spread.
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def sum_growing(displacement, path, mature, bonds, strips, law):
+    """Sum strips of the printed law with growing bonds (eqs. 2.10 and 2.17).
+
+    Parameters
+    ----------
+    displacement, path : float
+        Relative displacement and path [m] now.
+    mature : Mature
+        Length of mature bonds, and factor that undoes the scale of the starting lengths.
+    bonds, strips : array, Range
+        Array of strips, and those that are summed.
+    law : (24,) array
+        Numbers of `LAW`.
+
+    Returns
+    -------
+    BondSum
+        Force [m] and energy [m2], without the factor 1/(eps_0 Gamma(p + 1)).
     """
-    first = head + many
-    force, energy = _aged(q, path, psi, length, bonds, first, end, p)
-    for k in range(first, end):
-        a, b, near, wide = bonds[0, k], bonds[1, k], path - bonds[2, k], bonds[3, k]
-        beside = _bends(p) and near <= 3 * wide
-        if (q - a) * (q - b) >= 0 and not beside:
+    p = law[LAW.order]
+    merge_width = law[LAW.merge_width] * law[LAW.length]
+    total = _sum_gauss_growing(displacement, path, mature, bonds, strips.first, strips.end, p)
+    force = total.force
+    energy = total.energy
+    for k in range(strips.first, strips.end):
+        from_start = displacement - bonds[STRIP.start, k]
+        from_end = displacement - bonds[STRIP.end, k]
+        near = path - bonds[STRIP.clock, k]
+        width = bonds[STRIP.clock_width, k]
+        is_young = _is_steep(p) and near <= 3 * width
+        if from_start * from_end >= 0 and not is_young:
             continue
-        less, lower = _aged(q, path, psi, length, bonds, k, k + 1, p)
-        if not beside and wide <= coarse * fexp(near / (3 * length)) and near > length:
-            part, far = spread_over(q, min(a, b), max(a, b), 0.0)
-            own = _aged(max(a, b) + wide, path, psi, length, bonds, k, k + 1, p)[0]
-            more, higher = part * own, far * own
+        gauss = _sum_gauss_growing(displacement, path, mature, bonds, k, k + 1, p)
+        is_narrow = width <= merge_width * fexp(near / (3 * mature.length))
+        if not is_young and is_narrow and near > mature.length:
+            exact = _spread_growing_strip(displacement, path, mature, bonds, k, p)
         else:
-            more, higher = _aged_split(
-                q, path, psi, length, a, b, bonds[2, k], wide, bonds[5, k], bonds[6, k], p
-            )
-            dense = bonds[4, k] / wide
-            more, higher = dense * more, dense * higher
-        force += more - less
-        energy += higher - lower
-    for k in range(head, first):
-        near, dl = path - bonds[2, k], bonds[3, k]
-        x = max(near + FIRST * dl, 1e-300) / max(length - psi * bonds[5, k], 1e-9 * length)
-        y = max(near + SECOND * dl, 1e-300) / max(length - psi * bonds[6, k], 1e-9 * length)
-        own = 0.5 * bonds[4, k] * (fexp(p * flog(x) - x) + fexp(p * flog(y) - y))
-        part, far = spread_over(q, bonds[0, k], bonds[1, k], 0.0)
-        force += part * own
-        energy += far * own
-    return force, energy
+            exact = _integrate_growing_strip(displacement, path, mature, bonds, k, p)
+        force += exact.force - gauss.force
+        energy += exact.energy - gauss.energy
+    min_length = MIN_LENGTH * mature.length
+    for k in range(strips.head, strips.first):
+        near = path - bonds[STRIP.clock, k]
+        width = bonds[STRIP.clock_width, k]
+        length_1 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length)
+        length_2 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length)
+        x_1 = max(near + GAUSS_1 * width, MIN_PATH) / length_1
+        x_2 = max(near + GAUSS_2 * width, MIN_PATH) / length_2
+        carried = fexp(p * flog(x_1) - x_1) + fexp(p * flog(x_2) - x_2)
+        carried *= 0.5 * bonds[STRIP.weight, k]
+        average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], 0.0)
+        force += average.force * carried
+        energy += average.energy * carried
+    return BondSum(force, energy)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def first_bonds(q, path, damage, law):
-    """(force [1], energy [m]) per unit mu_s N of the initial bonds, of density m_0 and unstressed at q = 0.
+def sum_initial(displacement, path, damage, law):
+    """Return force and energy of the initial bonds, of density m_0 and unstressed at the displacement 0.
 
-    Their force may jump there: at the place itself, to the round-off of the path, it is 0, the mean of both sides. With
-    a width law[7] [m] they lie evenly as far as that on both sides of their place, where they store nothing.
-    q, path [m], damage [1]: now; law: `list_numbers.law_numbers`.
+    Their force may jump there: at the place itself, to the round-off of the path, it is 0, the mean of both sides. If
+    the law spreads them over a width, they store nothing at displacement 0.
+
+    Parameters
+    ----------
+    displacement, path, damage : float
+        Relative displacement [m], path [m] and damage [1] now.
+    law : (24,) array
+        Numbers of `LAW`.
+
+    Returns
+    -------
+    BondSum
+        Force [1] and energy [m] per friction limit.
     """
-    p, eps0, m0, norm, wide = law[0], law[2], law[3], law[4], law[7]
-    if m0 == 0 or (wide == 0 and abs(q) <= AT_PLACE * path):
-        return 0.0, 0.0
-    if law[1] <= POWER:
-        left = m0 * norm * fexp(-damage) * fexp(-p * flog(eps0))
-        if wide > 0:
-            f, g = spread_over(q, -wide, wide, p)
-            return left * f, left * (g - fexp((p + 1) * flog(wide)) / (p + 2)) / (p + 1)
-        f = left * fexp(p * flog(abs(q)))
-        return f * np.sign(q), f * abs(q) / (p + 1)
-    f = m0 * norm * fexp(p * flog(path / eps0) - path / eps0)
-    if wide > abs(q):
-        return f * q / wide, f * q * q / (2 * wide)
-    return f * np.sign(q), f * (abs(q) - wide / 2)
+    p = law[LAW.order]
+    eps0 = law[LAW.length]
+    initial = law[LAW.initial]
+    half_width = law[LAW.half_width]
+    is_at_place = half_width == 0 and abs(displacement) <= AT_PLACE * path
+    if initial == 0 or is_at_place:
+        return BondSum(0.0, 0.0)
+    if law[LAW.form] <= POWER:
+        weight = initial * law[LAW.inverse_gamma] * fexp(-damage) * fexp(-p * flog(eps0))
+        if half_width > 0:
+            average = average_spread(displacement, -half_width, half_width, p)
+            at_rest = fexp((p + 1) * flog(half_width)) / (p + 2)
+            energy = weight * (average.energy - at_rest) / (p + 1)
+            return BondSum(weight * average.force, energy)
+        force = weight * fexp(p * flog(abs(displacement)))
+        return BondSum(force * np.sign(displacement), force * abs(displacement) / (p + 1))
+    force = initial * law[LAW.inverse_gamma] * fexp(p * flog(path / eps0) - path / eps0)
+    if half_width > abs(displacement):
+        energy = force * displacement * displacement / (2 * half_width)
+        return BondSum(force * displacement / half_width, energy)
+    return BondSum(force * np.sign(displacement), force * (abs(displacement) - half_width / 2))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def first_mean(dq, q, path, law):
-    """Path mean [1] of the force of the first bonds of the print over the increment dq [m] from the slide q, path [m]
-    before it: exact on both sides of their place, where it jumps, or turns over the width law[7]."""
-    p, eps0, size, wide = law[0], law[2], abs(dq), law[7]
-    if law[3] == 0:
+def average_initial(increment, displacement, path, law):
+    """Average the force of the initial bonds of the printed law over an increment, exactly.
+
+    The force jumps at the place of the bonds, or turns over the width that they are spread over.
+
+    Parameters
+    ----------
+    increment, displacement, path : float
+        Increment [m]; relative displacement and path [m] before it.
+    law : (24,) array
+        Numbers of `LAW`.
+
+    Returns
+    -------
+    float
+        Path-mean force [1] per friction limit.
+    """
+    p = law[LAW.order]
+    eps0 = law[LAW.length]
+    half_width = law[LAW.half_width]
+    size = abs(increment)
+    if law[LAW.initial] == 0:
         return 0.0
-    way = np.copysign(1.0, dq)
-    enter, leave = min(max(-way * q - wide, 0.0), size), min(max(-way * q + wide, 0.0), size)
-    ends = share(p, path / eps0), share(p, (path + enter) / eps0), share(p, (path + leave) / eps0)
-    total = share(p, (path + size) / eps0) - ends[2] - (ends[1] - ends[0])
+    direction = np.copysign(1.0, increment)
+    # parts of the increment before, inside and behind the range of the bonds
+    enter = min(max(-direction * displacement - half_width, 0.0), size)
+    leave = min(max(-direction * displacement + half_width, 0.0), size)
+    p_start = share(p, path / eps0)
+    p_enter = share(p, (path + enter) / eps0)
+    p_leave = share(p, (path + leave) / eps0)
+    total = share(p, (path + size) / eps0) - p_leave - (p_enter - p_start)
     if leave > enter:
-        start, end = way * q + enter, way * q + leave
-        total += (ends[2] - ends[1]) * 0.5 * (start + end) / wide
-    return way * law[3] * total * eps0 / size
+        middle = 0.5 * (direction * displacement + enter + (direction * displacement + leave))
+        total += (p_leave - p_enter) * middle / half_width
+    return direction * law[LAW.initial] * total * eps0 / size
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def formed(size, eps, law):
-    """Weight [1], after one straight increment, of the bonds that form on it.
+def formed_force(path, eps, law):
+    """Return the force [1] of the bonds that form on a straight increment, per friction limit.
 
-    size [m]: length of the increment; eps [m]: bond length; law: `list_numbers.law_numbers`.
+    Parameters
+    ----------
+    path, eps : float
+        Length of the increment, bond length [m].
+    law : (24,) array
+        Numbers of `LAW`.
+
+    Returns
+    -------
+    float
     """
-    return eps / law[2] * share(law[0], size / eps)
+    return eps / law[LAW.length] * share(law[LAW.order], path / eps)

@@ -1,23 +1,33 @@
-"""The numbers of the bond law (report, 2.C) and the growth of the bond length (2.10)."""
+"""Parameters of the bond law (report, 2.C), and the growth of the bond length (eq. 2.10)."""
 
 from dataclasses import dataclass
 from math import exp, log
+from typing import NamedTuple
 
 import numpy as np
 
-LONG = 1e100  # exponents of growth beyond which nothing changes any more
-LONGEST = 600.0  # seconds that a list of bonds may take before a run is refused
+MAX_EXPONENT = 1e100  # exponents of growth beyond which the bond length no longer changes
+LONGEST = 600.0  # largest estimated CPU seconds of a run with a list of bonds
+SAME_SPEED = 1e-6  # relative difference of two speeds below which their mean is as good, and free of cancellation
+MIN_GROWTH = 1e-9  # growth J of a step below which the growth along it is linear
 
 
 @dataclass(frozen=True, slots=True)
 class Bonds:
-    """Parameters of eq. 2.10-2.17.
+    """Parameters of eqs. 2.10 to 2.17.
 
-    static: mu_s; ratio = eps_k/eps_0 = mu_k/mu_s (2.21); length = eps_0 [m]; order = p; reading "stretch" or "report";
-    rest_growth = a_s [m s-2] (2.10 needs this unit) and slip_growth = l_k [m], None for a constant bond length, (m,) in
-    `recursion` for points of their own temperature;
-    rest_speed = v_h [m/s], the floor under |v| without which 2.10 has no limit at a reversal; initial = m_0;
-    breakaway: share of the bond length that stretches without damage.
+    - static: friction coefficient mu_s
+    - length: bond length eps_0 [m]
+    - order: exponent p
+    - reading: "stretch" or "report", see `quadrature`
+    - ratio: eps_k/eps_0 = mu_k/mu_s (eq. 2.21)
+    - rest_growth: a_s [m s-2], None for a constant bond length (eq. 2.10 needs this unit)
+    - slip_growth: l_k [m], None for a constant bond length
+    - rest_speed: v_h [m/s], lower limit of |v|, without which eq. 2.10 has no limit at a reversal
+    - initial: density m_0 of the initial bonds
+    - breakaway: fraction of the bond length that stretches without damage
+
+    In `recursion` the growth may be an array (m,) for points of different temperature.
     """
 
     static: float
@@ -33,83 +43,139 @@ class Bonds:
 
     @property
     def grows(self) -> bool:
-        """Whether the bond length evolves by eq. 2.10; without rates it stays at eps_0."""
+        """Whether the bond length changes by eq. 2.10; else it is eps_0."""
         return self.rest_growth is not None
 
 
-def won_share(growth, back):
-    """Share of the mature length won in a step (2.10 at constant speed) that was won before the place `back` [1] behind
-    its end; growth: the step multiplies the distance to its goal by exp(-growth)."""
-    # of little growth the share is linear
-    return np.divide(
-        np.expm1(-growth * (1 - back)), np.expm1(-growth), out=1 - back, where=growth > 1e-9
-    )
+class ElasticSplit(NamedTuple):
+    """Elastic and damaging part of an increment [m], and the play [1] after it."""
+
+    elastic: float
+    damaging: float
+    play: float
 
 
-def ripening(law: Bonds, speed: float) -> float:
-    """Path in which a bond that starts from nothing ripens (2.10), over its steady length (2.11), at a speed [m/s].
+def grown_fraction(growth, back):
+    """Return the fraction of the growth in a step at constant speed that happened before a place of the step.
 
-    In the report reading friction is mu (eps/eps_0) G(a; p) with this a, so 2.18-2.21 hold where a is small: within
-    1.5 % up to 0.1 for p = 0 and 1; for a beyond 1 the friction itself fades away.
+    Parameters
+    ----------
+    growth : array
+        Growth J of the step, which multiplies the distance to the target length by exp(-J).
+    back : array
+        Place as a fraction of the step from its end.
+
+    Returns
+    -------
+    array
+    """
+    before = np.expm1(-growth * (1 - back))
+    return np.divide(before, np.expm1(-growth), out=1 - back, where=growth > MIN_GROWTH)
+
+
+def growth_path_ratio(law: Bonds, speed: float) -> float:
+    """Return the path on which a new bond grows (eq. 2.10) over its steady length (eq. 2.11), at a speed [m/s].
+
+    With this ratio a, the friction in the report reading is mu (eps/eps_0) G(a; p). Eqs. 2.18 to 2.21 hold for small a,
+    within 1.5 % up to 0.1 for p = 0 and 1; for a above 1 the friction itself vanishes.
     """
     if not law.grows or speed == 0:
         return 0.0
-    slow, fast = law.rest_growth / speed**2, 1 / law.slip_growth
-    return 1 / ((slow + fast) * law.length * (slow + law.ratio * fast) / (slow + fast))
+    healing = law.rest_growth / speed**2
+    weakening = 1 / law.slip_growth
+    steady = law.length * (healing + law.ratio * weakening) / (healing + weakening)
+    return 1 / ((healing + weakening) * steady)
 
 
-def elastic_part(law: Bonds, play, dq, eps):
-    """(elastic, damaging) parts of the increment dq and the play after it; dq [m] and play [1] scalars or (m,).
+def elastic_part(law: Bonds, play, increment, eps) -> ElasticSplit:
+    """Split an increment by the play operator (Visintin, Differential Models of Hysteresis, 1994).
 
-    Play says where the slide stands in its elastic range, of half width breakaway * eps: -1 and 1 at the ends. Inside,
-    bonds stretch and none breaks or forms, and the slide keeps its share of a width that changes with eps; at an end
-    all of an outward slide drags the range along and damages. A damaged path counted so keeps every statement about
-    energy, and a motion to and fro within the range leaves no trace (a play operator, Visintin, Differential Models of
-    Hysteresis, 1994).
+    The play says where the displacement stands in its elastic range, of half width breakaway eps: -1 and 1 at the ends.
+    Inside, bonds stretch, and none breaks or forms; the play keeps its value if the width changes with eps. At an end
+    an outward displacement moves the range along and damages bonds. A motion to and fro within the range leaves no
+    trace, and the statements about energy hold with the damaging path.
+
+    Parameters
+    ----------
+    law : Bonds
+    play, increment, eps : float or (m,) array
+        Play [1] before, increment and bond length [m].
+
+    Returns
+    -------
+    ElasticSplit
     """
     half = law.breakaway * eps
     start = play * half
-    end = np.clip(start + dq, -half, half)
-    free = np.where(end == start + dq, dq, end - start)[()]
+    end = np.clip(start + increment, -half, half)
+    elastic = np.where(end == start + increment, increment, end - start)[()]
     inside = np.divide(end, half, out=np.zeros_like(end), where=half > 0)
-    return free, dq - free, np.where(np.abs(end) == half, np.sign(end), inside)[()]
+    after = np.where(np.abs(end) == half, np.sign(end), inside)[()]
+    return ElasticSplit(elastic, increment - elastic, after)
 
 
-def growth_exponents(law: Bonds, v0: float, v1: float, dq: float, dt: float) -> tuple:
-    """(I_A, I_B): integrals over the step of a_s/max(|v|, v_h) and |v|/l_k, exact for a velocity linear in time.
+def _integrate_slowness(speed: float, floor: float) -> float:
+    """Return the integral of 1/max(|v|, floor) over v from 0 to the speed."""
+    if abs(speed) < floor:
+        return speed / floor
+    return np.sign(speed) * (1 + log(abs(speed) / floor))
 
-    v0, v1 [m/s] at the ends, dq [m] moved, dt [s]. With S(v) = v/v_h below the floor and sgn(v)(1 + ln(|v|/v_h)) above,
-    I_A = a_s dt (S(v1) - S(v0))/(v1 - v0).
+
+def growth_exponents(law: Bonds, v0: float, v1: float, increment: float, dt: float) -> tuple:
+    """Integrate a_s/max(|v|, v_h) and |v|/l_k over a step, exactly for a velocity linear in time.
+
+    Parameters
+    ----------
+    law : Bonds
+    v0, v1 : float
+        Velocities [m/s] at the ends of the step.
+    increment, dt : float
+        Increment [m] and duration [s].
+
+    Returns
+    -------
+    healing, weakening : float
+        Exponents of eq. 2.10.
     """
     floor = law.rest_speed
-
-    def primitive(v):
-        return v / floor if abs(v) < floor else np.sign(v) * (1 + log(abs(v) / floor))
-
     if max(abs(v0), abs(v1)) < floor:
-        rest = law.rest_growth * dt / floor
-    # closer speeds: their difference loses its digits, and the mean speed is as good
-    elif abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
-        rest = law.rest_growth * dt * (primitive(v1) - primitive(v0)) / (v1 - v0)
+        healing = law.rest_growth * dt / floor
+    elif abs(v1 - v0) > SAME_SPEED * (abs(v0) + abs(v1)):
+        slowness = _integrate_slowness(v1, floor) - _integrate_slowness(v0, floor)
+        healing = law.rest_growth * dt * slowness / (v1 - v0)
     else:
-        rest = law.rest_growth * dt / max(abs(v0 + v1) / 2, floor)
-    return np.minimum(rest, LONG), np.minimum(abs(dq) / law.slip_growth, LONG)
+        healing = law.rest_growth * dt / max(abs(v0 + v1) / 2, floor)
+    weakening = abs(increment) / law.slip_growth
+    return np.minimum(healing, MAX_EXPONENT), np.minimum(weakening, MAX_EXPONENT)
 
 
-def grow(law: Bonds, eps, v0: float, v1: float, dq: float, dt: float):
-    """Bond length [m] after a step (2.10): exact relaxation towards (I_A eps_0 + I_B eps_k)/(I_A + I_B), in (0, eps_0].
+def grow(law: Bonds, eps, v0: float, v1: float, increment: float, dt: float):
+    """Return the bond length after a step (eq. 2.10): it relaxes towards (A eps_0 + B eps_k)/(A + B).
 
-    A step of zero length and zero time changes nothing; at rest it is pure healing. Where the law holds its rates per
-    point (m,), so is the length.
+    A and B are the exponents of `growth_exponents`. At rest the bonds heal; a step without motion and time changes
+    nothing.
+
+    Parameters
+    ----------
+    law : Bonds
+    eps : float or (m,) array
+        Bond length [m] before; an array if the rates of the law are arrays.
+    v0, v1, increment, dt : float
+        As in `growth_exponents`.
+
+    Returns
+    -------
+    float or (m,) array
+        Bond length [m], at most eps_0.
     """
     if not law.grows:
         return law.length
-    rest, slide = growth_exponents(law, v0, v1, dq, dt)
-    total = rest + slide
+    healing, weakening = growth_exponents(law, v0, v1, increment, dt)
+    total = healing + weakening
     if np.ndim(total):
-        target = law.length * (rest + slide * law.ratio) / np.where(total > 0, total, 1.0)
+        target = law.length * (healing + weakening * law.ratio) / np.where(total > 0, total, 1.0)
         return np.where(total > 0, target + (eps - target) * np.exp(-total), eps)
     if total == 0:
         return eps
-    target = law.length * (rest + slide * law.ratio) / total
+    target = law.length * (healing + weakening * law.ratio) / total
     return target + (eps - target) * exp(-total)

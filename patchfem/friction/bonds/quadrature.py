@@ -26,7 +26,7 @@ import numpy as np
 from ..protocol import Step
 from .list_numbers import cutoff
 from .parameters import Bonds, elastic_part, grow, growth_exponents
-from .recursion import direction, moved, pressed, refuse_directions
+from .recursion import BondState, direction, move_bonds, press_bonds, refuse_directions
 from .strips import COLUMNS, Strips, surviving, weights
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
@@ -77,14 +77,10 @@ class Quadrature:
         if not dq.any():
             return Step(self.traction(after), -gain, after)
         if self._closed:
-            mean = moved(
-                self.law,
-                self._moments(state),
-                state.play,
-                dq[0] if len(dq) == 1 else dq,
-                (s0 + s1) / 2,
-                self._middle(state, dq, dt),
-            )[1]
+            middle = self._middle(state, dq, dt)
+            bonds = BondState(self._moments(state), middle, state.play)
+            increment = dq[0] if len(dq) == 1 else dq
+            mean = move_bonds(self.law, bonds, increment, (s0 + s1) / 2, middle).mean
             mean = self.law.static / self.law.length * np.reshape(mean, (len(dq), -1))
         elif self.law.reading == "report":
             mean = self._along(state, dq, s0, s1, dt)[0]
@@ -136,7 +132,7 @@ class Quadrature:
         """The pressure at rest goes from s0 to s1 (m,) [Pa] on a line; mean: the traction after it.
 
         As printed, a bond keeps the pressure it formed under and none forms at rest. In the stretch reading with p = 1
-        the rule is that of `recursion.pressed`; with another order the last-formed bonds are let go first, one by one.
+        the rule is that of `recursion.press_bonds`; with another order the last-formed bonds are let go first, one by one.
         """
         after = replace(state, alive=np.where(s1 > 0, state.alive, len(state.q)))
         if self.law.reading == "stretch":
@@ -154,7 +150,7 @@ class Quadrature:
         that have the moments of `pressed`."""
         before = self._moments(state)
         m, _, s2 = before
-        dense, _, kept = pressed(self.law, before, s0, s1)
+        dense, _, kept = press_bonds(self.law, before, s0, s1)
         keep = np.divide(kept, s2, out=np.ones_like(s2), where=s2 > 0)
         return keep, dense - keep * m
 

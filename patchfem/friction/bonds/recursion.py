@@ -1,28 +1,28 @@
-"""The stretch reading for p = 1, summed exactly by a bond state that never grows, along a line or in a plane.
+"""Stretch reading with p = 1, summed exactly by a state of constant size, along a line or in a plane.
 
-With k = exp(-int dR/eps) the surviving share of a bond, u its stretch and 1/eps frozen when it forms, the sums over all
-bonds
+With k = exp(-int dR/eps) the surviving fraction of a bond, u its stretch and 1/eps frozen when it forms, the sums over
+all bonds
 
     m = sum sigma k dL/eps,   z = sum sigma k u dL/eps,   s2 = sum sigma k u^2 dL/eps        [Pa, Pa m, Pa m2]
 
 obey, per unit of path in the direction e, m' = (sigma - m)/eps, z' = m e - z/eps, s2' = 2 z.e - s2/eps; the traction is
-mu_s z/eps_0. The step is exact for a bond length held over it. Stored energy mu_s s2/(2 eps_0) and dissipation
+mu_s z/eps_0. A step is exact for a bond length that is constant in it. Stored energy mu_s s2/(2 eps_0) and dissipation
 mu_s s2/(2 eps_0 eps) per path are never negative: passive for every path, pressure and bond length, and for every part
 of the path that is counted as damaging.
 
 Directions. A line is a plane with one component: u and z are vectors of d = 1 or 2 components, the part of z along the
 increment steps as on a line and the part across it decays. Bonds are arrays (d + 2, m) of m, the components of z, s2.
 
-Breakaway (on a line). The path counts only where the slide drags its elastic range along
-(`parameters.elastic_part`); inside it z' = m e and s2' = 2 z.e. With a share b of the bond length, a dither of the
-force by less than 2 b mu_s sigma from end to end drifts in its first cycle only, b = 0 is Dahl's law and b -> 1 the
-elastic-plastic one.
+Breakaway (on a line). The path counts only where the displacement moves its elastic range along
+(`parameters.elastic_part`); inside it z' = m e and s2' = 2 z.e. With a fraction b of the bond length, an oscillation of
+the force by less than 2 b mu_s sigma from end to end drifts in its first cycle only; b = 0 is Dahl's law, and b -> 1
+the elastic-plastic one.
 
-Load. Where the load falls at rest, the bonds that carry nothing, the last formed, are let go first: the force stays as
+Load. Where the load falls at rest, the bonds without stretch, which formed last, are released first: the force stays as
 long as a population with the moments (m, z, s2) exists, m >= z^2/s2. Beyond that all stretches shrink, and no point
-keeps more than mu_s sigma. Where it rises, unstressed bonds come in the density m_0. Neither gives energy.
+keeps more than mu_s sigma. Where it rises, unstressed bonds of density m_0 form. Neither adds energy.
 
-Compiled twins: `point_kernels` for one point of a line.
+Compiled for one point of a line: `point_kernels`.
 """
 
 from dataclasses import dataclass
@@ -36,188 +36,298 @@ from ...effects import not_supported_message
 from ..protocol import Step
 from .parameters import Bonds, elastic_part, grow
 
+MAX_SERIES = 0.03  # path in bond lengths below which the shape functions are power series
+MAX_POWER_SERIES = 0.5  # path in bond lengths below which the integrals of powers are power series
+TINY = 1e-300  # divisor that keeps quotients finite where nothing is left
+
 
 class BondState(NamedTuple):
-    """bonds (d + 2, m): m [Pa], z [Pa m], s2 [Pa m2]; eps: bond length [m], common or one per point (m,); play [1] of
-    `parameters.elastic_part`."""
+    """State of the bonds of all points.
+
+    - bonds: m [Pa], the components of z [Pa m] and s2 [Pa m2], (d + 2, m)
+    - eps: bond length [m], common or per point (m,)
+    - play: place in the elastic range [1], see `parameters.elastic_part`
+    """
 
     bonds: np.ndarray
     eps: float | np.ndarray
     play: float | np.ndarray = 0.0
 
 
-def shape_functions(x):
-    """(f1, f2, exp(-x)) [1] with f1 = (1 - exp(-x))/x, f2 = (1 - f1)/x for x >= 0 of any shape, without cancellation.
+class ShapeFunctions(NamedTuple):
+    """Shape functions f1 = (1 - exp(-x))/x, f2 = (1 - f1)/x and decay = exp(-x) of a path x in bond lengths."""
 
-    Below x = 0.03 both are series of seven terms. Compiled twin: `point_kernels.shape`.
+    f1: np.ndarray
+    f2: np.ndarray
+    decay: np.ndarray
+
+
+class PowerIntegrals(NamedTuple):
+    """Integrals from 0 to x of y exp(-y) and of y^2 exp(-y), and the integral of the latter."""
+
+    first: np.ndarray
+    second: np.ndarray
+    second_integral: np.ndarray
+
+
+class LineIncrement(NamedTuple):
+    """Increment along a line.
+
+    - bonds: bonds (3, m) after it
+    - mean, slope: path-mean z (m,) [Pa m] and its derivative over the increment (m,) [Pa]
+    - damage_integral: integral of s2 dR/eps (m,) [Pa m2], of which mu_s/(2 eps_0) is dissipated
     """
+
+    bonds: np.ndarray
+    mean: np.ndarray
+    slope: np.ndarray
+    damage_integral: np.ndarray
+
+
+class BondIncrement(NamedTuple):
+    """Increment along a line or in a plane: as in `LineIncrement`, and the play after it."""
+
+    bonds: np.ndarray
+    mean: np.ndarray
+    damage_integral: np.ndarray
+    play: float | np.ndarray
+
+
+def shape_functions(x) -> ShapeFunctions:
+    """Return the shape functions of paths x >= 0 of any shape, without cancellation."""
     x = np.asarray(x, float)
-    small = x < 0.03
-    safe = np.where(small, 1.0, x)
+    is_small = x < MAX_SERIES
+    safe = np.where(is_small, 1.0, x)
     f1 = -np.expm1(-safe) / safe
     f2 = (1 - f1) / safe
     series = 1 / 2 - x * (
         1 / 6 - x * (1 / 24 - x * (1 / 120 - x * (1 / 720 - x * (1 / 5040 - x / 40320))))
     )
-    f2 = np.where(small, series, f2)
-    f1 = np.where(small, 1 - x * f2, f1)
-    return f1, f2, np.exp(-x)
+    f2 = np.where(is_small, series, f2)
+    f1 = np.where(is_small, 1 - x * f2, f1)
+    return ShapeFunctions(f1, f2, np.exp(-x))
 
 
-def moments(x, e):
-    """Integrals from 0 to x of y exp(-y), of y^2 exp(-y) and of the latter once more, without cancellation.
-
-    x >= 0 of any shape; e = exp(-x). Compiled twin: `point_kernels.moments`.
-    """
+def integrate_powers(x, decay) -> PowerIntegrals:
+    """Return the integrals of y exp(-y) and y^2 exp(-y) for x >= 0 of any shape and decay = exp(-x)."""
     series = sum((-1) ** k * x**k / (factorial(k) * (k + 4)) for k in range(13))
-    c = np.where(x < 0.5, x**4 * series, 6 - e * (x**3 + 3 * x * x + 6 * x + 6))
-    third = (c + x**3 * e) / 3
-    return (third + x * x * e) / 2, third, x * third - c
+    closed = 6 - decay * (x**3 + 3 * x * x + 6 * x + 6)
+    cubic = np.where(x < MAX_POWER_SERIES, x**4 * series, closed)
+    second = (cubic + x**3 * decay) / 3
+    return PowerIntegrals((second + x * x * decay) / 2, second, x * second - cubic)
 
 
-def direction(dq) -> tuple:
-    """(length [m], unit vector (d,)) of an increment (d,) [m]; the vector is 0 where nothing moves."""
-    path = float(abs(dq[0]) if len(dq) == 1 else np.hypot(*dq))
-    return path, np.asarray(dq, float) / path if path > 0 else np.zeros(len(dq))
+def direction(increment) -> tuple:
+    """Return the length [m] and the unit vector (d,) of an increment (d,) [m]; the vector is 0 without motion."""
+    path = float(abs(increment[0]) if len(increment) == 1 else np.hypot(*increment))
+    if path > 0:
+        return path, np.asarray(increment, float) / path
+    return path, np.zeros(len(increment))
 
 
-def advance(bonds, dq, sigma, eps):
-    """New bonds (3, m), path-mean stretch zbar (m,) [Pa m], its slope (m,) [Pa], integral of s2 dR/eps (m,) [Pa m2] of
-    an increment along a line.
+def advance(bonds, increment, sigma, eps) -> LineIncrement:
+    """Move bonds over an increment along a line.
 
-    bonds (3, m), dq scalar or (m,) [m], sigma (m,) [Pa] the pressure that forms the new bonds, eps [m].
+    Parameters
+    ----------
+    bonds : (3, m) array
+        m, z and s2 before.
+    increment, eps : float or (m,) array
+        Increment and bond length [m].
+    sigma : (m,) array
+        Pressure [Pa] under which the new bonds form.
+
+    Returns
+    -------
+    LineIncrement
     """
     m, z, s2 = bonds
-    path = np.abs(dq)
-    g = np.sign(dq)
+    path = np.abs(increment)
+    sign = np.sign(increment)
     x = path / eps
-    f1, f2, e = shape_functions(x)
-    a1, young = x * f1, sigma - m
+    f1, f2, decay = shape_functions(x)
+    zeroth = x * f1
+    missing = sigma - m
     with np.errstate(over="ignore", invalid="ignore"):
-        a2, a3, a4 = moments(x, e)
-    mean = z * f1 + g * eps * x * (sigma * f2 - young * (f1 - f2))
-    slope = g * z * (f2 - f1) / eps + sigma * (f1 - f2) - young * (f2 - x * (f1 - f2))
-    slope = np.where(path > 0, slope, m / 2)  # the mean of the two sides
-    out = np.stack(
+        powers = integrate_powers(x, decay)
+    mean = z * f1 + sign * eps * x * (sigma * f2 - missing * (f1 - f2))
+    slope = sign * z * (f2 - f1) / eps + sigma * (f1 - f2) - missing * (f2 - x * (f1 - f2))
+    # without motion the slope is the mean of both directions
+    slope = np.where(path > 0, slope, m / 2)
+    after = np.stack(
         [
-            sigma - young * e,
-            z * e + g * eps * (sigma * a1 - young * x * e),
-            e * (s2 + 2 * g * z * path + m * path**2) + sigma * eps**2 * a3,
+            sigma - missing * decay,
+            z * decay + sign * eps * (sigma * zeroth - missing * x * decay),
+            decay * (s2 + 2 * sign * z * path + m * path**2) + sigma * eps**2 * powers.second,
         ]
     )
-    dissipated = s2 * a1 + 2 * g * z * eps * a2 + m * eps**2 * a3 + sigma * eps**2 * a4
-    return out, mean, slope, dissipated
+    damage = s2 * zeroth + 2 * sign * z * eps * powers.first
+    damage = damage + m * eps**2 * powers.second + sigma * eps**2 * powers.second_integral
+    return LineIncrement(after, mean, slope, damage)
 
 
-def stretch(bonds, dq):
-    """Bonds (3, m) that all stretch by dq [m] along a line and neither break nor form.
-
-    m stays, z' = z + m dq, s2' = s2 + dq (2 z + m dq).
-    """
+def stretch(bonds, increment):
+    """Stretch all bonds (3, m) by an increment [m] along a line; none breaks or forms."""
     m, z, s2 = bonds
-    return np.stack([m, z + m * dq, s2 + dq * (2 * z + m * dq)])
+    return np.stack([m, z + m * increment, s2 + increment * (2 * z + m * increment)])
 
 
-def moved(law: Bonds, bonds, play, dq, sigma, eps) -> tuple:
-    """(new bonds (d + 2, m), path-mean stretch [Pa m], integral of s2 dR/eps (m,) [Pa m2], play) of an increment.
+def move_bonds(law: Bonds, state: BondState, increment, sigma, eps) -> BondIncrement:
+    """Move bonds over an increment along a line or in a plane.
 
-    dq [m]: a number along a line, where the mean is (m,) and the elastic range of the law is gone through first; (2,)
-    in a plane, where the mean is (2, m). sigma (m,) [Pa] forms the new bonds; eps [m], play [1] numbers or (m,).
+    Along a line the elastic range of the law comes first. In a plane the part of z along the increment moves as on a
+    line, and the part across it decays.
+
+    Parameters
+    ----------
+    law : Bonds
+    state : BondState
+        Bonds before; its bond length is not used.
+    increment : float or (2,) array
+        Increment [m].
+    sigma : (m,) array
+        Pressure [Pa] under which the new bonds form.
+    eps : float or (m,) array
+        Bond length [m] of the increment.
+
+    Returns
+    -------
+    BondIncrement
+        Its mean is (m,) along a line and (2, m) in a plane.
     """
+    bonds = state.bonds
     if len(bonds) == 3:
-        free, damaging, play = elastic_part(law, play, dq, eps)
-        loose = stretch(bonds, free)
-        out, mean, _, dissipated = advance(loose, damaging, sigma, eps)
-        if np.any(free):
-            mean = free / dq * (bonds[1] + loose[1]) / 2 + damaging / dq * mean
-        return out, mean, dissipated, play
-    path, e = direction(dq)
-    along = e @ bonds[1:3]
-    across = bonds[1:3] - e[:, None] * along
+        elastic, damaging, play = elastic_part(law, state.play, increment, eps)
+        stretched = stretch(bonds, elastic)
+        moved = advance(stretched, damaging, sigma, eps)
+        mean = moved.mean
+        if np.any(elastic):
+            elastic_mean = (bonds[1] + stretched[1]) / 2
+            mean = elastic / increment * elastic_mean + damaging / increment * mean
+        return BondIncrement(moved.bonds, mean, moved.damage_integral, play)
+    path, unit = direction(increment)
+    along = unit @ bonds[1:3]
+    across = bonds[1:3] - unit[:, None] * along
     f1, _, decay = shape_functions(path / eps)
-    out, mean, _, dissipated = advance(np.stack([bonds[0], along, bonds[3]]), path, sigma, eps)
-    z = e[:, None] * out[1] + across * decay
-    return np.stack([out[0], *z, out[2]]), e[:, None] * mean + across * f1, dissipated, play
+    moved = advance(np.stack([bonds[0], along, bonds[3]]), path, sigma, eps)
+    z = unit[:, None] * moved.bonds[1] + across * decay
+    after = np.stack([moved.bonds[0], *z, moved.bonds[2]])
+    mean = unit[:, None] * moved.mean + across * f1
+    return BondIncrement(after, mean, moved.damage_integral, state.play)
 
 
-def pressed(law: Bonds, bonds, s0, s1):
-    """Bonds (3, m) after a change of the pressure from s0 to s1 (m,) [Pa] at rest; the stored energy never rises.
+def press_bonds(law: Bonds, bonds, s0, s1):
+    """Return the bonds after a change of the pressure at rest; the stored energy never rises.
 
-    Where it falls, bonds without stretch are let go first, as long as m >= z^2/s2 allows it; beyond that all stretches
-    shrink. Where it rises, unstressed bonds of density m_0 (s1 - s0) come.
+    Where the pressure falls, bonds without stretch are released first, as long as m >= z^2/s2; beyond that all
+    stretches shrink. Where it rises, unstressed bonds of density m_0 (s1 - s0) form.
+
+    Parameters
+    ----------
+    law : Bonds
+    bonds : (3, m) array
+    s0, s1 : (m,) array
+        Pressures before and after [Pa].
+
+    Returns
+    -------
+    (3, m) array
     """
     m, z, s2 = bonds
     falls = s1 < s0
-    left = np.divide(m * s1, s0, out=np.zeros_like(m), where=s0 > 0)
-    density = np.where(falls, left, m + law.initial * (s1 - s0))
-    least = np.divide(z * z, s2, out=np.zeros_like(m), where=s2 > 0)
-    keep = np.where(falls & (least > left), left / np.maximum(least, 1e-300), 1.0)
+    remaining = np.divide(m * s1, s0, out=np.zeros_like(m), where=s0 > 0)
+    density = np.where(falls, remaining, m + law.initial * (s1 - s0))
+    needed = np.divide(z * z, s2, out=np.zeros_like(m), where=s2 > 0)
+    must_shrink = falls & (needed > remaining)
+    factor = np.where(must_shrink, remaining / np.maximum(needed, TINY), 1.0)
     bound = law.length * s1
-    keep *= np.where(
-        falls & (keep * np.abs(z) > bound), bound / np.maximum(keep * np.abs(z), 1e-300), 1.0
-    )
-    return np.stack([density, z * keep, s2 * keep])
+    stretched = factor * np.abs(z)
+    factor *= np.where(falls & (stretched > bound), bound / np.maximum(stretched, TINY), 1.0)
+    return np.stack([density, z * factor, s2 * factor])
 
 
 def refuse_directions(law: Bonds, directions: int) -> None:
-    """Raise PatchfemError for a law with breakaway in more than one direction: its elastic range has no form in a
-    plane."""
+    """Raise PatchfemError for a law with breakaway in a plane, where its elastic range is not defined."""
     if directions > 1 and law.breakaway:
         raise PatchfemError(not_supported_message("breakaway in two directions", "elastic range"))
 
 
 @dataclass(frozen=True, slots=True)
 class Recursion:
-    """Law object of the stretch reading, p = 1; the pressure may change along the increment and in time.
+    """Law of the stretch reading with p = 1, under a pressure that may change along the increment and in time.
 
     Along a line increments are numbers and tractions (m,) [Pa]; in a plane they are (2,) and (2, m), positive against
-    slip. Where `law` holds rest_growth and slip_growth per point (m,), every point has a bond length of its own.
+    slip. If the rates of growth of `law` are arrays (m,), every point has a bond length of its own.
     """
 
     law: Bonds
 
     def start(self, sigma, directions: int = 1) -> BondState:
-        """Unstressed bonds of density m_0 on pressure sigma (m,) [Pa]; PatchfemError for a law that has no form in two
-        directions."""
+        """Return unstressed bonds of density m_0 under a pressure (m,) [Pa].
+
+        PatchfemError is raised for a law that is not defined in two directions.
+        """
         refuse_directions(self.law, directions)
         bonds = np.zeros((2 + directions, np.size(sigma)))
         bonds[0] = self.law.initial * sigma
         return BondState(bonds, self.law.length)
 
     def step(self, state: BondState, dq, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] in dt [s]; new bonds form at the mean pressure of its ends (m,) [Pa], all are
-        lost where s1 = 0."""
+        """Take a step: bonds form at the mean pressure of its ends, and all are lost where it ends without pressure.
+
+        Parameters
+        ----------
+        state : BondState
+        dq : float or (2,) array
+            Straight increment [m].
+        s0, s1 : (m,) array
+            Pressures at the ends [Pa].
+        dt : float
+            Duration [s].
+
+        Returns
+        -------
+        Step
+        """
         law = self.law
         path = direction(np.atleast_1d(dq))[0]
         speed = path / dt if dt > 0 else 0.0
         middle = grow(law, state.eps, speed, speed, path / 2, dt / 2)
-        out, mean, dissipated, play = moved(law, state.bonds, state.play, dq, (s0 + s1) / 2, middle)
+        moved = move_bonds(law, state, dq, (s0 + s1) / 2, middle)
+        bonds = moved.bonds
         scale = law.static / law.length
-        spent = scale * dissipated / 2
-        lost = (s1 <= 0) & (np.abs(out).sum(axis=0) > 0)
-        if lost.any():
-            spent = spent + np.where(lost, scale * out[-1] / 2, 0.0)
-            out = np.where(lost, 0.0, out)
-        return Step(
-            scale * mean, spent, BondState(out, grow(law, state.eps, speed, speed, path, dt), play)
-        )
+        dissipated = scale * moved.damage_integral / 2
+        is_lost = (s1 <= 0) & (np.abs(bonds).sum(axis=0) > 0)
+        if is_lost.any():
+            dissipated = dissipated + np.where(is_lost, scale * bonds[-1] / 2, 0.0)
+            bonds = np.where(is_lost, 0.0, bonds)
+        end = grow(law, state.eps, speed, speed, path, dt)
+        return Step(scale * moved.mean, dissipated, BondState(bonds, end, moved.play))
 
     def press(self, state: BondState, s0, s1) -> Step:
-        """The law at rest on a line while the pressure goes from s0 to s1 (m,) [Pa], by the rule of `pressed`.
+        """Change the pressure at rest on a line by the rule of `press_bonds`; energy that is no longer stored is lost.
 
-        The mean of the Step is the traction after it; what the bonds no longer store is dissipated.
+        Parameters
+        ----------
+        state : BondState
+        s0, s1 : (m,) array
+            Pressures before and after [Pa].
+
+        Returns
+        -------
+        Step
+            Its mean is the traction after the change.
         """
-        bonds = pressed(self.law, state.bonds, s0, s1)
+        bonds = press_bonds(self.law, state.bonds, s0, s1)
         scale = self.law.static / self.law.length
-        return Step(
-            scale * bonds[1], scale / 2 * (state.bonds[2] - bonds[2]), state._replace(bonds=bonds)
-        )
+        released = scale / 2 * (state.bonds[2] - bonds[2])
+        return Step(scale * bonds[1], released, state._replace(bonds=bonds))
 
     def traction(self, state: BondState):
-        """Traction tau = mu_s z/eps_0 [Pa] of a state, > 0 against slip: (m,) along a line, (2, m) in a plane."""
+        """Return the traction mu_s z/eps_0 [Pa], positive against slip: (m,) along a line, (2, m) in a plane."""
         z = state.bonds[1] if len(state.bonds) == 3 else state.bonds[1:-1]
         return self.law.static / self.law.length * z
 
     def stored(self, state: BondState):
-        """Elastic energy per area mu_s s2/(2 eps_0) (m,) [J/m2] of the bonds of a state."""
+        """Return the elastic energy per area mu_s s2/(2 eps_0) (m,) [J/m2]."""
         return self.law.static / (2 * self.law.length) * state.bonds[-1]

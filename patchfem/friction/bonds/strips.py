@@ -20,7 +20,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import gammainc, gammaln, roots_jacobi
 
-from .parameters import Bonds, won_share
+from .parameters import Bonds, grown_fraction
 
 _THREE, _EIGHT = (np.polynomial.legendre.leggauss(count) for count in (3, 8))
 PIECE = 0.25  # longest Gauss piece in bond lengths
@@ -194,7 +194,7 @@ def _own(state: Strips, at, back, law: Bonds):
         return law.length
     part, (won, grown) = back / state.length[at][:, None], state.gain[:, at][..., None]
     age = state.now[3] - state.growth[at][:, None] + part * won
-    born = state.mature[at][:, None] - (1 - won_share(won, part)) * grown
+    born = state.mature[at][:, None] - (1 - grown_fraction(won, part)) * grown
     return np.maximum(state.now[4] - born * np.exp(-age), 1e-300)
 
 

@@ -1,19 +1,22 @@
-"""Points of eq. 2.17 in the stretch reading with p = 1 as the loops take them; the law itself is `bonds.recursion`."""
+"""Points of eq. 2.17 in the stretch reading with p = 1 as elements of the engines; the law is `bonds.recursion`."""
 
 import numpy as np
 
 from ..bonds.parameters import Bonds
 from ..protocol import Element
 
+N_HEAD = 9  # numbers of an element before those of its points
+CONSTANT_LENGTH = -1.0  # value of a_s that marks a constant bond length
+
 
 def growth_numbers(law: Bonds) -> np.ndarray:
-    """The six numbers of the growth of bonds that compiled code takes: (a_s, l_k, v_h, eps_0, eps_k) of eq. 2.10 and
-    breakaway.
+    """Return the numbers (6,) of the growth of bonds (eq. 2.10) and of breakaway for compiled code.
 
-    a_s [m s-2], l_k [m], v_h [m/s], eps_0 and eps_k [m]; a_s = -1 says that the bond length is constant.
+    They are a_s [m s-2], or -1 for a constant bond length, l_k [m], v_h [m/s], eps_0 [m], eps_k [m] and the fraction of
+    the bond length that stretches without damage.
     """
     if not law.grows:
-        return np.array([-1.0, 1.0, 1.0, law.length, law.length, law.breakaway])
+        return np.array([CONSTANT_LENGTH, 1.0, 1.0, law.length, law.length, law.breakaway])
     return np.array(
         [
             law.rest_growth,
@@ -27,53 +30,76 @@ def growth_numbers(law: Bonds) -> np.ndarray:
 
 
 def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
-    """Points that slide alike, on nodal areas (m,) [m2] under sigma (m,) [Pa].
+    """Return the element of points that all have the same relative displacement.
 
-    pattern: (x, sigma on x) when the pressure stays on the lower piece; `area` and `sigma` then belong to the points of
-    the upper one, which stand at x at first.
+    Parameters
+    ----------
+    law : Bonds
+    area, sigma : (m,) array
+        Areas [m2] and pressures [Pa] of the points.
+    pattern : ((p,) array, (p,) array), optional
+        Positions [m] of the nodes of the lower piece and pressures [Pa] there, if the pressure stays on the lower
+        piece. The points then belong to the upper piece and are at the nodes at first.
+
+    Returns
+    -------
+    Element
     """
-    area, sigma = np.asarray(area, float), np.asarray(sigma, float)
-    weight, limit = law.static * area / law.length, law.static * float(area @ sigma)
+    area = np.asarray(area, float)
+    sigma = np.asarray(sigma, float)
+    weight = law.static * area / law.length
+    limit = law.static * float(area @ sigma)
     if pattern is None:
-        numbers = np.concatenate([[0.0, weight @ sigma, law.length], growth_numbers(law), sigma])
-        memory = np.array([law.length, law.initial, 0.0, 0.0, 0.0, 0.0])
-        grown = (law.length, 1.0, law.length, law.length**2)
-        rates = None if law.grows and law.breakaway else grown if law.grows else ()
+        head = [0.0, weight @ sigma, law.length]
         return Element(
-            "friction.laws.stretch_kernels",
-            numbers,
-            memory,
-            limit,
-            law.length,
-            False,
-            "points",
-            rates,
+            kernels="friction.laws.stretch_kernels",
+            numbers=np.concatenate([head, growth_numbers(law), sigma]),
+            memory=np.array([law.length, law.initial, 0.0, 0.0, 0.0, 0.0]),
+            limit=limit,
+            length=law.length,
+            bounded=False,
+            form="points",
+            sizes=_state_sizes(law),
         )
-    x, on_lower = (np.asarray(part, float) for part in pattern)
-    numbers = np.concatenate(
-        [
-            [0.0, area.size, law.length],
-            growth_numbers(law),
-            weight,
-            sigma,
-            [x.size],
-            x,
-            np.zeros(area.size),
-            x,
-            on_lower,
-        ]
-    )
-    memory = np.concatenate([[law.length], law.initial * sigma, np.zeros(4 * area.size)])
+    x, sigma_on_lower = (np.asarray(part, float) for part in pattern)
+    head = [0.0, area.size, law.length]
+    workspace = np.zeros(area.size)
+    points = [weight, sigma, [x.size], x, workspace, x, sigma_on_lower]
     return Element(
-        "friction.laws.stretch_lower_kernels", numbers, memory, limit, law.length, False, "places"
+        kernels="friction.laws.stretch_lower_kernels",
+        numbers=np.concatenate([head, growth_numbers(law), *points]),
+        memory=np.concatenate([[law.length], law.initial * sigma, np.zeros(4 * area.size)]),
+        limit=limit,
+        length=law.length,
+        bounded=False,
+        form="places",
     )
+
+
+def _state_sizes(law: Bonds) -> tuple | None:
+    """Return typical magnitudes of (eps, m, z, s2); () for a constant length, None if rates cannot integrate the law."""
+    if not law.grows:
+        return ()
+    if law.breakaway:
+        return None
+    return law.length, 1.0, law.length, law.length**2
 
 
 def bonds_of(element: Element, memory) -> np.ndarray:
-    """Bonds (5, m) in the memory of a `points_element`: m [Pa], z [Pa m], s2 [Pa m2], local slide [m] and play [1] per
-    point."""
+    """Return the bonds in the memory of a `points_element`.
+
+    Parameters
+    ----------
+    element : Element
+    memory : (l,) array
+
+    Returns
+    -------
+    (5, m) array
+        m [Pa], z [Pa m], s2 [Pa m2], local displacement [m] and play [1] of every point.
+    """
     bonds = np.asarray(memory)[1:].reshape(5, -1)
     if element.form == "places":
         return bonds
-    sigma = element.numbers[9:]
+    sigma = element.numbers[N_HEAD:]
     return bonds * np.stack([sigma, sigma, sigma, np.ones_like(sigma), np.ones_like(sigma)])

@@ -45,10 +45,10 @@ def warming(model, patch, response, work: float | None = None) -> list:
 
 def unripe(law, speed: float) -> list:
     """Warning that a printed law's bonds break before they are grown, as a list of sentences."""
-    a = parameters.ripening(law, speed) if law.reading == "report" else 0.0
+    a = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
     if a <= RIPE:
         return []
-    # ripening(law, speed) = RIPE with it
+    # growth_path_ratio(law, speed) = RIPE with it
     least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)
     return [
         f"at the peak speed of {speed:.3g} m/s a bond slides by {a:.2g} of its length while it forms (limit "

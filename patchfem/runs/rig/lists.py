@@ -13,7 +13,8 @@ import numpy as np
 from ...core import Missing
 from ...effects import law_has_trait
 from ...friction.bonds import engines
-from ...friction.bonds.list_numbers import AGED, form_of
+from ...friction.bonds.list_forms_kernels import PRINTED_GROWING
+from ...friction.bonds.list_numbers import form_of
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
 from ...structure.drive_sizes import drive_omega, max_acceleration, max_frequency_ratio
@@ -126,9 +127,9 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
     if f is None or not law_has_trait(f.law, "bonds"):
         return 0.0
     released, printed = rig.drive.kind == "free", f.reading == "report"
-    if (released and (not printed or rig.start is None or form_of(model.bonds) != AGED)) or (
-        not printed and model.bonds.order != 0
-    ):
+    if (
+        released and (not printed or rig.start is None or form_of(model.bonds) != PRINTED_GROWING)
+    ) or (not printed and model.bonds.order != 0):
         return 0.0
     needed = (
         _held_with(rig, 0.0, np.zeros(rig.modes.omega.size), rig.modes.interfaces @ rig.start.z)
@@ -141,7 +142,7 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
 def least_held(model: Model) -> float:
     """What `held_by_bonds` is at least where a list grows with every step: MIN_STUCK_RATIO; 1 of a driven
     block where each step leaves a strip, which no path wears away: bonds that grow, or have no stiffness by their order."""
-    leaves = form_of(model.bonds) == AGED or model.friction.reading != "report"
+    leaves = form_of(model.bonds) == PRINTED_GROWING or model.friction.reading != "report"
     return 1.0 if leaves and model.rig.drive.kind != "free" else MIN_STUCK_RATIO
 
 
@@ -218,7 +219,7 @@ def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
         return False
     return (
         lists_grow(model)
-        if form_of(model.bonds) == AGED
+        if form_of(model.bonds) == PRINTED_GROWING
         else strips > TURNING * numerics.cycles * numerics.steps
     )
 

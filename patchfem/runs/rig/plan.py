@@ -314,7 +314,7 @@ def summed_words(model: Model, numerics) -> list:
     if not law_has_trait(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
     found = lists.quadrature_of(model, numerics)
-    out = ["method of the sum over bonds: " + found.said()]
+    out = ["method of the sum over bonds: " + found.describe()]
     if found.engine == "recursion":
         return out
     if lists.lists_grow(model):

@@ -15,15 +15,15 @@ from ...contact import strips
 from ...core import PatchfemError, frozen_array
 from ...disk.atomic_write import write_atomically
 from ...effects import not_supported_message
-from ...wear.depth import rates
-from ...wear.jumps import Wearing, Worn, after, replayed, start
+from ...wear.depth import wear_rates
+from ...wear.jumps import WearProblem, WearState, replay_jumps, start_wear, take_jump
 from ..patch.measures import other_strips
 from ..patch.press import areas, pressed, presser
 from ..patch.values import values
 from ..rig import numerics
 from .slip import Rubbed, apart, even, frames_for, rubbed
 
-STATE = tuple(Worn.__slots__)
+STATE = tuple(WearState.__slots__)
 THIN = 1e-6  # share of a coating that may be left where it counts as worn through
 MOST_TRIES = 60  # jumps that look for the cycle at which it is
 MOMENT = ("cycle", "depth", "used", "pressure", "gap", "miss")
@@ -59,7 +59,7 @@ class Evolved:
 
     patch: object
     coarse: tuple
-    state: Worn
+    state: WearState
     moments: tuple
     depths: tuple
     stripped: tuple | None
@@ -99,7 +99,7 @@ class _Motion:
 
 
 def mean_depth(patch, depth) -> float:
-    """Worn volume over the area of the patch [m], of a depth (m,) [m], of strips (s, m)."""
+    """WearState volume over the area of the patch [m], of a depth (m,) [m], of strips (s, m)."""
     area = patch.pieces.interface.weight
     return float(np.atleast_2d(depth).mean(axis=0) @ area / area.sum())
 
@@ -133,7 +133,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         )
         raise PatchfemError(text, "wear")
     clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
-    asked = Wearing(
+    asked = WearProblem(
         presser(model.patch, patch.pair),
         motion,
         areas(model.patch, patch.pieces.interface),
@@ -219,17 +219,17 @@ def _taken(model, depth) -> list:
     ]
 
 
-def _jumped(model, asked: Wearing, state: Worn) -> Worn:
+def _jumped(model, asked: WearProblem, state: WearState) -> WearState:
     """The state one jump later, or earlier where a coating is gone, by the Illinois form of regula falsi."""
 
-    def ahead(one: Worn) -> float:
+    def ahead(one: WearState) -> float:
         return max(_taken(model, one.depth), default=(0.0,))[0] - 1
 
     if model.patch.interface.strips is not None:
         asked.press.begin(state.force)
     how = asked, state, model.accuracy.tolerance, model.wear.jumps
     found, low, high, last = (
-        after(*how, until=next_row(model.wear, asked, state)),
+        take_jump(*how, until=next_row(model.wear, asked, state)),
         state.cycle,
         np.inf,
         0.0,
@@ -246,11 +246,11 @@ def _jumped(model, asked: Wearing, state: Worn) -> Worn:
             above = above / 2 if last < 0 else above
             low, below = found.cycle, over
         last, end = over, low - below * (high - low) / (above - below)
-        found = after(*how, until=end)
+        found = take_jump(*how, until=end)
     return found
 
 
-def next_row(wear, asked: Wearing, state: Worn) -> float:
+def next_row(wear, asked: WearProblem, state: WearState) -> float:
     """Cycle up to which an automatic jump may go, so that it follows the friction from row to row of its table.
 
     That is where the wear per cycle as it is now reaches the next row, or the one after it where the next is nearer
@@ -262,7 +262,9 @@ def next_row(wear, asked: Wearing, state: Worn) -> float:
     if not ahead:
         return np.inf
     near = len(ahead) > 1 and ahead[0] - mean < 0.1 * (ahead[1] - ahead[0])
-    rate = float(np.vdot(rates(asked.coefficient, state.path, asked.area) * state.force, weight))
+    rate = float(
+        np.vdot(wear_rates(asked.coefficient, state.path, asked.area) * state.force, weight)
+    )
     return state.cycle + (ahead[near] - mean) / rate if rate > 0 else np.inf
 
 
@@ -283,13 +285,13 @@ def _before(model, patch, area):
     return pressed(model.patch, patch.pair, depth)
 
 
-def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:
+def _first(model, patch, asked: WearProblem, motion: _Motion) -> tuple:
     """(state, moments) before any wear but that of `_before`."""
-    state = start(asked, model.wear.depth_before(patch.x, asked.area))
+    state = start_wear(asked, model.wear.depth_before(patch.x, asked.area))
     return state, (_moment(patch, state, motion),)
 
 
-def _moment(patch, state: Worn, motion: _Motion) -> Moment:
+def _moment(patch, state: WearState, motion: _Motion) -> Moment:
     area = areas(motion.model.patch, patch.pieces.interface)
     worn = {
         "worn_volume": float(np.vdot(state.depth, area)),
@@ -327,7 +329,7 @@ def _on(asked, model, patch, other, moments) -> tuple:
         return np.array([np.interp(y, own, column) for column in rows.T]).T
 
     legs = [(two.cycle - one.cycle, path(two.used)) for one, two in pairwise(moments)]
-    depth = replayed(
+    depth = replay_jumps(
         presser(asked, other.pair),
         area,
         model.wear.coefficient,
@@ -346,7 +348,7 @@ def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved
     return evolve(model, patch, coarse, progress, begin, partial(save_state, kept.path, key))
 
 
-def save_state(path: Path, key: str, state: Worn, moments: tuple) -> None:
+def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
     """Write a state and the moments so far; an earlier file is replaced only when the new one is whole."""
     arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE}
     arrays |= {
@@ -378,7 +380,7 @@ def load_state(path: Path, key: str) -> tuple:
                 "version of patchfem; run without --resume"
             )
         whole = {name: found[f"state_{name}"] for name in STATE}
-        state = Worn(
+        state = WearState(
             **{name: float(value) if value.ndim == 0 else value for name, value in whole.items()}
         )
         columns = [found[f"moment_{name}"] for name in MOMENT]

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...structure.drive_sizes import drive_omega, max_acceleration
-from ...wear.jumps import Wearing, after, start
+from ...wear.jumps import WearProblem, start_wear, take_jump
 from ..cost import Cost
 from .evolve import next_row
 
@@ -53,11 +53,11 @@ def jumps_about(model) -> int:
     slides = (
         changing if wear.uses_friction_work and wear.friction is not None else lambda worn: path
     )
-    row = Wearing(press, slides, area, wear.coefficient, wear.cycles)
-    state, count = start(row, wear.depth_before(x, area)), 0
+    row = WearProblem(press, slides, area, wear.coefficient, wear.cycles)
+    state, count = start_wear(row, wear.depth_before(x, area)), 0
     while state.cycle < wear.cycles and count < MOST:
         state, count = (
-            after(row, state, model.accuracy.tolerance, until=next_row(wear, row, state)),
+            take_jump(row, state, model.accuracy.tolerance, until=next_row(wear, row, state)),
             count + 1,
         )
     least = min(count, 6)
@@ -72,7 +72,7 @@ def _path_about(model) -> float:
 
 
 def _springs(asked, x, area):
-    """Forces (m,) [N] of a row of springs at x (m,) [m] under the load of a `PatchModel`, as `Wearing` wants them."""
+    """Forces (m,) [N] of a row of springs at x (m,) [m] under the load of a `PatchModel`, as `WearProblem` wants them."""
     try:
         gap = asked.gap.at(x).heights
     except PatchfemError:  # a trace too fine for the row

@@ -25,7 +25,9 @@ LIMIT = 0.4 * 98.0665
 
 def model_of(law, entries):
     made = list_model(law, LIMIT, np.inf, 0.0)
-    return replace(made, fields=made.fields | {"bondlist": np.zeros((10, entries))})
+    return replace(
+        made, fields=made.fields | {"bondlist": np.zeros((len(made.fields["bondlist"]), entries))}
+    )
 
 
 def marched(model, frames=0):

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from list_paths import STATUS
 from printed_sums import Bonds as BondsByHand
 from printed_sums import settled
 from scipy.optimize import brentq
@@ -115,8 +116,12 @@ def test_exact_the_ledger_closes(reading, order, grows):
     lost = np.cumsum(energies[:-1, 0])
     assert bad == 0
     assert np.abs(work - lost - energies[1:, 1]).max() < 1e-12 * np.abs(np.diff(work)).sum()
-    made = contact.statuses[:, 6].sum()
-    assert made < 1e-6 * contact.statuses[:, 7].sum() if reading == "stretch" else made >= 0
+    made = contact.statuses[:, STATUS.created].sum()
+    assert (
+        made < 1e-6 * contact.statuses[:, STATUS.dissipated].sum()
+        if reading == "stretch"
+        else made >= 0
+    )
 
 
 @pytest.mark.share(1, 3)
@@ -168,7 +173,7 @@ def test_always_a_step_has_the_balance_downhill_where_bonds_weaken():
     forces, energies, bad, contact = follow(model, path, 1e-4)
     work, lost = np.cumsum(forces[:-1, 1] * np.diff(path)), np.cumsum(energies[:-1, 0])
     assert bad == 0 and np.abs(work - lost - energies[1:, 1]).max() < 1e-12 * work[-1]
-    assert contact.statuses[0, 6] <= 1e-6 * contact.statuses[0, 7]
+    assert contact.statuses[0, STATUS.created] <= 1e-6 * contact.statuses[0, STATUS.dissipated]
 
 
 @pytest.mark.parametrize(("reading", "order"), PRINTED)
@@ -192,7 +197,12 @@ def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(re
         found.append(weight * twin.traction(state).sum())
         stored.append(weight * twin.stored(state).sum())
     away = np.abs(path) > 1e-8  # of the place of the first bonds, which have a width behind shear
-    assert bad == 0 and contact.statuses[0, 15] == contact.statuses[4, 15] == 0.0
+    assert (
+        bad == 0
+        and contact.statuses[0, STATUS.initial_pressure]
+        == contact.statuses[4, STATUS.initial_pressure]
+        == 0.0
+    )
     assert np.abs(forces[:, 0] - found)[away].max() < 6e-3 * model.limit
     assert np.abs(energies[:, 1] - stored)[away].max() < 6e-3 * model.limit * 1e-6
     work, lost = np.cumsum(forces[:-1, 1] * np.diff(path)), np.cumsum(energies[:-1, 0])

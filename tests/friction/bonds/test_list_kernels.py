@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from friction_paths import pulled, random_walk, sum_by_hand, triangle, upper_pressure, walk
-from list_paths import energy_by_hand, follow_list
+from list_paths import STATUS, energy_by_hand, follow_list
 from scipy.special import gammainc
 
 from patchfem.friction.bonds.engines import choose
@@ -179,7 +179,7 @@ def test_exact_a_step_of_a_million_bond_lengths(reading, order, within):
     got = follow_list(law, np.array([0.0, 1e6, 1e6 + 0.05]), tail=1e-9)
     assert got.after == pytest.approx([1.0, 1.0], abs=within)
     assert got.mean[0] == pytest.approx(1.0, abs=1e-4)
-    assert got.status[10] <= 4 * 30 + 2
+    assert got.status[STATUS.max_strips] <= 4 * 30 + 2
 
 
 def test_exact_growing_bonds_of_a_nanometre_are_bounded_and_counted():
@@ -195,7 +195,11 @@ def test_exact_growing_bonds_of_a_nanometre_are_bounded_and_counted():
         initial=0.0,
     )
     got = follow_list(law, np.array([0.0, 1e6, 0.0]), tail=1e-9)
-    assert np.isfinite(got.after).all() and got.status[10] <= 300 and got.status[8] >= 4e6
+    assert (
+        np.isfinite(got.after).all()
+        and got.status[STATUS.max_strips] <= 300
+        and got.status[STATUS.n_extra] >= 4e6
+    )
 
 
 # ---- truncated
@@ -211,7 +215,10 @@ def test_always_truncation_loses_less_than_its_tail(reading, order, growth):
     for tail in (1e-2, 1e-5):
         cut = follow_list(law, path, 0.5, tail=tail)
         assert np.abs(cut.after - whole.after).max() <= tail
-        assert cut.status[1] - cut.status[0] < whole.status[1] - whole.status[0]
+        assert (
+            cut.status[STATUS.end] - cut.status[STATUS.head]
+            < whole.status[STATUS.end] - whole.status[STATUS.head]
+        )
 
 
 # ---- merged
@@ -229,11 +236,11 @@ def test_order_of_the_merge_width_is_two(reading, order, growth):
     for merge in (0.01, 0.1):
         got = follow_list(law, path, 0.05, merge)
         errors.append(np.abs(got.after - whole.after).max())
-        held.append(got.status[10])
+        held.append(got.status[STATUS.max_strips])
     assert errors[0] < 0.25 * 0.01**2 and errors[1] < 0.25 * 0.1**2
     # the age of growing bonds caps wide merges
     assert np.log10(errors[1] / errors[0]) > (1.4 if growth else 1.7)
-    assert held[1] < held[0] < 500 < whole.status[10]
+    assert held[1] < held[0] < 500 < whole.status[STATUS.max_strips]
 
 
 @pytest.mark.share(1, 2, 3, 6, 7, 10, 11)
@@ -247,7 +254,7 @@ def test_always_merging_stays_short_and_close_at_any_amplitude(amplitude, readin
     cycles = int(np.clip(6 / amplitude, 4, 150))
     path = amplitude * np.sin(2 * np.pi * np.arange(40 * cycles + 1) / 40)
     got, whole = follow_list(law, path, 0.05, 0.05), follow_list(law, path, 0.05)
-    assert got.status[10] <= 250
+    assert got.status[STATUS.max_strips] <= 250
     assert np.abs(got.after - whole.after).max() <= (1e-3 if order == 2 else 2.5e-3)
 
 
@@ -264,4 +271,4 @@ def test_always_merging_of_growing_bonds_keeps_its_bound_at_small_strokes(order,
     path, dt = 0.05 * np.sin(2 * np.pi * np.arange(2 * steps + 1) / steps), 2 * np.pi / steps
     got, whole = follow_list(law, path, dt, chosen.merge), follow_list(law, path, dt)
     assert np.abs(got.after - whole.after).max() <= chosen.error
-    assert got.status[10] < 0.5 * whole.status[10]
+    assert got.status[STATUS.max_strips] < 0.5 * whole.status[STATUS.max_strips]

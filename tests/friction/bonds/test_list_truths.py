@@ -4,7 +4,7 @@ forms (checks C5, C6, C8), bounded memory, and trials that leave no trace."""
 import numpy as np
 import pytest
 from friction_paths import triangle
-from list_paths import follow_list
+from list_paths import STATUS, follow_list
 from march_paths import OMEGA, one_mode
 
 from patchfem.core import SineDrive
@@ -64,7 +64,7 @@ def test_always_long_runs_stay_bounded_and_right(growth, count):
     law = printed(1, growth)
     got = follow_list(law, np.concatenate([[0.0], np.cumsum(steps)]), tail=1e-9, merge=0.01)
     tail = np.concatenate([[0.0], np.cumsum(steps[-1500:])])
-    assert got.status[10] < 1500
+    assert got.status[STATUS.max_strips] < 1500
     assert got.after[-1] == pytest.approx(follow_list(law, tail).after[-1], abs=5e-5)
 
 

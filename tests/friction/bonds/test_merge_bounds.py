@@ -4,7 +4,7 @@ path and law, growing bonds and small strokes among them."""
 import numpy as np
 import pytest
 from friction_paths import random_walk
-from list_paths import follow_list
+from list_paths import STATUS, follow_list
 
 from patchfem.friction.bonds.engines import choose
 from patchfem.friction.bonds.parameters import Bonds
@@ -23,7 +23,7 @@ def share(law, path, steps, tolerance):
     whole, got = follow_list(law, path, dt), follow_list(law, path, dt, chosen.merge, chosen.tail)
     moved = np.abs(moves) > 1e-9 * np.abs(moves).max()
     off = max(np.abs(got.after - whole.after).max(), np.abs(got.mean - whole.mean)[moved].max())
-    return off / chosen.error, got.status[10] / whole.status[10]
+    return off / chosen.error, got.status[STATUS.max_strips] / whole.status[STATUS.max_strips]
 
 
 def test_always_step_means_of_merged_bonds_keep_the_bound_where_forces_jump():

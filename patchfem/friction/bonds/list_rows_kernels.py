@@ -1,0 +1,147 @@
+"""Named positions in the arrays of a list of strips of bonds (eq. 2.17).
+
+A strip holds the bonds that formed on one straight increment, or on several increments that were merged. Some rows of
+the array of strips depend on the form of the sum (`list_forms_kernels`): `MOMENT` names the rows of a strip that is
+known by its moments; `POWER_ROW`, `PRINTED_ROW` and `GROWING_ROW` name what the other forms keep beside the rows of
+`STRIP`.
+
+The clock of a form is the quantity that ages a bond: the damage int dR/eps in the stretch reading, and the path R [m]
+in the printed law. A scaled number is multiplied by exp(clock - reference), so that ageing multiplies the whole sum by
+one number. A relative pressure is divided by the pressure of the friction limit.
+"""
+
+from typing import NamedTuple
+
+
+class StripRows(NamedTuple):
+    """Rows of the array of strips.
+
+    - start, end: relative displacement [m] at the start and at the end of the strip; of a spread strip, which stands
+      for several passes over the same range, the lower and the upper end of this range
+    - clock, clock_width: clock at the end of the strip, and the part of it that the strip covers
+    - weight: path/eps^p in the form POWER, else the path [m]; times the relative pressure
+    - covered, path: path [m] that the strip covers, and the path at its end
+    """
+
+    start: int = 0
+    end: int = 1
+    clock: int = 2
+    clock_width: int = 3
+    weight: int = 4
+    covered: int = 7
+    path: int = 8
+
+
+class MomentRows(NamedTuple):
+    """Rows of a strip in the form MOMENTS: centre [m], variance [m2] and scaled weight [m] of its bonds."""
+
+    centre: int = 0
+    variance: int = 1
+    weight: int = 5
+
+
+class PowerRows(NamedTuple):
+    """Rows of a strip in the form POWER: scaled weights at both Gauss points; a spread strip has all in the first."""
+
+    weight_1: int = 5
+    weight_2: int = 6
+
+
+class PrintedRows(NamedTuple):
+    """Row of a strip in the form PRINTED: the relative pressure that its bonds formed under."""
+
+    pressure: int = 5
+
+
+class GrowingRows(NamedTuple):
+    """Rows of a strip in the form PRINTED_GROWING: scaled starting lengths [m] of the bonds at both Gauss points."""
+
+    length_1: int = 5
+    length_2: int = 6
+
+
+class LawNumbers(NamedTuple):
+    """Positions in the numbers of a law, see `list_numbers.law_numbers`.
+
+    - order, form: exponent p, and the form of the sum
+    - length, initial: bond length eps_0 [m], density m_0 of the initial bonds [1]
+    - inverse_gamma: 1/Gamma(p + 1)
+    - merge_width: largest width of a merged strip of age 0 [bond lengths]; 0 merges nothing
+    - cutoff: age on the clock beyond which strips are dropped
+    - half_width: half the width [m] over which the initial bonds are spread; 0 puts all at one place
+    - nodes: first of 16 numbers: four Gauss-Jacobi points and weights for |u|^p, and four for |u|^(p + 1)
+    """
+
+    order: int = 0
+    form: int = 1
+    length: int = 2
+    initial: int = 3
+    inverse_gamma: int = 4
+    merge_width: int = 5
+    cutoff: int = 6
+    half_width: int = 7
+    nodes: int = 8
+
+
+class Clocks(NamedTuple):
+    """Positions in the clocks of a list.
+
+    - displacement, path: relative displacement and path [m] since the start
+    - damage: int dR/eps, with the bond length of each step
+    - growth: exponent J of the growth of bonds (eq. 2.10)
+    - length: length [m] of mature bonds
+    - reference: clock to which the scaled numbers refer
+    """
+
+    displacement: int = 0
+    path: int = 1
+    damage: int = 2
+    growth: int = 3
+    length: int = 4
+    reference: int = 5
+
+
+class ListStatus(NamedTuple):
+    """Positions in the status of a list.
+
+    - head, end: first strip, and last strip + 1
+    - n_spread: number of spread strips, which stand at the head
+    - n_after_merge: number of strips after the last merge
+    - energy, force: stored energy [m] and force [1] of the bonds, per friction limit mu_s N
+    - created, dissipated: energies [m] since the start, per friction limit
+    - n_extra: strips beyond one per step
+    - n_unlike: merged strips whose ranges differ
+    - max_strips: largest number of strips
+    - owed: energy [m] that the next dissipation repays, see `dynamics.interfaces.list_kernels`
+    - room_start, room_end: columns of the array that belong to this list
+    - pressure: relative pressure under which bonds form
+    - initial_pressure: relative pressure under which the initial bonds formed
+    """
+
+    head: int = 0
+    end: int = 1
+    n_spread: int = 2
+    n_after_merge: int = 3
+    energy: int = 4
+    force: int = 5
+    created: int = 6
+    dissipated: int = 7
+    n_extra: int = 8
+    n_unlike: int = 9
+    max_strips: int = 10
+    owed: int = 11
+    room_start: int = 12
+    room_end: int = 13
+    pressure: int = 14
+    initial_pressure: int = 15
+
+
+STRIP = StripRows()
+MOMENT = MomentRows()
+POWER_ROW = PowerRows()
+PRINTED_ROW = PrintedRows()
+GROWING_ROW = GrowingRows()
+LAW = LawNumbers()
+CLOCK = Clocks()
+STATUS = ListStatus()
+N_ROWS = 9  # rows of the array of strips
