@@ -1,7 +1,7 @@
-"""What the surfaces add to the gap between the pieces: plain functions of x [m], summed by the caller.
+"""Shapes of the surfaces: functions of the positions x [m], whose sum is the gap between the pieces.
 
-What a mesh or a holder has to know of a shape beside its gap stands in `STATED`: a new shape that has none of it needs
-no entry there.
+`STATED` has what a mesh or a holder needs to know of a shape besides its gap. A shape of which they need to
+know nothing has no entry there.
 """
 
 from collections.abc import Callable
@@ -11,10 +11,12 @@ import numpy as np
 
 
 class Stated(NamedTuple):
-    """What a shape states beside its gap, each a function of the keys of its table, None where it has none.
+    """Properties of a shape, each a function of the keys of its table, or None.
 
-    angle: [rad] by which it turns the piece; edge: (place, height) [m] of a jump of the gap; wave: length [m] of its
-    shortest wave, which the cells have to show. A shape without a wave bends as far as the piece is long.
+    - angle: angle [rad] by which the shape rotates the piece.
+    - edge: position and height [m] of a jump of the gap.
+    - wave: shortest wavelength [m], which the cells have to resolve. Without it the shape varies over the
+      length of the piece.
     """
 
     angle: Callable | None = None
@@ -29,15 +31,15 @@ STATED = {
 
 
 def tilt(x: np.ndarray, angle: float) -> np.ndarray:
-    """Wedge of a tilted upper piece, the gap angle x (m,) [m] at x (m,) [m]; angle [rad] > 0 opens the gap at +x."""
+    """Return the gap angle x (m,) [m] of a tilted upper piece; angle [rad] > 0 opens the gap at +x."""
     return angle * x
 
 
 def crown(x: np.ndarray, radius: float) -> np.ndarray:
-    """Crowned piece on a flat, the parabola x^2/(2 radius) (m,) [m] at x (m,) [m]; radius [m] > 0 of the cylinder."""
+    """Return the gap x^2/(2 radius) (m,) [m] of a crowned piece on a flat one; radius [m] > 0."""
     return x**2 / (2 * radius)
 
 
 def step(x: np.ndarray, height: float, at: float) -> np.ndarray:
-    """Step in the gap, `height` [m] from x = at [m] on to +x, (m,) [m]; x (m,) [m]. A node on the edge counts half."""
+    """Return a gap (m,) [m] that is `height` [m] beyond x = at [m], and half of it at a node on the edge."""
     return height * np.heaviside(x - at, 0.5)

@@ -1,5 +1,9 @@
-"""Many contacts of one pair of pieces at once, as a sweep over loads, tilts and crowns has them.
+"""Many contacts of one pair of pieces at once, for sweeps over loads, tilts and crowns.
 
-In: a compliance and gaps, loads and moments by the hundred. Out: forces, motions, edges and stiffnesses, the same as of
-`unilateral` and `edges` one by one. Read `intervals`.
+In: one compliance, and gaps, loads and moments of q cases. Out: forces, motions, edges and stiffnesses, the
+same that `unilateral` and `edges` give case by case.
+
+`intervals` solves cases whose contact set is one stretch of consecutive nodes, and reports by a residual which
+cases are not of this kind; `interval_kernels` has its compiled parts, and `arrays` the records that they work
+on. Read `intervals` first.
 """

@@ -1,43 +1,81 @@
-"""What the compiled contacts of many cases work on, as named tuples of arrays."""
+"""Records of arrays on which the compiled contacts of many cases work."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 
-class Body(NamedTuple):
-    """A compliance of m nodes and what is worked out along its left ends.
+class NestedStretches(NamedTuple):
+    """A compliance of m nodes, its factor for the current left end, and sums of all stretches so far.
 
-    c (m, m) [m/N]; x (m,) [m]; upper (m, m): factor of the nodes from a on, which is overwritten; side (2, m): U^-T of
-    1 and of x; table (m + 1, 3, m + 1): of the stretches [a, stop) the sums of the first squared, of both and of the
-    second squared, which are dN/d closing, -dN/d theta and -dM/d theta; room (m,): scratch.
+    - c (m, m) [m/N]; x (m,) [m].
+    - upper (m, m): upper Cholesky factor U of the nodes from the left end on.
+    - unit (2, m): U^-T of the vectors 1 and x.
+    - sums (m + 1, 3, m + 1): by first node and end of a stretch the sums of unit[0]^2, unit[0] unit[1] and
+      unit[1]^2, which are dN/d(closing), -dN/d(theta) and -dM/d(theta).
+    - workspace (m,).
     """
 
     c: np.ndarray
     x: np.ndarray
     upper: np.ndarray
-    side: np.ndarray
-    table: np.ndarray
-    room: np.ndarray
+    unit: np.ndarray
+    sums: np.ndarray
+    workspace: np.ndarray
 
 
 class Cases(NamedTuple):
-    """q problems on one body and what is found of them.
+    """Problems of q cases and their solutions.
 
-    begin, reach (q,): the first left end that is tried, and the node by which the contact is expected to have ended;
-    gap (q, m) [m]; target (q, 3): load [N], moment [N m] about x = 0, spring [N m/rad]. Written are first, stop (q,):
-    the stretch, a stop of 0 where none was found; force (q, m) [N]; moved (q, 2): closing [m] and theta [rad]; leave,
-    fall (q, 2): of the left and of the right end the force of the last node over its rise per approach [m], and the
-    fall of the gap at the next one per approach; left alone where the stretch ends with the interface.
+    Given:
+
+    - first_try (q,): left end that is tried first.
+    - end_limit (q,): node before which the contact is expected to end.
+    - gap (q, m) [m].
+    - loads (q, 3): load [N], moment about x = 0 [N m] and stiffness of the holder [N m/rad].
+
+    Written:
+
+    - first, stop (q,): the stretch in contact, from `first` on and before `stop`, which is 0 for none.
+    - force (q, m) [N].
+    - motion (q, 2): closing [m] and rotation theta [rad].
+    - leaving (q, 2): for the left and the right end the force of the last node over its increase per
+      approach [m]; 0 where the stretch ends with the interface.
+    - gap_rate (q, 2): for both ends the decrease of the gap at the next node per approach.
     """
 
-    begin: np.ndarray
-    reach: np.ndarray
+    first_try: np.ndarray
+    end_limit: np.ndarray
     gap: np.ndarray
-    target: np.ndarray
+    loads: np.ndarray
     first: np.ndarray
     stop: np.ndarray
     force: np.ndarray
-    moved: np.ndarray
-    leave: np.ndarray
-    fall: np.ndarray
+    motion: np.ndarray
+    leaving: np.ndarray
+    gap_rate: np.ndarray
+
+
+def make_cases(first_try, end_limit, gap, loads) -> Cases:
+    """Return cases without solutions.
+
+    Parameters
+    ----------
+    first_try, end_limit : (q,) int ndarray
+    gap : (q, m) ndarray
+    loads : (q, 3) ndarray
+        As in `Cases`.
+    """
+    n_cases = len(gap)
+    return Cases(
+        first_try,
+        end_limit,
+        gap,
+        loads,
+        first=np.zeros(n_cases, int),
+        stop=np.zeros(n_cases, int),
+        force=np.zeros(gap.shape),
+        motion=np.zeros((n_cases, 2)),
+        leaving=np.zeros((n_cases, 2)),
+        gap_rate=np.ones((n_cases, 2)),
+    )

@@ -1,14 +1,15 @@
-"""Compiled parts of the contacts of one stretch of nodes: what a body is to all cases, and where their stretches end.
+"""Compiled parts of the contacts of one stretch of nodes: factors of nested stretches, and their right ends.
 
-With C = U^T U on the nodes from a on, the leading blocks of U are the factors of every stretch that begins at a. One
-forward substitution of a gap tells of every right end at once what closing and rotation it takes, the force of its last
-node and the gap at the next one:
+With C = U^T U on the nodes from a on, the leading blocks of U are the factors of all stretches that begin at
+a. One forward substitution of the gap gives, for every right end at once, the closing and the rotation, the
+force of the last node and the gap at the next node of
 
     C f = closing - theta x - g on the stretch,    sum f = N,    sum f x = M + K theta.
 
-The substitution back has the force of the first node, which says whether the contact begins further on. The factor from
-a + 1 on is that from a on with its first row added to the rest, by rotations that lose no digits. NumPy twin:
-`unilateral.solve`, a case at a time. Bodies are those of `arrays`; `intervals` substitutes for many cases at once.
+The backward substitution gives the force of the first node, which shows whether the contact begins further
+right. The factor from a + 1 on is a rank-one update of that from a on: the first row is added by Givens
+rotations, which lose no digits. `unilateral.solve` is the NumPy twin, case by case. `stretches` is an
+`arrays.NestedStretches`.
 """
 
 from math import sqrt
@@ -20,108 +21,151 @@ FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def drop(upper, a, side):
-    """From the factor of the nodes from a on to that of those from a + 1 on, in its place; side (m,): scratch."""
-    m = side.size
-    for i in range(a + 1, m):
-        side[i] = upper[a, i]
-    for j in range(a + 1, m):
-        size = sqrt(upper[j, j] * upper[j, j] + side[j] * side[j])
-        c, s = upper[j, j] / size, side[j] / size
+def drop_first_node(upper, a, row):
+    """Turn the factor of the nodes from a on into that of the nodes from a + 1 on, in place.
+
+    row: (m,) workspace.
+    """
+    n_nodes = row.size
+    for i in range(a + 1, n_nodes):
+        row[i] = upper[a, i]
+    for j in range(a + 1, n_nodes):
+        size = sqrt(upper[j, j] * upper[j, j] + row[j] * row[j])
+        cosine = upper[j, j] / size
+        sine = row[j] / size
         upper[j, j] = size
-        for i in range(j + 1, m):
-            u, v = upper[j, i], side[i]
-            upper[j, i] = c * u + s * v
-            side[i] = c * v - s * u
+        for i in range(j + 1, n_nodes):
+            above = upper[j, i]
+            below = row[i]
+            upper[j, i] = cosine * above + sine * below
+            row[i] = cosine * below - sine * above
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def forward(upper, a, stop, y):
-    """Solve U^T y = y on the nodes from a to stop, in its place."""
+def substitute_forward(upper, a, stop, y):
+    """Solve U^T z = y on the nodes from a to stop; z is written to y."""
     for j in range(a, stop):
-        here = y[j] / upper[j, j]
-        y[j] = here
+        value = y[j] / upper[j, j]
+        y[j] = value
         for i in range(j + 1, stop):
-            y[i] -= upper[j, i] * here
+            y[i] -= upper[j, i] * value
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def motions(body, a):
-    """Write `side` and the row of the table of the stretches that begin at a."""
-    one, arm, m = body.side[0], body.side[1], body.x.size
-    for i in range(a, m):
-        one[i], arm[i] = 1.0, body.x[i]
-    forward(body.upper, a, m, one)
-    forward(body.upper, a, m, arm)
-    for i in range(a, m):
-        body.table[a, 0, i + 1] = body.table[a, 0, i] + one[i] * one[i]
-        body.table[a, 1, i + 1] = body.table[a, 1, i] + one[i] * arm[i]
-        body.table[a, 2, i + 1] = body.table[a, 2, i] + arm[i] * arm[i]
+def write_sums(stretches, a):
+    """Write `unit` and the sums of the stretches that begin at a."""
+    closing = stretches.unit[0]
+    arm = stretches.unit[1]
+    sums = stretches.sums[a]
+    n_nodes = stretches.x.size
+    for i in range(a, n_nodes):
+        closing[i] = 1.0
+        arm[i] = stretches.x[i]
+    substitute_forward(stretches.upper, a, n_nodes, closing)
+    substitute_forward(stretches.upper, a, n_nodes, arm)
+    for i in range(a, n_nodes):
+        sums[0, i + 1] = sums[0, i] + closing[i] * closing[i]
+        sums[1, i + 1] = sums[1, i] + closing[i] * arm[i]
+        sums[2, i + 1] = sums[2, i] + arm[i] * arm[i]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rigid(load, moment, spring, turns, sums, stop):
-    """(closing [m], theta [rad]) of a stretch up to stop, whose sums are a row of the table; theta 0 where it is held.
+def solve_motion(load, moment, spring, is_free, sums, stop):
+    """Return closing [m] and theta [rad] of the stretch before stop, with `sums` as `write_sums` writes them.
 
-    closing a - theta b = load,  closing b - theta (c + spring) = moment.
+    closing a - theta b = load,  closing b - theta (c + spring) = moment; theta is 0 unless it is free.
     """
-    a, b, c = sums[0, stop], sums[1, stop], sums[2, stop] + spring
-    if not turns:
+    a = sums[0, stop]
+    b = sums[1, stop]
+    c = sums[2, stop] + spring
+    if not is_free:
         return load / a, 0.0
-    whole = a * c - b * b
-    return (load * c - moment * b) / whole, (load * b - moment * a) / whole
+    determinant = a * c - b * b
+    return (load * c - moment * b) / determinant, (load * b - moment * a) / determinant
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def right_end(body, y, a, stop, load, moment, spring, turns):
-    """End of the largest stretch from a on whose last node pushes and whose next one stays open, 0 where there is none
-    before stop. y (k,): U^-T of the gap from a on."""
-    one, arm, out, m = body.side[0], body.side[1], 0, body.x.size
-    for i in range(a, stop):
-        load += y[i - a] * one[i]
-        moment += y[i - a] * arm[i]
-        closing, theta = rigid(load, moment, spring, turns, body.table[a], i + 1)
-        push = closing * one[i] - theta * arm[i] - y[i - a] > 0
-        n = min(i + 1, m - 1)
-        stays = i + 1 == m or (i + 1 < stop and closing * one[n] - theta * arm[n] - y[n - a] <= 0)
-        # of a few nodes a free rotation is round-off, which may look like a contact
-        if push and stays:
-            out = i + 1
-    return out
+def find_end(stretches, a, y, limit, loads, is_free):
+    """Return the end of the largest stretch from a on whose last node is pressed and whose next one is open.
 
-
-@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def walk(body, a, b, begins):
-    """Go from the left end a to b: `upper` becomes the factor from b on, `side` and the rows of the table up to b are
-    written; begins: that of a as well. Cost: 2 m^2 multiplications a left end."""
-    if begins:
-        motions(body, a)
-    for k in range(a, b):
-        drop(body.upper, k, body.room)
-        motions(body, k + 1)
-
-
-@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def pushes(body, a, y, reach, target, stop, moved, turns):
-    """From U^-T of gaps to what U^-1 makes of them the forces of stretches that begin at a.
-
-    y (n, k): of n cases on k nodes from a on, in its place, 0 beyond the stretch; reach (n,): node before which the
-    right end is sought of a case whose stop (n,) is 0, which stays 0 where none is found; target (n, 3): as of
-    `arrays.Cases`; moved (n, 2): closing [m] and theta [rad], written; turns: the rotation is free.
+    y: (k,) U^-T of the gap from a on; loads: (3,) as in `arrays.Cases`. 0 if there is none before limit.
     """
-    one, arm = body.side[0], body.side[1]
+    unit_closing = stretches.unit[0]
+    unit_arm = stretches.unit[1]
+    load = loads[0]
+    moment = loads[1]
+    n_nodes = stretches.x.size
+    end = 0
+    for i in range(a, limit):
+        load += y[i - a] * unit_closing[i]
+        moment += y[i - a] * unit_arm[i]
+        closing, theta = solve_motion(load, moment, loads[2], is_free, stretches.sums[a], i + 1)
+        is_pressed = closing * unit_closing[i] - theta * unit_arm[i] - y[i - a] > 0
+        is_open = i + 1 == n_nodes
+        # the free rotation of a few nodes is a rounding error, which may look like a contact
+        if i + 1 < limit:
+            n = i + 1
+            is_open = closing * unit_closing[n] - theta * unit_arm[n] - y[n - a] <= 0
+        if is_pressed and is_open:
+            end = i + 1
+    return end
+
+
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+def move_left_end(stretches, a, b, is_start):
+    """Move the left end from a to b: factor, `unit`, and the sums of the left ends on the way.
+
+    is_start: the sums of the left end a are written as well. Cost: 2 m^2 multiplications for each node.
+    """
+    if is_start:
+        write_sums(stretches, a)
+    for k in range(a, b):
+        drop_first_node(stretches.upper, k, stretches.workspace)
+        write_sums(stretches, k + 1)
+
+
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+def solve_ends(stretches, a, y, limits, loads, stop, motion, is_free):
+    """Find right ends and motions of n cases that begin at a, and what U^-1 turns into their forces.
+
+    Parameters
+    ----------
+    stretches : arrays.NestedStretches
+    a : int
+        Left end.
+    y : (n, k) ndarray
+        U^-T of the gaps on k nodes from a on; replaced by U f, which is 0 beyond the stretch.
+    limits : (n,) ndarray
+        Nodes before which right ends are searched.
+    loads : (n, 3) ndarray
+        As in `arrays.Cases`.
+    stop : (n,) ndarray
+        Right ends; where it is 0 one is searched, and it stays 0 if there is none.
+    motion : (n, 2) ndarray
+        Closing [m] and theta [rad], written.
+    is_free : int
+        1 if the rotation is free, else 0.
+    """
+    unit_closing = stretches.unit[0]
+    unit_arm = stretches.unit[1]
     for k in range(stop.size):
-        load, moment, spring, row = target[k, 0], target[k, 1], target[k, 2], y[k]
+        row = y[k]
         if stop[k] == 0:
-            stop[k] = right_end(body, row, a, reach[k], load, moment, spring, turns)
+            stop[k] = find_end(stretches, a, row, limits[k], loads[k], is_free)
         end = max(stop[k], a)
+        load = loads[k, 0]
+        moment = loads[k, 1]
         for i in range(a, end):
-            load += row[i - a] * one[i]
-            moment += row[i - a] * arm[i]
-        closing, theta = (
-            rigid(load, moment, spring, turns, body.table[a], end) if end > a else (0.0, 0.0)
-        )
+            load += row[i - a] * unit_closing[i]
+            moment += row[i - a] * unit_arm[i]
+        closing = 0.0
+        theta = 0.0
+        if end > a:
+            closing, theta = solve_motion(
+                load, moment, loads[k, 2], is_free, stretches.sums[a], end
+            )
         for i in range(a, end):
-            row[i - a] = closing * one[i] - theta * arm[i] - row[i - a]
+            row[i - a] = closing * unit_closing[i] - theta * unit_arm[i] - row[i - a]
         row[end - a :] = 0.0
-        moved[k, 0], moved[k, 1] = closing, theta
+        motion[k, 0] = closing
+        motion[k, 1] = theta

@@ -1,7 +1,8 @@
-"""Contacts of one stretch of nodes: any number of them on one compliance, pressed in one pass along its left ends.
+"""Contacts of one stretch of nodes: any number of cases on one compliance, solved in one pass over left ends.
 
-Cases that begin at one node share its factor (`interval_kernels`) and are solved together by BLAS.
-A flat, tilted or crowned piece presses like this under any load, wherever its load line is. Twin: `unilateral.solve`.
+Flat, tilted and crowned pieces press like this under any load, wherever the load line is. Cases that begin at
+the same node share its Cholesky factor (`interval_kernels`) and are solved together by BLAS.
+`unilateral.solve` is the twin for single cases.
 """
 
 from typing import NamedTuple
@@ -13,22 +14,26 @@ from ...elasticity.lapack import dtrsm
 from ..active_set import OPENING_NOISE
 from ..edges import edge_offset, parabola_change
 from ..strip_compliance import factorise
-from . import arrays
+from ..unilateral import RESIDUAL_TOL
+from .arrays import Cases, NestedStretches, make_cases
 
 kernels = compiled.load("contact.batch.interval_kernels")
-NEAR = 12  # left ends that are tried where the stretch is known
-COARSEST, EVERY = 40, 4  # nodes from which on every fourth of them are pressed first
-TOGETHER = 256  # cases that are solved together
-SOLVED = 1e-12  # largest residual, as `unilateral` has it
+N_TRIES = 12  # left ends that are tried if the stretch is known; beyond them all others are tried
+MIN_COARSE_NODES = 40  # nodes above which the stretches are first found on fewer nodes
+COARSENING = 4  # the coarse interface has every fourth node
+BATCH_SIZE = 256  # cases that are solved together, so that their forces stay in the cache
+MIN_PARABOLA_NODES = 3  # nodes in contact from which a stiffness is interpolated between sets
 
 
 class Pressed(NamedTuple):
-    """Contacts of q problems on m nodes.
+    """Contacts of q cases on m nodes.
 
-    first, stop: (q,) the nodes that touch, from first on and before stop; force: (q, m) [N]; opening: (q, m) [m];
-    closing: (q,) [m]; theta: (q,) [rad]; shares: (q, 2) of the cell beyond the left and the right end that the edge has
-    passed, as `edges.ContactEdge` has them; flaw: (q,) largest relative residual [1], infinite where no such contact was
-    found."""
+    - first, stop (q,): the nodes in contact, from `first` on and before `stop`.
+    - force (q, m) [N]; opening (q, m) [m]; closing (q,) [m]; theta (q,) [rad].
+    - fractions (q, 2): fraction of the cell beyond the left and the right end that the edge has passed, as
+      in `edges.ContactEdge`.
+    - residual (q,): largest relative residual; infinite if the contact is not a single stretch.
+    """
 
     first: np.ndarray
     stop: np.ndarray
@@ -36,263 +41,299 @@ class Pressed(NamedTuple):
     opening: np.ndarray
     closing: np.ndarray
     theta: np.ndarray
-    shares: np.ndarray
-    flaw: np.ndarray
+    fractions: np.ndarray
+    residual: np.ndarray
 
     @property
-    def count(self) -> np.ndarray:
-        """Nodes (q,) that touch."""
+    def n_nodes(self) -> np.ndarray:
+        """Number of nodes in contact (q,)."""
         return self.stop - self.first
 
 
-class Intervals:
-    """A compliance c (m, m) [m/N] on places x (m,) [m] whose contacts are stretches of nodes.
+class _Solutions(NamedTuple):
+    """Solutions of n cases with the same left end: its lower factor, forces (n, k), ends (n,), motions (n, 2)."""
 
-    table: (m + 1, 3, m + 1) sums of the stretches by first node and end, as `interval_kernels.Body` has it, of those
-    that were asked for.
+    left_end: int
+    lower: np.ndarray
+    force: np.ndarray
+    stop: np.ndarray
+    motion: np.ndarray
+
+
+class Intervals:
+    """Interface whose contact sets are stretches of consecutive nodes.
+
+    Parameters
+    ----------
+    c : (m, m) ndarray
+        Compliance [m/N].
+    x : (m,) ndarray
+        Positions [m].
     """
 
-    def __init__(self, c, x):
-        self.c, self.x, m = np.ascontiguousarray(c), np.ascontiguousarray(x), x.size
-        self.table = np.zeros((m + 1, 3, m + 1))
+    def __init__(self, c: np.ndarray, x: np.ndarray):
+        self.c = np.ascontiguousarray(c)
+        self.x = np.ascontiguousarray(x)
+        # as in `arrays.NestedStretches`, of the left ends that were visited
+        self.sums = np.zeros((x.size + 1, 3, x.size + 1))
 
     def press(self, gap, load, moment=None, spring=0.0, known=None) -> Pressed:
-        """Contacts on gaps (q, m) [m] under loads (q,) [N].
+        """Solve the contacts of q cases.
 
-        moment: (q,) [N m] about x = 0 where the pieces are free to turn against the `spring` (q,) or () [N m/rad] of
-        the holder; None: the rotation is held, it is in the gap. known: (first, stop) (q,) that hold the contacts as
-        far as one knows. Where the contact is none of this kind `flaw` says so.
+        Parameters
+        ----------
+        gap : (q, m) ndarray
+            Gaps [m].
+        load : (q,) ndarray
+            Loads [N].
+        moment : (q,) ndarray, optional
+            Moments about x = 0 [N m] of pieces that are free to rotate; without them the rotation is
+            prescribed and contained in the gap.
+        spring : float or (q,) ndarray
+            Stiffness of the holder against the rotation [N m/rad].
+        known : tuple of (q,) ndarray, optional
+            First node and end of stretches that are expected to contain the contacts.
+
+        Returns
+        -------
+        Pressed
+            `residual` shows whether a contact is a single stretch.
         """
-        q, m, turns = load.size, self.x.size, moment is not None
-        target = np.stack(
-            np.broadcast_arrays(load, moment if turns else 0.0, spring), axis=1
-        ).astype(float)
+        is_free = moment is not None
+        columns = np.broadcast_arrays(load, moment if is_free else 0.0, spring)
+        return self._press(gap, np.stack(columns, axis=1).astype(float), known, is_free=is_free)
+
+    def _press(self, gap, loads: np.ndarray, known, *, is_free: bool) -> Pressed:
+        n_cases, m = gap.shape
         gap = np.ascontiguousarray(gap)
-        if known is None and m > COARSEST:
-            known = self._on_coarser(gap, load, moment, spring)
-        first, reach = np.clip(((0,), (m,)) if known is None else known, [[0], [1]], [[m - 1], [m]])
-        begin = np.broadcast_to(first, q).astype(int)
-        found = arrays.Cases(
-            begin,
-            np.broadcast_to(reach, q).astype(int),
-            gap,
-            target,
-            *np.zeros((2, q), int),
-            np.zeros((q, m)),
-            np.zeros((q, 2)),
-            np.zeros((q, 2)),
-            np.ones((q, 2)),
+        everywhere = ((0,), (m,))
+        if known is None:
+            known = everywhere
+            if m > MIN_COARSE_NODES:
+                known = self._bracket_on_coarse(gap, loads, is_free=is_free)
+        first, stop = np.clip(known, [[0], [1]], [[m - 1], [m]])
+        first_try = np.broadcast_to(first, n_cases).astype(int)
+        is_known = first_try.any()
+        cases = make_cases(first_try, np.broadcast_to(stop, n_cases).astype(int), gap, loads)
+        n_tries = N_TRIES if is_known else m
+        self._solve_all(cases, int(first_try.min()) - 1, 0, n_tries, is_free=is_free)
+        displacement = cases.force @ self.c
+        opening = self._opening(gap, displacement, cases.motion)
+        nodes = np.arange(m)
+        in_contact = (nodes >= cases.first[:, None]) & (nodes < cases.stop[:, None])
+        residual = self._residual(cases, displacement, opening, is_free=is_free)
+        contacts = Pressed(
+            first=cases.first,
+            stop=cases.stop,
+            force=cases.force,
+            opening=np.where(in_contact, 0.0, np.maximum(opening, 0.0)),
+            closing=cases.motion[:, 0],
+            theta=cases.motion[:, 1],
+            fractions=self._edge_fractions(cases, opening),
+            residual=np.where(cases.stop > 0, residual, np.inf),
         )
-        self._pass(found, int(begin.min()) - 1, 0, NEAR if begin.any() else m, turns)
-        closing, theta = found.moved.T
-        bent = found.force @ self.c
-        opening = self._opening(gap, bent, closing, theta)
-        flaw = self._flaw(gap, found.force, bent, opening, closing, theta, target, turns)
-        inside = (np.arange(m) >= found.first[:, None]) & (np.arange(m) < found.stop[:, None])
-        beside, rows = np.stack([found.first - 1, found.stop], axis=1), np.arange(q)[:, None]
-        gaps = np.where((beside >= 0) & (beside < m), opening[rows, np.clip(beside, 0, m - 1)], 0.0)
-        leave, enter = found.leave, gaps / found.fall
-        good = (leave >= 0) & (enter >= 0) & (leave + enter > 0)
-        shares = np.divide(leave, leave + enter, out=np.full((q, 2), 0.5), where=good)
-        out = Pressed(
-            found.first,
-            found.stop,
-            found.force,
-            np.where(inside, 0.0, np.maximum(opening, 0.0)),
-            closing,
-            theta,
-            shares,
-            np.where(found.stop > 0, flaw, np.inf),
-        )
-        lost = np.flatnonzero(~(out.flaw <= SOLVED)) if begin.any() else ()
-        if len(lost):
-            again = self.press(
-                gap[lost],
-                load[lost],
-                moment if moment is None else moment[lost],
-                np.broadcast_to(spring, q)[lost],
-                ((0,), (m,)),
-            )
-            for mine, other in zip(out, again):
-                mine[lost] = other
-        return out
+        missed = np.flatnonzero(~(contacts.residual <= RESIDUAL_TOL))
+        if is_known and missed.size:
+            again = self._press(gap[missed], loads[missed], everywhere, is_free=is_free)
+            for values, new_values in zip(contacts, again):
+                values[missed] = new_values
+        return contacts
 
-    def _on_coarser(self, gap, load, moment, spring) -> tuple:
-        """(first, stop) (q,) that hold the contacts as far as those on every EVERY-th node tell."""
-        coarse = Intervals(self.c[::EVERY, ::EVERY], self.x[::EVERY]).press(
-            gap[:, ::EVERY], load, moment, spring
-        )
-        held = coarse.stop > 0
-        return np.where(held, EVERY * (coarse.first - 1), 0), np.where(
-            held, EVERY * coarse.stop + 2, self.x.size
-        )
+    def _bracket_on_coarse(self, gap, loads, *, is_free: bool) -> tuple:
+        """Return first node and end (q,) of stretches that contain the contacts, from those on fewer nodes."""
+        coarse = Intervals(self.c[::COARSENING, ::COARSENING], self.x[::COARSENING])
+        contacts = coarse._press(gap[:, ::COARSENING], loads, None, is_free=is_free)
+        has_end = contacts.stop > 0
+        first = np.where(has_end, COARSENING * (contacts.first - 1), 0)
+        stop = np.where(has_end, COARSENING * contacts.stop + 2, self.x.size)
+        return first, stop
 
-    def fill(self, first) -> None:
-        """Fill the table for stretches from `first` (q,) on and from the nodes beside them."""
-        none, m = np.zeros(0, int), self.x.size
-        cases = arrays.Cases(
-            none,
-            none,
-            np.zeros((0, m)),
-            np.zeros((0, 3)),
-            none,
-            none,
-            np.zeros((0, m)),
-            *np.zeros((3, 0, 2)),
-        )
-        self._pass(cases, int(first.min()) - 1, int(first.max()) + 1, 1, False)
+    def fill_sums(self, first: np.ndarray) -> None:
+        """Fill `sums` for stretches that begin at the nodes `first` (q,) or beside them."""
+        none = np.zeros(0, int)
+        cases = make_cases(none, none, np.zeros((0, self.x.size)), np.zeros((0, 3)))
+        self._solve_all(cases, int(first.min()) - 1, int(first.max()) + 1, 1, is_free=False)
 
-    def _pass(self, cases, low: int, high: int, tries: int, turns: bool) -> None:
-        """Press all cases and fill the rows of the table from the left end `low` to `high` and beside every stretch;
-        tries: left ends that are tried of each."""
-        m, a = self.x.size, max(low, 0)
+    def _solve_all(self, cases: Cases, low: int, high: int, n_tries: int, *, is_free: bool) -> None:
+        """Solve all cases, and fill `sums` of the left ends from `low` to `high` and beside every stretch.
+
+        n_tries: number of left ends that are tried for a case.
+        """
+        m = self.x.size
+        a = max(low, 0)
         upper = np.zeros((m, m))
         upper[a:, a:] = factorise(self.c[a:, a:].copy()).T
-        body = arrays.Body(self.c, self.x, upper, np.zeros((2, m)), self.table, np.zeros(m))
-        kernels.walk(body, a, a, 1)
-        waits = np.minimum(cases.begin, m)  # left end that is tried next, m of what is done
-        while (after := int(waits.min(initial=m))) < m:
-            if after > a:
-                kernels.walk(body, a, after, 0)
-            a, here = after, np.flatnonzero(waits == after)
-            here = here[np.argsort(cases.reach[here], kind="stable")]
-            for start in range(0, here.size, TOGETHER):
-                some = here[start : start + TOGETHER]
-                waits[some] = self._begun(body, cases, some, a, turns)
-            high = max(high, a + 1) if (cases.stop[here] > 0).any() else high
-            waits[waits >= cases.begin + tries] = m
+        stretches = NestedStretches(
+            self.c, self.x, upper, np.zeros((2, m)), self.sums, workspace=np.zeros(m)
+        )
+        kernels.move_left_end(stretches, a, a, 1)
+        # left end that is tried next for a case, m for a case that is done
+        next_try = np.minimum(cases.first_try, m)
+        while (left_end := int(next_try.min(initial=m))) < m:
+            if left_end > a:
+                kernels.move_left_end(stretches, a, left_end, 0)
+            a = left_end
+            here = np.flatnonzero(next_try == a)
+            here = here[np.argsort(cases.end_limit[here], kind="stable")]
+            for start in range(0, here.size, BATCH_SIZE):
+                some = here[start : start + BATCH_SIZE]
+                next_try[some] = self._try_left_end(stretches, cases, some, a, is_free=is_free)
+            if (cases.stop[here] > 0).any():
+                high = max(high, a + 1)
+            next_try[next_try >= cases.first_try + n_tries] = m
         if min(high, m - 1) > a:
-            kernels.walk(body, a, min(high, m - 1), 0)
+            kernels.move_left_end(stretches, a, min(high, m - 1), 0)
 
-    def _begun(self, body, cases, some, a: int, turns: bool) -> np.ndarray:
-        """Left ends (n,) at which cases `some` (n,) that may begin at a are to be tried again, m of those that do."""
-        m, reach, target = (
-            self.x.size,
-            np.minimum(cases.reach[some], self.x.size),
-            cases.target[some],
-        )
-        here = slice(a, max(int(reach.max()), a + 1))
-        low = np.asfortranarray(body.upper[here, here].T)
-        stop, moved, y = (
-            np.zeros(some.size, int),
-            np.zeros((some.size, 2)),
-            _solved(low, cases.gap[some, here]),
-        )
-        kernels.pushes(body, a, y, reach, target, stop, moved, int(turns))
-        force = _solved(low, y, back=True)
-        good, far = (stop > 0) & (force[:, 0] > 0), (stop == 0) & (reach < m)
-        cases.reach[some[far]] = m
-        out = np.where(good, m, np.where(far, a, a + 1))
-        if good.any():
-            self._kept(
-                body, cases, some[good], (a, low, force[good], stop[good], moved[good]), turns
+    def _try_left_end(self, stretches, cases: Cases, some, a: int, *, is_free: bool) -> np.ndarray:
+        """Try the left end a for some cases (n,); returns their next left ends (n,), m for those solved."""
+        m = self.x.size
+        limits = np.minimum(cases.end_limit[some], m)
+        nodes = slice(a, max(int(limits.max()), a + 1))
+        lower = np.asfortranarray(stretches.upper[nodes, nodes].T)
+        y = _substitute(lower, cases.gap[some, nodes])
+        stop = np.zeros(some.size, int)
+        motion = np.zeros((some.size, 2))
+        kernels.solve_ends(stretches, a, y, limits, cases.loads[some], stop, motion, int(is_free))
+        force = _substitute(lower, y, is_backward=True)
+        is_solved = (stop > 0) & (force[:, 0] > 0)
+        # without an end before its limit, a contact is searched once more up to the end of the interface
+        is_cut = (stop == 0) & (limits < m)
+        cases.end_limit[some[is_cut]] = m
+        if is_solved.any():
+            found = _Solutions(
+                a, lower, force[is_solved], stop[is_solved], motion=motion[is_solved]
             )
-        return out
+            self._store(stretches, cases, some[is_solved], found, is_free=is_free)
+        return np.where(is_solved, m, np.where(is_cut, a, a + 1))
 
-    def _kept(self, body, cases, some, found: tuple, turns: bool) -> None:
-        """Write contacts of cases `some` (n,), with what round-off left of openings inside, of load and moment taken
-        out of forces and motion; found: left end, its factor, forces (n, k), stops (n,), motions (n, 2)."""
-        a, low, force, stop, moved = found
-        here, target = slice(a, a + force.shape[1]), cases.target[some].copy()
-        x, inside, one = (
-            self.x[here],
-            np.arange(a, a + force.shape[1]) < stop[:, None],
-            body.side[0],
-        )
-        target[:, 0] -= force.sum(axis=1)
-        target[:, 1] += target[:, 2] * moved[:, 1] - force @ x
-        y = _solved(
-            low,
-            inside * self._opening(cases.gap[some, here], force @ self.c[here, here], *moved.T, x),
-        )
-        more = np.zeros_like(moved)
-        kernels.pushes(body, a, y, stop, target, stop, more, int(turns))
-        force = force + _solved(low, y, back=True)
-        cases.force[some, here], cases.moved[some] = force, moved + more
-        cases.first[some], cases.stop[some] = a, stop
-        within = np.flatnonzero(stop < self.x.size)
-        last, size = stop[within], body.upper.diagonal()
-        cases.leave[some[within], 1] = force[within, last - 1 - a] * size[last - 1] / one[last - 1]
-        cases.fall[some[within], 1] = size[last] * one[last]
+    def _store(self, stretches, cases: Cases, some, found: _Solutions, *, is_free: bool) -> None:
+        """Store the solutions of some cases (n,) after a step of iterative refinement."""
+        a = found.left_end
+        stop = found.stop
+        nodes = slice(a, a + found.force.shape[1])
+        x = self.x[nodes]
+        in_contact = np.arange(nodes.start, nodes.stop) < stop[:, None]
+        imbalance = cases.loads[some].copy()
+        imbalance[:, 0] -= found.force.sum(axis=1)
+        imbalance[:, 1] += imbalance[:, 2] * found.motion[:, 1] - found.force @ x
+        displacement = found.force @ self.c[nodes, nodes]
+        opening = self._opening(cases.gap[some, nodes], displacement, found.motion, x)
+        y = _substitute(found.lower, in_contact * opening)
+        motion_change = np.zeros_like(found.motion)
+        kernels.solve_ends(stretches, a, y, stop, imbalance, stop, motion_change, int(is_free))
+        force = found.force + _substitute(found.lower, y, is_backward=True)
+        cases.force[some, nodes] = force
+        cases.motion[some] = found.motion + motion_change
+        cases.first[some] = a
+        cases.stop[some] = stop
+        unit = stretches.unit[0]
+        pivots = stretches.upper.diagonal()
+        inside = np.flatnonzero(stop < self.x.size)
+        end = stop[inside]
+        last_force = force[inside, end - 1 - a]
+        cases.leaving[some[inside], 1] = last_force * pivots[end - 1] / unit[end - 1]
+        cases.gap_rate[some[inside], 1] = pivots[end] * unit[end]
         if a > 0:
-            rise = _solved(low, inside * one[here], back=True)
-            cases.leave[some, 0], cases.fall[some, 0] = (
-                force[:, 0] / rise[:, 0],
-                1 - rise @ self.c[here, a - 1],
-            )
+            increase = _substitute(found.lower, in_contact * unit[nodes], is_backward=True)
+            cases.leaving[some, 0] = force[:, 0] / increase[:, 0]
+            cases.gap_rate[some, 0] = 1 - increase @ self.c[nodes, a - 1]
 
-    def places(self, found: Pressed, softness, row: float) -> np.ndarray:
-        """Places (2, q) [m] of the edges, as `edges.ContactEdge` has them; an end of the interface that bears is one.
+    def edge_positions(self, contacts: Pressed, softness, row: float) -> np.ndarray:
+        """Return the positions (2, q) [m] of the edges, as in `edges.ContactEdge`.
 
-        softness: (m,) [m/N] of a skin alone, 0 without one; row [m]: height of the first cells.
+        An end of the interface that is in contact is an edge.
+
+        Parameters
+        ----------
+        contacts : Pressed
+        softness : (m,) ndarray
+            Compliance [m/N] of a skin alone; 0 without one.
+        row : float
+            Height [m] of the first row of cells.
         """
-        x, m, out = self.x, self.x.size, []
-        for node, side, share in zip((found.first, found.stop - 1), (-1, 1), found.shares.T):
-            after, inner = np.clip([node + side, node - side], 0, m - 1)
-            cells = [
-                np.abs(x[node] - x[np.where(one == node, other, one)])
-                for one, other in ((inner, after), (after, inner))
-            ]
-            off = (1 - softness[node] / self.c.diagonal()[node]) * edge_offset(*cells, share, row)
-            out.append(
-                np.where(
-                    after == node, x[node], x[node] + share * (x[after] - x[node]) - side * off
-                )
-            )
-        return np.clip(out, x[0], x[-1])
+        x = self.x
+        m = x.size
+        elastic_fraction = 1 - softness / self.c.diagonal()
+        positions = []
+        ends = ((contacts.first, -1), (contacts.stop - 1, 1))
+        for (node, side), fraction in zip(ends, contacts.fractions.T):
+            outer, inner = np.clip([node + side, node - side], 0, m - 1)
+            is_border = outer == node
+            outer_cell = np.abs(x[node] - x[np.where(is_border, inner, outer)])
+            inner_cell = np.abs(x[node] - x[np.where(inner == node, outer, inner)])
+            offset = elastic_fraction[node] * edge_offset(inner_cell, outer_cell, fraction, row)
+            between = x[node] + fraction * (x[outer] - x[node]) - side * offset
+            positions.append(np.where(is_border, x[node], between))
+        return np.clip(positions, x[0], x[-1])
 
-    def stiffness(self, found: Pressed, lever: bool = False) -> np.ndarray:
-        """Stiffnesses (q,) of contacts with their edges between nodes, as `edges.set_stiffness` has them: [N/m] of a
-        translation, or [N m/rad] of a rotation about x = 0 where `lever`."""
-        sums, a, b, m = self.table[:, 2 if lever else 0], found.first, found.stop, self.x.size
-        out = here = sums[a, b]
-        for inside, share, more, less in (
-            (
-                a > 0,
-                found.shares[:, 0],
-                sums[np.maximum(a - 1, 0), b],
-                sums[np.minimum(a + 1, m), b],
-            ),
-            (
-                b < m,
-                found.shares[:, 1],
-                sums[a, np.minimum(b + 1, m)],
-                sums[a, np.maximum(b - 1, 0)],
-            ),
-        ):
-            out = out + np.where(
-                inside & (found.count >= 3),
-                parabola_change(share - 0.5, more - here, here - less),
-                0.0,
-            )
-        return out
+    def stiffness(self, contacts: Pressed, *, is_rotation: bool = False) -> np.ndarray:
+        """Return the stiffnesses (q,) of contacts with edges between nodes, as `edges.set_stiffness` does.
 
-    def _opening(self, gap, bent, closing, theta, x=None) -> np.ndarray:
-        """Openings (q, m) [m]; bent (q, m) [m]: C times the forces; x: places of other nodes than all."""
-        return gap + theta[:, None] * (self.x if x is None else x) - closing[:, None] + bent
-
-    def _flaw(self, gap, force, bent, opening, closing, theta, target, turns: bool) -> np.ndarray:
-        """Largest residual (q,) as `unilateral.residuals` has them; an overlap within OPENING_NOISE of its terms is none."""
-        load, moment, spring = target.T
-        depth = (
-            np.abs(gap) + np.abs(theta[:, None] * self.x) + np.abs(closing)[:, None] + np.abs(bent)
+        They are those of a translation [N/m], or of a rotation about x = 0 [N m/rad].
+        """
+        sums = self.sums[:, 2 if is_rotation else 0]
+        m = self.x.size
+        first = contacts.first
+        stop = contacts.stop
+        set_stiffness = sums[first, stop]
+        is_long = contacts.n_nodes >= MIN_PARABOLA_NODES
+        left_change = parabola_change(
+            contacts.fractions[:, 0] - 0.5,
+            sums[np.maximum(first - 1, 0), stop] - set_stiffness,
+            set_stiffness - sums[np.minimum(first + 1, m), stop],
         )
-        share = opening / np.where(depth > 0, depth, 1.0)
-        worst = [
+        right_change = parabola_change(
+            contacts.fractions[:, 1] - 0.5,
+            sums[first, np.minimum(stop + 1, m)] - set_stiffness,
+            set_stiffness - sums[first, np.maximum(stop - 1, 0)],
+        )
+        stiffness = set_stiffness + np.where((first > 0) & is_long, left_change, 0.0)
+        return stiffness + np.where((stop < m) & is_long, right_change, 0.0)
+
+    def _opening(self, gap, displacement, motion, x=None) -> np.ndarray:
+        """Return the openings (q, m) [m]; x: positions (m,) [m], those of all nodes by default."""
+        x = self.x if x is None else x
+        return gap + motion[:, 1:] * x - motion[:, :1] + displacement
+
+    def _edge_fractions(self, cases: Cases, opening) -> np.ndarray:
+        """Return the fractions (q, 2) of `Pressed`; 1/2 where the set does not change with the approach."""
+        m = self.x.size
+        neighbour = np.stack([cases.first - 1, cases.stop], axis=1)
+        has_neighbour = (neighbour >= 0) & (neighbour < m)
+        rows = np.arange(len(neighbour))[:, None]
+        gaps = np.where(has_neighbour, opening[rows, np.clip(neighbour, 0, m - 1)], 0.0)
+        entering = gaps / cases.gap_rate
+        leaving = cases.leaving
+        is_valid = (leaving >= 0) & (entering >= 0) & (leaving + entering > 0)
+        fractions = np.full(leaving.shape, 0.5)
+        return np.divide(leaving, leaving + entering, out=fractions, where=is_valid)
+
+    def _residual(self, cases: Cases, displacement, opening, *, is_free: bool) -> np.ndarray:
+        """Return the largest residual (q,), as in `unilateral.compute_residuals`.
+
+        An overlap within OPENING_NOISE of its terms counts as 0.
+        """
+        load, moment, spring = cases.loads.T
+        closing, theta = cases.motion.T
+        force = cases.force
+        scale = np.abs(cases.gap) + np.abs(theta[:, None] * self.x)
+        scale = scale + np.abs(closing)[:, None] + np.abs(displacement)
+        relative_opening = opening / np.where(scale > 0, scale, 1.0)
+        overlap = np.maximum(-relative_opening - OPENING_NOISE, 0.0)
+        residuals = [
             np.abs(force.sum(axis=1) - load) / load,
             np.maximum(-force.min(axis=1), 0.0) / load,
-            np.where(force != 0, 0.0, np.maximum(-share - OPENING_NOISE, 0.0)).max(axis=1),
-            (np.abs(force * share)).sum(axis=1) / load,
+            np.where(force != 0, 0.0, overlap).max(axis=1),
+            np.abs(force * relative_opening).sum(axis=1) / load,
         ]
-        if turns:
-            lack = np.abs(force @ self.x - moment - spring * theta)
-            worst.append(lack / (load * np.ptp(self.x) + np.abs(spring * theta)))
-        out = np.max(worst, axis=0)
-        return np.where(np.isfinite(out), out, np.inf)
+        if is_free:
+            imbalance = np.abs(force @ self.x - moment - spring * theta)
+            residuals.append(imbalance / (load * np.ptp(self.x) + np.abs(spring * theta)))
+        largest = np.max(residuals, axis=0)
+        return np.where(np.isfinite(largest), largest, np.inf)
 
 
-def _solved(low, rows, back: bool = False) -> np.ndarray:
-    """Each of rows (n, k) solved with a lower factor (k, k), or with its transpose where `back`."""
-    return dtrsm(
-        1.0, low, np.ascontiguousarray(rows).T, lower=1, trans_a=int(back), overwrite_b=1
-    ).T
+def _substitute(lower: np.ndarray, rows: np.ndarray, *, is_backward: bool = False) -> np.ndarray:
+    """Solve for each of the rows (n, k) with a lower factor (k, k), or with its transpose."""
+    right_sides = np.ascontiguousarray(rows).T
+    return dtrsm(1.0, lower, right_sides, lower=1, trans_a=int(is_backward), overwrite_b=1).T

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.batch.intervals import SOLVED, Intervals, Pressed
+from ...contact.batch.intervals import Intervals, Pressed
+from ...contact.unilateral import RESIDUAL_TOL
 from ...core import ContactState, Measure, Outcome, frozen_array
 from ...elasticity.lapack import one_thread
 from ...mesh.tensor import TensorGrid
@@ -71,7 +72,7 @@ class Level(NamedTuple):
     @property
     def is_solved(self) -> np.ndarray:
         """Whether each patch (q,) is a contact of one stretch that was found."""
-        return self.contacts.flaw <= SOLVED
+        return self.contacts.residual <= RESIDUAL_TOL
 
 
 class Together(NamedTuple):
@@ -200,7 +201,10 @@ def patches_on(patches, pair: Pair) -> list:
         with one_thread():
             level = pressed_on(asked_of([patches[k] for k in cases]), pair)
         for place, k in enumerate(cases):
-            if level.is_solved[place] and level.contacts.count[place] > one_by_one.UNRESOLVED_NODES:
+            if (
+                level.is_solved[place]
+                and level.contacts.n_nodes[place] > one_by_one.UNRESOLVED_NODES
+            ):
                 out[k] = _patch_of(patches[k], pair, level, place)
     return out
 
@@ -249,7 +253,7 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
         theirs = () if pieces else _in_other_plane(asked, levels[1])
     fine, pair = levels[0], pairs[0]
     good = np.logical_and.reduce([level.is_solved for level in (*levels, *theirs)])
-    good &= (fine.contacts.count > one_by_one.UNRESOLVED_NODES) & (
+    good &= (fine.contacts.n_nodes > one_by_one.UNRESOLVED_NODES) & (
         not any(one.closing.any() for one in pairs)
     )
     hidden = one_by_one.hidden_by_meshes(
@@ -336,7 +340,7 @@ def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
         asked.spring,
         coarse and _about(x, coarse),
     )
-    tangential.fill(contacts.first)
+    tangential.fill_sums(contacts.first)
     sigma = contacts.force / bare.interface.weight
     pressure = ContactState(
         sigma,
@@ -350,14 +354,14 @@ def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
         MappingProxyType({}),
     )
     softness = normal.c.diagonal() - bare.normal.diagonal()
-    left, right = normal.places(contacts, softness, pair.row)
+    left, right = normal.edge_positions(contacts, softness, pair.row)
     width = np.maximum(right - left, 0.0)
     edge_values = EdgeValues(
         width,
         width,
         normal.stiffness(contacts),
         tangential.stiffness(contacts),
-        normal.stiffness(contacts, lever=True),
+        normal.stiffness(contacts, is_rotation=True),
     )
     peak = peak_pressures(
         x, sigma, None if asked.first.interface.skin is None else softness / normal.c.diagonal()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.contact import edges
-from patchfem.contact.batch.intervals import COARSEST, Intervals
+from patchfem.contact.batch.intervals import MIN_COARSE_NODES, Intervals
 from patchfem.contact.unilateral import press
 
 X = np.concatenate([np.linspace(-5e-3, 0, 40), np.linspace(0, 5e-3, 12)[1:]])
@@ -31,7 +31,7 @@ def family(count=60, seed=5):
 def test_exact_as_one_solve_each_under_a_held_rotation():
     load, gap = family()
     found = Intervals(C, X).press(gap, load)
-    assert X.size > COARSEST and found.flaw.max() < 1e-14  # begun on every fourth node
+    assert X.size > MIN_COARSE_NODES and found.residual.max() < 1e-14  # begun on every fourth node
     kinds = {(bool(a), bool(b < X.size)) for a, b in zip(found.first, found.stop)}
     assert kinds == {(a, b) for a in (False, True) for b in (False, True)}
     for k, one in enumerate(load):
@@ -50,7 +50,7 @@ def test_exact_as_one_solve_each_with_a_free_rotation(spring, crown):
     )
     for k, line in enumerate(lines):
         one = press(PIECES, crown * X**2, load, load * line, spring=spring)
-        assert found.flaw[k] < 1e-13
+        assert found.residual[k] < 1e-13
         assert found.force[k] == pytest.approx(one.sigma_n * WEIGHT, rel=1e-11, abs=1e-12 * load)
         assert found.theta[k] == pytest.approx(one.rotation, rel=1e-11)
 
@@ -60,16 +60,16 @@ def test_exact_edges_and_stiffnesses_are_those_of_the_set():
     body = Intervals(C, X)
     found = body.press(gap, load)
     places, plain, lever = (
-        body.places(found, np.zeros(X.size), 1e-4),
+        body.edge_positions(found, np.zeros(X.size), 1e-4),
         body.stiffness(found),
-        body.stiffness(found, True),
+        body.stiffness(found, is_rotation=True),
     )
-    for k in np.flatnonzero(found.count > 1).tolist():
+    for k in np.flatnonzero(found.n_nodes > 1).tolist():
         force = found.force[k]
         ends = edges.find_edges(C, X, force, found.opening[k], None, 1e-4)
         for end in ends:
             side = int(end.side > 0)
-            assert found.shares[k, side] == pytest.approx(end.fraction, rel=1e-9, abs=1e-11)
+            assert found.fractions[k, side] == pytest.approx(end.fraction, rel=1e-9, abs=1e-11)
             assert places[side, k] == pytest.approx(np.clip(end.position, X[0], X[-1]), rel=1e-9)
         assert plain[k] == pytest.approx(
             edges.set_stiffness(C, force > 0, np.ones(X.size), ends), rel=1e-11
@@ -89,4 +89,4 @@ def test_exact_a_wrong_guess_of_the_stretch_changes_nothing(off):
 def test_always_a_contact_of_two_stretches_is_told():
     """Two humps bear side by side: no one stretch of nodes does."""
     humps = 1e-6 * np.cos(np.pi * X / 2.5e-3) ** 2
-    assert Intervals(C, X).press(humps[None], np.array([1.0])).flaw[0] > 1e-6
+    assert Intervals(C, X).press(humps[None], np.array([1.0])).residual[0] > 1e-6

@@ -163,7 +163,7 @@ def test_exact_a_sweep_in_columns_is_that_of_its_models():
         "contact.crown.radius": [f"{r!r} m" for _, r, _ in values],
         "contact.load": [f"{load!r} N" for _, _, load in values],
     }
-    cases = Cases(tuple(make_axis(key, texts, False) for key, texts in keys.items()), True)
+    cases = Cases(tuple(make_axis(key, texts, distinct=False) for key, texts in keys.items()), True)
     found = swept(Asked(Path("patch.toml"), text), cases, LocalExecutor())
     models = meshed(
         [
