@@ -15,16 +15,18 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ..core import PatchfemError, frozen_array
 
-ROOM = 64e6  # bytes of kept contact sets
-SIDES = 16  # most sides of a polygon, as in `polygon_kernels`
+MAX_BYTES = 64e6  # size of the contact sets that are stored
+MAX_SIDES = 16  # sides of a polygon, as in `polygon_kernels`
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactSet:
     """One contact set, with its forces and gaps as affine functions of the motion.
 
-    on: (m,) the nodes that touch; rows: (3, m) force [N] where they touch and gap [m] where not, per (1, d, t); energy:
-    (6,) of the preloaded contact, E - E0 - N0 d + M0 t, the coefficients of 1, d, t, d^2/2, d t, t^2/2.
+    - on (m,): whether a node is in contact.
+    - rows (3, m): force [N] of nodes in contact and gap [m] of the others, per (1, d, t).
+    - energy (6,): energy of the preloaded contact, E - E0 - N0 d + M0 t, as coefficients of 1, d, t, d^2/2,
+      d t and t^2/2.
     """
 
     on: np.ndarray
@@ -32,41 +34,55 @@ class ContactSet:
     energy: np.ndarray
 
     def values(self, d: float, t: float) -> np.ndarray:
-        """Forces [N] on the set and gaps [m] off it, (m,), at a motion d [m], t [rad] beyond the reference."""
+        """Return forces [N] of nodes in contact and gaps [m] of the others (m,) at a motion d [m], t [rad]."""
         return self.rows[0] + d * self.rows[1] + t * self.rows[2]
 
     def forces(self, d: float, t: float) -> np.ndarray:
-        """Nodal forces (m,) [N], >= 0, at a motion d [m], t [rad] beyond the reference; round-off is cut off."""
+        """Return the nodal forces (m,) [N] >= 0 at a motion d [m], t [rad]; rounding errors below 0 are cut off."""
         return np.where(self.on, np.maximum(self.values(d, t), 0.0), 0.0)
 
 
 class ContactSets:
-    """Pressed state around which `press_kernels` searches for the contact sets of a pair of bodies.
+    """Pressed reference state, around which `press_kernels` searches for contact sets.
 
-    c: (m, m) [m/N]; x: (m,) [m]; opening: (m,) [m], g + theta0 x - delta0 of the state, below zero where the bodies
-    would overlap without forces; on: (m,) bool, the contact set of the state. load N0 [N] and moment M0 [N m] are those
-    of the state. PatchfemError where nothing presses. The tests have a NumPy form of the search.
+    Parameters
+    ----------
+    c : (m, m) ndarray
+        Compliance [m/N].
+    x : (m,) ndarray
+        Positions [m].
+    opening : (m,) ndarray
+        Openings g + theta0 x - delta0 [m] of the state without forces, negative where the pieces would overlap.
+    on : (m,) bool ndarray
+        Contact set of the state.
+
+    Raises
+    ------
+    PatchfemError
+        If the state carries no load.
     """
 
     def __init__(self, c, x, opening, on):
-        self.c, self.x, self.opening = frozen_array(c), frozen_array(x), frozen_array(opening)
-        self.load, self.moment, self.energy = 0.0, 0.0, 0.0
+        self.c = frozen_array(c)
+        self.x = frozen_array(x)
+        self.opening = frozen_array(opening)
+        self.load = 0.0
+        self.moment = 0.0
+        self.energy = 0.0
         self.size = float(np.abs(self.opening).max())
-        found = self._made(np.asarray(on, bool))
+        found = self._make_set(np.asarray(on, bool))
         force = found.forces(0.0, 0.0)
-        self.load, self.moment, self.energy = (
-            float(force.sum()),
-            float(force @ self.x),
-            float(found.energy[0]),
-        )
+        self.load = float(force.sum())
+        self.moment = float(force @ self.x)
+        self.energy = float(found.energy[0])
         self.size += float(np.abs(self.c @ force).max())
         if not self.load > 0:
             raise PatchfemError(
                 "contact: the motion must start from a loaded contact; raise contact.load"
             )
-        self.reference = self._made(found.on)
+        self.reference = self._make_set(found.on)
 
-    def _made(self, on) -> ContactSet:
+    def _make_set(self, on) -> ContactSet:
         index = np.flatnonzero(on)
         right = np.stack([self.opening, -np.ones(self.x.size), self.x], axis=1)
         force = np.zeros_like(right)
@@ -89,10 +105,10 @@ class ContactSets:
         )
         return ContactSet(frozen_array(on, bool), frozen_array(rows), frozen_array(energy))
 
-    def arrays(self, room: float = ROOM) -> dict:
-        """The sets as arrays of `press_kernels.SetArrays`, nothing in it yet but the reference set in `wanted`.
+    def arrays(self, room: float = MAX_BYTES) -> dict:
+        """Return the arrays of `press_kernels.SetArrays` without sets; `wanted` is the reference set.
 
-        room: bytes that its contact sets may take.
+        room: size of the contact sets that can be stored [bytes].
         """
         m = self.x.size
         # 25 m + 400 bytes: rows, set, polygon and names of one set
@@ -122,16 +138,16 @@ class ContactSets:
         }
 
     def name(self, arrays: dict) -> int:
-        """64-bit name of the reference set in `arrays`: the exclusive or of the names of its nodes."""
+        """Return the 64-bit name of the reference set: the exclusive or of the names of its nodes."""
         return int(np.bitwise_xor.reduce(arrays["node"][self.reference.on], initial=0))
 
 
 def sides(count: int) -> dict:
-    """Empty arrays for the polygons of `count` contact sets, by their names in `press_kernels.SetArrays`."""
+    """Return empty arrays for the polygons of `count` contact sets, named as in `press_kernels.SetArrays`."""
     return {
         "sides": np.zeros(count, np.int64),
-        "edge": np.zeros((count, SIDES), np.int64),
-        "beside": np.zeros((count, SIDES), np.int64),
+        "edge": np.zeros((count, MAX_SIDES), np.int64),
+        "beside": np.zeros((count, MAX_SIDES), np.int64),
         "limit": np.zeros((count, 2)),
-        "corner": np.zeros((2, 3, 4 * SIDES)),
+        "corner": np.zeros((2, 3, 4 * MAX_SIDES)),
     }

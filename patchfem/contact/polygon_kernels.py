@@ -1,7 +1,8 @@
-"""Compiled polygons of the contact sets: a set holds where none of its few sides is passed.
+"""Compiled polygons of contact sets: the motions (d, t) of the holder at which a set holds.
 
-Every node of a set bounds by a line the motions (d, t) at which the set holds. Few of these lines are sides of the
-polygon that they enclose. `sets` is a `press_kernels.SetArrays`.
+Each node of a set limits these motions to one side of a line. The lines enclose a convex polygon, of which
+only few are sides, so that comparing a motion with the sides is faster than checking all nodes. `sets` is a
+`press_kernels.SetArrays`.
 """
 
 import numpy as np
@@ -10,27 +11,25 @@ from numba.core.options import DefaultOptions
 from ..compiled.jit import njit
 
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-NOISE = 1e-13  # of the largest term: what counts as nothing
-# most sides of a polygon; half its largest width, in the closing of the reference state
-SIDES, BOX = (
-    16,
-    100.0,
-)
+ROUNDING = 1e-13  # rounding error of a force or gap over the largest of its terms
+MAX_SIDES = 16  # sides of a polygon; sets with more are checked node by node
+# half width of the box in which polygons are computed, over the openings of the reference state
+BOX_HALF_WIDTH = 100.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def units(sets):
-    """Scales of the polygons: of a closing [m], as of the reference state, and of a turn [rad], that over the arm."""
+    """Return the units of the polygons: the openings of the reference state [m], and these over the arm [rad]."""
     arm = max(abs(sets.x[0]), abs(sets.x[-1]))
     return sets.base[3], sets.base[3] / arm if arm > 0 else 1.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def outline(sets, slot):
-    """Work out the polygon of the set in a slot: a box, cut by the line of every node (Sutherland, Hodgman 1974).
+def write_polygon(sets, slot):
+    """Compute the polygon of the set in a slot, a box clipped by the line of each node.
 
-    The nodes at the ends of the contact cut first, because they leave little to the others. A set of too many sides
-    gets none.
+    Clipping is that of Sutherland and Hodgman (Comm. ACM 17, 32, 1974). Nodes at the ends of the contact come
+    first, because they cut off most. A set with too many sides gets no polygon.
     """
     unit_d, unit_t = units(sets)
     r0, r1, r2, on = sets.rows[slot, 0], sets.rows[slot, 1], sets.rows[slot, 2], sets.on[slot]
@@ -38,13 +37,14 @@ def outline(sets, slot):
     for i in range(on.size):
         if on[i]:
             top = max(top, abs(r0[i]) + abs(r1[i]) * unit_d + abs(r2[i]) * unit_t)
-    sets.limit[slot, 0], sets.limit[slot, 1] = -4 * NOISE * top, -4 * NOISE * unit_d
+    sets.limit[slot, 0], sets.limit[slot, 1] = -4 * ROUNDING * top, -4 * ROUNDING * unit_d
     old, new = sets.corner[0], sets.corner[1]
     count = 4
-    for k in range(4):  # corner k: place, and the node whose line leads on to the next corner
+    # a corner has two coordinates and the node whose line leads to the next corner, -1 for the box
+    for k in range(4):
         old[0, k], old[1, k], old[2, k] = (
-            BOX * (-1 if k in (0, 3) else 1),
-            BOX * (-1 if k < 2 else 1),
+            BOX_HALF_WIDTH * (-1 if k in (0, 3) else 1),
+            BOX_HALF_WIDTH * (-1 if k < 2 else 1),
             -1.0,
         )
     sets.sides[slot] = 0
@@ -82,7 +82,7 @@ def outline(sets, slot):
     sides = 0
     for k in range(count):
         if old[2, k] >= 0:
-            if sides == SIDES:
+            if sides == MAX_SIDES:
                 return
             sets.edge[slot, sides], sets.beside[slot, sides] = int(old[2, k]), -1
             sides += 1
@@ -90,17 +90,17 @@ def outline(sets, slot):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def boxed(sets, d, t):
-    """Whether a motion (d [m], t [rad]) lies in the box in which polygons are drawn, BOX units to each side."""
+def is_in_box(sets, d, t):
+    """Return whether a motion (d [m], t [rad]) lies in the box in which polygons are computed."""
     unit_d, unit_t = units(sets)
-    return abs(d) <= BOX * unit_d and abs(t) <= BOX * unit_t
+    return abs(d) <= BOX_HALF_WIDTH * unit_d and abs(t) <= BOX_HALF_WIDTH * unit_t
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def margin(sets, k, side, d, t):
-    """How far the node of a side of set k is from failing: force [N] where it touches, else gap [m].
+    """Return the force [N] or gap [m] by which the node of a side of set k is above its limit at (d, t).
 
-    d [m], t [rad]: the motion at which it is asked.
+    d [m], t [rad]: motion of the holder.
     """
     i = sets.edge[k, side]
     least = sets.limit[k, 0] if sets.on[k, i] else sets.limit[k, 1]
@@ -108,12 +108,12 @@ def margin(sets, k, side, d, t):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def within(sets, k, d, t):
-    """Whether the polygon of set k says that the set holds at (d [m], t [rad]); False also where it has no polygon.
+def is_inside(sets, k, d, t):
+    """Return whether (d [m], t [rad]) lies in the polygon of set k; False also if the set has none.
 
     Cost: a few multiplications per side, instead of one pass over the nodes.
     """
-    if sets.sides[k] == 0 or not boxed(sets, d, t):
+    if sets.sides[k] == 0 or not is_in_box(sets, d, t):
         return False
     for side in range(sets.sides[k]):
         if margin(sets, k, side, d, t) < 0:
@@ -122,13 +122,14 @@ def within(sets, k, d, t):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def way_out(sets, k, d, t, dd, dt):
-    """Share [1] of the increment (dd [m], dt [rad]) from (d, t) after which set k ends, and the side where it does.
+def find_exit(sets, k, d, t, dd, dt):
+    """Return the fraction of the increment (dd, dt) from (d, t) at which it leaves set k, and the side.
 
-    Where no polygon can say, the share is inf and the side -1.
+    d, dd [m]; t, dt [rad]. The fraction is inf and the side -1 if the increment stays inside or the set has no
+    polygon.
     """
     out, found = np.inf, -1
-    if sets.sides[k] == 0 or not (boxed(sets, d, t) and boxed(sets, d + dd, t + dt)):
+    if sets.sides[k] == 0 or not (is_in_box(sets, d, t) and is_in_box(sets, d + dd, t + dt)):
         return out, found
     for side in range(sets.sides[k]):
         here = margin(sets, k, side, d, t)

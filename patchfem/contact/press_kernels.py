@@ -1,12 +1,14 @@
-"""Compiled contact sets: on one contact set everything is affine in the motion of the upper holder.
+"""Compiled search for contact sets, on each of which forces and gaps are affine in the motion of the holder.
 
-d is the closing beyond a reference state, t the rotation beyond it. With the unknowns of a set (forces where it
-touches, gaps where not) the complementarity problem w = b + t x - d + C f reads y = R (1, d, t). One node more or less
-is a principal pivot of the tableau [T | R].
+The motion is counted from a reference state: closing d [m] and rotation t [rad]. The unknowns y of a set are
+the forces of its nodes in contact and the gaps of the others. The linear complementarity problem
+w = b + t x - d + C f then reads y = R (1, d, t). A node that enters or leaves the set is a principal pivot of
+the tableau [T | R].
 
-A set is known by its 64-bit name, the exclusive or of the names of its nodes, so a state on a known set costs one pass
-over the nodes. The search flips all nodes that fail, later the first of them alone; that ends for every positive
-definite C (Murty, Opsearch 11, 1974). NumPy twin: `contact_sets.ContactSets`.
+A set is stored under a 64-bit name, the exclusive or of the names of its nodes, so that a state on a stored
+set costs one pass over the nodes. The search exchanges all nodes of a wrong sign at once (block pivoting), and
+after `N_BLOCK_EXCHANGES` sets only the first of them, which ends for every positive definite C (Murty, Opsearch 11,
+1974). `contact_sets.ContactSets` is the NumPy twin.
 """
 
 from typing import NamedTuple
@@ -14,31 +16,46 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled.jit import njit
-from .polygon_kernels import NJIT_NO_REFCOUNT, NOISE, outline, within
+from .polygon_kernels import NJIT_NO_REFCOUNT, ROUNDING, is_inside, write_polygon
 
 FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
-# for passes that look for the least value: without them none is vectorised
-LEAST = FASTMATH_FLAGS | {
-    "nnan",
-    "nsz",
-}
-BLOCKS = 12  # sets tried with all failing nodes flipped at once
-FLAW = 1e-8  # relative residual above which the tableau is made anew; below it one refinement reaches round-off
-COUNT, SLOT, BUILT, PIVOTS, RENEWED = range(5)
+# loops that search a minimum are vectorised only with these flags
+FASTMATH_MINIMUM = FASTMATH_FLAGS | {"nnan", "nsz"}
+N_BLOCK_EXCHANGES = 12  # sets that are tried with all failing nodes exchanged; more may cycle
+# relative residual above which the tableau is computed anew; below it one refinement reaches rounding errors
+MAX_TABLEAU_RESIDUAL = 1e-8
+# places of `SetArrays.meta`
+COUNT = 0  # number of sets that are stored
+SLOT = 1  # slot of the next set
+BUILT = 2  # number of sets computed so far
+PIVOTS = 3  # number of pivots so far
+RENEWED = 4  # number of times that the tableau was computed anew
 
 
 class SetArrays(NamedTuple):
-    """Arrays of the contact sets of m nodes with room for k contact sets.
+    """Contact sets of m nodes, with slots for k sets.
 
-    c (m, m); x, b (m,): places and openings of the reference state; tableau (m, m + 3) with its set `here` (m,); rows
-    (k, 3, m): force or gap per (1, d, t) of every set; on (k, m); energy (k, 6): of the preloaded contact, the
-    coefficients of 1, d, t, d^2/2, d t, t^2/2; names (k,), heads, link: hash chains; node (m,): names of the nodes;
-    base (5,): force, moment and energy of the reference state, size of its openings, its dN/d(delta); wanted (m,), side
-    (2, 3, m), row (m + 3,): scratch; meta: COUNT .. RENEWED.
+    Interface:
 
-    A set whose motions form a polygon of few sides has more: sides (k,): their number, 0 where the rows have to be
-    asked; edge (k, SIDES): the node of each side; beside (k, SIDES): slot of the set beyond it, -1 unknown; limit (k,
-    2): forces and gaps below which a node fails; corner (2, 3, 4 SIDES): scratch.
+    - c (m, m) [m/N]; x (m,) [m]; b (m,) openings of the reference state without forces [m].
+    - base (5,): load, moment and energy of the reference state, the size of its openings, and its
+      dN/d(delta).
+    - node (m,): 64-bit names of the nodes.
+
+    Tableau: tableau (m, m + 3), here (m,) the set to which it is pivoted, wanted (m,) the set that is
+    searched, side (2, 3, m) and row (m + 3,) workspaces.
+
+    Stored sets:
+
+    - on (k, m): nodes in contact; rows (k, 3, m): force or gap of the nodes per (1, d, t).
+    - energy (k, 6): coefficients of 1, d, t, d^2/2, d t, t^2/2 of the energy of the preloaded contact.
+    - names (k,), heads, link: names of the sets and their hash chains; meta (5,): `COUNT` to `RENEWED`.
+
+    Polygons of motions on which a set holds:
+
+    - sides (k,): number of sides; 0 if there is no polygon, so that all nodes have to be checked.
+    - edge (k, MAX_SIDES): node of each side; beside (k, MAX_SIDES): slot of the set beyond it, or -1.
+    - limit (k, 2): force [N] and gap [m] below which a node fails; corner (2, 3, 4 MAX_SIDES): workspace.
     """
 
     c: np.ndarray
@@ -67,7 +84,10 @@ class SetArrays(NamedTuple):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def pivot(sets, k):
-    """Exchange force and gap of node k in the tableau; m^2 multiplications. False where the pivot is not positive."""
+    """Exchange force and gap of node k in the tableau; False if the pivot is not positive.
+
+    Cost: m^2 multiplications.
+    """
     tableau, row = sets.tableau, sets.row
     m, wide = tableau.shape
     p = tableau[k, k]
@@ -92,7 +112,7 @@ def pivot(sets, k):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def renew(sets):
+def reset_tableau(sets):
     """Write the tableau of the empty contact set."""
     m = sets.x.size
     for i in range(m):
@@ -106,8 +126,8 @@ def renew(sets):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def refine(sets):
-    """Read the rows of the set off the tableau and refine them once on C itself; relative residual found before that."""
+def refine_rows(sets):
+    """Refine the rows of the set of the tableau once with C itself; returns the relative residual before."""
     m, c, tableau = sets.x.size, sets.c, sets.tableau
     force, left = sets.side[0], sets.side[1]
     for i in range(m):
@@ -151,9 +171,8 @@ def refine(sets):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def store(sets, name):
-    """Keep the refined set of the tableau in the next slot and return the slot; the oldest set gives way where none is
-    free."""
+def store_set(sets, name):
+    """Store the set of the tableau in the next slot and return the slot; without a free one the oldest set is dropped."""
     m, meta = sets.x.size, sets.meta
     slot, bucket = meta[SLOT], sets.heads.size - 1
     meta[SLOT] = (slot + 1) % sets.names.size
@@ -187,13 +206,13 @@ def store(sets, name):
     at = name & bucket
     sets.link[slot] = sets.heads[at]
     sets.heads[at] = slot
-    outline(sets, slot)
+    write_polygon(sets, slot)
     return slot
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def to_wanted(sets):
-    """Pivot the tableau to the set `wanted`; False where a pivot is not positive."""
+def pivot_to_wanted(sets):
+    """Pivot the tableau to the set `wanted`; False if a pivot is not positive."""
     for i in range(sets.x.size):
         if sets.here[i] != sets.wanted[i] and not pivot(sets, i):
             return False
@@ -201,22 +220,25 @@ def to_wanted(sets):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def build(sets, name):
-    """Work out the set `wanted` and return its slot; -1 where the compliance is not positive definite on it.
+def build_set(sets, name):
+    """Compute the set `wanted` and return its slot; -1 if the compliance is not positive definite on it.
 
-    name: of the set. The tableau is pivoted to it, m^2 multiplications a node; where it has lost its digits it is
-    written anew and pivoted once more.
+    name: name of the set. The tableau is pivoted to it. If it has lost its digits, it is computed anew and
+    pivoted once more. Cost: m^2 multiplications for each node that is exchanged.
     """
-    if not to_wanted(sets) or refine(sets) > FLAW:
-        renew(sets)
-        if not to_wanted(sets) or refine(sets) > FLAW:
+    if not pivot_to_wanted(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
+        reset_tableau(sets)
+        if not pivot_to_wanted(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
             return -1
-    return store(sets, name)
+    return store_set(sets, name)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find(sets, name):
-    """Slot of the set `wanted` with this `name`; -1 where it is not kept. Equal names are told apart node by node."""
+def find_stored(sets, name):
+    """Return the slot of the set `wanted`, or -1 if it is not stored.
+
+    name: name of the set; sets of equal names are compared node by node.
+    """
     k = sets.heads[name & (sets.heads.size - 1)]
     while k >= 0:
         if sets.names[k] == name:
@@ -231,11 +253,11 @@ def find(sets, name):
     return k
 
 
-@njit(error_model="numpy", fastmath=LEAST, **NJIT_NO_REFCOUNT)
-def holds(sets, k, d, t):
-    """Whether no node of set k fails at (d [m], t [rad]), and the bounds below which a node counts as failing.
+@njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
+def check_set(sets, k, d, t):
+    """Return whether set k holds at (d [m], t [rad]), and the force [N] and gap [m] below which nodes fail.
 
-    The bounds are a force [N] for nodes that touch and a gap [m] for open ones, both <= 0.
+    Both bounds are <= 0, by the rounding error of a force and of a gap.
     """
     r0, r1, r2, on = sets.rows[k, 0], sets.rows[k, 1], sets.rows[k, 2], sets.on[k]
     top, pull, deep = 0.0, 0.0, 0.0
@@ -245,14 +267,17 @@ def holds(sets, k, d, t):
         top = max(top, term if on[i] else 0.0)
         pull = min(pull, y if on[i] else 0.0)
         deep = min(deep, 0.0 if on[i] else y)
-    force = -NOISE * top
-    gap = -NOISE * (sets.base[3] + abs(d) + abs(t) * max(abs(sets.x[0]), abs(sets.x[-1])))
+    force = -ROUNDING * top
+    gap = -ROUNDING * (sets.base[3] + abs(d) + abs(t) * max(abs(sets.x[0]), abs(sets.x[-1])))
     return pull >= force and deep >= gap, force, gap
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def flip(sets, k, d, t, force, gap, alone):
-    """Write set k with its failing nodes exchanged into `wanted` and return its name; `alone`: only the first of them."""
+def exchange_failing(sets, k, d, t, force, gap, is_single):
+    """Write set k with its failing nodes exchanged to `wanted`, and return its name.
+
+    force [N], gap [m]: bounds from `check_set`; is_single: only the first failing node is exchanged.
+    """
     name, searching = sets.names[k], True
     for i in range(sets.x.size):
         on = sets.on[k, i]
@@ -260,26 +285,26 @@ def flip(sets, k, d, t, force, gap, alone):
         fails = searching and y < (force if on else gap)
         if fails:
             name ^= sets.node[i]
-            searching = not alone
+            searching = not is_single
         sets.wanted[i] = on != fails
     return name
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def locate(sets, k, d, t):
-    """Slot of the contact set at (d, t), searched from set k; -1 where none was found.
+    """Return the slot of the contact set at (d [m], t [rad]), searched from set k; -1 if none is found.
 
     Cost: 0.5 us for 400 nodes on a known set, 0.3 ms for a new one that differs by one node.
     """
-    for count in range(BLOCKS + 10 * sets.x.size):
-        if within(sets, k, d, t):
+    for count in range(N_BLOCK_EXCHANGES + 10 * sets.x.size):
+        if is_inside(sets, k, d, t):
             return k
-        good, force, gap = holds(sets, k, d, t)
+        good, force, gap = check_set(sets, k, d, t)
         if good:
             return k
-        name = flip(sets, k, d, t, force, gap, count >= BLOCKS)
-        found = find(sets, name)
-        k = found if found >= 0 else build(sets, name)
+        name = exchange_failing(sets, k, d, t, force, gap, count >= N_BLOCK_EXCHANGES)
+        found = find_stored(sets, name)
+        k = found if found >= 0 else build_set(sets, name)
         if k < 0:
             return k
     return -1
@@ -287,16 +312,16 @@ def locate(sets, k, d, t):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def begin(sets, name):
-    """Work out the set `wanted` under its `name` from the empty set and return its slot; -1 as in `build`."""
-    renew(sets)
-    return build(sets, name)
+    """Compute the set `wanted` of this name from the empty set and return its slot; -1 as in `build_set`."""
+    reset_tableau(sets)
+    return build_set(sets, name)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pull(sets, k, h, turn):
-    """Energy of the preloaded contact of set k, and its slopes in heave h = -d and in turn.
+    """Return the energy [J] of the preloaded contact on set k, and its slopes in heave h = -d and rotation.
 
-    N = N0 - slope in heave, M = M0 - slope in turn.
+    The load is N0 less the slope in heave, the moment M0 less that in rotation.
     """
     q, d = sets.energy[k], -h
     by_d, by_t = q[3] * d + q[4] * turn, q[4] * d + q[5] * turn
@@ -305,9 +330,9 @@ def pull(sets, k, h, turn):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def press_state(sets, k, d, t, force):
-    """Load N [N], moment M [N m] and energy [J] of set k at (d [m], t [rad]); its nodal forces are written.
+    """Return load [N], moment [N m] and energy [J] of set k at (d [m], t [rad]), and write its nodal forces.
 
-    force: (m,) [N] to write to; none is below zero.
+    force: (m,) array [N] for the forces, which are >= 0.
     """
     energy, slope, turn = pull(sets, k, -d, t)
     for i in range(force.size):

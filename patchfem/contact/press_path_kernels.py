@@ -3,15 +3,15 @@
 import numpy as np
 
 from ..compiled.jit import njit
-from .polygon_kernels import NJIT_NO_REFCOUNT, way_out, within
-from .press_kernels import LEAST, holds, locate, pull
+from .polygon_kernels import NJIT_NO_REFCOUNT, find_exit, is_inside
+from .press_kernels import FASTMATH_MINIMUM, check_set, locate, pull
 
 
-@njit(error_model="numpy", fastmath=LEAST, **NJIT_NO_REFCOUNT)
-def reach(sets, k, d, t, dd, dt, force, gap):
-    """Share [1] of the increment (dd [m], dt [rad]) from (d, t) at which the first node of set k falls to its bound.
+@njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
+def find_first_failure(sets, k, d, t, dd, dt, force, gap):
+    """Return the fraction of the increment (dd [m], dt [rad]) from (d, t) at which a node of set k fails first.
 
-    force [N], gap [m]: the bounds of touching and of open nodes, <= 0, as `press_kernels.holds` gives them.
+    force [N], gap [m]: bounds of nodes in contact and of open nodes, from `press_kernels.check_set`.
     """
     r0, r1, r2, on = sets.rows[k, 0], sets.rows[k, 1], sets.rows[k, 2], sets.on[k]
     out = np.inf
@@ -24,15 +24,15 @@ def reach(sets, k, d, t, dd, dt, force, gap):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def across(sets, k, side, d, t):
-    """Slot of the contact set beyond a side of set k at (d [m], t [rad]), -1 where none was found; side -1: any side.
+def cross_side(sets, k, side, d, t):
+    """Return the slot of the contact set beyond a side of set k at (d [m], t [rad]); -1 if none is found.
 
-    The set found is noted beside the side, so that the next crossing costs no search.
+    side: -1 if the side is not known. The set is stored with the side, so that the next crossing needs no search.
     """
     if side >= 0:
         following = sets.beside[k, side]
         name = sets.names[k] ^ sets.node[sets.edge[k, side]]
-        if following >= 0 and sets.names[following] == name and within(sets, following, d, t):
+        if following >= 0 and sets.names[following] == name and is_inside(sets, following, d, t):
             return following
         following = locate(sets, k, d, t)
         if following >= 0 and sets.names[following] == name and following != k:
@@ -43,30 +43,42 @@ def across(sets, k, side, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def path_mean(sets, k, h, turn, dh, dt, out):
-    """Mean slopes of the energy of the preloaded contact along a straight increment (dh, dt) of heave and turn from set
-    k on.
+    """Average the slopes of the energy of the preloaded contact along an increment of heave and rotation.
 
-    Returns the slot at the end, -1 where none was found. out (9,): mean slopes (2,), energy and slopes (2,) at the end,
-    derivatives of the mean by (dh, dt) (2, 2). The mean times the increment is the difference of the energies (a
-    discrete gradient), and it is itself the gradient of a convex function.
+    The mean times the increment is the difference of the energies (a discrete gradient), and the mean is
+    itself the gradient of a convex function.
+
+    Parameters
+    ----------
+    sets : press_kernels.SetArrays
+    k : int
+        Slot of the set at the beginning.
+    h, turn, dh, dt : float
+        Heave [m] and rotation [rad] at the beginning, and their increments.
+    out : (9,) ndarray
+        Written: mean slopes (2,), energy, slopes at the end (2,), derivatives of the mean by (dh, dt) (2, 2).
+
+    Returns
+    -------
+    int
+        Slot of the set at the end, -1 if none is found.
     """
     out[:] = 0.0
-    # share by which the next set is looked up beyond a border, above its round-off
-    at, small = (
-        0.0,
-        1e-10,
-    )
-    for _ in range(20 * sets.x.size + 100):  # guard against a path that goes round in circles
+    at = 0.0
+    # fraction beyond a border at which the next set is searched, above rounding errors
+    small = 1e-10
+    # a path that returns to the same sets because of rounding errors ends here
+    for _ in range(20 * sets.x.size + 100):
         end, side = 1.0, -1
-        if not within(sets, k, -(h + dh), turn + dt):
+        if not is_inside(sets, k, -(h + dh), turn + dt):
             d, t = -(h + at * dh), turn + at * dt
-            share, side = way_out(sets, k, d, t, -(1 - at) * dh, (1 - at) * dt)
+            share, side = find_exit(sets, k, d, t, -(1 - at) * dh, (1 - at) * dt)
             end = min(at + max(share, 0.0) * (1 - at), 1.0)
             if side < 0:
-                good, force, gap = holds(sets, k, -(h + dh), turn + dt)
+                good, force, gap = check_set(sets, k, -(h + dh), turn + dt)
                 if not good:
-                    _, f, g = holds(sets, k, d, t)
-                    share = reach(sets, k, d, t, -dh, dt, min(force, f), min(gap, g))
+                    _, f, g = check_set(sets, k, d, t)
+                    share = find_first_failure(sets, k, d, t, -dh, dt, min(force, f), min(gap, g))
                     end = min(at + max(share, 0.0), 1.0)
         _, a1, a2 = pull(sets, k, h + at * dh, turn + at * dt)
         energy, b1, b2 = pull(sets, k, h + end * dh, turn + end * dt)
@@ -81,10 +93,11 @@ def path_mean(sets, k, h, turn, dh, dt, out):
             out[2], out[3], out[4], out[7] = energy, b1, b2, out[6]
             return k
         beyond = min(at + small, 1.0)
-        following = across(sets, k, side, -(h + beyond * dh), turn + beyond * dt)
+        following = cross_side(sets, k, side, -(h + beyond * dh), turn + beyond * dt)
         if following < 0:
             return following
-        small = 10 * small if following == k else 1e-10  # the same set again: step farther
+        # a search that returns the same set is repeated farther on
+        small = 10 * small if following == k else 1e-10
         if following == k:
             at = beyond
         k = following
