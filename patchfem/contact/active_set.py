@@ -27,17 +27,12 @@ N_REFINEMENTS = 2  # steps of iterative refinement; a third one changes nothing
 class ContactProblem(NamedTuple):
     """Contact of n nodes under one rigid holder with r free motions.
 
-    Attributes
-    ----------
-    gap : (n,) ndarray
-        Gap [m] between the undeformed surfaces; negative where they overlap under a given approach.
-    motions : (n, r) ndarray
-        Closing of each node per unit of each free motion. The first one is the approach [m], a column of ones; the
-        others are rotations. No column: the approach is prescribed and already contained in the gap.
-    target : (r,) ndarray
-        Load [N], then the moments about the axes of the free rotations [N m].
-    springs : (r,) ndarray
-        Stiffness [N m/rad] of the holder against each motion, 0 for the approach.
+    - gap (n,): Gap [m] between the undeformed surfaces; negative where they overlap under a given approach.
+    - motions (n, r): Closing of each node per unit of each free motion. The first one is the approach [m],
+      a column of ones; the others are rotations. No column: the approach is prescribed and already
+      contained in the gap.
+    - target (r,): Load [N], then the moments about the axes of the free rotations [N m].
+    - springs (r,): Stiffness [N m/rad] of the holder against each motion, 0 for the approach.
     """
 
     gap: np.ndarray
@@ -80,16 +75,11 @@ def patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> Contac
 class SetSolution(NamedTuple):
     """Solution of the contact equations on a given set, whatever the signs of its forces.
 
-    Attributes
-    ----------
-    force, opening : (n,) ndarray
-        Forces [N] and gap under load [m].
-    scale : (n,) ndarray
-        Sum of the magnitudes of the terms of each opening [m], to which its rounding error is compared.
-    motion : (r,) ndarray
-        Approach [m] and rotations [rad] q.
-    stiffness : float
-        dN/d(approach) at fixed rotations [N/m]; 0 without free motions.
+    - force, opening (n,): Forces [N] and gap under load [m].
+    - scale (n,): Sum of the magnitudes of the terms of each opening [m], to which its rounding error is
+      compared.
+    - motion (r,): Approach [m] and rotations [rad] q.
+    - stiffness: dN/d(approach) at fixed rotations [N/m]; 0 without free motions.
     """
 
     force: np.ndarray

@@ -19,16 +19,12 @@ RESULTANT_TOL = (
 
 
 class _QuadraticProgram(NamedTuple):
-    """Minimise f . C f/2 + g . f over forces f >= 0 with the prescribed resultants rigid^T f = target.
+    """Quadratic program: minimise f . C f/2 + g . f for f >= 0 and rigid^T f = target.
 
-    Attributes
-    ----------
-    product : callable
-        Function f -> C f.
-    gap : (n,) ndarray
-    rigid : (n, r) ndarray
-        Rigid motions, all of size 1.
-    target : (r,) ndarray
+    - product: Function f -> C f.
+    - gap (n,): The gap g [m].
+    - rigid (n, r): Rigid motions, all of size 1.
+    - target (r,): Prescribed load and moments.
     """
 
     product: Callable

@@ -21,16 +21,11 @@ MAX_ASPECT = 4.0
 class ContactEdge(NamedTuple):
     """An end of a contact set inside the interface.
 
-    Attributes
-    ----------
-    node : int
-        Last node in contact.
-    side : int
-        1 where the contact ends towards +x, else -1.
-    fraction : float
-        Fraction of the cell beyond that the edge has passed: 0 as the node enters and 1 as the next one does.
-    position : float
-        Position of the edge [m].
+    - node: Last node in contact.
+    - side: 1 where the contact ends towards +x, else -1.
+    - fraction: Fraction of the cell beyond that the edge has passed: 0 as the node enters and 1 as the next
+      one does.
+    - position: Position of the edge [m].
     """
 
     node: int

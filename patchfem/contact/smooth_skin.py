@@ -39,14 +39,10 @@ MAX_PRESSURE_RISE = (
 class SkinProblem(NamedTuple):
     """Contact of strips through a smooth skin.
 
-    Attributes
-    ----------
-    skin : SmoothSkin
-    compliance : StripCompliance
-    area : (n,) ndarray
-        Nodal areas [m2].
-    contact : ContactProblem
-        Gap, motions and loads; the motions are of size 1.
+    - skin: Law of the asperities.
+    - compliance: Compliance of the pieces.
+    - area (n,): Nodal areas [m2].
+    - contact: Gap, motions and loads; the motions are of size 1.
     """
 
     skin: SmoothSkin
@@ -81,13 +77,9 @@ class SkinSolution(NamedTuple):
 class _StripResponse(NamedTuple):
     """Response of the nodes of one strip: (I + D^1/2 C D^1/2)^-1 D^1/2 (R, values).
 
-    Attributes
-    ----------
-    nodes : (k,) ndarray
-        Indices among all nodes.
-    root : (k,) ndarray
-        D^1/2.
-    to_motions, to_values : (k, r) and (k,) ndarray
+    - nodes (k,): Indices among all nodes.
+    - root (k,): D^1/2.
+    - to_motions (k, r) and to_values (k,): Its columns for R and for the values.
     """
 
     nodes: np.ndarray

@@ -31,12 +31,8 @@ def factorise(matrix: np.ndarray) -> np.ndarray:
 class WarmStart:
     """Contact set and Cholesky factors that one pressing of strips leaves for the next one.
 
-    Attributes
-    ----------
-    contact_set : (s, m) bool ndarray or None
-        Nodes in contact, from which the next pressing starts.
-    factors : dict
-        Cholesky factors by the active nodes of a strip and its own diagonal, oldest first.
+    - contact_set (s, m): Nodes in contact, from which the next pressing starts.
+    - factors: Cholesky factors by the active nodes of a strip and its own diagonal, oldest first.
     """
 
     contact_set: np.ndarray | None = None
@@ -58,14 +54,9 @@ class WarmStart:
 class StripCompliance:
     """Compliance of s strips of m nodes, each symmetric positive definite.
 
-    Attributes
-    ----------
-    common : (m, m) ndarray
-        Compliance [m/N] that all strips share.
-    added : (s, m) ndarray or None
-        What each strip adds to the diagonal [m/N].
-    warm_start : WarmStart or None
-        Results of the previous pressing with the same compliance.
+    - common (m, m): Compliance [m/N] that all strips share.
+    - added (s, m): What each strip adds to the diagonal [m/N].
+    - warm_start: Results of the previous pressing with the same compliance.
     """
 
     common: np.ndarray

@@ -58,14 +58,9 @@ LOOSE_ROLL_MESSAGE = (
 class StripLayout(NamedTuple):
     """Nodes of equal strips.
 
-    Attributes
-    ----------
-    x : (m,) ndarray
-        Positions [m] along each strip.
-    weight : (m,) ndarray
-        Nodal areas [m2] of one strip.
-    offsets : (s,) ndarray
-        Distances y [m] of the strips from the middle.
+    - x (m,): Positions [m] along each strip.
+    - weight (m,): Nodal areas [m2] of one strip.
+    - offsets (s,): Distances y [m] of the strips from the middle.
     """
 
     x: np.ndarray
@@ -85,20 +80,15 @@ class HolderPosition(NamedTuple):
 class StripsState:
     """State of s strips of m nodes pressed by one holder; forces are of all pairs together.
 
-    Attributes
-    ----------
-    force : (s, m) ndarray
-        Nodal forces [N] >= 0.
-    gap : (s, m) ndarray
-        Gap under load [m]; with a skin the separation of the mean planes, negative where the skin is compressed.
-    stiffness : (s, m) ndarray or None
-        Stiffness of the skin [Pa/m], None without one.
-    layout : StripLayout
-    position : HolderPosition
-    outcome : Outcome
-    iterations : int
-    residuals : mapping
-        Relative residuals of the independent check.
+    - force (s, m): Nodal forces [N] >= 0.
+    - gap (s, m): Gap under load [m]; with a skin the separation of the mean planes, negative where the skin
+      is compressed.
+    - stiffness (s, m): Stiffness of the skin [Pa/m], None without one.
+    - layout: Nodes of the strips.
+    - position: Approach and rotations of the holder.
+    - outcome: Whether the strips touch.
+    - iterations: Number of contact sets or Newton steps.
+    - residuals: Relative residuals of the independent check.
     """
 
     force: np.ndarray

@@ -43,16 +43,10 @@ MIN_LOAD = 1e-200  # load [N] or overlap [m] below which the products of the che
 class ContactSolution(NamedTuple):
     """Solution of a contact problem.
 
-    Attributes
-    ----------
-    force : (n,) ndarray
-        Nodal forces [N], > 0 on the contact set and 0 elsewhere.
-    motion : (r,) ndarray
-        Approach [m] and rotations [rad] q; the rotation about y is -theta.
-    stiffness : float
-        dN/d(approach) at fixed rotations [N/m], 0 under a prescribed approach.
-    n_iterations : int
-        Number of contact sets tried.
+    - force (n,): Nodal forces [N], > 0 on the contact set and 0 elsewhere.
+    - motion (r,): Approach [m] and rotations [rad] q; the rotation about y is -theta.
+    - stiffness: dN/d(approach) at fixed rotations [N/m], 0 under a prescribed approach.
+    - n_iterations: Number of contact sets tried.
     """
 
     force: np.ndarray

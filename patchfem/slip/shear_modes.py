@@ -56,22 +56,14 @@ MAX_SLIDE_LENGTHS = 6
 class JenkinsSet:
     """Parallel Jenkins elements: springs that slip at a yield slide.
 
-    Attributes
-    ----------
-    stiffness, yield_slide : (t,) ndarray
-        [N/m] and [m]; the sum of their products is the friction limit.
-    points : (a,) ndarray
-        Nodes of the contact set.
-    limit : (a,) ndarray
-        Yield forces of the points [N].
-    order : (a,) ndarray
-        Indices into `points`, the last point to yield first.
-    low : (a, a) ndarray
-        Lower Cholesky factor of the compliance in that order; empty for one spring in series with rigid points.
-    starts : (t,) ndarray
-        Index of the first yield of each element.
-    reluctant : int
-        Number of points whose force at first has the wrong sign.
+    - stiffness, yield_slide (t,): [N/m] and [m]; the sum of their products is the friction limit.
+    - points (a,): Nodes of the contact set.
+    - limit (a,): Yield forces of the points [N].
+    - order (a,): Indices into `points`, the last point to yield first.
+    - low (a, a): Lower Cholesky factor of the compliance in that order; empty for one spring in series with
+      rigid points.
+    - starts (t,): Index of the first yield of each element.
+    - reluctant: Number of points whose force at first has the wrong sign.
     """
 
     stiffness: np.ndarray
@@ -110,20 +102,13 @@ class JenkinsSet:
 class Spectrum:
     """All modes of D^1/2 C D^1/2, the most compliant first, whose backbones show the error of a few of them.
 
-    Attributes
-    ----------
-    points : (a,) ndarray
-        Indices of the contact set.
-    limit : (a,) ndarray
-        Friction limits D [N].
-    shape : (a, n) ndarray
-        Slide of a point per unit of a modal coordinate.
-    values : (n,) ndarray
-        Compliance of the coordinates [m/N].
-    length : float
-        Bond length [m].
-    tangential : (m, m) ndarray or None
-        Compliance C [m/N] if these are the first modes only; the others are computed on demand.
+    - points (a,): Indices of the contact set.
+    - limit (a,): Friction limits D [N].
+    - shape (a, n): Slide of a point per unit of a modal coordinate.
+    - values (n,): Compliance of the coordinates [m/N].
+    - length: Bond length [m].
+    - tangential (m, m): Compliance C [m/N] if these are the first modes only; the others are computed on
+      demand.
     """
 
     points: np.ndarray
@@ -212,16 +197,10 @@ class Spectrum:
 class ShearModes:
     """The most compliant shear modes of the pieces.
 
-    Attributes
-    ----------
-    points : (a,) ndarray
-        Indices of the contact set.
-    shape : (a, r) ndarray
-        Slide of a point per unit of a modal coordinate.
-    stiffness : (r,) ndarray
-        Stiffness of the coordinates [N/m].
-    of : Spectrum
-        All modes.
+    - points (a,): Indices of the contact set.
+    - shape (a, r): Slide of a point per unit of a modal coordinate.
+    - stiffness (r,): Stiffness of the coordinates [N/m].
+    - of: All modes.
     """
 
     points: np.ndarray
@@ -299,16 +278,10 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
 class _Sequence(NamedTuple):
     """Yields of n points in an order, the last one first.
 
-    Attributes
-    ----------
-    order : (n,) ndarray
-        Indices of the points.
-    low : (n, n) ndarray
-        Lower Cholesky factor L of the compliance in that order.
-    root, pull : (n,) ndarray
-        L^-1 1 and L' force.
-    slides : (n,) ndarray
-        Slides of the yields [m], pull/root.
+    - order (n,): Indices of the points.
+    - low (n, n): Lower Cholesky factor L of the compliance in that order.
+    - root, pull (n,): L^-1 1 and L' force.
+    - slides (n,): Slides of the yields [m], pull/root.
     """
 
     order: np.ndarray
@@ -640,14 +613,9 @@ def comparison_count(count: int) -> int:
 class GaussModes(NamedTuple):
     """Modes on Gauss points that represent all points.
 
-    Attributes
-    ----------
-    modes : ShearModes
-        The indices of their points count from 0.
-    limit : (k,) ndarray
-        Friction limits of the Gauss points [N].
-    error : float
-        Largest error of the backbone over the friction limit.
+    - modes: The indices of their points count from 0.
+    - limit (k,): Friction limits of the Gauss points [N].
+    - error: Largest error of the backbone over the friction limit.
     """
 
     modes: ShearModes

@@ -27,18 +27,11 @@ MAX_REFERENCE_POINTS = 64  # points of a contact that count in the choice of its
 class PointCompliance:
     """Compliance of n even cells, whose forces act at their middles.
 
-    Attributes
-    ----------
-    x : (n,) ndarray
-        Middles of the cells [m].
-    area : float
-        Area of a cell [m2].
-    waves : (n,) ndarray
-        Compliance [m/Pa] for a pressure cos(j pi x/L), j = 0, 1, ...
-    modes : (n, r) ndarray
-        Functions of the free ends [1].
-    sizes : (r,) ndarray
-        Compliance [m/N] of these functions.
+    - x (n,): Middles of the cells [m].
+    - area: Area of a cell [m2].
+    - waves (n,): Compliance [m/Pa] for a pressure cos(j pi x/L), j = 0, 1, ...
+    - modes (n, r): Functions of the free ends [1].
+    - sizes (r,): Compliance [m/N] of these functions.
     """
 
     x: np.ndarray
