@@ -328,7 +328,7 @@ def press(
 
     Returns
     -------
-    Pressure
+    ContactState
 
     Raises
     ------
@@ -369,7 +369,7 @@ def press_to_approach(
 
     Returns
     -------
-    Pressure
+    ContactState
 
     Raises
     ------
@@ -392,7 +392,7 @@ def press_to_approach(
 
 
 def _open_interface(gap: np.ndarray, approach: float, rotation: float) -> ContactState:
-    """Return the Pressure of pieces that do not press each other."""
+    """Return the ContactState of pieces that do not press each other."""
     return ContactState(
         frozen_array(np.zeros(gap.size)),
         frozen_array(gap - approach),

@@ -59,7 +59,7 @@ class Asked(NamedTuple):
 class Level(NamedTuple):
     """q patches pressed on one mesh.
 
-    values: static measures by name, (q,) each; pressure: a Pressure whose fields have a row or a number for each patch;
+    values: static measures by name, (q,) each; pressure: a ContactState whose fields have a row or a number for each patch;
     contacts: the stretches in contact; gap_range: (q,) [m]; x: (m,) nodes [m].
     """
 
