@@ -235,8 +235,6 @@ UNDER = {
     "peak x gain": ("peak", STUCK),
     "fundamental x gain": (ROOT2,),
 }
-# m, how far the friction acts below the middle of the block in `pads.py`: two patches fore and aft, of which a rocking
-# block loads one as it frees the other; marched, so that the numbers of "spring and yaw" under ROOT2 are kept there
 PLACEBOS = {  # (rung, reading, protocol) -> what is put in the place of what the report says
     ("yaw in the accelerometer", STUCK, "all"): tuple(
         f"structure.mode.yaw.frequency={one} Hz" for one in (73, 110, 122, 138)
