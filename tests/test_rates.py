@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 from scene_texts import BENCH
 
-from patchfem import cost_model
-from patchfem.runs.plan import plan
+from patchfem import cost_model, plan
 from patchfem.scene.scene import loads
 
 

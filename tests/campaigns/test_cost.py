@@ -10,12 +10,11 @@ from command_line import cli
 from scene_texts import BENCH, PIECE
 
 import patchfem as pf
+from patchfem import build
 from patchfem.campaigns import numerical_settings
 from patchfem.campaigns.cost import TOLERANCE, Cost, cheapest, curve, quickest, sentence
 from patchfem.export.cost import lines_of
-from patchfem.model.model import build
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 
 LENGTH = 12.7e-3
 TEXT = (
@@ -33,7 +32,7 @@ tolerance = {tolerance}
 
 
 def model(keys="", tolerance=0.05):
-    return build(loads(TEXT.format(keys=keys, tolerance=tolerance)))
+    return build(TEXT.format(keys=keys, tolerance=tolerance))
 
 
 def made(label, seconds, error, distance=None, value=1.0):
@@ -209,6 +208,6 @@ def test_refuses_knobs_that_a_scene_does_not_have(tmp_path, words, said):
 def test_exact_a_bench_without_pieces_has_the_steps_as_its_knob():
     """A law with a memory and one without; settings that gave the same run would be one."""
     for text in (BENCH, BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')):
-        found = build(loads(text))
+        found = build(text)
         assert numerical_settings.knobs_of(found) == ["steps_per_cycle"]
     assert len(curve(found, "steps_per_cycle")) > 2

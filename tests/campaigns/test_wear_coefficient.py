@@ -7,9 +7,9 @@ from command_line import cli
 from scene_texts import COATED, COULOMB, POINT
 
 import patchfem as pf
+from patchfem import load
 from patchfem.campaigns.fits.wear import read_depth
 from patchfem.core import PatchfemError
-from patchfem.scene.scene import loads
 
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
 WEAR = '[wear]\ncoefficient = "3e-15 m^2/N"\ncycles = 100000\n'
@@ -27,7 +27,7 @@ def scene(tmp_path):
 @pytest.mark.share(1)
 @pytest.mark.parametrize("name", ["worn_depth_max", "worn_depth_mean"])
 def test_exact_the_coefficient_comes_back_from_its_own_depth(scene, tmp_path, name):
-    found = pf.run(loads(WORN)).measures
+    found = pf.run(load(WORN)).measures
     length = 12.7e-3
     value = {"worn_depth_mean": found["worn_volume"].value / length**2}.get(name) or found[
         name

@@ -10,12 +10,11 @@ from command_line import cli
 from lab_files import SI, record, written
 from lab_modes import OMEGA, RESIDUE, TIME, ZETA, driven, free
 
+from patchfem import build
 from patchfem.core import PatchfemError
 from patchfem.inputs.loops import read_loop
 from patchfem.inputs.signals import read_signal
 from patchfem.inputs.slides import read_slide
-from patchfem.model.model import build
-from patchfem.scene.scene import loads
 from patchfem.structure import universal
 
 HERTZ = OMEGA / (2 * np.pi)
@@ -95,7 +94,7 @@ def test_exact_modes_of_a_record_are_the_structure_of_a_scene(shaken, tmp_path):
     assert [one["damping"] for one in found["modes"]] == pytest.approx(ZETA, rel=1e-6)
     assert any("widen the peak at 143 Hz" in note for note in found["notes"])
     text = (tmp_path / "modes.toml").read_text()
-    modes = build(loads(FORCED + text)).rig.modes
+    modes = build(FORCED + text).rig.modes
     assert modes.omega == pytest.approx(OMEGA, rel=1e-8) and modes.mass == pytest.approx(
         1 / 1.2, rel=1e-6
     )
@@ -134,7 +133,7 @@ def test_exact_the_response_written_is_read_by_structure_file(shaken, tmp_path):
     assert shapes.frequency[at] == pytest.approx(HERTZ[1], rel=1e-3)
     answer = cli("import", tmp_path / "response.uff", "-o", tmp_path / "modes.toml")
     assert answer.code == 0 and "260" in answer.out, answer.err
-    build(loads(FORCED + (tmp_path / "modes.toml").read_text()))
+    build(FORCED + (tmp_path / "modes.toml").read_text())
 
 
 def test_always_the_export_of_a_release_is_a_record_that_a_law_is_fitted_to(tmp_path):
@@ -186,7 +185,7 @@ def test_exact_a_free_decay_of_a_table(tmp_path):
     assert "143 Hz with a damping of 0.004; 260 Hz with a damping of 0.01" in answer.out
     text = (tmp_path / "modes.toml").read_text()
     assert "set moving_mass" in answer.err and "logarithmic decrement 0.02513" in text
-    modes = build(loads(SHAKEN + text)).rig.modes
+    modes = build(SHAKEN + text).rig.modes
     assert modes.zeta == pytest.approx(ZETA, rel=1e-7)
 
 
@@ -221,7 +220,7 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
     )
     answer = cli("import", path, "-o", tmp_path / "modes.toml", "--map", "slide=12:+x,output=11:+x")
     assert answer.code == 0, answer.err
-    modes = build(loads(SHAKEN + (tmp_path / "modes.toml").read_text())).rig.modes
+    modes = build(SHAKEN + (tmp_path / "modes.toml").read_text()).rig.modes
     assert modes.mass == pytest.approx(3, rel=1e-5)  # dataset 55 holds six digits
     assert modes.slide == pytest.approx(phi[1] * np.sqrt(3), rel=1e-5)
     assert modes.output == pytest.approx(phi[0] * np.sqrt(3), rel=1e-5)

@@ -13,11 +13,11 @@ import pytest
 from command_line import cli
 
 import patchfem as pf
+from patchfem import load
 from patchfem.__main__ import VERBS, app, known
 from patchfem.commands import examine
 from patchfem.commands.sources import SOURCES, bibtex
 from patchfem.effects import EFFECTS
-from patchfem.scene.scene import loads
 from patchfem.scene.starting import KINDS, NEXT, shipped_scene, template_text
 
 known([])  # all verbs
@@ -164,7 +164,7 @@ def test_exact_a_scene_cites_what_its_effects_stand_on(tmp_path):
         template_text("rig").replace('"coulomb"', '"nonlocal"\nbond_length = "1 um"'), "utf-8"
     )
     assert keys(cli("cite", path).out) == ["srinivasan1985", "patchfem", "oden1983"]
-    assert {"hueber2005", "archard1953"} <= set(keys(bibtex(loads(template_text("wear")).named())))
+    assert {"hueber2005", "archard1953"} <= set(keys(bibtex(load(template_text("wear")).named())))
     assert {name for names, _ in SOURCES for name in names} <= set(EFFECTS)
 
 

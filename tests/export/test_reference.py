@@ -8,6 +8,7 @@ from reference import limits, records
 from reference.keys import FILE, tables, text
 from scene_texts import SMALL_PATCH, STRUCTURE
 
+from patchfem import SceneError
 from patchfem.effects import EFFECTS, LAWS
 from patchfem.response.rows import TABLE as MOTION
 from patchfem.runs.results.patch_rows import TABLE as STATIC
@@ -15,7 +16,7 @@ from patchfem.scene.keys.lookup import is_table_or_value
 from patchfem.scene.keys.materials import MATERIALS
 from patchfem.scene.keys.quantities import KINDS, parse
 from patchfem.scene.keys.types import inner_table, key_record, keys, meaning
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 
 PAGE = text()
 

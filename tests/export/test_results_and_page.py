@@ -12,11 +12,10 @@ from command_line import CommandResult, cli
 from limits import limited
 from scene_texts import BENCH, COATED
 
+from patchfem import plan
 from patchfem.core import Missing
 from patchfem.export import folder as results_folder
 from patchfem.export import netcdf, report
-from patchfem.runs.plan import plan
-from patchfem.scene.scene import load
 
 WHOLE = {"summary.json", "result.nc", "scene.resolved.toml"}
 
@@ -179,7 +178,7 @@ def test_refuses_to_put_its_page_into_the_results_of_another_run(scene, tmp_path
 
 def test_refuses_a_page_for_a_folder_that_is_gone(scene, tmp_path):
     out = tmp_path / "out"
-    written = results_folder.run_into(plan(load(scene)), out)
+    written = results_folder.run_into(plan(scene), out)
     os.replace(out, tmp_path / "moved")
     with pytest.raises(Missing, match="replaced by another run"):
         results_folder.write_page(written, out)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from patchfem import SceneError, run
 from patchfem.export.page_data import data_of
 from patchfem.export.report import page_of
-from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, load
+from patchfem.scene.scene import load
 
 LINEAR = """
 [structure]

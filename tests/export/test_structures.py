@@ -9,7 +9,7 @@ from scene_texts import DRIVE, PAIR, PLASTIC, POINT, STRUCTURE, friction_of
 from scipy.io import loadmat
 
 import patchfem as pf
-from patchfem.model.model import build
+from patchfem import build
 
 CUBIC = '[structure.stiffening]\ncubic = "1e12 N/m^3"\n'
 WAVE = 'amplitude = "3 N"\nfrequency = "70 Hz"\n'

@@ -13,7 +13,7 @@ import surfaces as write
 from command_line import cli
 from scene_texts import BENCH, COATED, COULOMB, POINT, STRUCTURE, line_of
 
-from patchfem.scene.scene import SceneError, load
+from patchfem import SceneError, load
 
 PROFILE = COATED + '[contact.profile]\nfile = "{}"\n'
 SLIDE = POINT + COULOMB + '[slide]\nkind = "file"\nfile = "{}"\n'

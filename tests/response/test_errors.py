@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patchfem.model.model import build
+from patchfem import build, run
 from patchfem.response.errors import (
     SAFETY,
     change,
@@ -20,7 +20,6 @@ from patchfem.response.errors import (
 from patchfem.response.rows import floor_of
 from patchfem.runs.rig import march as rig_march
 from patchfem.runs.rig.numerics import choose
-from patchfem.runs.run import run
 from patchfem.scene import scene
 
 NAME = "relative_displacement_amplitude"

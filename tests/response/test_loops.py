@@ -9,10 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import COULOMB, DRIVE, MODE, POINT
 
+from patchfem import run
 from patchfem.response import loops
 from patchfem.response.measures import harmonic
-from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 
 OMEGA = 2 * pi * 143
 PERIOD = 2 * pi / OMEGA
@@ -190,7 +189,7 @@ def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
 def test_exact_range_and_drift_of_an_exact_run(more, drive):
     """A ring-up, sliding through and sticking: the last cycles by the engine's series at 20 000 instants a cycle. Both
     bars hold; they did not while A came from Gauss nodes and the drift from a mean of uneven samples."""
-    done = run(loads(BLOCK.format(more=more, drive=drive, cycles=21)))
+    done = run(BLOCK.format(more=more, drive=drive, cycles=21))
     slides = [dense(done, begin) for begin in (19, 20)]
     drift, damping = done.measures["drift_per_cycle"], done.measures["equivalent_damping"]
     rough = 1e-8 * np.ptp(slides[0]) * 1e-3  # of the midpoint rule across stops: 1/20000^2

@@ -5,11 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from patchfem import run
 from patchfem.core import DriveSegment, Measure
 from patchfem.response.events import RELEASE_UP
 from patchfem.response.reasons import APERIODIC, STILL, STOPS, UNCLOSED, unclosed
-from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 
 FREE = SimpleNamespace(segments=(DriveSegment(0.0),), period=0.1)
 RELEASED = """[normal]
@@ -84,7 +83,7 @@ def test_exact_one_of_several_loops_does_not_close_where_it_gives_back_more_than
 
 def measures(text: str):
     """Measures and friction work by cycle of a scene."""
-    found = run(loads(text))
+    found = run(text)
     assert found.outcome.value in ("steady", "stuck", "transient")
     return found.measures, found
 
@@ -104,7 +103,7 @@ def test_exact_no_distortion_of_an_output_that_stands_still(force, there):
         RELEASED.partition("[drive]")[0].replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
         + f'[drive]\nkind = "force"\nforce = "{force}"\nfrequency = "80 Hz"\ncycles = 20\n'
     )
-    found = run(loads(text)).measures
+    found = run(text).measures
     first, ratio = (
         found[name] for name in ("absolute_acceleration_fundamental", "acceleration_distortion")
     )
@@ -116,7 +115,7 @@ def test_exact_no_distortion_of_an_output_that_stands_still(force, there):
 def test_always_no_drift_where_no_drive_gives_a_period(start, cycles):
     """The stuck interface rings with a period of its own, so means over periods of the free mode differ by nothing that
     moves on."""
-    found = run(loads(RELEASED.format(start=start, cycles=cycles))).measures["drift_per_cycle"]
+    found = run(RELEASED.format(start=start, cycles=cycles)).measures["drift_per_cycle"]
     assert found.value is None and found.error is None and found.reason == APERIODIC
 
 
@@ -143,7 +142,7 @@ cycles = 12
 
 def test_exact_several_slips_per_half_cycle_have_no_start_phase():
     """Its slips start at 18, 51, 141 and 170 deg of the force; the circular mean was 3.72 deg."""
-    done = run(loads(STICK_SLIP))
+    done = run(STICK_SLIP)
     events = done.extra["events"]
     starts = (
         360 * 3 * events.time[(events.kind == RELEASE_UP) | (events.kind == RELEASE_UP + 1)] % 180
@@ -162,7 +161,7 @@ def test_exact_no_secant_where_rigid_friction_sticks_at_the_largest_slide(kineti
             .replace("static = 0.4", "static = 0.05")
             .replace("= 12", "= 60")
         )
-    found = run(loads(text)).measures
+    found = run(text).measures
     secant = found["secant_stiffness"]
     assert (found["stick_fraction"].value == 0) == there == (secant.value is not None)
     assert secant.value == pytest.approx(0.0, abs=1e-3) if there else secant.reason == STOPS

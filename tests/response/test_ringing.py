@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import KILOGRAM
 
+from patchfem import load
 from patchfem.compiled.no_jit import plain
 from patchfem.response.ringing import ring, ringing
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 
 RELEASE = (
     """\
@@ -152,14 +152,14 @@ def test_exact_the_median_over_sticks_outvotes_a_stray_one():
 def test_exact_a_released_block_rings_on_its_bonds(length, hertz):
     """sqrt(omega^2 + mu N/(m eps)); the damper of 0.003 of 143 Hz decays as 0.003 * 143 over the ring's frequency."""
     text = RELEASE.format(law="elastic-plastic", length=length, cycles=40, steps=4000)
-    found = run(loads(text), estimate=False).measures
+    found = run(load(text), estimate=False).measures
     assert found["ring_frequency"].value == pytest.approx(hertz, rel=1.2e-5)
     assert found["ring_damping"].value == pytest.approx(0.003 * 143 / hertz, rel=1e-4)
 
 
 def test_exact_the_second_mode_rings_while_the_interface_holds():
     """The eigenvalue of the two modes held together at the interface."""
-    scene = loads(TWO_MODES.format(load=10))
+    scene = load(TWO_MODES.format(load=10))
     result = run(scene)
     modes, found = result.plan.model.rig.modes, result.measures
     assert result.extra["engine"] == "exact" and 0.1 < found["stick_fraction"].value < 1

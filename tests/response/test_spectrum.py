@@ -5,12 +5,11 @@ from math import pi
 import numpy as np
 import pytest
 
+from patchfem import build
 from patchfem.core import Response, SineDrive
-from patchfem.model.model import build
 from patchfem.response import spectrum
 from patchfem.runs.rig.engines import EXACT
 from patchfem.runs.rig.numerics import choose
-from patchfem.scene.scene import loads
 
 OMEGA, PERIOD = 2.0, pi
 
@@ -108,7 +107,7 @@ cycles = 12
 def test_exact_friction_harmonic_is_that_of_the_force(kind, size, kinetic):
     """Two modes, sticking and sliding, by the event engine: from the motion alone and from the force's own series."""
     text = SCENE.format(kinetic=kinetic, kind=kind, size=size)
-    model = build(loads(text))
+    model = build(text)
     found = EXACT.run(model, choose(model), None)
     w, drive = found.window, model.rig.drive.signal
     slide = spectrum.motion_harmonic(w.time, w.slide, w.slide_rate, drive.omega)

@@ -5,17 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from patchfem import SceneError, build, plan
 from patchfem.core import Missing
 from patchfem.friction.bonds.parameters import LONGEST
 from patchfem.friction.record import loop_from
-from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.bench.ledger import BLOCK, UNWATCHED, Watch
 from patchfem.runs.bench.stepped import stepped
 from patchfem.runs.patch.ladder import solve_all
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 
 POINT = '[normal]\nload = "100 N"\n'
 PATCH = (

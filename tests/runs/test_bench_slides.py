@@ -9,11 +9,9 @@ from friction_forms import steady_bond_length
 from scene_texts import COULOMB, POINT
 from scipy.integrate import quad, solve_ivp
 
+from patchfem import build, plan, run
 from patchfem.core import PatchfemError
-from patchfem.model.model import build
 from patchfem.runs.bench import bench
-from patchfem.runs.plan import plan
-from patchfem.runs.run import run
 from patchfem.scene.scene import load, loads
 
 SPEED, LENGTH, RATIO, A_S, L_K, FLOOR = 1e-3, 2e-6, 0.5, 2e-6, 1e-6, 1e-6

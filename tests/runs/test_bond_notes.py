@@ -2,10 +2,10 @@
 
 import pytest
 
+from patchfem import load
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.runs.results.notes import unbounded_bonds
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 
 BENCH = (
     '[normal]\nload = "100 N"\n[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\n{law}[slide]\n'
@@ -22,7 +22,7 @@ RIG = (
 
 
 def notes(text, law):
-    found = run(loads(text.format(law=law)), estimate=False)
+    found = run(load(text.format(law=law)), estimate=False)
     return found, " | ".join(found.extra["notes"])
 
 

@@ -12,10 +12,11 @@ from itertools import product
 import pytest
 from scene_texts import COATED, DRIVE, MODE, SLIDE, only
 
+from patchfem import SceneError
 from patchfem.dynamics.march import march
 from patchfem.effects import LAWS
 from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 
 VALUES = {
     "reference_speed": "1 mm/s",

@@ -5,11 +5,9 @@ import pytest
 from remedies import drawn, ran, remedies_of, verdict
 from scene_texts import DRIVE, JOINT_SHAKEN, MODE, NONLOCAL, POINT
 
+from patchfem import build, run
 from patchfem.core import Measure
-from patchfem.model.model import build
 from patchfem.runs.accuracy_warnings import Finding, tolerance_warnings
-from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 
 SHAKEN = POINT + NONLOCAL + MODE + DRIVE
 FEW = "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 16\n"
@@ -34,7 +32,7 @@ FAILED = 460, 482, 484, 725, 746  # of 500 more
 
 
 def ran_text(text: str):
-    return run(loads(text))
+    return run(text)
 
 
 @pytest.mark.share(*EVERY_TIME)
@@ -54,7 +52,7 @@ def test_always_a_printed_remedy_does_what_it_promises(seed):
 def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
     """The change of no measure falls from 2 to 8 steps; those that the tolerance chooses meet it."""
     eight = FEW.replace("steps_per_cycle = 16", "steps_per_cycle = 8")
-    few, main = run(loads(SHAKEN + eight)), "relative_displacement_amplitude"
+    few, main = run(SHAKEN + eight), "relative_displacement_amplitude"
     said = [text for text in few.warnings if text.startswith(f"{main} has an estimated error of ")]
     assert (
         len(said) == 1
@@ -65,7 +63,7 @@ def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
         "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps"
         in said[0]
     )
-    again = run(loads(SHAKEN + FEW.replace("steps_per_cycle = 16\n", ""))).measures[main]
+    again = run(SHAKEN + FEW.replace("steps_per_cycle = 16\n", "")).measures[main]
     assert again.error <= 1e-2 * again.value < few.measures[main].error
 
 
@@ -89,9 +87,7 @@ def test_exact_what_a_run_answers_first_is_named_first(wide, first):
     """Errors of 16 steps; that of second order falls by 16 at 64 steps, by 64 at 128."""
     measures = {name: Measure(1.0, "1", error) for name, error in wide.items()}
     left = {"parts": {"steps": wide}, "orders": dict.fromkeys(wide, 2.0)}
-    seen = Finding(
-        build(loads(SHAKEN + FEW)), measures, None, {"steps_per_cycle": 16, "left_open": left}
-    )
+    seen = Finding(build(SHAKEN + FEW), measures, None, {"steps_per_cycle": 16, "left_open": left})
     assert tolerance_warnings(seen) == [first]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.scene.scene import loads
+from patchfem import load
 
 LAWS = {
     "coulomb": 'law = "coulomb"',
@@ -76,7 +76,7 @@ def test_exact_the_scale_of_a_mode_does_not_enter(law, method):
     resonance makes 2e-7 of the amplitude of that, and the stiffness, far below that of the limit at the amplitude, is a
     difference of such forces. Processors differ in where they round."""
     plain, doubled, scaled = (
-        pf.run(loads(scene(law, method, slide))) for slide in (1.0, 2.0, SLIDE)
+        pf.run(load(scene(law, method, slide))) for slide in (1.0, 2.0, SLIDE)
     )
     for name in (
         "equivalent_damping",
@@ -100,7 +100,7 @@ def test_exact_another_mode_that_slides_leaves_no_ratio():
     """At 110 Hz a mode of 300 Hz that slides as much carries some tenths of the slide; one of 0.001 does not."""
     second = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = {}\nbase = 0.9\n'
     shared, alone = (
-        pf.run(loads(scene("coulomb", slide=SLIDE, more=second.format(slide))))
+        pf.run(load(scene("coulomb", slide=SLIDE, more=second.format(slide))))
         for slide in (2.5, 0.001)
     )
     part = shared.window.modal * shared.plan.model.rig.modes.slide

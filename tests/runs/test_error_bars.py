@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scene_texts import PIECE
 
-from patchfem.model.model import build
+from patchfem import build
 from patchfem.runs.patch import ladder
 from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.ladder import solve_all

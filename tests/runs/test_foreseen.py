@@ -12,9 +12,10 @@ import plan_trial
 import pytest
 from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 
+from patchfem import plan
 from patchfem.core import Missing
 from patchfem.runs import memory, run
-from patchfem.runs.plan import UP_TO, plan, refuse_size
+from patchfem.runs.plan import UP_TO, refuse_size
 from patchfem.runs.rig import costs
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene.scene import loads

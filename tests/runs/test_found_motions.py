@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import patchfem as pf
+from patchfem import load
 from patchfem.core import Measure, Outcome, SineDrive
 from patchfem.response import settling
 from patchfem.response.outcome import settle
-from patchfem.scene.scene import load, loads
 
 FOUND = Path(__file__).parent / "found"
 TRUE = (  # scene, measure, truth: DOP853 from reversal to reversal at 3e-14, or a march of 4000 steps a cycle
@@ -69,7 +69,7 @@ def test_always_a_motion_that_nothing_bounds_has_no_steady_amplitude():
 def test_always_what_slides_for_ever_under_a_step_has_no_bar():
     drive = 'kind = "force"\nwaveform = "step"\nforce = "5 N"\ncycles = 40'
     result = pf.run(
-        loads(
+        load(
             RIG.format(
                 law='law = "elastic-plastic"\nbond_length = "1 um"',
                 frequency=0,
@@ -117,7 +117,7 @@ def test_always_a_motion_that_drifts_is_not_steady(drift, outcome, sine):
     assert settling.classify(sizes, 1e-3) is Outcome.STEADY
     if not sine:
         drive = pf.build(
-            loads(
+            load(
                 RIG.format(
                     law='law = "coulomb"',
                     frequency=143,
@@ -135,7 +135,7 @@ def test_always_a_joint_that_never_slips_as_a_whole_has_more_than_one_steady_mot
     law = 'law = "iwan"\nstiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5'
     drive = f'kind = "base"\nfrequency = "120 Hz"\nacceleration = "{level}"\ncycles = 20'
     text = RIG.format(law=law, frequency=120, drive=drive, method='method = "harmonic"')
-    found = pf.run(loads(text.replace('load = "10 N"', 'load = "100 N"')))
+    found = pf.run(load(text.replace('load = "10 N"', 'load = "100 N"')))
     assert any("the steady motion is therefore not unique" in note for note in found.notes) == said
 
 
@@ -157,7 +157,7 @@ def test_always_a_step_beyond_the_barrier_of_a_softening_spring_ends_the_run_bef
         text.replace("[structure]\n", f"[structure]\n{stop}")
         + '[structure.stiffening]\ncubic = "-1e14 N/m^3"\n'
     )
-    result = pf.run(loads(text))
+    result = pf.run(load(text))
     assert result.outcome.value == outcome
     assert result.measures["relative_displacement_amplitude"].value < 0.05
     assert any("softening spring" in text for text in result.warnings)

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 from motion_scenes import spec, written
 
-from patchfem.runs.run import run
-from patchfem.scene.scene import load
+from patchfem import run
 
 FOUND = Path(__file__).parent / "found"
 KNOWN = [  # scene, measure, truth, half a unit of its last digit
@@ -26,7 +25,7 @@ KNOWN = [  # scene, measure, truth, half a unit of its last digit
 
 @pytest.mark.parametrize(("name", "measure", "truth", "digit"), KNOWN)
 def test_exact_a_truth_from_outside_lies_inside_the_bar(name, measure, truth, digit):
-    found = run(load(FOUND / f"{name}.toml")).measures[measure]
+    found = run(FOUND / f"{name}.toml").measures[measure]
     assert abs(found.value - truth) <= found.error + digit
     assert found.error <= 0.1 * abs(found.value)
 
@@ -59,7 +58,7 @@ def test_exact_a_random_scene_holds_what_the_independent_program_found(
     asked = spec(seed)
     if seed == 5046:  # all its cells, where a looser tolerance takes as few as do
         asked["tolerance"] = 1e-6
-    found = run(load(written(asked, tmp_path))).measures[measure]
+    found = run(written(asked, tmp_path)).measures[measure]
     assert abs(found.value - truth) <= found.error + digit
     # a run whose steps meet a tolerance keeps a hundredth of the floor, a crossing besides 1e-7, 1e-4 of its floor
     assert found.error <= 1e-6 * abs(found.value) + 0.0101 * found.floor
@@ -73,5 +72,5 @@ def test_instants_of_slip_of_a_density_in_cells_have_an_error_of_first_order(
 ):
     """The stiffness of Iwan's law jumps from cell to cell; with errors of second order, which were 1.4 times too small
     here, the run took a quarter of the cells."""
-    found = run(load(written(spec(97000034), tmp_path))).measures[measure]
+    found = run(written(spec(97000034), tmp_path)).measures[measure]
     assert abs(found.value - truth) <= found.error <= 0.01

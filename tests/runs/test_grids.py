@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scene_texts import SMALL_PATCH
 
-from patchfem.model.model import build
+from patchfem import build
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.plan import expected_grids
 from patchfem.scene.scene import loads

@@ -5,8 +5,9 @@ import pytest
 from scene_texts import BLOCK
 
 import patchfem as pf
+from patchfem import SceneError
 from patchfem.core import Outcome
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 
 GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
 PRESSED = f"""

@@ -5,9 +5,9 @@ import pytest
 from scene_texts import BLOCK, KEYS
 
 import patchfem as pf
+from patchfem import build
 from patchfem.core import Outcome
 from patchfem.dynamics.march.march import march
-from patchfem.model.model import build
 from patchfem.runs.rig import interface
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene.scene import loads

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from patchfem.model.model import build
+from patchfem import build
 from patchfem.runs.run import run as run_plan
 from patchfem.scene.scene import loads
 

@@ -7,11 +7,11 @@ import pytest
 from command_line import cli
 from scene_texts import PIECE
 
+from patchfem import run
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.core import Outcome, PatchfemError
 from patchfem.runs.patch import ladder
 from patchfem.runs.patch.grids import seconds_of
-from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
 SIZE, WIDTH, LOAD = 12.7e-3, 12.7e-3, 115.653761996773

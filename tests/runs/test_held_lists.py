@@ -6,12 +6,11 @@ from time import process_time
 import numpy as np
 import pytest
 
+from patchfem import load, plan
 from patchfem.core import Missing
-from patchfem.runs.plan import plan
 from patchfem.runs.rig import lists
 from patchfem.runs.rig.lists import chatters, lists_grow, stalls
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 
 RIG = """[normal]
 load = "54.08 N"
@@ -109,7 +108,7 @@ tolerance = 0.003
 )
 def test_always_the_steps_of_a_stuck_block_are_within_those_of_the_plan(text, more):
     """more: strips over those foreseen, one per step; steps of a released block are cut into pieces at its start."""
-    scene = loads(text)
+    scene = load(text)
     foreseen = plan(scene)
     found = run(scene)
     assert (
@@ -129,7 +128,7 @@ def test_exact_the_printed_law_holds_what_a_spring_pulls_with_half_its_limit(rea
     text = RELEASED.replace("11.82", str(start)).replace("report", reading)
     stiff = 0.3877 * (2 * np.pi * 47.05) ** 2 + 176000
     assert (stiff * start * 1e-6 <= 0.53 * 133.2 / 2) == (held or reading == "stretch")
-    assert stalls(plan(loads(text)).model) is held
+    assert stalls(plan(text).model) is held
 
 
 @pytest.mark.parametrize(
@@ -139,7 +138,7 @@ def test_exact_the_printed_law_holds_what_a_spring_pulls_with_half_its_limit(rea
 def test_exact_the_printed_law_holds_fast_below_half_its_limit_over_the_pushed_mass(
     reading, push, held
 ):
-    model = plan(loads(RIG.format(reading=reading, push=push))).model
+    model = plan(RIG.format(reading=reading, push=push)).model
     # 2 * 39.84 m/s^2 * 0.8 = 0.662 * 54.08 N / 0.5617 kg, base 0.8
     assert chatters(model) is held
 
@@ -161,7 +160,7 @@ tolerance = 0.2
 
 def test_always_the_plan_estimates_the_list_of_growing_bonds_under_levels():
     """D 1.2 of the largest level: one strip per step, and one of each piece that a step is cut into."""
-    foreseen, found = plan(loads(LEVELS)), run(loads(LEVELS), estimate=False)
+    foreseen, found = plan(LEVELS), run(load(LEVELS), estimate=False)
     book = found.extra["book"]
     assert lists_grow(foreseen.model) and not chatters(foreseen.model)
     assert foreseen.unknowns["bond_list_about"] == pytest.approx(
@@ -171,7 +170,7 @@ def test_always_the_plan_estimates_the_list_of_growing_bonds_under_levels():
 
 def test_refuses_a_stuck_block_whose_list_of_bonds_grows_too_long(monkeypatch):
     """Its seconds grow with the square of its cycles: the run is stopped after a sixtieth of the limit or more."""
-    scene = loads(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
+    scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
     begin = process_time()
     assert "each reversal makes the list of bonds longer" in str(plan(scene))
     monkeypatch.setattr(lists, "LONGEST", 3.0)

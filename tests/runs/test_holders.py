@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import COATING, PIECE
 
+from patchfem import build
 from patchfem.contact.gaps import step
 from patchfem.core import Outcome
-from patchfem.model.model import build
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.values import values
 from patchfem.scene import scene

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from patchfem import SceneError, run
 from patchfem.response.measures import half_swing
 from patchfem.response.spectrum import reading
-from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 
 MODES = """
 [structure]

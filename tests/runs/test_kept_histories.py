@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PLASTIC, POINT
 
+from patchfem import build
 from patchfem.core import G_N, Outcome
-from patchfem.model.model import build
 from patchfem.runs.rig.march import run_march
 from patchfem.runs.rig.numerics import choose
 from patchfem.runs.run import run

@@ -8,15 +8,14 @@ from any_mesh_cases import FORMATS, drawn
 from command_line import cli
 from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE
 
+from patchfem import build, plan
 from patchfem.core import NotConverged, PatchfemError
 from patchfem.mesh.files import EDGE_TAGS
 from patchfem.mesh.tensor import graded_grid
-from patchfem.model.model import build
 from patchfem.model.pieces import piece_meshes
 from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.press import pressed
 from patchfem.runs.patch.values import values
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from patchfem import load
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 
 RIG = """[normal]
 load = "{load:.6g} N"
@@ -66,7 +66,7 @@ def books(seed, count) -> list:
     rng, out = np.random.default_rng(seed), []
     for _ in range(count):
         text = drawn(rng)
-        found = run(loads(text), estimate=False)
+        found = run(load(text), estimate=False)
         value = {name: one.value for name, one in found.measures.items()}
         passed = value["energy_dissipated"] + found.extra["book"]["power"]
         created = value["energy_created"] / passed if '"stretch"' in text else 0.0

@@ -8,6 +8,7 @@ from scene_texts import COATED, COULOMB, SLIDE
 from wedges import falling
 
 import patchfem as pf
+from patchfem import build
 from patchfem.closed_forms.contact import (
     punch_pressure,
     rounded_punch_half_width,
@@ -20,7 +21,6 @@ from patchfem.elasticity.recovery import get_cells, quadratures
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows
 from patchfem.model.files import faults
-from patchfem.model.model import build
 from patchfem.model.pieces import extend_grid, piece_meshes, rounded_edges
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures

@@ -9,19 +9,18 @@ import pytest
 from command_line import cli
 from scene_texts import COATED, PIECE
 
+from patchfem import build, plan
 from patchfem.closed_forms import contact as exact
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.formatting import format_length
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.pairs import as_piece
 from patchfem.mesh.tensor import graded_grid
-from patchfem.model.model import build
 from patchfem.model.pieces import piece_meshes
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures, plane_band
 from patchfem.runs.patch.press import solve
 from patchfem.runs.patch.values import values
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 

@@ -7,13 +7,12 @@ import xarray as xr
 from command_line import cli
 from scene_texts import NONLOCAL, POINT, SMALL_PATCH, TRIANGLE
 
+from patchfem import build, plan
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import Recursion
-from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.runs.patch.ladder import solve_all
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import load, loads
 

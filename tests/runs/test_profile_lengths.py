@@ -7,8 +7,8 @@ import pytest
 from scene_texts import COATING, PIECE
 
 import patchfem as pf
+from patchfem import build
 from patchfem.closed_forms import contact as closed_forms
-from patchfem.model.model import build
 from patchfem.runs.patch import fine as trace
 from patchfem.scene.scene import loads
 

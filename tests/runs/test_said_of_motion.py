@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import patchfem as pf
+from patchfem import load
 from patchfem.core import Measure, Outcome
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.response.measures import relative_gap
 from patchfem.response.rows import Seen
 from patchfem.runs.results.notes import creeping
-from patchfem.scene.scene import loads
 
 BONDS = 'law = "nonlocal"\nbond_length = "{} m"\n'
 RIG = """
@@ -83,12 +83,12 @@ def test_exact_a_drift_of_a_steady_motion_is_said_whatever_the_breakaway(outcome
 )
 def test_exact_a_block_on_bonds_as_soft_as_its_mode_is_not_said_to_stick(length, said):
     """The mode has 1.916e5 N/m, the bonds mu N over their length: 4 N over 40 and 0.3 um."""
-    found = pf.plan(loads(RIG.format(law=BONDS.format(length), load=4 / 0.3)))
+    found = pf.plan(load(RIG.format(law=BONDS.format(length), load=4 / 0.3)))
     assert any(said in line for line in found.verdict)
 
 
 def test_exact_a_plan_has_a_link_of_every_interface():
-    chain = pf.plan(loads(PAIR)).chain
+    chain = pf.plan(load(PAIR)).chain
     assert chain["bonds"] == "none: it creeps" and chain["bonds_2"] == pytest.approx(2.6e5)
 
 

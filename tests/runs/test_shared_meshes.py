@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 from scene_texts import COATING, CROWNED_JOINT, PIECE
 
+from patchfem import build
 from patchfem.core import PatchfemError
-from patchfem.model.model import build
 from patchfem.runs.batch.meshes import meshed
 from patchfem.runs.run import run
 from patchfem.scene import scene

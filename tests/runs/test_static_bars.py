@@ -12,11 +12,10 @@ from scene_texts import PIECE
 from static_scenes import KINDS, drawn, judged, line, missed, text_of, wider
 
 import patchfem as pf
-from patchfem.model.model import build
+from patchfem import build
 from patchfem.model.pieces import piece_meshes
 from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.press import pressed
-from patchfem.scene.scene import loads
 
 TITANIUM = 'substrate = {young = "120 GPa", poisson = 0.32, density = "4370 kg/m^3"}\n'
 NARROW = (
@@ -176,7 +175,7 @@ def test_always_the_bar_of_a_single_jump_holds_the_worn_peak():
 @pytest.mark.parametrize("worn, said", [(0.0, 0), (4e-9, 1)])
 def test_a_ripple_is_said_where_the_pressure_zigzags(worn, said):
     """One join, which is expected to ripple by 6.7 %: a smooth pressure has none, one on alternating nodes has."""
-    asked = build(loads(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM)).patch
+    asked = build(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM).patch
     pair = condensed(asked, *piece_meshes(asked))
     pair = replace(
         pair, joint=SimpleNamespace(ripple=0.067, reason="is expected to ripple by 6.7 %")

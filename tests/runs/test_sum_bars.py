@@ -2,7 +2,7 @@
 
 import pytest
 
-from patchfem.model.model import build
+from patchfem import build
 from patchfem.runs.bench.engine import bench_engine
 from patchfem.runs.bench.errors import sum_error
 from patchfem.runs.run import run

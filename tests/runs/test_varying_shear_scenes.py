@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scene_texts import RIG
 
-from patchfem.runs.plan import plan
+from patchfem import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 

@@ -15,11 +15,11 @@ from scene_texts import COATED, COULOMB, MODE, NONLOCAL, POINT, SHEAR, STRUCTURE
 from scipy.optimize import brentq
 
 import patchfem as pf
+from patchfem import build
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance
-from patchfem.model.model import build
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve
 from patchfem.scene.scene import loads

@@ -5,8 +5,8 @@ import pytest
 from march_paths import share_one_loop
 from scene_texts import DRIVE, MODE, PIECE, mistakes
 
+from patchfem import load
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 
 TEXT = (
     PIECE
@@ -45,7 +45,7 @@ def one_loop(monkeypatch):
 
 
 def found(law="coulomb", keys="", yaw="30 rad/m", roll="0.01 mrad", method="auto"):
-    result = run(loads(TEXT.format(law=law, keys=keys, yaw=yaw, roll=roll, method=method)))
+    result = run(load(TEXT.format(law=law, keys=keys, yaw=yaw, roll=roll, method=method)))
     return result, result.measures
 
 
@@ -122,7 +122,7 @@ BEHIND = pytest.mark.parametrize(
 
 
 def behind_shear(law, strips="", yaw="", method="march"):
-    return run(loads(SOFT.format(law=law, strips=strips, yaw=yaw, method=method)), estimate=False)
+    return run(load(SOFT.format(law=law, strips=strips, yaw=yaw, method=method)), estimate=False)
 
 
 @BEHIND

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.model.model import build
+from patchfem import build
 from patchfem.runs.bench.engine import slips_by_elements
 from patchfem.scene.scene import loads
 from patchfem.slip.mesh_correction import spread

@@ -5,12 +5,11 @@ import pytest
 from scene_texts import MODE, PLASTIC, POINT
 from scipy.integrate import quad, solve_ivp
 
+from patchfem import SceneError, plan, run
 from patchfem.core import InitialState, ModalBasis, Outcome, PatchfemError, SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model
-from patchfem.runs.plan import plan
-from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 from patchfem.structure.drives import Recorded, Sweep, levels, release, step
 
 W = 2 * np.pi * 143

@@ -8,6 +8,7 @@ import pytest
 from command_line import cli
 
 import patchfem as pf
+from patchfem import SceneError, build, run
 from patchfem.campaigns.rows.asked import Asked, Question
 from patchfem.campaigns.rows.cells import cells_of
 from patchfem.campaigns.rows.computed import Computed
@@ -15,11 +16,9 @@ from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
 from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits.rows import Starts, describe_answer
-from patchfem.model.model import build
 from patchfem.runs.batch.watched import Watcher
-from patchfem.runs.run import run
 from patchfem.scene.ranges import read_ranges
-from patchfem.scene.scene import SceneError, load, loads
+from patchfem.scene.scene import load, loads
 
 MIL = 25.4e-6
 LINEAR = """

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 from scene_texts import BENCH, PATCH, SMALL_PATCH
 
+from patchfem import SceneError
 from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.campaigns.sweeps.cases import Cases, product
 from patchfem.campaigns.sweeps.parse_request import Request, cases_of
 from patchfem.scene.axes import read_axes
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 
 THREE = ["normal.load=1 N,2 N", "friction.static=0.1,0.2,0.3", "slide.speed=1 mm/s,2 mm/s"]
 

@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
 
+from patchfem import plan
 from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.campaigns.sweeps.estimate import ONCE, estimate
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.parse_request import Request, cases_of, contradictions
 from patchfem.export.sweeps.run import Place, sweep_into
-from patchfem.runs.plan import plan
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,11 @@ import numpy as np
 import pytest
 from scene_texts import COULOMB, MODE, POINT
 
+from patchfem import plan
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import event_list
 from patchfem.response.run_events import of_log
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 from patchfem.structure.drives import Piecewise, levels
 
 RIG = (
@@ -44,7 +43,7 @@ def test_exact_borders_of_levels_are_listed():
 
 def test_exact_levels_of_a_scene_are_those_of_one_run():
     """The scene runs level after level; the list is that of one run through all segments."""
-    result = run(plan(loads(RIG)), estimate=False)
+    result = run(plan(RIG), estimate=False)
     found, model = result.extra["events"], result.plan.model
     drive = model.rig.drive.signal
     assert isinstance(drive, Piecewise)

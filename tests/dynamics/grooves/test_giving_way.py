@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
+from patchfem import load
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.grooves import climbing
 from patchfem.dynamics.grooves.climbing import ClimbingModel
@@ -16,7 +17,6 @@ from patchfem.dynamics.march.varying_load import bonds, plastic
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.grooves import Grooves
 from patchfem.response.measures import energy_balance
-from patchfem.scene.scene import loads
 from patchfem.slip.shear_modes import jenkins_set, shear_modes
 
 LOAD, MU, LENGTH, COUNT = 115.65, 0.4, 1e-6, 12
@@ -224,7 +224,7 @@ steps_per_cycle = 100
         'damping = 0.003\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 5\n'
     )
     for motion in (slide, rig):
-        found = pf.run(loads(text + motion))
+        found = pf.run(load(text + motion))
         area = found.patch.pieces.interface.weight
         tau, time = found.fields["shear_stress"], found.fields["time"]
         force = np.interp(time, found.response.time, found.response.force)

@@ -6,6 +6,7 @@ from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sd
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
+from patchfem import plan, run
 from patchfem.core import G_N, ModalBasis, NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics.harmonic.backbone import FreeBalance, trace
 from patchfem.dynamics.harmonic.balance import periodic_response
@@ -17,9 +18,6 @@ from patchfem.dynamics.harmonic.laws import Jenkins, Spring, synthesis
 from patchfem.dynamics.harmonic.point import point
 from patchfem.dynamics.harmonic.stability import monodromy_of, with_stability
 from patchfem.dynamics.periodic import multipliers
-from patchfem.runs.plan import plan
-from patchfem.runs.run import run
-from patchfem.scene.scene import loads
 
 W = 2 * np.pi * 143
 MASS = 0.884
@@ -300,7 +298,7 @@ def test_exact_backbone_is_that_of_the_loops_of_a_bench(text, law):
     omega, amplitudes = W, np.array([4.0])
     found = backbone(RIG, law, amplitudes * 1e-6, harmonics=1)
     for k, amplitude in enumerate(amplitudes):
-        result = run(plan(loads(BENCH.format(law=text, amplitude=amplitude))))
+        result = run(plan(BENCH.format(law=text, amplitude=amplitude)))
         stiffness = result.measures["equivalent_stiffness"].value
         area = result.measures["loop_area"].value
         w = np.sqrt(omega**2 + stiffness / MASS)

@@ -5,6 +5,7 @@ import pytest
 from harmonic_cases import bonds, five, march, plain_jenkins, sdof
 from scene_texts import NONLOCAL, POINT, STRUCTURE
 
+from patchfem import plan
 from patchfem.core import ModalBasis, NotConverged, SineDrive
 from patchfem.dynamics.harmonic.balance import periodic_response, regime
 from patchfem.dynamics.harmonic.branch import response
@@ -12,7 +13,6 @@ from patchfem.dynamics.harmonic.laws import Jenkins, Spring, synthesis
 from patchfem.dynamics.harmonic.point import group_of, point
 from patchfem.response.loops import interface_loop
 from patchfem.response.measures import acceleration_peak, harmonic, slip_measures
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 

@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 from march_paths import OMEGA, one_mode
 
+from patchfem import build
 from patchfem.core import Missing, SineDrive
 from patchfem.dynamics.march import capacity
 from patchfem.dynamics.march.joints import JointsModel, cubic
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import list_model
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.model.model import build
 from patchfem.runs.bench import bench
-from patchfem.scene.scene import loads
 
 LAWS = {
     "stretch": Bonds(0.4, 2e-5, 0.5), "printed": Bonds(0.4, 2e-5, 1.0, "report", initial=0.0),
@@ -75,7 +74,7 @@ def test_exact_a_bench_whose_list_grows_is_that_with_room_from_the_start(monkeyp
         '[normal]\nload = "100 N"\n[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\norder = 2\n'
         '[slide]\nkind = "sine"\namplitude = "40 um"\nfrequency = "10 Hz"\n[accuracy]\nquadrature = "direct"\n'
     )
-    one = bench.run(build(loads(text)), None, 400)
+    one = bench.run(build(text), None, 400)
     monkeypatch.setattr(list_numbers, "capacity", lambda *_: 50)
-    two = bench.run(build(loads(text)), None, 400)
+    two = bench.run(build(text), None, 400)
     assert np.array_equal(one.force, two.force) and np.array_equal(one.ledger, two.ledger)

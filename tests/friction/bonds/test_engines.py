@@ -8,14 +8,13 @@ from friction_paths import pulled, random_walk, triangle, upper_pressure
 from march_paths import OMEGA, follow, one_mode
 from scene_texts import DRIVE, KILOGRAM
 
+from patchfem import build, plan
 from patchfem.core import SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import list_model, points_model
 from patchfem.friction.bonds.engines import ENGINES, choose, impossible
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.model.model import build
-from patchfem.runs.plan import plan
 from patchfem.runs.rig.interface import contact_model
 from patchfem.runs.rig.lists import quadrature_of
 from patchfem.runs.rig.motion_warnings import created_warning

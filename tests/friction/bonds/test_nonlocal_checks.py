@@ -16,6 +16,7 @@ from scipy.optimize import brentq
 from scipy.special import gammainc
 from vibration_forms import sliding_amplitude
 
+from patchfem import build
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
@@ -23,7 +24,6 @@ from patchfem.friction.bonds.parameters import Bonds, grow
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 from patchfem.friction.bonds.recursion import BondState, Recursion
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
 

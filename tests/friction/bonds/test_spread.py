@@ -5,12 +5,11 @@ import pytest
 from scene_texts import NONLOCAL, POINT, SHEAR, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.integrate import dblquad
 
+from patchfem import SceneError, build, plan
 from patchfem.friction.bonds.spread import pad_factor
-from patchfem.model.model import build
 from patchfem.runs.bench import bench
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 
 LONGER = NONLOCAL.replace("1 um", "2 um")
 SPREAD = ["friction.spread=4 mm"]

@@ -11,15 +11,14 @@ from hypothesis import strategies as st
 from scene_texts import BENCH, GROWING, POINT, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.special import erfc
 
+from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.bonds.temperature import growth_at, surface_rise
-from patchfem.model.model import build
 from patchfem.runs.bench import bench
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 
 WARM = """[friction.temperature]
 surface = "393.15 K"

@@ -7,9 +7,9 @@ from scene_texts import COATED, DRIVE, MODE, mistakes, only
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from patchfem import load
 from patchfem.friction.laws.bouc_wen import loop_from_keys
 from patchfem.scene.keys.tables import Friction
-from patchfem.scene.scene import loads
 
 LAW = 'law = "bouc-wen"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\n'
 LIMIT, EPS = 0.31 * LOAD, 0.31 * LOAD / 1.3e7
@@ -111,6 +111,6 @@ def test_refuses_what_the_law_cannot_do():
         in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
     )
     assert (
-        loads(scene).friction.exponent == 2.0
-        and loads(scene.replace("exponent = 2.0\n", "")).friction.exponent == 1
+        load(scene).friction.exponent == 2.0
+        and load(scene.replace("exponent = 2.0\n", "")).friction.exponent == 1
     )

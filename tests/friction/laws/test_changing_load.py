@@ -7,6 +7,7 @@ from scene_texts import BENCH
 from scipy.integrate import quad
 from scipy.special import gammainc
 
+from patchfem import build, plan
 from patchfem.core import Missing
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
@@ -14,9 +15,7 @@ from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import Rate
-from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 

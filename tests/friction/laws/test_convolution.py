@@ -11,18 +11,17 @@ from scene_texts import COULOMB, POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
 from scipy.integrate import quad
 from scipy.special import gamma
 
+from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.laws.convolution import Convolution, average, limits
 from patchfem.friction.laws.coulomb import Coulomb
-from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.patch.ladder import solve_all
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 
 AVERAGED = '[friction]\nlaw = "convolution"\nstatic = 0.3\nbond_length = "1 mm"\n'
 FLAT = SMALL_PATCH.split("[contact.tilt]")[0]

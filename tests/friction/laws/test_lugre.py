@@ -6,7 +6,7 @@ from law_runs import LOAD, bench_along, shrinking
 from scene_texts import COATED, DRIVE, MODE, mistakes, only
 from scipy.integrate import solve_ivp
 
-from patchfem.scene.scene import loads
+from patchfem import load
 
 STATIC, KINETIC, STIFFNESS, SPEED = 0.31 * LOAD, 0.22 * LOAD, 1.3e7, 2e-3
 DAHL = 'law = "lugre"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nstribeck_speed = "2 mm/s"\n'
@@ -82,6 +82,6 @@ def test_refuses_what_the_law_cannot_do():
         in mistakes(scene, "normal.amplitude=1 N", "normal.frequency=3 Hz")[0]
     )
     assert (
-        loads('[normal]\nload = "100 N"\n[friction]\n' + DAHL + MODE + DRIVE).friction.kinetic
+        load('[normal]\nload = "100 N"\n[friction]\n' + DAHL + MODE + DRIVE).friction.kinetic
         == 0.31
     )

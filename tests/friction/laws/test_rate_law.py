@@ -5,11 +5,9 @@ import pytest
 from scene_texts import DRIVE, MODE, POINT
 from scipy.integrate import quad, solve_ivp
 
+from patchfem import SceneError, load, plan, run
 from patchfem.core import Outcome
 from patchfem.friction.laws.tanh import Rate
-from patchfem.runs.plan import plan
-from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, loads
 
 LOAD, LIMIT, MASS, OMEGA = 115.653761996773, 0.3 * 115.653761996773, 0.884, 2 * np.pi * 143
 LAW = POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "{} m/s"\n'
@@ -22,7 +20,7 @@ RIG = (
 
 
 def found(text):
-    return run(plan(loads(text)))
+    return run(plan(text))
 
 
 # ---- the bench
@@ -137,6 +135,6 @@ def test_refuses_the_rate_law_behind_shear_and_without_its_speed():
     with pytest.raises(
         SceneError, match=r"'tanh' with .contact\.shear. is not supported yet; leave out"
     ):
-        loads(patch.format('reference_speed = "1 mm/s"\n'))
+        load(patch.format('reference_speed = "1 mm/s"\n'))
     with pytest.raises(SceneError, match="reference_speed: missing"):
-        loads(patch.format("").replace("[contact.shear]\n", ""))
+        load(patch.format("").replace("[contact.shear]\n", ""))

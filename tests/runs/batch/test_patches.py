@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scene_texts import COATING, PIECE
 
+from patchfem import build
 from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.export.sweeps.run import swept
-from patchfem.model.model import build
 from patchfem.runs.batch import batches, one_by_one, patches
 from patchfem.runs.batch.meshes import meshed
 from patchfem.runs.patch.grids import contact_extent

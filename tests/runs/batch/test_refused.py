@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scene_texts import COULOMB, DRIVE, MODE, POINT, SECOND, SHORT
 
-from patchfem.model.model import build
+from patchfem import build
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.scene.scene import loads
 
 RIG = POINT + COULOMB + SHORT
 SWEEP = (
@@ -127,18 +126,18 @@ def alike(model):
 @pytest.mark.share(0, 1, 2, 3, 4, 6, 7, 8, 10, 12, 14)
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_a_case_of_any_kind_is_its_single_run(kind):
-    alike(build(loads(KINDS[kind])))
+    alike(build(KINDS[kind]))
 
 
 @pytest.mark.parametrize("kind", MARCHED)
 def test_refuses_what_is_marched(kind):
-    assert batches.batch_of(build(loads(MARCHED[kind]))) is None
+    assert batches.batch_of(build(MARCHED[kind])) is None
 
 
 @pytest.mark.parametrize("end", ENDS)
 def test_exact_a_batch_ends_as_single_runs_do(end):
     pairs, outcome, estimated = ENDS[end]
-    model = build(loads(changed(*pairs)))
+    model = build(changed(*pairs))
     found = alike(model)
     assert batches.batch_of(model) is not None and found.outcome[0] == outcome
     assert ("relative_displacement_amplitude_steady" in found.values) == estimated
@@ -149,8 +148,6 @@ def test_exact_a_batch_ends_as_single_runs_do(end):
 def test_exact_a_batch_of_elements_ends_as_single_runs_do(end):
     """The same cases behind an elastic-plastic element, however they end."""
     text = changed(*ENDS[end][0])
-    model = build(
-        loads(text.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"'))
-    )
+    model = build(text.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"'))
     assert batches.batch_of(model) is not None
     alike(model)

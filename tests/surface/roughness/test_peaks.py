@@ -11,8 +11,8 @@ from scipy.integrate import quad
 from scipy.ndimage import gaussian_filter1d
 
 import patchfem as pf
+from patchfem import build
 from patchfem.core import PatchfemError
-from patchfem.model.model import build
 from patchfem.scene.scene import loads
 from patchfem.surface.profile import Profile, level
 from patchfem.surface.roughness.peaks import (
