@@ -46,6 +46,18 @@ def run_of(modes, drive, groups, cycles=24, window=5) -> tuple:
     return run, kept[0][:-1], done
 
 
+@pytest.mark.parametrize("omega", [1.01, 1.0105, 1.0107, 1.0109])
+def test_exact_secant_stiffness_where_the_slide_turns_at_the_border_of_a_cycle(omega):
+    """Near resonance the largest slide is reached within a thousandth of a period of the border."""
+    drive = SineDrive(1.5, omega)
+    _, _, done = run_of(basis(1.0, 0.05), drive, [elements_of([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])])
+    ends = done.window
+    phase = ends.time[np.argmax(ends.slide[:-1])] / drive.period
+    assert abs(phase - round(phase)) < 2e-3
+    turns = turns_of(ends.time, ends.slide, ends.slide_rate, ends.force, drive.period, "slide")
+    assert done.reading.of(at.SECANT, 0) == pytest.approx(secant_stiffness(turns), rel=1e-9)
+
+
 @pytest.mark.parametrize("drive", [SineDrive(1.5, 1.3), SineDrive(1.5, 0.4)])
 @pytest.mark.parametrize("many", [False, True])
 def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
