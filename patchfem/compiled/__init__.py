@@ -1,24 +1,21 @@
-"""Where compiled code is kept: one folder per state of the kernel sources, so an edited law never runs as its old self.
+"""Compiled functions of the package and their files, kept in one folder per state of the kernel sources.
 
-Numba's own cache notices only a change of the file that holds the function, not of the files it calls. A function that
-is handed another one as an argument is never cached at all, so a loop that should run with any law is a text of its own
-per law: `instance` writes it beside the compiled code, with the import of the law exchanged.
+In: the name of a module of kernels, and modules to exchange in it. Out: a `Kernels`, which imports the module, and with
+it numba, only if a function is called whose machine code is not stored yet. `jit` has the decorator `njit` of all
+kernels, `machine` stores and loads machine code, `no_jit` runs kernels as Python, `prebuilt` finds the code of a wheel,
+`cache_files` and `cache_limit` keep the folders. Read `load`, `instance` and `Entry` first.
 
-Numba's own switches are obeyed: NUMBA_DISABLE_JIT=1 runs every kernel as the Python that it is written in (a debugger
-or a measure of coverage sees each line), NUMBA_BOUNDSCHECK=1 compiles all anew and checks every index.
+The cache of numba notices a change of the file of a function, but not of the files that it calls, and it stores no
+function that takes another function as an argument. So the folder is named by a hash of all kernel sources, and a loop
+for any friction law is written out once per law by `instance`, with the import of the law exchanged.
 
-Numba's level of optimisation stays its own, 3. Compile CPU s of the rig, Iwan, Bouc-Wen, tanh,
-LuGre and bonds at the levels 3, 2 and 1: 6.4 5.0 5.1, 23.0 24.3 21.8, 8.9 9.7 9.2, 7.8 8.5 7.8, 8.4
-8.0 7.8, 8.8 8.9 9.0, in all 63, 64 and 61 on a busy machine, for most of it was numba's own Python.
-Iwan's loop then takes 7.9, 10.1 and 10.0 ms, others up to a sixth more. Since tuples are taken by
-their address (`pass_by_reference`) and only the passes run that are needed (`jit`), the loop from
-event to event compiles in three fifths of the time: the first sweep of a Coulomb rig 13.5 CPU s,
-21.9 before.
+NUMBA_DISABLE_JIT=1 runs every kernel as Python, so that debuggers and coverage see its lines. NUMBA_BOUNDSCHECK=1
+compiles all kernels anew and checks every index. A function whose caller estimates its cost as Python (`Entry.expect`)
+runs as Python while the cost is small, because compiling takes longer.
 
-`jit` has the `njit` of all kernels. `load` and `instance` give `Kernels`, which import the module of compiled code,
-and with it numba, only where a function of it is called whose machine code is not kept yet (`machine`). A function
-whose caller says what its work would cost as Python (`Entry.expect`) runs as Python (`no_jit`) while that is little: a
-short history is over long before its loop would be compiled.
+The optimisation level is 3, the default of numba. Levels 2 and 1 save no compile time: the rig and five laws took 64
+and 61 CPU seconds instead of 63, most of it in the Python of numba. At level 2 the loop of Iwan's law takes 10.1 ms
+instead of 7.9 ms.
 """
 
 import ast
@@ -84,8 +81,7 @@ ARITHMETIC = {
 
 
 def sources():
-    """Hash, as an object, of every *kernels.py of the package, of the tuples that they take and how they are
-    compiled."""
+    """Return the hash object of all kernels of the package, of the tuples that they take and of their compiler."""
     digest = hashlib.sha256()
     for source in (
         *(HERE / "compiled" / name for name in ("jit.py", "pass_by_reference.py")),
@@ -97,7 +93,7 @@ def sources():
 
 
 def kernel_key() -> str:
-    """Hash of the kernels and their compilers, the kind of CPU and what it can do."""
+    """Return a hash of the kernels, of numba and llvmlite, and of the CPU with its instruction sets."""
     digest = sources()
     checked = os.environ.get("NUMBA_BOUNDSCHECK", "")
     made_by = (
@@ -122,19 +118,22 @@ def _cpu() -> str:
 
 
 def cache_folder() -> Path:
-    """The user's cache folder for this state of the kernels; where it is not the user's own or cannot be written, that
-    of the session (XDG_RUNTIME_DIR), else one of this process alone."""
+    """Return the folder of compiled code for this state of the kernels.
+
+    It lies in the user's cache. If that belongs to another user or cannot be written, it lies in the folder of the
+    session (XDG_RUNTIME_DIR), or else in a folder of this process alone.
+    """
     return _place()[0]
 
 
 def why_elsewhere() -> str:
-    """Why `cache_folder` is not among the user's caches, "" where it is."""
+    """Return the reason why `cache_folder` is not in the user's cache; "" if it is."""
     return _place()[1]
 
 
 @cache
 def _placed() -> tuple[Path, str]:
-    """The folder of this process, and why it is not the user's."""
+    """Return the folder for this process, and the reason why it is not in the user's cache."""
     return _place()
 
 
@@ -150,10 +149,10 @@ def _place() -> tuple[Path, str]:
 
 
 class Kernels:
-    """A module of compiled code that is imported when it is needed.
+    """Module of compiled code that is imported when it is needed.
 
-    `__name__` is that of the module. An attribute is a function to call, a constant that stands in its text, or, with
-    the module imported, anything else of it.
+    An attribute is a function to call or a constant, both read from the text of the module; for any other attribute the
+    module is imported.
     """
 
     def __init__(self, name: str, text: Path | str, bring):
@@ -174,17 +173,17 @@ class Kernels:
         return self._entries[name]
 
     def module(self):
-        """The module itself."""
+        """Import the module and return it."""
         _prepared()
         return self._bring()
 
 
-SPENT = [0.0]  # seconds in which this process made code, or waited for one that did
+SPENT = [0.0]  # s for which this process compiled code, or waited for another process that did
 
 
 @contextmanager
 def spending():
-    """What is done within counts among the seconds of `SPENT`."""
+    """Add the time of the block to `SPENT`."""
     begin = monotonic()
     try:
         yield
@@ -194,7 +193,7 @@ def spending():
 
 @contextmanager
 def tidied_later():
-    """No search for cyclic garbage within: a seventh of the time of a compilation, which makes millions of objects."""
+    """Pause the search for cyclic garbage in the block, which takes a seventh of the time of a compilation."""
     was = gc.isenabled()
     gc.disable()
     try:
@@ -206,10 +205,10 @@ def tidied_later():
 
 @contextmanager
 def alone(path: Path):
-    """One process at a time within, by a lock on a file, which the system takes from a process that is killed.
+    """Let one process at a time run the block, by a lock on a file, which the system releases if the process is killed.
 
-    Others wait, `WAIT` at most: on a network's file system the lock of a machine that is gone may stay. Where a file
-    system has no locks nobody waits.
+    Other processes wait for at most `WAIT` seconds, because the lock of a machine that has disappeared may remain on a
+    network file system. On a file system without locks no process waits.
     """
     try:
         import fcntl
@@ -235,20 +234,25 @@ def alone(path: Path):
 
 
 class Entry:
-    """A function of a module of compiled code: its kept machine code where there is some, else by numba, or as Python
-    while that costs little."""
+    """Function of a module of compiled code.
+
+    A call runs its stored machine code. If there is none, numba compiles the function, or it runs as Python while that
+    costs little.
+    """
 
     def __init__(self, home: Kernels, name: str, kept: str):
         self.home, self.name, self.kept = home, name, kept
         self.words, self.codes, self.as_python = machine.Words(), {}, inf
 
     def expect(self, seconds: float) -> None:
-        """Take note of calls that are to come and what they would take as Python [CPU s], an estimate that is the same
-        in every process: so is what runs as Python."""
+        """Announce calls that would take this time as Python [CPU s].
+
+        The estimate must be the same in every process, so that all of them choose the same form of the function.
+        """
         self.as_python = seconds + (self.as_python if self.as_python < inf else 0.0)
 
     def is_kept(self, *arguments) -> bool:
-        """Return whether machine code is kept for arguments of these types."""
+        """Return whether machine code for arguments of these types is stored."""
         kinds = ",".join(self.words.of(argument)[0] for argument in arguments)
         return any(
             (folder / "code" / f"{self.kept}{digest(kinds)}.code").is_file() for folder in _kept()
@@ -292,7 +296,7 @@ class Entry:
         return code(b"".join(words)) if code else self.function()(*arguments)
 
     def _first(self, kinds: tuple, words: tuple, arguments: tuple):
-        """What the function returns at its first call with arguments of these kinds, for which its code is brought."""
+        """Return the result of the first call with arguments of these types, for which code is loaded or made."""
         path = _prepared() / "code" / f"{self.kept}{digest(','.join(kinds))}.code"
         code = machine.found(path) or _generic(path)
         if code is None and self.as_python <= PATIENCE:
@@ -312,7 +316,7 @@ class Entry:
         return code(b"".join(words))
 
     def _made(self, path: Path, arguments: tuple):
-        """Machine code made for arguments of these types, or by another process meanwhile; None where there is none."""
+        """Return code compiled for arguments of these types, here or by another process in the meantime; None on failure."""
         with alone(path.with_suffix(".lock")):
             code = machine.found(path)
             if code is None:
@@ -323,7 +327,7 @@ class Entry:
         return code
 
     def function(self):
-        """The function of the module, which numba compiles or finds in its cache."""
+        """Return the function of the module, which numba compiles or finds in its cache."""
         function = getattr(self.home.module(), self.name)
         return function.alone() if hasattr(function, "alone") else function
 
@@ -335,8 +339,7 @@ class Entry:
 
 @cache
 def _names(text: Path | str) -> tuple:
-    """What a module names, read from its text or its file: its constants, numbers and texts, and its compiled
-    functions."""
+    """Read the constants and the names of the compiled functions of a module from its text or its file."""
     out, functions = {}, set()
     for line in ast.parse(text.read_text("utf-8") if isinstance(text, Path) else text).body:
         if isinstance(line, ast.FunctionDef) and any(
@@ -355,8 +358,7 @@ def _names(text: Path | str) -> tuple:
 
 
 def _value(node: ast.expr, names: dict):
-    """What an expression stands for: constants and these names with arithmetic between them, ranges of them; KeyError
-    for others."""
+    """Evaluate an expression of constants, known names, arithmetic and ranges; raise KeyError for any other."""
     match node:
         case ast.Constant():
             return node.value
@@ -374,15 +376,18 @@ def _value(node: ast.expr, names: dict):
 
 
 def load(module: str, say=None):
-    """A module of the package, such as "dynamics.modal_kernels", its compiled code cached on disk; `say` is told when
-    nothing is there yet and it has to compile first. Modules named *kernels come as `Kernels`."""
+    """Load a module of the package, such as "dynamics.modal_kernels", with its compiled code cached on disk.
+
+    A module named *kernels is returned as `Kernels`. The callback `say` receives a message if nothing is stored yet, so
+    that the code has to be compiled first.
+    """
     _prepared(say)
     return kernels(module) if module.endswith("kernels") else import_module(f"patchfem.{module}")
 
 
 @cache
 def kernels(module: str) -> Kernels:
-    """The module of compiled code of this name, nothing of it loaded."""
+    """Return the module of compiled code of this name without importing it."""
     name = f"patchfem.{module}"
     return Kernels(
         name, HERE.joinpath(*module.split(".")).with_suffix(".py"), lambda: import_module(name)
@@ -390,13 +395,30 @@ def kernels(module: str) -> Kernels:
 
 
 def instance(module: str, parts: dict, say=None):
-    """A module of compiled code with others in place of modules that it imports, as `Kernels`.
+    """Write out a module of compiled code with other modules in place of some of its imports.
 
-    module: as of `load`; parts: name under which the module imports another (`from . import other as name`) -> the
-    module, or its name as of `load`, that takes its place and must offer the same functions. The text differs from the
-    file in these lines alone, so its lines have the numbers of the file in every traceback. It is kept in the folder of
-    the compiled code, under a name with the hash of its content, and written in one move: processes may ask for it at
-    once, and the package may be read-only. ValueError where the module has no such part.
+    The text differs from the file in these imports only, so the line numbers of tracebacks are those of the file. It is
+    written atomically into the folder of the compiled code, under a name with the hash of its content, because several
+    processes may need it at the same time and the package may be read-only.
+
+    Parameters
+    ----------
+    module : str
+        Name as in `load`.
+    parts : dict
+        Name under which the module imports another one (`from . import other as name`) -> the module that takes its
+        place, or its name as in `load`. It must have the same functions.
+    say : callable or None
+        Callback as in `load`.
+
+    Returns
+    -------
+    Kernels
+
+    Raises
+    ------
+    ValueError
+        If the module does not import a part exactly once under this name.
     """
     text = HERE.joinpath(*module.split(".")).with_suffix(".py").read_text("utf-8")
     for part, other in parts.items():
@@ -415,14 +437,26 @@ def instance(module: str, parts: dict, say=None):
 
 
 def digest(text: str) -> str:
-    """Short hash of a text."""
+    """Return a short hash of a text."""
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def written(module: str, text: str, say=None, parts=()):
-    """The module of compiled code, named as of `load`, whose text is kept in the folder of the compiled code.
+    """Write the text of a module into the folder of the compiled code, and return the module as `Kernels`.
 
-    parts: Kernels that the text imports, brought before it.
+    Parameters
+    ----------
+    module : str
+        Name as in `load`.
+    text : str
+    say : callable or None
+        Callback as in `load`.
+    parts : sequence of Kernels
+        Modules that the text imports; they are imported before it.
+
+    Returns
+    -------
+    Kernels
     """
     name = f"patchfem.{module}"
     path, data = _prepared(say) / "instances" / f"{module}.py", text.encode()
@@ -444,23 +478,23 @@ def written(module: str, text: str, say=None, parts=()):
 
 
 def ran(kind: str) -> None:
-    """Note that a run of this kind came to its end: its compiled code is kept."""
+    """Record that a run of this kind was completed, so that its compiled code is stored."""
     if not PLAIN:
         user_cache.write_file(_folder() / "kinds" / digest(kind), kind.encode())
 
 
 def has_run(kind: str) -> bool:
-    """Whether a run of this kind has come to its end with the kernels as they are, so that nothing of it compiles."""
+    """Return whether a run of this kind was completed with the present kernels, so that nothing has to be compiled."""
     return PLAIN or any((one / "kinds" / digest(kind)).is_file() for one in _kept())
 
 
 def _kept(own_code: Path | None = None) -> list:
-    """Folders in which compiled code may be: that of this machine, and what came with the package."""
+    """List the folders that may have compiled code: the one of this machine, and the one of the wheel."""
     return [own_code or _placed()[0], *filter(None, [prebuilt.folder(sources)])]
 
 
 def _generic(path: Path) -> machine.Code | None:
-    """The code that came with the package for a file of this name."""
+    """Load the code of the wheel for a file of this name; None if there is none."""
     found = prebuilt.folder(sources)
     return found and machine.found(found / "code" / path.name)
 
@@ -473,7 +507,7 @@ def _bytes_of(path: Path) -> bytes | None:
 
 
 def _prepared(say=None) -> Path:
-    """The folder of the compiled code, made known to numba; `say` is told, once, where nothing is in it."""
+    """Return the folder of the compiled code, also for numba; `say` receives a message, once, if it is empty."""
     folder = _folder()
     if say is not None:
         _told(say)
@@ -494,7 +528,7 @@ def _folder() -> Path:
 
 
 def when_compiling(say) -> None:
-    """Tell `say` what `load` tells it, but where something is compiled and not before."""
+    """Give `say` the message of `load`, but only when something is compiled."""
     if say is not None:
         _LISTENERS[:] = [say]
 
