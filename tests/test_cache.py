@@ -226,7 +226,7 @@ def test_exact_code_that_came_with_the_package_is_of_this_machine(tmp_path, monk
             (tmp_path / "generic" / prebuilt.key(compiled.sources)).mkdir(exist_ok=True)
             assert found() is None
     with monkeypatch.context() as more:
-        more.setattr(prebuilt, "version", lambda name: "0.0")
+        more.setattr(prebuilt, "package_version", lambda name: "0.0")
         assert found() is None
     (tmp_path / "machine.py").write_text("# edited")
     assert found() is None
@@ -409,7 +409,7 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
         else:
             monkeypatch.setattr(
                 user_cache,
-                "_of_others",
+                "_reason_for_distrust",
                 lambda folder: (
                     "" if not folder.is_relative_to(base) else f"{folder} belongs to another user"
                 ),

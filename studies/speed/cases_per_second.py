@@ -145,7 +145,7 @@ def by_loop(cases: np.ndarray, steps: int) -> np.ndarray:
 def by_patchfem(cases: np.ndarray):
     """Answers of the cases from the values of their keys on, by this process: by lanes where they are many."""
     axes = [
-        make_axis(key, map(repr, column), False)
+        make_axis(key, map(repr, column), distinct=False)
         for key, column in zip(
             ("friction.static", "structure.mode.block.damping"), cases.T.tolist()
         )
@@ -301,7 +301,9 @@ def of_family(name: str, count: int, seed: int):
     r = np.random.default_rng(seed)
     axes = [
         make_axis(
-            key, [f"{one!r} {UNITS.get(key, '')}".strip() for one in draw(r, count).tolist()], False
+            key,
+            [f"{one!r} {UNITS.get(key, '')}".strip() for one in draw(r, count).tolist()],
+            distinct=False,
         )
         for key, draw in keys.items()
     ]

@@ -64,7 +64,7 @@ class DerivedAsked(Asked):
         ]
 
     def model(self, values):
-        return build(self.base.changed(self.strings(values)))
+        return build(self.base.override(self.strings(values)))
 
 
 def rods(share: float, mass: float) -> list:

@@ -28,7 +28,7 @@ def turning(angle):
 @pytest.mark.parametrize("energy", [False, True])
 def test_always_the_error_of_a_path_holds_what_its_frames_hide(slip, path, energy):
     """At every phase of the frames; where every second frame alone was asked, a turn half way between hid itself."""
-    model = SimpleNamespace(wear=SimpleNamespace(energy=energy), grooves=None)
+    model = SimpleNamespace(wear=SimpleNamespace(uses_friction_work=energy), grooves=None)
     interface = SimpleNamespace(weight=np.array([1.0, 3.0]))
     patch = SimpleNamespace(
         pressure=SimpleNamespace(sigma_n=np.array([2.0, 1.0])),

@@ -134,7 +134,7 @@ def marched(s: dict, time, slide) -> float:
         interfaces=faces @ shapes,
         mass=1.0,
         omega=np.sqrt(square),
-        dampers=shapes.T @ damp @ shapes,
+        damping_matrix=shapes.T @ damp @ shapes,
         base=shapes.T @ mass @ np.ones(len(mass)),
     )
     size, omega = s["size"] if s["kind"] != "release" else 0.0, 2 * np.pi * s["frequency"]
@@ -173,7 +173,7 @@ def truth(s: dict, end: float, order: str) -> tuple:
         interfaces=(faces @ shapes)[np.unique(same)],
         mass=1.0,
         omega=np.sqrt(square),
-        dampers=shapes.T @ damp @ shapes,
+        damping_matrix=shapes.T @ damp @ shapes,
         base=shapes.T @ mass @ np.ones(n),
     )
     size, omega = s["size"] if s["kind"] != "release" else 0.0, 2 * np.pi * s["frequency"]

@@ -143,7 +143,7 @@ def test_exact_lanes_answer_stuck_cases(law):
     """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""
     base = base_of(load(SCENE.format(law=LAWS[law])))
     cases = [
-        build(base.changed([f"normal.load={load} N", f"structure.mode.axial.damping={damping}"]))
+        build(base.override([f"normal.load={load} N", f"structure.mode.axial.damping={damping}"]))
         for load in (300, 1000, 3000)
         for damping in (0.003, 0.03)
     ]
@@ -171,7 +171,7 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
     found = run_many(
         [
             build(
-                base.changed(
+                base.override(
                     format_assignments(sets | {"drive.cycles": 30, "drive.acceleration": level})
                 )
             )
@@ -179,7 +179,7 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
         ]
     )
     far = build(
-        base.changed(
+        base.override(
             format_assignments(
                 sets | {"drive.cycles": 6000, "drive.acceleration": 2.090740650793879}
             )

@@ -47,7 +47,7 @@ def models(law: str, seed: int, count: int) -> list:
         if law == "elastic-plastic":
             sets["friction.bond_length"] = 10 ** r.uniform(-7, -4)
         scene = load(SCENE.format(law=LAWS[law], kind=kind, kind_size=SIZES[kind]))
-        out.append(build(base_of(scene).changed(format_assignments(sets))))
+        out.append(build(base_of(scene).override(format_assignments(sets))))
     return out
 
 
@@ -76,7 +76,7 @@ def test_always_errors_of_few_cells_hold_the_result_of_many():
     base = base_of(load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"])))
     for push in ("20 m/s^2", "2 m/s^2", "0.3 m/s^2"):
         few, many = (
-            build(base.changed([f"drive.acceleration={push}", f"accuracy.tolerance={tolerance}"]))
+            build(base.override([f"drive.acceleration={push}", f"accuracy.tolerance={tolerance}"]))
             for tolerance in (1e-3, 1e-6)
         )
         found, best = lumped.solve([few]), lumped.solve([many])

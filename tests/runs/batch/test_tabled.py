@@ -53,7 +53,7 @@ def test_always_a_patch_that_sticks_is_answered_in_lanes():
         }
         for static, tilt in ((0.57, 3.7e-6), (0.54, 1.2e-6), (0.59, 4e-6))
     ]
-    models = meshes.meshed([pf.build(base.changed(format_assignments(one))) for one in sets])
+    models = meshes.meshed([pf.build(base.override(format_assignments(one))) for one in sets])
     found, ones = tabled.solve(models), sheared.solve(models)
     assert all(one["engine"] == "lanes" for one in found.numerics.values())
     assert list(found.outcome) == list(ones.outcome) == 3 * ["stuck"]

@@ -30,7 +30,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "inputs.records.MAX_BYTES": "bytes of a laboratory file",
     "inputs.matlab.MAX_BYTES": "bytes of a .mat file",
     "inputs.matlab5.MAX_NUMBERS": "number of elements of one variable in a .mat file",
-    "mesh.files.LARGEST": "bytes of a mesh file",
+    "mesh.files.MAX_FILE_BYTES": "bytes of a mesh file",
     "surface.files.raw.MAX_BYTES": "bytes of the file of a scan, also after decompression",
     "surface.samples.MAX_LENGTH": "length of a trace [m]",
     "model.slide.MAX_STEPS": "steps per cycle of a prescribed slide",
