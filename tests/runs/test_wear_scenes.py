@@ -24,8 +24,7 @@ from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve
 from patchfem.scene.scene import loads
 from patchfem.slip.shear_modes import jenkins_set
-from patchfem.wear.jumps import WearProblem, take_jump
-from patchfem.wear.jumps import start as unworn
+from patchfem.wear.jumps import WearProblem, start_wear, take_jump
 
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
@@ -223,7 +222,7 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
         return np.where(slips, 4 * np.abs(slide - pair.tangential @ shear), 0.0)
 
     asked = WearProblem(press, path, area, 1e-13, 1e9)
-    state, count = unworn(asked), 0
+    state, count = start_wear(asked), 0
     at_first = state.path @ state.force
     while state.cycle < asked.cycles:
         state, count = take_jump(asked, state, 1e-2), count + 1
