@@ -9,11 +9,11 @@ from ..structure import drives
 from ..structure.drive_sizes import DriveKeys, cycles_per_level, first_period
 from .file_cache import cache_by_file
 
-MIN_CYCLES = 0.25  # drive cycles; a run whose length is given as a duration is at least so long
+MIN_CYCLES = 0.25  # drive cycles; minimum length of a run whose length is given as a duration
 
 
 def build_signal(scene, modes: ModalBasis):
-    """Build the drive signal of a scene as the engines take it.
+    """Build the drive signal of a scene in the form that the engines use.
 
     A displacement amplitude X of the base becomes the acceleration amplitude X omega^2, and a force F
     becomes F over the modal mass. A drive without a frequency of its own gets its cycle from the

@@ -23,13 +23,13 @@ LOADING_KEYS = (
     "load_line",
     "plane",
 )
-# keys of [contact] that may be written in another way; the gap shows whether the surfaces are the same
+# keys of [contact] that may be written differently; the gap shows whether the surfaces are the same
 SURFACE_KEYS = (
     "tilt",
     "profile",
     "mesh",
 )
-# part of the range of the gap; the gaps of one patch on two meshes differ by less
+# fraction of the range of the gap; the gaps of one patch on two meshes differ by less
 MAX_GAP_CHANGE = 1e-2
 MIN_GAP_CHANGE = 1e-12  # m; a smaller difference between gaps is round-off
 MAX_LENGTH_CHANGE = 1e-6  # relative; the lengths of one interface on two meshes differ by less
@@ -72,7 +72,7 @@ class EarlierWear:
         )
 
     def depth_at(self, x) -> np.ndarray:
-        """Interpolate the worn depth (m,) [m] at positions x (m,) [m] of an interface of the same length."""
+        """Interpolate the worn depth (m,) [m] at x (m,) [m] on an interface of the same length."""
         self._require_same_length(x)
         return np.interp(x, self.x, self.depth)
 
@@ -172,7 +172,7 @@ def _has_depth_along_patch(earlier: EarlierWear) -> bool:
 
 
 def read_for_scene(path: Path, tables: Tables) -> EarlierWear:
-    """Read the end of an earlier run; raise PatchfemError unless it wore the pieces of a scene."""
+    """Read the end of an earlier run; raise PatchfemError unless a scene has the same pieces."""
     earlier = read(path)
     pieces_before = _describe_pieces(earlier.scene)
     pieces_now = _describe_pieces(tomllib.loads(format_toml(tables)))
@@ -191,7 +191,7 @@ def read_for_scene(path: Path, tables: Tables) -> EarlierWear:
 
 
 def _describe_pieces(scene: dict) -> dict:
-    """Return the values of a scene that say which pieces wear, by key."""
+    """Return key -> value of the keys of a scene that determine which pieces wear."""
     pieces = {
         f"contact.{key}": value
         for key, value in scene["contact"].items()

@@ -75,7 +75,7 @@ def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) 
 
 
 def _select_interface(key: str, tables) -> tuple:
-    """Return what a reader needs for the file of a key.
+    """Return the arguments with which a reader checks the file of a key.
 
     For the patch of an interface: the prefix of its keys, its key in [contact], and tables with its
     [contact]. For any other file: "", the key and the tables as they are.
@@ -139,7 +139,7 @@ def _check_profile(path: Path, tables, whole: bool) -> tuple:
 
 
 def _check_slide(path: Path, tables, whole: bool) -> None:
-    """Check that the law and the contact can follow a slide, also sideways."""
+    """Check that the law and the contact can follow a path, including lateral motion."""
     has_lateral = len(slide.read_path_file(path)) == 3
     if whole and has_lateral and (reason := limits.refuse_lateral_slide(tables)):
         raise PatchfemError(reason)
@@ -154,7 +154,7 @@ def _check_drive(path: Path, tables, whole: bool) -> None:
 
 
 def _check_structure(path: Path, tables, whole: bool) -> None:
-    """Build the modes of a file of arrays; the responses of a universal file are not fitted."""
+    """Check structure.file: build the modes of arrays, but do not fit those of responses."""
     if structure_files.is_universal(path) or not whole:
         structure_files.read_content(path)
         return
@@ -163,7 +163,7 @@ def _check_structure(path: Path, tables, whole: bool) -> None:
 
 
 def _matrix_check(key: str):
-    """Return the check of one matrix of [structure.reduced]."""
+    """Return the function that checks the file of one matrix of [structure.reduced]."""
     return lambda path, tables, whole: structure_reduced.check_matrix(path, key)
 
 
@@ -173,13 +173,13 @@ def _check_measured(path: Path, tables, whole: bool) -> None:
 
 
 def _check_wear_start(path: Path, tables, whole: bool) -> tuple:
-    """Check that an earlier run wore the same pieces; return a sentence on it."""
+    """Check that the pieces are those of the earlier run; return a note on the worn depth."""
     start = earlier_wear.read_for_scene(path, tables) if whole else earlier_wear.read(path)
     return (start.sentence,)
 
 
 def _check_asperities(path: Path, tables, whole: bool) -> None:
-    """Check that the peaks of a trace can be those of a surface."""
+    """Check that a rough surface can have the peaks of a trace."""
     cutoff = None
     if whole:
         cutoff = patch.shortest_wave(tables.contact, patch.build_pieces(tables.contact).length)

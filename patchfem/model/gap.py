@@ -26,8 +26,8 @@ class ProfileLengths(NamedTuple):
 
     - average: averaging length [m]; None for the cells of the mesh, down to the spacing of the
       file.
-    - limit: cell length [m] than which a large part of the heights may not be finer: 0 for that of
-      the mesh, None for no limit.
+    - limit: cell length [m]; a large fraction of the heights must not be finer; 0 stands for
+      the cells of the mesh, None for no limit.
     """
 
     average: float | None
@@ -110,7 +110,7 @@ class Gap:
         Returns
         -------
         float or None
-            The longest cell beside a loaded node, but at least `average` or the spacing of the
+            The longest cell next to a loaded node, but at least `average` or the spacing of the
             file; None without a profile.
         """
         if self.profile is None:
@@ -120,7 +120,7 @@ class Gap:
         return float(max(longest, self.average or profiles.sample_spacing(self.profile)))
 
     def half_steps(self, x) -> np.ndarray:
-        """Return half the height [m] of the steps with an edge at a node, (m,), 0 elsewhere."""
+        """Return half the height [m] of the step at a node, (m,); 0 at nodes that are no step edge."""
         heights = np.zeros(x.size)
         for _, (edge, height) in self._values("edge"):
             heights += np.where(x == edge, abs(height) / 2, 0.0)

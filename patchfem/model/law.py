@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # default of the rest speed of bonds (2.10) as a fraction of the peak speed
 REST_SPEED_FRACTION = 1e-3
-LOAD_OF_UNLOADED = 1.0  # N; load for the bond length of a law with a stiffness, if the load is 0
+LOAD_OF_UNLOADED = 1.0  # N; an unloaded law with a stiffness takes its bond length at this load
 
 
 class FrictionLimits(NamedTuple):
@@ -55,7 +55,7 @@ class InterfaceLaw:
 
     @property
     def partial_slip(self) -> str:
-        """Key of the scene that lets the patch slip part by part, "" without partial slip."""
+        """Key of the scene that allows partial slip of the patch, "" without partial slip."""
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     def friction_limits(self, load: float) -> FrictionLimits:
@@ -68,7 +68,7 @@ class InterfaceLaw:
 def effective_law(
     law: Friction, width: float | None, where: Callable, load: float | None = None
 ) -> Friction:
-    """Return the keys of a law after the effects that only change its numbers.
+    """Return the keys of a law changed by the effects that only modify numbers of the law.
 
     `rest_growth` and `slip_growth` are taken at the surface temperature; `static` and `kinetic` are
     multiplied by the factor of the pad; `bond_length` follows from a stiffness.
@@ -79,7 +79,7 @@ def effective_law(
     width : float or None
         Width [m] of the contact across the path.
     where : callable
-        Function of a key that returns its place for a message.
+        Function of a key that returns file and line for a message.
     load : float, optional
         Normal load [N].
 
@@ -122,7 +122,7 @@ def _growth_at_temperature(law: Friction, where: Callable) -> tuple:
 
 
 def complete_bond_length(law: Friction, load) -> Friction:
-    """Return the keys of a law with the bond length [m] that gives its stiffness, if it has one.
+    """Return the keys of a law with the bond length [m] that follows from a given stiffness.
 
     Numbers of the law and the load [N] may be columns.
     """

@@ -11,8 +11,10 @@ from ..friction import grooves
 from .slide import SlidePath
 
 MAX_SAMPLES = 5_000_000  # samples of a slide; more take too much memory
-ROUND_OFF_LOAD = 1e-12  # part of the largest load; less is round-off of a lost contact
-MIN_SPACING = 1e-9  # periods of the load; closer samples are the same instant but for round-off
+# fraction of the largest load; a smaller load is round-off of zero, so the contact is lost
+ROUND_OFF_LOAD = 1e-12
+# periods of the load; samples that are closer differ only by round-off of the same instant
+MIN_SPACING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +85,7 @@ class PointLoad:
         return grid, np.interp(grid, time, rel_disp)
 
     def _times_in_periods(self, time, steps: int) -> np.ndarray:
-        """Times [s] at `steps` phases of each period of the load, and where the contact is lost or made.
+        """Compute times [s] at `steps` phases per load period, and at loss and start of contact.
 
         The periods cover the range of `time`.
         """
@@ -99,7 +101,7 @@ class PointLoad:
 
 
 def build_grooves(scene) -> grooves.Grooves | None:
-    """Build the grooves of [contact] or [normal] that the load climbs, None without them or if flat."""
+    """Build the grooves of [contact] or [normal]; None without grooves or if they are flat."""
     for name in ("contact", "normal"):
         table = getattr(scene, name)
         if table is not None and table.grooves is not None and table.grooves.amplitude:
@@ -111,7 +113,7 @@ def build_grooves(scene) -> grooves.Grooves | None:
 
 
 def build_point_load(scene) -> PointLoad | None:
-    """Build the load of [normal] or of the first [[structure.interface]], None if neither gives one."""
+    """Build the load of [normal] or of the first interface, None if neither gives one."""
     if scene.structure is not None and scene.structure.interface:
         return PointLoad(scene.structure.interface[0].normal_load)
     keys = scene.normal

@@ -1,4 +1,4 @@
-"""The model of a scene: everything that the scene means, built once.
+"""Model of a scene: the complete problem, built once and not solved.
 
 No module after this folder knows a Scene.
 """
@@ -103,12 +103,12 @@ class Model:
 
     @property
     def partial_slip(self) -> str:
-        """Key of the scene that lets the patch slip part by part, "" without partial slip."""
+        """Key of the scene that allows partial slip of the patch, "" without partial slip."""
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     @property
     def has_interface_patches(self) -> bool:
-        """Whether an interface of the rig has a patch of its own."""
+        """Whether at least one interface of the rig has a patch."""
         if self.rig is None:
             return False
         return any(interface.patch is not None for interface in self.rig.friction.interfaces)
@@ -208,7 +208,7 @@ def build(scene: Scene) -> Model:
 
 
 def write_resolved(scene: Scene, model: Model) -> str:
-    """Write the scene as TOML in SI units with all defaults, also those that follow from a model."""
+    """Write the scene as TOML in SI units with all defaults, including those from the model."""
     friction = scene.friction
     if friction is not None and friction.rest_growth is not None and friction.rest_speed is None:
         friction = friction.model_copy(update={"rest_speed": float(model.bonds.rest_speed)})
@@ -233,7 +233,7 @@ def _find_edge_motion(scene: Scene, rig_model: Rig | None) -> str:
 
 
 def _add_slip(model: PatchModel, path: SlidePath, law: Friction | None) -> PatchModel:
-    """Let the mesh of a bench resolve its partial slip, if the patch slips as parallel elements."""
+    """Request a mesh that resolves partial slip under a prescribed slide, except for bond laws."""
     if not model.interface.partial_slip or path.across is not None:
         return model
     if law is None or law_has_trait(law.law, "bonds") or not law.static or law.static <= 0:
@@ -267,5 +267,5 @@ def _build_measured(scene: Scene) -> MeasuredFile | None:
 
 @lru_cache(64)
 def _find_absent(effects: tuple) -> tuple:
-    """Return the effects that a scene with some effects does not name."""
+    """Return the known effects that are not among the given effects of a scene."""
     return tuple(absent_effects(effects))

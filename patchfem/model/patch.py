@@ -87,7 +87,7 @@ class PatchPieces:
 
     @property
     def shear_stiffness(self) -> float:
-        """Shear stiffness [N/m] of the pieces as blocks in series, all pairs together.
+        """Shear stiffness [N/m] of both pieces as blocks in series, for all equal pairs in parallel.
 
         Short blocks that are fixed at both faces are stiffer.
         """
@@ -96,7 +96,7 @@ class PatchPieces:
         )
 
     def series_compliance(self, softness: Callable) -> float:
-        """Compliance [m/N] of the layers of both pieces in series, all pairs together.
+        """Compliance [m/N] of the layers of both pieces in series, for all equal pairs in parallel.
 
         Parameters
         ----------
@@ -154,10 +154,10 @@ class PatchStrips(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PatchInterface:
-    """What lies between the pieces, and what gives way in shear.
+    """Asperity layer between the pieces, strips of the patch, and compliance in shear.
 
     - has_shear: whether the pieces deform in shear.
-    - partial_slip: key of the scene that lets the patch slip part by part, "" without partial slip.
+    - partial_slip: key of the scene that allows partial slip, "" without partial slip.
     """
 
     skin: Asperities | None
@@ -179,7 +179,7 @@ class SharedMeshes(NamedTuple):
 
 
 class PrescribedSlip(NamedTuple):
-    """Prescribed slide of the holders under which a patch slips part by part.
+    """Prescribed slide of the holders that causes partial slip of a patch.
 
     - amplitude: half the range of the slide [m].
     - static: coefficient of friction.
@@ -194,7 +194,7 @@ class PrescribedSlip(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PatchMesh:
-    """Requests on the mesh of a patch.
+    """Settings of the mesh of a patch.
 
     - element_size: size [m] of the elements of an even interface.
     - file: mesh file of the two pieces.
@@ -266,7 +266,7 @@ class PatchModel:
 
     @property
     def nominal_load(self) -> float:
-        """Load [N] of all pairs; an upper estimate if the approach is prescribed.
+        """Total load [N] of all equal pairs; an upper estimate if the approach is prescribed.
 
         The estimate takes the layers as flat bars in series, tilted by the moment of the load.
         """
@@ -289,11 +289,11 @@ class PatchModel:
         return replace(self, mesh=replace(self.mesh, element_size=size), gap=gap)
 
     def with_loading(self, **changes) -> "PatchModel":
-        """Return the patch with other values of its loading."""
+        """Return the patch with changed values of its loading."""
         return replace(self, loading=replace(self.loading, **changes))
 
     def with_mesh(self, **changes) -> "PatchModel":
-        """Return the patch with other requests on its mesh."""
+        """Return the patch with changed settings of its mesh."""
         return replace(self, mesh=replace(self.mesh, **changes))
 
 
@@ -343,7 +343,7 @@ def build_pieces(contact: Contact) -> PatchPieces:
 
 
 def _build_piece(contact: Contact, own) -> PatchPiece:
-    """Build one piece; the keys of its own table come before the common ones."""
+    """Build one piece; keys of the table of this piece take precedence over those of [contact]."""
     if own is None:
         return PatchPiece(
             contact.height, contact.substrate, contact.coating, contact.length, SHARP_END

@@ -1,4 +1,4 @@
-"""Peaks of [contact.asperities] with law = "hertz", from a trace or from its root mean squares."""
+"""Peaks of [contact.asperities] with law 'hertz', from a trace or from root mean squares."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ TABLE = "contact.asperities."  # prefix of the keys in messages
 def complete_skin(
     table: Asperities, resolve_path: Callable, cutoff: float | None = None
 ) -> Asperities:
-    """Add the radius, density and height deviation of the peaks to a table.
+    """Add radius, density and standard deviation of height of the peaks to [contact.asperities].
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def read_moments(path: Path, cutoff: float | None = None) -> TraceMoments:
 
 @cache_by_file
 def _read_moments(path: Path, cutoff: float | None) -> TraceMoments:
-    """Read the spectral moments of a trace that has peaks of a surface."""
+    """Read the spectral moments of a trace; raise PatchfemError if no rough surface has them."""
     moments = trace_moments(read_profile(path), cutoff)
     gaussian_peaks(moments.fine)
     return moments

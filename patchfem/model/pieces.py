@@ -1,4 +1,4 @@
-"""Grids and elastic layers of the two pieces of a patch: generated, or read from a mesh file."""
+"""Grids and elastic layers of the two pieces of a patch, generated or from a mesh file."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,8 @@ from ..mesh import files, shaped
 from ..mesh.tensor import GROWTH, TensorGrid, graded_grid
 from .patch import PatchModel, PatchPiece
 
-MESH_FILE_TOL = 1e-6  # printed digits of a mesh file, as a fraction of the length of the interface
+# fraction of the length of the interface; mesh files contain coordinates of few digits
+MESH_FILE_TOL = 1e-6
 
 
 class RoundedEdges(NamedTuple):

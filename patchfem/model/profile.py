@@ -15,11 +15,11 @@ from ..surface.profile import Profile, clean, level, resample_evenly
 from ..surface.roughness.filter import mean_line
 from .file_cache import cache_by_file
 
-CURVE_POINTS_PER_CELL = 16  # straight parts by which a cell of a smooth profile is drawn
+CURVE_POINTS_PER_CELL = 16  # line segments per cell that represent a smooth profile
 # m; heights with a smaller standard deviation are round-off of a straight line
 MIN_HEIGHT_STD = 1e-10
 STRAIGHT_TOL = 1e-5  # standard deviation over range of heights; a straighter profile is a line
-# rise of a removed slope over range of heights; a note reports a larger one
+# height difference between the ends due to the removed slope over the range of heights; a note reports a larger one
 MAX_SILENT_SLOPE = 1e-2
 SAMPLES_PER_CUTOFF = 16  # minimum number of samples per cut-off on which a trace is filtered
 EVEN_TOL = 1e-9  # spacings that differ by a smaller fraction of the interface are equal

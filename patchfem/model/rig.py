@@ -1,4 +1,4 @@
-"""The rig of a scene: modes, drive, start, interfaces and springs, before anything is solved."""
+"""The unsolved rig of a scene: modes, drive, initial state, interfaces and springs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -25,7 +25,8 @@ from .structure import (
 )
 
 MAX_TRAVEL = 1e3  # m; a motion that grows without bound is not followed beyond this displacement
-ROUND_OFF_SLIDE = 1e-9  # part of the largest slide of a mode; less is round-off
+# fraction of the largest slide per modal coordinate of all modes; less is round-off
+ROUND_OFF_SLIDE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +70,7 @@ class RigFriction:
     - interfaces: friction laws of the interfaces, empty in a linear rig.
     - names: names of the interfaces between masses, empty in other rigs.
     - load_varies: whether the normal load changes with the motion or in time.
-    - strips_slide_apart: whether modes yaw a patch in strips, so that each strip has its own slide.
+    - strips_slide_apart: whether a mode yaws the patch, so the strips have different displacements.
     """
 
     interfaces: tuple
@@ -79,13 +80,13 @@ class RigFriction:
 
     @property
     def has_partial_slip(self) -> bool:
-        """Whether an interface has a patch of its own that slips part by part."""
+        """Whether an interface has a patch that allows partial slip."""
         return any(interface.partial_slip for interface in self.interfaces)
 
 
 @dataclass(frozen=True, slots=True)
 class RigSprings:
-    """Springs beside the contact, and the limit of the motion.
+    """Springs of the rig in addition to the contact, and the limit of the motion.
 
     - bonded: stiffness [N/m] of the bonded spring.
     - interlock: stiffness [N/m] and wavelength [m] of a bonded spring that is not linear.
@@ -101,7 +102,7 @@ class RigSprings:
 
     @property
     def is_nonlinear(self) -> bool:
-        """Whether a spring beside the contact is not linear."""
+        """Whether one of these springs is not linear."""
         return self.cubic is not None or self.interlock is not None
 
 
@@ -124,7 +125,7 @@ class FirstMode:
 
     @property
     def stiffness(self) -> float:
-        """Modal stiffness [N/m] as the contact meets it, 0 if the mode does not move the contact.
+        """Modal stiffness [N/m] referred to the contact, 0 if the mode does not move the contact.
 
         The mode moves the contact by its slide s per unit of its coordinate, so that
         (mass omega^2/2)(A/s)^2 is its energy at a slide of A.
@@ -132,7 +133,7 @@ class FirstMode:
         return self.contact_mass * (2 * np.pi * self.frequency) ** 2
 
     def fraction_of_other_modes(self, modal) -> float:
-        """Range of slide in the largest of the other modes over the range of the whole slide.
+        """Largest range of slide of the other modes as a fraction of that of the whole slide.
 
         Parameters
         ----------
@@ -304,7 +305,7 @@ def _build_first_mode(scene, own: ModalBasis, modes: ModalBasis) -> FirstMode:
     slide = own.interfaces[0] if len(own.interfaces) else own.output
     elastic = np.flatnonzero(own.omega > 0)
     first = int(elastic[0]) if elastic.size else 0
-    # the shapes of both bases say where the same masses are
+    # both bases describe the same masses, so a least-squares fit converts the coordinates
     own_from_modes = np.eye(slide.size)
     if modes is not own and modes.shapes is not None:
         own_from_modes = modes.shapes

@@ -1,4 +1,4 @@
-"""Models that differ from one model in plain numbers only, one by one or as columns of numbers.
+"""Models that differ in plain numbers only, one by one or as columns of numbers.
 
 They are cases of a sweep: rigs under a sine, or patches that are pressed together.
 """
@@ -89,7 +89,7 @@ def collect_columns(models: Sequence[Model], row: Callable[[Model], tuple]) -> n
 def replace_numbers(
     model: Model, plain_numbers: PlainNumbers, values: Sequence, sets: tuple = ()
 ) -> Model:
-    """Return the model of a scene with other plain numbers, equal to `build` of that scene.
+    """Return the model that `build` returns for a scene with other values of the plain keys.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def replace_numbers(
 
 
 def _replace_in_patch(patch: PatchModel, numbers: dict) -> PatchModel:
-    """Return a patch with other numbers of its load and its shapes."""
+    """Return a patch with other values of load and shapes."""
     changes = {}
     for (table, shape, key), value in numbers.items():
         if table == "contact" and shape:
@@ -154,7 +154,7 @@ def _replace_in_patch(patch: PatchModel, numbers: dict) -> PatchModel:
 
 
 def _replace_in_drive(rig: Rig, keys: Drive, numbers: dict) -> Rig:
-    """Return a rig with other numbers of its drive."""
+    """Return a rig with other values of the drive."""
     frequency = numbers.get(("drive", None, "frequency"), keys.frequency)
     omega = 2 * np.pi * frequency
     amplitude = numbers.get(("drive", None, "acceleration"), keys.acceleration)
@@ -165,7 +165,7 @@ def _replace_in_drive(rig: Rig, keys: Drive, numbers: dict) -> Rig:
 
 
 def _replace_in_modes(rig: Rig, structure: Structure, numbers: dict) -> Rig:
-    """Return a rig without a bonded spring with other numbers of its modes."""
+    """Return a rig without a bonded spring with other values of the modes."""
     mass = numbers.get(("structure", None, "moving_mass"), structure.moving_mass)
     columns = [
         numbers.get(("structure", k, name), getattr(mode, name))

@@ -212,7 +212,7 @@ def build_slide(scene) -> SlidePath:
 
 
 def _dwell_corners(keys) -> tuple:
-    """Return time [s] and relative displacement [m] at the corners of a dwell, without empty legs."""
+    """Return time [s] and relative displacement [m] at corners of a dwell, without empty legs."""
     length = np.array([keys.distance, 0.0, keys.distance_after or 0.0])
     duration = np.array([keys.distance / keys.speed, keys.hold, length[2] / keys.speed])
     is_leg = duration > 0

@@ -1,4 +1,4 @@
-"""Origin of a model: path, text and effects of its scene, and the line of a key for messages."""
+"""Origin of a model: path, text and effects of the scene, and line numbers for messages."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -18,7 +18,7 @@ from ..structure import modes as listed_modes
 from . import structure_files, structure_reduced
 from .law import InterfaceLaw, build_interface_laws, load_of_scene
 
-# part of the squared motion of the output; a mode with less does not move it but for round-off
+# fraction of the squared motion of the output; a mode with less moves the output by round-off only
 MIN_MODE_FRACTION = 1e-12
 
 
@@ -47,10 +47,10 @@ def build_modes(scene, own: ModalBasis | None = None) -> ModalBasis:
     """
     modes = _split_into_strips(scene, build_own_modes(scene) if own is None else own)
     if modes.faces is not None and not len(modes.faces):
-        # without an interface the motion of the output stands for the slide, without friction
+        # without an interface there is no friction, and the motion of the output replaces the slide
         modes = replace(modes, faces=None)
     bonded = scene.structure.bonded
-    # interlocking is not linear, so the march applies it
+    # a bonded spring that interlocks is not linear, so the time integration applies it
     if bonded is None or bonded.wavelength is not None:
         return modes
     if len(modes.interfaces) != 1 and not scene.structure.mode:
@@ -63,7 +63,7 @@ def build_modes(scene, own: ModalBasis | None = None) -> ModalBasis:
 
 
 def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
-    """Build the modes of a rig without its bonded spring.
+    """Build the modes of a rig without the bonded spring.
 
     The joint is subtracted from modes that were measured while it stuck.
 
@@ -94,7 +94,7 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
 
 
 def has_patch_joint(scene) -> bool:
-    """Return whether the stiffness of the joint depends on a pressed patch and not on its law alone."""
+    """Return whether the joint stiffness depends on a pressed patch and not on the law alone."""
     contact = scene.contact
     if scene.friction is None or contact is None:
         return False
@@ -176,7 +176,7 @@ def _build_listed_modes(structure, is_forced: bool) -> ModalBasis:
 
 
 def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
-    """Give each strip its own slide if the modes yaw a patch in strips."""
+    """Add a relative displacement for each strip if a mode yaws the patch."""
     if not has_yawing_strips(scene):
         return modes
     n_strips = scene.contact.strips.count
@@ -264,9 +264,9 @@ def named_motions(modes: ModalBasis, modal) -> np.ndarray:
 
 
 def natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
-    """Return the natural frequencies (n,) [Hz] with the bonded spring; those of rigid modes are 0."""
+    """Return the natural frequencies (n,) [Hz] with the bonded spring, 0 for rigid modes."""
     if structure.mode and structure.bonded is None and structure.measured == "free":
-        # the numbers of the scene have no round-off
+        # frequencies that the scene states are returned without round-off of the modes
         return np.array([mode.frequency for mode in structure.mode])
     return modes.omega / (2 * pi)
 
@@ -300,14 +300,14 @@ def first_elastic_mode(scene, own: ModalBasis) -> tuple:
 
 
 def has_yawing_strips(scene) -> bool:
-    """Return whether modes yaw a patch in strips, so that each strip has its own slide."""
+    """Return whether a mode yaws the patch, which gives each of its strips another displacement."""
     if scene.contact is None or scene.contact.strips is None or scene.friction is None:
         return False
     return any(mode.yaw for mode in scene.structure.mode)
 
 
 def strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
-    """Compute the slide of strips per coordinate: slide - y yaw.
+    """Compute the relative displacement of strips per modal coordinate: slide - y yaw.
 
     A positive yaw turns +x towards +y, so that a piece at +y moves backwards. The friction forces f of
     the strips, which resist, exert the moment sum y f about +z on the upper piece.

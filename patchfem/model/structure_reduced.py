@@ -1,4 +1,4 @@
-"""Modes of [structure.reduced]: those that the scene keeps, and more of them for the error estimate."""
+"""Modes of [structure.reduced]: those that the scene keeps, and more for the error estimate."""
 
 import re
 from functools import lru_cache
@@ -36,7 +36,7 @@ class ReducedModes(NamedTuple):
 
 
 class _MatrixFile(NamedTuple):
-    """Matrix file of a scene: its key, its path, and the version by which a changed file is noticed."""
+    """Matrix file of a scene: key, path, and the version by which a change is noticed."""
 
     key: str
     path: Path
@@ -94,7 +94,7 @@ def build_reduced_modes(scene) -> ReducedModes:
 
 
 def slide_pairs(structure) -> tuple:
-    """List the pairs of coordinates that slide on each other.
+    """List the pairs of coordinates between which the interfaces slide.
 
     Returns
     -------
@@ -261,7 +261,7 @@ def _locate_coordinates(
 
 
 def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
-    """Find the rows, from 0, of coordinates that are named in a scene.
+    """Find the row indices, counted from 0, of coordinates that are named in a scene.
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
 
 
 def _rows_in_range(row_range: re.Match, n: int, where: str) -> np.ndarray:
-    """Return the rows, from 0, of a text "a..b" or "a..b:n"; `where` is the key for messages."""
+    """Return the row indices, counted from 0, of a range "a..b" or "a..b:n" of row numbers."""
     first = int(row_range[1])
     last = int(row_range[2])
     count = int(row_range[3] or 0) or last - first + 1

@@ -1,6 +1,6 @@
-"""A TOML file becomes a `Scene` in SI units, every mistake named at once with its line.
+"""Reading of scenes: a TOML file becomes a `Scene` in SI units; all mistakes are listed.
 
 In: text of a scene and --set words. Out: `Scene`, frozen tables of SI values with the line of every key.
 `keys/` holds the keys and their kinds, `rules/` what excludes or needs what, `text` the resolved scene.
-Read `scene` first, then `keys/tables`. What every key means stands in README.md beside them.
+Read `scene` first, then `keys/tables`. README.md in this folder explains every key.
 """

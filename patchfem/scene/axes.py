@@ -1,4 +1,4 @@
-"""Values of a key from case to case: lists and ranges, as --over and the table [sweep] write them.
+"""Values of a key for the cases of a sweep: lists and ranges, as in --over and in [sweep].
 
 A text such as ``1 mm..9 mm:5, 12 mm`` becomes an `Axis`. If values are drawn at random, ``1 mm..9 mm`` and
 ``5 mm +- 4 mm`` become a `Span`.
@@ -21,11 +21,13 @@ from .keys.types import inner_table, is_array, key_types, keys, quantity_kind, r
 from .reader import read_set_value
 
 LENGTH_KEY = "drive.displacement"  # a key that holds a length, for `read_lengths`
-MAX_VALUES = 10_000_000  # values of one range; the cases of a sweep would fill the memory
-LOG_RATIO = 10  # ratio of the ends from which a range of positive numbers is logarithmic by default
+MAX_VALUES = 10_000_000  # values of one range; more would fill the memory with the cases of a sweep
+# ratio of the ends; a range of positive numbers with at least this ratio is logarithmic by default
+LOG_RATIO = 10
 N_SUGGESTED = 4  # keys of a table that a message suggests in place of the table
-DIGITS = 15  # significant digits of a value, so that a tenth of a range is 0.1 and not 0.1000000000000001
-MAX_WHOLE = 1e15  # magnitude up to which a whole number without a unit is written without a point
+DIGITS = 15  # significant digits of a value; a tenth of a range is 0.1 and not 0.1000000000000001
+# magnitude up to which a whole number without a unit is written without a decimal point
+MAX_WHOLE = 1e15
 _NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 _RANGE = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
 _QUANTITY = re.compile(rf"{_NUMBER}\s*(.*)")
@@ -37,7 +39,7 @@ _OPENING = {"]": "[", "}": "{"}
 
 
 class FormattedNumbers(Sequence):
-    """Numbers as a scene writes them; each text is made when it is read, because millions would fill the memory.
+    """Numbers formatted on access as in a scene; millions of texts would fill the memory.
 
     Parameters
     ----------
@@ -79,7 +81,7 @@ class Axis:
 
     @property
     def name(self) -> str:
-        """The key as a name of a variable, with underscores in place of dots."""
+        """Key as the name of a variable, with underscores in place of dots."""
         return re.sub(r"\W", "_", self.key)
 
 
@@ -100,7 +102,7 @@ class Span:
     log: bool
 
     def axis(self, fractions: Iterable[float]) -> Axis:
-        """Return the values at these fractions of the range, each in [0, 1]."""
+        """Return the axis of the values at these fractions of the range, each in [0, 1]."""
         ends = _Ends(self.low, self.high, self.unit)
         numbers = (_interpolate(ends, fraction, self.log) for fraction in fractions)
         texts = FormattedNumbers(array("d", numbers), self.unit)
@@ -174,7 +176,7 @@ def read_lengths(text: str, name: str) -> list[float]:
 
 
 def read_table(table: Any) -> tuple[list[Axis | Span], list[tuple[str, str]]]:
-    """Return the axes of a table [sweep] as TOML gives it, and (key, sentence) of its mistakes."""
+    """Return the axes of a plain table [sweep], and (key, sentence) for each of its mistakes."""
     if not isinstance(table, dict) or not table:
         example = '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"'
         return [], [("sweep", f"keys with their values are needed, such as {example}")]
@@ -199,7 +201,7 @@ def describe_ranges(texts: Iterable[str]) -> list[str]:
         key, _, values = (part.strip() for part in text.partition("="))
         try:
             ends = _range_about(values)
-        except ValueError:  # `read_axes` reports it
+        except ValueError:  # `read_axes` reports this mistake
             continue
         if ends:
             sentences.append(f"{key}: {values} is drawn evenly from {ends}")
@@ -245,7 +247,7 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
 
 
 def _read_into(axes: list, mistakes: list, key: str, values: str, *, sampled: bool = False) -> None:
-    """Append the axis of a key to `axes`, or its mistakes to `mistakes`."""
+    """Read the axis of a key and append it to `axes`, or append its mistakes to `mistakes`."""
     try:
         axes.append(_read_axis(key, values, sampled=sampled))
     except ValueError as error:
@@ -253,7 +255,7 @@ def _read_into(axes: list, mistakes: list, key: str, values: str, *, sampled: bo
 
 
 def _read_axis(key: str, text: str, *, sampled: bool = False) -> Axis | Span:
-    """Return the values of a text; ValueError with one line for each mistake."""
+    """Return the axis of the values in a text; ValueError with one line for each mistake."""
     require_key(key)
     pieces = _split(text)
     can_be_span = sampled and len(pieces) == 1
@@ -276,7 +278,7 @@ def _read_axis(key: str, text: str, *, sampled: bool = False) -> Axis | Span:
 
 
 def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | None:
-    """Return the range that a value stands for; None for a single value."""
+    """Return the range that a text such as ``1..9 mm:5`` stands for; None for a single value."""
     if not piece:
         raise ValueError("there is no value between two commas")
     if not _is_number(key):
@@ -290,7 +292,7 @@ def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | No
     match = _RANGE.fullmatch(piece) if ".." in piece else None
     if match is None:
         return None
-    # A bare number before the dots has the unit of the number behind them, as in 1..9 mm.
+    # A bare number before the dots has the unit of the number after them, as in 1..9 mm.
     written = _WrittenRange(*match.groups())
     low = _QUANTITY.fullmatch(written.low)
     high = _QUANTITY.fullmatch(written.high)
@@ -300,7 +302,7 @@ def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | No
 
 
 def _range_about(text: str) -> str:
-    """Return the range of a value with its width: ``4.0 mm..6.0 mm`` for ``5 mm +- 1 mm``; "" for another text.
+    """Return ``4.0 mm..6.0 mm`` for ``5 mm +- 1 mm``; "" for a text without a width.
 
     ValueError if the width has another unit than the value.
     """
@@ -311,7 +313,7 @@ def _range_about(text: str) -> str:
     try:
         middle = Fraction(number)
         half = Fraction(width)
-    except ValueError:  # as in 1.2.3
+    except ValueError:  # the text is not a number, such as 1.2.3
         return ""
     if width_unit not in ("%", "", unit):
         unit_of_value = f" ({unit})" if unit else ""
@@ -362,7 +364,7 @@ def _is_number(key: str) -> bool:
 
 
 def _split(text: str) -> list[str]:
-    """Return the pieces between the commas of a text, but for commas inside brackets and quotes.
+    """Split a text at its commas, except those inside brackets and quotes.
 
     A quote opens at the start of a value or inside brackets; anywhere else it is a character like others.
     """
@@ -388,7 +390,7 @@ def _split(text: str) -> list[str]:
 
 
 def _value_reader(key: str) -> Callable[[str], float | str]:
-    """Return the function that reads a text of a key: its SI value, or the text if it is no number.
+    """Return the function that converts a text of a key to SI; it keeps a text without number.
 
     The function raises ValueError if the key does not accept the text.
     """
@@ -401,7 +403,8 @@ def _value_reader(key: str) -> Callable[[str], float | str]:
 
     def read_value(text: str) -> float | str:
         if is_number and takes_float and _PLAIN_NUMBER.fullmatch(text):
-            return float(text)  # the short way for thousands of drawn values
+            # most drawn values are plain numbers; `read_set_value` is slow for thousands of them
+            return float(text)
         value = read_set_value(key, text)
         if isinstance(value, dict) and inner_table(*place) is not None:
             return text
@@ -438,7 +441,7 @@ def _require_range(ends: _Ends, written: _WrittenRange) -> None:
 
 
 def _is_log(ends: _Ends, spacing: str | None) -> bool:
-    """Return whether a range is logarithmic: as it says, or by the ratio of its ends."""
+    """Return whether a range is logarithmic: by its suffix, or by the ratio of its ends."""
     is_positive = ends.low > 0 and ends.high > 0
     if spacing is None and is_positive:
         return max(ends.low / ends.high, ends.high / ends.low) >= LOG_RATIO
@@ -481,7 +484,7 @@ def _make_span(key: str, written: _WrittenRange) -> Span:
 
 
 def _interpolate(ends: _Ends, fraction: Fraction | float, is_log: bool) -> float:
-    """Return the value at a fraction of a range; exact fractions keep an even range exact until it is rounded."""
+    """Return the value at a fraction of a range; exact fractions are rounded only once."""
     if not is_log:
         return float(ends.low + (ends.high - ends.low) * fraction)
     if fraction in (0, 1):

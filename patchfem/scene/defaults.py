@@ -23,7 +23,7 @@ SLIDE_DEFAULTS = {  # slide.kind -> defaults of the keys that this kind uses
 
 
 def complete(scene: tables.Tables, kind: str) -> tables.Tables:
-    """Return the tables of a valid scene with every default filled in, and unused keys at their defaults."""
+    """Return the tables of a valid scene with defaults filled in and unused keys reset to them."""
     unused = list(unused_settings(scene, kind))
     if scene.accuracy.method in unused_methods(kind):
         unused.append("method")

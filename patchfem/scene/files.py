@@ -26,7 +26,7 @@ def named_files(tables: Any) -> list[tuple[str, str]]:
         ("slide.file", scene["slide"].file),
         ("drive.file", scene["drive"].file),
         ("structure.file", structure.file),
-        # a damping ratio is no file
+        # damping may also be a ratio, which names no file
         *(
             (f"structure.reduced.{key}", structure.reduced[key])
             for key in _MATRICES
@@ -82,7 +82,7 @@ def require_files(scene: Any) -> Any:
 
 
 def relative_files(scene: Any, folder: Path) -> list[str]:
-    """Return a ``table.key=value`` for every file of a scene, named from another folder."""
+    """Return ``table.key=value`` for each file of a scene, with paths from another folder."""
     return [
         f"{key}={Path(os.path.relpath(scene.beside(file), folder)).as_posix()}"
         for key, file in named_files(scene)

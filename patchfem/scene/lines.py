@@ -1,4 +1,4 @@
-"""Lines of the keys of a TOML text, so that every mistake can name its line; and keys as people write them."""
+"""Line numbers of the keys of a TOML text, for messages, and parsing of dotted keys."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
-# Parts of a dotted key. No key of a scene has more than five, and many parts take the square of their number in time.
+# Parts of a dotted key. No key of a scene has more than five, and the run time is quadratic in the number of parts.
 MAX_PARTS = 50
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _ITEM = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
@@ -25,7 +25,7 @@ _STRINGS = (
 
 
 def split_key(key: str) -> list[str]:
-    """Return the parts of a dotted key; the item ``mode[1]``, counted from 1, becomes ``mode`` and ``0``."""
+    """Return the parts of a dotted key; an item ``mode[1]`` becomes ``mode`` and ``0``."""
     parts = []
     for piece in key.split("."):
         item = _ITEM.fullmatch(piece.strip())
@@ -34,9 +34,10 @@ def split_key(key: str) -> list[str]:
 
 
 def count_from_one(text: str) -> str:
-    """Return a message with the items of arrays counted from 1: ``structure.mode.0`` as ``structure.mode[1]``."""
+    """Return a message in which ``structure.mode.0`` is written as ``structure.mode[1]``."""
     changed = _ITEM_IN_MESSAGE.sub(lambda item: f"{item[1]}[{int(item[2]) + 1}]", text)
-    return changed if changed == text else count_from_one(changed)  # for an item inside an item
+    # an item inside another item needs a second pass
+    return changed if changed == text else count_from_one(changed)
 
 
 def locate_key(path: str | Path, text: str, key: str) -> str:
@@ -77,11 +78,11 @@ def key_lines(text: str) -> dict[str, int]:
 
 
 class _SyntaxError(Exception):
-    """The text is not TOML at the cursor."""
+    """Error for a text that is not TOML at the cursor."""
 
 
 class TooManyParts(ValueError):
-    """A key of more than MAX_PARTS parts stands in this `line`, counted from 1."""
+    """Error for a key of more than MAX_PARTS parts in this `line`, counted from 1."""
 
     def __init__(self, line: int) -> None:
         super().__init__(f"a key has more than {MAX_PARTS} parts; write table.key")
@@ -96,7 +97,7 @@ class _Scanner:
         self.at = 0
         self.lines: dict[str, int] = {}
         self._line = 1
-        self._counted = 0  # position up to which line ends are counted in _line
+        self._counted = 0  # position up to which `_line` counts the line ends
         self._last_item: dict[str, int] = {}  # array of tables -> index of its last item
 
     def scan_document(self) -> None:
@@ -160,7 +161,7 @@ class _Scanner:
         self.scan_value(path)
 
     def scan_items(self, end: str, scan_one: Callable) -> None:
-        """Read what stands between brackets, separated by commas."""
+        """Read the items between brackets, separated by commas."""
         self.at += 1
         index = 0
         while not (self.peek() and self.take(end)):
@@ -207,20 +208,20 @@ class _Scanner:
         return self.text[self.at : self.at + 1]
 
     def take(self, mark: str) -> bool:
-        """Skip a mark if it stands at the cursor, and return whether it does."""
+        """Skip a token such as "=" if it is at the cursor; return whether it was there."""
         if not self.text.startswith(mark, self.at):
             return False
         self.at += len(mark)
         return True
 
     def expect(self, mark: str) -> None:
-        """Skip blanks and a mark that must follow."""
+        """Skip blanks and the token that must follow them."""
         self.peek()
         if not self.take(mark):
             raise _SyntaxError
 
     def current_line(self) -> int:
-        """Return the line of the cursor."""
+        """Return the number of the line at the cursor, counted from 1."""
         self._line += self.text.count("\n", self._counted, self.at)
         self._counted = self.at
         return self._line

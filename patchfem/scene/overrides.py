@@ -1,4 +1,4 @@
-"""Scenes that differ from one scene in a few keys, made without parsing its text again: for sweeps and fits."""
+"""Scenes that differ from a base scene in a few keys, made without parsing its text again."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from .rules.structure import HEAVY_DAMPING
 from .rules.view import View
 from .scene import Scene, finish_scene
 
-# Tables that a BaseScene keeps, so that the cases of a sweep do not read them again.
+# Tables that a BaseScene keeps, which saves the cases of a sweep from reading them again.
 MAX_TABLES = 4096
-# Keys of a rig under a sine, or of a pressed patch, whose value no rule or remark looks at, as long as it lies between 0
-# and this number (SI).
+# Keys of a rig with sinusoidal base motion, or of a pressed patch. No rule or remark depends on their values as
+# long as they lie between 0 and this number (SI).
 PLAIN_KEYS = {
     "normal.load": inf,
     "contact.load": inf,
@@ -42,7 +42,7 @@ PLAIN_KEYS = {
 
 
 class _ReadTable(NamedTuple):
-    """A table that was read once: its name, its plain values, what was read, and the keys that --set wrote in it."""
+    """Cached table: its name, its plain values, what was read, and the keys set by --set."""
 
     name: str
     raw: Any
@@ -51,7 +51,7 @@ class _ReadTable(NamedTuple):
 
 
 class BaseScene:
-    """A valid scene from which others differ in a few keys; its text is parsed and its tables are read once.
+    """Valid scene from which others differ in a few keys; text and tables are read only once.
 
     The table [sweep] of the scene stands in none of the others.
     """
@@ -65,11 +65,11 @@ class BaseScene:
         for assignment in scene.sets:
             apply_set(self._draft, assignment)
         read_tables(self._draft)
-        # assignments in one table -> that table
+        # assignments to the keys of one table -> that table as it was read
         self._known: dict[tuple[str, ...], _ReadTable] = {}
 
     def override(self, sets: Iterable[str]) -> Scene:
-        """Return the scene with ``table.key=value`` applied in order after its own, as --set applies them.
+        """Return the scene with further ``table.key=value`` applied in order, as by --set.
 
         Tables that no key touches, or that had the same values before, are not read again; all rules are checked.
         SceneError as in `scene.loads`, and if a file that the scene names does not exist.
@@ -85,7 +85,7 @@ class BaseScene:
                 _copy_tables(draft.raw, assignment.partition("=")[0])
                 apply_set(draft, assignment)
         scene = require_files(finish_scene(draft, base.path, base.text, (*base.sets, *sets)))
-        for group in fresh:  # a scene was made, so that these tables have no mistakes
+        for group in fresh:  # no SceneError was raised, so these tables are valid and can be reused
             name = _table_name(group[0])
             read = draft.read_now.get(id(draft.raw.get(name)))
             if read is not None and len(self._known) < MAX_TABLES:
@@ -94,7 +94,7 @@ class BaseScene:
         return scene
 
     def _reuse(self, draft: SceneDraft, group: tuple[str, ...]) -> bool:
-        """Put a table into a draft that was read before with the same assignments; return whether there is one."""
+        """Reuse a table that was read with the same assignments; return whether there is one."""
         known = self._known.get(group)
         if known is None:
             return False
@@ -104,7 +104,7 @@ class BaseScene:
         return True
 
     def plain_numbers(self, scene: Scene, keys: Sequence[str]) -> PlainNumbers | None:
-        """Return how scenes with other numbers at some keys are made without any check.
+        """Return what makes scenes with other values of some keys without checking them.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ class BaseScene:
 
 
 class Place(NamedTuple):
-    """Place of a number in a scene.
+    """Location of a number in a scene.
 
     - table: table of the scene.
     - part: index of a mode, name of a shape, None for the table itself.
@@ -141,7 +141,7 @@ class Place(NamedTuple):
 
 
 class PlainKey(NamedTuple):
-    """Place of a plain number, and the limit below which no rule looks at it."""
+    """Location of a plain number, and the limit below which no rule depends on its value."""
 
     place: Place
     limit: float
@@ -149,7 +149,7 @@ class PlainKey(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PlainNumbers:
-    """Scenes that are one scene with other numbers, at which no rule looks.
+    """Scenes that differ only in numbers on whose values no rule depends.
 
     - scene: one of these scenes.
     - keys: the numbers that differ.
@@ -159,11 +159,11 @@ class PlainNumbers:
     keys: tuple[PlainKey, ...]
 
     def are_plain(self, values: np.ndarray) -> bool:
-        """Return whether no rule looks at these values (..., number of keys) [SI]."""
+        """Return whether no rule depends on these values (..., number of keys) [SI]."""
         return bool(np.all((values > 0) & (values < [key.limit for key in self.keys])))
 
     def by_place(self, values: Sequence) -> dict[Place, Any]:
-        """Return place -> value for one value per key, with the kinetic coefficient that follows from the static one."""
+        """Map the location of each key to its value, and that of a dependent kinetic coefficient."""
         numbers = {key.place: value for key, value in zip(self.keys, values)}
         static = Place("friction", None, "static")
         if static in numbers and self.scene.friction.kinetic is not None:
@@ -171,7 +171,7 @@ class PlainNumbers:
         return numbers
 
     def make_table(self, name: str, numbers: dict[Place, Any]) -> Any:
-        """Return a table of the scene with numbers as `by_place` returns them."""
+        """Return a table of the scene with values replaced by those of `by_place`."""
         table = getattr(self.scene, name)
         updates: dict[int | str | None, dict[str, Any]] = {}
         for place, value in numbers.items():
@@ -190,7 +190,10 @@ class PlainNumbers:
         return (*self.scene.sets[: len(self.scene.sets) - len(self.keys)], *sets)
 
     def make_scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene:
-        """Return the scene with values [SI] that are plain, equal to that of `BaseScene.override(sets)`."""
+        """Make the scene that `BaseScene.override(sets)` returns, without reading or checking it.
+
+        `values` [SI] are those of the keys; `are_plain` must hold for them.
+        """
         numbers = self.by_place(values)
         tables = {place.table for place in numbers}
         return replace(
@@ -205,7 +208,7 @@ def _update(table: Any, values: dict[str, Any]) -> Any:
 
 
 def _is_plain_point(scene: Scene) -> bool:
-    """Return whether a scene is a rig of modes and one contact point under a sine of the base.
+    """Return whether a scene is a rig of modes, one contact point and sinusoidal base motion.
 
     In such a scene PLAIN_KEYS holds.
     """
@@ -216,7 +219,7 @@ def _is_plain_point(scene: Scene) -> bool:
 
 
 def _is_plain_patch(scene: Scene) -> bool:
-    """Return whether a scene is a patch under a load, alone or in a rig of modes under a sine of the base.
+    """Return whether a scene is a loaded patch, alone or in a rig with sinusoidal base motion.
 
     In such a scene, without a load line, strips, grooves and files but [measured], PLAIN_KEYS holds.
     """
@@ -231,7 +234,7 @@ def _is_plain_patch(scene: Scene) -> bool:
 
 
 def _is_plain_motion(scene: Scene) -> bool:
-    """Return whether a rig consists of modes under a sine of the base and has a law without temperature."""
+    """Return whether a rig of modes has sinusoidal base motion and a law without temperature."""
     law = View(scene.friction)
     structure = scene.structure
     drive = scene.drive
@@ -241,7 +244,7 @@ def _is_plain_motion(scene: Scene) -> bool:
 
 
 def _find_plain_key(scene: Scene, key: str) -> PlainKey | None:
-    """Return the place of a key of PLAIN_KEYS; None for another key, or if its value is not plain."""
+    """Return the PlainKey of a key of PLAIN_KEYS; None if the key or the value is not plain."""
     pieces = split_key(key)
     table = getattr(scene, pieces[0], None)
     part: int | str | None = None
@@ -283,7 +286,7 @@ def _table_name(key: str) -> str:
 
 
 def _copy_tables(raw: dict[str, Any], key: str) -> None:
-    """Replace the tables above a dotted key by copies, so that the key can be set in them alone."""
+    """Replace the tables above a dotted key by copies, in which the key can then be set."""
     holder: Any = raw
     for piece in split_key(key)[:-1]:
         inner = find_inner(holder, piece)

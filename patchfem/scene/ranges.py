@@ -1,4 +1,4 @@
-"""Numeric keys of a scene with the range in which a fit may vary them, written ``table.key=low..high``."""
+"""Numeric keys with the ranges in which a fit varies them, as ``table.key=low..high``."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .reader import read_set_value
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """A key with its bounds low < high in SI; `kind` is the kind of quantity, None for a plain number."""
+    """Key with its bounds low < high in SI; `kind` is that of the quantity, None for a number."""
 
     key: str
     low: float
@@ -87,7 +87,7 @@ def _require_number(key: str) -> KeyPlace:
 
 
 def _read_number(place: KeyPlace, key: str, text: str) -> float:
-    """Return the value of a text in SI; ValueError if the key does not accept it."""
+    """Convert the string of a value to SI units; ValueError if the key does not accept it."""
     written = read_set_value(key, text)
     if isinstance(written, int) and not isinstance(written, bool):
         written = float(written)

@@ -1,4 +1,4 @@
-"""Reading of plain values: from those of a TOML file and of --set to the tables, with every mistake at its line."""
+"""Reading of the tables from the plain values of TOML and --set; mistakes name their line."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from .keys.types import (
 from .lines import count_from_one, split_key
 from .rules.scene_draft import SceneDraft
 
-# Numbers such as .3 and 5., which a person writes and TOML does not know.
+# Numbers such as .3 and 5., which people write but TOML does not allow.
 _BARE_POINT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?")
-_PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # matches a text in quotes without escapes
+_PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # matches a string in quotes without escapes
 
 
 def read_tables(draft: SceneDraft) -> None:
@@ -43,7 +43,7 @@ def read_tables(draft: SceneDraft) -> None:
 
 
 def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], at: str) -> Any:
-    """Read the table at the dotted key `at`; what is missing or wrong is reported and becomes None."""
+    """Read the table at the dotted key `at`; report missing or wrong values, which become None."""
     if id(raw) in draft.read_before:
         return draft.read_before[id(raw)][1]
     names = keys(model)
@@ -70,7 +70,7 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], at: 
 
 
 def _read_inner(draft: SceneDraft, place: KeyPlace, value: Any, path: str) -> Any:
-    """Read a table, or an array of tables, inside another; None, with the mistake reported, for anything else."""
+    """Read an inner table or array of tables; report anything else and return None."""
     inner = inner_table(*place)
     if not is_array(*place):
         if isinstance(value, dict):
@@ -92,7 +92,7 @@ def _validate(
         model.model_validate(values, context=valid)
     except ValidationError as caught:
         reported = set()
-        # If a key accepts several types, the type of which only a limit is broken is the one that was meant.
+        # A key may accept several types; a value that only breaks a limit of one type was meant to be of this type.
         errors = sorted(
             caught.errors(include_url=False), key=lambda error: error["type"] not in LIMITS
         )
@@ -114,7 +114,7 @@ def _validate(
 def _report_unknown(
     draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, at: str
 ) -> None:
-    """Report a key that the table at the dotted key `at` does not have, with the one that was probably meant."""
+    """Report a key that the table at `at` does not have, with the key that was probably meant."""
     path = f"{at}.{key}" if at else key
     if path in removed.KEYS:
         draft.add_mistake(path, removed.KEYS[path])
@@ -135,10 +135,10 @@ def _report_unknown(
 def _find_meant(
     draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, at: str
 ) -> str:
-    """Return the key or table that an unknown one probably stands for; "" if nothing tells."""
+    """Return the key or table that an unknown one probably stands for; "" if none is similar."""
     is_table = _is_table(raw[key])
     if not at and not is_table:
-        # A key without its table, as --set may be given it, belongs to a table that has such a key.
+        # --set may be given a key without its table; the key then belongs to a table that has a key of this name.
         owners = [
             name
             for name, attribute in keys(model).items()
@@ -147,7 +147,7 @@ def _find_meant(
         present = [name for name in owners if name in raw]
         if owners:
             return "' or '".join(f"{name}.{key}" for name in present[:1] or owners)
-    # A key of the file is not what was meant by another key of the file, but may be what --set wants to change.
+    # A key of the file is not a misspelling of another key of the file, but one of --set may be meant to change it.
     is_set = (f"{at}.{key}" if at else key) in draft.sets
     written = {
         name: raw[name]
@@ -167,7 +167,7 @@ def _is_table(value: Any) -> bool:
 
 
 def apply_set(draft: SceneDraft, assignment: str) -> None:
-    """Write one ``table.key=value`` of --set into a draft; the value stands without quotes, items by name."""
+    """Write one ``table.key=value`` of --set into a draft; a string value needs no quotes."""
     try:
         assignment.encode()
     except UnicodeEncodeError:
@@ -205,7 +205,7 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
 
 
 def _find_item(draft: SceneDraft, items: list[Any], path: str, written: str) -> int | None:
-    """Return the index of the item that a key of --set names; None, with the mistake reported, if there is none.
+    """Return the index of the item that a key of --set names; report a missing one as None.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written: str) -> 
 
 
 def read_set_value(key: str, text: str) -> Any:
-    """Return the plain value of a text of --set; a text that is no value of TOML stands for itself."""
+    """Return the plain value of a text of --set; a text that is not TOML stays a string."""
     model, name = find_key(key)
     is_text_key = model is not None and str in key_types(model, name)
     if _PLAIN_TEXT.fullmatch(text):

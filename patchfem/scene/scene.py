@@ -84,7 +84,7 @@ class Scene:
         return tables.Tables.model_construct(**{name: getattr(self, name) for name in names})
 
     def resolved(self) -> str:
-        """Return the scene as TOML in SI with every default written out; loading it gives the same values."""
+        """Return the scene as TOML in SI with all defaults; loading it gives the same values."""
         return format_toml(self.tables())
 
     def named(self) -> list[str]:
@@ -96,7 +96,7 @@ class Scene:
         return locate_key(self.path, self.text, key)
 
     def beside(self, name: str) -> Path:
-        """Return a path that is written in the scene, and relative to its folder, as a Path."""
+        """Return the path of a file whose name in the scene is relative to the folder of the scene."""
         return self.path.parent / name
 
 
@@ -206,12 +206,12 @@ def finish_scene(
 
 
 def move_scene(scene: Scene, path: Path) -> Scene:
-    """Return a scene as if it stood at another path, with its files named from there."""
+    """Return a scene as if it were stored at another path; its files are named from there."""
     return loads(scene.text, path, [*scene.sets, *relative_files(scene, path.parent)])
 
 
 def read_sweep_axes(text: str, path: str | Path) -> tuple[list, list[str]]:
-    """Return the axes of the table [sweep] of a text, and the lines of their mistakes; nothing else is read."""
+    """Return the axes of the table [sweep] of a text, and the lines of the mistakes in it."""
     raw, lines = parse_text(text, path)
     draft = SceneDraft(str(path), lines, raw)
     swept = _read_axes(draft, raw["sweep"]) if "sweep" in raw else []

@@ -1,4 +1,4 @@
-"""JSON schema of a scene, made from the records of its keys, for editors that complete and check TOML.
+"""JSON schema of a scene, with which editors complete and check the TOML text.
 
 A schema cannot express which keys go together and which files exist; `patchfem check` reports these mistakes.
 """
@@ -25,7 +25,7 @@ SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ �
 
 
 def make_schema() -> dict:
-    """Return the JSON schema (draft 2020-12) of a scene: tables and keys with meaning, limits, default, units."""
+    """Return the JSON schema (draft 2020-12) of a scene: meaning, limits, default, unit of keys."""
     with nested_validators():
         _rebuild(Tables)
     raw = Tables.model_json_schema(by_alias=True)
@@ -53,7 +53,7 @@ def _inner_models(model: type[Table]) -> set[type[Table]]:
 
 
 def _describe_table(model: type[Table], raw: dict) -> dict:
-    """Return the schema of a table: the meaning of its keys, no null, defaults as a scene writes them."""
+    """Return the schema of a table: the meaning of keys, no null, defaults as in a scene."""
     schema = {
         "type": "object",
         "description": " ".join((model.__doc__ or "").split()),
@@ -86,7 +86,7 @@ def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
 
 
 def _describe_selection(model: type[Table], key: str) -> str:
-    """Return the keys that each value of a selector needs, or the values that need or use a key; "" for others."""
+    """Return which keys the values of a selector need, or which values need a key; "" otherwise."""
     selector = next((one for one in SELECTORS.values() if issubclass(model, one.model)), None)
     if selector is None:
         return ""

@@ -28,7 +28,7 @@ def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
 
 
 def format_scene(tables: dict[str, Any]) -> str:
-    """Return a dict of tables as the text of a scene; SceneError for values that no scene can hold.
+    """Return a dict of tables as the text of a scene; SceneError for values it cannot hold.
 
     Texts are as in a scene, numbers are in SI.
     """
@@ -36,7 +36,7 @@ def format_scene(tables: dict[str, Any]) -> str:
 
 
 def format_values(key: str, values: Any) -> list[str]:
-    """Return values of one key as --over reads them between commas; a single value is a list of one.
+    """Return the values of one key as in --over between commas; one value gives a list of one.
 
     Texts stay as they are, but for quotes around a text with a comma or a bracket; numbers in SI get the unit of the key.
     """
@@ -70,7 +70,7 @@ def find_oversized_lengths(
     values : dict
         Values by key, or tables of values.
     patch_length : float, optional
-        Length of the patch [m]. No slide, bond or motion beside the patch is longer.
+        Length of the patch [m]. No slide, bond or other motion is longer.
     at : str
         Beginning of the dotted keys.
 
@@ -128,7 +128,7 @@ def _format_value(key: str, value: Any) -> str:
 
 
 def _format_toml(key: str, value: Any) -> str:
-    """Return a value of TOML that is exact to the last bit; a number of a key with a unit is a text in SI."""
+    """Return a TOML value with all digits; a number of a key with a unit becomes a text in SI."""
     value = _plain(value)
     if isinstance(value, dict):
         pairs = [f"{name} = {_format_toml(f'{key}.{name}', item)}" for name, item in value.items()]

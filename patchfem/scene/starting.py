@@ -35,7 +35,7 @@ def template_text(kind: str) -> str:
 
 
 def shipped_scene() -> Path:
-    """Return the path of the example scene, a rig with the rows measured on it.
+    """Return the path of the example scene, a rig with measured responses.
 
     It lies in `studies/rig` of a checkout and in `templates/shipped` of an installed package. Missing if it was removed
     from the installation.

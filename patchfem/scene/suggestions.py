@@ -1,4 +1,4 @@
-"""The key or table that was probably meant by one that no scene has: by its name, and by what it holds."""
+"""Suggestion of the key or table that was probably meant by an unknown one."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -12,7 +12,7 @@ from .rules.selectors import SELECTORS, split_keys
 def suggest_key(
     model: type[Table], at: str, written: dict, key: str, *, is_set: bool = False
 ) -> str:
-    """Return the key of a table that an unknown key probably stands for; "" if nothing tells.
+    """Return the key of a table that an unknown key probably stands for; "" if none is similar.
 
     A key with a similar name, or with a word in common, comes first, then a key that the table lacks. Keys that accept
     the value come before those that do not.
@@ -50,7 +50,7 @@ def suggest_key(
 
 
 def suggest_table(model: type[Table], written: dict, key: str) -> str:
-    """Return the table, one or two levels deep, that an unknown table probably stands for; "" if nothing tells.
+    """Return the table that an unknown table probably stands for; "" if none is similar.
 
     A table with a similar name is taken unless another has more of the keys inside.
 
@@ -99,7 +99,7 @@ def _accepts(model: type[Table], key: str, value: object) -> bool:
 
 
 def _lacking_keys(model: type[Table], at: str, written: dict) -> list[str]:
-    """Return keys that a table needs and does not have: always, by its selector, or under a condition."""
+    """Return keys that a table lacks: always required, by a selector, or under a condition."""
     needed = list(required_keys(model))
     if at in SELECTORS:
         selector = SELECTORS[at]

@@ -24,7 +24,7 @@ def format_toml(table: Table) -> str:
 
 
 def named_effects(tables: Any) -> list[str]:
-    """Return the effects of a scene or its tables: ``contact.tilt``, ``friction.law=nonlocal``, ``slide.kind=sine``."""
+    """Return the names of the effects in a scene, such as ``contact.tilt``, ``slide.kind=sine``."""
     named: dict[str, None] = {}
     for name in Tables.model_fields:
         table = getattr(tables, name)
@@ -63,7 +63,7 @@ def _find_effects(table: Any, at: str) -> Iterator[str]:
 
 
 def _find_array_effects(items: tuple, at: str) -> Iterator[str]:
-    """Yield the effects of an array of tables; those of patches are named as the effects of [contact]."""
+    """Yield the effects of an array of tables; patches have the effects of [contact]."""
     for item in items:
         for effect in _find_effects(item, at):
             if "=" in effect and ".contact" not in effect:
@@ -74,7 +74,7 @@ def _find_array_effects(items: tuple, at: str) -> Iterator[str]:
 
 
 class _EffectSources(NamedTuple):
-    """Attributes of a table that name effects: selectors by their value, tables by their presence."""
+    """Attributes of a table that name effects: selectors with their value, and inner tables."""
 
     selectors: list[str]
     tables: list[str]

@@ -1,4 +1,4 @@
-"""The text of a scene: reading of the file, its plain values, and sentences on text that is not TOML."""
+"""Reading of the text of a scene: the file, the plain values, and messages on TOML syntax."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from ..effects import MAX_COORDINATES
 from .lines import MAX_PARTS, TooManyParts, key_lines
 from .rules.scene_draft import SceneDraft, SceneError
 
-MAX_BYTES = 32 * 2**20  # size of a scene file; larger data belong into files that the scene names
+# bytes; maximum size of a scene file, because larger data belong in files that the scene names
+MAX_BYTES = 32 * 2**20
 MAX_QUOTED = 60  # characters of a value that the advice on missing quotes repeats
-# Bytes and seconds for a full matrix of n modes are these times 3 n^2 and n^3 (measured on one core).
+# Memory [B] and time [s] of a full matrix of n modes are these times 3 n^2 and n^3 (measured on one core).
 BYTES_PER_ENTRY = 8
 SECONDS_PER_CUBE = 1.5e-9
 # A key with a value that opens neither quotes nor a bracket.
@@ -69,7 +70,8 @@ def parse_text(text: str, path: str | Path) -> ParsedText:
     """
     try:
         if any(line.count(".") > MAX_PARTS for line in text.split("\n")):
-            key_lines(text)  # refuses a key of many parts, which tomllib would read for minutes
+            # refuses a key of very many parts, which tomllib would take minutes to read
+            key_lines(text)
         values = tomllib.loads(text)
         _refuse_crowds(values, text, path)
         return ParsedText(values, key_lines(text))
@@ -80,7 +82,7 @@ def parse_text(text: str, path: str | Path) -> ParsedText:
 
 
 def _refuse_crowds(values: dict, text: str, path: str | Path) -> None:
-    """Raise SceneError for more masses or modes than any run can use, before each of them is read."""
+    """Raise SceneError for more masses or modes than any run can use, before reading them."""
     structure = values.get("structure")
     if not isinstance(structure, dict):
         return
@@ -121,7 +123,7 @@ def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
 
 
 def _advise_spelling(text: str, line: int) -> str:
-    """Return how a value is written that TOML refuses for want of quotes or of a digit; "" for others."""
+    """Return how to write a value that lacks quotes or a digit in TOML; "" for other values."""
     match = _BARE_VALUE.match([*text.split("\n"), ""][line - 1])
     if match is None:
         return ""

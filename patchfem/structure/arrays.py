@@ -42,9 +42,9 @@ MAX_NUMBER_BYTES = 16  # bytes of a number, which is at most complex of double p
 MAX_DIRECTORY_BYTES = 2**20  # bytes of the list of members of a zip file; a longer one is damaged
 ZIP_END = b"PK\x05\x06"  # signature of the end of the list of members of a zip file
 MAX_ZIP_END_BYTES = 2**16 + 22  # bytes after the list of members: a record and a comment
-# part of the largest entry; a more negative eigenvalue is not round-off of a singular D
+# fraction of the largest entry; a more negative eigenvalue is not round-off of a singular D
 MIN_DAMPING = -1e-9
-MAX_MASS_FRACTION = 1 + 1e-9  # sum of base^2, which is at most 1, with its round-off
+MAX_MASS_FRACTION = 1 + 1e-9  # sum of base^2: at most 1, plus round-off of the shapes
 
 
 def read(path: Path) -> dict:

@@ -1,4 +1,4 @@
-"""A spring and a damper across an interface, added to the modes of a rig or subtracted from them."""
+"""A spring and a damper across an interface, added to the modes of a rig or removed."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import numpy as np
 from ..core import ModalBasis, PatchfemError, frozen_array
 from .matrices import decouple, split_damping, trim_round_off
 
-MIN_STIFFNESS = 1e-12  # part of the largest omega^2; a mode with a smaller omega^2 is rigid
+MIN_STIFFNESS = 1e-12  # fraction of the largest omega^2; a mode with a smaller omega^2 is rigid
 ROWS = (
     "slide",
     "base",
@@ -17,7 +17,7 @@ ROWS = (
     "pitch",
     "lateral",
     "yaw",
-)  # fields of a basis
+)  # fields of a basis that are rows over its coordinates
 
 
 def add_spring(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> ModalBasis:
@@ -89,7 +89,7 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
                 "part; lower structure.bonded.damping"
             )
     free = _change_coordinates(basis, np.sqrt(squares), shapes, damper)
-    # a single mode is its own coordinate
+    # a single mode keeps its coordinate, so no shapes are needed
     return replace(free, shapes=None) if squares.size == 1 and basis.shapes is None else free
 
 

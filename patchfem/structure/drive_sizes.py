@@ -1,4 +1,4 @@
-"""Drive of a scene as numbers: acceleration, speed, frequency and cycle, for defaults and measures."""
+"""Amplitude, speed, frequency and cycle of a drive, for defaults and measures."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from ..core import InitialState, ModalBasis, SineDrive
 SAMPLES_PER_CYCLE = 200  # equally spaced samples of a whole release; they resolve 100 harmonics
 MIN_SAMPLES_PER_CYCLE = 20  # with fewer samples only the reversals are stored
 MAX_SAMPLES = 20_000  # samples of a whole run; more make results files large
-ROUND_OFF_TIME = 1e-6  # part of a period; times have this round-off after many cycles
+ROUND_OFF_TIME = 1e-6  # fraction of a period; round-off of times after many cycles
 
 
 class DriveKeys(NamedTuple):
@@ -29,7 +29,7 @@ class DriveKeys(NamedTuple):
 
     @property
     def moving(self) -> bool:
-        """Whether the base accelerates, and not a force acts."""
+        """Whether the base accelerates; otherwise a force acts."""
         return self.keys.kind == "base"
 
     @property
@@ -52,7 +52,7 @@ class DriveKeys(NamedTuple):
 
 
 def cycles_per_level(keys) -> float:
-    """Return the drive cycles of each level, an integer, so that each level begins where the sine does."""
+    """Return the drive cycles per level, an integer, so each level begins at a cycle start."""
     cycles = keys.cycles if keys.cycles is not None else keys.duration * keys.frequency
     return float(max(1, round(cycles)))
 
@@ -75,13 +75,13 @@ def min_decay_rate(modes: ModalBasis) -> float:
 
 
 def decay_rate(modes: ModalBasis) -> float:
-    """Return `min_decay_rate`; if a coordinate grows, the largest growth rate [1/s] as a negative number."""
+    """Return `min_decay_rate`, or minus the largest growth rate [1/s] if a coordinate grows."""
     lowest = float(np.diagonal(modes.damping_matrix).min(initial=0.0)) / 2
     return lowest if lowest < 0 else float(min_decay_rate(modes))
 
 
 def max_acceleration(drive) -> float:
-    """Return the largest acceleration [m s-2] of a drive, or force over the modal mass; it is >= 0."""
+    """Return the largest acceleration [m s-2] of a drive, or force over modal mass; it is >= 0."""
     if isinstance(drive, SineDrive):
         return drive.acceleration
     if drive.segments:
@@ -130,12 +130,12 @@ def is_periodic(drive) -> bool:
 
 
 def repeat_cycles(drive) -> float | None:
-    """Return the number of cycles after which a drive repeats: 1, the `beat` of tones, or None if it never does."""
+    """Return the number of cycles after which a drive repeats, None if it never does."""
     return 1.0 if is_periodic(drive) else getattr(drive, "beat", None)
 
 
 def has_full_cycle(span: float, drive) -> bool:
-    """Return whether a time span [s] contains a full cycle of the drive, which a friction loop needs."""
+    """Return whether a time span [s] contains a full drive cycle, as a friction loop needs."""
     return span > drive.period * (1 - ROUND_OFF_TIME)
 
 
@@ -145,7 +145,7 @@ def is_release(drive) -> bool:
 
 
 def stored_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> int:
-    """Return how many equally spaced samples per cycle are stored of a whole run.
+    """Return the number of equally spaced samples per cycle that a whole run stores.
 
     They are `SAMPLES_PER_CYCLE`, or fewer so that the run has at most `MAX_SAMPLES`. They are 0, so that
     only reversals are stored, if fewer than `MIN_SAMPLES_PER_CYCLE` remained, and under a drive.
@@ -170,5 +170,5 @@ def _build_sine(drive: DriveKeys) -> SineDrive:
     return SineDrive(float(drive.acceleration(omega)), float(omega), drive.moving)
 
 
-# the sine stands here, so that a run under a sine imports no other drive
+# only the sine is built here, so a run with a sine does not import the other drives
 BUILDERS = {"sine": _build_sine}

@@ -28,7 +28,7 @@ import numpy as np
 from ..core import DriveSegment, PatchfemError
 from .drive_sizes import DriveKeys, cycles_per_level
 
-# the rate times the duration is at least this, so that a Taylor series covers at most 1/20 of a sweep
+# rate times duration is at least this, so a Taylor series covers at most 1/20 of a sweep
 MIN_SWEEP_RATE = 40
 
 
@@ -60,17 +60,17 @@ class Piecewise:
 
 
 def step(acceleration: float, period: float, *, moving: bool = True) -> Piecewise:
-    """Build a drive that is constant [m s-2] from t = 0 on; `period` [s] is the duration of its cycle."""
+    """Build a drive that is constant [m s-2] from t = 0 on; `period` [s] is that of the cycle."""
     return Piecewise((DriveSegment(0.0, acceleration),), period, moving)
 
 
 def release(period: float) -> Piecewise:
-    """Build a drive that is zero, for free motion; `period` [s] is the duration of its cycle."""
+    """Build a drive that is zero, for free motion; `period` [s] is that of the cycle."""
     return Piecewise((DriveSegment(0.0),), period, False)
 
 
 def levels(accelerations, omega: float, cycles: float, *, moving: bool = True) -> Piecewise:
-    """Build a sine whose amplitude changes from level to level at a continuous phase (report, 4.C).
+    """Build a sine of continuous phase whose amplitude changes between levels (report, 4.C).
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ class Recorded:
 
     @property
     def segments(self) -> tuple:
-        """Empty, because a recorded signal consists of rows."""
+        """Empty, because a recorded signal is no sequence of constants and sines."""
         return ()
 
     @property
@@ -212,7 +212,7 @@ class Recorded:
 
     @property
     def rate(self) -> float:
-        """Zero, because the Taylor series of a straight line ends."""
+        """Zero, because the Taylor series of a linear function has only two terms."""
         return 0.0
 
     def phase(self, t):
@@ -248,7 +248,7 @@ def _build_levels(drive: DriveKeys) -> Piecewise:
 def _build_step(drive: DriveKeys) -> Piecewise:
     """Build the drive with waveform "step"."""
     if drive.moving and drive.keys.acceleration is None:
-        # the jump of the base displacement is part of the initial state
+        # the jump of the base displacement is included in the initial state
         return release(drive.period)
     return step(float(drive.acceleration(0.0)), drive.period, moving=drive.moving)
 

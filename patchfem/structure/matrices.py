@@ -11,14 +11,17 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
 from ..core import ModalBasis, PatchfemError, frozen_array
 
-# relative; eigenvalues of rigid modes come out at about this part of the largest, times their number
+# relative; round-off of an eigenvalue of an n x n matrix is about n times this fraction of the largest eigenvalue
 ROUND_OFF = 16 * np.finfo(float).eps
 ROUND_OFF_ENTRY = 1e-12  # relative; smaller entries of a projected damping matrix are round-off
-MAX_ASYMMETRY = 1e-8  # part of the largest entry by which a matrix may differ from its transpose
-# part of the largest eigenvalue; a more negative one is not round-off of a singular C
+# fraction of the largest entry by which a matrix may differ from its transpose
+MAX_ASYMMETRY = 1e-8
+# fraction of the largest eigenvalue; a more negative one is not round-off of a singular C
 MIN_DAMPING = -1e-9
-SAME_FREQUENCY = 1e-11  # relative; closer modes may be combined freely
-MIN_OUTPUT = 1e-9  # relative; a smaller motion of the output is round-off at a node of the mode
+# relative; closer modes count as modes of equal frequency, whose shapes may be rotated
+SAME_FREQUENCY = 1e-11
+# relative; a smaller motion of the output is round-off, because the output is a node of the mode
+MIN_OUTPUT = 1e-9
 
 
 def build_basis(
@@ -55,7 +58,7 @@ def build_basis(
         Names of the coordinates.
     spring_rows : (s, n) array_like, optional
         Rows with K = rows^T rows, in place of K, for springs that are known one by one. Soft modes
-        beside stiff springs then keep all their digits.
+        in the presence of stiff springs then keep all their digits.
     damper_rows : (d, n) array_like, optional
         The same for C.
     **rows : (n,) array_like, optional
@@ -159,13 +162,13 @@ def decouple(rows) -> tuple:
 
 
 def trim_round_off(matrix, scale, round_off: float = ROUND_OFF_ENTRY) -> np.ndarray:
-    """Make a matrix (n, n) symmetric, and set entries to 0 that are round-off relative to a scale (n, n)."""
+    """Make a matrix (n, n) symmetric and zero entries that are round-off of a scale (n, n)."""
     matrix = (matrix + matrix.T) / 2
     return np.where(np.abs(matrix) <= round_off * scale, 0.0, matrix)
 
 
 def _modes_of_stiffness(root, K) -> tuple:
-    """Compute the modes of a stiffness K: circular frequencies (n,) [rad/s], ascending, and shapes (n, n)."""
+    """Compute ascending circular frequencies (n,) [rad/s] and shapes (n, n) of a stiffness K."""
     per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
     squares, shapes = eigh((per_mass + per_mass.T) / 2)
     min_square = len(K) * ROUND_OFF * np.abs(squares).max(initial=0.0)

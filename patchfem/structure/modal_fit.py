@@ -1,4 +1,4 @@
-"""Modes from measured frequency responses: poles by variable projection, residues by least squares.
+"""Modes from frequency responses: poles by variable projection, residues by least squares.
 
 H(w) = sum_r A_r / (w_r^2 - w^2 + 2i zeta_r w_r w) + L / (-w^2) + U, with real residues A, lower residuals
 L and upper residuals U for each response (Ewins, Modal testing, 2000): normal modes inside the band, and
@@ -19,16 +19,18 @@ from scipy.signal import find_peaks
 from ..core import NotConverged, PatchfemError
 from .places import AXES, Shapes
 
-MAX_MODES = 30  # modes of one fit
-PEAKS_TRIED = 2  # peaks of each spectrum at which a further mode is tried
+MAX_MODES = 30  # maximum number of modes of one fit
+PEAKS_TRIED = 2  # largest peaks of each residual spectrum at which a further mode is tried
 MIN_CORRELATION = 0.5  # mean cosine of neighbouring residuals at a peak: 1 for a mode, 0 for noise
 NEIGHBOURS = 8  # frequencies on each side of a peak or mode over which means are taken
-MIN_NOISE_RATIO = 15.0  # gain of a mode over what it would gain from white noise
-MIN_GAIN = 0.02  # part of the residual sum of squares that a further mode explains
-MIN_LEVEL = 1e-3  # part of the responses near its frequency that a mode makes up
-MIN_RESIDUAL_RATIO = 5.0  # contribution of a mode near its frequency over the residual there
+# decrease of the sum of squares by a further mode over the decrease expected in white noise
+MIN_NOISE_RATIO = 15.0
+MIN_GAIN = 0.02  # fraction of the residual sum of squares that a further mode must explain
+MIN_LEVEL = 1e-3  # fraction of the responses near its frequency that a mode must contribute
+# minimum contribution of a mode near its frequency over the residual there
+MIN_RESIDUAL_RATIO = 5.0
 MIN_MISFIT = 1e-9  # relative residual; a smaller one is round-off
-# part of the largest residue; with less a mode does not move the driven point
+# fraction of the largest residue; a mode with less does not move the driven point
 MIN_DRIVEN_RESIDUE = 1e-6
 MAX_MISFIT = 0.5  # relative residual; with more, the fit is refused
 
@@ -202,11 +204,11 @@ class ModalFit:
         return result.x, 2 * result.cost
 
     def complex_residual(self, theta):
-        """Compute the residual (q, p) of complex numbers, without weights."""
+        """Compute the unweighted complex residual (q, p) of the fit to the responses."""
         return _join_complex(self.solve(theta).residual) / self.weight[:, None]
 
     def contributions(self, theta):
-        """Compute the contribution (q, n, p) of each mode to the responses, without weights."""
+        """Compute the unweighted contribution (q, n, p) of each mode to the responses."""
         linear = self.solve(theta)
         n = theta.size // 2
         modes = _join_complex(linear.columns.design[:, :n]) / self.weight[:, None]
@@ -295,7 +297,7 @@ def _refine_with_noise(fit: ModalFit, theta, cost):
         square = np.mean(np.abs(fit.complex_residual(theta)) ** 2, axis=1)
         columns = np.stack([np.ones_like(fit.level), fit.level**2], axis=1)
         variance = np.full(square.size, square.mean())
-        # the uncertainty of a squared residual is proportional to the variance that is searched
+        # the uncertainty of a squared residual is proportional to the variance that is estimated
         for _ in range(4):
             parts = nnls(columns / variance[:, None], square / variance)[0]
             variance = np.maximum(columns @ parts, 1e-6 * square.mean())
@@ -304,7 +306,7 @@ def _refine_with_noise(fit: ModalFit, theta, cost):
 
 
 def _remove_faint_modes(fit: ModalFit, theta):
-    """Remove modes that contribute little to the responses near their own frequency."""
+    """Remove modes that contribute little to the responses near their natural frequency."""
     while theta.size > 2:
         w = np.exp(np.split(theta, 2)[0])
         residual = np.sqrt(np.mean(np.abs(fit.complex_residual(theta)) ** 2, axis=1))
@@ -370,7 +372,7 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     frequency : (q,) ndarray
         Frequencies [Hz].
     measured : dict
-        Values (q,) and time derivative (0, 1 or 2) of each pair (place, reference).
+        Values (q,) and time derivative (0, 1 or 2) of each pair (response, reference) of degrees of freedom.
     notes : list
         Sentences for the user; it is extended.
 
@@ -448,7 +450,7 @@ def _check_misfit(poles: FittedPoles, n_modes: int) -> list:
 
 
 def _note_modes_below(poles: FittedPoles, first_response) -> list:
-    """Return a note if modes below the band make up 20 % of the responses (p,) at its lowest frequency."""
+    """Return a note if modes below the band make up 20 % of the first responses (p,)."""
     fit = poles.fit
     lowest = fit.omega[0]
     lower_residual = fit.residues(poles.theta)[1] / lowest**2 * np.abs(fit.derivative[0])
@@ -463,13 +465,13 @@ def _note_modes_below(poles: FittedPoles, first_response) -> list:
 
 
 def _place_name(place) -> str:
-    """Return the name of a place for messages, such as "12:x"."""
+    """Return the name of a measured degree of freedom for messages, such as "12:x"."""
     node, axis = place
     return f"{node}:{AXES[axis]}"
 
 
 def _choose_reference(measured: dict):
-    """Return the reference with a response at itself and the most responses."""
+    """Return the reference with a driving-point response and the most responses."""
     candidates = [reference for place, reference in measured if place == reference]
     if not candidates:
         references = sorted({reference for _, reference in measured})

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..core import ModalBasis, frozen_array
 
-PATCH_MOTIONS = ("normal", "pitch", "lateral", "yaw")  # motions of the patch beside its slide
+# motions of the patch in addition to its slide
+PATCH_MOTIONS = ("normal", "pitch", "lateral", "yaw")
 
 
 def build_basis(modes, mass: float) -> ModalBasis:

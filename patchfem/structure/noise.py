@@ -17,7 +17,8 @@ from .drives import Recorded
 
 ROWS_PER_PERIOD = 8  # rows of the record per period of the highest frequency
 MIN_LINES = 8  # spectral lines of a record; fewer do not make its values Gaussian
-ROUND_OFF_LINE = 1e-9  # spacings; round-off of the number of a line at the end of the band
+# line spacings; tolerance on the number of the spectral line at each end of the band
+ROUND_OFF_LINE = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -97,7 +98,7 @@ def _build_random(drive: DriveKeys) -> Random:
 
 
 def _cut_spectrum(frequency, density, low: float | None, high: float | None) -> tuple:
-    """Cut a spectrum at two frequencies [Hz]; None stands for its own end.
+    """Cut a spectrum at two frequencies [Hz]; None keeps the end of the spectrum.
 
     Returns frequencies and densities; raises PatchfemError if an end lies outside the spectrum.
     """

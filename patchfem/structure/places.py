@@ -1,4 +1,4 @@
-"""Measured modes at places of a rig: nodes with directions such as "12:+x", or "12:+x, 13:-x"."""
+"""Measured modes at nodes of a rig, with directions such as "12:+x", or "12:+x, 13:-x"."""
 
 import re
 from dataclasses import dataclass, field
@@ -9,9 +9,10 @@ from ..core import ModalBasis, PatchfemError, frozen_array
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 PLACE_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")  # "12:+x"
-MAX_LISTED_PLACES = 12  # places that an error message lists
-MAX_MASS_FRACTION = 1.05  # part of the moving mass; with more, the mass or the place is wrong
-MIN_MASS_FRACTION = 0.8  # part of the moving mass; with less, a note says how much is missing
+MAX_LISTED_PLACES = 12  # nodes with directions that an error message lists
+# fraction of the moving mass; with more, the mass or the node of the base motion is wrong
+MAX_MASS_FRACTION = 1.05
+MIN_MASS_FRACTION = 0.8  # fraction of the moving mass; with less, a note says how much is missing
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -30,7 +31,7 @@ class Shapes:
     notes: list = field(default_factory=list)
 
     def motion_at(self, text: str, key: str) -> np.ndarray:
-        """Return the motion of the modes at a place.
+        """Return the displacement of each mode at a node and direction such as "12:+x".
 
         Parameters
         ----------
@@ -48,7 +49,7 @@ class Shapes:
         Raises
         ------
         PatchfemError
-            If the text names no place, or one that the file does not contain.
+            If the text names no node and direction, or one that the file does not contain.
         """
         total = np.zeros(self.frequency.size)
         for part in text.split(","):
@@ -71,7 +72,7 @@ class Shapes:
 
 
 def _list_places(motion: dict) -> str:
-    """List the first places of a file for a message."""
+    """List the first nodes and directions of a file for a message."""
     names = [f"{node}:{AXES[axis]}" for node, axis in sorted(motion)]
     text = ", ".join(names[:MAX_LISTED_PLACES])
     n_more = len(names) - MAX_LISTED_PLACES
@@ -83,7 +84,7 @@ def build_basis(shapes: Shapes, mass: float, places: dict, *, is_forced: bool) -
 
     A fixed-base mode phi of a rig whose moving mass m is all in one rigid block participates in the base
     motion by phi^T M r = m phi(block). Modal tests give no mass matrix, so base_at must be that block.
-    The sum of base^2 is the part of the moving mass that the modes contain.
+    The sum of base^2 is the fraction of the moving mass that the modes contain.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ def build_basis(shapes: Shapes, mass: float, places: dict, *, is_forced: bool) -
         Modal mass [kg] to which the modes are scaled; their coordinates are motions like those of a
         block of this mass.
     places : dict
-        Text of each place, or None: slide_at, and optionally output_at (default: slide_at), force_at
+        Node and direction of each key, or None: slide_at, and optionally output_at (default: slide_at), force_at
         (output_at), base_at (slide_at), normal_at and pitch_at.
     is_forced : bool
         Whether a force drives the rig, and not its base.

@@ -26,17 +26,20 @@ from . import masses, matrices
 
 # coordinates; the modes of a larger structure come from Lanczos iteration
 MAX_DENSE_COORDINATES = 600
-EXTRA_MODES = 4  # modes beyond twice the number that is kept, for the run that shows the error
+# modes in addition to twice the number that is kept; the run for the error estimate keeps more
+EXTRA_MODES = 4
 # relative; round-off of a projected matrix entry, compared with the sum of its absolute terms
 ROUND_OFF = 64 * np.finfo(float).eps
-# part of the largest stiffness over mass; a loose structure is shifted by it so that K has an inverse
+# fraction of the largest stiffness over mass, by which the stiffness of an unconstrained structure is shifted,
+# because K alone has no inverse
 SHIFT_FRACTION = 1e-9
-MIN_PIVOT = 1e-12  # part of a diagonal stiffness; a smaller pivot belongs to a rigid motion
-# part of the largest mass over stiffness; a smaller one is that of a massless motion
+MIN_PIVOT = 1e-12  # fraction of a diagonal stiffness; a smaller pivot belongs to a rigid motion
+# fraction of the largest mass over stiffness; a motion with a smaller ratio is massless
 MIN_INERTIA = 1e-14
-# part of the largest squared frequency, per coordinate; a smaller one belongs to a rigid motion
+# fraction of the largest squared frequency, per coordinate; a smaller one belongs to a rigid motion
 MIN_STRAIN = 1e-12
-MIN_RESIDUAL = 1e-8  # part of the flexibility at the boundary; less is left only by round-off
+# minimum reciprocal condition number of the residual flexibility at the boundary; a smaller one is round-off
+MIN_RESIDUAL = 1e-8
 CRAIG_BAMPTON = "craig-bampton"
 
 
@@ -55,7 +58,7 @@ class ComputedModes(NamedTuple):
 
 
 class Reduction(NamedTuple):
-    """Structure in p shapes: m modes, then a static shapes, of which the first b are of the boundary.
+    """Matrices in p shapes: m modes, then a static shapes, the first b of the boundary.
 
     - stiffness, mass: projected matrices (p, p) [N/m, kg].
     - damping: projected damping matrix (p, p) [N s/m], or None.
@@ -74,7 +77,7 @@ class Reduction(NamedTuple):
     lowest: np.ndarray
 
     def select_modes(self, n_modes: int) -> np.ndarray:
-        """Combine the shapes so that only the first modes are kept.
+        """Return the linear combinations of the shapes that keep only the first modes.
 
         The static shapes take over what the other modes contribute to a static response.
 
@@ -227,7 +230,7 @@ def _lowest_modes(K, M, count: int, factor: Factor, shift: float = 0.0) -> tuple
             "structure.reduced.modes",
         )
     shifted = (K + shift * M).toarray()
-    # K is divided by and not M, which may be singular
+    # eigh requires a positive definite second matrix; M may be singular, so M v = mu K v is solved
     inverse_squares, shapes = eigh(M.toarray(), (shifted + shifted.T) / 2)
     has_mass = inverse_squares > MIN_INERTIA * inverse_squares.max(initial=0.0)
     lowest = np.flatnonzero(has_mass)[::-1][:count]
@@ -302,7 +305,7 @@ def _free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
 
 
 def _subtract_modes(static, modes, M) -> tuple:
-    """Normalize static shapes (n, a) and make them orthogonal to modes (n, m) of unit modal mass.
+    """Normalize static shapes (n, a) and make them orthogonal to modes (n, m) of unit mass.
 
     M is the mass matrix. Returns the residual shapes (n, a) and the participation (m, a) of the modes in the static shapes.
     """
@@ -316,7 +319,7 @@ def _subtract_modes(static, modes, M) -> tuple:
 
 
 def _expand_rows(shapes, rows, n: int) -> np.ndarray:
-    """Put the rows of shapes into the given rows of shapes over n coordinates, zero elsewhere."""
+    """Insert the rows of shapes at the given rows of shapes over n coordinates, zero elsewhere."""
     expanded = np.zeros((n, shapes.shape[1]))
     expanded[rows] = shapes
     return expanded

@@ -6,7 +6,7 @@ from ..core import ModalBasis, PatchfemError
 
 
 def receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarray:
-    """Compute the receptance matrix of a rig, exactly also if the damping couples its modes.
+    """Compute the exact receptance matrix of a rig, even if the damping couples its modes.
 
     H = rows_out (diag(omega_r^2) - omega^2 + i omega D)^-1 rows_in^T / mass
 
@@ -16,7 +16,7 @@ def receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarray:
     omega : (k,) array_like
         Circular frequencies [rad/s].
     rows_out, rows_in : (o, n) and (i, n) array_like
-        Motion of the observed and of the driven places per modal coordinate.
+        Motion of the observed and of the driven points per modal coordinate.
 
     Returns
     -------

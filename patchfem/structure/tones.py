@@ -1,4 +1,4 @@
-"""Several sines at once, such as two tones or a modulated one, as a record with linear interpolation.
+"""Drive of several sines, such as two tones or a modulated one, as a linear interpolation.
 
 a(t) = sum_k a_k sin(2 pi f_k t + phi_k). Linear interpolation between rows h apart multiplies a tone by
 sinc^2(f h), which is compensated. It adds images at n/h +- f of the relative size (f h)^2; a mode of a
@@ -66,7 +66,7 @@ def tones(frequencies, accelerations, phases, duration: float) -> Tones:
 
 
 def beat_cycles(frequencies) -> float:
-    """Return the cycles of the first frequency after which all repeat: f_1 over their greatest common divisor."""
+    """Return the cycles of the first tone after which all repeat: f_1 / greatest common divisor."""
     fractions = [Fraction(f).limit_denominator(MAX_DENOMINATOR) or Fraction(f) for f in frequencies]
     denominator = lcm(*(fraction.denominator for fraction in fractions))
     numerators = [int(fraction * denominator) for fraction in fractions]

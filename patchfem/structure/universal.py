@@ -1,4 +1,4 @@
-"""Measured modes of a universal file: shapes (dataset 55), or frequency responses to be fitted (dataset 58)."""
+"""Measured modes of a universal file: shapes (dataset 55) or fits to responses (dataset 58)."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -36,7 +36,7 @@ class _Mode(NamedTuple):
     - frequency: natural frequency [Hz].
     - zeta: damping ratio.
     - modal_mass: modal mass [kg] of the shape.
-    - shape: motion at each place.
+    - shape: motion of each (node, axis).
     - notes: sentences for the user.
     """
 
@@ -118,7 +118,7 @@ def _read_modes(datasets: list, factors: _UnitFactors) -> Shapes:
 
 
 def _motion_by_place(dataset: dict) -> dict:
-    """Return the motion of each (node, axis) of a shape."""
+    """Return the motion of a shape in each direction (node, axis)."""
     motion = {}
     for axis in range(len(AXES)):
         column = dataset.get(f"r{axis + 1}")
@@ -129,7 +129,7 @@ def _motion_by_place(dataset: dict) -> dict:
 
 
 def _read_normal_mode(number: int, dataset: dict, values) -> _Mode:
-    """Read a real mode; without viscous damping half of the hysteretic one is its ratio."""
+    """Read a real mode; half its hysteretic damping replaces a missing viscous damping ratio."""
     zeta = dataset["modal_damp_vis"]
     notes = ()
     if not zeta and dataset["modal_damp_his"]:
@@ -231,7 +231,7 @@ def _unit_of_label(label: str | None, notes: list) -> float:
 
 
 def _signed_place(node: int, direction: int) -> tuple:
-    """Return the sign and the place (node, axis) of a direction +-1 to +-6 of a universal file."""
+    """Return the sign and the (node, axis) of a direction +-1 to +-6 of a universal file."""
     if not 1 <= abs(direction) <= len(AXES):
         raise PatchfemError(
             f"structure.file: direction {direction} of node {node} is unknown; +-1 to +-6 for x, y, z, "

@@ -8,11 +8,11 @@ from . import removed
 from .types import Share, Table, key, number, whole_number
 
 MAX_STEPS_PER_CYCLE = 10_000_000  # time steps; more would take days for a single cycle
-MAX_MODES = 10_000  # harmonics or shear modes; their matrices are full
+MAX_MODES = 10_000  # harmonics or shear modes; more of them make their dense matrices too large
 
 
 def _refuse_removed(value: object) -> object:
-    """Return a value of a key; ValueError, with what to use instead, for a value that was removed."""
+    """Return a value of a key; ValueError for a removed value, with what to use instead."""
     for values in (removed.METHODS, removed.QUADRATURES):
         if isinstance(value, str) and value in values:
             raise ValueError(values[value])

@@ -1,4 +1,4 @@
-"""The table [contact] and the tables inside it: materials, pieces, shapes of the gap, load and compliance.
+"""The table [contact] and its inner tables: materials, pieces, gap, load and compliance.
 
 As in `tables`, each model is a table and each attribute is a key.
 """
@@ -29,7 +29,7 @@ from .types import (
 
 Piece = Literal["upper", "lower"]
 MAX_PAIRS = 1_000_000  # equal patches; far more than any joint has
-MAX_STRIPS = 10_000  # strips over the width; more would not fit into memory beside their pressures
+MAX_STRIPS = 10_000  # strips over the width; the pressures of more strips would not fit into memory
 MATERIAL_NEEDED = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
 )
@@ -51,7 +51,7 @@ class Material(Table):
 
 
 def find_material(value: object) -> object:
-    """Return the Material of a name; ValueError for an unknown name, and for what is no name."""
+    """Return the Material of a name; ValueError for an unknown name and for other values."""
     if isinstance(value, Material):
         return value
     if not isinstance(value, str):
@@ -154,7 +154,7 @@ class Holder(Table):
 
 
 def require_convex(value: object) -> object:
-    """Return the radius of a crown; ValueError, with what to write instead, for the negative radius of a hollow."""
+    """Return the radius of a crown; ValueError for the negative radius of a hollow."""
     if str(value).lstrip().startswith("-"):
         raise ValueError(
             "a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] "
@@ -377,13 +377,13 @@ class Contact(Table):
 
     @property
     def shapes(self) -> dict:
-        """Tables of the given shapes of the gap by their names; the key `on` of each names its piece."""
+        """Tables of the given shapes of the gap by name; the key `on` of a table names the piece."""
         tables = {name: getattr(self, name) for name in _shape_names()}
         return {name: table for name, table in tables.items() if table is not None}
 
     @property
     def compliance_key(self) -> str:
-        """Key of what lets parts of the patch slip at different times; "" if the patch slips as a whole."""
+        """Key of the compliance that allows partial slip; "" if the patch slips as a whole."""
         if self.shear is not None:
             return "[contact.shear]"
         if self.asperities is not None and self.asperities.tangential_ratio is not None:

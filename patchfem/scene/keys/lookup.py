@@ -1,4 +1,4 @@
-"""Dotted keys: the table and attribute that a key names, what it accepts, and the sentence on a wrong value."""
+"""Dotted keys: the table and attribute of a key, valid values, and messages on wrong values."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[st
 
 @cache
 def is_table_or_value(model: type[Table], name: str) -> bool:
-    """Return whether a key that takes an inline table takes a plain value as well: a material, a coating."""
+    """Return whether a key of a table also takes a plain value, as a material or a coating does."""
     inner = key_types(model, name)[1:]
     return inner_table(model, name) is Material or any(
         get_origin(part) is Literal for part in inner

@@ -1,4 +1,4 @@
-"""Materials known by name: Young's modulus [Pa], Poisson's ratio [1], density [kg/m3] and where they come from."""
+"""Materials known by name, with the sources of Young's modulus and the other properties."""
 
 from __future__ import annotations
 

@@ -1,13 +1,14 @@
-"""A cache of results that depend on one frozen object; scenes of a sweep share most of their tables."""
+"""Cache of results that depend on one frozen object, because scenes of a sweep share tables."""
 
 from collections.abc import Callable
 from functools import wraps
 
-MAX_RESULTS = 1024  # results that one function remembers before it forgets all of them
+# maximum number of cached results of one function; at this number, the cache is emptied
+MAX_RESULTS = 1024
 
 
 def memoize(function: Callable) -> Callable:
-    """Return a function that remembers its results by the identity of its first argument.
+    """Cache the results of a function by the identity of the first argument.
 
     The first argument and the result must be frozen, and the other arguments hashable. Equal tables are not looked for,
     because a comparison of tables takes as long as the functions that are remembered.
@@ -20,7 +21,7 @@ def memoize(function: Callable) -> Callable:
         if entry is None:
             if len(results) >= MAX_RESULTS:
                 results.clear()
-            # The entry keeps the object alive, so that no other object gets its id.
+            # The entry keeps the object alive; otherwise another object could get the same id.
             entry = (frozen, function(frozen, *others))
             results[id(frozen), *others] = entry
         return entry[1]

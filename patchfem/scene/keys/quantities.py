@@ -1,4 +1,4 @@
-"""Quantities of a scene: ``"<number> <unit>"`` to SI and back, without arithmetic and without guesses.
+"""Conversion of quantities ``"<number> <unit>"`` of a scene to SI and back, without guesses.
 
 The kind of a quantity follows from the key, so `g` is standard gravity in an acceleration and a gram in a mass.
 """
@@ -155,7 +155,7 @@ def parse(text: object, kind: str) -> float:
     """Return the SI value of a quantity ``"<number> <unit>"``, correctly rounded.
 
     ValueError, with the kind and an example, for a bare number, an unknown or ambiguous unit, a unit of another kind,
-    anything beside one number and one unit, and a value that is not finite.
+    anything but one number and one unit, and a value that is not finite.
     """
     if not isinstance(text, str):
         raise ValueError(_not_text(text, kind))
@@ -184,7 +184,7 @@ def si_unit(kind: str | None) -> str:
 
 
 def format_si(value: float, kind: str) -> str:
-    """Return a value with its SI unit, such as ``"0.0127 m"``; `parse` gives back the same float."""
+    """Return a value with its SI unit, as ``"0.0127 m"``; `parse` gives back the same float."""
     return f"{float(value)!r} {si_unit(kind)}"
 
 
@@ -194,7 +194,7 @@ def requirement(kind: str) -> str:
 
 
 def _multiply(number: str, factor: float, kind: str) -> float:
-    """Return number times factor; ValueError with the end of a sentence for a value out of range."""
+    """Return number times factor; ValueError if the product is out of range."""
     rounded = float(number)
     if rounded == 0.0:
         if re.search("[1-9]", re.split("[eE]", number)[0]):
@@ -219,7 +219,7 @@ def _exact_factor(factor: float) -> Decimal:
 
 @lru_cache(256)
 def normalize_unit(unit: str) -> str:
-    """Return the spelling of a unit in KINDS: u for micro, ^ for superscripts, one blank in a product."""
+    """Return a unit as spelled in KINDS: u for micro, ^ for powers, one blank in a product."""
     for sign, letter in (("µ", "u"), ("μ", "u"), ("²", "^2"), ("³", "^3"), ("·", " ")):
         unit = unit.replace(sign, letter)
     return " ".join(unit.split())

@@ -1,4 +1,4 @@
-"""The tables of a scene as frozen pydantic models: a model is a table, an attribute is a key, values are in SI.
+"""The tables of a scene as frozen pydantic models: attributes are keys, values are in SI.
 
 An attribute says all about its key: type, unit, limits, meaning, when it is required, default. The reader, the schema
 and the reference of keys are made from it. `scene.rules` says which keys need or exclude one another.
@@ -334,7 +334,7 @@ class Interface(Friction):
 
     @property
     def compliance_key(self) -> str:
-        """Key of what lets parts of its patch slip at different times; "" if the interface slips as a whole."""
+        """Key of the compliance that allows partial slip; "" if the interface slips as a whole."""
         key = self.contact.compliance_key if self.contact is not None else ""
         return key.replace("contact", "structure.interface.contact", 1)
 

@@ -1,4 +1,4 @@
-"""Building blocks of the tables of a scene: types of keys, the base class of tables, and questions about a table."""
+"""Building blocks of the tables: types of keys, the base class, and queries about tables."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from .quantities import EXAMPLES, parse
 
 # Largest magnitude of a value in SI. Its fourth power, and products with it, stay within double precision.
 LARGEST = 1e50
-# Kinds of quantities by which a rig divides: a magnitude that is not 0 must be at least 1/LARGEST.
+# Kinds of quantities that are divisors in the equations of a rig. A magnitude that is not 0 must be at least
+# 1/LARGEST, which keeps the quotients finite.
 DIVIDED_BY = {
     "mass",
     "frequency",
@@ -29,7 +30,7 @@ DIVIDED_BY = {
     "cubic stiffness",
     "sweep rate",
 }
-# Ratio of difflib from which two names are taken for a slip of the pen.
+# Minimum similarity ratio of difflib at which an unknown name is taken for a misspelling.
 NAME_SIMILARITY = 0.6
 
 
@@ -57,11 +58,11 @@ After = partial(Check, core_schema.no_info_after_validator_function)
 
 
 class Kind(str):
-    """Mark of a key that holds a quantity of this kind of `quantities.KINDS`."""
+    """Annotation of a key that holds a quantity of this kind of `quantities.KINDS`."""
 
 
 def _require_magnitude(value: float, smallest: float) -> float:
-    """Return a value; ValueError if its magnitude is above LARGEST, or not 0 and below `smallest`."""
+    """Return a value; ValueError if its magnitude is above LARGEST or in (0, `smallest`)."""
     if value and not smallest <= abs(value) <= LARGEST:
         allowed = f"must not exceed {LARGEST:g} in magnitude"
         if smallest:
@@ -93,7 +94,7 @@ def quantity(kind: str, **limits: float) -> Any:
 
 
 def number(**limits: float) -> Any:
-    """Return the type of a key that holds a finite number without a unit; limits as in `quantity`."""
+    """Return the type of a key that holds a finite number without unit; limits as in `quantity`."""
     return Annotated[
         float,
         Strict(),
@@ -109,7 +110,7 @@ def whole_number(low: int, high: int) -> Any:
 
 
 def _require_printable(value: str) -> str:
-    """Return a text; ValueError for control characters and surrogates, which no file of results can hold."""
+    """Return a text; ValueError for characters that results files cannot hold."""
     for sign in value:
         if category(sign) in ("Cc", "Cs") and sign not in "\n\t":
             raise ValueError(
@@ -170,7 +171,7 @@ _OUTER: ContextVar = ContextVar("outer", default=None)  # the table whose valida
 
 @contextmanager
 def nested_validators() -> Iterator[None]:
-    """Make validators that include those of the tables inside, as a JSON schema needs them."""
+    """Make the validator of each table include those of inner tables, for the JSON schema."""
     token = _OUTER.set(_NESTED)
     try:
         yield
@@ -214,7 +215,7 @@ class Table(BaseModel):
 
 
 def build_table(model: type[Table], values: dict[str, Any]) -> Any:
-    """Return a table of values by attribute without validating them.
+    """Build a table from values by attribute, without validating them.
 
     It does what `model_construct` does in a fraction of the time: the defaults are shared, since they are frozen.
     """
@@ -250,7 +251,7 @@ def choices(got: str, names: Iterable[str]) -> str:
 
 @cache
 def keys(model: type[BaseModel]) -> dict[str, str]:
-    """Return the attribute of each key of a table; they differ if the key is a reserved word of Python."""
+    """Return key -> attribute of a table; they differ if the key is a reserved word of Python."""
     return {field.alias or name: name for name, field in model.model_fields.items()}
 
 
@@ -261,7 +262,7 @@ def required_keys(model: type[BaseModel]) -> list[str]:
 
 
 def annotation_parts(annotation: Any) -> Iterator[Any]:
-    """Yield all that an annotation is made of: types, marks, values of a Literal."""
+    """Yield all parts of an annotation: types, metadata such as Kind, values of a Literal."""
     for part in (*getattr(annotation, "__metadata__", ()), *get_args(annotation)):
         yield part
         yield from annotation_parts(part)
@@ -275,7 +276,7 @@ def key_types(model: type[BaseModel], name: str) -> tuple[Any, ...]:
 
 
 def key_record(model: type[BaseModel], written: str) -> KeyRecord | None:
-    """Return the documentation of a key as written in a scene; None if it has none, as a table."""
+    """Return the documentation of a key of a scene; None for a table, which has none."""
     marks = model.model_fields[keys(model)[written]].metadata
     return next((mark for mark in marks if isinstance(mark, KeyRecord)), None)
 
@@ -299,7 +300,7 @@ def quantity_kind(model: type[BaseModel], name: str) -> str | None:
 
 @cache
 def inner_table(model: type[BaseModel], name: str) -> type[Table] | None:
-    """Return the model of an attribute that holds a table or an array of tables; None for a value."""
+    """Return the model of an attribute that holds a table or array of tables; None for a value."""
     types = (part for part in key_types(model, name) if isinstance(part, type))
     return next((part for part in types if issubclass(part, Table)), None)
 

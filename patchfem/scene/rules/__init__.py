@@ -1,4 +1,4 @@
-"""Rules between the keys of a scene, one module per table.
+"""Rules on combinations of keys of a scene, one module per table.
 
 In: a `SceneDraft`, which holds what was written and what could be read. Out: mistakes and remarks, each with its key; the
 draft finds the line, and nothing is raised here. Read `rule_table` first: most rules are rows of tables, with a

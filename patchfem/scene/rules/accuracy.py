@@ -56,7 +56,7 @@ def fixed_settings(accuracy: Accuracy) -> list[str]:
 
 
 class QuadratureFacts(Facts):
-    """Facts of accuracy.quadrature, which is the `quadrature` of these facts, and of the sum over bonds."""
+    """Facts for the rules of accuracy.quadrature, and of the sum over bonds."""
 
     def __init__(self, draft: SceneDraft, kind: str) -> None:
         super().__init__(draft, "accuracy", draft.tables.accuracy)
@@ -110,7 +110,7 @@ QUADRATURE_RULES = (
 
 
 def check_quadrature(draft: SceneDraft, kind: str) -> None:
-    """Report a quadrature that cannot compute the sum over bonds, or remark that the scene has no such sum."""
+    """Report a quadrature that does not fit the sum over bonds; remark if there is no sum."""
     apply_rules(draft, QUADRATURE_RULES, QuadratureFacts(draft, kind))
 
 
@@ -124,7 +124,7 @@ def check_settings(draft: SceneDraft, kind: str) -> None:
 
 
 def unused_settings(tables: Tables, kind: str) -> dict[str, str]:
-    """Return setting -> where it has no effect, in words, of the settings that a scene fixes in vain."""
+    """Return setting -> words that tell where it has no effect, for settings without effect."""
     accuracy = tables.accuracy
     method = "bench" if kind == "bench" else accuracy.method or "auto"
     unused = {}
@@ -142,7 +142,7 @@ def unused_settings(tables: Tables, kind: str) -> dict[str, str]:
 
 
 def _no_effect_on_laws(setting: str, accuracy: Any, motion: Motion) -> str:
-    """Return why a setting has no effect on the laws and patches of a motion, in words; "" if it has."""
+    """Return why a setting has no effect on the laws and patches of a motion; "" if it has."""
     trait = SETTINGS[setting].trait
     laws = [joint.law for joint in motion.joints]
     if trait and not any(law_has_trait(law.law, trait) for law in laws):

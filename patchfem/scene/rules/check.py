@@ -1,4 +1,4 @@
-"""All rules of a scene beyond the limits of each key, in their order, and the kind of run that follows from the tables.
+"""All rules on combinations of keys of a scene, and the kind of run that the tables define.
 
 A rule sees the tables as far as they could be read and is silent about values that are missing.
 """
@@ -88,7 +88,7 @@ SLIDE_RULES = (
 
 
 def check(draft: SceneDraft) -> str:
-    """Report all mistakes of a scene; return its kind: patch, bench, rig, linear, or "" if it has none."""
+    """Report all mistakes of a scene; return the kind of scene, "" if the tables define none."""
     check_patches(draft)
     _check_table(draft, "normal", NORMAL_RULES)
     check_laws(draft)
@@ -130,7 +130,7 @@ def _is_ageless(law: Friction) -> bool:
 
 
 def _find_kind(draft: SceneDraft) -> str:
-    """Return the kind of run that the tables stand for; report tables that exclude each other or are missing."""
+    """Return the kind of run that the tables define; report missing and conflicting tables."""
     tables = {name for name in TABLES_OF_RUNS if draft.has(name)}
     if draft.has("structure.interface"):
         for name in sorted(tables & {"friction", "normal", "contact"}):
@@ -145,7 +145,7 @@ def _find_kind(draft: SceneDraft) -> str:
                 f"[{name}] and [[structure.interface]] exclude each other: each interface has its own law and load"
                 f"{instead}",
             )
-        # An interface has its own law and load, as if they were written in these tables.
+        # Each interface holds a law and a load, which count as the tables [friction] and [normal] here.
         tables = tables - {"contact"} | {"friction", "normal"}
     if {"contact", "normal"} <= tables:
         draft.add_mistake(
@@ -168,7 +168,7 @@ def _find_kind(draft: SceneDraft) -> str:
 
 
 def _find_moving_kind(draft: SceneDraft, tables: set[str]) -> str:
-    """Return whether a scene that is no patch and has friction is a bench or a rig; report missing tables."""
+    """Return whether a scene with friction is a bench or a rig; report missing tables."""
     if not tables:
         draft.add_missing_table(
             "contact",
@@ -213,7 +213,7 @@ def _require_friction(draft: SceneDraft, tables: set[str], has_rig: bool) -> Non
 
 
 def _remark_unused(draft: SceneDraft, kind: str) -> None:
-    """Remark on keys that have a meaning only for a patch that slides, or for a rig with friction."""
+    """Remark on keys that only matter for a patch that slides, or for a rig with friction."""
     if kind == "patch" and draft.tables.contact is not None:
         shapes = draft.tables.contact.shapes.items()
         keys = [f"{name}.on" for name, shape in shapes if shape.on == "lower" and name != "tilt"]

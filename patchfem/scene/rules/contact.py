@@ -1,4 +1,4 @@
-"""Rules of [contact], and of the patch of an interface: keys that exclude or need one another."""
+"""Rules of [contact] and of patches of interfaces: keys that exclude or need one another."""
 
 from collections.abc import Iterator
 from functools import cached_property
@@ -11,14 +11,14 @@ from .scene_draft import SceneDraft
 from .selectors import ASPERITY_LAW, HERTZ_PEAKS, check_selector
 from .view import View
 
-# Height of a piece over its length. From 80 000 on, the stiffness of the piece is lost in round-off.
+# Height of a piece over its length. From 80 000 on, the stiffness of the piece is lost to round-off.
 MAX_SLENDERNESS = 10_000
-# Elements along the interface. The matrices of a tenth of them already take gigabytes.
+# Elements along the interface. Even with 10 000 elements, the dense matrices take gigabytes.
 MAX_ELEMENTS = 100_000
 
 
 class PatchFacts(Facts):
-    """Facts of a patch and of the table that presses its pieces together."""
+    """Facts for the rules of a patch: that of [contact] or that of an interface."""
 
     @cached_property
     def flat_length(self) -> float:
@@ -177,7 +177,7 @@ LOAD_LINE_RULES = (
 
 
 def patches(draft: SceneDraft) -> Iterator[tuple[str, Contact]]:
-    """Yield the dotted key and the table of [contact] and of the patch of every interface."""
+    """Yield the dotted keys and tables of all patches: [contact] and those of interfaces."""
     if draft.tables.contact is not None:
         yield "contact", draft.tables.contact
     for index, interface in enumerate(draft.values.structure.interface):

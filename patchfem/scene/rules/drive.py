@@ -45,7 +45,7 @@ class DriveFacts(Facts):
 
     @property
     def can_be_displacement(self) -> bool:
-        """Whether a displacement may stand in place of this acceleration."""
+        """Whether a displacement may be given instead of this acceleration."""
         return self.is_accelerated and self.wave.takes("displacement")
 
     @property
@@ -209,7 +209,7 @@ def check_length(draft: SceneDraft, kind: str) -> None:
 
 
 def _check_tones(drive: DriveFacts) -> None:
-    """Report lists with another number of values than there are frequencies."""
+    """Report lists whose number of values differs from the number of frequencies."""
     for key in ("accelerations", "phases"):
         values = drive[key]
         if not (drive.wave.takes("frequencies") and drive.wave.takes(key)):

@@ -54,14 +54,14 @@ class LawFacts(Facts):
 
     @property
     def temperature_lacks(self) -> str:
-        """Keys that a surface temperature needs to have an effect, in words."""
+        """Missing keys without which a surface temperature has no effect, in words."""
         if not self.rest_growth:
             return "keys for the growth of the bonds; add rest_growth and slip_growth"
         return "activation temperatures; add rest_activation, slip_activation or both"
 
     @property
     def has_unknown_springs(self) -> bool:
-        """Whether `stiffness` stands for the springs of a law whose number depends on the load."""
+        """Whether `stiffness` is given for a law whose number of springs depends on the load."""
         return takes_stiffness_or_length(self.table.law) and bool(self.stiffness)
 
     @property

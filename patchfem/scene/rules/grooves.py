@@ -1,4 +1,4 @@
-"""Rules of [contact.grooves] and [normal.grooves]: flanks that do not lock, laws that act along them."""
+"""Rules of [contact.grooves] and [normal.grooves]: their slope, and supported friction laws."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .scene_draft import SceneDraft
 
 
 class GrooveFacts(Facts):
-    """Facts of the grooves of a scene, of which `at` is the key, and of what stands beside them."""
+    """Facts for the rules of the grooves at the key `at`, and of the tables used with them."""
 
     @property
     def law_table(self) -> Any:
@@ -27,7 +27,7 @@ class GrooveFacts(Facts):
 
     @property
     def law_advice(self) -> str:
-        """Advice on a law that acts along the flanks."""
+        """Advice on a friction law that does not support grooves."""
         return suggest_laws("grooves", friction=self.law_table)
 
     @property
@@ -177,5 +177,5 @@ def groove_key(draft: SceneDraft) -> str:
 
 
 def groove_table(draft: SceneDraft) -> Any:
-    """Return the grooves of a scene as rules read them; UNKNOWN without grooves."""
+    """Return the view of the grooves of a scene; UNKNOWN without grooves."""
     return draft.values.contact.grooves or draft.values.normal.grooves

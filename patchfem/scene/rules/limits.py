@@ -1,4 +1,4 @@
-"""Combinations of effects that a scene may name and no run can compute yet.
+"""Combinations of effects that a scene may contain but no run can compute yet.
 
 Each sentence has the words "not supported yet" and says what to do instead. To support a combination, delete its row.
 """
@@ -32,11 +32,11 @@ from .rule_table import Facts, Missing, Mistake, apply_rules, unsupported
 from .scene_draft import SceneDraft
 from .view import View, view
 
-NOT_YET_BUILT = "structure.mode.lateral"  # no run uses this key yet
+NOT_YET_BUILT = "structure.mode.lateral"  # no run supports this key yet
 
 
 class JointFacts(Facts):
-    """Facts of a joint: its friction law, its patch, and what stands beside them.
+    """Facts of a joint: its friction law, its patch, and the other tables of the scene.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class JointFacts(Facts):
         return law_has_trait(self.table.law, trait)
 
     def carries(self, *words: str) -> bool:
-        """Return whether the law carries all these words of `effects.LAWS[...].supports`."""
+        """Return whether the law supports all these words of `effects.LAWS[...].supports`."""
         return all(law_supports(self.table, word) for word in words)
 
     @property
@@ -100,12 +100,12 @@ class JointFacts(Facts):
 
     @property
     def joints_advice(self) -> str:
-        """Advice on a law that several interfaces carry."""
+        """Advice on a friction law that does not support several interfaces."""
         return suggest_laws("joints", friction=self.table)
 
     @property
     def plane_advice(self) -> str:
-        """Advice on a law that slides in a plane."""
+        """Advice on a friction law that does not support motion in two directions."""
         if self.has_trait("set-valued"):
             return ALTERNATIVES["stiff"]
         return f"{suggest_laws('plane')}, or leave lateral out"
@@ -138,13 +138,13 @@ class JointFacts(Facts):
 
     @property
     def has_constant_pressure(self) -> bool:
-        """Whether the law requires a constant pressure: it remembers, and no changing load carries it."""
+        """Whether the law requires constant pressure: it has memory and supports no varying load."""
         has_own_form = self.has_trait("memoryless") or self.has_trait("bonds")
         return not has_own_form and not self.carries("varying-load")
 
     @property
     def can_slip_in_strips(self) -> bool:
-        """Whether each strip can slip part by part.
+        """Whether partial slip can be computed in each strip.
 
         That needs elements under a constant load, the shear of the pieces, and no spring that couples the strips.
         """
@@ -155,7 +155,7 @@ class JointFacts(Facts):
 
     @property
     def is_soft_strip(self) -> bool:
-        """Whether strips would have to slip part by part and cannot."""
+        """Whether partial slip of the strips would be needed and cannot be computed."""
         return bool(self.contact.strips and self.compliance) and not self.can_slip_in_strips
 
 
@@ -347,7 +347,7 @@ PATCH_LAW_RULES = (
 
 
 def not_yet_built(tables: Tables) -> Iterator[tuple[str, str]]:
-    """Yield key and message of every mode with a motion across x, which no run uses."""
+    """Yield key and message of each mode with lateral motion, which no run supports yet."""
     for index, mode in enumerate(tables.structure.mode if tables.structure else ()):
         if mode.lateral:
             yield f"structure.mode.{index}.lateral", "not supported yet"
@@ -377,7 +377,7 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
 
 
 def _check_interface(draft: SceneDraft, at: str, interface: Any) -> None:
-    """Report what an interface between two masses cannot have yet."""
+    """Report features that an interface between two masses does not support yet."""
     joint = JointFacts(draft, at, interface, interface.contact, "rig")
     apply_rules(draft, INTERFACE_RULES, joint)
     if interface.law is not None:
@@ -406,7 +406,7 @@ def _needs_upper(joint: JointFacts) -> str:
 
 
 def _check_sides(joint: JointFacts, only_upper: str) -> None:
-    """Report shapes on different pieces, or on the lower piece where they must lie on the upper one.
+    """Report shapes on different pieces, or on the lower piece if this is not supported.
 
     `only_upper` says in words what requires the upper piece; "" if the shapes may lie on the lower one.
     """
@@ -431,7 +431,7 @@ def _check_sides(joint: JointFacts, only_upper: str) -> None:
 
 
 def refuse_lateral_slide(tables: Tables) -> str:
-    """Return why a bench cannot slide in two directions, as the file of a path asks for; "" if it can."""
+    """Return why a bench cannot follow a path file with lateral motion; "" if it can."""
     law = tables.friction
     scene = View(tables)
     compliance = compliance_key(law, tables)

@@ -1,4 +1,4 @@
-"""The features that each engine supports, and why the engine that accuracy.method names cannot run a scene."""
+"""Features that each engine supports, and why the chosen accuracy.method cannot run a scene."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from .view import View
 
 
 class Joint(NamedTuple):
-    """An interface as an engine sees it.
+    """Interface with friction, as described by the facts that decide which engines support it.
 
     - law: table of its friction law.
-    - compliance: key of what lets parts of its patch slip at different times; "" if it slips as a whole.
+    - compliance: key of the compliance that allows partial slip; "" if the patch slips as a whole.
     """
 
     law: Any
@@ -37,7 +37,7 @@ class Motion(NamedTuple):
     - joints: the interfaces with friction.
     - load_change: cause of a load that changes, such as "with normal.amplitude".
     - strips_yaw: whether the strips of the patch slide independently.
-    - spring: nonlinear spring beside the contact, or grooves that the load climbs, as the scene writes them.
+    - spring: key of the nonlinear spring of the rig, or of the grooves that the upper piece climbs.
     - waveform: NO_WAVEFORM of a release and of the sine of a response curve.
     - drive: the table [drive].
     - lower_shape: shape that moves the pressure with the lower piece, such as "contact.crown.on = 'lower'".
@@ -55,7 +55,7 @@ class Motion(NamedTuple):
 
     @property
     def compliance(self) -> str:
-        """Key of what lets parts of a patch slip at different times, of the first such patch."""
+        """Key of the compliance that allows partial slip, for the first patch that has one."""
         return next((joint.compliance for joint in self.joints if joint.compliance), "")
 
     @property
@@ -65,7 +65,7 @@ class Motion(NamedTuple):
 
 
 class Support(NamedTuple):
-    """What an engine supports.
+    """Features that an engine supports.
 
     - law: word of `effects.LAWS[...].supports` that every friction law must carry; "" for any law.
     - features: names of FEATURES, separated by blanks.
@@ -75,7 +75,7 @@ class Support(NamedTuple):
     features: str
 
 
-# Feature -> function of a Motion that describes it, as words that go on after the engine; "" if it is absent.
+# Feature -> function of a Motion that returns the words after the name of the engine in a message; "" without it.
 FEATURES = {
     "no-law": lambda motion: "" if motion.joints else "for law 'none'",
     "load": lambda motion: motion.load_change,
@@ -106,7 +106,7 @@ METHOD = "accuracy.method"
 
 
 def unsupported_feature(engine: str, motion: Motion) -> str:
-    """Return the first feature of a motion that an engine of SUPPORT does not support, in words; "" if none."""
+    """Return the first feature of a motion that an engine does not support; "" if none."""
     return first_unsupported(SUPPORT[engine], motion)
 
 
@@ -131,19 +131,19 @@ def _unsupported_joint(support: Support, motion: Motion) -> Joint | None:
 
 
 def _is_supported(word: str, joint: Joint) -> bool:
-    """Return whether an engine that needs `word` of `effects.LAWS[...].supports` supports the law of an interface."""
+    """Return whether an engine that needs `word` in LAWS[...].supports supports an interface."""
     if not law_supports(joint.law, word):
         return False
-    if word == "exact":  # the event-driven solution knows only patches that slip as a whole
+    if word == "exact":  # the event-driven solution supports only patches that slip as a whole
         return not joint.compliance
     if word == "pieces":
-        # a law that holds without a stretch becomes elements only behind a compliance
+        # a law that sticks without displacement becomes spring-slider elements only with a compliance in series
         return bool(joint.compliance) or not law_has_trait(joint.law.law, "set-valued")
     return True
 
 
 def check_method(draft: SceneDraft, kind: str) -> None:
-    """Report an accuracy.method that cannot compute the scene, or remark that it is not used."""
+    """Report an accuracy.method that cannot solve the scene; remark on one that is not used."""
     method = draft.values.accuracy.method
     if method in unused_methods(kind):
         draft.add_remark(METHOD, f"= '{method}' has no meaning in a {kind} scene and is not used")
@@ -155,7 +155,7 @@ def check_method(draft: SceneDraft, kind: str) -> None:
 
 
 def unused_methods(kind: str) -> tuple[str, ...]:
-    """Return the methods that have no meaning in a kind of scene, which has no time integration."""
+    """Return the methods without meaning in a kind of scene that has no time integration."""
     return ("exact", "march") if kind in ("patch", "bench") else ()
 
 
@@ -183,7 +183,7 @@ def motion_features(tables: Tables, kind: str) -> Motion:
 
 
 def compliance_key(law: Any, tables: Tables) -> str:
-    """Return the key of what lets parts of the patch under a law slip at different times; "" if there is none."""
+    """Return the key that allows partial slip of the patch under a law; "" if there is none."""
     owner = law if isinstance(law, Interface) else tables.contact
     return owner.compliance_key if owner is not None else ""
 
@@ -195,7 +195,7 @@ def lower_shapes(contact: Any, at: str = "contact") -> list[str]:
 
 
 def nonlinear_spring(tables: Tables) -> str:
-    """Return the nonlinear spring beside the contact, as the scene writes it; "" without one."""
+    """Return the key of the nonlinear spring of the rig; "" without one."""
     structure = View(tables).structure
     if structure.stiffening:
         return "[structure.stiffening]"
@@ -203,7 +203,7 @@ def nonlinear_spring(tables: Tables) -> str:
 
 
 def climbed_grooves(tables: Tables) -> str:
-    """Return the grooves that the load climbs, as the scene writes them; "" without grooves or with flat ones."""
+    """Return the key of the grooves that the upper piece climbs; "" without or with flat ones."""
     for name in ("contact", "normal"):
         if View(tables)[name].grooves.amplitude:
             return f"[{name}.grooves]"
@@ -231,7 +231,7 @@ def load_change_key(tables: Tables) -> str:
 
 
 def load_change_words(key: str) -> str:
-    """Return the cause of a changing load in words: normal.amplitude or, for example, "a mode's pitch"."""
+    """Return the cause of a changing load, such as normal.amplitude or "a mode's pitch"."""
     return key if key == "normal.amplitude" else f"a mode's {key.rpartition('.')[2]}"
 
 
@@ -264,12 +264,12 @@ def _refuse_harmonic(motion: Motion) -> str:
         return not_supported_message(f"'harmonic' {feature}", "march")
     is_exact = not all(unsupported_feature(engine, motion) for engine in EXACT_ENGINES)
     if not motion.joints or is_exact or motion.has_grooves:
-        return ""  # over grooves the method marches until the motion repeats
+        return ""  # with grooves, the method integrates in time until the motion repeats
     return _refuse_harmonic_law(motion)
 
 
 def _refuse_harmonic_law(motion: Motion) -> str:
-    """Return why harmonic balance cannot use the law of a rig that has no exact solution; "" if it can."""
+    """Return why harmonic balance cannot use the law of a rig; "" if it can."""
     law = motion.joints[0].law
     if len(motion.joints) > 1:
         return not_supported_message(

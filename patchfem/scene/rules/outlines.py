@@ -17,7 +17,7 @@ def piece_length(contact: View, name: str) -> float:
 
 
 def flat_length(patch: View) -> float:
-    """Return the length [m] over which both faces are flat and opposite; UNKNOWN if there is none."""
+    """Return the length [m] over which both faces are flat and opposite; UNKNOWN without one."""
     lengths = []
     for name in PIECES:
         end = max(patch[name][key] or 0.0 for key in END_KEYS) if patch[name] else 0.0
@@ -53,7 +53,7 @@ def check_outlines(patch: Facts) -> None:
 
 
 def _check_beside_mesh(patch: Facts, name: str) -> None:
-    """Report keys of the outline of a piece beside a mesh file."""
+    """Report keys for the outline of a piece that are given together with a mesh file."""
     for key in ("length", *END_KEYS):
         if patch.mesh and patch.has(f"{name}.{key}"):
             patch.draft.add_mistake(

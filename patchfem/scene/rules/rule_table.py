@@ -1,4 +1,4 @@
-"""Tables of rules: a row holds the condition, the key at fault and the sentence that the user reads.
+"""Tables of rules: a row holds the condition, the key at fault and the sentence shown.
 
 A mistake goes one way to the screen: `apply_rules` hands the key and the sentence of a row to the `SceneDraft`, which
 finds the line of the key. A new rule is a new row.
@@ -18,7 +18,7 @@ from .view import View
 
 
 class Facts(View):
-    """The facts on which the rules of one table depend: its values, and which of its keys are written.
+    """Facts on which the rules of one table depend: the values, and which keys are written.
 
     Subclasses add what follows from the values as properties. The tables do not change while rules are applied, so that
     a property which several rules use is a `cached_property`.
@@ -50,7 +50,7 @@ class Facts(View):
 
     @cached_property
     def compliance(self) -> str:
-        """Key of what lets parts of the patch slip at different times; "" if there is none."""
+        """Key of the compliance that allows partial slip of the patch; "" if there is none."""
         return compliance_key(self.table, self.draft.tables)
 
     def has(self, *names: str) -> bool:
@@ -86,7 +86,7 @@ Remark = partial(Rule, SceneDraft.add_remark)
 
 
 def unsupported(condition: Callable, key: str, feature: str, instead: str) -> Rule:
-    """Return the row of a combination that is not supported yet.
+    """Return the rule for a combination that is not supported yet.
 
     Parameters
     ----------

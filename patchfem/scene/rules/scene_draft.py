@@ -1,4 +1,4 @@
-"""A scene while it is read: what was written, what could be read, and every mistake with its line."""
+"""A scene during reading: plain values, tables read so far, and every mistake with its line."""
 
 from __future__ import annotations
 
@@ -14,14 +14,15 @@ from ..keys.types import build_table
 from ..lines import count_from_one, split_key
 from .view import View
 
-SET_ORDER = 10**9  # place of the mistakes of --set in the list: behind those of any line of a file
-MAX_WORD = 200  # characters; no key, unit or file name is as long, so that a longer word is cut in a message
-N_SHOWN = 60  # characters that a message shows of a word that is too long
+# sort order of the mistakes of --set, which are listed after those of all lines of a file
+SET_ORDER = 10**9
+MAX_WORD = 200  # characters; no key, unit or file name is as long, so a message cuts a longer word
+N_SHOWN = 60  # characters of a word longer than MAX_WORD that a message shows
 _LONG_WORD = re.compile(rf"[^\s/\\:]{{{MAX_WORD},}}")
 
 
 class SceneError(PatchfemError):
-    """A scene that cannot be run; `mistakes` holds one line each, ``FILE:LINE: table.key: message``."""
+    """Error of a scene that cannot be run; `mistakes` holds ``FILE:LINE: key: message`` lines."""
 
     def __init__(self, mistakes: Iterable[str]) -> None:
         self.mistakes = list(mistakes)
@@ -60,11 +61,12 @@ class SceneDraft:
         self.remarks: list[str] = []
         self.read_before: dict[int, tuple[dict, Any]] = {}
         self.read_now: dict[int, tuple[dict, Any]] = {}
-        self._mistakes: dict[tuple[int, str], None] = {}  # (order, line of text), each once
+        # keys (order, line of text); a dict lists each mistake only once
+        self._mistakes: dict[tuple[int, str], None] = {}
 
     @property
     def values(self) -> View:
-        """The tables as rules read them."""
+        """View of the tables read so far; a missing or refused value is UNKNOWN."""
         if self._values.table is not self.tables:
             self._values = View(self.tables)
         return self._values
@@ -79,11 +81,11 @@ class SceneDraft:
         return self.written_value(key) is not None
 
     def written_value(self, key: str) -> Any:
-        """Return what is written at a dotted key, with items by number; None if nothing is."""
+        """Return the plain value at a dotted key, with items by number; None without a value."""
         return written_inside(self.raw, key)
 
     def has_set_key(self, key: str) -> bool:
-        """Return whether a key as --set and [sweep] write it, with items by name or number, is written."""
+        """Return whether a key in the notation of --set, with items by name or number, is written."""
         value: Any = self.raw
         for piece in split_key(key):
             value = find_inner(value, piece)
@@ -109,7 +111,7 @@ class SceneDraft:
         self._add(SET_ORDER, "--set", text)
 
     def add_remark(self, key: str, sentence: str) -> None:
-        """Add a sentence on a key that is not a mistake; `sentence` goes on after the name of the key."""
+        """Add a remark on a key that is not a mistake; `sentence` follows the name of the key."""
         remark = count_from_one(f"{self.display_key(key)} {sentence}")
         if remark not in self.remarks:
             self.remarks.append(remark)
@@ -134,7 +136,7 @@ class SceneDraft:
         return ".".join(pieces)
 
     def _locate(self, key: str) -> tuple[int, str]:
-        """Return the order of a mistake and the place that its line names."""
+        """Return the sort order of a mistake and the text that locates it, such as FILE:LINE."""
         pieces = key.split(".")
         paths = [".".join(pieces[:count]) for count in range(len(pieces), 0, -1)]
         if self.sets.intersection(paths):
@@ -149,7 +151,7 @@ class SceneDraft:
 
 
 def written_inside(value: Any, key: str) -> Any:
-    """Return what a plain table holds at a dotted key, with items by number; None if nothing."""
+    """Return the value at a dotted key of a plain table, with items by number; None without one."""
     for piece in _pieces(key):
         if isinstance(value, dict):
             value = value.get(piece)
@@ -161,7 +163,7 @@ def written_inside(value: Any, key: str) -> Any:
 
 
 def find_inner(holder: Any, piece: str) -> Any:
-    """Return what a plain table or array holds under a key, a name or a number; None if nothing."""
+    """Return the value under a key, name or number of a plain table or array; None without one."""
     if isinstance(holder, dict):
         return holder.get(piece)
     if not isinstance(holder, list):

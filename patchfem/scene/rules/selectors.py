@@ -1,4 +1,4 @@
-"""Selector keys such as friction.law, whose value decides which other keys of the table are required or used."""
+"""Selector keys such as friction.law, whose value decides which other keys are used."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def dependent_keys(selector: Selector) -> frozenset[str]:
 
 
 def check_selector(facts: Facts, selector: Selector) -> None:
-    """Report keys that the value of a selector requires or excludes, and remark on those it does not use.
+    """Report keys that the value of a selector requires or excludes; remark on unused ones.
 
     Parameters
     ----------

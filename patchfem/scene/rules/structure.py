@@ -1,4 +1,4 @@
-"""Rules of [structure]: one description of the rig, masses that exist, participations that are possible."""
+"""Rules of [structure]: a single description of the rig, existing masses, participations."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ MATRIX_ENDINGS = (
     ".bdf",
     ".dat",
 )
-# Damping ratio from which a mode hardly swings. It is seldom meant: 1 % is 0.01.
+# Damping ratio at which a free oscillation decays to a few per cent within one cycle; a larger one is probably a
+# wrong unit, because 1 % is 0.01.
 HEAVY_DAMPING = 0.5
-# Excess over 1 of the sum of squared base participations that is round-off of the shapes.
+# Excess over 1 of the sum of squared base participations that round-off of the mode shapes can cause.
 BASE_SUM_SLACK = 1e-9
 PLACE_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 DESCRIPTIONS = ("mode", "masses", "file", "reduced")  # keys that describe a rig; a scene has one
 
 
 class Coordinates(NamedTuple):
-    """What the numbers in `between` and `mass` count.
+    """Coordinates to which the numbers in `between` and `mass` refer.
 
     - number: number of masses or boundary coordinates; None if there are none, or if their number is not
       known.
@@ -47,7 +48,7 @@ class Coordinates(NamedTuple):
 
     @classmethod
     def from_structure(cls, structure: Any) -> Coordinates:
-        """Return what the numbers of a table [structure] count."""
+        """Return the coordinates to which the numbers in a table [structure] refer."""
         if structure.reduced is not None:
             number = len(structure.reduced.boundary or ()) or None
             return cls(number, "boundary coordinate", "structure.reduced.boundary")
@@ -56,7 +57,7 @@ class Coordinates(NamedTuple):
 
 
 class StructureFacts(Facts):
-    """Facts of the structure: how it is described, and what stands beside it."""
+    """Facts for the rules of [structure]: how the rig is described, and the other tables."""
 
     @cached_property
     def descriptions(self) -> list[str]:
@@ -310,7 +311,7 @@ def check_structure(draft: SceneDraft) -> None:
 
 
 def advise_modes(draft: SceneDraft) -> str:
-    """Return advice on the modes that replace masses and springs beside [contact].
+    """Return advice on the modes that replace masses and springs in a scene with [contact].
 
     One mass m on springs k and dampers c to the base is a mode of the frequency sqrt(k/m)/(2 pi) and the damping ratio
     c/(2 sqrt(k m)). The advice gives these numbers if the scene describes such a mass.
@@ -406,7 +407,7 @@ def describe_hidden_modes(tables: Tables) -> list[str]:
 
 
 def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
-    """Report instruments with a motion of their own beside what is judged by the motion of the output."""
+    """Report instruments that move differently from the output, if a key depends on the output."""
     written = []
     for index, mode in enumerate(modes):
         output = mode.output
@@ -426,7 +427,7 @@ def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
 
 
 def _judged_at_output(draft: SceneDraft) -> str:
-    """Return the key whose effect is judged by the motion of the output; "" if there is none."""
+    """Return the key whose effect depends on the motion of the output; "" if there is none."""
     for key in ("structure.travel", "structure.stiffening"):
         if draft.has(key):
             return key
@@ -512,7 +513,7 @@ def _check_number(draft: SceneDraft, key: str, number: int | None) -> None:
 
 
 def check_driven_mass(draft: SceneDraft) -> None:
-    """Report a drive.mass that does not exist, or that stands beside modes."""
+    """Report a drive.mass that does not exist, or that is given for a rig of modes."""
     drive = draft.tables.drive
     if drive.mass is None or draft.tables.structure is None or drive.kind == "base":
         return

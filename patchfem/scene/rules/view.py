@@ -1,4 +1,4 @@
-"""Tables as the rules read them: a value that is missing or was refused compares as false."""
+"""Views of the tables for the rules: a missing or refused value compares as false."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..keys.types import Table
 
 
 class _Unknown(float):
-    """Value of a key that is missing or was refused: NaN, false and empty, with itself as every attribute."""
+    """Value of a missing or refused key: a NaN that is false, empty and has any attribute."""
 
     def __bool__(self) -> bool:
         return False
@@ -26,7 +26,7 @@ UNKNOWN = _Unknown("nan")
 
 
 class View:
-    """A table for reading, in which every missing value is UNKNOWN and every table is a view.
+    """Wrapper of a table that returns UNKNOWN for missing values and a View for inner tables.
 
     A rule compares the values of a view without asking first whether they are there. A field of a sentence, such as
     `{length:g}`, names an attribute of the view. AttributeError for a name that the table does not have.
@@ -45,7 +45,7 @@ class View:
 
 
 def view(value: Any) -> Any:
-    """Return a value as rules read it: a view of a table, UNKNOWN in place of None."""
+    """Wrap a value for the rules: a table becomes a View, and None becomes UNKNOWN."""
     if value is None:
         return UNKNOWN
     if isinstance(value, Table):

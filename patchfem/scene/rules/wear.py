@@ -1,4 +1,4 @@
-"""Rules of [wear]: what wear needs, and what it cannot stand beside yet."""
+"""Rules of [wear]: what wear needs, and what it cannot be combined with yet."""
 
 from itertools import pairwise
 from math import pi
@@ -13,7 +13,7 @@ FACTOR_KEYS = ("coefficient_factor", "bond_length_factor")
 
 
 class WearFacts(Facts):
-    """Facts of [wear] and of what stands beside it; `friction` is its table of friction over the worn depth."""
+    """Facts for the rules of [wear]; `friction` is its table of friction over the worn depth."""
 
     def __init__(self, draft: SceneDraft, kind: str) -> None:
         super().__init__(draft, "wear", draft.tables.wear)
@@ -37,7 +37,7 @@ class WearFacts(Facts):
 
     @property
     def strip_compliance(self) -> str:
-        """Key of what lets strips slip part by part; "" if there is none."""
+        """Key of the compliance that allows partial slip of strips; "" if there is none."""
         return self.compliance if self.scene.contact.strips else ""
 
     @property
