@@ -10,8 +10,8 @@ the energy f . C f/2 + g . f (+ that of the springs).
 
 Both methods solve the equations w = 0 on a set A of active nodes and f = 0 elsewhere, signs aside (`solve_on_set`).
 `solve_primal_dual` exchanges all nodes of a wrong sign at once; it takes few steps, but may return to a set.
-`solve_primal` exchanges one node at a time; its energy falls, so that it ends. A patch and several strips differ in
-their compliance only (`strip_compliance`).
+`solve_primal` exchanges one node at a time; the energy decreases, so the method ends. A patch and several
+strips differ in their compliance only (`strip_compliance`).
 """
 
 from typing import NamedTuple
@@ -92,9 +92,8 @@ class SetSolution(NamedTuple):
 class _SetEquations:
     """Contact equations of one set of active nodes, for motions made orthogonal to each other.
 
-    The motions R T are orthogonal in the norm of C^-1 on the set plus the springs (modified Gram-Schmidt),
-    so that each one is found from a single division. Two neighbouring nodes at the far end of the
-    interface then lose no digits.
+    The motions R T are orthogonal in the norm of C^-1 on the set plus the springs (modified Gram-Schmidt), so each
+    motion is found from a single division. Two neighbouring nodes at the far end of the interface then lose no digits.
     """
 
     def __init__(self, compliance, problem: ContactProblem, active: np.ndarray):
@@ -104,9 +103,10 @@ class _SetEquations:
         n_nodes = self.index.size
         n_motions = problem.target.size
         gap = problem.gap[self.index]
-        # subtracted first, because the approach may be far smaller than the gaps
+        # the smallest gap is subtracted first, because the approach may be far smaller than the gaps
         self.offset = gap.min() if n_motions else 0.0
-        # a row for the gap and one for each motion: what it closes at the nodes, then its column of T
+        # right-hand sides: a row for the gap and one for each motion. The first columns are the gap or closing of
+        # the nodes; the last columns of the motions begin as the identity and become T, transposed
         right_sides = np.zeros((1 + n_motions, n_nodes + n_motions))
         right_sides[0, :n_nodes] = gap - self.offset
         rows = right_sides[1:]
@@ -167,7 +167,7 @@ class _SetEquations:
         )
 
     def _close_gap(self, gap_force: np.ndarray, loads: np.ndarray) -> tuple:
-        """Return the forces (k,) [N] and orthogonal motions (r,) that close a gap of the nodes under loads.
+        """Return forces (k,) [N] and orthogonal motions (r,) that close a gap under given loads.
 
         gap_force: (k,) forces [N] that close the gap without any motion; loads: (r,) of the motions.
         """
@@ -202,7 +202,7 @@ def solve_on_set(
 
 
 def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSolution:
-    """Return the solution on the same set after iterative refinement, if that lowers its violation.
+    """Refine a solution iteratively on its contact set, if that lowers its violation.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSo
         Solution on the set `active`; it is returned unless its openings show rounding errors.
     active : (n,) bool ndarray
     """
-    # a tenth of the overlap at which a node enters the set
+    # the limit is a tenth of the overlap at which a node enters the set
     error = np.abs(solution.opening[active])
     if not (error > OPENING_NOISE / 10 * solution.scale[active]).any():
         return solution
@@ -357,7 +357,7 @@ def solve_primal(
 
 
 def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> float:
-    """Return the rotation theta [rad] at which a rigid piece rests on the gap under load and moment.
+    """Return the rotation theta [rad] at which a rigid piece rests under load and moment.
 
     The piece rests on the edge of the lower convex hull of the gap below the load line; against a spring it may rest
     on one corner.
@@ -392,7 +392,10 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
 
 
 def find_rest_motion(problem: ContactProblem) -> np.ndarray:
-    """Return the motion q (r,) at which the rigid holder rests on the gap, about one axis after the other."""
+    """Return the motion q (r,) at which a rigid piece rests under load and moments.
+
+    The rotations are found about one axis after the other.
+    """
     motion = np.zeros(problem.target.size)
     gap = problem.gap
     for k in range(1, motion.size):
@@ -413,7 +416,7 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
 
 
 def guess_contact_set(compliance, problem: ContactProblem) -> np.ndarray:
-    """Return the nodes (n,) that the load is likely to bring into contact from the rest position.
+    """Guess the nodes (n,) that the load brings into contact from the rest position.
 
     The load closes the gap by the geometric mean of what a point load and a uniform load would. Under a prescribed
     approach these are the nodes that overlap.

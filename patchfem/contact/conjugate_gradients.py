@@ -1,4 +1,4 @@
-"""Constrained conjugate gradients for a contact problem, the fallback of the active-set methods.
+"""Constrained conjugate gradients for contact, the fallback of the active-set methods.
 
 The method is that of Polonsky and Keer (Wear 231, 1999, 206). It needs products with the compliance only, so it also
 serves rows of thousands of points. After each step the load, or load and moments, are restored by the nearest
@@ -13,9 +13,8 @@ import numpy as np
 from .active_set import OPENING_NOISE, ContactProblem
 
 ENERGY_NOISE = 1e-13  # rounding error of the energy over the sum of the magnitudes of its terms
-RESULTANT_TOL = (
-    1e-12  # error of a resultant over the load, above which the forces are projected once more
-)
+# error of a resultant over the load, above which the forces are projected once more
+RESULTANT_TOL = 1e-12
 
 
 class _QuadraticProgram(NamedTuple):
@@ -23,7 +22,7 @@ class _QuadraticProgram(NamedTuple):
 
     - product: Function f -> C f.
     - gap (n,): The gap g [m].
-    - rigid (n, r): Rigid motions, all of size 1.
+    - rigid (n, r): Rigid motions, scaled to a largest closing of 1.
     - target (r,): Prescribed load and moments.
     """
 
@@ -75,7 +74,7 @@ def project_forces(
     rigid : (n, r) ndarray
         Rigid motions.
     target : (r,) ndarray
-        Wanted resultants rigid^T f.
+        Prescribed resultants rigid^T f.
     max_iterations : int
         Number of Newton steps.
     """
@@ -98,7 +97,10 @@ def project_forces(
 
 
 def _line_search(start: np.ndarray, change: np.ndarray, wanted: float) -> float:
-    """Return t > 0 with change . max(0, start + t change) = wanted; the left-hand side is piecewise linear in t."""
+    """Return t > 0 with change . max(0, start + t change) = wanted.
+
+    The left-hand side is piecewise linear in t.
+    """
     is_positive = (start > 0) | ((start == 0) & (change > 0))
     crossing = np.flatnonzero(start * change < 0)
     t = -start[crossing] / change[crossing]
@@ -188,7 +190,10 @@ def solve_by_gradients(
 
 
 def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Return admissible forces near to nonnegative ones; nodes without force keep none unless they are needed."""
+    """Return forces >= 0 with the prescribed resultants, near to given forces >= 0.
+
+    Nodes without force stay unloaded, unless the loaded nodes alone cannot carry the resultants.
+    """
     is_loaded = force > 0
     restored = np.zeros(force.size)
     if np.count_nonzero(is_loaded) >= target.size:

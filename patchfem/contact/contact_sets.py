@@ -1,8 +1,9 @@
-"""Contact sets: normal contact as a piecewise linear function of approach delta and rotation theta of the holder.
+"""Contact sets: normal contact as a piecewise linear function of the holder's motion.
 
-The unilateral contact of `unilateral`, w = g + theta x - delta + C f >= 0, f >= 0, f . w = 0, is affine in (delta,
-theta) as long as its set of touching nodes stays. So the plane falls into convex polygons, one for each contact set.
-Motions are counted from a solved reference state: d = delta - delta0, t = theta - theta0.
+The motion consists of the approach delta and the rotation theta. The unilateral contact of `unilateral`, w = g + theta
+x - delta + C f >= 0, f >= 0, f . w = 0, is affine in (delta, theta) as long as its set of touching nodes stays. So the
+plane falls into convex polygons, one for each contact set. Motions are counted from a solved reference state: d = delta
+- delta0, t = theta - theta0.
 
 The energy E = f . C f/2 is convex and has the slopes dE/d(delta) = N and dE/d(theta) = -M, M = sum f x, across the
 borders of the polygons as well. So the forces give back the energy that they took.
@@ -15,7 +16,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ..core import PatchfemError, frozen_array
 
-MAX_BYTES = 64e6  # size of the contact sets that are stored
+MAX_BYTES = 64e6  # bytes of stored contact sets; when they are full, the oldest set is replaced
 MAX_SIDES = 16  # sides of a polygon, as in `polygon_kernels`
 
 
@@ -34,11 +35,17 @@ class ContactSet:
     energy: np.ndarray
 
     def values(self, d: float, t: float) -> np.ndarray:
-        """Return forces [N] of nodes in contact and gaps [m] of the others (m,) at a motion d [m], t [rad]."""
+        """Return forces [N] of nodes in contact and gaps [m] of the others (m,) at a motion.
+
+        d [m], t [rad]: motion of the holder.
+        """
         return self.rows[0] + d * self.rows[1] + t * self.rows[2]
 
     def forces(self, d: float, t: float) -> np.ndarray:
-        """Return the nodal forces (m,) [N] >= 0 at a motion d [m], t [rad]; rounding errors below 0 are cut off."""
+        """Return the nodal forces (m,) [N] at a motion, with rounding errors below 0 cut off.
+
+        d [m], t [rad]: motion of the holder.
+        """
         return np.where(self.on, np.maximum(self.values(d, t), 0.0), 0.0)
 
 
@@ -106,7 +113,7 @@ class ContactSets:
         return ContactSet(frozen_array(on, bool), frozen_array(rows), frozen_array(energy))
 
     def arrays(self, room: float = MAX_BYTES) -> dict:
-        """Return the arrays of `press_kernels.SetArrays` without sets; `wanted` is the reference set.
+        """Return empty arrays of `press_kernels.SetArrays`, with the reference set in `wanted`.
 
         room: size of the contact sets that can be stored [bytes].
         """
@@ -143,7 +150,7 @@ class ContactSets:
 
 
 def sides(count: int) -> dict:
-    """Return empty arrays for the polygons of `count` contact sets, named as in `press_kernels.SetArrays`."""
+    """Return the empty polygon arrays of `press_kernels.SetArrays` for `count` contact sets."""
     return {
         "sides": np.zeros(count, np.int64),
         "edge": np.zeros((count, MAX_SIDES), np.int64),

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..elasticity.lapack import cho_factor, cho_solve
 
-# node pressure over the largest pressure, above which a node of a smooth skin counts as in contact
+# node pressure over the largest pressure, above which a node with a smooth asperity law counts as in contact
 MIN_RELATIVE_PRESSURE = 1e-13
 # height of the first row of cells over the length of a cell, up to which `edge_offset_fraction` was measured
 MAX_ASPECT = 4.0
@@ -35,10 +35,11 @@ class ContactEdge(NamedTuple):
 
 
 def edge_offset_fraction(aspect):
-    """Return the fraction of the last cell in contact by which the edge lies behind `ContactEdge.fraction`.
+    """Return the offset of an edge behind `ContactEdge.fraction`, over the length of a cell.
 
-    It decreases with the aspect, first with its square and then in proportion. The three numbers fit Hertz contact on
-    35 meshes of aspects 1/8 to 4 within 0.0005; each of these is known to 0.003.
+    The cell is the last one in contact. The offset decreases with the aspect, first with its square and then in
+    proportion. The three numbers fit Hertz contact on 35 meshes of aspects 1/8 to 4 within 0.0005; each of these is
+    known to 0.003.
 
     Parameters
     ----------
@@ -50,9 +51,9 @@ def edge_offset_fraction(aspect):
 
 
 def edge_offset(inner, outer, fraction, row: float | None = None):
-    """Return the lengths [m] by which edges lie behind where `ContactEdge.fraction` puts them.
+    """Return the distances [m] of edges behind the positions that `ContactEdge.fraction` gives.
 
-    As the edge passes from one cell to the other it takes over its length, so that it does not jump where cells of two
+    The cell length is interpolated between both cells by the fraction, so an edge does not jump where cells of two
     lengths meet.
 
     Parameters
@@ -77,7 +78,7 @@ def _find_ends(active: np.ndarray) -> list:
 
 
 def passed_fraction(force: float, force_rate: float, gap: float, gap_rate: float) -> float:
-    """Return the fraction of a cell that an edge has passed, 1/2 where the rates do not determine it.
+    """Return the fraction of a cell that an edge has passed; 1/2 if it is not determined.
 
     Parameters
     ----------
@@ -99,11 +100,11 @@ def find_edges(normal, x, force, gap, softness=None, row: float | None = None) -
     Parameters
     ----------
     normal : (m, m) ndarray
-        Compliance [m/N], that of a linear skin included.
+        Compliance [m/N], that of a linear asperity layer included.
     x, force, gap : (m,) ndarray
         Positions [m], forces [N] and gap under load [m].
     softness : (m,) ndarray, optional
-        Compliance [m/N] of the skin alone, which has its edge at the node itself.
+        Compliance [m/N] of the asperity layer alone, which has its edge at the node itself.
     row : float, optional
         Height of the first row of cells [m]; square cells without it.
 
@@ -163,8 +164,8 @@ def snap_to_steps(edges: list, x, gap, jumps) -> list:
 def find_pressure_edges(x, pressure, fraction: float, largest: float | None = None) -> list:
     """Find the edges of the nodes whose pressure exceeds a fraction of the largest pressure.
 
-    This serves pressures without an edge, behind a smooth skin. Between two nodes the logarithm of the pressure is
-    taken as linear.
+    This serves the pressures of a smooth asperity law, which have no sharp edge. Between two nodes the logarithm of the
+    pressure is taken as linear.
 
     Parameters
     ----------
@@ -214,10 +215,10 @@ def contact_intervals(x, force, edges: list) -> np.ndarray:
 
 
 def set_stiffness(compliance, active, motion, edges: list) -> float:
-    """Return the stiffness motion . C_AA^-1 motion of a contact set whose edges lie between the nodes.
+    """Return the stiffness of a contact set whose edges lie between the nodes.
 
-    The stiffness of the set is that of edges half a cell beyond its last nodes. Every edge that lies elsewhere adds its
-    part of the parabola through the sets with one node less and one more.
+    The stiffness motion . C_AA^-1 motion of the nodes A in contact is that of edges half a cell beyond the last nodes.
+    Every edge that lies elsewhere adds the change along the parabola through the sets with one node less and one more.
 
     Parameters
     ----------
@@ -259,7 +260,9 @@ def set_stiffness(compliance, active, motion, edges: list) -> float:
 
 
 def parabola_change(shift: float, gain: float, loss: float) -> float:
-    """Return the change at `shift` of the parabola that changes by `gain` at 1, by -`loss` at -1 and by 0 at 0.
+    """Interpolate a change at `shift` by a parabola through three given changes.
+
+    These are `gain` at 1, -`loss` at -1 and 0 at 0.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Shapes of the surfaces: functions of the positions x [m], whose sum is the gap between the pieces.
+"""Shapes of the surfaces: functions of x [m] whose sum is the gap between the pieces.
 
 `STATED` has what a mesh or a holder needs to know of a shape besides its gap. A shape of which they need to
 know nothing has no entry there.
@@ -31,7 +31,10 @@ STATED = {
 
 
 def tilt(x: np.ndarray, angle: float) -> np.ndarray:
-    """Return the gap angle x (m,) [m] of a tilted upper piece; angle [rad] > 0 opens the gap at +x."""
+    """Return the gap angle x (m,) [m] of a tilted upper piece.
+
+    An angle [rad] > 0 opens the gap at +x.
+    """
     return angle * x
 
 
@@ -41,5 +44,8 @@ def crown(x: np.ndarray, radius: float) -> np.ndarray:
 
 
 def step(x: np.ndarray, height: float, at: float) -> np.ndarray:
-    """Return a gap (m,) [m] that is `height` [m] beyond x = at [m], and half of it at a node on the edge."""
+    """Return a gap (m,) [m] that is `height` [m] beyond x = at [m].
+
+    A node on the edge has half the height.
+    """
     return height * np.heaviside(x - at, 0.5)

@@ -1,7 +1,7 @@
 """Compiled polygons of contact sets: the motions (d, t) of the holder at which a set holds.
 
-Each node of a set limits these motions to one side of a line. The lines enclose a convex polygon, of which
-only few are sides, so that comparing a motion with the sides is faster than checking all nodes. `sets` is a
+Each node of a set limits these motions to one side of a line. The lines enclose a convex polygon, of which only a few
+are sides, so comparing a motion with the sides is faster than checking all nodes. `sets` is a
 `press_kernels.SetArrays`.
 """
 
@@ -19,17 +19,21 @@ BOX_HALF_WIDTH = 100.0
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def units(sets):
-    """Return the units of the polygons: the openings of the reference state [m], and these over the arm [rad]."""
+    """Return the units of d [m] and of t [rad] in which polygons are computed.
+
+    They are the size of the openings of the reference state, and this size over the largest |x|.
+    """
     arm = max(abs(sets.x[0]), abs(sets.x[-1]))
     return sets.base[3], sets.base[3] / arm if arm > 0 else 1.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_polygon(sets, slot):
-    """Compute the polygon of the set in a slot, a box clipped by the line of each node.
+    """Compute the polygon of motions at which the contact set in a storage slot holds.
 
-    Clipping is that of Sutherland and Hodgman (Comm. ACM 17, 32, 1974). Nodes at the ends of the contact come
-    first, because they cut off most. A set with too many sides gets no polygon.
+    It is a box of motions, clipped by one line for each node: that of the motions at which the node would enter or
+    leave the contact. Clipping is that of Sutherland and Hodgman (Comm. ACM 17, 32, 1974). Nodes at the ends of the
+    contact come first, because they cut off most. A set with too many sides gets no polygon.
     """
     unit_d, unit_t = units(sets)
     r0, r1, r2, on = sets.rows[slot, 0], sets.rows[slot, 1], sets.rows[slot, 2], sets.on[slot]
@@ -98,9 +102,9 @@ def is_in_box(sets, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def margin(sets, k, side, d, t):
-    """Return the force [N] or gap [m] by which the node of a side of set k is above its limit at (d, t).
+    """Return how far the force [N] or gap [m] of the node of a side is above its limit.
 
-    d [m], t [rad]: motion of the holder.
+    k: slot of the set; d [m], t [rad]: motion of the holder.
     """
     i = sets.edge[k, side]
     least = sets.limit[k, 0] if sets.on[k, i] else sets.limit[k, 1]
@@ -109,7 +113,9 @@ def margin(sets, k, side, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def is_inside(sets, k, d, t):
-    """Return whether (d [m], t [rad]) lies in the polygon of set k; False also if the set has none.
+    """Return whether a motion (d [m], t [rad]) lies in the polygon of set k.
+
+    A set without polygon contains no motion.
 
     Cost: a few multiplications per side, instead of one pass over the nodes.
     """
@@ -123,10 +129,10 @@ def is_inside(sets, k, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_exit(sets, k, d, t, dd, dt):
-    """Return the fraction of the increment (dd, dt) from (d, t) at which it leaves set k, and the side.
+    """Return the fraction of an increment of motion at which it leaves set k, and the side.
 
-    d, dd [m]; t, dt [rad]. The fraction is inf and the side -1 if the increment stays inside or the set has no
-    polygon.
+    The increment (dd, dt) begins at (d, t). d, dd [m]; t, dt [rad]. The fraction is inf and the side -1 if the
+    increment stays inside or the set has no polygon.
     """
     out, found = np.inf, -1
     if sets.sides[k] == 0 or not (is_in_box(sets, d, t) and is_in_box(sets, d + dd, t + dt)):

@@ -1,14 +1,14 @@
-"""Compiled search for contact sets, on each of which forces and gaps are affine in the motion of the holder.
+"""Compiled search for the contact set at a motion of the holder.
 
-The motion is counted from a reference state: closing d [m] and rotation t [rad]. The unknowns y of a set are
-the forces of its nodes in contact and the gaps of the others. The linear complementarity problem
-w = b + t x - d + C f then reads y = R (1, d, t). A node that enters or leaves the set is a principal pivot of
-the tableau [T | R].
+On each set forces and gaps are affine in the motion. The motion is counted from a reference state: closing d [m] and
+rotation t [rad]. The unknowns y of a set are the forces of its nodes in contact and the gaps of the others. The linear
+complementarity problem w = b + t x - d + C f then reads y = R (1, d, t). A node that enters or leaves the set is a
+principal pivot of the tableau [T | R].
 
-A set is stored under a 64-bit name, the exclusive or of the names of its nodes, so that a state on a stored
-set costs one pass over the nodes. The search exchanges all nodes of a wrong sign at once (block pivoting), and
-after `N_BLOCK_EXCHANGES` sets only the first of them, which ends for every positive definite C (Murty, Opsearch 11,
-1974). `contact_sets.ContactSets` is the NumPy twin.
+A set is stored under a 64-bit name, the exclusive or of the names of its nodes, so a state on a stored set costs one
+pass over the nodes. The search exchanges all nodes of a wrong sign at once (block pivoting), and after
+`N_BLOCK_EXCHANGES` sets only the first of them, which ends for every positive definite C (Murty, Opsearch 11, 1974).
+`contact_sets.ContactSets` is the NumPy twin.
 """
 
 from typing import NamedTuple
@@ -19,12 +19,12 @@ from ..compiled.jit import njit
 from .polygon_kernels import NJIT_NO_REFCOUNT, ROUNDING, is_inside, write_polygon
 
 FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
-# loops that search a minimum are vectorised only with these flags
+# the compiler vectorises loops that search a minimum only with these flags
 FASTMATH_MINIMUM = FASTMATH_FLAGS | {"nnan", "nsz"}
 N_BLOCK_EXCHANGES = 12  # sets that are tried with all failing nodes exchanged; more may cycle
 # relative residual above which the tableau is computed anew; below it one refinement reaches rounding errors
 MAX_TABLEAU_RESIDUAL = 1e-8
-# places of `SetArrays.meta`
+# indices into `SetArrays.meta`
 COUNT = 0  # number of sets that are stored
 SLOT = 1  # slot of the next set
 BUILT = 2  # number of sets computed so far
@@ -53,7 +53,7 @@ class SetArrays(NamedTuple):
 
     Polygons of motions on which a set holds:
 
-    - sides (k,): number of sides; 0 if there is no polygon, so that all nodes have to be checked.
+    - sides (k,): number of sides; 0 if there is no polygon, and all nodes have to be checked.
     - edge (k, MAX_SIDES): node of each side; beside (k, MAX_SIDES): slot of the set beyond it, or -1.
     - limit (k, 2): force [N] and gap [m] below which a node fails; corner (2, 3, 4 MAX_SIDES): workspace.
     """
@@ -127,7 +127,7 @@ def reset_tableau(sets):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def refine_rows(sets):
-    """Refine the rows of the set of the tableau once with C itself; returns the relative residual before."""
+    """Refine the tableau by one iterative step with C; return the relative residual before."""
     m, c, tableau = sets.x.size, sets.c, sets.tableau
     force, left = sets.side[0], sets.side[1]
     for i in range(m):
@@ -157,7 +157,7 @@ def refine_rows(sets):
             tableau[i, m], tableau[i, m + 1], tableau[i, m + 2] = s0, s1, s2
             left[0, i], left[1, i], left[2, i] = 0.0, 0.0, 0.0
     worst = max(off0 / top0 if top0 > 0 else 0.0, off1 / top1, off2 / top2 if top2 > 0 else 0.0)
-    for i in range(m if worst > 1e-15 else 0):  # nothing to refine at round-off
+    for i in range(m if worst > 1e-15 else 0):  # a residual at round-off cannot be refined
         s0, s1, s2 = 0.0, 0.0, 0.0
         line = tableau[i]
         for j in range(m):
@@ -172,7 +172,10 @@ def refine_rows(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def store_set(sets, name):
-    """Store the set of the tableau in the next slot and return the slot; without a free one the oldest set is dropped."""
+    """Store the set of the tableau in the next slot and return the slot.
+
+    Without a free slot the oldest set is dropped.
+    """
     m, meta = sets.x.size, sets.meta
     slot, bucket = meta[SLOT], sets.heads.size - 1
     meta[SLOT] = (slot + 1) % sets.names.size
@@ -212,7 +215,7 @@ def store_set(sets, name):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pivot_to_wanted(sets):
-    """Pivot the tableau to the set `wanted`; False if a pivot is not positive."""
+    """Pivot the tableau to the contact set `sets.wanted`; False if a pivot is not positive."""
     for i in range(sets.x.size):
         if sets.here[i] != sets.wanted[i] and not pivot(sets, i):
             return False
@@ -221,7 +224,9 @@ def pivot_to_wanted(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def build_set(sets, name):
-    """Compute the set `wanted` and return its slot; -1 if the compliance is not positive definite on it.
+    """Compute the contact set `sets.wanted` and return its slot.
+
+    The slot is -1 if the compliance is not positive definite on the set.
 
     name: name of the set. The tableau is pivoted to it. If it has lost its digits, it is computed anew and
     pivoted once more. Cost: m^2 multiplications for each node that is exchanged.
@@ -255,9 +260,10 @@ def find_stored(sets, name):
 
 @njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
 def check_set(sets, k, d, t):
-    """Return whether set k holds at (d [m], t [rad]), and the force [N] and gap [m] below which nodes fail.
+    """Return whether set k holds at a motion, and the force and gap below which nodes fail.
 
-    Both bounds are <= 0, by the rounding error of a force and of a gap.
+    d [m], t [rad]: motion of the holder. Both bounds [N] and [m] are <= 0, by the rounding error of a force and of a
+    gap.
     """
     r0, r1, r2, on = sets.rows[k, 0], sets.rows[k, 1], sets.rows[k, 2], sets.on[k]
     top, pull, deep = 0.0, 0.0, 0.0
@@ -292,7 +298,7 @@ def exchange_failing(sets, k, d, t, force, gap, is_single):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def locate(sets, k, d, t):
-    """Return the slot of the contact set at (d [m], t [rad]), searched from set k; -1 if none is found.
+    """Find the contact set at a motion (d [m], t [rad]) from set k; return its slot or -1.
 
     Cost: 0.5 us for 400 nodes on a known set, 0.3 ms for a new one that differs by one node.
     """
@@ -312,16 +318,20 @@ def locate(sets, k, d, t):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def begin(sets, name):
-    """Compute the set `wanted` of this name from the empty set and return its slot; -1 as in `build_set`."""
+    """Compute the contact set `sets.wanted` from an empty tableau and return its slot.
+
+    name: name of the set. The slot is -1 if the compliance is not positive definite on the set.
+    """
     reset_tableau(sets)
     return build_set(sets, name)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pull(sets, k, h, turn):
-    """Return the energy [J] of the preloaded contact on set k, and its slopes in heave h = -d and rotation.
+    """Return the energy [J] of the preloaded contact on set k, and the slopes of the energy.
 
-    The load is N0 less the slope in heave, the moment M0 less that in rotation.
+    The slopes are those in heave h = -d and in rotation. The load is N0 less the slope in heave, the moment M0 less
+    that in rotation.
     """
     q, d = sets.energy[k], -h
     by_d, by_t = q[3] * d + q[4] * turn, q[4] * d + q[5] * turn
@@ -330,9 +340,9 @@ def pull(sets, k, h, turn):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def press_state(sets, k, d, t, force):
-    """Return load [N], moment [N m] and energy [J] of set k at (d [m], t [rad]), and write its nodal forces.
+    """Return load [N], moment [N m] and energy [J] of set k, and write the nodal forces.
 
-    force: (m,) array [N] for the forces, which are >= 0.
+    d [m], t [rad]: motion of the holder. force: (m,) array [N] for the forces, which are >= 0.
     """
     energy, slope, turn = pull(sets, k, -d, t)
     for i in range(force.size):

@@ -1,4 +1,4 @@
-"""Compiled mean of the contact forces along a straight increment of the holder's motion, from set to set."""
+"""Compiled mean of the contact forces along a straight increment of the holder's motion."""
 
 import numpy as np
 
@@ -9,7 +9,9 @@ from .press_kernels import FASTMATH_MINIMUM, check_set, locate, pull
 
 @njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
 def find_first_failure(sets, k, d, t, dd, dt, force, gap):
-    """Return the fraction of the increment (dd [m], dt [rad]) from (d, t) at which a node of set k fails first.
+    """Return the fraction of an increment of motion at which a node of set k fails first.
+
+    The increment (dd [m], dt [rad]) begins at (d, t).
 
     force [N], gap [m]: bounds of nodes in contact and of open nodes, from `press_kernels.check_set`.
     """
@@ -25,9 +27,10 @@ def find_first_failure(sets, k, d, t, dd, dt, force, gap):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def cross_side(sets, k, side, d, t):
-    """Return the slot of the contact set beyond a side of set k at (d [m], t [rad]); -1 if none is found.
+    """Return the slot of the contact set beyond a side of set k; -1 if none is found.
 
-    side: -1 if the side is not known. The set is stored with the side, so that the next crossing needs no search.
+    d [m], t [rad]: motion just beyond the side. side: -1 if the side is not known. The set is stored with the side, so
+    the next crossing needs no search.
     """
     if side >= 0:
         following = sets.beside[k, side]
@@ -43,7 +46,7 @@ def cross_side(sets, k, side, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def path_mean(sets, k, h, turn, dh, dt, out):
-    """Average the slopes of the energy of the preloaded contact along an increment of heave and rotation.
+    """Average the slopes of the energy of the preloaded contact along an increment of motion.
 
     The mean times the increment is the difference of the energies (a discrete gradient), and the mean is
     itself the gradient of a convex function.
@@ -67,7 +70,7 @@ def path_mean(sets, k, h, turn, dh, dt, out):
     at = 0.0
     # fraction beyond a border at which the next set is searched, above rounding errors
     small = 1e-10
-    # a path that returns to the same sets because of rounding errors ends here
+    # the number of sets is limited, because rounding errors may make a path return to the same sets
     for _ in range(20 * sets.x.size + 100):
         end, side = 1.0, -1
         if not is_inside(sets, k, -(h + dh), turn + dt):

@@ -1,21 +1,22 @@
-"""Local laws of a rough skin: pressure P as a function of the separation s of the mean planes, and its slope.
+"""Pressure laws of the skin, the compliant layer of asperities between rough surfaces.
 
-P >= 0 falls with s. The linear skin carries nothing beyond s = 0. The smooth laws reach everywhere; they are handled by
-the logarithm of P, which neither overflows nor vanishes.
+The pressure P >= 0 decreases with the separation s of the mean planes. The linear law carries nothing beyond s = 0. The
+smooth laws have P > 0 at every s; they are computed by the logarithm of P, which neither overflows nor vanishes.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-_V = 0.1 * np.arange(1, 70)  # trapezoidal rule on an even analytic integrand: error below 1e-15
+# nodes of the trapezoidal rule, whose error is below 1e-15 for an even analytic integrand
+_V = 0.1 * np.arange(1, 70)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LinearSkin:
-    """A linear skin: P = k max(0, -s), k [Pa/m] > 0.
+    """Linear law of the asperity layer: P = k max(0, -s), k [Pa/m] > 0.
 
-    s < 0 is the crush of the skin; at s >= 0 it carries nothing.
+    -s > 0 is the compression of the layer; at s >= 0 it carries nothing.
     """
 
     k: float
@@ -25,12 +26,12 @@ class LinearSkin:
         return self.k * np.maximum(0.0, -np.asarray(s, float))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """Stiffness -dP/ds (m,) [Pa/m]; 0 where the skin is not crushed."""
+        """Stiffness -dP/ds (m,) [Pa/m]; 0 where the layer is not compressed."""
         return np.where(np.asarray(s) < 0, self.k, 0.0)
 
 
 class SmoothSkin:
-    """Base of the skin laws with P > 0 everywhere, which gives P and -dP/ds from the logarithm of P.
+    """Base of the smooth laws, with P > 0 at every separation; P and -dP/ds follow from log P.
 
     Each law has `log_pressure` and `separation`.
     """
@@ -38,27 +39,31 @@ class SmoothSkin:
     __slots__ = ()
 
     def pressure(self, s: np.ndarray) -> np.ndarray:
-        """Pressure P (m,) [Pa] at the separations s (m,) [m]; held at exp(700) Pa, before numbers overflow."""
+        """Return the pressure P (m,) [Pa] at the separations s (m,) [m].
+
+        P is limited to exp(700) Pa, because larger numbers overflow.
+        """
         return np.exp(np.minimum(self.log_pressure(np.asarray(s, float))[0], 700.0))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """Stiffness -dP/ds = P times the fall of log P, (m,) [Pa/m], at the separations s (m,) [m]."""
+        """Stiffness -dP/ds (m,) [Pa/m] at s (m,) [m]: P times the decay rate of log P."""
         return self.pressure(s) * self.log_pressure(np.asarray(s, float))[1]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ExponentialSkin(SmoothSkin):
-    """An exponential skin: P = reference exp(-s/u0), u0 [m] > 0, reference [Pa] the pressure at s = 0.
+    """Exponential law of the asperity layer: P = reference exp(-s/u0).
 
-    Without a reference `strips.press_strips` takes the mean pressure of the given load, so that flat aligned pieces
-    have s = 0 and the approach is the closing of the bodies alone. The choice shifts the approach and nothing else.
+    u0 [m] > 0 is the decay length, reference [Pa] the pressure at s = 0. Without a reference `strips.press_strips`
+    takes the mean pressure of the given load. Flat aligned pieces then have s = 0, and the approach is the closing of
+    the bodies alone. The choice shifts the approach and nothing else.
     """
 
     u0: float
     reference: float | None = None
 
     def log_pressure(self, s: np.ndarray) -> tuple:
-        """log P = log reference - s/u0 at s (m,) [m], P in Pa, and its fall -d(log P)/ds = 1/u0 [1/m], (m,) each."""
+        """Return log P (m,), P in Pa, and its decay rate 1/u0 (m,) [1/m] at s (m,) [m]."""
         return np.log(self.reference) - s / self.u0, np.full(np.shape(s), 1 / self.u0)
 
     def separation(self, pressure: np.ndarray) -> np.ndarray:
@@ -68,7 +73,7 @@ class ExponentialSkin(SmoothSkin):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class HertzSkin(SmoothSkin):
-    """A skin of Hertzian peaks of Gaussian heights (Greenwood, Williamson 1966).
+    """Asperity layer of Hertzian peaks with Gaussian heights (Greenwood and Williamson 1966).
 
     P = 4/3 E* sqrt(R) eta int_s^inf (z - s)^3/2 phi(z) dz, mean height 0. radius: R [m] of a peak; density: eta [1/m2];
     deviation [m] of the peak heights; modulus: E* [Pa] of the pair, 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2. All >
@@ -85,7 +90,10 @@ class HertzSkin(SmoothSkin):
         return np.log(4 / 3 * self.modulus * self.density * self.radius**0.5 * self.deviation**1.5)
 
     def log_pressure(self, s: np.ndarray) -> tuple:
-        """log P at s (m,) [m], P in Pa, and its fall -d(log P)/ds [1/m], (m,) each, by `peak_integral`."""
+        """Return log P (m,), P in Pa, and its decay rate (m,) [1/m] at s (m,) [m].
+
+        The decay rate is -d(log P)/ds.
+        """
         log, fall = peak_integral(np.asarray(s, float) / self.deviation)
         return self._level + log, fall / self.deviation
 
@@ -109,11 +117,11 @@ class HertzSkin(SmoothSkin):
 
 
 def peak_integral(h: np.ndarray) -> tuple:
-    """Logarithm and its fall -d(log F)/dh of F(h) = int_h^inf (z - h)^3/2 phi(z) dz, phi the unit normal density; h any
-    shape.
+    """Return log F(h) and its decay rate -d(log F)/dh, each of the shape of h.
 
-    F = phi(h) 2 int_0^inf v^4 exp(-h v^2 - v^4/2) dv by the trapezoidal rule, and the moment series of (z - h)^3/2
-    below h = -8, which is short of it by exp(-32). Error of log F 2e-14 + 1e-16 h^2, of its fall 3e-13.
+    F(h) = int_h^inf (z - h)^3/2 phi(z) dz with the unit normal density phi. It is computed as F = phi(h) 2 int_0^inf
+    v^4 exp(-h v^2 - v^4/2) dv by the trapezoidal rule, and the moment series of (z - h)^3/2 below h = -8, which is
+    short of it by exp(-32). Error of log F 2e-14 + 1e-16 h^2, of the decay rate 3e-13.
     """
     h = np.asarray(h, float)
     flat = np.maximum(h, -8.0).reshape(-1, 1)
@@ -131,7 +139,10 @@ def peak_integral(h: np.ndarray) -> tuple:
 
 
 def _moment(n: float, a: np.ndarray) -> np.ndarray:
-    """Expectation of (1 + z/a)^n for a unit normal z and large a: sum binom(n, 2k) (2k - 1)!! a^-2k."""
+    """Return the expectation of (1 + z/a)^n for a unit normal z and large a.
+
+    It is the sum of binom(n, 2k) (2k - 1)!! a^-2k.
+    """
     out, term = np.zeros_like(a), np.ones_like(a)
     for k in range(0, 24, 2):
         out += term

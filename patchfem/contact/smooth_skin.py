@@ -1,6 +1,6 @@
-"""Solver of strips behind a smooth skin of asperities under one rigid holder.
+"""Solver of strips with a smooth skin (a compliant asperity layer) under one rigid holder.
 
-With the law P of the skin, the nodal areas A and the notation of `active_set` the equations are
+With the pressure law P of this layer, the nodal areas A and the notation of `active_set` the equations are
 
     f = A P(s),    s = g - R q + C f,    R^T f + S q = t.
 
@@ -23,26 +23,23 @@ from .unilateral import solve
 
 MAX_NEWTON_STEPS = 60  # more steps do not converge either; the descent of the dual function follows
 MAX_DUAL_STEPS = 60  # steps of the descent, and trials along each of its directions
-MIN_LOG_PRESSURE = (
-    -300.0
-)  # log of the pressure [Pa] below which an approach does not reach the skin
-MAX_LOG_FORCE = (
-    600.0  # log of a force [N] above which the exponential function overflows in products
-)
-MIN_RELATIVE_SLOPE = 1e-18  # nodes of a smaller slope, relative to the largest, follow the geometry
+# log of the pressure [Pa] below which the asperity layer counts as untouched
+MIN_LOG_PRESSURE = -300.0
+# log of a force [N] above which the exponential function overflows in products
+MAX_LOG_FORCE = 600.0
+MIN_RELATIVE_SLOPE = 1e-18  # slope over the largest slope; a step does not change smaller forces
 NEWTON_TOL = 1e-12  # relative imbalance and relative change of pressure of a solution
-MAX_PRESSURE_RISE = (
-    0.01  # pressure over the mean pressure to which an unloaded node may rise in one step
-)
+# pressure over the mean pressure to which an unloaded node may rise in one step
+MAX_PRESSURE_RISE = 0.01
 
 
 class SkinProblem(NamedTuple):
-    """Contact of strips through a smooth skin.
+    """Contact of strips through a skin, a compliant layer of asperities with a smooth law.
 
-    - skin: Law of the asperities.
+    - skin: Pressure law of the layer.
     - compliance: Compliance of the pieces.
     - area (n,): Nodal areas [m2].
-    - contact: Gap, motions and loads; the motions are of size 1.
+    - contact: Gap, motions and loads, with motions that close no node by more than 1.
     """
 
     skin: SmoothSkin
@@ -56,7 +53,7 @@ class SkinProblem(NamedTuple):
         return self.contact.target[0] / self.area.sum()
 
     def separation(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
-        """Return the separations (n,) [m] of the mean planes under forces (n,) [N] and a motion (r,)."""
+        """Return the separations (n,) [m] of the mean planes under forces [N] and a motion."""
         return self.contact.gap - self.contact.motions @ motion + self.compliance.product(force)
 
     def imbalance(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
@@ -79,7 +76,7 @@ class _StripResponse(NamedTuple):
 
     - nodes (k,): Indices among all nodes.
     - root (k,): D^1/2.
-    - to_motions (k, r) and to_values (k,): Its columns for R and for the values.
+    - to_motions (k, r) and to_values (k,): Columns of the response for R and for the values.
     """
 
     nodes: np.ndarray
@@ -89,7 +86,7 @@ class _StripResponse(NamedTuple):
 
 
 def solve_tangent(compliance, motions, slope, values) -> tuple:
-    """Factorise the tangent of every strip with its skin.
+    """Factorise the tangent equations of every strip with its asperity layer.
 
     Parameters
     ----------
@@ -97,7 +94,7 @@ def solve_tangent(compliance, motions, slope, values) -> tuple:
     motions : (n, r) ndarray
         Closing of the nodes per motion.
     slope : (n,) ndarray
-        Stiffness D of the skin at each node [N/m].
+        Stiffness D of the asperity layer at each node [N/m].
     values : (n,) ndarray
         One more right-hand side.
 
@@ -128,8 +125,8 @@ def solve_tangent(compliance, motions, slope, values) -> tuple:
 def _newton_step(problem: SkinProblem, slope, mismatch, imbalance) -> tuple:
     """Return the Newton step (forces, motion, separations) of f = A P(s).
 
-    slope: (n,) stiffness of the skin [N/m]; mismatch: (n,) separation of the geometry less that of the law [m];
-    imbalance: (r,) missing load and moments.
+    slope: (n,) stiffness of the asperity layer [N/m]; mismatch: (n,) separation of the geometry less that of the law
+    [m]; imbalance: (r,) missing load and moments.
     """
     contact = problem.contact
     responses, tangent = solve_tangent(problem.compliance, contact.motions, slope, mismatch)
@@ -171,7 +168,8 @@ def _solve_newton(problem: SkinProblem, separation, motion) -> SkinSolution | No
         noise = NEWTON_TOL + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
         missing = np.abs(imbalance).max() / contact.target[0] if imbalance.size else 0.0
         if max(missing, np.max(fraction * np.abs(log_change))) <= noise:
-            # the force of a nearly unloaded node follows its law
+            # a nearly unloaded node takes its force from the pressure law of the asperity layer, because
+            # the Newton step gives that force only to rounding errors of the largest force
             law_force = np.exp(np.minimum(log_force + log_change, MAX_LOG_FORCE))
             new_force = np.maximum(force + force_change, 0.0)
             new_force = np.where(fraction < 1e-15, law_force, new_force)
@@ -185,9 +183,9 @@ def _solve_newton(problem: SkinProblem, separation, motion) -> SkinSolution | No
 
 
 def _guess_separation(problem: SkinProblem) -> np.ndarray | None:
-    """Return first separations of one strip under its approach; None where the skin is not reached.
+    """Guess the separations of one strip under its approach; None without any contact.
 
-    No node can carry more than what flattens its overlap.
+    No node can carry more force than the one that flattens its overlap.
     """
     skin, gap = problem.skin, problem.contact.gap
     diagonal = problem.compliance.common.diagonal()
@@ -267,8 +265,8 @@ def _try_approach(problem: SkinProblem, motion: np.ndarray) -> SkinSolution | No
 def _minimise_dual(problem: SkinProblem, approach: float, length: float) -> SkinSolution:
     """Minimise the convex dual function of the motion, from an approach [m].
 
-    The gradient of the dual function is the imbalance of load and moments. length [m]: decay length of the skin, which
-    scales the regularisation.
+    The gradient of the dual function is the imbalance of load and moments. length [m]: decay length of the pressure
+    law, which scales the regularisation.
     """
     contact = problem.contact
     motion = np.zeros(contact.target.size)
@@ -296,7 +294,9 @@ def _minimise_dual(problem: SkinProblem, approach: float, length: float) -> Skin
 
 
 def _search_dual(problem: SkinProblem, start: SkinSolution, direction, min_imbalance) -> tuple:
-    """Return the best solution along a direction of the motion, found by bisection, and the iterations.
+    """Search the best solution along a direction of the motion by bisection.
+
+    Returns the solution and the number of iterations.
 
     min_imbalance: smallest imbalance so far; a trial that halves it is taken at once.
     """
@@ -321,7 +321,7 @@ def _search_dual(problem: SkinProblem, start: SkinSolution, direction, min_imbal
 
 
 def _linearised_start(problem: SkinProblem) -> tuple:
-    """Return first separations and motion: those of the tangent of the law at the mean pressure, a linear skin."""
+    """Return first separations and motion, from the law linearised at the mean pressure."""
     contact, mean_pressure = problem.contact, problem.mean_pressure
     mean_separation = problem.skin.separation(np.array([mean_pressure]))
     stiffness = mean_pressure * problem.skin.log_pressure(mean_separation)[1][0]
@@ -332,7 +332,7 @@ def _linearised_start(problem: SkinProblem) -> tuple:
     try:
         linear = solve(compliance, contact._replace(gap=contact.gap - first_touch))
     except (np.linalg.LinAlgError, NotConverged):
-        # any start will do
+        # uniform separations serve as the start where the linear problem has no solution
         approach = contact.gap.mean() - mean_separation[0]
         uniform = np.full(contact.gap.size, mean_separation[0])
         return uniform, approach * np.eye(1, contact.target.size)[0]
@@ -344,7 +344,7 @@ def _linearised_start(problem: SkinProblem) -> tuple:
 
 
 def solve_smooth_skin(problem: SkinProblem) -> SkinSolution:
-    """Solve strips behind a smooth skin under a load, and moments of the free rotations.
+    """Solve strips with a smooth asperity layer under a load and moments of free rotations.
 
     Parameters
     ----------
@@ -353,7 +353,7 @@ def solve_smooth_skin(problem: SkinProblem) -> SkinSolution:
     Returns
     -------
     SkinSolution
-        The best that was reached; the caller checks its residuals.
+        The best solution that was reached; the caller checks the residuals.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Stiffnesses of a contact set that sticks, from the compliance of the pieces."""
+"""Stiffnesses of a contact set in full stick, from the compliance of the pieces."""
 
 import numpy as np
 
@@ -7,9 +7,10 @@ from ..elasticity.lapack import one_thread
 
 
 def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
-    """Return the tangential stiffness dT/d(slide) [N/m] of a patch with every node of its contact set sticking.
+    """Return the tangential stiffness [N/m] of a patch in full stick.
 
-    Of the normal compliance it is dN/d(approach) at fixed rotation.
+    It is dT/d(relative displacement). With the normal compliance instead of the tangential one, the function returns
+    dN/d(approach) at fixed rotation.
 
     Parameters
     ----------
@@ -23,7 +24,9 @@ def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
 
 
 def coupled_stiffness(pieces: Compliance, closing: np.ndarray, active: np.ndarray) -> float:
-    """Return the tangential stiffness [N/m] of unlike pieces that stick, at fixed approach and rotation.
+    """Return the tangential stiffness [N/m] of dissimilar bodies in full stick.
+
+    Approach and rotation are fixed.
 
     Parameters
     ----------
@@ -43,14 +46,16 @@ def coupled_stiffness(pieces: Compliance, closing: np.ndarray, active: np.ndarra
 
 
 def rotational_stiffness(normal: np.ndarray, x: np.ndarray, active: np.ndarray) -> float:
-    """Return the rotational stiffness -dM/d(rotation) [N m/rad] > 0 about x = 0 at fixed approach and contact set.
+    """Return the rotational stiffness [N m/rad] > 0 of a contact set about x = 0.
+
+    It is -dM/d(rotation). Approach and contact set are fixed.
 
     Parameters
     ----------
     normal : (m, m) ndarray
         Compliance [m/N].
     x : (m,) ndarray
-        Places [m].
+        Positions [m].
     active : (m,) bool ndarray
         Contact set.
     """

@@ -11,9 +11,8 @@ import numpy as np
 
 from ..elasticity.lapack import dpotrf, dpotrs
 
-MAX_CACHE_BYTES = (
-    1e8  # size of the factors that are kept; more than a sequence of pressings of 16 strips needs
-)
+# bytes of cached Cholesky factors; a sequence of pressings of 16 strips needs fewer
+MAX_CACHE_BYTES = 1e8
 
 
 def factorise(matrix: np.ndarray) -> np.ndarray:
@@ -39,7 +38,7 @@ class WarmStart:
     factors: dict = field(default_factory=dict)
 
     def factor(self, key: tuple, make_matrix: Callable) -> np.ndarray:
-        """Return the Cholesky factor of the matrix that `make_matrix` returns; it is cached under `key`."""
+        """Return the Cholesky factor of the matrix of `make_matrix`; it is cached under `key`."""
         lower_factor = self.factors.pop(key, None)
         if lower_factor is None:
             lower_factor = factorise(make_matrix())
@@ -133,7 +132,7 @@ class StripCompliance:
         return solve
 
     def _factor(self, strip: int, is_active: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-        """Return the Cholesky factor of the block of the active nodes of a strip, from the cache if there is one."""
+        """Return the Cholesky factor of the active nodes of a strip, if possible from the cache."""
         if self.warm_start is None:
             return factorise(self.block(strip, nodes))
         diagonal = b"" if self.added is None else self.added[strip].tobytes()
@@ -141,5 +140,5 @@ class StripCompliance:
         return self.warm_start.factor(key, lambda: self.block(strip, nodes))
 
     def add_to_diagonal(self, diagonal: np.ndarray) -> "StripCompliance":
-        """Return the compliance with `diagonal` (m,) [m/N] added in every strip, without a warm start."""
+        """Return a compliance with `diagonal` (m,) [m/N] added in every strip; no warm start."""
         return StripCompliance(self.common + np.diag(diagonal), self.added)

@@ -4,10 +4,10 @@ Strip j, at y_j from the middle, has the gap g(x) + roll y_j (or one of its own)
 strips is neglected. The motion q = (delta, -theta, -roll) of the holder, or as much of it as is free, is common to all
 strips: strip j closes by R_j q with R_j = (1, x, y_j).
 
-Asperities are a skin, a local law P(s) in series with the pieces: a node of area A_i carries f_i = A_i P(s_i) at the
-separation s_i = g_i + theta x_i - delta + (C f)_i of the mean planes. P >= 0 decreases with s, so that the solution is
-unique for every law, gap and control. A linear skin adds 1/(k A_i) to the diagonal of C, and bare contact follows
-(`unilateral.solve`); `smooth_skin` solves the other laws. A patch with a skin is one strip.
+Asperities form a skin, a compliant layer with the local law P(s) in series with the pieces: a node of area A_i carries
+f_i = A_i P(s_i) at the separation s_i = g_i + theta x_i - delta + (C f)_i of the mean planes. P >= 0 decreases with s,
+so the solution is unique for every law, gap and control. A linear law adds 1/(k A_i) to the diagonal of C, and bare
+contact follows (`unilateral.solve`); `smooth_skin` solves the other laws. A patch with asperities is one strip.
 """
 
 from dataclasses import dataclass, replace
@@ -37,9 +37,8 @@ from .unilateral import (
     solve,
 )
 
-STRIP_RESIDUAL_TOL = (
-    1e-9  # relative residual of solved strips; rounding of steep skins stays below it
-)
+# relative residual of solved strips; rounding errors of steep asperity laws stay below it
+STRIP_RESIDUAL_TOL = 1e-9
 # the smallest force [N] that counts, so that quotients of an unloaded interface stay finite
 MIN_TOTAL_FORCE = 1e-150
 # force of a loaded node over the largest force; smaller ones are rounding errors
@@ -81,9 +80,9 @@ class StripsState:
     """State of s strips of m nodes pressed by one holder; forces are of all pairs together.
 
     - force (s, m): Nodal forces [N] >= 0.
-    - gap (s, m): Gap under load [m]; with a skin the separation of the mean planes, negative where the skin
-      is compressed.
-    - stiffness (s, m): Stiffness of the skin [Pa/m], None without one.
+    - gap (s, m): Gap under load [m]; with asperities the separation of the mean planes, negative where
+      their layer is compressed.
+    - stiffness (s, m): Stiffness of the asperity layer [Pa/m], None without asperities.
     - layout: Nodes of the strips.
     - position: Approach and rotations of the holder.
     - outcome: Whether the strips touch.
@@ -165,9 +164,9 @@ class StripsState:
 
 
 def strip_offsets(width: float, count: int) -> np.ndarray:
-    """Return the centres y (count,) [m] of equal strips over the width [m] of one pair, 0 in the middle.
+    """Return the centres y (count,) [m] of equal strips over the width [m] of one pair.
 
-    PatchfemError for less than one strip or no width.
+    y is 0 in the middle of the width. PatchfemError for less than one strip or no width.
     """
     if not (count >= 1 and width > 0):
         raise PatchfemError(
@@ -185,7 +184,10 @@ class StripProperties(NamedTuple):
 
 
 def split_into_strips(pieces: Compliance, count: int) -> StripProperties:
-    """Return the properties of one of `count` equal strips, which is `count` times as compliant as the whole width."""
+    """Return the properties of one of `count` equal strips.
+
+    A strip is `count` times as compliant as the whole width.
+    """
     return StripProperties(
         pieces.normal * count, pieces.tangential * count, pieces.interface.weight / count
     )
@@ -227,7 +229,7 @@ def compute_strip_residuals(
     Returns
     -------
     mapping
-        tension; penetration and complementarity of bare strips, law of a skin, each of the worst strip;
+        tension; penetration and complementarity of bare strips, law of an asperity layer, each of the worst strip;
         force_balance and moment_balance where they are prescribed.
     """
     displacement = compliance.product(force.ravel()).reshape(force.shape)
@@ -278,7 +280,7 @@ def press_strips(
     Parameters
     ----------
     compliance : (m, m) ndarray or StripCompliance
-        Compliance [m/N] of each strip; rigid pieces (0) need a skin.
+        Compliance [m/N] of each strip; rigid pieces (0) need asperities.
     x, weight : (m,) ndarray
         Positions [m] and nodal areas [m2] of one strip.
     offsets : (s,) ndarray
@@ -298,7 +300,7 @@ def press_strips(
     spring : float
         Stiffness [N m/rad] of the holder against the rotation about y, unloaded at `rotation`.
     skin : LinearSkin, SmoothSkin, optional
-        Law of the asperities; bare pieces without one.
+        Pressure law of the asperities; without a law the pieces are bare.
     lateral : float, optional
         Moment sum f y [N m] of a roll that is free from `roll` on; without it the roll is prescribed.
 
@@ -343,7 +345,7 @@ def press_strips(
     if lateral is not None:
         error = abs(force.sum(axis=1) @ offsets - lateral) / (load * np.ptp(offsets))
         residuals = MappingProxyType({**residuals, "roll_balance": float(error)})
-    # one node of a single strip may carry the load; its rotation is chosen by `unilateral.solve`
+    # one node of a single strip may carry the load; `unilateral.solve` then chooses the rotation
     if not isinstance(skin, SmoothSkin) and offsets.size > 1:
         _refuse_loose_holder(force, moment is not None and spring == 0, lateral is not None)
     _refuse_strip_residuals(skin, residuals)
@@ -359,7 +361,7 @@ def press_strips(
 
 
 def _holder_problem(layout: StripLayout, gap, loads: dict, spring: float) -> ContactProblem:
-    """Return the contact problem of all strips, with a column of motions for each load that is given."""
+    """Return the contact problem of all strips, with one motion for each given load."""
     n_strips = layout.offsets.size
     columns = {
         "load": np.ones(gap.size),
@@ -383,7 +385,7 @@ def _holder_position(motion, moment, lateral) -> HolderPosition:
 
 
 def _press_bare(skin, compliance, layout: StripLayout, problem: ContactProblem, approach):
-    """Solve bare strips, or strips behind a linear skin, which makes them more compliant."""
+    """Solve bare strips, or strips with a linear asperity layer, which adds to the compliance."""
     warm_start = compliance.warm_start
     if skin is not None:
         compliance = compliance.add_to_diagonal(1 / (skin.k * layout.weight))
@@ -414,7 +416,11 @@ def _press_bare(skin, compliance, layout: StripLayout, problem: ContactProblem, 
 
 
 def _press_through_skin(skin, compliance, layout: StripLayout, problem: ContactProblem, approach):
-    """Solve strips behind a smooth skin, with motions that are scaled to size 1."""
+    """Solve strips with an asperity layer of a smooth pressure law.
+
+    Each motion is scaled: the largest closing of a node per unit of motion becomes 1, and load and moments become
+    comparable.
+    """
     scale = 1 / np.abs(problem.motions).max(axis=0)
     scaled = problem._replace(
         motions=problem.motions * scale,
@@ -449,7 +455,10 @@ def _refuse_controls(skin, x, gap, load, moment, approach) -> None:
 
 
 def _refuse_roll(offsets, load, lateral) -> None:
-    """Raise PatchfemError where a free roll has no load, no second strip, or a load line beyond the strips."""
+    """Raise PatchfemError for a free roll that the strips cannot balance.
+
+    This is a roll without load or second strip, or with a load line beyond the strips.
+    """
     if lateral is None:
         return
     if load is None or offsets.size < 2:
@@ -478,7 +487,7 @@ def _refuse_loose_holder(force, rotation_is_free: bool, roll_is_free: bool) -> N
 
 
 def _refuse_strip_residuals(skin, residuals) -> None:
-    """Raise NotConverged, with the remedy for this kind of skin, where a residual is too large."""
+    """Raise NotConverged, with the remedy for this pressure law, where a residual is too large."""
     if isinstance(skin, SmoothSkin):
         place = "contact.asperities"
         remedy = (
@@ -512,18 +521,18 @@ def _make_state(
 def strips_stiffness(
     c: np.ndarray, weight: np.ndarray, state: StripsState, ratio: float = 1.0
 ) -> float:
-    """Return the stiffness of all strips for one common translation, skin and pieces in series.
+    """Return the stiffness of all strips in translation, asperities and pieces in series.
 
     Parameters
     ----------
     c : (m, m) ndarray
         Compliance of one strip [m/N]: the normal one for dN/d(approach) at fixed rotation and roll, the tangential one
-        for dT/d(slide) in stick without yaw.
+        for dT/d(relative displacement) in full stick without yaw.
     weight : (m,) ndarray
         Nodal areas of one strip [m2].
     state : StripsState
     ratio : float
-        Tangential over normal stiffness of the skin, inf where it is rigid in shear.
+        Tangential over normal stiffness of the asperity layer, inf if the layer is rigid in shear.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Unilateral contact of the condensed interface: forces, rigid motion, and an independent check of both.
+"""Unilateral contact of the condensed interface: solution and independent check.
 
 Find nodal forces f >= 0 with w = g + theta x - delta + C f >= 0 and f . w = 0. Either the approach delta is
 prescribed, or the load sum f = N. Under a load the rotation theta is prescribed (it is part of g), free under a moment,
@@ -74,16 +74,17 @@ class PlainSolution(NamedTuple):
 
 
 def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int) -> tuple:
-    """Return the SetSolution and the iterations of slower methods, for a problem whose contact sets come back.
+    """Solve by slower methods where the primal-dual method cycles.
 
-    In turn: the primal-dual method from all nodes, the same from the result of conjugate gradients, the primal method.
+    Returns the SetSolution and the number of iterations. The methods are, in turn: primal-dual from all nodes,
+    primal-dual from the result of conjugate gradients, and primal.
     """
     every_node = np.ones(problem.gap.size, bool)
     solution, n_first = solve_primal_dual(compliance, problem, every_node, max_iterations)
     if solution is not None and relative_violation(solution) <= RESIDUAL_TOL:
         return solution, n_first
     force, n_second = conjugate_gradients.solve_by_gradients(compliance, problem)
-    # smaller forces are what the gradients have not yet removed
+    # smaller forces are remainders that the gradient steps have not yet removed
     is_loaded = force > 1e-9 * force.max()
     solution, n_third = solve_primal_dual(compliance, problem, is_loaded, max_iterations)
     n_iterations = n_first + n_second + n_third
@@ -94,10 +95,10 @@ def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int
 
 
 def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float):
-    """Return the SetSolution of a patch of which one node under the load line carries the whole load, else None.
+    """Solve a patch of which one node carries the whole load; None if there is no such node.
 
-    Any rotation that leaves the other nodes open is a solution. It is that without rotation of the holder if the other
-    nodes are open then, else the mean of the two limits.
+    The node lies under the load line. Any rotation that leaves the other nodes open is a solution. It is that without
+    rotation of the holder if the other nodes are open then, else the mean of the two limits.
 
     rest_rotation: rotation q [rad] that is already contained in the gap.
     """
@@ -217,8 +218,8 @@ def compute_residuals(
 ) -> MappingProxyType:
     """Compute the relative residuals of a solution from the definition of contact alone.
 
-    An opening is compared to the terms that it is the sum of at its node, so that a spike of the gap elsewhere hides
-    nothing.
+    An opening is relative to the sum of the magnitudes of its terms at the same node, so a spike of the gap elsewhere
+    hides no error.
 
     Parameters
     ----------
@@ -290,7 +291,10 @@ def refuse_unsolvable(x, gap, load: float, moment: float | None, spring: float) 
 
 
 def refuse_tipping(load_line: float, middle: float, half_length: float) -> None:
-    """Raise PatchfemError unless the load line [m] lies within the half length [m] about the middle [m]."""
+    """Raise PatchfemError unless the load line [m] lies within the patch.
+
+    middle, half_length: extent of the patch [m].
+    """
     if not abs(load_line - middle) < half_length:
         raise PatchfemError(
             f"contact.load_line: the load line lies {load_line:.6g} m from the middle, outside the "
@@ -353,7 +357,7 @@ def press_to_approach(
     rotation: float = 0.0,
     start: np.ndarray | None = None,
 ) -> ContactState:
-    """Press two pieces together by a given approach of the holders and return the static pressure.
+    """Press two pieces together by a given approach and return the static pressure.
 
     Parameters
     ----------
@@ -409,7 +413,10 @@ def _open_interface(gap: np.ndarray, approach: float, rotation: float) -> Contac
 def _solve_and_check(
     pieces: Compliance, problem: ContactProblem, start, approach: float, rotation: float
 ) -> ContactState:
-    """Solve and check a problem whose gap is counted from `approach` [m], so that a large offset costs no digits."""
+    """Solve and check a contact problem whose gap is counted from `approach` [m].
+
+    A large offset of the gap then costs no digits.
+    """
     x, weight = pieces.interface.x, pieces.interface.weight
     with one_thread():
         try:
@@ -432,9 +439,9 @@ def _solve_and_check(
 
 
 def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
-    """Return the message for a contact set whose equations are singular, with the remedy that fits.
+    """Return the message, with a remedy, for a contact set whose equations are singular.
 
-    A prescribed rotation is determined by any node in contact, so that only the compliance itself can be at fault.
+    A prescribed rotation is determined by any node in contact, so only the compliance itself can be at fault.
 
     Parameters
     ----------

@@ -12,9 +12,9 @@ S = K_ss - K_si K_ii^-1 K_is.
 - Read `elasticity` first: materials, pieces, compliance and displacement.
 - A piece on a tensor grid is assembled in `tensor_stiffness` from the matrices of three reference
   cells. `condense` computes S, and `grid_fronts` eliminates the inside and predicts the cost.
-- A piece of any other cells, from a mesh file or with round ends, is assembled cell by cell in
+- A piece on an unstructured mesh (from a file, or with round ends) is assembled cell by cell in
   `substructure` and factorised by `fronts`, in the order of `dissect`.
 - `mortar` joins pieces whose interface nodes do not match.
 - `recovery` computes stresses and their errors, `coating_bond` the traction below a coating.
-- `cache` keeps compliances on disk; `lapack` loads BLAS and LAPACK quickly.
+- `cache` stores compliances on disk; `lapack` loads BLAS and LAPACK quickly.
 """

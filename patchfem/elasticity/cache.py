@@ -1,4 +1,4 @@
-"""Compliances of pieces and matrices of reference cells, kept on disk.
+"""Disk cache of the compliances of pieces and of the matrices of reference cells.
 
 The name of a file is a hash of everything that its content depends on: mesh, materials and the
 source text that computes it. So neither a changed piece nor a changed program reads an old
@@ -16,7 +16,8 @@ import numpy as np
 from ..core import frozen_array
 from ..disk import user_cache
 
-MAX_FOLDER_BYTES = 512 * 2**20  # the files that were not used for longest are deleted above it
+MAX_FOLDER_BYTES = 512 * 2**20  # above it the least recently used files are deleted
+# Source files from which a result is computed; their text is hashed into its key.
 REFERENCE_SOURCE = ("plane_form.py",)
 COMMON_SOURCE = ("elasticity.py", "plane_form.py", "lapack.py")
 GRID_SOURCE = (*COMMON_SOURCE, "tensor_stiffness.py", "condense.py", "grid_fronts.py")
@@ -24,12 +25,15 @@ MESH_SOURCE = (*COMMON_SOURCE, "dissect.py", "fronts.py", "substructure.py")
 
 
 def folder() -> Path:
-    """Return the folder: patchfem/operators below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache."""
+    """Return the folder of the cache.
+
+    It is patchfem/operators below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache.
+    """
     return user_cache.cache_base() / "patchfem" / "operators"
 
 
 def grid_key(x, depth, coating_rows: int, layers) -> str:
-    """Return the key of a piece on a tensor grid.
+    """Return the cache key of the compliance of a piece on a tensor grid.
 
     Parameters
     ----------
@@ -49,7 +53,10 @@ def grid_key(x, depth, coating_rows: int, layers) -> str:
 
 
 def mesh_key(mesh, layers) -> str:
-    """Return the key of a piece of any mesh (PieceMesh), which depends on the numbers of its nodes."""
+    """Return the cache key of the compliance of a piece on an unstructured mesh (PieceMesh).
+
+    The same mesh with its nodes numbered in another order has another key.
+    """
     numbers = (mesh.triangles, mesh.quads, mesh.is_coating, mesh.interface, mesh.far)
     arrays = [np.asarray(mesh.points, np.float64)]
     arrays += [np.asarray(part, np.int64) for part in numbers]
@@ -57,7 +64,7 @@ def mesh_key(mesh, layers) -> str:
 
 
 def reference_key() -> str:
-    """Return the key of the matrices of `plane_form.rectangle_terms`."""
+    """Return the cache key of the reference-cell matrices of `plane_form.rectangle_terms`."""
     return _hash_source(hashlib.sha256(), REFERENCE_SOURCE)
 
 
@@ -78,7 +85,7 @@ def _hash_source(digest, source: tuple) -> str:
 
 
 def fetch(key: str, shapes: dict) -> dict | None:
-    """Read the arrays that are kept under a key.
+    """Read the arrays that `keep` has stored under a key.
 
     Parameters
     ----------
@@ -108,7 +115,7 @@ def fetch(key: str, shapes: dict) -> dict | None:
 
 
 def keep(key: str, arrays: dict) -> None:
-    """Keep arrays by their names under a key; do nothing if the folder cannot be written."""
+    """Store named arrays under a key; do nothing if the folder cannot be written."""
     if user_cache.prepare_folder(folder()):
         return
     content = BytesIO()
@@ -118,7 +125,10 @@ def keep(key: str, arrays: dict) -> None:
 
 
 def _trim() -> None:
-    """Delete the files that were not used for longest, and those that killed processes left."""
+    """Delete the least recently used files until the folder is within `MAX_FOLDER_BYTES`.
+
+    Temporary files that killed processes have left behind are deleted in the same way.
+    """
     try:
         files = [path for path in folder().iterdir() if path.is_file()]
         files.sort(key=lambda path: path.stat().st_mtime)

@@ -12,8 +12,8 @@ from .recovery import Cells, quadrature_stress
 class Bond:
     """Forces of a coating on its substrate along their common line.
 
-    - ``node``: (b,) nodes by rising x
-    - ``length``: (b,) length of the line that belongs to each node [m]
+    - ``node``: (b,) nodes by increasing x
+    - ``length``: (b,) tributary length of each node along the line [m]
     - ``force``: (frames, b, 2) nodal forces along x and inward, per unit width [N/m]
     - ``shear``, ``normal``: (frames, b) tractions along and across the line [Pa]; normal > 0 in
       compression
@@ -51,7 +51,8 @@ def bond_forces(cells: Cells, rules: list, u) -> Bond | None:
     position = np.empty(len(cells.points), np.int64)
     position[nodes] = np.arange(nodes.size)
     along_x, inward = (cells.points[edges[:, 1]] - cells.points[edges[:, 0]]).T
-    edge_normals = np.stack([inward, -along_x], axis=1)  # into the substrate, as long as the edge
+    # each normal points into the substrate and has the length of its edge
+    edge_normals = np.stack([inward, -along_x], axis=1)
     edge_lengths = np.hypot(*edge_normals.T)
     across = np.zeros((nodes.size, 2))
     length = np.zeros(nodes.size)
@@ -68,7 +69,7 @@ def bond_forces(cells: Cells, rules: list, u) -> Bond | None:
 
 
 def _bond_edges(cells: Cells) -> np.ndarray:
-    """Return the edges (e, 2) of coating cells that are edges of substrate cells, too."""
+    """Return the edges (e, 2) that a coating cell shares with a substrate cell."""
     edges = np.concatenate(
         [
             np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2)
@@ -88,7 +89,7 @@ def _bond_edges(cells: Cells) -> np.ndarray:
 
 
 def _select_coating(cells: Cells, rules: list, nodes) -> tuple[Cells, list]:
-    """Return the coating cells that touch some nodes, and their part of the quadratures.
+    """Return the coating cells that touch given nodes, and the quadratures of these cells.
 
     No other cell exerts a force of the coating on these nodes.
     """
@@ -114,7 +115,7 @@ def _select_coating(cells: Cells, rules: list, nodes) -> tuple[Cells, list]:
 
 
 def _nodal_forces(cells: Cells, rules: list, u) -> np.ndarray:
-    """Return the nodal forces (N, 2) [N/m] that the stress of the cells balances."""
+    """Return the nodal forces (N, 2) [N/m] in equilibrium with the stress of the cells."""
     out = np.zeros((len(cells.points), 2))
     for rule, stress in zip(rules, quadrature_stress(cells, rules, u)):
         tensor = stress[..., [[0, 2], [2, 1]]] * rule.weight[..., None, None]
@@ -124,7 +125,7 @@ def _nodal_forces(cells: Cells, rules: list, u) -> np.ndarray:
 
 
 def interpolate_bond(cells: Cells, bond: Bond | None, x) -> dict:
-    """Interpolate the tractions of a bond line at places of the interface.
+    """Interpolate the tractions of a bond line at positions along the interface.
 
     Parameters
     ----------

@@ -4,10 +4,10 @@ With the inside i eliminated (`grid_fronts`), the Schur complement S = K_ss - K_
 the interface s gives the compliance S^-1 of the piece. The same factors give the displacements
 inside.
 
-A piece that is its own mirror image is split at its middle. Any motion is the sum of an even motion
-(the inward displacements of both halves are equal, those along x are opposite) and an odd motion
-(the other way round). The two do not interact, and each is determined by the right half of the
-piece, whose inside is eliminated once for both.
+A piece that is mirror-symmetric in x is split at its middle. Any motion is the sum of an even
+motion (the inward displacements of both halves are equal, those along x are opposite) and an odd
+motion (the other way round). The two do not interact, and each is determined by the right half of
+the piece, whose inside is eliminated once for both.
 """
 
 from collections.abc import Callable
@@ -20,17 +20,17 @@ from .grid_fronts import GridFactor, eliminate
 from .lapack import cho_inverse, dpotrf, dtrsm, one_thread
 from .tensor_stiffness import apply_stencil
 
-# A solution whose residual, relative to the forces, is larger is refined once.
+# Residual over the largest load above which a solution is refined once.
 RESIDUAL_TOL = 1e-8
 # Factors are refused if one step of refinement changes the displacements by a larger fraction.
 MAX_REFINEMENT = 1e-2
-# In even motion the displacement along x changes its sign at the mirror, the inward one does not.
+# In even motion the displacement along x changes sign at the mirror plane, the inward one does not.
 MIRROR_SIGNS = np.array([-1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class KeptFactor:
-    """Cholesky factor of the stiffness of the nodes that elimination keeps, for one kind of motion.
+    """Cholesky factor of the stiffness of the kept nodes, for one kind of motion.
 
     - ``unknowns``: (k,) kept unknowns that can move, those of the interface last
     - ``low``: (k, k) lower Cholesky factor
@@ -60,7 +60,7 @@ class Condensed:
     - ``stencil``: stiffness of the whole grid (`tensor_stiffness`)
     - ``inside``: factors of the inner nodes of the grid, or of its right half if `is_mirrored`
     - ``kept``: factors of the kept nodes: one, or one for even and one for odd motion
-    - ``is_mirrored``: whether the grid is its own mirror image in x
+    - ``is_mirrored``: whether the grid is mirror-symmetric in x
     - ``rounding``: relative error of the compliance by round-off. If it is not 0, solutions take
       one step of iterative refinement.
     """
@@ -94,7 +94,8 @@ class Condensed:
         right = np.arange(2 * (columns // 2), 2 * columns)
         halves = np.zeros((2, right.size, right.size))
         for half, factor, compliance in zip(halves, self.kept, (even, odd)):
-            # the kept column stands between the first node of the interface and the others
+            # the first interface node and the other ones are numbered before and after the kept
+            # column, whose unknowns are skipped to number the interface alone
             unknowns = factor.unknowns[-factor.n_interface :]
             position = np.where(unknowns < 2, unknowns, unknowns - 2 * (rows - 1))
             half[np.ix_(position, position)] = compliance / 2
@@ -173,7 +174,7 @@ def condense(stencil, is_mirrored: bool) -> Condensed:
     stencil : (nx, rows, 3, 3, 2, 2) ndarray
         Stiffness [N/m per m].
     is_mirrored : bool
-        Whether the grid is its own mirror image in x.
+        Whether the grid is mirror-symmetric in x.
 
     Returns
     -------
@@ -209,13 +210,13 @@ def condense(stencil, is_mirrored: bool) -> Condensed:
 def _factorise_motion(stencil, inside: GridFactor, *, is_odd: bool) -> KeptFactor:
     """Factorise the stiffness of the kept nodes of the right half in even or in odd motion.
 
-    If a column stands in the middle, it does not move along x in even motion, nor inward in odd
-    motion. Otherwise the middle runs through a column of cells, and the left neighbour of each node
-    of the first column is the mirror image of a node of the same column.
+    If a column of nodes lies in the middle, it does not move along x in even motion, nor inward in
+    odd motion. Otherwise the middle runs through a column of cells, and the left neighbour of each
+    node of the first column is the mirror image of a node of the same column.
     """
     columns, rows = stencil.shape[:2]
     n_kept = inside.schur.shape[0]
-    # the ring runs down the first column, whose first node belongs to the interface
+    # the kept nodes are numbered down the first column, whose first node is on the interface
     column = np.arange(2, 2 * rows)
     interface = np.concatenate([[0, 1], np.arange(2 * rows, n_kept)])
     unknowns = np.concatenate([column, interface])
@@ -243,7 +244,7 @@ def _factorise(matrix, unknowns, n_interface: int) -> KeptFactor:
 
 
 def irregular_load(size: int) -> np.ndarray:
-    """Return a load (size,) between -1/2 and 1/2 without a pattern, with which factors are checked.
+    """Return a quasi-random load (size,) in [-1/2, 1/2], with which factors are checked.
 
     The fractional parts of k^2 (sqrt(5) - 1)/2 are equidistributed (Weyl, Math. Ann. 77, 1916,
     313). Importing numpy.random would take 20 ms.
@@ -260,7 +261,7 @@ def rounding_error(load, u, residual, solve: Callable) -> float:
     Parameters
     ----------
     load, u, residual : ndarray
-        Loads, the solution and the load that it leaves.
+        Loads, the solution and its residual, the loads that the solution does not balance.
     solve : callable
         solve(load) -> u
 

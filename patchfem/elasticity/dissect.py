@@ -10,8 +10,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, maximum_bipartite_matching
 
-MAX_LEAF_NODES = 48  # larger parts are cut
-N_LANDMARKS = 4  # the distances from this number of nodes separate the parts of a graph well
+MAX_LEAF_NODES = 48  # parts of more nodes are cut again
+N_LANDMARKS = 4  # nodes whose distances serve as coordinates; four separate a graph well
 
 
 def graph_coordinates(graph) -> np.ndarray:
@@ -91,7 +91,9 @@ def dissect_nodes(points, pairs) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _split_parts(sorted_nodes, pairs, part_of_node) -> np.ndarray:
-    """Assign each node of a part to one of its halves, 0 or 1, by the best median.
+    """Split the nodes of each part into halves 0 and 1 at the median of one coordinate.
+
+    Each part is cut along the coordinate whose median separates the fewest pairs of neighbours.
 
     sorted_nodes: (d, n) all nodes by each coordinate; part_of_node: (n,) or -1.
     """
@@ -114,8 +116,8 @@ def _split_parts(sorted_nodes, pairs, part_of_node) -> np.ndarray:
 def minimum_vertex_cover(pairs, side) -> np.ndarray:
     """Return the smallest set of nodes that contains a node of every pair.
 
-    By Koenig's theorem it consists of the nodes of side 0 that alternating paths from its
-    unmatched nodes do not reach, and of the nodes of side 1 that they reach.
+    By Koenig's theorem it consists of the nodes of side 0 that alternating paths from the
+    unmatched nodes of side 0 do not reach, and of the nodes of side 1 that these paths reach.
 
     Parameters
     ----------
@@ -153,7 +155,10 @@ def minimum_vertex_cover(pairs, side) -> np.ndarray:
 
 
 def _sort_by_key(points, key) -> tuple[np.ndarray, np.ndarray]:
-    """Sort the nodes by key and within a key along its longer extent; return where keys begin."""
+    """Sort the nodes by key, and the nodes of one key along their longest extent.
+
+    Returns the sorted nodes (n,), and the position at which each key begins, and n.
+    """
     _, group, sizes = np.unique(key, return_inverse=True, return_counts=True)
     by_group = points[np.argsort(group, kind="stable")]
     firsts = np.concatenate([[0], np.cumsum(sizes)])

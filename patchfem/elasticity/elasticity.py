@@ -1,8 +1,8 @@
 """Plane elasticity of one piece on a tensor grid of bilinear quadrilaterals.
 
 The unknowns of a node are its displacements along x and into the piece, so both pieces of a pair
-obey the same equations. The functions of compliance and displacement serve a piece of any mesh
-(`substructure`), too.
+obey the same equations. The functions of compliance and displacement also serve a piece on an
+unstructured mesh (`substructure`).
 """
 
 from dataclasses import dataclass, field
@@ -61,9 +61,9 @@ def lame(young: float, poisson: float, plane: str) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Piece:
-    """A piece on a tensor grid that is fixed at its far face, assembled when it is first needed.
+    """Piece on a tensor grid with a fixed far face; its stiffness is assembled on first use.
 
-    So a piece whose compliance is kept on disk is often never assembled.
+    A piece whose compliance is in the disk cache is often never assembled.
 
     - ``x``: (nx,) [m] of the interface nodes
     - ``depth``: (ny,) [m] of the rows of nodes
@@ -71,7 +71,7 @@ class Piece:
     - ``cells``: (t, 4) nodes, column by column
     - ``is_coating``: (t,) bool
     - ``layers``: the materials
-    - ``computed``: results that are kept by name: stencil and factor
+    - ``computed``: cached results by name: stencil and factor
     """
 
     x: np.ndarray
@@ -84,7 +84,7 @@ class Piece:
 
     @property
     def is_mirrored(self) -> bool:
-        """Whether the piece is its own mirror image in x, to round-off of its nodes."""
+        """Whether the piece is mirror-symmetric in x, to round-off of the coordinates."""
         grid = self.nodes.reshape(self.x.size, -1, 2)
         return bool(np.abs(grid * [-1, 1] - grid[::-1]).max() <= 1e-13 * np.ptp(self.x))
 
@@ -156,7 +156,7 @@ def suggest_remedy(layers: Layers, has_coating: bool, min_length: float, size) -
 
 
 def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
-    """Return a piece on a tensor grid of bilinear quadrilaterals; its stiffness is assembled later.
+    """Make a piece on a tensor grid of bilinear quadrilaterals; no stiffness is computed yet.
 
     Parameters
     ----------
@@ -200,7 +200,9 @@ def grid_cells(columns: int, rows: int, coating_rows: int) -> tuple[np.ndarray, 
 
 
 def displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Compute the displacements of a piece under forces on its interface, from kept factors.
+    """Compute the displacements of a piece under forces on its interface.
+
+    The factors of the stiffness are computed once and reused.
 
     Parameters
     ----------

@@ -1,9 +1,10 @@
 """Multifrontal Cholesky factors of a sparse stiffness, in dense fronts (Duff and Reid 1983).
 
-The nodes of one leaf or cut of a nested dissection form a front: first its own unknowns, then all
-later unknowns that are coupled with them. Eliminating the own unknowns leaves an update, which is
-added to the front that owns the first of the later nodes. The last front is the interface. It
-receives all updates, so its matrix is the Schur complement S, and S^-1 is the compliance.
+Each leaf or cut of a nested dissection has a front, a dense matrix of the unknowns of its nodes
+(the own unknowns of the front) and of all later unknowns that are coupled with them. Eliminating
+the own unknowns leaves an update, which is added to the front that owns the first later node. The
+last front is the interface. It receives all updates, so its matrix is the Schur complement S, and
+S^-1 is the compliance.
 """
 
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from .dissect import dissect_nodes, graph_coordinates
 from .lapack import cho_inverse
 
 PER_NODE = 2  # unknowns of a node, which follow one another
-MIN_SLICED_NODES = 40  # smaller updates are added by one indexed assignment
+MIN_SLICED_NODES = 40  # updates of fewer nodes are added by one indexed assignment
 # An update whose nodes form shorter runs of successive numbers, on average, is added by columns.
 MIN_MEAN_RUN = 24
 
@@ -29,10 +30,10 @@ MIN_MEAN_RUN = 24
 class Fronts:
     """Factors L L^T of a matrix (n, n) in f fronts.
 
-    - ``triangles``: the own triangle of L of each front, packed as LAPACK's rectangular format
-    - ``sides``: (later, own) the columns of L below each triangle
+    - ``triangles``: triangle of L for the own unknowns of each front, in LAPACK's rectangular format
+    - ``sides``: (later, own) columns of L below each triangle
     - ``firsts``: (f + 1,) first own unknown of each front, and n
-    - ``later``: the unknowns below the own ones of each front
+    - ``later``: later unknowns that are coupled with the own unknowns of each front
     """
 
     triangles: list
@@ -65,13 +66,14 @@ class Fronts:
 
 
 class Strainless(NotConverged):
-    """Some motion of the unknowns causes no strain, to round-off."""
+    """The stiffness is singular to round-off: it has a zero-energy (rigid-body) mode."""
 
 
 class Factor:
-    """Factors of a symmetric positive definite sparse matrix without coordinates of its nodes.
+    """Cholesky factors of a sparse matrix that is given without a mesh.
 
-    Unknowns with the same neighbours form one node of the dissection. `min_pivot` and the
+    The order of elimination follows from the graph of the matrix (`dissect.graph_coordinates`).
+    Unknowns with the same neighbours form one node of this graph. `min_pivot` and the
     exceptions are those of `factorise`.
     """
 
@@ -102,7 +104,7 @@ class Factor:
 def factorise(
     matrix: csc_matrix, firsts, per_node: int = PER_NODE, min_pivot: float = 0.0
 ) -> Fronts:
-    """Factorise a symmetric positive definite matrix in the order in which it comes.
+    """Factorise a symmetric positive definite matrix without reordering its unknowns.
 
     Parameters
     ----------
@@ -160,9 +162,9 @@ def factorise(
 
 
 def _explain_fault(block, diagonal, min_pivot: float) -> NotConverged:
-    """Return the exception for a front whose own block cannot be factorised.
+    """Return the exception for a front whose diagonal block cannot be factorised.
 
-    block: (k, k), its lower half; diagonal: (k,) entries of the matrix there.
+    block: (k, k), of which the lower half is read; diagonal: (k,) entries of the matrix there.
     """
     scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
     if eigvalsh(block / np.outer(scale, scale))[0] > -min_pivot:
@@ -173,8 +175,9 @@ def _explain_fault(block, diagonal, min_pivot: float) -> NotConverged:
 def _add_update(front, update, nodes, per_node: int) -> None:
     """Add the lower half of an update to a front, in the way that is fastest for its nodes.
 
-    nodes: their rising positions in the front. A small update is added by one indexed assignment, a
-    large one in rectangles of successive nodes, or by columns if few nodes are successive.
+    nodes: ascending positions of its nodes in the front. A small update is added by one indexed
+    assignment, a large one in rectangles of successive nodes, or by columns if few nodes are
+    successive.
     """
     unknowns = _unknowns(nodes, per_node)
     if nodes.size < MIN_SLICED_NODES:
@@ -201,9 +204,10 @@ def _unknowns(nodes, per_node: int) -> np.ndarray:
 
 
 def _later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
-    """Return the later nodes in each front: symbolic factorisation.
+    """Find the later nodes that each front is coupled with (symbolic factorisation).
 
-    They are coupled with its own nodes once all earlier ones are eliminated. Each list rises.
+    A later node may be coupled with a front only once earlier nodes are eliminated. Each list is in
+    ascending order.
     """
     n_fronts = len(firsts) - 1
     front_of_node = np.repeat(np.arange(n_fronts), np.diff(firsts))
@@ -225,7 +229,7 @@ def _later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
 def _own_columns(
     lower: csc_matrix, start: int, stop: int, size: int, position, per_node: int
 ) -> np.ndarray:
-    """Return a front (size, size) with the columns of the matrix that belong to its own nodes."""
+    """Return a front (size, size) that contains the matrix columns of the nodes it eliminates."""
     front = np.zeros((size, size), order="F")
     pointer = lower.indptr[per_node * start : per_node * stop + 1]
     entries = slice(pointer[0], pointer[-1])

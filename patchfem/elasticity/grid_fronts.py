@@ -1,14 +1,14 @@
 """Multifrontal elimination of the inside of a tensor grid.
 
 The grid is halved again and again by lines of nodes, always across its longer side (nested
-dissection, George 1973). The stiffness that is left of a part after its inside is eliminated is its
-update (Schur complement). It couples the nodes on the ring of the part. The updates of two halves
-are added and the line of nodes between them is eliminated (multifrontal elimination, Duff and Reid
-1983). Parts of one shape have the same pattern, so they are handled as one stack of matrices.
+dissection, George 1973). Eliminating the inside of a part leaves its update, a Schur complement
+that couples the nodes on the border of the part, its ring. The updates of two halves are added and
+the line of nodes between them is eliminated (multifrontal elimination, Duff and Reid 1983). Parts
+of one shape have the same pattern, so they are handled as one stack of matrices.
 
 The first row of nodes, the interface, is always kept. The last row is fixed. The first column is
-kept on request: it is the middle of a piece that is its own mirror image. The order follows from
-the numbers of columns and rows, which also predict the cost.
+kept on request: it is the middle of a mirror-symmetric piece. The order follows from the numbers of
+columns and rows, which also predict the cost.
 """
 
 from collections import Counter
@@ -23,7 +23,7 @@ from .. import cost_model
 from ..core import NotConverged
 from .lapack import dgemm, dpotrf, dtrsm
 
-MAX_LEAF_CELLS = 24  # larger parts are halved
+MAX_LEAF_CELLS = 24  # parts of more cells are halved
 LEAVES_PER_CHUNK = 256  # the index arrays of this number of leaves fit into the cache of a core
 NODE_ENTRIES = 36  # numbers in the stencil of one node: 3 x 3 neighbours, 2 x 2 directions
 BYTES_PER_NUMBER = 8
@@ -73,7 +73,7 @@ class Shape(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Numbering:
-    """The nodes of a part that take part in its elimination, in the order of its matrix.
+    """Nodes in the matrix of a part, in the order of its rows.
 
     - ``own``: (o, 2) column and row of the nodes that are eliminated with the part
     - ``ring``: (b, 2) column and row of the nodes that are kept
@@ -118,7 +118,7 @@ def number_nodes(shape: Shape) -> Numbering:
 
 
 class Blocks(NamedTuple):
-    """Stiffness matrices of g parts of one shape, by own unknowns and unknowns of the ring.
+    """Stiffness blocks of g parts of one shape: unknowns to eliminate (own) and of the ring.
 
     ::
 
@@ -183,7 +183,7 @@ def _leaf_couplings(shape: Shape) -> tuple[Couplings, ...]:
         column step       0   1   2
 
     Two leaves share the nodes on the line between them. A coupling of two such nodes belongs to one
-    leaf only: that which contains the cell whose column and row are the lesser ones of both nodes.
+    leaf only: the leaf with the cell whose column and row are the smaller ones of both nodes.
     At a free right side no other leaf follows, and the leaf takes the couplings there, too.
     """
     numbering = number_nodes(shape)
@@ -234,10 +234,10 @@ def _assemble_leaves(stencil, shape: Shape, corners) -> Blocks:
 
 
 class Run(NamedTuple):
-    """Successive nodes on the ring of a half that are successive in the matrix of the whole part.
+    """Successive nodes on the ring of a half that are also successive in the whole part.
 
     - ``source``: their unknowns in the update of the half
-    - ``target``: their unknowns among the own ones or those on the ring of the whole part
+    - ``target``: their unknowns among those that the whole part eliminates, or among its ring
     """
 
     source: slice
@@ -245,7 +245,11 @@ class Run(NamedTuple):
 
 
 class Runs(NamedTuple):
-    """The ring of a half in runs: nodes that the whole part eliminates, and nodes on its ring."""
+    """Runs of successive nodes on the ring of a half, by their use in the whole part.
+
+    - ``own``: runs of nodes that the whole part eliminates
+    - ``ring``: runs of nodes that stay on the ring of the whole part
+    """
 
     own: list[Run]
     ring: list[Run]
@@ -276,7 +280,7 @@ def _add_updates(shape: Shape, updates) -> Blocks:
     """Assemble the matrices of parts of one shape from the updates of their halves.
 
     A part that is cut along a column has the nodes of two rings. Where the rings meet, the updates
-    are added. The nodes o of the cut become the own nodes of the part, the nodes r its ring; a dot
+    are added. The part eliminates the nodes o of the cut and keeps the nodes r of its ring; a dot
     is a node that was eliminated before::
 
         first half    second half    whole part
@@ -303,14 +307,14 @@ def _add_updates(shape: Shape, updates) -> Blocks:
             for row, column in product(row_runs, column_runs):
                 rectangle = update[:, row.source, column.source]
                 if half is halves[0]:
-                    block[:, row.target, column.target] = rectangle  # nothing is there yet
+                    block[:, row.target, column.target] = rectangle  # the block is still zero
                 else:
                     block[:, row.target, column.target] += rectangle
     return blocks
 
 
 def _eliminate_own(blocks: Blocks) -> None:
-    """Eliminate the own unknowns of parts in place by a Cholesky factorisation own_own = L L^T.
+    """Eliminate the unknowns `own` of parts in place: Cholesky factorisation own_own = L L^T.
 
     own_own becomes L^T, own_ring becomes L^-1 own_ring and ring_ring becomes the update of each
     part, ring_ring - own_ring^T own_own^-1 own_ring. NotConverged unless own_own is positive
@@ -330,8 +334,8 @@ def _eliminate_own(blocks: Blocks) -> None:
 class Stack:
     """Factors of g eliminated parts of one shape.
 
-    - ``own``, ``ring``: (g, o) and (g, b) numbers of their nodes in the grid, column * rows + row
-    - ``own_factor``: (g, 2o, 2o) transposed Cholesky factors L^T of their own unknowns
+    - ``own``, ``ring``: (g, o) and (g, b) eliminated and ring nodes in the grid, column * rows + row
+    - ``own_factor``: (g, 2o, 2o) transposed Cholesky factors L^T of the eliminated unknowns
     - ``ring_factor``: (g, 2o, 2b) transposed rows of the factor that belong to the ring
     """
 
@@ -490,13 +494,13 @@ def eliminate(stencil, *, keep_left: bool = False) -> GridFactor:
 
 
 class Work(NamedTuple):
-    """The work of assembling and condensing one piece.
+    """Operation count and storage of assembling and condensing one piece.
 
     - ``shapes``: number of stacks
     - ``fronts``: number of eliminated parts
     - ``factor_entries``: numbers in the factors
     - ``operations``: floating-point operations
-    - ``other_entries``: numbers in all arrays that are not factors, at most at one time
+    - ``other_entries``: largest number of entries outside the factors that exist at one time
     """
 
     shapes: int
@@ -516,7 +520,7 @@ def predicted_seconds(nx: int, ny: int, mirrored: bool) -> float:
     nx, ny : int
         Columns and rows of nodes, with those of the far face.
     mirrored : bool
-        Whether the piece is its own mirror image in x.
+        Whether the piece is mirror-symmetric in x.
 
     Returns
     -------
@@ -534,9 +538,9 @@ def predicted_seconds(nx: int, ny: int, mirrored: bool) -> float:
 
 
 def predicted_bytes(nx: int, ny: int, mirrored: bool) -> float:
-    """Predict the largest memory [bytes] of condensing one piece.
+    """Predict the peak memory [bytes] of assembling and condensing one piece.
 
-    It contains the stencil, the factors, the updates and the compliance. The parameters are those
+    This includes the stencil, the factors, the updates and the compliance. The parameters are those
     of `predicted_seconds`.
     """
     work = predict_work(nx, ny, mirrored)
@@ -545,9 +549,10 @@ def predicted_bytes(nx: int, ny: int, mirrored: bool) -> float:
 
 @lru_cache(maxsize=1024)
 def predict_work(nx: int, ny: int, mirrored: bool) -> Work:
-    """Count the work of condensing one piece, without numbering its nodes.
+    """Estimate the operation count and the storage of condensing one piece.
 
-    The parameters are those of `predicted_seconds`.
+    Nodes are counted but not numbered, so the estimate is cheap. The parameters are those of
+    `predicted_seconds`.
     """
     is_halved = mirrored and nx > 3
     columns = (nx + 1) // 2 if is_halved else nx
@@ -580,7 +585,7 @@ def predict_work(nx: int, ny: int, mirrored: bool) -> Work:
 
 
 def _count_unknowns(shape: Shape) -> tuple[int, int]:
-    """Count the own unknowns of a part and those of its ring, without numbering its nodes."""
+    """Count the unknowns that are eliminated with a part, and the unknowns of its ring."""
     kept_sides = shape.left + shape.right
     kept_lines = 1 + (shape.bottom and shape.lines > 1)
     ring = kept_sides * shape.lines + (shape.columns + 1 - kept_sides) * kept_lines

@@ -34,7 +34,7 @@ def _load_compiled(name: str):
         module = module_from_spec(spec)
         spec.loader.exec_module(module)
         return module
-    # there is no such file, or the package has to find its shared libraries first
+    # the file does not exist, or the package has to find its shared libraries first
     except (ImportError, AttributeError, OSError):
         return import_module(f"scipy.linalg.{name}")
 

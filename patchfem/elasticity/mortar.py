@@ -2,9 +2,9 @@
 
 The pressure is sum lambda_i psi_i on a grid of its own along the interface, with the biorthogonal
 functions psi_i of Wohlmuth (SIAM J. Numer. Anal. 38 (2000) 989). On a cell with the hat functions a
-and b they are 2a - b and 2b - a, so that int psi_i phi_j = delta_ij D_i, where D_i is the tributary
-length of node i. A body with hat functions phi^s on its own nodes is coupled by the matrix
-T_s = D^-1 int psi_i phi^s_j:
+and b they are 2a - b and 2b - a, so int psi_i phi_j = delta_ij D_i, where D_i is the tributary
+length of node i. A body with hat functions phi^s on its own nodes is coupled by the matrix T_s =
+D^-1 int psi_i phi^s_j:
 
 - nodal forces f = D lambda of the grid act on the nodes of the body as f T_s
 - displacements u of the body reach the grid as T_s u
@@ -32,30 +32,34 @@ from ..formatting import format_length
 from ..mesh.grading import LENGTH_TOL, tributary_lengths
 from .elasticity import InterfaceCompliance
 
-# The nodes of a piece carry the pressure, although they are finer, if it is softer by this factor.
+# Ratio of compliances above which the nodes of the softer piece carry the pressure, even if finer.
 SOFTNESS_RATIO = 20.0
-# `expected_ripples` refers to a contact whose half width has this number of cells of the coarser side.
+# Half width of the contact to which `expected_ripples` refers, in cells of the coarser piece.
 REFERENCE_CELLS = 16
-MAX_RIPPLE = 1e-2  # a grid with larger expected ripples is replaced, if there is a better one
-REFUSED_RIPPLE = 0.1  # the pair is refused if the best grid has larger expected ripples
+MAX_RIPPLE = 1e-2  # expected ripple over peak pressure above which other grids are tried
+REFUSED_RIPPLE = 0.1  # expected ripple of the best grid above which the pair is refused
 
 
 class Body(NamedTuple):
-    """One piece: rising interface nodes (n,) [m] and compliances (n, n) per unit width [m2/N]."""
+    """Ascending interface nodes (n,) [m] of a piece, and its compliances (n, n) [m2/N]."""
 
     x: np.ndarray
     compliance: InterfaceCompliance
 
 
 class Grids(NamedTuple):
-    """Candidates for the nodes of the pressure [m]: of either piece, and common to both."""
+    """Candidate grids of interface nodes [m] on which the pressure is defined.
+
+    - ``lower``, ``upper``: interface nodes of that piece
+    - ``both``: nodes taken from both pieces (`common_grid`)
+    """
 
     lower: np.ndarray
     upper: np.ndarray
     both: np.ndarray
 
     def name_of_common(self) -> str:
-        """Return the name of the piece whose nodes are the common grid, or "both"."""
+        """Return the name of the piece whose nodes equal the grid `both`, or "both"."""
         for side in ("lower", "upper"):
             x = getattr(self, side)
             if x.size == self.both.size and np.abs(x - self.both).max() <= LENGTH_TOL * np.ptp(x):
@@ -108,8 +112,8 @@ def join_pieces(lower: Body, upper: Body) -> Mortar:
     Raises
     ------
     PatchfemError
-        If nodes do not rise, if the pieces do not face one another, or if the expected ripples are
-        larger than `REFUSED_RIPPLE` on every grid.
+        If nodes are not in ascending order, if the pieces do not face one another, or if the
+        expected ripples are larger than `REFUSED_RIPPLE` on every grid.
     """
     _check_body(lower, "lower")
     _check_body(upper, "upper")
@@ -118,7 +122,8 @@ def join_pieces(lower: Body, upper: Body) -> Mortar:
     if best.ripple > MAX_RIPPLE:
         others = [side for side in ("lower", "upper") if side != best.side]
         candidates = [best, *(join_on_grid(grids, side, lower, upper) for side in others)]
-        # ripples that differ by round-off are equal: exchanged pieces must give the same grid
+        # pressure ripples are compared to three digits, because round-off must not decide: the same
+        # grid has to follow if lower and upper piece are exchanged
         best = min(candidates, key=lambda joined: (float(f"{joined.ripple:.2e}"), tuple(joined.x)))
     if best.ripple > REFUSED_RIPPLE:
         raise PatchfemError(
@@ -157,9 +162,9 @@ def transfer_matrix(x, own) -> csr_array:
     Parameters
     ----------
     x : (m,) ndarray
-        Rising nodes of the grid [m], within the ends of `own`.
+        Ascending nodes of the grid [m], within the ends of `own`.
     own : (n,) ndarray
-        Rising nodes of the body [m].
+        Ascending nodes of the body [m].
 
     Returns
     -------
@@ -198,18 +203,18 @@ def transfer_matrix(x, own) -> csr_array:
 
 
 def _hats(x, cell, places) -> np.ndarray:
-    """Return the values (2, k) of both hat functions of cells (k,) at places (k,) within them."""
+    """Return the values (2, k) of both hat functions of cells (k,) at positions (k,) in them."""
     width = x[cell + 1] - x[cell]
     return np.stack([(x[cell + 1] - places) / width, (places - x[cell]) / width])
 
 
 def common_interval(x_lower, x_upper) -> tuple[float, float]:
-    """Return the ends [m] of the interface that both pieces cover, from their rising nodes [m].
+    """Return the ends [m] of the interval that the nodes [m] of both pieces cover.
 
     Raises
     ------
     PatchfemError
-        If there is none.
+        If the pieces have no interval in common.
     """
     begin = max(x_lower[0], x_upper[0])
     end = min(x_lower[-1], x_upper[-1])
@@ -225,12 +230,12 @@ def common_interval(x_lower, x_upper) -> tuple[float, float]:
 def clip_nodes(x, begin: float, end: float) -> np.ndarray:
     """Return the nodes between two ends, and these ends.
 
-    Nodes closer to a new end than half their cell are left out, so that no tiny cell arises.
+    Nodes closer to a new end than half a cell are left out, because tiny cells would arise.
 
     Parameters
     ----------
     x : (n,) ndarray
-        Rising nodes [m].
+        Ascending nodes [m].
     begin, end : float [m]
 
     Returns
@@ -250,15 +255,16 @@ def clip_nodes(x, begin: float, end: float) -> np.ndarray:
 
 
 def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
-    """Choose nodes of two pieces with the same ends: from left to right the farther next node.
+    """Choose the pressure nodes from those of two pieces with the same ends.
 
-    If one piece is coarser everywhere, these are its nodes. Where one piece is softer than the
-    other by `SOFTNESS_RATIO`, only its own nodes are chosen.
+    From left to right, each step goes to the next node of the piece that has it farther away. If
+    one piece is coarser everywhere, these are its nodes. Where one piece is softer than the other
+    by `SOFTNESS_RATIO`, only nodes of the softer piece are chosen.
 
     Parameters
     ----------
     x_lower, x_upper : (n,) ndarray
-        Rising nodes [m].
+        Ascending nodes [m].
     soft_lower, soft_upper : (n,) ndarray
         `softness` of each piece at its nodes [m2/N].
 
@@ -303,7 +309,7 @@ def zigzag_compliance(x, compliance) -> np.ndarray:
     Parameters
     ----------
     x : (m,) ndarray
-        Rising nodes [m].
+        Ascending nodes [m].
     compliance : (m, m) ndarray [m2/N]
 
     Returns
@@ -321,7 +327,7 @@ def zigzag_compliance(x, compliance) -> np.ndarray:
 
 
 def softness(x, compliance, places) -> np.ndarray:
-    """Interpolate the `zigzag_compliance` [m2/N] of a body at other places (k,) [m]."""
+    """Interpolate the `zigzag_compliance` [m2/N] of a body to given positions (k,) [m]."""
     return np.interp(places, x[1:-1], zigzag_compliance(x, compliance))
 
 
@@ -331,7 +337,7 @@ def expected_ripples(x, nn, bodies) -> np.ndarray:
     It holds for a smooth contact whose half width is `REFERENCE_CELLS` cells of the coarser side,
     and falls with the square of this width. A body that is deformed to a parabola reaches the grid
     with the kinks of its own nodes, d = T (x_s)^2 - x^2. Zigzag forces against the joint compliance
-    balance the part of d that is not smooth. For Hertz contact the measured ripple was 0.4 to 1.3
+    balance the non-smooth component of d. For Hertz contact the measured ripple was 0.4 to 1.3
     times this one, for cells of 1:1.5 to 1:10 and moduli of 1:1 to 1:100.
 
     Parameters
@@ -371,7 +377,7 @@ def join_on_grid(grids: Grids, side: str, lower: Body, upper: Body) -> Mortar:
     ----------
     grids : Grids
     side : {"lower", "upper", "both"}
-        Which of them.
+        Name of the grid.
     lower, upper : Body
 
     Returns
@@ -413,7 +419,7 @@ def join_on_grid(grids: Grids, side: str, lower: Body, upper: Body) -> Mortar:
 
 
 def _check_body(body: Body, side: str) -> None:
-    """Raise PatchfemError unless a body has rising nodes and compliances of their number."""
+    """Raise PatchfemError unless a body has ascending nodes and compliances of this size."""
     size = body.x.size
     has_shape = all(part.shape == (size, size) for part in body.compliance)
     if size < 3 or not np.all(np.diff(body.x) > 0) or not has_shape:

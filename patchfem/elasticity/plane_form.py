@@ -6,7 +6,7 @@ from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, MeshQuad
 
 @BilinearForm
 def plane_elasticity(u, v, w):
-    """Stress of the displacement u times strain of the displacement v.
+    """Integrand sigma(u) : eps(v) of the weak form.
 
     w.lam and w.mu are the Lame constants [Pa] of the plane problem at the quadrature points.
     """

@@ -92,7 +92,7 @@ def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
 def _axis_changes(values, block) -> tuple[np.ndarray, np.ndarray]:
     """Return the changes (..., c, k) of nodal values (..., N, k) along both local axes of cells.
 
-    For a quad these are twice the differences between the middles of opposite sides.
+    For a quad these are twice the differences between the midpoints of opposite sides.
     """
     corners = [values.take(nodes, axis=-2) for nodes in block.T]
     if len(corners) == 3:
@@ -104,14 +104,14 @@ def _axis_changes(values, block) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Recovery:
-    """A linear map from values at cell centres to places: nodes in one of their materials.
+    """Linear map from cell centres to recovery points, one for each node and material.
 
-    A node at the border of coating and substrate has two places.
+    A node on the border of coating and substrate has two recovery points.
 
     - ``cells``: the Cells
-    - ``node``, ``is_coating``: (s,) node number and material of each place
-    - ``corner_place``: place of every corner, in the order of `Cells.corners`
-    - ``fit``: cells and weights of every place; the weights add up to 1
+    - ``node``, ``is_coating``: (s,) node number and material of each recovery point
+    - ``corner_place``: recovery point of every corner, in the order of `Cells.corners`
+    - ``fit``: cells and weights of every recovery point; the weights add up to 1
     """
 
     cells: Cells
@@ -121,7 +121,7 @@ class Recovery:
     fit: Patches
 
     def __call__(self, values) -> np.ndarray:
-        """Recover values (..., s, k) at the places from values (..., t, k) at the cell centres.
+        """Recover values (..., s, k) at the recovery points from (..., t, k) at cell centres.
 
         Linear fields are recovered exactly.
         """
@@ -148,7 +148,7 @@ def fit_recovery(cells: Cells) -> Recovery:
     if is_thin.any():
         thin = np.flatnonzero(is_thin)
         own = near.select(thin)
-        touched = patches(near.cells, near.row).select(own.cells)  # places around these cells
+        touched = patches(near.cells, near.row).select(own.cells)  # points near these cells
         beyond = near.select(touched.cells)
         widened = patches(own.row[touched.row][beyond.row], beyond.cells)
         more, _ = _fit_planes(widened, cells.points[node[thin]], centres)
@@ -162,7 +162,7 @@ def fit_recovery(cells: Cells) -> Recovery:
 
 
 def _fit_planes(near: Patches, points, centres) -> tuple[Patches, np.ndarray]:
-    """Fit planes by least squares.
+    """Fit a plane to the cell centres of each patch by least squares.
 
     Returns the weights of the cells of each patch, and whether it is too thin for a plane.
 
@@ -275,12 +275,12 @@ class StressError:
     energy: np.ndarray
 
     def relative(self, *others: "StressError") -> tuple[np.ndarray, np.ndarray]:
-        """Return the errors over the energy norm of all pieces.
+        """Return the errors relative to the energy norm of the stress in all pieces.
 
         Parameters
         ----------
         *others : StressError
-            Those of the pieces that are pressed together with this one.
+            Errors of the pieces that are pressed together with this piece.
 
         Returns
         -------
@@ -361,7 +361,7 @@ class Rectangles(NamedTuple):
     """Recovery on cells that are rectangles.
 
     - ``fit``: weights of the recovery
-    - ``places``, ``nodes``: (4, t) of the corners
+    - ``places``, ``nodes``: (4, t) recovery points and nodes of the corners
     - ``sides``: (2, t) lengths [m] along x and inward
     """
 
@@ -372,7 +372,7 @@ class Rectangles(NamedTuple):
 
 
 def _rectangle_norms(rectangles: Rectangles, u, stress, lam, mu) -> Norms:
-    """Compute the norms of one frame on rectangles, without quadrature.
+    """Compute the `Norms` of the stress at one instant on rectangles, in closed form.
 
     Both fields are split into 1, xi, eta and xi eta, which are orthogonal with the mean squares 1,
     1/3, 1/3 and 1/9, and into (xx + yy) / (2 sqrt(lam + mu)), (xx - yy) / (2 sqrt(mu)) and
@@ -416,7 +416,7 @@ def _rectangle_norms(rectangles: Rectangles, u, stress, lam, mu) -> Norms:
 
 
 def _quadrature_norms(recovery: Recovery, rules: list, u, stress, lam, mu) -> Norms:
-    """Compute the norms of one frame on cells of any shape by quadrature."""
+    """Compute the `Norms` of the stress at one instant by quadrature, on cells of any shape."""
     at_corners = recovery(stress)[recovery.corner_place]
     errors = []
     energy = 0.0
@@ -445,7 +445,7 @@ def _complementary_energy(stress, lam, mu) -> np.ndarray:
 
 
 def harmless_rounding(recovery: Recovery, error: StressError, rules: list, fraction: float):
-    """Return a step to which the stresses of a piece may be rounded.
+    """Compute a rounding step for stresses that is small against their estimated error.
 
     Rounding to multiples of q changes xx, yy and xy by q / sqrt(12) in the root mean square, whose
     complementary energy is at most q^2 / (6 mu) per volume.

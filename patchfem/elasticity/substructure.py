@@ -1,4 +1,4 @@
-"""Static condensation of a piece of any mesh to its interface.
+"""Static condensation of a piece on an unstructured mesh to its interface.
 
 scikit-fem assembles the stiffness cell by cell. With the unknowns split into the inside i and the
 interface s, eliminating the inside leaves the Schur complement S = K_ss - K_si K_ii^-1 K_is. One
@@ -24,12 +24,12 @@ from .plane_form import plane_elasticity
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Substructure:
-    """A piece of any mesh that is fixed at its far face, factorised when it is first needed.
+    """Piece on an unstructured mesh with a fixed far face; stiffness factorised on demand.
 
-    So a piece whose compliance is kept on disk is never assembled.
+    A piece whose compliance is in the disk cache is never assembled.
 
     - ``mesh``, ``layers``: cells and materials
-    - ``computed``: results that are kept: order, factor and rounding
+    - ``computed``: cached results: order, factor and rounding
     """
 
     mesh: PieceMesh

@@ -1,4 +1,4 @@
-"""Stiffness of a tensor grid, stored as the couplings of every node with its eight neighbours.
+"""Stiffness of a tensor grid, stored as couplings of every node with its neighbours.
 
 scikit-fem evaluates the form of plane elasticity on three reference rectangles (`plane_form`). The
 stiffness of every cell follows from these by the height and width of the cell, and is scattered
@@ -6,8 +6,8 @@ into a stencil. A grid of 400 x 120 cells takes 0.015 CPU s; scikit-fem's assemb
 takes 0.35 s.
 
 A stencil (nx, rows, 3, 3, 2, 2) [N/m per m] contains at [c, r, 1 + dc, 1 + dr] the coupling of node
-(c, r) with node (c + dc, r + dr), unknowns (along x, inward); it is zero where there is no such
-node. rows: the free ones; the last row of nodes is fixed.
+(c, r) with node (c + dc, r + dr), unknowns (along x, inward); it is zero where that node does
+not exist. rows: the free ones; the last row of nodes is fixed.
 """
 
 from functools import cache
@@ -19,15 +19,15 @@ from .lapack import one_thread
 
 # Corners (column, row) of a cell.
 CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
-# Shape of the array that `plane_form.rectangle_terms` returns.
+# Shape of `plane_form.rectangle_terms`: Lame constant, term A, B or C, two corners, two directions.
 TERMS_SHAPE = (2, 3, 4, 4, 2, 2)
 
 
 @cache
 def _rectangle_terms() -> np.ndarray:
-    """Return `plane_form.rectangle_terms`, which is kept on disk.
+    """Return `plane_form.rectangle_terms`, from the disk cache if it is there.
 
-    So only the first run on a machine imports scikit-fem, which takes as long as a small patch.
+    Only the first run on a machine imports scikit-fem, which takes as long as a small patch.
     """
     key = disk_cache.reference_key()
     kept = disk_cache.fetch(key, {"terms": TERMS_SHAPE})
@@ -41,7 +41,7 @@ def _rectangle_terms() -> np.ndarray:
 
 
 def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
-    """Assemble the stencil of bilinear quadrilaterals on a tensor grid that is fixed at its last row.
+    """Assemble the stencil of bilinear quadrilaterals on a grid with a fixed last row.
 
     Parameters
     ----------

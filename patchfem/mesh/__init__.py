@@ -5,7 +5,7 @@ In: sizes and layers, or a file with tagged cells and edges. Out: a `TensorGrid`
 `row`, `height`, `coating`, `tributary()`, `refine()` and `base_grid`.
 
 - Read `tensor` first: a grid of columns and rows that grow with depth. `grading` divides a length
-  into cells of wanted lengths, which grow with the distance from bands of small cells.
+  into cells of target lengths, which grow with the distance from bands of small cells.
 - `ends` and `shaped`: pieces that are longer than the interface, chamfered or rounded.
 - `files` reads and writes tagged meshes with meshio; `decks` reads .inp; `anymesh` checks them and
   builds both pieces; `recognise` detects tensor grids; `pairs` joins two pieces into one mesh.

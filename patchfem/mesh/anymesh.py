@@ -28,7 +28,7 @@ class TaggedMesh:
     - ``triangles``: (t, 3), ``quads``: (q, 4) node numbers
     - ``names``: (t + q,) tag of every cell, triangles first
     - ``nodes``: node numbers by the tag of an edge
-    - ``how``: how files of this format tag, for messages
+    - ``how``: how files of this format contain tags, for messages
     """
 
     points: np.ndarray
@@ -46,7 +46,7 @@ class PieceMesh:
     - ``points``: (N, 2) x and depth >= 0 [m]
     - ``triangles``: (t, 3), ``quads``: (q, 4) nodes, counterclockwise in (x, depth)
     - ``is_coating``: (t + q,) bool, triangles first
-    - ``interface``: (m,) nodes by rising x
+    - ``interface``: (m,) nodes by increasing x
     - ``far``: (f,) fixed nodes
     """
 
@@ -59,7 +59,7 @@ class PieceMesh:
 
     @property
     def x(self) -> np.ndarray:
-        """Coordinates of the interface nodes (m,) [m], rising."""
+        """Coordinates of the interface nodes (m,) [m], in ascending order."""
         return self.points[self.interface, 0]
 
     @property
@@ -69,7 +69,7 @@ class PieceMesh:
 
     @property
     def row(self) -> float:
-        """Median height [m] of the cells along the interface: their area over their edge there."""
+        """Median height [m] of the cells along the interface: area over interface edge length."""
         position = np.full(len(self.points), -2)
         position[self.interface] = np.arange(self.interface.size)
         heights = []
@@ -95,7 +95,7 @@ class PieceMesh:
 
     @property
     def coating(self) -> float:
-        """Mean thickness of the coating [m]: its area over its extent along x; 0 without one."""
+        """Mean thickness of the coating [m], area over extent along x; 0 without a coating."""
         if not self.is_coating.any():
             return 0.0
         n_triangles = len(self.triangles)
@@ -106,7 +106,7 @@ class PieceMesh:
 
     @property
     def base_grid(self):
-        """The TensorGrid that the piece is made from, if any: None for a mesh of any cells."""
+        """The TensorGrid from which the piece is made; None for an unstructured mesh."""
         return None
 
     def areas(self) -> np.ndarray:
@@ -115,7 +115,7 @@ class PieceMesh:
         return np.concatenate(parts)
 
     def tributary(self) -> np.ndarray:
-        """Return the length of interface that belongs to each of its nodes (m,) [m]."""
+        """Return the tributary length (m,) [m] of each interface node."""
         return tributary_lengths(self.x)
 
     def refine(self) -> "PieceMesh":
@@ -143,7 +143,7 @@ class PieceMesh:
         interface[::2] = self.interface
         interface_pairs = np.stack([self.interface[:-1], self.interface[1:]], axis=1)
         interface_pairs.sort(axis=1)
-        key = pairs[:, 0] * n_points + pairs[:, 1]  # sorted, as the pairs are
+        key = pairs[:, 0] * n_points + pairs[:, 1]  # ascending, because the pairs are sorted
         wanted = interface_pairs[:, 0] * n_points + interface_pairs[:, 1]
         interface[1::2] = np.searchsorted(key, wanted) + n_points
         is_fixed = np.isin(pairs, self.far).all(axis=1) & (n_cells == 1)
@@ -253,7 +253,7 @@ def freeze_piece(mesh: PieceMesh) -> PieceMesh:
 
 
 def _check_tags(mesh: TaggedMesh, where) -> None:
-    """Raise PatchfemError if a required tag is missing or a cell has an unknown one."""
+    """Raise PatchfemError if a required tag is missing or a cell has an unknown tag."""
     names = set(np.unique(mesh.names).tolist())
     missing = {"upper_substrate", "lower_substrate"} - names
     missing |= {edge for edge in EDGES if not len(mesh.nodes.get(edge, ()))}
@@ -302,7 +302,7 @@ def _select_piece(mesh: TaggedMesh, side: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _build_piece(mesh: TaggedMesh, side: str, is_cell, used, where) -> PieceMesh:
-    """Build a piece of its cells and the nodes that they use, with y as depth, and check it."""
+    """Build a piece from its cells and the nodes that they use, with y as depth; check it."""
     n_triangles = len(mesh.triangles)
     points = mesh.points[used, :2] * [1.0, -1.0 if side == "lower" else 1.0]
     triangles = np.searchsorted(used, mesh.triangles[is_cell[:n_triangles]])
@@ -338,7 +338,8 @@ def _build_piece(mesh: TaggedMesh, side: str, is_cell, used, where) -> PieceMesh
 
 def _signed_areas(corners) -> np.ndarray:
     """Return the areas (c,) of cells by their corners (c, n, 2), > 0 if counterclockwise."""
-    own = corners[:, :1]  # relative to a corner of the cell, a far origin costs no digits
+    # coordinates relative to a corner of the cell lose no digits if the origin is far away
+    own = corners[:, :1]
     a = corners - own
     b = np.roll(corners, -1, axis=1) - own
     return (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]).sum(axis=1) / 2
@@ -363,9 +364,9 @@ def _turn_counterclockwise(points, cells, where) -> np.ndarray:
 
 
 def _check_interface(points, nodes, side: str, where) -> None:
-    """Raise PatchfemError unless an interface is straight at y = 0, or slopes gently away from it.
+    """Raise PatchfemError unless an interface is the line y = 0 or slopes gently from it.
 
-    nodes: those of the interface by rising x. They must be apart, and nothing may lie beyond y = 0.
+    nodes: interface nodes by increasing x. Nodes must not coincide, and none may lie beyond y = 0.
     """
     name = f"{side}_interface"
     if nodes.size < 3:
@@ -406,7 +407,7 @@ def _check_interface(points, nodes, side: str, where) -> None:
 def _check_connections(mesh: PieceMesh, side: str, where) -> None:
     """Raise PatchfemError unless the cells of a piece are connected edge to edge.
 
-    The interface and the far face must lie on its border.
+    The interface and the far face must lie on the border of the piece.
     """
     n_points = len(mesh.points)
     near = cKDTree(mesh.points).query_pairs(LENGTH_TOL * mesh.length, output_type="ndarray")

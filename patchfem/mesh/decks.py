@@ -20,7 +20,8 @@ PLANE_ELEMENT = re.compile(
 )
 LINE_ELEMENT = re.compile(r"(?:T2D2|T3D2|B21|B31|R2D2|RAX2|SAX1)H?$")
 UNSUPPORTED_KEYWORDS = ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY")
-# A set may repeat members, up to this number of times the nodes and elements of the deck.
+# Members of a set over the nodes and elements of the deck, above which the set is refused. A set may
+# repeat the members of other sets, so a short deck could otherwise name any number of members.
 MAX_REPETITIONS = 4
 
 
@@ -158,7 +159,7 @@ def read_deck(text: str) -> TaggedMesh:
     Raises
     ------
     PatchfemError, ValueError
-        If the text is no such deck.
+        If the text is not a flat deck with these keywords.
     """
     deck = Deck()
     for block in _split_blocks(text):
@@ -186,7 +187,7 @@ def _split_blocks(text: str):
 
 
 def _read_elements(kind: str, lines) -> dict[int, list[int]]:
-    """Return the nodes of elements of one type by their numbers."""
+    """Return the nodes of elements of one type, by element number."""
     plane = PLANE_ELEMENT.match(kind)
     if plane:
         n_nodes = int(plane[1])

@@ -5,7 +5,7 @@ from math import hypot, sqrt
 
 import numpy as np
 
-# The face of a rounded end is part of the interface up to this slope, as on pieces of a mesh file.
+# Slope up to which the face of a rounded end belongs to the interface, as on pieces of a mesh file.
 MAX_INTERFACE_SLOPE = 0.097
 # At this slope (60 degrees) a rounded end leaves the circle and continues along its tangent.
 MAX_CIRCLE_SLOPE = sqrt(3)
@@ -23,9 +23,10 @@ class End:
     size: float = 0.0
 
     def bearing(self, length: float) -> float:
-        """Return half the length [m] of the face that can touch, of a piece of some length [m].
+        """Return half the length [m] of the face that can be in contact.
 
-        A chamfer does not touch. A rounding touches up to the slope `MAX_INTERFACE_SLOPE`.
+        length: length of the piece [m]. A chamfer does not touch. A rounding touches up to the
+        slope `MAX_INTERFACE_SLOPE`.
         """
         flat = length / 2 - self.size
         if self.kind != "radius":
@@ -33,11 +34,11 @@ class End:
         return flat + self.size * MAX_INTERFACE_SLOPE / hypot(1, MAX_INTERFACE_SLOPE)
 
     def drop(self, x, length: float) -> np.ndarray:
-        """Return the depth of the face below its flat part.
+        """Return the depth of the end face below the level of the flat face.
 
         At the distance s beyond the flat part the circle lies R - sqrt(R^2 - s^2) deep. It is
-        followed to 60 degrees, then its tangent: the cells below an upright face would have no
-        angle.
+        followed to 60 degrees, then its tangent: the cells below a vertical face would have an
+        angle of zero.
 
         Parameters
         ----------

@@ -23,7 +23,7 @@ from .recognise import recognise_grids
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
 EDGE_TAGS = {"upper_interface": 11, "lower_interface": 12, "upper_far": 13, "lower_far": 14}
 MAX_FILE_BYTES = 256 * 2**20  # meshes of two plane pieces are smaller
-# Every entry of these sections of a .msh file takes this number of bytes or more.
+# Minimum number of bytes that an entry takes in these sections of a .msh file.
 MIN_ENTRY_BYTES = {b"$Nodes": 6, b"$Elements": 4}
 
 
@@ -35,12 +35,12 @@ def write_mesh(lower, path: Path, upper=None) -> None:
     lower, upper : TensorGrid or PieceMesh
         upper is None if it equals the lower piece.
     path : Path
-        Its ending selects the format: .msh or .vtu.
+        Its suffix selects the format: .msh or .vtu.
 
     Raises
     ------
     PatchfemError
-        If the ending is another one.
+        If the suffix is neither .msh nor .vtu.
     Missing
         If the folder cannot be written.
     """
@@ -78,8 +78,8 @@ def read_bodies(path: Path) -> tuple:
     Returns
     -------
     lower, upper : TensorGrid, or PieceMesh
-        Both are grids if both pieces are such (`recognise_grids`); upper is then None if it equals
-        the lower one.
+        Both are grids if `recognise_grids` finds both pieces to be tensor grids; upper is then None
+        if it equals the lower grid.
 
     Raises
     ------
@@ -139,7 +139,7 @@ class _Tags(NamedTuple):
 
     - ``names``: name by (1 for lines or 2 for cells, code)
     - ``codes``: an array for each block of cells, or None
-    - ``how``: how files of this format tag, for messages
+    - ``how``: how files of this format contain tags, for messages
     """
 
     names: dict

@@ -1,4 +1,4 @@
-"""Columns and rows of a piece that are graded towards rapid changes of the pressure or stress."""
+"""Columns and rows of a piece, graded towards rapid changes of pressure or stress."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -12,7 +12,7 @@ LENGTH_TOL = 1e-9  # lengths are equal if they differ by less than this fraction
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Wanted cell lengths between `start` and `stop` [m].
+    """Target cell lengths between `start` and `stop` [m].
 
     - ``bands``: (from, to, length) [m] each. A cell has this length within the band and grows by
       `slope` per distance from it.
@@ -29,10 +29,11 @@ class Layout:
     slope: float
 
     def size(self, x) -> np.ndarray:
-        """Return the wanted cell lengths (k,) [m] at places (k,) [m]."""
+        """Return the target cell lengths (k,) [m] at positions (k,) [m]."""
         x = np.asarray(x, float)
         out = np.full(x.shape, self.largest)
-        for low, high, length in self.bands:  # in place, because there are many bands
+        # the lengths are computed in place, because there are many bands
+        for low, high, length in self.bands:
             wanted = _distance(x, low, high)
             wanted *= self.slope
             wanted += length
@@ -51,7 +52,7 @@ class Layout:
 
 
 def _distance(x, low: float, high: float) -> np.ndarray:
-    """Return the distance of places (k,) from an interval."""
+    """Return the distance of positions (k,) from an interval."""
     if low == high:
         return np.abs(x - low)
     return np.maximum(0.0, np.maximum(low - x, x - high))
@@ -60,7 +61,7 @@ def _distance(x, low: float, high: float) -> np.ndarray:
 def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) -> np.ndarray:
     """Divide a layout into cells.
 
-    The levels stand at equal steps of the integral of 1/size, so the lengths of neighbouring cells
+    The levels lie at equal steps of the integral of 1/size, so the lengths of neighbouring cells
     differ by a factor of about 1 + slope at most.
 
     Parameters
@@ -98,7 +99,10 @@ def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) 
 
 
 def tributary_lengths(x) -> np.ndarray:
-    """Return the length (m,) [m] that belongs to each rising node (m,) [m]: half of its cells."""
+    """Return the tributary length (m,) [m] of nodes at ascending positions (m,) [m].
+
+    It is half the sum of the lengths of the cells on either side of a node.
+    """
     half_cells = np.diff(x) / 2
     return np.append(half_cells, 0.0) + np.insert(half_cells, 0, 0.0)
 
@@ -110,7 +114,7 @@ def columns(layout: Layout, through=()) -> np.ndarray:
     ----------
     layout : Layout
     through : sequence of float
-        Places [m] at each of which a column ends.
+        Positions [m] at each of which a column ends.
 
     Returns
     -------

@@ -1,6 +1,6 @@
-"""Weighted sums over the cells around places of a mesh.
+"""Weighted sums over the cells around the points of a mesh.
 
-A place is a node, or a node in one of its materials.
+A point is a node, or a node as seen from one of the materials that meet there.
 """
 
 from dataclasses import dataclass
@@ -8,15 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAX_ORDERED_CELLS = 8  # NumPy adds up to this number of terms in their order
+# NumPy sums at most this number of terms in their given order; `Gathered` uses the same order.
+MAX_ORDERED_CELLS = 8
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Patches:
-    """The cells around every place, with weights.
+    """The cells around every point, with weights.
 
-    - ``starts``: (s + 1,) position in `cells` at which each place begins
-    - ``cells``, ``weights``: (k,) place by place
+    - ``starts``: (s + 1,) index into `cells` at which each point begins
+    - ``cells``, ``weights``: (k,) point by point
     """
 
     starts: np.ndarray
@@ -25,7 +26,7 @@ class Patches:
 
     @property
     def row(self) -> np.ndarray:
-        """The place (k,) to which each entry of `cells` belongs."""
+        """Index (k,) of the point to which each entry of `cells` belongs."""
         return np.repeat(np.arange(self.starts.size - 1), np.diff(self.starts))
 
     def __matmul__(self, values) -> np.ndarray:
@@ -33,7 +34,7 @@ class Patches:
         return np.add.reduceat(self.weights[:, None] * values[self.cells], self.starts[:-1])
 
     def gather(self) -> "Gathered":
-        """Return the same sums for values whose cells are on the last axis."""
+        """Return these patches as `Gathered`, for values that have the cells on the last axis."""
         counts = np.diff(self.starts)
         groups = []
         for count in np.unique(counts[counts <= MAX_ORDERED_CELLS]):
@@ -45,7 +46,7 @@ class Patches:
         return Gathered(counts.size, groups, other_places, others)
 
     def select(self, places) -> "Patches":
-        """Return the patches of some places (p,)."""
+        """Return the patches of the points with given indices (p,)."""
         counts = np.diff(self.starts)[places]
         starts = np.append(0, np.cumsum(counts))
         shifts = self.starts[:-1][places] - starts[:-1]
@@ -54,7 +55,7 @@ class Patches:
 
 
 class Group(NamedTuple):
-    """Places (p,) with the same number c of cells, and their cells and weights (c, p)."""
+    """Points (p,) with the same number c of cells each, and the cells and weights (c, p)."""
 
     places: np.ndarray
     cells: np.ndarray
@@ -63,11 +64,14 @@ class Group(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Gathered:
-    """Patches for values with the cells on the last axis, at a fifth of the time.
+    """Weighted sums over patches, for values that have the cells on the last axis.
 
-    - ``size``: number of places
-    - ``groups``: places with up to `MAX_ORDERED_CELLS` cells
-    - ``other_places``: (p,) other places; ``others``: their Patches
+    All points with the same number of cells are summed at once. This takes a fifth of the time of
+    `Patches`.
+
+    - ``size``: number of points
+    - ``groups``: points with up to `MAX_ORDERED_CELLS` cells
+    - ``other_places``: (p,) other points; ``others``: their Patches
     """
 
     size: int
@@ -97,12 +101,12 @@ class Gathered:
 
 
 def patches(place, cell, weight=None) -> Patches:
-    """Collect pairs of a place and a cell into patches.
+    """Collect pairs of a point and a cell into patches.
 
     Parameters
     ----------
     place, cell : (k,) array_like of int
-        A pair may occur more than once. Every place has a cell.
+        Numbers of points and of cells. A pair may occur more than once. Every point has a cell.
     weight : (k,) ndarray, optional
         By default 1.
 

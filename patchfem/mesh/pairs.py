@@ -1,4 +1,4 @@
-"""Two pieces of any kind as one list of points and tagged cells, as a mesh file contains them."""
+"""Two pieces as one list of points and tagged cells, as a mesh file contains them."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ class Block(NamedTuple):
 def as_piece(body) -> PieceMesh:
     """Return a body as a PieceMesh; the cells of a TensorGrid become quads.
 
-    Node column * ny + row is that of a column and a row.
+    The node in a column and a row has the number column * ny + row.
     """
     if not isinstance(body, TensorGrid):
         return body
@@ -54,7 +54,7 @@ def join_meshes(lower, upper) -> tuple[np.ndarray, list[Block]]:
     for side, sign, body in (("lower", -1.0, as_piece(lower)), ("upper", 1.0, as_piece(upper))):
         names = np.where(body.is_coating, f"{side}_coating", f"{side}_substrate")
         n_triangles = len(body.triangles)
-        # a cell that is mirrored at y = 0 turns the other way
+        # mirroring at y = 0 makes a cell clockwise, so the order of its corners is reversed
         turn = slice(None, None, -1) if sign < 0 else slice(None)
         parts["triangle"].append((body.triangles[:, turn] + n_points, names[:n_triangles]))
         parts["quad"].append((body.quads[:, turn] + n_points, names[n_triangles:]))
@@ -72,7 +72,7 @@ def join_meshes(lower, upper) -> tuple[np.ndarray, list[Block]]:
 
 
 def _far_edges(body: PieceMesh) -> np.ndarray:
-    """Return the edges between nodes of the far face; a node without one is an edge to itself."""
+    """Return the edges between nodes of the far face; an isolated node is joined to itself."""
     edges = np.unique(np.sort(cell_edges(body)[0], axis=1), axis=0)
     edges = edges[np.isin(edges, body.far).all(axis=1)]
     single = np.setdiff1d(body.far, edges)

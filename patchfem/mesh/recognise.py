@@ -1,4 +1,4 @@
-"""What a piece of any mesh is: a tensor grid or not, how much of it is fixed, and its holes."""
+"""Shape of an unstructured piece: tensor grid or not, fixed length and holes."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -9,14 +9,14 @@ from .anymesh import PairMesh, PieceMesh, cell_edges
 from .grading import LENGTH_TOL
 from .tensor import TensorGrid
 
-# Coordinates of one grid line differ by less than this fraction of the piece, those of two by more.
+# Fraction of the size of the piece; coordinates that differ by less lie on the same grid line.
 GRID_LINE_TOL = 1e-7
 # Successive edges of the border that turn by more than 30 degrees belong to different faces.
 MIN_FACE_COSINE = np.cos(np.radians(30.0))
 
 
 def recognise_grids(pair: PairMesh) -> tuple[TensorGrid, TensorGrid | None] | None:
-    """Return a checked pair as tensor grids, if both pieces are such and have the same columns.
+    """Return a checked pair as tensor grids, if both are tensor grids with equal columns.
 
     Parameters
     ----------
@@ -74,13 +74,13 @@ def recognise_grid(mesh: PieceMesh) -> TensorGrid | None:
 
 
 def _grid_lines(values, span: float) -> np.ndarray:
-    """Return the different values among coordinates, rising."""
+    """Return the distinct values among coordinates, in ascending order."""
     values = np.sort(values)
     return values[np.append(True, np.diff(values) > GRID_LINE_TOL * span)]
 
 
 def fixed_length(mesh: PieceMesh) -> tuple[float, float]:
-    """Measure how much of the far face is fixed.
+    """Measure the fixed length and the whole length of the far face.
 
     The whole face consists of every face of the border, from corner to corner, on which an edge is
     fixed, and of the deepest face. An edge is fixed if both of its ends are.

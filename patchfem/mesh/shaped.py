@@ -1,9 +1,9 @@
-"""Pieces that reach beyond the interface, or with chamfered or rounded ends, as moved grids.
+"""Pieces longer than the interface or with chamfered or rounded ends, as deformed grids.
 
-The columns stay upright. Over the interface they are those of the other piece; beyond it they grow
-towards the end of the piece. Every column is lowered by the drop of the face: the coating by all of
-it, because a layer that is sprayed from above has the same thickness along the spray, the substrate
-by a fraction that decreases to zero at the far face.
+The columns stay vertical. Over the interface they are those of the other piece; beyond it they grow
+towards the end of the piece. Every column is lowered by the drop of the face: the coating by the
+whole drop, because a layer that is sprayed from above has the same thickness along the spray, the
+substrate by a fraction that decreases to zero at the far face.
 """
 
 from dataclasses import dataclass
@@ -32,12 +32,12 @@ class ShapedGrid(PieceMesh):
 
     @property
     def coating(self) -> float:
-        """Thickness of the coating [m], 0 without one."""
+        """Thickness of the coating [m]; 0 without a coating."""
         return self.inner.coating
 
     @property
     def flat(self) -> float:
-        """Half the length [m] of the face between its ends."""
+        """Half the length [m] of the flat face between both ends."""
         return self._piece_length() / 2 - self.end.size
 
     @property
@@ -65,10 +65,10 @@ class ShapedGrid(PieceMesh):
 
 
 def shaped_grid(inner: TensorGrid, length: float, end: End, growth: float = GROWTH) -> ShapedGrid:
-    """Make a piece from its grid over the interface, which lies in its middle.
+    """Make a piece with shaped ends from the grid over the interface.
 
-    The first column beyond the interface is as long as the last one over it. A column of nodes
-    stands where a chamfer or a rounding begins.
+    The interface lies in the middle of the piece. The first column beyond the interface is as long
+    as the last column over it. A column of nodes lies where a chamfer or a rounding begins.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A coated piece as a graded tensor grid: columns along the interface, rows that grow with depth.
+"""A coated piece as a tensor grid of columns and of rows that grow with depth.
 
 Both pieces of a pair have the same columns, so their interface nodes match. The shapes of the
 surfaces are described by the gap g(x), never by the mesh.
@@ -12,10 +12,11 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from .grading import tributary_lengths
 
-# Ratio of the heights of successive rows: the compliance errs by 1e-3, with 1.15 by 2e-3.
+# Ratio of the heights of successive rows. The relative error of the compliance is 1e-3, and 2e-3 if
+# the ratio is 1.15.
 GROWTH = 1.1
 COATING_ROWS = 4  # minimum number of rows through a coating
-SUBSTRATE_ROWS = 3  # minimum number of rows below it
+SUBSTRATE_ROWS = 3  # minimum number of rows below the coating
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,7 +49,7 @@ class TensorGrid:
 
     @property
     def coating(self) -> float:
-        """Thickness of the coating [m], 0 without one."""
+        """Thickness of the coating [m]; 0 without a coating."""
         return float(self.depth[self.coating_rows])
 
     @property
@@ -57,7 +58,7 @@ class TensorGrid:
         return self
 
     def tributary(self) -> np.ndarray:
-        """Return the length of interface that belongs to each of its nodes (nx,) [m]."""
+        """Return the tributary length (nx,) [m] of each interface node."""
         return tributary_lengths(self.x)
 
     def cell_is_coating(self) -> np.ndarray:
@@ -84,7 +85,7 @@ class TensorGrid:
         return self._with_rows(split_levels(self.x), split_levels)
 
     def _with_rows(self, x, change) -> "TensorGrid":
-        """Return the grid with columns x and the change of rows of coating and of substrate."""
+        """Return the grid with columns `x`, and with `change` applied to the rows of each layer."""
         coated = change(self.depth[: self.coating_rows + 1])
         under = change(self.depth[self.coating_rows :])
         depth = np.concatenate([coated, under[1:]])
@@ -219,7 +220,7 @@ def graded_grid(
 
 
 def merge_levels(levels) -> np.ndarray:
-    """Return every second of the levels (k,), first and last kept; interpolated if k is even."""
+    """Return every second level, first and last included; interpolated if their number is even."""
     if levels.size % 2:
         return levels[::2]
     position = np.linspace(0, levels.size - 1, levels.size // 2 + 1)
@@ -227,7 +228,7 @@ def merge_levels(levels) -> np.ndarray:
 
 
 def split_levels(levels) -> np.ndarray:
-    """Return levels with one more in each cell, so that a geometric series stays geometric."""
+    """Insert a level into each cell, so that geometrically growing cells stay geometric."""
     if levels.size < 2:
         return levels
     cells = np.diff(levels)

@@ -6,7 +6,7 @@ import numpy as np
 
 
 class NestedStretches(NamedTuple):
-    """A compliance of m nodes, its factor for the current left end, and sums of all stretches so far.
+    """Compliance of m nodes, Cholesky factor from the current left end on, sums of stretches.
 
     - c (m, m) [m/N]; x (m,) [m].
     - upper (m, m): upper Cholesky factor U of the nodes from the left end on.
@@ -57,7 +57,7 @@ class Cases(NamedTuple):
 
 
 def make_cases(first_try, end_limit, gap, loads) -> Cases:
-    """Return cases without solutions.
+    """Return the records of q problems, with zeros where the solutions will be written.
 
     Parameters
     ----------

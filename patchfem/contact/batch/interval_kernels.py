@@ -1,8 +1,9 @@
-"""Compiled parts of the contacts of one stretch of nodes: factors of nested stretches, and their right ends.
+"""Compiled solution of contacts that consist of a single stretch of nodes.
 
-With C = U^T U on the nodes from a on, the leading blocks of U are the factors of all stretches that begin at
-a. One forward substitution of the gap gives, for every right end at once, the closing and the rotation, the
-force of the last node and the gap at the next node of
+The kernels update the factors of nested stretches and find the right ends of the contacts. With C = U^T U on the nodes
+from a on, the leading blocks of U are the factors of all stretches that begin at a. One forward substitution of the gap
+gives, for every right end at once, the closing and the rotation, the force of the last node and the gap at the next
+node of
 
     C f = closing - theta x - g on the stretch,    sum f = N,    sum f x = M + K theta.
 
@@ -71,9 +72,10 @@ def write_sums(stretches, a):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_motion(load, moment, spring, is_free, sums, stop):
-    """Return closing [m] and theta [rad] of the stretch before stop, with `sums` as `write_sums` writes them.
+    """Return closing [m] and theta [rad] of the stretch before stop.
 
-    closing a - theta b = load,  closing b - theta (c + spring) = moment; theta is 0 unless it is free.
+    sums: those of one left end, from `write_sums`. The equations are closing a - theta b = load and closing b - theta
+    (c + spring) = moment; theta is 0 unless it is free.
     """
     a = sums[0, stop]
     b = sums[1, stop]
@@ -86,9 +88,11 @@ def solve_motion(load, moment, spring, is_free, sums, stop):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_end(stretches, a, y, limit, loads, is_free):
-    """Return the end of the largest stretch from a on whose last node is pressed and whose next one is open.
+    """Return the end of the longest stretch from node a that ends like a contact.
 
-    y: (k,) U^-T of the gap from a on; loads: (3,) as in `arrays.Cases`. 0 if there is none before limit.
+    The last node of the stretch is pressed, and the next node is open. The end is 0 if there is none before limit.
+
+    y: (k,) U^-T of the gap from a on; loads: (3,) as in `arrays.Cases`.
     """
     unit_closing = stretches.unit[0]
     unit_arm = stretches.unit[1]
@@ -126,7 +130,7 @@ def move_left_end(stretches, a, b, is_start):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def solve_ends(stretches, a, y, limits, loads, stop, motion, is_free):
-    """Find right ends and motions of n cases that begin at a, and what U^-1 turns into their forces.
+    """Find right ends, motions and scaled forces U f of n cases that begin at node a.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Contacts of one stretch of nodes: any number of cases on one compliance, solved in one pass over left ends.
+"""Contacts of a single stretch of nodes: many cases on one compliance in one pass.
 
-Flat, tilted and crowned pieces press like this under any load, wherever the load line is. Cases that begin at
-the same node share its Cholesky factor (`interval_kernels`) and are solved together by BLAS.
-`unilateral.solve` is the twin for single cases.
+Flat, tilted and crowned pieces touch on a single stretch under any load, wherever the load line is. The pass goes over
+the left ends of the stretches. Cases that begin at the same node share its Cholesky factor (`interval_kernels`) and are
+solved together by BLAS. `unilateral.solve` is the twin for single cases.
 """
 
 from typing import NamedTuple
@@ -26,7 +26,7 @@ MIN_PARABOLA_NODES = 3  # nodes in contact from which a stiffness is interpolate
 
 
 class Pressed(NamedTuple):
-    """Contacts of q cases on m nodes.
+    """Contact solutions of q cases: nodes in contact, forces, openings and motions.
 
     - first, stop (q,): the nodes in contact, from `first` on and before `stop`.
     - force (q, m) [N]; opening (q, m) [m]; closing (q,) [m]; theta (q,) [rad].
@@ -51,7 +51,11 @@ class Pressed(NamedTuple):
 
 
 class _Solutions(NamedTuple):
-    """Solutions of n cases with the same left end: its lower factor, forces (n, k), ends (n,), motions (n, 2)."""
+    """Solutions of n cases whose contacts begin at the same node `left_end`.
+
+    - lower (k, k): lower Cholesky factor of the compliance of the k nodes from `left_end` on.
+    - force (n, k); stop (n,): ends of the contacts; motion (n, 2): closing [m] and theta [rad].
+    """
 
     left_end: int
     lower: np.ndarray
@@ -74,7 +78,7 @@ class Intervals:
     def __init__(self, c: np.ndarray, x: np.ndarray):
         self.c = np.ascontiguousarray(c)
         self.x = np.ascontiguousarray(x)
-        # as in `arrays.NestedStretches`, of the left ends that were visited
+        # the sums of `arrays.NestedStretches`, filled for the left ends that were visited
         self.sums = np.zeros((x.size + 1, 3, x.size + 1))
 
     def press(self, gap, load, moment=None, spring=0.0, known=None) -> Pressed:
@@ -140,7 +144,10 @@ class Intervals:
         return contacts
 
     def _bracket_on_coarse(self, gap, loads, *, is_free: bool) -> tuple:
-        """Return first node and end (q,) of stretches that contain the contacts, from those on fewer nodes."""
+        """Bracket the contacts: first node and end (q,) of stretches that contain them.
+
+        The brackets follow from the contacts on a coarse interface.
+        """
         coarse = Intervals(self.c[::COARSENING, ::COARSENING], self.x[::COARSENING])
         contacts = coarse._press(gap[:, ::COARSENING], loads, None, is_free=is_free)
         has_end = contacts.stop > 0
@@ -155,7 +162,9 @@ class Intervals:
         self._solve_all(cases, int(first.min()) - 1, int(first.max()) + 1, 1, is_free=False)
 
     def _solve_all(self, cases: Cases, low: int, high: int, n_tries: int, *, is_free: bool) -> None:
-        """Solve all cases, and fill `sums` of the left ends from `low` to `high` and beside every stretch.
+        """Solve all cases, and fill `sums` for the left ends that later calls need.
+
+        These are the left ends from `low` to `high` and those beside every stretch.
 
         n_tries: number of left ends that are tried for a case.
         """
@@ -167,7 +176,7 @@ class Intervals:
             self.c, self.x, upper, np.zeros((2, m)), self.sums, workspace=np.zeros(m)
         )
         kernels.move_left_end(stretches, a, a, 1)
-        # left end that is tried next for a case, m for a case that is done
+        # for each case the left end to try next, or m once the case is solved
         next_try = np.minimum(cases.first_try, m)
         while (left_end := int(next_try.min(initial=m))) < m:
             if left_end > a:
@@ -185,7 +194,7 @@ class Intervals:
             kernels.move_left_end(stretches, a, min(high, m - 1), 0)
 
     def _try_left_end(self, stretches, cases: Cases, some, a: int, *, is_free: bool) -> np.ndarray:
-        """Try the left end a for some cases (n,); returns their next left ends (n,), m for those solved."""
+        """Try the left end a for the cases `some` (n,); return the next left ends (n,), m if solved."""
         m = self.x.size
         limits = np.minimum(cases.end_limit[some], m)
         nodes = slice(a, max(int(limits.max()), a + 1))
@@ -207,7 +216,7 @@ class Intervals:
         return np.where(is_solved, m, np.where(is_cut, a, a + 1))
 
     def _store(self, stretches, cases: Cases, some, found: _Solutions, *, is_free: bool) -> None:
-        """Store the solutions of some cases (n,) after a step of iterative refinement."""
+        """Store the solutions of the cases `some` (n,) after a step of iterative refinement."""
         a = found.left_end
         stop = found.stop
         nodes = slice(a, a + found.force.shape[1])
@@ -247,7 +256,7 @@ class Intervals:
         ----------
         contacts : Pressed
         softness : (m,) ndarray
-            Compliance [m/N] of a skin alone; 0 without one.
+            Compliance [m/N] of the asperity layer alone; 0 without asperities.
         row : float
             Height [m] of the first row of cells.
         """
@@ -267,9 +276,10 @@ class Intervals:
         return np.clip(positions, x[0], x[-1])
 
     def stiffness(self, contacts: Pressed, *, is_rotation: bool = False) -> np.ndarray:
-        """Return the stiffnesses (q,) of contacts with edges between nodes, as `edges.set_stiffness` does.
+        """Return the stiffnesses (q,) of contacts, as `edges.set_stiffness` does.
 
-        They are those of a translation [N/m], or of a rotation about x = 0 [N m/rad].
+        The edges of the contacts lie between nodes. The stiffnesses are those of a translation [N/m], or of a rotation
+        about x = 0 [N m/rad].
         """
         sums = self.sums[:, 2 if is_rotation else 0]
         m = self.x.size
@@ -296,7 +306,7 @@ class Intervals:
         return gap + motion[:, 1:] * x - motion[:, :1] + displacement
 
     def _edge_fractions(self, cases: Cases, opening) -> np.ndarray:
-        """Return the fractions (q, 2) of `Pressed`; 1/2 where the set does not change with the approach."""
+        """Return `Pressed.fractions`; 1/2 where the set does not change with the approach."""
         m = self.x.size
         neighbour = np.stack([cases.first - 1, cases.stop], axis=1)
         has_neighbour = (neighbour >= 0) & (neighbour < m)

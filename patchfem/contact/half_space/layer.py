@@ -1,4 +1,4 @@
-"""Compliance of a coated layer on a rigid base for waves along its face, which needs no mesh.
+"""Closed-form compliance of a coated layer on a rigid base, for waves along its face.
 
 A layer between two guides without friction responds to a pressure cos(k x) by a wave of the same length, if k times its
 length is a multiple of pi. The stress function of a layer is (a + b k z) e^(-k z) cos(k x), with another pair that grows
@@ -27,7 +27,7 @@ class WaveCompliance(NamedTuple):
 
 
 def layer_compliance(k, height: float, thickness: float, layers: Layers) -> WaveCompliance:
-    """Return the compliance of a coated layer, fixed at its foot, for waves of pressure and of shear.
+    """Return the compliance of a coated layer on a rigid base for waves of pressure and shear.
 
     Parameters
     ----------
@@ -85,7 +85,10 @@ def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
 
 
 def _layer_states(k, z: float, depth: float, moduli: tuple, scale: float) -> np.ndarray:
-    """Return k scale u_x, k scale u_z, tension and shear (n, 4, 4) of the four solutions of a layer at the depth z [m]."""
+    """Return the states (n, 4, 4) of the four solutions of a layer at the depth z [m].
+
+    A state is k scale u_x, k scale u_z, tension and shear.
+    """
     lam, mu = moduli
     nu = lam / (2 * (lam + mu))
     softness = scale / (2 * mu)
@@ -104,11 +107,11 @@ def _layer_states(k, z: float, depth: float, moduli: tuple, scale: float) -> np.
 
 
 def end_compliance(piece: Piece) -> WaveCompliance:
-    """Return what the free ends of a piece add to its compliance between guides without friction, (nx, nx) [m2/N] each.
+    """Return the compliances (nx, nx) [m2/N] that free ends add to those between guides.
 
-    The guides prevent displacements across them under a pressure, and along them under a shear, so that
-    `layer_compliance` is the closed form between them. The error of the cells near a force is the same with and without
-    guides and cancels, which leaves a function as smooth as the distance to the end is long.
+    The guides are without friction. They prevent displacements across them under a pressure, and along them under a
+    shear, so `layer_compliance` is the closed form between them. The error of the cells near a force is the same with
+    and without guides and cancels, which leaves a function as smooth as the distance to the end is long.
     """
     free = piece.factor.compliance()
     parts = []
@@ -120,7 +123,10 @@ def end_compliance(piece: Piece) -> WaveCompliance:
 
 
 def guide_ends(stencil: np.ndarray, component: int) -> np.ndarray:
-    """Return the stencil of a grid whose first and last column do not move along x (component 0) or inward (1)."""
+    """Return the stencil of a grid whose first and last column are guided.
+
+    The guides prevent motion along x (component 0) or inward (component 1).
+    """
     guided = stencil.copy()
     for column, inner, side in ((0, 1, 0), (-1, -2, 2)):
         diagonal = stencil[column, :, 1, 1, component, component]

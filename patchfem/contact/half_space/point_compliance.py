@@ -1,4 +1,4 @@
-"""Compliance of the interface at thousands of even points, known by its products with forces alone.
+"""Matrix-free compliance of the interface at thousands of evenly spaced points.
 
 u = H p + V E V^T f: H multiplies each wave cos(n pi x/L) of the pressure by its closed form (`layer.layer_compliance`),
 which takes two cosine transforms; V E V^T is what the free ends of the pieces change (`layer.end_compliance`), a few
@@ -14,20 +14,20 @@ from scipy.fft import dct, idct
 from ...core import NotConverged
 from ..edges import ContactEdge, parabola_change, passed_fraction
 
-MIN_RELATIVE_SIZE = (
-    1e-9  # smaller functions of the free ends, relative to the largest one, are left out
-)
-EQUATION_TOL = 1e-10  # relative residual of the equations on a part of the points
+# compliance of a function of the free ends over the largest one; smaller functions are left out
+MIN_RELATIVE_SIZE = 1e-9
+EQUATION_TOL = 1e-10  # relative residual of the equations on the active points
 # fraction of a cell by which an edge lies behind `ContactEdge.fraction`: Hertz contact, 24 rows of points, to 0.001
 EDGE_OFFSET_FRACTION = 0.189
-MAX_REFERENCE_POINTS = 64  # points of a contact that count in the choice of its longest part
+# number of points from which contacts count as equally long in the choice of the longest one
+MAX_REFERENCE_POINTS = 64
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PointCompliance:
-    """Compliance of n even cells, whose forces act at their middles.
+    """Compliance of a row of n equal cells, each loaded at its centre.
 
-    - x (n,): Middles of the cells [m].
+    - x (n,): Centres of the cells [m].
     - area: Area of a cell [m2].
     - waves (n,): Compliance [m/Pa] for a pressure cos(j pi x/L), j = 0, 1, ...
     - modes (n, r): Functions of the free ends [1].
@@ -109,7 +109,7 @@ class SmoothModes(NamedTuple):
 
 
 def smooth_modes(positions, change, x) -> SmoothModes:
-    """Return the eigenfunctions of a symmetric compliance that is smooth between given positions.
+    """Return the eigenfunctions of a symmetric compliance that is smooth along x.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
 def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> float:
     """Return the stiffness motion . C^-1 motion of a contact set with edges between its points.
 
-    Each edge adds its part of the parabola through the set with one point less and one more (`contact.edges`). The
+    Each edge adds the change along the parabola through the set with one point less and one more (`contact.edges`). The
     compliances of these points are taken from the edge of the longest contact, because they are the same at all edges
     but those of the shortest contacts.
 
@@ -192,7 +192,7 @@ def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> f
 
 
 def _contact_length(active: np.ndarray, edge: ContactEdge) -> int:
-    """Return the number of points of the contact that ends at `edge`, at most MAX_REFERENCE_POINTS."""
+    """Count the points of the contact that ends at `edge`, up to MAX_REFERENCE_POINTS."""
     if edge.side > 0:
         first = max(edge.node - MAX_REFERENCE_POINTS + 1, 0)
         points = active[first : edge.node + 1][::-1]
