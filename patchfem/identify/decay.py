@@ -16,11 +16,13 @@ from .variable_projection import Projection, project, standard_errors
 
 MIN_SAMPLES = 32  # smallest number of samples of a record
 MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
-MAX_REMAINING = 0.8  # residual with / without a further sinusoid; above this ratio the sinusoid fits noise
+# residual with / without a further sinusoid; above this ratio the sinusoid fits noise
+MAX_REMAINING = 0.8
 MIN_MISFIT = 1e-9  # residual / record; a smaller residual is round-off
 MIN_DISTANCE = 3  # spectral lines, 1/T apart for a record of length T, between two sinusoids
 MIN_AMPLITUDE = 0.01  # amplitude / largest amplitude; weaker sinusoids are left out
-START_DECAYS = (0.3, 3.0, 30.0)  # decay rates at which the iteration starts, multiplied by the length of the record
+# decay rates at which the iteration starts, multiplied by the length of the record
+START_DECAYS = (0.3, 3.0, 30.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

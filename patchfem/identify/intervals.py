@@ -13,11 +13,13 @@ from .space import CubeResidual
 # fraction of the largest singular value of the scaled Jacobian; smaller ones are undetermined directions
 MIN_SINGULAR_VALUE = 1e-6
 MIN_EFFECT = 1e-9  # fraction of the largest residual; a value that changes the residual by less has no effect
-MIN_DIRECTION = 1e-3  # squared component of an undetermined direction; a value with a smaller one is determined
+# squared component of an undetermined direction; a value with a smaller one is determined
+MIN_DIRECTION = 1e-3
 # relative error of the linear growth of the sum of squares at an interval's ends
 MAX_NONLINEARITY = 0.2
 MIN_INTERVAL = 1e-9  # fraction of the range of a parameter; a smaller interval is round-off and treated as linear
-START_FRACTION = 64  # distance to the bound / first step of a profile, for a parameter without a linear interval
+# distance to the bound / first step of a profile, for a parameter without a linear interval
+START_FRACTION = 64
 # relative error of the growth of the sum of squares at the end of a profile, also for quick models
 PROFILE_TOL = 1e-3
 QUICK_PROFILE_TOL = 1e-2

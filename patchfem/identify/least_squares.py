@@ -22,10 +22,12 @@ FTOL = 1e-10  # relative change of the sum of squares in a step at which a desce
 QUICK_FTOL = 1e-4  # FTOL of a residual that is expensive to evaluate
 MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without those for Jacobians
 EXACT = 1e-9  # fraction of the largest residual; a fit with less is exact and needs no other starting point
-SAME_VALLEY = 1.02  # sum of squares / the smallest one; descents that end below it found the same minimum
+# sum of squares / the smallest one; descents that end below it found the same minimum
+SAME_VALLEY = 1.02
 SAME_RESULT = 1e-6  # relative difference of the sums of squares of descents that agree
 NEAR_BOUND = 1e-3  # fraction of the range; a value closer to a bound is also tried on the bound
-STARTS_PER_VALUE = 8  # number of points per value at which the residual is evaluated to choose the starting points
+# number of points per value at which the residual is evaluated to choose the starting points
+STARTS_PER_VALUE = 8
 
 
 @dataclass(frozen=True, eq=False, slots=True)

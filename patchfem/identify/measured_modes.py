@@ -15,11 +15,13 @@ from .frequency_response import Estimate, estimate_response, even_step
 from .swings import half_swings, sparse_after
 
 INPUTS = ("force", "base_acceleration")  # quantities of a record that drive the rig
-PLACES = ("slide", "output", "base", "normal", "pitch")  # quantities whose mode-shape components a user can name
+# quantities whose mode-shape components a user can name
+PLACES = ("slide", "output", "base", "normal", "pitch")
 # part of a damping ratio by which that of the windowed estimate may be larger without a note
 MAX_WIDENING = 0.05
 MAX_ERROR_RATIO = 2.0  # half-width of the interval / damping ratio; an amplitude with a wider interval is left out
-MAX_MISFIT = 0.1  # fraction of a driven response that the modes may leave unexplained without a note
+# fraction of a driven response that the modes may leave unexplained without a note
+MAX_MISFIT = 0.1
 # part of a free decay that the sinusoids may leave unexplained without a note
 MAX_DECAY_MISFIT = 0.05
 

@@ -15,15 +15,18 @@ from ..response.decay_curve import HalfSwings, smooth_slopes
 MIN_SAMPLES = 5  # smallest number of samples in a half swing
 # part of a half period and of a half swing; error of a sine fitted to few samples
 SINE_ERROR = 3e-5
-MAX_NOISE = 0.25  # standard deviation / amplitude; a half swing with a larger ratio is lost in the noise
+# standard deviation / amplitude; a half swing with a larger ratio is lost in the noise
+MAX_NOISE = 0.25
 N_PASSES = 3  # number of passes over all half swings; each starts from the half periods and rates of the pass before
 MAX_MOVES = 4  # largest number of iterations that move the middle of a half swing
 MAX_SHIFT = 0.35  # largest distance of a middle from the predicted one, in half periods
-N_NEIGHBOURS = 8  # number of half swings on each side whose residuals give the noise of a half swing
+# number of half swings on each side whose residuals give the noise of a half swing
+N_NEIGHBOURS = 8
 # frequencies of the first cycle that are tried, over that of the highest spectral line
 FREQUENCY_RATIOS = np.linspace(0.75, 1.3, 56)
 MAX_STEP_RATIO = 10.0  # time step / 10 % quantile of the time steps; messages name a larger step
-MAX_PERIOD_CHANGE = 0.3  # largest difference of the second half period from the first, as a fraction of the first
+# largest difference of the second half period from the first, as a fraction of the first
+MAX_PERIOD_CHANGE = 0.3
 PADDING = 8  # factor by which zeros lengthen the record for its spectrum
 
 

@@ -21,7 +21,8 @@ MAX_ROUNDS = 4  # largest number of corrections of the cheap model in one search
 MAX_RESIDUAL_CHANGE = 1e-3  # largest difference of the residuals of two models that agree
 TRIALS_PER_VALUE = 24  # number of points per value at which the cheap model is computed to choose the starting points
 MAX_VALLEYS = 3  # largest number of minima of the cheap model from which the search continues
-MIN_DISTANCE = 0.03  # smallest distance in the unit cube between two minima from which the search continues
+# smallest distance in the unit cube between two minima from which the search continues
+MIN_DISTANCE = 0.03
 MAX_WORSE = 10.0  # sum of squares / the smallest one; a minimum with a larger ratio is left out
 # sum of squares / the smallest one; points below it are refined with derivatives of the expensive model
 MAX_RIVAL = 1.5

@@ -6,9 +6,7 @@ from ..core import PatchfemError
 from . import matlab5, matlab73
 
 MAX_BYTES = 512 * 2**20  # largest size of a file
-HDF5 = (
-    b"\x89HDF\r\n\x1a\n"  # signature at the beginning of the file, or behind the user block that MATLAB puts there
-)
+HDF5 = b"\x89HDF\r\n\x1a\n"  # signature at the beginning of the file, or behind the user block that MATLAB puts there
 
 
 def read_variables(path, data: bytes | None = None) -> dict:
@@ -44,7 +42,8 @@ def read_variables(path, data: bytes | None = None) -> dict:
 def _read_bytes(path) -> bytes:
     with open(path, "rb") as file:
         head = file.read(128)
-        if len(head) < 128 or 0 in head[:4]:  # a version-4 file has zeros there, and so may a file that is not from MATLAB
+        # a version-4 file has zeros there, and so may a file that is not from MATLAB
+        if len(head) < 128 or 0 in head[:4]:
             raise PatchfemError(f"{path}: {matlab5.DAMAGED_HEADER}")
         if os.fstat(file.fileno()).st_size > MAX_BYTES:
             raise PatchfemError(

@@ -16,9 +16,8 @@ from .section import Section, median_of_five
 
 MIN_SAMPLES = 40  # samples of the shortest unworn part
 MIN_WORN_DEPTH = 2 * MAX_UNWORN  # standard deviations of the deepest height of a worn place
-SPECK_SAMPLES = (
-    16  # samples at half of its depth; a narrower place may be an error of interpolation
-)
+# samples at half of its depth; a narrower place may be an error of interpolation
+SPECK_SAMPLES = 16
 NARROW_SAMPLES = 5  # samples of a scratch at half of its depth
 MIN_SCRATCH = 20.0  # standard deviations of the depth of a scratch
 MIN_TOPS = 8  # worn tops, between which the valleys are a reference

@@ -18,18 +18,16 @@ from ..profile import robust_deviation
 # fraction of the heights that least trimmed squares fits; only few may be unworn
 TRIMMED_FRACTION = 0.2
 MIN_UNWORN = 0.08  # smallest fraction of unworn heights that can serve as a reference surface
-BIWEIGHT = (
-    4.685  # scales; heights farther off have no weight, with 95 % efficiency for normal noise
-)
+# scales; heights farther off have no weight, with 95 % efficiency for normal noise
+BIWEIGHT = 4.685
 MAX_UNWORN = 2.5  # scales; an unworn height is at most so far from the floor
 MAX_NOISE = 4.0  # standard deviations to which noise is clipped; a height farther off is no noise
 MAX_OUTLIER = 8.0  # standard deviations that the noise of no height reaches
 SHORTH_FRACTION = 0.3  # fraction of the heights of a block in the interval that gives its mode
 MAX_SUBSETS = 1200  # elemental subsets of blocks that are tried, which limits the time
 MAX_FLOORS = 3  # floors that are sought, each in the blocks that lie on none before it
-MIN_DETERMINANT = (
-    1e-3  # of an elemental subset; with a smaller one its blocks lie too close together
-)
+# of an elemental subset; with a smaller one its blocks lie too close together
+MIN_DETERMINANT = 1e-3
 N_JUDGED = 1000  # heights whose trimmed squares rank the subsets
 SEED = 1985  # seed of the random subsets, and of random traces
 

@@ -41,9 +41,8 @@ END_TEXTS = ("x of the first worn place", "x of the last worn place")
 
 # fraction of the whole lost area of a worn run; the ends of smaller runs are no ends of the wear
 MIN_AREA_FRACTION = 0.01
-FORM_WAVES = (
-    2.5  # cut-off / longest wave of the band; longer waves of the depth are the form of a track
-)
+# cut-off / longest wave of the band; longer waves of the depth are the form of a track
+FORM_WAVES = 2.5
 MIN_VALLEY = 10.0  # standard deviations of the depth of a new valley below the first trace
 N_BESIDE = 5  # samples beside a track, where the running median may still show the track
 
