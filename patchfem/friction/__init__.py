@@ -1,4 +1,4 @@
-"""Laws of friction: traction against slide at given pressure.
+"""Friction laws: traction as a function of the relative displacement at a given pressure.
 
 In: increments of slide and pressure. Out: path-mean traction, dissipated energy, the state after the step
 (`protocol`). `laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named

@@ -17,8 +17,8 @@ from math import pi
 
 import numpy as np
 
-SMALL = 0.1  # mu t below which the series of the friction's work is used; the closed form loses digits there
-TERMS = 18  # of it: 0.1^18 is round-off
+SMALL = 0.1  # mu t below which the friction work is a series, because the closed form suffers from cancellation
+TERMS = 18  # number of terms of this series; 0.1^18 is round-off
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Grooves:
 
     @property
     def steepest(self) -> float:
-        """Largest slope A k of a flank [1]."""
+        """Largest slope A k of the flanks [1]."""
         return self.amplitude * self.wave
 
     def worn(self, depth: float, upper_share: float) -> "Grooves | None":
@@ -55,21 +55,21 @@ class Grooves:
         return replace(self, amplitude=left) if left > 0 else None
 
     def height(self, q):
-        """Height z = A (1 - cos(k q - phase)) [m] at slides q [m], 0 at the bottom of a groove."""
+        """Return the height z = A (1 - cos(k q - phase)) [m] at relative displacements q [m]."""
         return (
             2 * self.amplitude * np.sin(0.5 * (self.wave * np.asarray(q, float) - self.phase)) ** 2
         )
 
     def slope(self, q):
-        """Slope t = A k sin(k q - phase) [1] at slides q [m]."""
+        """Return the slope t = A k sin(k q - phase) [1] at relative displacements q [m]."""
         return self.steepest * np.sin(self.wave * np.asarray(q, float) - self.phase)
 
     def bend(self, q):
-        """Rate of the slope t' = A k^2 cos(k q - phase) [1/m] at slides q [m]."""
+        """Return the derivative t' = A k^2 cos(k q - phase) [1/m] of the slope at q [m]."""
         return self.steepest * self.wave * np.cos(self.wave * np.asarray(q, float) - self.phase)
 
     def ratio(self, q, way, friction: float):
-        """Force against the slide over the vertical force, (t + way mu)/(1 - way mu t) [1], at slides q [m].
+        """Return tangential / vertical force (t + way mu)/(1 - way mu t) [1] at q [m].
 
         way: sign of the motion, 0 for a slide held by the flank alone; friction: coefficient mu [1].
         """
@@ -77,7 +77,7 @@ class Grooves:
         return (t + part) / (1 - part * t)
 
     def stiffness(self, load: float) -> float:
-        """Stiffness N k^2 A [N/m] of small motions about the bottom under a load [N]."""
+        """Return the stiffness N k^2 A [N/m] of small motions about the bottom under a load [N]."""
         return load * self.wave**2 * self.amplitude
 
     def capacity(self, load: float, friction: float) -> float:
@@ -91,13 +91,15 @@ class Grooves:
         )
 
     def rise(self, q0, q1):
-        """Height gained from slides q0 to q1 [m]; it loses no digits where they are close."""
+        """Return the height difference [m] between q0 and q1 [m] without cancellation."""
         half, middle = 0.5 * self.wave * (q1 - q0), 0.5 * self.wave * (q1 + q0) - self.phase
         return 2 * self.amplitude * np.sin(middle) * np.sin(half)
 
     def lost(self, q0, q1, friction: float):
-        """Energy [J/N] per vertical force that Coulomb friction dissipates from slides q0 to q1 [m], any way: int mu
-        (1 + t^2)/(1 - way mu t) |dq|, in closed form."""
+        """Return the energy / vertical force [J/N] that friction dissipates from q0 to q1 [m].
+
+        It is the integral of mu (1 + t^2)/(1 - way mu t) |dq| in closed form, for either direction.
+        """
         q0, q1 = np.asarray(q0, float), np.asarray(q1, float)
         way = np.sign(q1 - q0)
         turn, start, end = self.wave, self.wave * q0 - self.phase, self.wave * q1 - self.phase
@@ -125,9 +127,11 @@ class Grooves:
         return np.where(way == 0, 0.0, c * total / turn)
 
     def least_mass(self, friction: float) -> float:
-        """Least of t (t - mu)/(1 + mu t) [1] on the flanks: the lifted mass times it, where it is below zero, is taken
-        from the mass that the interface moves."""
-        # its derivative is zero where mu t^2 + 2 t - mu = 0
+        """Return the minimum of t (t - mu)/(1 + mu t) [1] over the slopes t of the flanks.
+
+        Where it is negative, its product with the lifted mass reduces the mass that the interface moves.
+        """
+        # the derivative is zero where mu t^2 + 2 t - mu = 0
         flank = (np.sqrt(1 + friction**2) - 1) / friction if friction > 0 else 0.0
         flank = min(flank, self.steepest)
         return flank * (flank - friction) / (1 + friction * flank)

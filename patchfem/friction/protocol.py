@@ -32,7 +32,7 @@ class Step(NamedTuple):
 
 
 class LastTraction:
-    """Base of the laws without a stretch: their state is the last traction (m,) [Pa].
+    """Base of laws without a stretch: the state is the last traction (m,) [Pa].
 
     A subclass has `limit(sigma, direction)`, `share(increment, dt)` and `step`.
     """
@@ -45,7 +45,7 @@ class LastTraction:
         return np.zeros_like(sigma)
 
     def press(self, state, s0, s1) -> Step:
-        """Change the pressure at rest: the traction is cut to its new limit, and nothing is dissipated.
+        """Change the pressure at rest: the traction is reduced to the new limit without dissipation.
 
         Parameters
         ----------

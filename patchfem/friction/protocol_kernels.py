@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 from ..compiled.jit import NJIT_NO_REFCOUNT, njit
 
-IS_SET_VALUED = False  # such a law holds the relative displacement at rest without a stretch
-HAS_ZERO_KINK = False  # the rate equation of such a law has a kink at zero stretch
-IS_RATE_INDEPENDENT = False  # the stretch of such a law follows the path alone: `integrate_stretch`
-HAS_SPEED_LAYER = False  # the force of such a law changes within a layer of speeds around 0
+IS_SET_VALUED = False  # a set-valued law holds the relative displacement at rest without a stretch
+HAS_ZERO_KINK = False  # the rate equation of the law has a kink at zero stretch
+# the stretch of the law depends on the path alone and is given by `integrate_stretch`
+IS_RATE_INDEPENDENT = False
+HAS_SPEED_LAYER = False  # the force of the law changes within a layer of small speeds
 
 
 class Reading(NamedTuple):
@@ -94,7 +95,7 @@ def solve_step(numbers, memory, free, compliance):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def integrate_stretch(numbers, stretch, mean_square, increment, direction):
-    """Return the stretch as it was: only the rate of the law is known.
+    """Return the unchanged stretch: the law has a rate only.
 
     Parameters
     ----------

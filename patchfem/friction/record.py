@@ -7,7 +7,7 @@ from ..effects import LAWS, law_has_trait
 
 
 def law_from(friction, load: float = 1.0):
-    """Return the law object of a [friction] table, for laws that its keys define completely.
+    """Return the law object of a [friction] table, for laws that the keys define completely.
 
     Parameters
     ----------

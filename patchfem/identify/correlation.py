@@ -2,7 +2,7 @@
 
 import numpy as np
 
-MIN_ROWS = 20  # rows; with fewer, correlation cannot be distinguished from chance
+MIN_ROWS = 20  # number of rows; with fewer, correlation cannot be distinguished from chance
 CHANCE_CORRELATION = 2.0  # standard deviations 1/sqrt(rows); a smaller correlation is chance
 MIN_REPEAT_CORRELATION = 0.5  # correlation of one cycle with the next; cycles with more are repeats
 

@@ -14,13 +14,15 @@ from scipy.optimize import least_squares
 from ..core import PatchfemError
 from .variable_projection import Projection, project, standard_errors
 
-MIN_SAMPLES = 32  # samples of a record
-MAX_SINUSOIDS = 8  # sinusoids of one fit
-MAX_REMAINING = 0.8  # residual with a further sinusoid over that without it; with more, it is noise
-MIN_MISFIT = 1e-9  # residual over the record; a smaller one is round-off
+MIN_SAMPLES = 32  # smallest number of samples of a record
+MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
+# residual with / without a further sinusoid; above this ratio the sinusoid fits noise
+MAX_REMAINING = 0.8
+MIN_MISFIT = 1e-9  # residual / record; a smaller residual is round-off
 MIN_DISTANCE = 3  # spectral lines, 1/T apart for a record of length T, between two sinusoids
-MIN_AMPLITUDE = 0.01  # amplitude over the largest one; fainter sinusoids are left out
-START_DECAYS = (0.3, 3.0, 30.0)  # decay rates of the starts, times the length of the record
+MIN_AMPLITUDE = 0.01  # amplitude / largest amplitude; weaker sinusoids are left out
+# decay rates at which the iteration starts, multiplied by the length of the record
+START_DECAYS = (0.3, 3.0, 30.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -46,7 +48,7 @@ class Decay:
 
 
 class _Refined(NamedTuple):
-    """Poles (2n,), w_1, s_1, w_2, ..., and the residual (k,) that they leave."""
+    """Poles (2n,) w_1, s_1, w_2, ..., and the residual (k,) of the fit with them."""
 
     poles: np.ndarray
     residual: np.ndarray
@@ -144,7 +146,7 @@ def _columns(time, poles) -> np.ndarray:
 
 
 def _slopes(time, columns, linear: Projection) -> np.ndarray:
-    """Compute the derivatives (k, 2n) of the residual over the poles."""
+    """Compute the derivatives (k, 2n) of the residual with respect to the poles."""
     slopes = []
     for k in range(1, columns.shape[1], 2):
         cosine, sine = columns[:, k : k + 2].T

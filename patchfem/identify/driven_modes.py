@@ -23,14 +23,14 @@ from .variable_projection import Projection, project, standard_errors
 
 # time derivative of the displacement
 DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
-MAX_MODES = 12  # modes of one fit
-MIN_GAIN = 0.02  # part of the residual sum of squares that a further mode removes
-MIN_AMPLITUDE = 3e-3  # root mean square of a mode over that of the response
-MIN_MISFIT = 1e-8  # residual over the response; a smaller one is round-off
+MAX_MODES = 12  # largest number of modes in one fit
+MIN_GAIN = 0.02  # fraction of the residual sum of squares that a further mode must remove
+MIN_AMPLITUDE = 3e-3  # root mean square of a mode / that of the response; weaker modes are left out
+MIN_MISFIT = 1e-8  # residual / response; a smaller residual is round-off
 MAX_START_EVALUATIONS = 12  # evaluations from each start; only the best is refined further
 # samples at both ends that are not fitted, because the transform joins them by a jump
 EDGE_SAMPLES = 32
-MAX_SAMPLES = 2**16  # samples of a record that are fitted, from its start on
+MAX_SAMPLES = 2**16  # number of samples of a record that are fitted, counted from its beginning
 MIN_ZETA = 1e-6  # smallest damping ratio
 MAX_ZETA = 0.5  # largest damping ratio
 START_WIDTHS = (0.1, 1.0, 5.0)  # widths of a peak at the starts, in spectral lines of a segment
@@ -72,7 +72,7 @@ class _Columns(NamedTuple):
 
 
 class _Fit(NamedTuple):
-    """Parameters theta (2n,), ln w_r then ln zeta_r, and the residual (k,) that they leave."""
+    """Parameters theta (2n,): ln w_r, then ln zeta_r; and the residual (k,) of their fit."""
 
     theta: np.ndarray
     residual: np.ndarray
@@ -128,7 +128,7 @@ class _Record:
         return _Columns(np.stack(columns, axis=1), by_frequency, by_damping)
 
     def _derivatives(self, motion: tuple, by_pole, by_omega) -> tuple:
-        """Compute the derivatives of the three columns of a mode over ln w or ln zeta.
+        """Compute the derivatives of the three columns of a mode with respect to ln w or ln zeta.
 
         `motion` holds its pole, decay rate, cosine and sine. `by_pole` and `by_omega` are the derivatives
         of 1/pole and of the damped frequency.

@@ -13,14 +13,16 @@ import numpy as np
 from ..core import PatchfemError
 from ..response.welch import CrossDensities, average_segments, transform_segments
 
-MAX_UNEVENNESS = 1e-3  # time steps by which a time may be off; text files have six digits
-DEFAULT_SEGMENTS = 8  # lengths of a segment in a record
-MIN_SEGMENT = 64  # samples of a segment
-# part of the largest response; with less at both ends, the record is a whole transient
+# largest error of a sample time in time steps; times in text files have only six digits
+MAX_UNEVENNESS = 1e-3
+DEFAULT_SEGMENTS = 8  # number of segment lengths in a record, if the user gives no length
+MIN_SEGMENT = 64  # smallest number of samples in a segment
+# fraction of the largest response; if both ends are below it, the record is a complete transient
 MAX_REST = 1e-2
-MIN_INPUT = 1e-6  # part of the largest power of the input; lines with less are not driven
-MAX_FREQUENCY = 0.8  # part of the Nyquist frequency; filters and aliases disturb higher lines
-WINDOW_LINES = 1.5  # lines by which a Hann window widens the mean of a segment
+MIN_INPUT = 1e-6  # fraction of the largest input power; lines with less input are left out
+MAX_FREQUENCY = 0.8  # fraction of the Nyquist frequency; filters and aliasing disturb higher lines
+# number of spectral lines by which a Hann window widens the average of a segment
+WINDOW_LINES = 1.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -10,14 +10,16 @@ from scipy.stats import t as student
 from .correlation import effective_rows
 from .space import CubeResidual
 
-# part of the largest one of the scaled Jacobian; less is an unknown direction
+# fraction of the largest singular value of the scaled Jacobian; smaller ones are undetermined directions
 MIN_SINGULAR_VALUE = 1e-6
-MIN_EFFECT = 1e-9  # part of the largest residual; a value that changes it less has no effect
-MIN_DIRECTION = 1e-3  # squared part of an unknown direction; a value with less is still known
+MIN_EFFECT = 1e-9  # fraction of the largest residual; a value that changes the residual by less has no effect
+# squared component of an undetermined direction; a value with a smaller one is determined
+MIN_DIRECTION = 1e-3
 # relative error of the linear growth of the sum of squares at an interval's ends
 MAX_NONLINEARITY = 0.2
-MIN_INTERVAL = 1e-9  # part of the range; a smaller interval is round-off, and linear
-START_FRACTION = 64  # room to the bound over the first step of a profile without a linear interval
+MIN_INTERVAL = 1e-9  # fraction of the range of a parameter; a smaller interval is round-off and treated as linear
+# distance to the bound / first step of a profile, for a parameter without a linear interval
+START_FRACTION = 64
 # relative error of the growth of the sum of squares at the end of a profile, also for quick models
 PROFILE_TOL = 1e-3
 QUICK_PROFILE_TOL = 1e-2
@@ -70,7 +72,7 @@ class _Profile(NamedTuple):
 
 
 def no_intervals(n: int) -> FitIntervals:
-    """Return the intervals of a fit of n values for which none were asked: NaN throughout."""
+    """Return NaN intervals for a fit of n values whose intervals were not requested."""
     return FitIntervals(
         ends=np.full((n, 2), np.nan),
         methods=("none",) * n,
@@ -186,7 +188,7 @@ def _correlation(covariance, unknown: set) -> np.ndarray:
 
 
 def _unknown_directions(model: CubeResidual, u, inner: list, null, size) -> np.ndarray:
-    """Return the unknown directions (d, n) as relative changes of the values, the largest of which is 1.
+    """Return the undetermined directions (d, n) as relative changes, scaled to a maximum of 1.
 
     If a value at the point u of the cube is 0, they are changes over the range.
     """
@@ -248,7 +250,7 @@ def _follow_profile(fit: _LeastSquares, i: int, sign: float, half: float, others
     high = None
     near = fit.u
     tolerance = QUICK_PROFILE_TOL if fit.model.quick else PROFILE_TOL
-    # the step doubles until the end is bracketed; 40 evaluations are more than this and the secant need
+    # the step doubles until the end is bracketed; bracketing and the secant method need fewer than 40 evaluations
     for _ in range(40):
         f, point = evaluate(step, near)
         if abs(f) < tolerance:

@@ -19,13 +19,15 @@ from .intervals import FitIntervals, compute_intervals, no_intervals
 from .space import CubeResidual, space, spread_points
 
 FTOL = 1e-10  # relative change of the sum of squares in a step at which a descent ends
-QUICK_FTOL = 1e-4  # value of FTOL for a residual whose evaluations are expensive
-MAX_EVALUATIONS = 100  # evaluations of one descent, Jacobians not counted
-EXACT = 1e-9  # part of the largest residual; a result this good needs no other start
-SAME_VALLEY = 1.02  # sum of squares over the least one; descents that end below it found one valley
+QUICK_FTOL = 1e-4  # FTOL of a residual that is expensive to evaluate
+MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without those for Jacobians
+EXACT = 1e-9  # fraction of the largest residual; a fit with less is exact and needs no other starting point
+# sum of squares / the smallest one; descents that end below it found the same minimum
+SAME_VALLEY = 1.02
 SAME_RESULT = 1e-6  # relative difference of the sums of squares of descents that agree
-NEAR_BOUND = 1e-3  # part of the range; a value that is closer to a bound is tried on it
-STARTS_PER_VALUE = 8  # points per value at which the residual is evaluated to choose the starts
+NEAR_BOUND = 1e-3  # fraction of the range; a value closer to a bound is also tried on the bound
+# number of points per value at which the residual is evaluated to choose the starting points
+STARTS_PER_VALUE = 8
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -68,7 +70,7 @@ class Fit:
 
 
 class Descent(NamedTuple):
-    """End of a descent.
+    """Result of one descent (a local least-squares search).
 
     - u: point (n,) of the unit cube.
     - cost: sum of squares, infinite if the start failed.
@@ -335,7 +337,9 @@ def descend(model: CubeResidual, u, free) -> Descent:
 
 
 def _move_onto_bounds(model: CubeResidual, u, cost: float) -> tuple:
-    """Put values that press against a bound on it, and descend with the others, if that is no worse.
+    """Move values that press against a bound onto it, and keep the result if it is no worse.
+
+    The other values are fitted again.
 
     Returns the point u (n,) and the sum of squares.
     """

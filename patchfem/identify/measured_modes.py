@@ -15,11 +15,13 @@ from .frequency_response import Estimate, estimate_response, even_step
 from .swings import half_swings, sparse_after
 
 INPUTS = ("force", "base_acceleration")  # quantities of a record that drive the rig
-PLACES = ("slide", "output", "base", "normal", "pitch")  # motions of a mode that a user can name
+# quantities whose mode-shape components a user can name
+PLACES = ("slide", "output", "base", "normal", "pitch")
 # part of a damping ratio by which that of the windowed estimate may be larger without a note
 MAX_WIDENING = 0.05
-MAX_ERROR_RATIO = 2.0  # half-width of an interval over its damping ratio; a wider one is left out
-MAX_MISFIT = 0.1  # part of a driven response that the modes may leave unexplained without a note
+MAX_ERROR_RATIO = 2.0  # half-width of the interval / damping ratio; an amplitude with a wider interval is left out
+# fraction of a driven response that the modes may leave unexplained without a note
+MAX_MISFIT = 0.1
 # part of a free decay that the sinusoids may leave unexplained without a note
 MAX_DECAY_MISFIT = 0.05
 
@@ -56,7 +58,7 @@ class RecordEstimate(NamedTuple):
 
 
 class _Rows(NamedTuple):
-    """Motions (n,) of the modes by key, modal mass [kg] or None, and notes."""
+    """Mode-shape components (n,) by key, modal mass [kg] or None, and notes."""
 
     rows: dict
     mass: float | None
@@ -115,7 +117,7 @@ def estimate_record(
 def modes_of_driven_record(
     values: dict, segment: float | None, window: str | None, band: tuple
 ) -> ListedModes:
-    """Identify modes from a response to a force at the same place, or to the acceleration of the base.
+    """Identify modes from the response to a force at the same point or to a base acceleration.
 
     An acceleration is absolute; a displacement or a velocity is relative to the base. The slide of the
     contact is taken to be the motion at this place.
@@ -156,7 +158,10 @@ def modes_of_driven_record(
 
 
 def _rows_of_force(modes: DrivenModes) -> _Rows:
-    """Derive the motions at the driven place, relative to the first mode, whose residue gives the mass."""
+    """Derive mode-shape components at the drive point, and the modal mass, from the residues.
+
+    The components are relative to that of the first mode, whose residue is the reciprocal of the mass.
+    """
     first = modes.residue[0]
     if first <= 0:
         raise PatchfemError(
@@ -219,7 +224,10 @@ def _note_quality(modes: DrivenModes, estimate: Estimate, step: float) -> list:
 
 
 def _decay_part(values: dict, begin: float | None) -> tuple:
-    """Return times [s] and values of the only response from `begin` [s] on, by default from its maximum."""
+    """Return the times [s] and values of the only response from `begin` [s] on.
+
+    By default they begin at the maximum.
+    """
     value = values[response_name(values)]
     if "time" not in values:
         raise PatchfemError("a free decay needs a time channel; choose this channel with --map")
@@ -233,7 +241,7 @@ def _decay_part(values: dict, begin: float | None) -> tuple:
 
 
 def decay_curve(values: dict, begin: float | None = None) -> tuple:
-    """Determine frequency and damping over the amplitude of a free decay.
+    """Determine frequency and damping of a free decay as functions of the amplitude.
 
     A velocity is divided by the undamped circular frequency of its point, an acceleration by its square.
     Amplitudes whose damping ratio is too uncertain are left out with a note.
@@ -281,7 +289,7 @@ def decay_curve(values: dict, begin: float | None = None) -> tuple:
 
 
 def modes_of_decay(values: dict, begin: float | None = None) -> ListedModes:
-    """Identify modes from a free decay that begins at `begin` [s], by default at its largest value."""
+    """Identify modes from a free decay that begins at `begin` [s], by default at the maximum."""
     decay = fit_decay(*_decay_part(values, begin))
     descriptions = [
         f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {decrement:.4g}"

@@ -7,9 +7,9 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 
-STEP = 1e-5  # part of the range; step of difference quotients
-WIDE_RANGE = 10  # upper over lower bound; a wider range is searched in logarithms
-PENALTY = 1e3  # residual of a failed evaluation over the largest one so far
+STEP = 1e-5  # fraction of the range of a value; step of difference quotients
+WIDE_RANGE = 10  # upper / lower bound; a value with a wider range is searched in logarithms
+PENALTY = 1e3  # residual of a failed evaluation / largest residual so far
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,7 +47,7 @@ class Space:
         return np.clip(u, 0.0, 1.0)
 
     def slope(self, u) -> np.ndarray:
-        """Return the derivatives (n,) of the values over u (n,)."""
+        """Return the derivatives (n,) of the values with respect to u (n,)."""
         slope = self.high - self.low
         ratio = self.high[self.log] / self.low[self.log]
         slope[self.log] = self.values(u)[self.log] * np.log(ratio)
@@ -157,7 +157,7 @@ class CubeResidual:
         return residual
 
     def jacobian(self, u, free) -> np.ndarray:
-        """Compute the derivatives (r, f) over some coordinates by central differences.
+        """Compute the derivatives (r, f) along some coordinates by central differences.
 
         They are one-sided at a bound, beside a failure, and for an expensive residual.
 
@@ -189,7 +189,10 @@ class CubeResidual:
 
 
 def _difference_quotient(here, neighbours: dict) -> np.ndarray:
-    """Compute a derivative (r,) from the residual at a point and beside it; 0 without a neighbour."""
+    """Compute a derivative (r,) by finite differences from the residuals at neighbouring points.
+
+    It is 0 if there is no neighbour.
+    """
     if 1 in neighbours and -1 in neighbours:
         return (neighbours[1] - neighbours[-1]) / (2 * STEP)
     for k in (1, -1):

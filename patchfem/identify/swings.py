@@ -12,18 +12,21 @@ import numpy as np
 from ..core import PatchfemError
 from ..response.decay_curve import HalfSwings, smooth_slopes
 
-MIN_SAMPLES = 5  # samples of a half swing
+MIN_SAMPLES = 5  # smallest number of samples in a half swing
 # part of a half period and of a half swing; error of a sine fitted to few samples
 SINE_ERROR = 3e-5
-MAX_NOISE = 0.25  # standard deviation over the size; a half swing with more is lost in the noise
-N_PASSES = 3  # passes over all half swings, each with the half periods and rates of the one before
-MAX_MOVES = 4  # iterations in which the middle of a half swing moves
-MAX_SHIFT = 0.35  # half periods by which a middle may differ from the predicted one
-N_NEIGHBOURS = 8  # half swings on each side whose residuals give the noise of one
+# standard deviation / amplitude; a half swing with a larger ratio is lost in the noise
+MAX_NOISE = 0.25
+N_PASSES = 3  # number of passes over all half swings; each starts from the half periods and rates of the pass before
+MAX_MOVES = 4  # largest number of iterations that move the middle of a half swing
+MAX_SHIFT = 0.35  # largest distance of a middle from the predicted one, in half periods
+# number of half swings on each side whose residuals give the noise of a half swing
+N_NEIGHBOURS = 8
 # frequencies of the first cycle that are tried, over that of the highest spectral line
 FREQUENCY_RATIOS = np.linspace(0.75, 1.3, 56)
-MAX_STEP_RATIO = 10.0  # largest time step over the 10 % quantile; a larger one is named in messages
-MAX_PERIOD_CHANGE = 0.3  # half periods by which the second half period may differ from the first
+MAX_STEP_RATIO = 10.0  # time step / 10 % quantile of the time steps; messages name a larger step
+# largest difference of the second half period from the first, as a fraction of the first
+MAX_PERIOD_CHANGE = 0.3
 PADDING = 8  # factor by which zeros lengthen the record for its spectrum
 
 
@@ -94,7 +97,7 @@ def half_swings(time, value) -> HalfSwings:
 
 
 def _refuse_short_decay(time, middle: float, length: float) -> None:
-    """Raise PatchfemError with the reason why a decay has fewer than three half swings."""
+    """Raise PatchfemError that says why a decay has fewer than three half swings."""
     reasons = [_describe_sparse(time, middle + k * length, length) for k in range(3)]
     reasons.append(_describe_uneven(time))
     for reason in reasons:
@@ -256,7 +259,7 @@ def _fit_half_swing(time, value, middle: float, length: float, rate: float) -> _
 
 
 def _noise(swings: list) -> np.ndarray:
-    """Compute the standard deviation (k,) of the samples about each half swing and its neighbours."""
+    """Compute the standard deviation (k,) of the noise around each half swing."""
     n = len(swings)
     index = np.arange(n)
     low = np.maximum(index - N_NEIGHBOURS, 0)

@@ -17,16 +17,17 @@ from ..core import PatchfemError
 from .least_squares import descend, descents, starting_points
 from .space import CubeResidual, Space
 
-MAX_ROUNDS = 4  # corrections of the cheap model in one search
-MAX_RESIDUAL_CHANGE = 1e-3  # difference of the two residuals at which the models agree
-TRIALS_PER_VALUE = 24  # points per value at which the cheap model is computed to choose the starts
-MAX_VALLEYS = 3  # ends of the cheap search from which the search goes on
-MIN_DISTANCE = 0.03  # distance in the unit cube between two ends from which the search goes on
-MAX_WORSE = 10.0  # sum of squares over the least one; an end with more is left out
-# sum of squares over the least one; points with less are refined with the slopes of the expensive model
+MAX_ROUNDS = 4  # largest number of corrections of the cheap model in one search
+MAX_RESIDUAL_CHANGE = 1e-3  # largest difference of the residuals of two models that agree
+TRIALS_PER_VALUE = 24  # number of points per value at which the cheap model is computed to choose the starting points
+MAX_VALLEYS = 3  # largest number of minima of the cheap model from which the search continues
+# smallest distance in the unit cube between two minima from which the search continues
+MIN_DISTANCE = 0.03
+MAX_WORSE = 10.0  # sum of squares / the smallest one; a minimum with a larger ratio is left out
+# sum of squares / the smallest one; points below it are refined with derivatives of the expensive model
 MAX_RIVAL = 1.5
-SLOPE_STEP = 1e-4  # part of the unit cube; step of the slopes of the expensive model
-MIN_IMPROVEMENT = 1e-4  # relative change of the sum of squares at which the search ends
+SLOPE_STEP = 1e-4  # fraction of the edge of the unit cube; step of difference quotients of the expensive model
+MIN_IMPROVEMENT = 1e-4  # relative decrease of the sum of squares below which the search ends
 
 
 class _Point(NamedTuple):
@@ -57,7 +58,7 @@ class TwoModels:
     space: Space
 
     def search(self, own, starts: int) -> tuple:
-        """Search the least squares of the expensive model.
+        """Minimize the sum of squares of the expensive model.
 
         Parameters
         ----------
@@ -127,9 +128,9 @@ class TwoModels:
         return model
 
     def _search_with_value(self, u) -> _Point:
-        """Repeat the search with the cheap model that has the value of the expensive one at its last end.
+        """Minimize with the cheap model, corrected to the expensive one at the last minimum.
 
-        Returns the best point.
+        Both steps are repeated until the models agree. Returns the best point.
         """
         expensive = self.expensive(self.space.values(u))
         best = _Point(self._sum_of_squares(expensive), u)
@@ -150,7 +151,7 @@ class TwoModels:
         return best
 
     def _search_with_slopes(self, point: _Point) -> _Point:
-        """Repeat the search with the cheap model that also has the slopes of the expensive one.
+        """Minimize with the cheap model, corrected to value and derivatives of the expensive one.
 
         Returns the best point, without a model if the sum of squares does not converge.
         """
@@ -171,7 +172,10 @@ class TwoModels:
         return _Point(sum_of_squares, u)
 
     def _tangent_model(self, u) -> Callable:
-        """Correct the cheap model by value and one-sided difference quotients of the expensive one at u (n,)."""
+        """Correct the cheap model to the value and derivatives of the expensive one at u (n,).
+
+        The derivatives are one-sided difference quotients.
+        """
         expensive = self.expensive(self.space.values(u))
         plain = self.correct_cheap_model(u, expensive)
         slopes = []
@@ -193,7 +197,7 @@ class TwoModels:
 
 
 def _choose_valleys(ends: list) -> list:
-    """Return the points (n,) of the best descents that lie apart from each other, best first."""
+    """Return the points (n,) of the best descents that are far enough apart, best first."""
     ends = sorted((end for end in ends if np.isfinite(end.cost)), key=lambda end: end.cost)
     valleys = []
     for end in ends:

@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAX_CONDITION = 1e12  # weaker directions of the design get no coefficient
+# largest condition number of the design matrix; weaker directions get no coefficient
+MAX_CONDITION = 1e12
 
 
 class Projection(NamedTuple):

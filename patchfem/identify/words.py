@@ -5,14 +5,14 @@ import numpy as np
 from ..core import Outcome
 from .least_squares import MAX_EVALUATIONS, Fit
 
-MIN_SENSITIVITY = 1e-9  # part of the largest sensitivity; a value with less has no effect
+MIN_SENSITIVITY = 1e-9  # fraction of the largest sensitivity; a value with less has no effect
 
 
 def remarks(fit: Fit, names) -> list:
-    """Write sentences on what a fit leaves open.
+    """Describe which values a fit does not determine, and where the search failed.
 
-    They name values on a bound, without effect, known only in a combination, or open to a bound; failed
-    evaluations; and a search that did not converge.
+    The sentences name values that are at a bound, without effect, determined only in a combination, or whose
+    interval reaches a bound; failed evaluations; and a search that did not converge.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 from ..exceptions import PatchfemError
 
-MAX_REASON = 160  # characters of a reason
+MAX_REASON = 160  # largest number of characters of the quoted reason; longer reasons are cut
 
 # What the readers and the libraries that they call raise for wrong bytes. A NameError, an
 # AttributeError or a TypeError is a mistake in the program and stays visible as such.

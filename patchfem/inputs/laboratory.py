@@ -29,7 +29,7 @@ from .units import CHANNEL_UNITS, unit_factor
 ENDINGS = (*UNIVERSAL_ENDINGS, ".mat", ".csv", ".txt")
 # Channels that every motion of `patchfem export` has.
 MOTION_CHANNELS = {"absolute_acceleration", "base_acceleration"}
-MAX_COLUMNS = 1000  # columns of a table
+MAX_COLUMNS = 1000  # largest number of columns of a table
 MAX_LISTED = 20  # arrays of a MATLAB file that an error message lists
 _HEAD = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
 _COLUMN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
@@ -87,13 +87,13 @@ def _read_universal(path: Path, requests: list, exported: Mapping) -> Records:
 
 
 def _quantity(name: str, names: list, exported: Mapping) -> str:
-    """Return the quantity that a column is called by, "" if it is none."""
+    """Return the quantity that the name of a column states, or "" if it states none."""
     quantity = standard_name(name, names, exported)
     return quantity if quantity in CHANNEL_UNITS else ""
 
 
 def _read_table(path: Path, exported: Mapping) -> list:
-    """Read the columns of numbers of a table as channels; columns with a text in any row are left out."""
+    """Read the numeric columns of a table as channels; columns that contain text are left out."""
     header, *lines = read_text(path, "a measured table").rstrip("\n").split("\n")
     separator = max(",;\t", key=header.count)
     heads = [_HEAD.fullmatch(_bare(cell)) for cell in header.split(separator)]
@@ -125,12 +125,12 @@ def _read_table(path: Path, exported: Mapping) -> list:
 
 
 def _bare(cell: str) -> str:
-    """Return a cell without blanks and quotation marks around it."""
+    """Return a cell without the blanks and quotation marks around it."""
     return cell.strip().strip('"').strip()
 
 
 def _check_text_column(path, name: str, cells: tuple) -> None:
-    """Raise PatchfemError if a column that is not numeric was meant to be."""
+    """Raise PatchfemError if a column that should be numeric contains text."""
     number = next(n for n, cell in enumerate(cells, 2) if not NUMBER_PATTERN.fullmatch(cell))
     cell = cells[number - 2]
     if NUMBER_PATTERN.fullmatch(cell.replace(",", ".", 1)):

@@ -5,14 +5,14 @@ import os
 from ..core import PatchfemError
 from . import matlab5, matlab73
 
-MAX_BYTES = 512 * 2**20  # size of a file
-HDF5 = (
-    b"\x89HDF\r\n\x1a\n"  # signature at the beginning, or behind the block that MATLAB puts there
-)
+MAX_BYTES = 512 * 2**20  # largest size of a file
+HDF5 = b"\x89HDF\r\n\x1a\n"  # signature at the beginning of the file, or behind the user block that MATLAB puts there
 
 
 def read_variables(path, data: bytes | None = None) -> dict:
-    """Read the real arrays and the texts of a MATLAB file; values are converted when they are called for.
+    """Read the real arrays and character arrays of a MATLAB file.
+
+    Each array is converted when its values are first requested.
 
     Parameters
     ----------
@@ -42,7 +42,8 @@ def read_variables(path, data: bytes | None = None) -> dict:
 def _read_bytes(path) -> bytes:
     with open(path, "rb") as file:
         head = file.read(128)
-        if len(head) < 128 or 0 in head[:4]:  # zeros there: version 4, or no MATLAB file
+        # a version-4 file has zeros there, and so may a file that is not from MATLAB
+        if len(head) < 128 or 0 in head[:4]:
             raise PatchfemError(f"{path}: {matlab5.DAMAGED_HEADER}")
         if os.fstat(file.fileno()).st_size > MAX_BYTES:
             raise PatchfemError(

@@ -23,9 +23,9 @@ from scipy import sparse
 from ..core import PatchfemError
 from .damage import refuse_damage
 
-MAX_NUMBERS = 15 * 10**7  # numbers of one variable
+MAX_NUMBERS = 15 * 10**7  # largest number of values in one variable
 MAX_VARIABLES = 1000
-MAX_DEPTH = 8  # structures inside one another
+MAX_DEPTH = 8  # largest depth of nested structures
 MAX_UNPACK_RATIO = 200  # unpacked / packed size of a variable above UNPACK_CHECK_BYTES
 UNPACK_CHECK_BYTES = 2**20
 HEADER_BYTES = 1024  # bytes of a packed variable that contain its shape and its name
@@ -91,7 +91,7 @@ class Array(NamedTuple):
 
 
 class _Element(NamedTuple):
-    """An element; end: position of the next one."""
+    """Data element of the file; end: offset of the next element."""
 
     kind: int
     data: bytes
@@ -169,7 +169,11 @@ class _MatFile(NamedTuple):
         return _Variable(body, False, kind, shape, name.decode("latin-1"), at, len(body))
 
     def check_head(self, variable: _Variable) -> _Variable | None:
-        """Refuse a variable that is too large; None if it is neither a real array nor a text."""
+        """Check the shape and size of a variable; return None if its class cannot be read.
+
+        Real, sparse, character, cell and structure arrays can be read. A variable that is too large raises
+        PatchfemError.
+        """
         kind, shape = variable.kind, variable.shape
         if kind not in _READABLE:
             return None
@@ -202,7 +206,10 @@ class _MatFile(NamedTuple):
         return arrays
 
     def list_fields(self, data, at: int) -> Iterator[tuple]:
-        """Yield name and content of the fields; first come the length of a name, and all names."""
+        """Yield the name and content of each field of a structure.
+
+        The structure begins with the number of bytes of each field name, then all names, then the contents.
+        """
         _, length, at = self.read_element(data, at)
         _, names, at = self.read_element(data, at)
         (width,) = struct.unpack(self.order + "i", length)
@@ -217,7 +224,7 @@ class _MatFile(NamedTuple):
                 yield name.decode("latin-1"), memoryview(body)
 
     def make_array(self, variable: _Variable) -> Array:
-        """Make an array whose values are unpacked when they are called for."""
+        """Make an array whose values are unpacked when they are first requested."""
         name = variable.name[:40] if variable.name.isprintable() else "?"
 
         def read(convert: Callable):
@@ -268,7 +275,7 @@ class _MatFile(NamedTuple):
         return np.frombuffer(data, dtype.newbyteorder(self.order))
 
     def read_texts(self, data, variable: _Variable) -> np.ndarray:
-        """Return the rows of a character array, or the first row of each text of a cell array."""
+        """Return the rows of a character array, or the first row of each string in a cell array."""
         if variable.kind == ArrayClass.CHAR:
             kind, stored, _ = self.read_element(data, variable.start)
             encoding = _ENCODINGS[kind]
@@ -292,7 +299,7 @@ class _MatFile(NamedTuple):
         kind, size = struct.unpack_from(self.order + "II", data, at)
         start = at + 8
         end = start + size + -size % 8
-        is_small = kind >> 16 > 0  # up to four bytes of data, inside the tag
+        is_small = kind >> 16 > 0  # data of up to four bytes are stored inside the tag
         if is_small:
             kind, size = kind & 0xFFFF, kind >> 16
             start, end = at + 4, at + 8

@@ -68,7 +68,7 @@ def _matlab_class(item) -> str:
 
 
 def _make_array(path, kind: str, shape: tuple, read: Callable) -> Array:
-    """Make an array whose values are read when they are called for."""
+    """Make an array whose values are read when they are first requested."""
 
     def values():
         with _refuse_damage(path):
@@ -78,7 +78,7 @@ def _make_array(path, kind: str, shape: tuple, read: Callable) -> Array:
 
 
 def _dataset_array(path, dataset) -> Array | None:
-    """Return an array of real numbers, a text or a cell array of texts; None for other content."""
+    """Return a real array, a string or a cell array of strings; None for other content."""
     if dataset.shape is None:
         return None
     kind = _matlab_class(dataset)
@@ -90,7 +90,7 @@ def _dataset_array(path, dataset) -> Array | None:
     is_known = kind in ("", "char", "double", "single", "logical") or "int" in kind
     if dataset.dtype.kind not in "iufb" or not is_known:
         return None
-    # MATLAB writes two dimensions at least, other programs may write one.
+    # MATLAB always writes at least two dimensions; other programs may write only one.
     shape = dataset.shape[::-1] if len(dataset.shape) > 1 else (dataset.size, 1)
 
     def read() -> np.ndarray:
@@ -113,7 +113,7 @@ def _empty_array(path, dataset, kind: str) -> Array | None:
 
 
 def _cell_array(path, cells) -> Array | None:
-    """Return the first row of each text of a cell array; None if a cell is no text."""
+    """Return the first row of each string in a cell array; None if a cell is not a string."""
     if not isinstance(h5py.check_dtype(ref=cells.dtype), type):
         return None
     parts = [cells.file[reference] for reference in np.ravel(cells[()])[:MAX_VARIABLES]]
@@ -157,7 +157,7 @@ def _sparse_array(path, group) -> Array | None:
 
 
 def _optional_values(group, name: str) -> np.ndarray:
-    """Return a dataset of a group; MATLAB leaves those without values out."""
+    """Return a dataset of a group, or None; MATLAB leaves out datasets without values."""
     return group[name][()] if name in group else np.zeros(0)
 
 

@@ -31,9 +31,9 @@ N_SAMPLES = 500
 MIN_SAMPLES = 10
 SINGLE_DIGITS = 7  # decimal digits of single precision
 DOUBLE_DIGITS = 15  # decimal digits that double precision always keeps
-# Fraction of the numbers that need nearly all digits, above which all were rounded to these digits.
+# If at least this fraction of the numbers need nearly all digits, all numbers were rounded to these digits.
 MIN_FULL_FRACTION = 0.6
-FREE_DIGITS = 2  # digits by which "nearly all" falls short, for a sign or an exponent in the field
+FREE_DIGITS = 2  # digits by which a number may be shorter: a sign or an exponent takes their place in the field
 ROUNDING_DEVIATION = 12**-0.5  # standard deviation of a rounding error of a unit
 
 
@@ -124,7 +124,7 @@ def quadratic_form_deviation(values, deviation, shape) -> float:
 
 
 def align_rows(*matrices: Matrix) -> list[Matrix]:
-    """Bring matrices to the same rows: the places of all of them, or else their common size.
+    """Bring matrices to the same rows: all degrees of freedom, or else their common size.
 
     Raises PatchfemError if the sizes differ, or if only some of the matrices state places.
     """
@@ -152,7 +152,7 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
 
 
 def _enlarge(values, n: int) -> sparse.csr_array:
-    """Return a matrix (n, n) with empty rows and columns behind those of the given one."""
+    """Return a matrix (n, n) that has empty rows and columns after those of the given matrix."""
     if values.shape[0] < n:
         values = values.copy()
         values.resize((n, n))
@@ -192,7 +192,7 @@ def _symmetrize(path, values, wanted: str) -> sparse.csr_array:
 
 
 def _matrix_name(path, names, wanted: str) -> str:
-    """Return the name of the wanted matrix in a file: one of `NAMES`, or else the only name there is."""
+    """Return the name of the requested matrix in a file: one of `NAMES`, or the only name in it."""
     short_names = {name.rpartition(".")[2].lower(): name for name in reversed(list(names))}
     for known in NAMES[wanted]:
         if known in short_names:
@@ -214,7 +214,7 @@ def _matrix_name(path, names, wanted: str) -> str:
 
 
 def _read_market(path: Path, wanted: str) -> Matrix:
-    """Read a Matrix Market file of numbers, or else the text of Abaqus.
+    """Read a Matrix Market file of numbers; a file without its header is read as Abaqus text.
 
     `scipy.io.mmread` of SciPy 1.17 is not used: it reads the damaged number "1E-" as 1 and missing
     numbers of a full matrix as 0, and "1E-" at the end of a file ends its process (signal 11).
@@ -247,7 +247,7 @@ def _read_market(path: Path, wanted: str) -> Matrix:
         rows, columns = _whole_numbers(path, table[:, :2]).T - 1
     elif symmetry == "general":
         columns, rows = np.divmod(np.arange(n_numbers), n_rows)
-    else:  # the lower triangle, column by column
+    else:  # a symmetric array is stored as the lower triangle, column by column
         n_numbers = n_rows * (n_rows + 1) // 2
         columns, rows = np.triu_indices(n_rows)
     if table.shape != (n_numbers, width):
@@ -293,7 +293,7 @@ def _read_abaqus(path: Path) -> Matrix:
 
 
 def _whole_numbers(path, numbers: np.ndarray) -> np.ndarray:
-    """Return the numbers of rows, nodes or directions as integers."""
+    """Convert the numbers of rows, nodes or directions to integers."""
     if not (numbers == np.floor(numbers)).all() or not (np.abs(numbers) < 2**31).all():
         raise PatchfemError(f"{path}: rows, nodes and directions must be whole numbers")
     return numbers.astype(int)

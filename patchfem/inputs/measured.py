@@ -71,7 +71,7 @@ def read_table(path: Path) -> list[MeasuredRow]:
 
 
 def _records_error(path: Path) -> PatchfemError:
-    """Return the error for a file of records over time."""
+    """Make the error for a time record that was given where a table of responses is needed."""
     options = ""
     if path.suffix.lower() == ".mat":
         options = ' --map "time=VARIABLE [s]" --map "displacement=VARIABLE [m]"'

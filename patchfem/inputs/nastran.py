@@ -17,8 +17,8 @@ from scipy import sparse
 from ..core import PatchfemError
 from .damage import refuse_damage
 
-MAX_NUMBERS = 5 * 10**7  # numbers of a matrix
-MAX_ROWS = 2 * 10**6  # rows of a matrix
+MAX_NUMBERS = 5 * 10**7  # largest number of values in a matrix
+MAX_ROWS = 2 * 10**6  # largest number of rows of a matrix
 ROW_FIELD = 2**16  # head of a string in one word: length * ROW_FIELD + row
 FORM_SYMMETRIC = 6  # form of a DMIG matrix of which one triangle is stored
 FIELD = 16  # characters of a wide field of a DMIG card
@@ -85,7 +85,7 @@ def _refuse_output4(path) -> AbstractContextManager:
 
 
 def _words_per_number(number_type: int) -> int:
-    """Return the words of a number: type 1 is in single precision, 2 in double, 3 and 4 are complex."""
+    """Return the words per number of a type: 1 single, 2 double precision, 3 and 4 complex."""
     if number_type in (3, 4):
         raise ValueError("a matrix is complex; write only the real part")
     return {1: 1, 2: 2}[number_type]
@@ -181,7 +181,7 @@ def _read_text(path, data: bytes) -> dict[str, StringMatrix]:
 
 
 def _join_numbers(parts: list[bytes]) -> bytes:
-    """Join texts of numbers; exponents with the letter D get an E."""
+    """Join strings of numbers, with the exponent letter D replaced by E."""
     return b"".join(parts).upper().replace(b"D", b"E")
 
 
@@ -191,7 +191,7 @@ def _integers(line: bytes, count: int) -> list[int]:
 
 
 def _numbers_end(lines: list, at: int) -> int:
-    """Return where the lines of numbers end that begin at a line; a number has a decimal point."""
+    """Return the index of the first line after a block of numbers, which have decimal points."""
     while at < len(lines) and b"." in lines[at][:16]:
         at += 1
     return at
@@ -207,7 +207,7 @@ class DmigColumn(NamedTuple):
 
 
 class DmigMatrix:
-    """A matrix of DMIG cards; an entry is a text of three wide fields: node, component and number."""
+    """DMIG matrix; each entry is three wide fields of text: node, component and number."""
 
     def __init__(self, path, form: int):
         self.path = path
@@ -259,12 +259,15 @@ class DmigMatrix:
 
 
 def mirror_triangle(values: sparse.csr_array) -> sparse.csr_array:
-    """Return the symmetric matrix of which a triangle is given."""
+    """Return the symmetric matrix of which one triangle is given."""
     return (values + (values - sparse.diags_array(values.diagonal())).T).tocsr()
 
 
 def rank_places(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distinct places (n, 2) in order, and the index (k,) of each place (k, 2) among them."""
+    """Return the sorted distinct degrees of freedom (n, 2) and the index (k,) of each given one.
+
+    A degree of freedom is a row of node and direction.
+    """
     if not places.size:
         return places, np.zeros(0, int)
     if places.min() < 0 or places.max() >= 2**31:
@@ -330,7 +333,7 @@ def _start_card(path, matrices: dict, line: int, fields: list) -> DmigMatrix | N
 
 
 def parse_real(text: str) -> float:
-    """Parse a Nastran number: 1.5-3, 1.5D-3 and 1.5E-3 are the same; ValueError if it is none."""
+    """Parse a Nastran number, as in 1.5-3, 1.5D-3 and 1.5E-3; ValueError for other text."""
     match = _NUMBER.match(text)
     if match is None:
         raise ValueError(f"'{text}' is not a number")
@@ -338,7 +341,7 @@ def parse_real(text: str) -> float:
 
 
 def _card_fields(line: str, *, is_wide: bool) -> list[str]:
-    """Return the fields of a card behind the first one, four wide or eight narrow, without blanks."""
+    """Return the stripped fields after the first one of a card: four wide or eight narrow ones."""
     count = 4 if is_wide else 8
     width = 64 // count
     fields = line.split(",")[1:]

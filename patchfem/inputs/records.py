@@ -11,7 +11,7 @@ import numpy as np
 from ..core import Missing, PatchfemError, frozen_array
 from .units import CHANNEL_UNITS, SI_UNITS, unit_factor
 
-MAX_BYTES = 256 * 2**20  # size of a file of records
+MAX_BYTES = 256 * 2**20  # largest size of a file of records
 MAX_LISTED = 12  # channels that an error message lists
 _REQUEST = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 
@@ -103,7 +103,7 @@ def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> lis
 
 
 def select_channels(path: Path, channels: list, requests: list, notes: list) -> Records:
-    """Select the requested channels, or without a request those whose quantity the file states.
+    """Select the requested channels, or by default those for which the file states a quantity.
 
     Parameters
     ----------
@@ -152,13 +152,13 @@ def select_channels(path: Path, channels: list, requests: list, notes: list) -> 
 
 
 def _requested_channel(path, channels: list, request: RequestedChannel) -> Channel:
-    """Return a channel with the quantity of a request, and its unit if it has one."""
+    """Return a channel with the quantity of a request, and the unit if the request has one."""
     channel = find_channel(path, channels, request.source)._replace(quantity=request.quantity)
     return channel._replace(unit=request.unit, factor=None) if request.unit else channel
 
 
 def find_channel(path, channels: list, source: str) -> Channel:
-    """Find a channel by its name, by a place such as 12:+x, or by its number from 1.
+    """Find a channel by name, by degree of freedom such as 12:+x, or by number, counted from 1.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def find_channel(path, channels: list, source: str) -> Channel:
 
 
 def describe_channels(channels: list) -> str:
-    """List channels with number, name, place and unit."""
+    """List channels with number, name, degree of freedom and unit."""
     texts = []
     for number, channel in enumerate(channels[:MAX_LISTED], 1):
         place = f" at {channel.place}" if channel.place else ""
@@ -204,7 +204,7 @@ def describe_channels(channels: list) -> str:
 
 
 def make_records(path, values: dict, notes: list, channel_list: str = "") -> Records:
-    """Check arrays in SI and make records of them.
+    """Check arrays in SI and return them as `Records`.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def make_records(path, values: dict, notes: list, channel_list: str = "") -> Rec
 
 
 def shift_to_zero(values: dict) -> dict:
-    """Subtract the first row from time and displacements, as a prescribed slide needs it."""
+    """Subtract the first row from time and displacements, as a prescribed displacement requires."""
     return {
         name: column - column[0] if name in ("time", "displacement", "lateral") else column
         for name, column in values.items()
@@ -274,7 +274,7 @@ def _convert_to_si(path, channel: Channel) -> np.ndarray:
 
 
 def _shared_time(path, selected: list, channels: list, channel_list: str) -> np.ndarray | None:
-    """Return the time [s] of the selected channels, or of the only channel that is a time."""
+    """Return the time [s] of the selected channels, or of the only channel that contains times."""
     times = [channel.time for channel in selected if channel.time is not None]
     if not times:
         clocks = [channel for channel in channels if channel.quantity == "time"]

@@ -17,7 +17,7 @@ NAMES = ("time", "displacement", "lateral")
 
 
 def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
-    """Read a prescribed slide; a measured loop or a table of `patchfem import` may serve as one.
+    """Read a prescribed displacement from a table, a measured loop or a `patchfem import` file.
 
     Parameters
     ----------

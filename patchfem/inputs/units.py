@@ -59,7 +59,7 @@ def normalize_unit(text: str) -> str:
 
 
 def unit_factor(quantity: str, unit: str, where: str = "") -> float:
-    """Return the factor to SI of a unit.
+    """Return the factor that converts a value in a unit to SI.
 
     Parameters
     ----------

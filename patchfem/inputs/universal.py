@@ -20,7 +20,7 @@ TIME_ABSCISSA = 17  # abscissa type "time"
 
 
 class OrdinateType(IntEnum):
-    """Data types of dataset 58 that are known as quantities."""
+    """Data types of dataset 58 for which a quantity is defined here."""
 
     DISPLACEMENT = 8
     EXCITATION_FORCE = 9
@@ -123,7 +123,7 @@ def _is_record(dataset: dict) -> bool:
 
 
 def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes: list) -> Channel:
-    """Make a channel of one record; factors: dataset 164, if there is one."""
+    """Make a channel of a record; factors: unit conversion of dataset 164, or None."""
     where = f"{path}: record {number}"
     values = np.asarray(dataset["data"])
     time = np.asarray(dataset["x"], float)
@@ -156,7 +156,7 @@ def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes:
 
 
 def _quantity(ordinate_type: int) -> str:
-    """Return the quantity of a data type, "" if it is not known."""
+    """Return the quantity of a data type, or "" for an unknown type."""
     if ordinate_type not in list(OrdinateType):
         return ""
     return OrdinateType(ordinate_type).name.lower().removeprefix("excitation_")

@@ -1,4 +1,4 @@
-"""Shear modes of a pressed patch, and traction and local slip at every node from the states of elements or bonds."""
+"""Shear modes of a patch, and traction and slip at its nodes from states."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Correction of partial slip for the mesh: elements spread over the yield slides between the nodes.
+"""Correction of partial slip for the mesh by a spread of the yield displacements.
 
 Slip grows node by node from where a contact carries least. For a slide shorter than the first yield slide a mesh shows no
 slip at all, nor does a mesh of half its nodes, although the joint dissipates energy with the third power of a small slide
@@ -10,22 +10,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-SPREAD_FACTOR = 1.5  # error of a measure over its change when elements are spread (tests/README.md)
-N_PARTS = 4  # parts of an element, and of each halving of the first one
-N_HALVINGS = 8  # halvings of the first element, so that slides down to a 256th of it show slip
-# relative difference of yield slides below which nodes at both ends of a contact count as one
+# error of a measure / its change when the elements are spread (tests/README.md)
+SPREAD_FACTOR = 1.5
+N_PARTS = 4  # number of parts into which an element is split; the first element has as many per halving of its range
+N_HALVINGS = 8  # number of these halvings; even displacements down to a 256th of the first element then show slip
+# relative difference of yield displacements below which nodes at both ends of a contact count as one
 SAME_YIELD_TOL = 1e-6
 
 
 class SpreadElements(NamedTuple):
-    """Stiffness [N/m] and yield slide [m] of parallel elements, by increasing yield slide."""
+    """Stiffness [N/m] and rising yield displacements [m] of parallel elements."""
 
     stiffness: np.ndarray
     yield_slide: np.ndarray
 
 
 def spread(stiffness, yield_slide) -> SpreadElements:
-    """Spread parallel elements evenly over the ranges of yield slides around their own.
+    """Spread parallel elements evenly over ranges around their yield displacements.
 
     The sum of the stiffnesses and the friction limit stay. A range is as wide as the distance to the farther neighbour,
     because the nearer one may be at the other end of the contact. A single element stays as it is.

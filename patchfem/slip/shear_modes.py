@@ -1,4 +1,4 @@
-"""Partial slip of a patch under one rigid slide q of the holders: two reduced forms of the shear compliance.
+"""Partial slip of a patch under a rigid displacement q of the holders, in two reduced forms.
 
 Point i moves by the local slide q - sum_j C_ij f_j. Both forms hold for one contact set:
 
@@ -23,38 +23,38 @@ from ..contact.unilateral import INDEFINITE_MESSAGE
 from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 
-# relative difference of yield slides below which nodes yield at once, as mirrored ones do: rounding errors of 801 nodes
-# are 7e-13
+# relative difference of yield displacements below which nodes yield together, as mirrored nodes do; the rounding
+# errors of a patch with 801 nodes are 7e-13
 SAME_YIELD_TOL = 1e-11
-# times that the yields are sorted anew before neighbours are exchanged; sorting moves a point that is far off
+# number of sorts of the yields before neighbours are exchanged; sorting only moves points that are far off
 MAX_SORTS = 2
-# exchanges of neighbours per point before points are eliminated one by one; patches need 1 at most
+# exchanges of neighbours per point, after which points are eliminated one by one; patches need at most 1
 MAX_EXCHANGES = 20
-# modes from which a reduction starts: for bare pieces they leave 1e-6 of the friction limit
+# number of modes with which a reduction starts; without an interface layer its error is 1e-6 of the friction limit
 SHEAR_MODES = 4
-# smallest number of modes with which fewer are compared
+# smallest number of modes of the reference with which fewer modes are compared
 N_REFERENCE_MODES = 16
-# fraction of the tolerance by which few modes may miss the reference; more modes account for the rest
+# fraction of the tolerance by which few modes may differ from the reference; higher modes account for the rest
 MAX_MODE_ERROR = 0.8
-# number of points from which the most compliant modes are found without the others, which is faster from there on
+# number of points from which it is faster to compute the most compliant modes alone
 MIN_LANCZOS_POINTS = 128
-# products of Lanczos' method, with two vectors each; modes that are not found then are those of a soft skin
+# matrix products of Lanczos' method, with two vectors each; it fails to converge only for a soft layer of asperities
 MAX_PRODUCTS = 24
-# residual of a mode over the largest eigenvalue; the error of an eigenvalue is its square
+# residual of a mode / largest eigenvalue; the error of an eigenvalue is the square of this ratio
 MODE_TOL = 1e-6
 # numbers of Gauss points that may represent a patch
 GAUSS_COUNTS = (16, 32, 64)
-# bond lengths that a Newton step may move a point back by; the law is exp(2) times as steep there as at rest
+# bond lengths by which a Newton step may move a point back; the law there is exp(2) times as steep as at rest
 MAX_BACK_STEP = 2.0
-# slides on which backbones are compared
+# number of relative displacements at which backbones are compared
 N_SLIDES = 24
-# bond lengths of the largest of these slides, at which exp(-6) of the stretch of the bonds is left
+# bond lengths in the largest of these displacements, at which the force is within exp(-6) of its limit
 MAX_SLIDE_LENGTHS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class JenkinsSet:
-    """Parallel Jenkins elements: springs that slip at a yield slide.
+    """Parallel Jenkins elements: springs in series with sliders.
 
     - stiffness, yield_slide (t,): [N/m] and [m]; the sum of their products is the friction limit.
     - points (a,): Nodes of the contact set.
@@ -77,7 +77,7 @@ class JenkinsSet:
 
     @cached_property
     def point_yields(self) -> np.ndarray:
-        """Slide (a,) [m] at which each of the points yields."""
+        """Relative displacement (a,) [m] at which each point yields."""
         if not self.order.size:
             return np.full(self.limit.size, self.yield_slide[0])
         out = np.empty(self.limit.size)
@@ -87,7 +87,10 @@ class JenkinsSet:
 
     @cached_property
     def share(self) -> np.ndarray:
-        """Matrix (a, t) [N/m] from the stretch of the elements to the forces of the points, for any history."""
+        """Matrix (a, t) [N/m] that gives the point forces from the stretches of the elements.
+
+        It holds for any history.
+        """
         if not self.low.size:
             return self.limit[:, None] / self.yield_slide
         inverse, _ = dtrtri(self.low, lower=1)
@@ -100,7 +103,7 @@ class JenkinsSet:
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """All modes of D^1/2 C D^1/2, the most compliant first, whose backbones show the error of a few of them.
+    """Modes of D^1/2 C D^1/2, most compliant first, and backbones of any number of them.
 
     - points (a,): Indices of the contact set.
     - limit (a,): Friction limits D [N].
@@ -120,14 +123,14 @@ class Spectrum:
 
     @cached_property
     def whole(self) -> "Spectrum":
-        """The Spectrum of all modes."""
+        """The Spectrum with all modes."""
         if self.tangential is None:
             return self
         return _all_modes(self.tangential, self.points, self.limit, self.length)
 
     @cached_property
     def slides(self) -> np.ndarray:
-        """Slides [m] on which backbones are compared, closer together where the backbone bends."""
+        """Relative displacements [m] at which backbones are compared, denser at small values."""
         if self.tangential is None:
             displacement = self.shape @ (self.values * (self.shape.T @ self.limit))
         else:
@@ -148,11 +151,11 @@ class Spectrum:
 
     @cached_property
     def cache(self) -> dict:
-        """Backbones that were computed, by their numbers of modes."""
+        """Computed backbones by number of modes."""
         return {}
 
     def backbone(self, count: int, shape=None, limit=None) -> np.ndarray:
-        """Return the resultant [N] on `slides` with `count` modes.
+        """Return the friction force [N] of `count` modes at the relative displacements `slides`.
 
         Newton's method starts from the cached backbone of the most modes below `count`.
 
@@ -210,7 +213,7 @@ class ShearModes:
 
     @cached_property
     def backbone_error(self) -> float:
-        """Largest error of the resultant over the friction limit, against 64 or four times as many modes."""
+        """Largest error of the force / friction limit, compared with 64 or four times as many modes."""
         count = self.stiffness.size
         return self.of.relative_difference(
             self.of.backbone(max(64, 4 * count)), self.of.backbone(count)
@@ -218,7 +221,7 @@ class ShearModes:
 
 
 def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0) -> JenkinsSet:
-    """Return the parallel elements that are equivalent to points that yield behind a compliance.
+    """Return parallel elements equivalent to points that yield in series with a compliance.
 
     Parameters
     ----------
@@ -243,7 +246,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     points = np.flatnonzero(limit > 0)
     force, none = limit[points], np.zeros(0, np.int64)
-    # rigid points in series with one spring slip all at once
+    # rigid points in series with one spring all slip together
     if local_length == 0 and np.ptp(tangential) == 0:
         stiffness = 1 / tangential[0, 0]
         return JenkinsSet(
@@ -256,7 +259,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
             none,
             0,
         )
-    # a second thread waits for the first: 5 ms become 270 ms beside other work
+    # one thread: under load from other processes, waiting for a second one turns 5 ms into 270 ms
     with one_thread():
         c = _block(tangential, points)
         if local_length:
@@ -276,7 +279,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
 
 
 class _Sequence(NamedTuple):
-    """Yields of n points in an order, the last one first.
+    """Yields of n points in a given order, the last point to yield first.
 
     - order (n,): Indices of the points.
     - low (n, n): Lower Cholesky factor L of the compliance in that order.
@@ -292,12 +295,18 @@ class _Sequence(NamedTuple):
 
     @property
     def is_sorted(self) -> bool:
-        """Whether the slides increase from the last point to the first, as they do in the right order."""
+        """Whether the yield displacements increase from the last point to the first.
+
+        This is the condition that the order of the points is right.
+        """
         return bool((self.slides[1:] <= self.slides[:-1] * (1 + SAME_YIELD_TOL)).all())
 
 
 def _find_order(c: np.ndarray, force: np.ndarray) -> tuple:
-    """Return the _Sequence of the right order, its increasing yield slides and the number of reluctant points.
+    """Find the order in which the points yield.
+
+    Returns the `_Sequence` of this order, its increasing yield displacements, and the number of points whose force at
+    first has the wrong sign.
 
     While the first m points of an order stick, their rates solve the leading block of c = L L'. Thus the force that all
     points lose by the m-th yield is the m-th row of L^-1 times (L^-1 1)_m, and the slides of the yields are
@@ -323,7 +332,7 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> tuple:
 
 
 def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
-    """Return the quotients, infinite where the denominator is not positive."""
+    """Return the quotients; they are infinite where the denominator is not positive."""
     infinite = np.full(numerator.size, np.inf)
     return np.divide(numerator, denominator, out=infinite, where=denominator > 0)
 
@@ -337,7 +346,7 @@ def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Seq
 
 
 def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
-    """Exchange neighbours until the slides are sorted; None if that takes too many exchanges.
+    """Exchange neighbours until the yield displacements are sorted; None if this takes too long.
 
     An exchange changes the yields of these two points alone: L with two rows exchanged becomes lower triangular again by
     a rotation of two of its columns, which rotates L^-1 1 and L' force with them.
@@ -382,7 +391,10 @@ def _factorise(c: np.ndarray) -> np.ndarray:
 
 
 def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return the order of `_Sequence` by eliminating one point from the inverse of c after each yield (n^3 products)."""
+    """Return the order of `_Sequence` by eliminating one point after each yield.
+
+    The point is eliminated from the inverse of c, which takes n^3 products in all.
+    """
     inverse, remaining, yielded = np.linalg.inv(c), force.copy(), []
     rate = inverse.sum(axis=0)
     for _ in range(force.size):
@@ -398,7 +410,7 @@ def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 def scale_limits(elements: JenkinsSet, factor: float) -> JenkinsSet:
-    """Return the elements of points whose yield forces are `factor` > 0 times as large: the same springs."""
+    """Return elements with `factor` > 0 times the yield forces and the same springs."""
     return replace(
         elements,
         yield_slide=frozen_array(factor * elements.yield_slide),
@@ -461,7 +473,7 @@ def _all_modes(tangential, index, limit, length: float) -> Spectrum:
     """Return the Spectrum with all modes of the points `index` (a,) with limits (a,) [N]."""
     points = frozen_array(index, np.int64)
     if np.ptp(tangential) == 0:
-        # rigid points in series with one spring have a single mode
+        # rigid points in series with one spring have only one mode
         return Spectrum(points, limit, np.ones((index.size, 1)), tangential[:1, 0], length)
     root = np.sqrt(limit)
     with one_thread():
@@ -524,7 +536,7 @@ def largest_eigenpairs(
     basis, images = np.empty((2, len(start), 2 * n_products))
     new = np.stack([start, start * np.linspace(-1, 1, len(start))], axis=1)
     for k in range(0, 2 * n_products, 2):
-        # twice, because rounding errors of the first pass are not orthogonal
+        # The orthogonalization is repeated because rounding errors of the first pass remain.
         for _ in range(2):
             new = new - basis[:, :k] @ (basis[:, :k].T @ new)
             first = new[:, 0] / np.sqrt(new[:, 0] @ new[:, 0])
@@ -593,7 +605,7 @@ def fewest_modes(
     """
     spectrum = _make_spectrum(tangential, limit, bond_length, weakening, first_modes_only=True)
     for count in range(2, max_modes):
-        # the backbone of few modes is the start of that of many
+        # few modes come first, because their backbone is the starting point for many modes
         backbone = spectrum.backbone(count)
         reference = spectrum.backbone(max(N_REFERENCE_MODES, 4 * count))
         error = spectrum.relative_difference(reference, backbone)
@@ -603,7 +615,7 @@ def fewest_modes(
 
 
 def comparison_count(count: int) -> int:
-    """Return the number of modes of the run that shows the error of `count` modes.
+    """Return how many modes a second run needs to show the error of `count` modes.
 
     It is half as many. Of two or three modes of a symmetric patch only the first acts: there it is four times as many.
     """
@@ -624,7 +636,7 @@ class GaussModes(NamedTuple):
 
 
 def fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> GaussModes:
-    """Return the modes on as few Gauss points as the tolerance allows, for a motion without fields.
+    """Return the modes on as few Gauss points as the tolerance allows, if no fields are needed.
 
     All points are kept where more than half of them would be needed.
 
@@ -683,7 +695,7 @@ def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
     for _ in range(count):
         new = scaled * basis[-1]
         diagonal.append(new @ basis[-1])
-        # twice, because rounding errors of the first pass are not orthogonal
+        # The orthogonalization is repeated because rounding errors of the first pass remain.
         for _ in range(2):
             new = new - np.array(basis).T @ (np.array(basis) @ new)
         off_diagonal.append(np.linalg.norm(new))
@@ -694,14 +706,16 @@ def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
 
 
 class _Backbone(NamedTuple):
-    """Resultant (k,) [N] on k slides, NaN where it was not found, and coordinates (k, r) of the modes."""
+    """Force (k,) [N] at k displacements, NaN if not converged, and modal coordinates (k, r)."""
 
     force: np.ndarray
     coordinates: np.ndarray
 
 
 def _solve_backbone(limit, shape, values, length, slides, start) -> _Backbone:
-    """Solve for the first loading of the saturating law D (1 - exp(-xi/length)) on all slides (k,) by Newton's method.
+    """Solve for first loading at all relative displacements (k,) by Newton's method.
+
+    The law D (1 - exp(-xi/length)) saturates.
 
     The coordinates `start` (k, r) are overwritten. No step moves a point back by more than MAX_BACK_STEP lengths,
     because the law is so steep there that Newton's method does not return.
@@ -726,7 +740,7 @@ def _solve_backbone(limit, shape, values, length, slides, start) -> _Backbone:
         part = np.where((part > 0) & (part < 1), part, 1.0)
         coordinates[pending] -= part[:, None] * step
         size = np.abs(coordinates[pending]).max(axis=1) + 1e-300
-        # Newton's method converges quadratically, so that the next step is a rounding error
+        # Newton's method converges quadratically, so the omitted step is a rounding error
         is_converged = (part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size)
         pending = pending[~is_converged]
         if not pending.size:

@@ -21,18 +21,16 @@ LISTS = {  # settings of a list: whether it drops old strips, whether it merges 
 }
 ENGINES = (*LISTS, "recursion")
 # bounds of the error of merging over the square of its width, which test_merge_bounds measures
-MERGE_ERROR_CONSTANT = 0.25  # constant bond length
-MERGE_ERROR_GROWING = 1.0  # stretch reading with growing bonds
-MERGE_ERROR_PRINTED_GROWING = 6.0  # printed law with growing bonds
-MERGE_ERROR_PRINTED_FRACTIONAL = 1.0  # printed law with a constant bond length and an order below 1
-NEGATIVE_ORDER_ERROR = (
-    3e-4  # error of merging growing bonds with p < 0 at any width: bonds that form at a reversal
-)
-PASSES_PER_STEP = (
-    9  # evaluations of the list in a step of a rig: three for each of two or three trial increments
-)
-MAX_TAIL = 1e-6  # largest fraction of the friction limit that the cut-off may lose
-MAX_MERGE_WIDTH = 0.02  # largest width in bond lengths of merged strips
+MERGE_ERROR_CONSTANT = 0.25  # for a constant bond length
+MERGE_ERROR_GROWING = 1.0  # for reading="stretch" with growing bonds
+MERGE_ERROR_PRINTED_GROWING = 6.0  # for reading="report" with growing bonds
+# for reading="report" with a constant bond length and an order below 1
+MERGE_ERROR_PRINTED_FRACTIONAL = 1.0
+NEGATIVE_ORDER_ERROR = 3e-4  # error of merging growing bonds with p < 0 at any width, due to bonds that form at a reversal
+# evaluations of the list per step of a rig: three for each of two or three trial increments
+PASSES_PER_STEP = 9
+MAX_TAIL = 1e-6  # largest fraction of the friction limit by which the cut-off may change the force
+MAX_MERGE_WIDTH = 0.02  # largest width of a merged strip in bond lengths
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +135,7 @@ def choose(
 
 
 def _merge_error_factor(law: Bonds) -> float:
-    """Return the bound of the error of merging over the square of its width."""
+    """Return the error bound of merging / square of the merge width."""
     form = form_of(law)
     if form == PRINTED_GROWING:
         return MERGE_ERROR_PRINTED_GROWING
@@ -151,7 +149,7 @@ def _merge_error_factor(law: Bonds) -> float:
 def _estimate(
     law: Bonds, name: str, tail: float, merge: float, stroke: float, steps: float
 ) -> Choice:
-    """Estimate length, cost and error of a list with these settings; a setting of 0 is not used."""
+    """Estimate length, cost and error of a list with these settings; 0 switches a setting off."""
     increment = stroke / max(steps, 1)
     strips = _expected_strips(law, tail, merge, stroke, increment)
     seconds_per_strip = cost_model.STRIP_SECONDS[int(form_of(law))]

@@ -1,9 +1,9 @@
 """Forms of the sum over a list of strips of bonds (eq. 2.17), and the quadrature rules of its strips."""
 
-MOMENTS = 0.0  # stretch reading with p = 1: three moments of the strips, exact
-POWER = 1.0  # stretch reading of any order: two Gauss points per strip
-PRINTED = 2.0  # printed law with a constant bond length: differences of P(p + 1, R/eps), exact
-PRINTED_GROWING = 3.0  # printed law with growing bonds: two Gauss points per strip
+MOMENTS = 0.0  # reading="stretch" with p = 1: three moments of the strips, exact
+POWER = 1.0  # reading="stretch" with any order p: two Gauss points per strip
+PRINTED = 2.0  # reading="report" with a constant bond length: differences of P(p + 1, R/eps), exact
+PRINTED_GROWING = 3.0  # reading="report" with growing bonds: two Gauss points per strip
 
 GAUSS_1 = 0.21132486540518713  # first of two Gauss points, as a fraction of the strip from its end
 GAUSS_2 = 0.7886751345948129  # second of two Gauss points

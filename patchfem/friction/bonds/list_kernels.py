@@ -57,30 +57,28 @@ from .point_kernels import bond_mean, grow
 
 # two Gauss points per strip then sum growing bonds to 1e-6 (test_exact_direct_of_growing_bonds_is_the_sum_by_hand)
 MAX_GROWTH = 0.5  # largest growth J in a strip of growing bonds
-MAX_GROWTH_STRIPS = (
-    16  # strips of an increment for its growth alone, because J has no bound after a long rest
-)
-# the error falls with the fourth power of the number of strips, and vanishes once the bonds are grown
-GROWTH_TOLERANCE = 1e-9  # fraction of the friction limit that the bonds of an increment may miss
-PLACE_TOLERANCE = (
-    1e-6  # fraction of an increment within which it touches the place of the initial bonds
-)
-MIN_BALANCED = 1e-3  # increment in bond lengths below which a difference of energies has more round-off than the force
-MIN_BALANCED_SPREAD = (
-    1e-6  # the same for spread initial bonds, where a solve needs a force without jumps
-)
+# largest number of strips into which growth alone divides an increment, as J has no bound after a long rest
+MAX_GROWTH_STRIPS = 16
+# fraction of the friction limit; largest error of the bonds that form on an increment, which falls with the fourth power
+# of the number of strips and vanishes once the bonds are grown
+GROWTH_TOLERANCE = 1e-9
+# fraction of the increment; if it ends this close to the initial bonds, it touches them
+PLACE_TOLERANCE = 1e-6
+MIN_BALANCED = 1e-3  # increment in bond lengths; below it, a difference of energies has more round-off than the force
+# same limit for spread initial bonds, where a solver needs a force without jumps
+MIN_BALANCED_SPREAD = 1e-6
 MAX_SIMPSON = 0.1  # increment in bond lengths up to which Simpson's rule is exact enough
-MAX_SIMPSON_FRACTIONAL = 0.03  # the same with an order below 1
+MAX_SIMPSON_FRACTIONAL = 0.03  # same limit for an order below 1
 MAX_PANEL = 0.5  # longest first panel of five Gauss points, in bond lengths
-MAX_EXPONENT = 300.0  # exponent of the scaled numbers beyond which they are rescaled; exp(709) is the largest number
-MAX_SERIES = 1e-2  # path in bond lengths up to which the moments of new bonds are power series
-N_STRIPS_OF_MERGE = (
-    12  # strips beyond a fifth of the list by which it grows before it is merged again
-)
+MAX_EXPONENT = 300.0  # exponent beyond which the scaled numbers are rescaled; exp(709) is the largest floating-point number
+# path in bond lengths; below it, the moments of new bonds are computed by power series
+MAX_SERIES = 1e-2
+# strips by which a list must grow, besides a fifth of its length, before it is merged again
+N_STRIPS_OF_MERGE = 12
 
 
 class Advance(NamedTuple):
-    """Clocks of a list after an increment, and the bond length [m] half way along it."""
+    """Clocks of a list after an increment, and the bond length [m] in its middle."""
 
     displacement: float
     path: float
@@ -108,7 +106,7 @@ class Pieces(NamedTuple):
 
 
 class MeanForce(NamedTuple):
-    """Path-mean force [1] of an increment and its derivative over the increment [1/m]."""
+    """Path-mean force [1] of an increment and its derivative by the increment [1/m]."""
 
     mean: float
     slope: float
@@ -141,7 +139,7 @@ def _advance(increment, clocks, growth, v0, v1, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def target_length(before, after, exponent):
-    """Return the length that eq. 2.10 tends to in a step that multiplies the distance to it by exp(-exponent).
+    """Return the length to which eq. 2.10 relaxes by exp(-exponent) in a step.
 
     Parameters
     ----------
@@ -275,7 +273,9 @@ def list_force(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_energy(increment, bond_list, v0, dt):
-    """Return the energy [m] of all bonds after an increment, also of those that form on it; stretch reading.
+    """Return the energy [m] of all bonds after an increment, for reading="stretch".
+
+    Bonds that form on the increment are included.
 
     Parameters
     ----------
@@ -296,7 +296,7 @@ def list_energy(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrand(is_energy, increment, bond_list, v0, dt):
-    """Return what is averaged over an increment: the energy, or the force.
+    """Return the integrand of the mean over an increment: the energy or the force.
 
     The force of the printed law is without the initial bonds, whose mean has a closed form.
     """
@@ -370,7 +370,7 @@ def _suits_simpson(increment, bond_list):
         status[STATUS.end] > status[STATUS.head]
         and abs(increment) / clocks[CLOCK.length] <= limit
         and p >= 0
-        # the rule must not change with the place of spread bonds
+        # the choice of the rule must not depend on the position of spread bonds
         and not ((touches_place and has_jump) or has_turn)
     )
 
@@ -391,7 +391,7 @@ def _needs_energy_balance(increment, bond_list):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _mean_from_energy(is_short, increment, bond_list, v0, dt):
-    """Return the path-mean force from the energy balance: what damage takes and what the bonds gain."""
+    """Return the path-mean force from an energy balance: loss by damage plus stored energy."""
     last = list_energy(increment, bond_list, v0, dt)
     gain = last - bond_list.status[STATUS.energy]
     eps = _advance(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
@@ -420,7 +420,7 @@ def _average_by_gauss(is_energy, increment, bond_list, v0, dt):
     high = MAX_PANEL / path
     total = 0.0
     while low < 1:
-        # the last two panels become one
+        # the last two panels are merged into one
         high = 1.0 if high > 0.75 else high
         total += _integrate_panel(is_energy, (low, high), increment, bond_list, v0, dt)
         low = high
@@ -430,7 +430,7 @@ def _average_by_gauss(is_energy, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _first_integrand(is_energy, bond_list):
-    """Return `_integrand` of the present state, which the status of the list has."""
+    """Return `_integrand` of the present state from the status of the list."""
     status = bond_list.status
     clocks = bond_list.now
     if is_energy:
@@ -445,7 +445,7 @@ def _first_integrand(is_energy, bond_list):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_panel(is_energy, span, increment, bond_list, v0, dt):
-    """Integrate over the part of an increment between two fractions of it, by five Gauss points."""
+    """Integrate by five Gauss points between two fractions of an increment."""
     low, high = span
     total = 0.0
     for point, weight in GAUSS_FIVE:
@@ -457,7 +457,7 @@ def _integrate_panel(is_energy, span, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_slope(increment, bond_list, v0, dt):
-    """Return the path-mean force and its derivative in the stretch reading with p = 1, in closed form.
+    """Return path-mean force and derivative for reading="stretch" and p = 1, in closed form.
 
     Parameters
     ----------
@@ -492,7 +492,7 @@ def list_slope(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_step(increment, bond_list, v0, v1, dt):
-    """Move a list over an increment: append its strips, drop those beyond the cut-off, merge from time to time.
+    """Advance a list by an increment: append strips, drop the oldest, and merge now and then.
 
     Force and energy after the step are written into the status.
 
@@ -552,7 +552,7 @@ def list_step(increment, bond_list, v0, v1, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _rescale(bonds, status, clocks, law):
-    """Move the reference of the scaled numbers before they overflow."""
+    """Change the reference of the scaled numbers before they overflow."""
     form = law[LAW.form]
     if form == PRINTED:
         return
@@ -574,7 +574,7 @@ def _rescale(bonds, status, clocks, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _append(formation, bond_list):
-    """Append the strips of an increment, the oldest first; return False if there is no room."""
+    """Append the strips of an increment, the oldest first; return False if the list is full."""
     increment, before, after, pressure, _ = formation
     bonds = bond_list.bondlist
     status = bond_list.status
@@ -704,7 +704,7 @@ def _surviving_moments(x):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _drop_old_strips(bonds, status, clocks, law):
-    """Move the head of the list beyond the strips that are older than the cut-off."""
+    """Advance the head of the list beyond the strips that are older than the cut-off."""
     form = law[LAW.form]
     head = int(status[STATUS.head])
     end = int(status[STATUS.end])
@@ -725,7 +725,7 @@ def _drop_old_strips(bonds, status, clocks, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _pack(bonds, status):
-    """Move the list to the start of its room; return its end."""
+    """Move the list to the start of the array; return the index after its last strip."""
     head = int(status[STATUS.head])
     end = int(status[STATUS.end])
     room_start = int(status[STATUS.room_start])

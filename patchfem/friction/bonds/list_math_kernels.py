@@ -89,7 +89,7 @@ def gamma_p(a, x):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def share(p, x):
-    """P(p + 1, x) [1] to 1e-15 absolute: the share of the limit in the bonds that formed on the last x bond lengths.
+    """P(p + 1, x) [1] to 1e-15: fraction of the limit in bonds from the last x bond lengths.
 
     It has a closed form for p = 0, 1 and 2. Twin: scipy.special.gammainc.
     """

@@ -1,4 +1,4 @@
-"""Merging of strips of bonds: neighbours join while they stay narrow for their age.
+"""Merging of neighbouring strips of bonds as long as they are narrow for their age.
 
 The list then stays short however long the run, however small the strokes and however fine the steps. First moments are
 kept, so the error falls with the square of the width.
@@ -22,13 +22,13 @@ from .list_rows_kernels import (
 )
 from .list_sum_kernels import start_length
 
-MAX_START_LENGTH = 1e-8  # starting length over bond length, below which nothing is left of it
+# starting length / bond length; below it, the starting length no longer matters
+MAX_START_LENGTH = 1e-8
 MAX_GROWTH_SPAN = 0.1  # largest range of the growth J of a merged strip of growing bonds
-MAX_SHORTENING = (
-    0.1  # largest fraction by which the last bond of a merged strip is shorter than its first
-)
-MAX_RANGE_MISMATCH = 1e-3  # mismatch over width, below which two ranges count as the same
-MAX_AGE = 200.0  # age in bond lengths up to which the permitted width grows, which keeps it finite
+# largest fraction by which the last bond of a merged strip is shorter than its first
+MAX_SHORTENING = 0.1
+MAX_RANGE_MISMATCH = 1e-3  # mismatch / width; below it, two ranges count as the same
+MAX_AGE = 200.0  # age in bond lengths beyond which the permitted width no longer grows, which keeps it finite
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -116,14 +116,17 @@ def _are_end_to_end(bonds, i, k, width, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _ends_a_narrow_pass(bonds, i, k, width, law):
-    """Return whether strip i is narrow and the direction changes behind it, so that a pass over it will follow."""
+    """Return whether strip i is narrow and the direction reverses after it.
+
+    A pass over the strip will then follow.
+    """
     is_narrow = bonds[STRIP.covered, i] <= 0.5 * width
     return is_narrow and law[LAW.form] != MOMENTS and _step(bonds, i) * _step(bonds, k) < 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _is_full_grown(bonds, k, clocks):
-    """Return whether nothing is left of the starting lengths of a strip."""
+    """Return whether the starting lengths of the bonds of a strip no longer matter."""
     start = start_length(0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k])
     scale = exp(clocks[CLOCK.reference] - clocks[CLOCK.growth])
     return scale * start <= MAX_START_LENGTH * clocks[CLOCK.length]
@@ -131,7 +134,7 @@ def _is_full_grown(bonds, k, clocks):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _is_evenly_weighted(bonds, i, k, clocks, law):
-    """Return whether the weight of two strips is even over them, or so small that this does not matter.
+    """Return whether the weight of two strips is even over them, or too small to matter.
 
     With a fractional order the weight R^p of young bonds is far from even: taken as even, it moves the fraction
     joint/(near + joint) of their part ((near + joint)^(p + 1) - near^(p + 1))/Gamma(p + 1) of the friction limit.
@@ -165,7 +168,7 @@ def _have_similar_density(bonds, i, k, width, eps0):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _have_similar_lengths(bonds, i, k, clocks):
-    """Return whether the growing bonds of two strips have similar lengths, or nothing is left of the growth."""
+    """Return whether the growing bonds of two strips have similar lengths, or are fully grown."""
     if _is_full_grown(bonds, k, clocks):
         return True
     young = start_length(0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k])
@@ -178,7 +181,10 @@ def _have_similar_lengths(bonds, i, k, clocks):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _have_same_range(bonds, i, k, clocks, law, status):
-    """Return whether two strips cover nearly the same range, so that both can be spread over their mean range."""
+    """Return whether two strips cover nearly the same range.
+
+    Both can then be spread over their mean range.
+    """
     low_i = min(bonds[STRIP.start, i], bonds[STRIP.end, i])
     high_i = max(bonds[STRIP.start, i], bonds[STRIP.end, i])
     low_k = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
@@ -199,7 +205,7 @@ def _have_same_range(bonds, i, k, clocks, law, status):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_moments(bonds, i, k):
-    """Add strip k to strip i, both known by weight, centre and variance."""
+    """Add strip k to strip i, both given by weight, centre and variance."""
     weight_i = bonds[MOMENT.weight, i]
     weight_k = bonds[MOMENT.weight, k]
     total = weight_i + weight_k
@@ -249,7 +255,7 @@ def _join_ends(bonds, i, k, clocks, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _joint_start_length(gauss, bonds, i, k, clocks):
-    """Return the scaled starting length at a Gauss point of two joined strips, 0 once nothing is left of it."""
+    """Return the scaled starting length at a Gauss point of two joined strips; 0 if full-grown."""
     if _is_full_grown(bonds, k, clocks):
         return 0.0
     width_i = bonds[STRIP.clock_width, i]

@@ -13,8 +13,8 @@ STRIPS_PER_LENGTH = 4  # largest number of strips of an increment per bond lengt
 TABLE_STEPS = 32  # nodes of the table of P(p + 1, x) per unit of x
 N_NODES = 4  # Gauss-Jacobi points of the form POWER
 N_LAW_NUMBERS = 24  # numbers of a law, with the points and weights of two powers
-N_WORK_STRIPS = 64  # strips of a list beside those of an increment
-N_UNMERGED = 20_000  # strips that a list has room for at first if none are merged
+N_WORK_STRIPS = 64  # additional strips for work space, besides those of an increment
+N_UNMERGED = 20_000  # initial capacity of a list whose strips are not merged
 
 
 def form_of(law: Bonds) -> float:
@@ -118,7 +118,7 @@ def gamma_table(law: Bonds) -> np.ndarray:
 
 
 def capacity(law: Bonds, reach: float, merge: float) -> int:
-    """Return the number of strips to allocate: those after a merge, those of a long step, and some to work with.
+    """Return the number of strips to allocate: after a merge, for a long step, and work space.
 
     Parameters
     ----------

@@ -41,14 +41,17 @@ class MomentRows(NamedTuple):
 
 
 class PowerRows(NamedTuple):
-    """Rows of a strip in the form POWER: scaled weights at both Gauss points; a spread strip has all in the first."""
+    """Rows of a strip in the form POWER: scaled weights at both Gauss points.
+
+    A spread strip has its whole weight in the first row.
+    """
 
     weight_1: int = 5
     weight_2: int = 6
 
 
 class PrintedRows(NamedTuple):
-    """Row of a strip in the form PRINTED: the relative pressure that its bonds formed under."""
+    """Row of a strip in the form PRINTED: relative pressure at which its bonds formed."""
 
     pressure: int = 5
 

@@ -17,15 +17,14 @@ from .list_forms_kernels import GAUSS_1, GAUSS_2, POWER
 from .list_math_kernels import FASTMATH_FLAGS, fexp, flog, share, tabled
 from .list_rows_kernels import GROWING_ROW, LAW, MOMENT, POWER_ROW, PRINTED_ROW, STRIP
 
-MIN_GROWING_RATIO = (
-    0.05  # last over first bond length of a strip, below which all of its bonds are growing
-)
-AT_PLACE = 1e-14  # displacement over path, below which the displacement is at the place of the initial bonds
-MIN_LENGTH = (
-    1e-9  # smallest length of a growing bond over that of mature bonds, which keeps R/length finite
-)
+# last / first bond length of a strip; below it, all bonds of the strip are growing
+MIN_GROWING_RATIO = 0.05
+AT_PLACE = 1e-14  # displacement / path; below it, the initial bonds count as unstressed
+# smallest length of a growing bond / that of mature bonds, which keeps R/length finite
+MIN_LENGTH = 1e-9
 MIN_PATH = 1e-300  # smallest path [m] since a bond formed, which keeps its logarithm finite
-MIN_SPREAD = 1e-4  # width over distance below which a spread strip acts like a single place
+# width / distance; below it, a spread strip acts as if concentrated at one position
+MIN_SPREAD = 1e-4
 
 
 class BondSum(NamedTuple):
@@ -159,7 +158,7 @@ def _integrate_power_strip(displacement, bonds, k, p, nodes, is_force):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def average_spread(displacement, low, high, p):
-    """Average |u|^p sgn u and |u|^(p + 1) over bonds that are spread evenly over a range of places.
+    """Average |u|^p sgn u and |u|^(p + 1) over bonds that are spread evenly over a range.
 
     Parameters
     ----------
@@ -227,7 +226,7 @@ def sum_linear_density(displacement, start, end, weights, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_powers(displacement, damage, bonds, strips, law):
-    """Sum |u|^p over strips in the form POWER (eq. 2.17, stretch reading).
+    """Sum |u|^p over strips in the form POWER (eq. 2.17 with reading="stretch").
 
     Two Gauss points per strip are exact enough away from u = 0. A strip near u = 0 is integrated from there; if it is
     as narrow for its age as a merged strip, its density is taken as linear.
@@ -253,7 +252,7 @@ def sum_powers(displacement, damage, bonds, strips, law):
     force = total.force
     energy = total.energy
     is_polynomial = p == 3.0
-    # fractional powers are singular at u = 0, which two Gauss points feel outside the strip as well
+    # fractional powers are singular at u = 0, which also affects Gauss points in strips close to it
     reach = 1.0 if p == 0.0 or p == 2.0 else 5.0
     for k in range(strips.end if is_polynomial else strips.first, strips.end):
         start = bonds[STRIP.start, k]
@@ -284,7 +283,9 @@ def sum_powers(displacement, damage, bonds, strips, law):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _sum_closed_printed(displacement, path, bonds, strips, law):
-    """Sum strips of one pass in the form PRINTED for p = 0, 1 or 2, where P(p + 1, x) is elementary.
+    """Sum strips of reading="report" for p = 0, 1 or 2, where P(p + 1, x) is elementary.
+
+    The bond length is constant, and each strip has been passed only once.
 
     With S(x) = 1 - P(p + 1, x) the integral of y phi(y) from 0 to x is (p + 1) (1 - S(x)) - x phi(x).
     """
@@ -328,13 +329,16 @@ def _sum_closed_printed(displacement, path, bonds, strips, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _sum_tabled_printed(displacement, path, bonds, strips, law, table):
-    """Sum strips of one pass in the form PRINTED for any order, by the table of P(p + 1, x)."""
+    """Sum strips of reading="report" at constant bond length by the table of P(p + 1, x).
+
+    It holds for any order p and strips that have been passed only once.
+    """
     p = law[LAW.order]
     eps0 = law[LAW.length]
     inverse_gamma = law[LAW.inverse_gamma]
     force = 0.0
     energy = 0.0
-    # values at the start of the strip are those at the end of the strip before, which is visited next
+    # values at the start of a strip equal those at the end of the preceding one, which is visited next
     last = -1.0
     last_lever = 0.0
     for k in range(strips.end - 1, strips.first - 1, -1):
@@ -369,7 +373,7 @@ def _sum_tabled_printed(displacement, path, bonds, strips, law, table):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_printed(displacement, path, bonds, strips, law, table):
-    """Sum strips of the printed law at a constant bond length (eq. 2.17), exactly.
+    """Sum strips of reading="report" at a constant bond length (eq. 2.17), exactly.
 
     A strip of one pass is split where u changes its sign.
 
@@ -489,7 +493,7 @@ def start_length(fraction, length_1, length_2):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _bond_length(fraction, mature, bonds, k):
-    """Return the bond length [m] at a place of a strip: it approaches that of mature bonds (eq. 2.10)."""
+    """Return the bond length [m] at a position of a strip, which tends to that of mature bonds."""
     start = start_length(fraction, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k])
     return max(mature.length - mature.scale * start, MIN_LENGTH * mature.length)
 
@@ -547,11 +551,11 @@ def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _spread_growing_strip(displacement, path, mature, bonds, k, p):
-    """Take a strip of growing bonds as spread evenly over its places, each bond with the age that it has."""
+    """Treat a strip of growing bonds as spread evenly over its range; each bond keeps its age."""
     low = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
     high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
     average = average_spread(displacement, low, high, 0.0)
-    # beyond the strip all directions agree, so the sum is what the bonds carry
+    # outside the strip all bonds have the same direction, so the sum is what they carry
     beyond = high + bonds[STRIP.clock_width, k]
     carried = _sum_gauss_growing(beyond, path, mature, bonds, k, k + 1, p).force
     return BondSum(average.force * carried, average.energy * carried)
@@ -559,7 +563,7 @@ def _spread_growing_strip(displacement, path, mature, bonds, k, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_growing(displacement, path, mature, bonds, strips, law):
-    """Sum strips of the printed law with growing bonds (eqs. 2.10 and 2.17).
+    """Sum strips of reading="report" with growing bonds (eqs. 2.10 and 2.17).
 
     Parameters
     ----------
@@ -616,7 +620,7 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_initial(displacement, path, damage, law):
-    """Return force and energy of the initial bonds, of density m_0 and unstressed at the displacement 0.
+    """Return force and energy of the initial bonds: density m_0, unstressed at displacement 0.
 
     Their force may jump there: at the place itself, to the round-off of the path, it is 0, the mean of both sides. If
     the law spreads them over a width, they store nothing at displacement 0.
@@ -658,7 +662,7 @@ def sum_initial(displacement, path, damage, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def average_initial(increment, displacement, path, law):
-    """Average the force of the initial bonds of the printed law over an increment, exactly.
+    """Average the force of the initial bonds of reading="report" over an increment, exactly.
 
     The force jumps at the place of the bonds, or turns over the width that they are spread over.
 
@@ -681,7 +685,7 @@ def average_initial(increment, displacement, path, law):
     if law[LAW.initial] == 0:
         return 0.0
     direction = np.copysign(1.0, increment)
-    # parts of the increment before, inside and behind the range of the bonds
+    # lengths of the increment before, inside and behind the range of the bonds
     enter = min(max(-direction * displacement - half_width, 0.0), size)
     leave = min(max(-direction * displacement + half_width, 0.0), size)
     p_start = share(p, path / eps0)
@@ -696,7 +700,7 @@ def average_initial(increment, displacement, path, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def formed_force(path, eps, law):
-    """Return the force [1] of the bonds that form on a straight increment, per friction limit.
+    """Return the force [1] of the bonds that form on a straight increment / friction limit.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ import numpy as np
 
 MAX_EXPONENT = 1e100  # exponents of growth beyond which the bond length no longer changes
 LONGEST = 600.0  # largest estimated CPU seconds of a run with a list of bonds
-SAME_SPEED = 1e-6  # relative difference of two speeds below which their mean is as good, and free of cancellation
+SAME_SPEED = 1e-6  # relative difference of two speeds; below it their mean is accurate and avoids cancellation
 MIN_GROWTH = 1e-9  # growth J of a step below which the growth along it is linear
 
 
@@ -56,7 +56,9 @@ class ElasticSplit(NamedTuple):
 
 
 def grown_fraction(growth, back):
-    """Return the fraction of the growth in a step at constant speed that happened before a place of the step.
+    """Return the fraction of the growth in a step that happened before a position of the step.
+
+    The speed is constant in the step.
 
     Parameters
     ----------

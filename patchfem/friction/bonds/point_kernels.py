@@ -1,4 +1,4 @@
-"""Bonds of one point of a line in the stretch reading with p = 1, compiled. Equations and NumPy form: `recursion`.
+"""Bonds of one point on a line for reading="stretch" and p = 1, compiled (see `recursion`).
 
 m [Pa], z [Pa m] and s2 [Pa m2] are the sums over the bonds of a point: density, stretch and stretch squared. sigma [Pa]
 is the pressure under which new bonds form, eps [m] the bond length of the step. The traction is mu_s/eps_0 z.
@@ -14,12 +14,12 @@ import numpy as np
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
-MAX_SHORT = 0.5  # path in bond lengths up to which the power series are exact to round-off
-MAX_SERIES = 0.03  # path in bond lengths up to which half of the terms of the first series suffice
+MAX_SHORT = 0.5  # path in bond lengths; below it, the power series are exact to round-off
+MAX_SERIES = 0.03  # path in bond lengths; below it, half of the terms of the first series suffice
 # coefficients of (exp(-x) - 1 + x)/x^2 and of the integral of y^3 exp(-y) over x^4, both as series in -x
 SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(13)])
 MOMENT_SERIES = np.array([1 / (factorial(k) * (k + 4)) for k in range(13)])
-N_SHORT_TERMS = 7  # terms of the series that suffice up to MAX_SERIES
+N_SHORT_TERMS = 7  # number of terms of the series that suffice up to MAX_SERIES
 MAX_EXPONENT = 1e100  # exponents of growth beyond which the bond length no longer changes
 
 
@@ -137,7 +137,7 @@ def _mean_stretch(m, z, increment, sigma, eps, shapes):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bond_step(m, z, s2, increment, sigma, eps):
-    """Move the bonds of a point over an increment.
+    """Advance the bonds of a point by an increment.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def elastic_bond_mean(m, z, play, half, increment, sigma, eps):
     """
     elastic = _split_elastic(play, increment, half)[0]
     rest = increment - elastic
-    if rest == 0.0 or abs(increment) < 1e-280:  # a quotient by a smaller increment overflows
+    if rest == 0.0 or abs(increment) < 1e-280:  # a quotient by a smaller increment would overflow
         return z + 0.5 * m * increment, 0.5 * m
     if elastic == 0.0:
         return bond_mean(m, z, increment, sigma, eps)
@@ -235,7 +235,7 @@ def elastic_bond_mean(m, z, play, half, increment, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def elastic_bond_step(m, z, s2, play, half, increment, sigma, eps):
-    """Move the bonds of a point with an elastic range over an increment.
+    """Advance the bonds of a point with an elastic range by an increment.
 
     Parameters
     ----------
@@ -325,7 +325,7 @@ def bond_end(m, z, increment, sigma, eps):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_point(bonds, s0, s1, initial, length):
-    """Put the bonds of a point at rest under another load, as `recursion.press_bonds` does.
+    """Change the load of a point at rest, as `recursion.press_bonds` does.
 
     Parameters
     ----------

@@ -30,12 +30,15 @@ from .recursion import BondState, direction, move_bonds, press_bonds, refuse_dir
 from .strips import COLUMNS, Strips, surviving, weights
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
-PANELS = (0, 1, 2, 4, 8, 16, 32)  # of a step in bond lengths, five Gauss points each
+# ends of the panels of a step in bond lengths, with five Gauss points per panel
+PANELS = (0, 1, 2, 4, 8, 16, 32)
 
 
 @dataclass(frozen=True, slots=True)
 class Quadrature:
-    """Law object that evaluates 2.17 directly; `tail` bounds what the cut-off may lose, 0 keeps every bond.
+    """Law object that evaluates eq. 2.17 directly.
+
+    `tail` bounds the fraction of the friction limit that the cut-off leaves out; 0 keeps every bond.
 
     Along a line increments are numbers and tractions (m,) [Pa]; in a plane they are (2,) and (2, m), positive against
     slip.
@@ -45,8 +48,10 @@ class Quadrature:
     tail: float = 1e-9
 
     def start(self, sigma, directions: int = 1) -> Strips:
-        """Only the initial cohort: unstressed, full-grown bonds of density m_0 under sigma (m,) [Pa]. PatchfemError for
-        a law that has no form in two directions."""
+        """Return the initial cohort: unstressed, full-grown bonds under sigma (m,) [Pa].
+
+        Their density is m_0. Raises PatchfemError for a law that is not defined in two directions.
+        """
         refuse_directions(self.law, directions)
         none, length, place = np.zeros(1), np.full(1, self.law.length), np.zeros((1, directions))
         return Strips(
@@ -65,7 +70,7 @@ class Quadrature:
         )
 
     def step(self, state: Strips, dq, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] in dt [s] under s0 to s1 (m,) [Pa].
+        """Advance by a straight increment dq [m] in dt [s]; pressure from s0 to s1 (m,) [Pa].
 
         The mean traction is exact for p = 1 stretch. Otherwise it comes from five Gauss points, and its part along the
         increment in the stretch reading from the energy, so that no step creates any.
@@ -86,7 +91,7 @@ class Quadrature:
             mean = self._along(state, dq, s0, s1, dt)[0]
         else:
             mean, spent = self._along(state, dq, s0, s1, dt)
-            # bonds lost at the end of the step leave their energy to nobody: the force holds them until then
+            # energy of bonds that are lost at the end of the step, as they still act during the step
             held = (
                 end
                 if (s1 > 0).all()
@@ -107,8 +112,11 @@ class Quadrature:
         return Step(_squeezed(mean), dq @ mean - gain, after)
 
     def _along(self, state: Strips, dq, s0, s1, dt: float) -> tuple:
-        """(mean traction (d, m) [Pa], dissipated energy (m,) [J/m2]) of an increment. The latter holds in the stretch
-        reading, where damage takes the share dR/eps of what is stored and so never less than nothing."""
+        """Integrate the mean traction (d, m) [Pa] and dissipated energy (m,) [J/m2] of an increment.
+
+        The energy holds for reading="stretch", where damage dissipates the fraction dR/eps of the stored energy, which is
+        never negative.
+        """
         middle, path = self._middle(state, dq, dt), direction(dq)[0]
         length = self._damaging(state, dq, middle)[0] / middle
         free, edges = (
@@ -129,7 +137,9 @@ class Quadrature:
         return mean, spent
 
     def press(self, state: Strips, s0, s1) -> Step:
-        """The pressure at rest goes from s0 to s1 (m,) [Pa] on a line; mean: the traction after it.
+        """Change the pressure at rest linearly from s0 to s1 (m,) [Pa].
+
+        The mean of the Step is the traction after it.
 
         As printed, a bond keeps the pressure it formed under and none forms at rest. In the stretch reading with p = 1
         the rule is that of `recursion.press_bonds`; with another order the last-formed bonds are let go first, one by one.
@@ -146,8 +156,10 @@ class Quadrature:
         return Step(self.traction(after), self.stored(state) - self.stored(after), after)
 
     def _thinned(self, state: Strips, s0, s1) -> tuple:
-        """Factor (m,) on all bonds and density (m,) [Pa] of a cohort (below 0: bonds without stretch that are gone)
-        that have the moments of `pressed`."""
+        """Return the factor (m,) on all bonds and the density (m,) [Pa] of an added cohort.
+
+        Together they have the moments of `press_bonds`. A negative density removes unstretched bonds.
+        """
         before = self._moments(state)
         m, _, s2 = before
         dense, _, kept = press_bonds(self.law, before, s0, s1)
@@ -155,8 +167,11 @@ class Quadrature:
         return keep, dense - keep * m
 
     def _let_go(self, state: Strips, s0, s1) -> tuple:
-        """Factors (k, m) on the bonds where the pressure falls, the last-formed first, and density (m,) of the cohort
-        of bonds that re-form: those that rise with the pressure or would keep more than mu_s sigma."""
+        """Return the surviving fraction (k, m) of the bonds and the re-formed density (m,) [Pa].
+
+        Where the pressure falls, the last-formed bonds are lost first. Bonds re-form unstretched where the pressure
+        rises, or where the remaining ones would carry more than mu_s sigma.
+        """
         mass = _young(state) * state.sigma * surviving(state)[:, None]
         falls, total = s1 < s0, mass.sum(axis=0)
         excess = np.where(falls & (s0 > 0), total * (1 - s1 / np.where(s0 > 0, s0, 1.0)), 0.0)
@@ -175,14 +190,17 @@ class Quadrature:
         return self.law.order == 1 and self.law.reading == "stretch"
 
     def _moments(self, state: Strips) -> np.ndarray:
-        """(d + 2, m): m, z, s2 of `recursion`, in the stretch reading with p = 1."""
+        """Return m, z, s2 of `recursion`, (d + 2, m), for reading="stretch" with p = 1."""
         sums = self._sums(state) * self.law.length
         sums[-1] *= 2
         return np.vstack([_summed(state, surviving(state)[:, None]), sums])
 
     def carried(self, state: Strips, dq, s0, s1, dt: float, forming=None) -> Strips:
-        """The bonds after an increment, the state that `step` gives at a tenth of its cost or less, without its means;
-        forming (m,) [Pa]: the pressure of the new ones, the mean of both ends where it is not given."""
+        """Return the bonds after an increment, without the means that `step` computes.
+
+        This takes at most a tenth of the time of `step`. forming (m,) [Pa]: pressure at which new bonds form; by default
+        the mean of s0 and s1.
+        """
         (q, path, damage, growth, mature), law = state.now, self.law
         dq = np.atleast_1d(np.asarray(dq, float))
         distance = direction(dq)[0]
@@ -211,14 +229,17 @@ class Quadrature:
         )
 
     def _damaging(self, state: Strips, dq, middle: float) -> tuple:
-        """(length [m], direction (d,), play after it) of the part of an increment in which bonds form and break."""
+        """Return length [m], direction (d,) and final play of the damaging part of an increment.
+
+        In this part bonds form and break.
+        """
         if len(dq) > 1:
             return *direction(dq), state.play
         _, damaging, play = elastic_part(self.law, state.play, float(dq[0]), middle)
         return abs(damaging), np.sign([damaging]), play
 
     def _middle(self, state: Strips, dq, dt: float) -> float:
-        """Bond length [m] half way through an increment, which the bonds that form on it have."""
+        """Return the bond length [m] in the middle of an increment, which new bonds have."""
         half = direction(dq)[0] / 2
         speed = 2 * half / dt if dt > 0 else 0.0
         return grow(self.law, state.now[4], speed, speed, half, dt / 2)
@@ -233,7 +254,7 @@ class Quadrature:
             else (state.path / self.law.length, state.now[1] / self.law.length)
         )
         first = int(np.searchsorted(old, now - reach))
-        # copying the rest is worth it only when half of it is gone
+        # copying pays only when at least half of the strips can be dropped
         if first < max(64, len(state.q) // 2):
             return state
         kept = {name: getattr(state, name)[first:] for name in (*COLUMNS, "sigma")}
@@ -246,25 +267,27 @@ class Quadrature:
         )
 
     def weights(self, state: Strips) -> np.ndarray:
-        """(k, d + 1) of each entry: signed weights [1], tau = mu_s sum_k weight_k sigma_k, and stored energy [m],
-        V = mu_s sum_k energy_k sigma_k."""
+        """Return signed weights [1] and stored energy [m] of each entry, (k, d + 1).
+
+        The traction is mu_s sum_k weight_k sigma_k, the stored energy mu_s sum_k energy_k sigma_k.
+        """
         return weights(state, self.law)
 
     def _sums(self, state: Strips) -> np.ndarray:
-        """(d + 1, m): traction over mu_s [Pa], stored energy over mu_s [Pa m]."""
+        """Return traction / mu_s [Pa] and stored energy / mu_s [Pa m], (d + 1, m)."""
         return _summed(state, self.weights(state))
 
     def traction(self, state: Strips) -> np.ndarray:
-        """tau [Pa], positive against positive slip: (m,) along a line, (2, m) in a plane."""
+        """Return the traction [Pa], positive against slip: (m,) along a line, (2, m) in a plane."""
         return self.law.static * _squeezed(self._sums(state)[:-1])
 
     def stored(self, state: Strips) -> np.ndarray:
-        """Elastic energy per area (m,) [J/m2] of the bonds of a state, at the damage of the moment."""
+        """Return the elastic energy per area (m,) [J/m2] of the bonds at the current damage."""
         return self.law.static * self._sums(state)[-1]
 
 
 def _joined(state: Strips, new: tuple, gain, sigma) -> Strips:
-    """The strips and one more: its entries of COLUMNS, what grew on it (2,) and its pressures (m,) [Pa]."""
+    """Append a strip: the entries of COLUMNS, its gain (2,) and its pressures (m,) [Pa]."""
     columns = {
         name: np.concatenate([getattr(state, name), np.asarray(value, float)[None]])
         for name, value in zip(COLUMNS, new)
@@ -278,17 +301,17 @@ def _joined(state: Strips, new: tuple, gain, sigma) -> Strips:
 
 
 def _young(state: Strips) -> np.ndarray:
-    """(k, m): whether an entry still holds at a point."""
+    """Return whether each entry still acts at each point, (k, m) bool."""
     return np.arange(len(state.q))[:, None] >= state.alive
 
 
 def _summed(state: Strips, each) -> np.ndarray:
-    """(c, m) sums of weights (k, c) times the pressures of the bonds that still hold."""
+    """Sum weights (k, c) times the pressures of the bonds that still act; returns (c, m)."""
     if not state.alive.any():
         return each.T @ state.sigma
     return each.T @ (state.sigma * _young(state))
 
 
 def _squeezed(vectors):
-    """Vectors (d, m) as numbers (m,) along a line."""
+    """Return vectors (d, m) as an array (m,) along a line, unchanged in a plane."""
     return vectors[0] if len(vectors) == 1 else vectors

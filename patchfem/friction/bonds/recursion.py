@@ -1,4 +1,6 @@
-"""Stretch reading with p = 1, summed exactly by a state of constant size, along a line or in a plane.
+"""Bond law for reading="stretch" and p = 1, summed exactly, on a line or in a plane.
+
+The state has a constant size.
 
 With k = exp(-int dR/eps) the surviving fraction of a bond, u its stretch and 1/eps frozen when it forms, the sums over
 all bonds
@@ -36,9 +38,11 @@ from ...effects import not_supported_message
 from ..protocol import Step
 from .parameters import Bonds, elastic_part, grow
 
-MAX_SERIES = 0.03  # path in bond lengths below which the shape functions are power series
-MAX_POWER_SERIES = 0.5  # path in bond lengths below which the integrals of powers are power series
-TINY = 1e-300  # divisor that keeps quotients finite where nothing is left
+# path in bond lengths; below it, the shape functions are computed by power series
+MAX_SERIES = 0.03
+# path in bond lengths; below it, the integrals of powers are computed by power series
+MAX_POWER_SERIES = 0.5
+TINY = 1e-300  # divisor that keeps quotients finite where no bonds are left
 
 
 class BondState(NamedTuple):
@@ -126,7 +130,7 @@ def direction(increment) -> tuple:
 
 
 def advance(bonds, increment, sigma, eps) -> LineIncrement:
-    """Move bonds over an increment along a line.
+    """Advance bonds by an increment along a line.
 
     Parameters
     ----------
@@ -173,7 +177,7 @@ def stretch(bonds, increment):
 
 
 def move_bonds(law: Bonds, state: BondState, increment, sigma, eps) -> BondIncrement:
-    """Move bonds over an increment along a line or in a plane.
+    """Advance bonds by an increment along a line or in a plane.
 
     Along a line the elastic range of the law comes first. In a plane the part of z along the increment moves as on a
     line, and the part across it decays.
@@ -254,7 +258,7 @@ def refuse_directions(law: Bonds, directions: int) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Recursion:
-    """Law of the stretch reading with p = 1, under a pressure that may change along the increment and in time.
+    """Law for reading="stretch" and p = 1; the pressure may vary in the increment and in time.
 
     Along a line increments are numbers and tractions (m,) [Pa]; in a plane they are (2,) and (2, m), positive against
     slip. If the rates of growth of `law` are arrays (m,), every point has a bond length of its own.
@@ -273,7 +277,9 @@ class Recursion:
         return BondState(bonds, self.law.length)
 
     def step(self, state: BondState, dq, s0, s1, dt: float) -> Step:
-        """Take a step: bonds form at the mean pressure of its ends, and all are lost where it ends without pressure.
+        """Advance by a step; new bonds form at its mean pressure.
+
+        All bonds are lost where the step ends without pressure.
 
         Parameters
         ----------
@@ -305,7 +311,9 @@ class Recursion:
         return Step(scale * moved.mean, dissipated, BondState(bonds, end, moved.play))
 
     def press(self, state: BondState, s0, s1) -> Step:
-        """Change the pressure at rest on a line by the rule of `press_bonds`; energy that is no longer stored is lost.
+        """Change the pressure at rest linearly by the rule of `press_bonds`.
+
+        Energy that is no longer stored is lost.
 
         Parameters
         ----------

@@ -24,19 +24,27 @@ from .parameters import Bonds, grown_fraction
 
 _THREE, _EIGHT = (np.polynomial.legendre.leggauss(count) for count in (3, 8))
 PIECE = 0.25  # longest Gauss piece in bond lengths
-SLIGHT = 0.1  # strips so short against their distance and the bond length, or of so little growth J, take three points
-MOST_GROWN = 16  # pieces of a strip for its growth, one each e-fold
-FULL_GROWN = 36.0  # growth J after which nothing is left of the length that a bond started with
-AT_PLACE = 1e-14  # of the path since: a slide as near to the place of a cohort is at it
+SLIGHT = 0.1  # relative length and growth J of a strip below which three Gauss points are accurate enough
+MOST_GROWN = 16  # largest number of pieces of a strip due to growth, one per e-fold
+FULL_GROWN = 36.0  # growth J after which the starting length of a bond no longer matters
+AT_PLACE = 1e-14  # displacement from a cohort / path since it formed; below it, the displacement counts as zero
 COLUMNS = ("q", "path", "damage", "growth", "mature", "way", "length", "eps")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Strips:
-    """Bonds of a path of d = 1 or 2 components. Strip k: q (k, d) its end, path, damage, growth (J), mature (eps_p)
-    there; way (k, d) its direction, length [m], length scale eps when it formed, gain: growth and mature length won
-    while it formed (2, k); sigma (k, m) [Pa]. An entry of length 0 is a cohort: bonds, full-grown and unstressed at q,
-    of the density sigma; the first entry is the initial one, m_0 sigma."""
+    """Bonds along a path of d = 1 or 2 components, in k straight strips.
+
+    - q (k, d): relative displacement at the end of a strip [m]
+    - path, damage, growth, mature (k,): path [m], damage, growth J and mature length eps_p [m] at this end
+    - way (k, d), length (k,): direction and length [m] of a strip
+    - eps (k,): length scale of the bonds when they formed [m]
+    - gain (2, k): growth J and mature length [m] gained while the strip formed
+    - sigma (k, m): pressure at which the bonds formed [Pa]
+
+    An entry of length 0 is a cohort: unstressed, full-grown bonds at q, of density sigma. The first one is that of the
+    initial bonds, of density m_0 sigma.
+    """
 
     q: np.ndarray
     path: np.ndarray
@@ -48,14 +56,14 @@ class Strips:
     eps: np.ndarray
     gain: np.ndarray
     sigma: np.ndarray
-    now: tuple  # q (d,), path, damage, growth, mature of the present
-    alive: np.ndarray  # (m,) first strip that still holds at a point
+    now: tuple  # present q (d,), path, damage, growth and mature length
+    alive: np.ndarray  # index (m,) of the first strip that still acts at each point
     dropped: int = 0
-    play: float = 0.0  # of `parameters.elastic_part`
+    play: float = 0.0  # play of the play operator in `parameters.elastic_part`
 
 
 def surviving(state: Strips) -> np.ndarray:
-    """Surviving bond density (k,) [1] of each entry in the stretch reading, per unit of the pressure it formed under.
+    """Return the surviving density (k,) / pressure at formation, for reading="stretch".
 
     A cohort keeps exp(-damage since it formed), a strip that times 1 - exp(-length/eps).
     """
@@ -64,7 +72,7 @@ def surviving(state: Strips) -> np.ndarray:
 
 
 def weights(state: Strips, law: Bonds) -> np.ndarray:
-    """What each entry of the strips carries and stores, (k, d + 1), per unit mu_s sigma (eq. 2.17).
+    """Return force and stored energy of each entry per mu_s sigma (eq. 2.17), (k, d + 1).
 
     Columns: signed force [1] along each of the d directions, then stored energy [m]. It chooses the closed forms and
     the Gauss points that the head of the file lists.
@@ -86,24 +94,24 @@ def weights(state: Strips, law: Bonds) -> np.ndarray:
 
 
 def _size(u) -> np.ndarray:
-    """(...,) length of vectors (..., d)."""
+    """Return the lengths (...) of vectors (..., d)."""
     return np.abs(u[..., 0]) if u.shape[-1] == 1 else np.sqrt((u * u).sum(axis=-1))
 
 
 def _seen(state: Strips, rest) -> tuple:
-    """(u along the strip at its end (k,), how far u = 0 lies off its line (k,)) [m]."""
+    """Return u along the strip at its end, and the distance of u = 0 from its line, (k,) [m]."""
     a = state.now[0] - state.q[rest]
     along = (a * state.way[rest]).sum(axis=1)
     return along, _size(a - state.way[rest] * along[:, None])
 
 
 def _cohorts(state: Strips, which, law: Bonds) -> np.ndarray:
-    """Cohorts: (|u|/eps)^p exp(-damage) or phi_p(R/eps_0), against u."""
+    """Return force and energy of cohorts: (|u|/eps)^p exp(-damage) or phi_p(R/eps_0), against u."""
     u, damage = state.now[0] - state.q[which], state.now[2] - state.damage[which]
     x, far = (state.now[1] - state.path[which]) / law.length, _size(u)
     stretched = law.reading == "stretch"
     size, harm = (far / law.length, damage) if stretched else (x, x)
-    # the mean of both sides of a jump
+    # at a jump, the mean of both sides is taken
     at_place = far <= AT_PLACE * (state.now[1] - state.path[which])
     force = np.where(
         at_place,
@@ -117,7 +125,7 @@ def _cohorts(state: Strips, which, law: Bonds) -> np.ndarray:
 
 
 def _stretch(state: Strips, rest, law: Bonds) -> np.ndarray:
-    """Closed-form sums over a strip of k u dL/eps and of k |u|^2 dL/2 eps over eps_0 (p = 1)."""
+    """Sum k u dL/eps and k |u|^2 dL/2 eps over a strip, over eps_0, in closed form (p = 1)."""
     a, e, eps = state.now[0] - state.q[rest], state.way[rest], state.eps[rest]
     x = state.length[rest] / eps
     d = np.exp(-x)
@@ -130,21 +138,23 @@ def _stretch(state: Strips, rest, law: Bonds) -> np.ndarray:
 
 
 def _printed(state: Strips, rest, law: Bonds) -> np.ndarray:
-    """Exact strips of the printed law at constant eps with u along them: differences of P(p + 1, R/eps) and
-    P(p + 2, R/eps), split where u changes sign."""
+    """Sum strips of reading="report" with u along them at constant eps, exactly.
+
+    The sums are differences of P(p + 1, R/eps) and P(p + 2, R/eps), split where u changes sign.
+    """
     u, h = _seen(state, rest)[0], state.length[rest]
     near = state.now[1] - state.path[rest]
     turn = np.clip(-u, 0.0, h)
     ends = [np.maximum(near + y, 0) / law.length for y in (0.0, turn, h)]
     share = [gammainc(law.order + 1, x) for x in ends]
     reach = [law.length * (law.order + 1) * gammainc(law.order + 2, x) for x in ends]
-    signed = share[0] - share[1] + (share[2] - share[1])  # sgn(u) dL over both parts
+    signed = share[0] - share[1] + (share[2] - share[1])  # integral of sgn(u) dL over both parts
     arm = reach[0] - reach[1] + (reach[2] - reach[1])
     return np.column_stack([state.way[rest] * signed[:, None], (u - near) * signed + arm])
 
 
 def _gauss(state: Strips, rest, law: Bonds) -> np.ndarray:
-    """Strips by Gauss points on pieces."""
+    """Integrate over strips by Gauss points on pieces."""
     owner, begin, size, bent, slight = _pieces(state, rest, law)
     out = np.zeros((len(rest), state.q.shape[1] + 1))
     for few, (points, weight) in ((False, _EIGHT), (True, _THREE)):
@@ -165,7 +175,7 @@ def _gauss(state: Strips, rest, law: Bonds) -> np.ndarray:
 
 
 def _points(state: Strips, at, back, weight, law: Bonds) -> np.ndarray:
-    """(n, d + 1) sums over points `back` (n, points) [m] behind the ends of the strips `at` (n,)."""
+    """Sum over points `back` (n, points) [m] behind the ends of strips `at` (n,); (n, d + 1)."""
     u = (state.now[0] - state.q[at])[:, None] + back[..., None] * state.way[at][:, None]
     far, stretched = _size(u), law.reading == "stretch"
     if stretched:
@@ -189,7 +199,7 @@ def _points(state: Strips, at, back, weight, law: Bonds) -> np.ndarray:
 
 
 def _own(state: Strips, at, back, law: Bonds):
-    """Bond lengths (n, points) of the print: full or, with growth, as they grew from nothing."""
+    """Return the bond lengths (n, points) for reading="report": constant, or grown from zero."""
     if not law.grows:
         return law.length
     part, (won, grown) = back / state.length[at][:, None], state.gain[:, at][..., None]
@@ -207,7 +217,7 @@ def _pieces(state: Strips, rest, law: Bonds) -> tuple:
     owner = np.tile(np.arange(len(rest)), 2)
     start, wide = np.concatenate([np.zeros_like(h), turn]), np.concatenate([turn, h - turn])
     owner, start, wide = owner[wide > 0], start[wide > 0], wide[wide > 0]
-    # u = 0 there, not only the strip's own end
+    # u = 0 lies at this cut, which may also be an end of the strip
     turns = straight & (np.abs(turn + before) <= 1e-9 * h)
     first = turns[owner] & (start == turn[owner])
     last = turns[owner] & (start + wide == turn[owner])
@@ -215,7 +225,7 @@ def _pieces(state: Strips, rest, law: Bonds) -> tuple:
     away, near = _distances(
         state, rest[owner], law, (before[owner], aside[owner]), start, wide, turned
     )
-    if law.reading == "report":  # only the sign turns at u = 0
+    if law.reading == "report":  # at u = 0 the integrand only changes its sign
         first, last = first & False, last & False
     grown = np.zeros(owner.size)
     if law.reading == "report":
@@ -267,15 +277,17 @@ def _distances(state: Strips, at, law: Bonds, seen: tuple, start, wide, touching
 
 @cache
 def _weighted_points(order: float) -> tuple:
-    """Gauss-Jacobi points (8,) in (0, 1) for the weight t^order at 0, and their weights divided by it."""
+    """Return Gauss-Jacobi points (8,) in (0, 1) for the weight t^order, and weights / t^order."""
     x, w = roots_jacobi(8, 0.0, order)
     t = (1 + x) / 2
     return t, w / (2 ** (order + 1) * t**order)
 
 
 def _towards(bent, order: float) -> tuple:
-    """Gauss points (n, 8) in (0, 1) and weights of pieces; of those that are steep at an end the points that have that
-    power of the distance as their weight."""
+    """Return Gauss points (n, 8) in (0, 1) and weights for pieces that may be steep at an end.
+
+    There the integrand grows as a power of the distance from this end, which Gauss-Jacobi points take as their weight.
+    """
     t, w = _weighted_points(order)
     bent = bent[:, None]
     share = np.where(bent == 1, t, np.where(bent == -1, 1 - t, (1 + _EIGHT[0]) / 2))
@@ -283,7 +295,10 @@ def _towards(bent, order: float) -> tuple:
 
 
 def _graded(h: float, most: float, poles) -> np.ndarray:
-    """Cuts (k,) of [0, h], none longer than `most` or than its distance from the complex places `poles`."""
+    """Cut [0, h] into pieces no longer than `most` or than their distance from the `poles`.
+
+    The poles are complex. Returns the cuts (k,).
+    """
     inner = [p.real for p in poles if 0 < p.real < h]
     least = 1e-15 * h
     todo = list(pairwise(sorted({0.0, h, *inner})))[::-1]

@@ -14,7 +14,7 @@ import numpy as np
 from ..protocol import Element
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
-PIECES = 10  # of the integrals of a stroke
+PIECES = 10  # number of pieces for the integrals over a stroke
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,7 @@ class BoucWen:
     shape: float = 0.5
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N], as the loops take it (`protocol.Element`): limit mu N, length
-        eps."""
+        """Return the `protocol.Element` under a constant load [N], with limit mu N and length eps."""
         numbers = np.array([0.0, self.static * load, self.length, self.exponent, self.shape])
         return Element(
             "friction.laws.bouc_wen_kernels",
@@ -59,20 +58,21 @@ class BoucWen:
         return (rule * rise).sum(axis=-1), self._rates(w)[0], (rule * spent).sum(axis=-1)
 
     def _rates(self, w) -> tuple:
-        """Slopes over w of the slide [eps] of a stroke, and of its area [mu N eps]."""
+        """Return the derivatives of displacement [eps] and area [mu N eps] of a stroke over w."""
         pace, y, give = self._pace(w), -np.expm1(-w), 1 - 2 * self.shape
         power = y**self.exponent
         rest = 1 - give * power
         return 1 / pace + np.exp(-w) / rest, y / pace * power * (1 - give) / rest
 
     def _pace(self, w):
-        """dw/dx of w = -ln(1 - y): (1 - y^n)/(1 - y), between 1 and n."""
+        """Return dw/dx of w = -ln(1 - y): (1 - y^n)/(1 - y), between 1 and n."""
         y = -np.expm1(-w)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             pace = -np.expm1(
                 self.exponent * np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))
             ) * np.exp(w)
-        return np.where(w > 30.0, self.exponent, pace)  # 1 - y = 1e-13: the pace is n but for that
+        # beyond w = 30, 1 - y is below 1e-13 and the rate is n to round-off
+        return np.where(w > 30.0, self.exponent, pace)
 
 
 def loop_from_keys(friction, load: float, slide) -> tuple:

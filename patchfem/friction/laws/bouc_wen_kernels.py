@@ -24,8 +24,8 @@ HAS_ZERO_KINK = True  # the slope over the path jumps between loading and unload
 IS_RATE_INDEPENDENT = True  # z depends on the path alone
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
-MAX_PIECE = 0.25  # longest piece of the Gauss rule, in |y| or w
-FIRST_PIECE = 0.05  # the same next to zero, where a fractional power is not smooth
+MAX_PIECE = 0.25  # longest interval of the Gauss rule in |y| or w
+FIRST_PIECE = 0.05  # longest interval next to zero, where a fractional power is not smooth
 MAX_W = 36.0  # value of w beyond which y rounds to 1
 NEWTON_TOL = 1e-8  # residual over the path; the omitted step is its square
 MAX_NEWTON = 40  # iterations of Newton's method
@@ -58,7 +58,7 @@ def _integrand(u, n, give, is_loading):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_piece(low, size, n, give, is_loading):
-    """Integrate dx and |y| dx over a piece of u by the Gauss rule."""
+    """Integrate dx and |y| dx over an interval of the integration variable u by the Gauss rule."""
     path = 0.0
     area = 0.0
     for k in range(NODES.size):
@@ -70,7 +70,7 @@ def _integrate_piece(low, size, n, give, is_loading):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_from_zero(size, n, give, is_loading):
-    """Integrate dx and |y| dx from u = 0 in the root of u, where a fractional power of u is smooth."""
+    """Integrate dx and |y| dx from u = 0 over sqrt(u), in which fractional powers are smooth."""
     path = 0.0
     area = 0.0
     for k in range(NODES.size):
@@ -115,13 +115,16 @@ def _integrate(low, high, n, give, is_loading):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _scale_area(area, path, wanted):
-    """Scale an area that belongs to a path to the wanted path, which Newton's method missed by round-off."""
+    """Scale an area to the requested path, which Newton's method missed by round-off."""
     return area * (wanted / path) if path > 0 else 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _unload(y, x, n, give):
-    """Unload from y < 0 over a path x, at most to y = 0; return y, the path left over and the integral of y."""
+    """Unload from y < 0 over a path x, at most to y = 0.
+
+    Returns y, the remaining path and the integral of y.
+    """
     whole, area = _integrate(0.0, -y, n, give, False)
     if whole <= x:
         return 0.0, x - whole, -area
@@ -229,7 +232,7 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
     direction = 1.0 if increment > 0 else -1.0
     x = abs(increment) / length
     rise = _slope(direction * z, numbers[3], numbers[4])
-    if x < 1e-7:  # the series replaces a quotient of two numbers near zero
+    if x < 1e-7:  # the series replaces a quotient of two numbers close to zero
         return limit * (z + 0.5 * direction * x * rise), 0.5 * limit / length * rise
     end, area = _follow_path(direction * z, x, numbers[3], numbers[4])
     return direction * limit * area / x, limit / length * (end - area / x) / x
@@ -237,7 +240,7 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
-    """Move z over an increment; what the work does not store is dissipated.
+    """Advance z by an increment; work that is not stored is dissipated.
 
     Returns
     -------
@@ -279,7 +282,7 @@ def relax_stretch(numbers, stretch, increment, dt):
     end = _follow_path(start, abs(increment) / length, n, numbers[4])[0]
     rise = _slope(end, n, numbers[4])
     first = _slope(start, n, numbers[4])
-    # at the limit both slopes vanish
+    # both derivatives vanish at the limit
     by_stretch = rise / first if first > 1e-8 else exp(-n * abs(increment) / length)
     return RelaxedStretch(direction * length * end, by_stretch, rise, 0.0)
 
@@ -302,7 +305,9 @@ def start_motion(numbers, memory, direction, states):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state_rates(numbers, memory, motion, increment, velocity, states, rates):
-    """Write dz/dt [1/s] and return the force [N]; the side of the kink is that of the motion, not that of a stage.
+    """Write dz/dt [1/s] and return the force [N].
+
+    The side of the kink is that of the motion, not that of a Runge-Kutta stage.
 
     Returns
     -------

@@ -19,11 +19,12 @@ from scipy.special import gammainc, gammainccinv
 
 from ..protocol import Step
 
-ROWS = 64  # places averaged at a time, so that the nodes out of their reach are left out
+# number of positions averaged at a time, so that nodes out of their reach can be left out
+ROWS = 64
 
 
 def _share(order: float, x):
-    """P(order + 1, x), in closed form for the first orders."""
+    """Return P(order + 1, x), in closed form for the first orders."""
     if order in (0, 1, 2):
         e = np.exp(-x)
         return -np.expm1(-x) - (x * e if order else 0.0) - (x * x * e / 2 if order == 2 else 0.0)
@@ -59,7 +60,7 @@ def average(places, nodes, sigma, way: float, length: float, order: float) -> np
     if way < 0:
         return average(-places, -nodes[::-1], sigma[::-1], 1.0, length, order)
     bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
-    # weights beyond are below the last digit
+    # further nodes have weights below round-off
     reach = length * float(gammainccinv(order + 2, 1e-20))
     out = np.zeros(places.size)
     for first in range(0, places.size, ROWS):
@@ -115,20 +116,24 @@ class Convolution:
     holds: ClassVar[bool] = True  # the last traction at rest
 
     def start(self, sigma) -> Averaged:
-        """State before any motion: no traction, under a pressure sigma (m,) [Pa]."""
+        """Return the state before any motion: no traction, under a pressure sigma (m,) [Pa]."""
         return Averaged(np.zeros_like(sigma), 0.0, 0.0)
 
     def share(self, dq, dt):
-        """Share [1] of the limit that is carried in increments dq [m] of any duration; 0 at rest."""
+        """Return the fraction of the limit that is carried in increments dq [m]; 0 at rest."""
         return np.sign(dq)
 
     def limit(self, sigma, way: float):
-        """Traction (m,) [Pa], >= 0, that resists a motion of sign `way` under a pressure sigma (m,) [Pa] that rides on
-        the mover."""
+        """Return the traction (m,) [Pa], >= 0, that resists a motion of sign `way`.
+
+        The pressure sigma (m,) [Pa] moves with the mover.
+        """
         return self.static * self._averaged(0.0, sigma, way)
 
     def step(self, state: Averaged, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] under a pressure that goes from s0 to s1 (m,) [Pa]; dt is not used.
+        """Advance by a straight increment dq [m] while the pressure changes from s0 to s1 (m,) [Pa].
+
+        dt is not used.
 
         The mean traction is that of the two ends of the increment. All work is dissipated. At dq = 0 the traction
         stays.
@@ -144,7 +149,7 @@ class Convolution:
         return Step(mean, mean * dq, Averaged(end, slide, way))
 
     def press(self, state: Averaged, s0, s1) -> Step:
-        """The law at rest while the pressure goes from s0 to s1 (m,) [Pa]: the traction is kept within its new limit.
+        """Change the pressure at rest from s0 to s1 (m,) [Pa]; the traction is cut to its new limit.
 
         The mean of the Step is the traction after it; nothing is dissipated.
         """
@@ -169,9 +174,9 @@ class Convolution:
         return np.where(sigma > 0, behind, 0.0)
 
     def traction(self, state: Averaged):
-        """Traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
+        """Return the traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
         return state.traction
 
     def stored(self, state: Averaged):
-        """Elastic energy per area (m,) [J/m2]: none, as nothing stretches."""
+        """Return the elastic energy per area (m,) [J/m2]: zero, because the law has no stretch."""
         return np.zeros_like(state.traction)

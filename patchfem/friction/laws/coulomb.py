@@ -20,23 +20,27 @@ class Coulomb(LastTraction):
     holds: ClassVar[bool] = True  # the last traction at rest
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N]: static and kinetic force, and no kernels, as a set-valued law
-        has no slope."""
+        """Return the Element of a contact under a constant load [N]: static and kinetic force.
+
+        It has no kernels, because a set-valued law has no slope.
+        """
         static = self.kinetic if self.static is None else self.static
         return Element(
             "", np.array([0.0, static * load, self.kinetic * load]), np.zeros(1), static * load
         )
 
     def share(self, dq, dt):
-        """Share [1] of the limit that is carried in increments dq [m] of any duration; 0 at rest."""
+        """Return the fraction of the limit that is carried in increments dq [m]; 0 at rest."""
         return np.sign(dq)
 
     def limit(self, sigma, way: float):
-        """Largest traction mu_k sigma (m,) [Pa], >= 0, of a motion of either sign under a pressure sigma (m,) [Pa]."""
+        """Return the largest traction mu_k sigma (m,) [Pa] of a motion of either sign."""
         return self.kinetic * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] under a pressure that goes from s0 to s1 (m,) [Pa]; dt is not used.
+        """Advance by a straight increment dq [m] while the pressure changes from s0 to s1 (m,) [Pa].
+
+        dt is not used.
 
         The mean traction is mu_k (s0 + s1)/2 sgn dq and all work is dissipated. At dq = 0 the last traction is kept.
         """
@@ -46,8 +50,10 @@ class Coulomb(LastTraction):
         return Step(mean, mean * dq, self.kinetic * s1 * np.sign(dq))
 
     def breaking(self, sigma, direction: float):
-        """Traction mu_s sigma (m,) [Pa] under a pressure sigma (m,) [Pa] at the instant a rest ends; direction: sign of
-        the motion."""
+        """Return the traction mu_s sigma (m,) [Pa] at the instant at which a rest ends.
+
+        direction: sign of the motion.
+        """
         return (self.kinetic if self.static is None else self.static) * sigma * direction
 
 

@@ -22,18 +22,22 @@ class ElasticPlastic:
     length: float
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N]: one spring of stiffness mu N/eps that slips at mu N."""
+        """Return the Element under a constant load [N]: a spring mu N/eps that slips at mu N."""
         return parallel([self.static * load / self.length], [self.length])._replace(
             length=self.length
         )
 
     def start(self, sigma):
-        """State (traction/mu, density of springs), (2, m) [Pa], before any motion: unstressed springs under sigma (m,)
-        [Pa]."""
+        """Return the initial state: traction/mu and density of springs, (2, m) [Pa].
+
+        The springs are unstressed under a pressure sigma (m,) [Pa].
+        """
         return np.stack([np.zeros_like(sigma), sigma])
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] under a pressure that goes from s0 to s1 (m,) [Pa]; dt is not used.
+        """Advance by a straight increment dq [m] while the pressure changes from s0 to s1 (m,) [Pa].
+
+        dt is not used.
 
         The pressure of the step is the mean of its ends. The traction is a ramp cut at mu sigma, whose path mean is
         exact.
@@ -46,13 +50,13 @@ class ElasticPlastic:
         mean = np.where(move != 0, ramp * (y0 + y1) / 2 + (1 - ramp) * y1, y0)
         left = np.minimum(sigma, springs)
         springs = left + (springs - left) * np.exp(-(1 - ramp) * abs(dq) / self.length)
-        bare = s1 <= 0  # bonds are lost where no pressure holds them
+        bare = s1 <= 0  # bonds are lost where the pressure vanishes
         after = np.stack([np.where(bare, 0.0, y1), np.where(bare, 0.0, springs)])
         spent = self.static * mean * dq - (self.stored(after) - self.stored(state))
         return Step(self.static * mean, spent, after)
 
     def press(self, state, s0, s1) -> Step:
-        """The law at rest while the pressure goes from s0 to s1 (m,) [Pa]: what exceeds the new limit is dissipated.
+        """Change the pressure at rest from s0 to s1 (m,) [Pa]; stretch beyond the limit is lost.
 
         The mean of the Step is the traction after it.
         """
@@ -60,16 +64,16 @@ class ElasticPlastic:
         return Step(self.static * after[0], self.stored(state) - self.stored(after), after)
 
     def _at(self, state, sigma):
-        """Traction/mu and density of springs under another pressure; without any both are gone."""
+        """Return traction/mu and density of springs under a changed pressure; 0 without pressure."""
         y, springs = state
         return np.clip(y, -sigma, sigma), np.where(sigma > 0, np.maximum(springs, sigma), 0.0)
 
     def traction(self, state):
-        """Traction (m,) [Pa] of a state, > 0 against slip towards +x."""
+        """Return the traction (m,) [Pa] of a state, > 0 against slip towards +x."""
         return self.static * state[0]
 
     def stored(self, state):
-        """Elastic energy per area mu eps y^2/(2 density) (m,) [J/m2] of a state, y its traction over mu."""
+        """Return the elastic energy mu eps y^2/(2 density) (m,) [J/m2] of a state; y = traction/mu."""
         y, springs = state
         return (
             self.static
@@ -79,7 +83,7 @@ class ElasticPlastic:
 
 
 def parallel(stiffness, yield_slide) -> Element:
-    """Elastic-plastic elements side by side under one slide (eq. 3.12 with its reversal), as the loops take them.
+    """Return the Element of parallel elastic-plastic elements (eq. 3.12 with reversal).
 
     stiffness (t,) [N/m]; yield_slide (t,) [m], the stretch at which each slips. The Element has the sum of their slip
     forces as its limit. Kernels: `elastic_plastic_kernels`.
@@ -98,14 +102,17 @@ def parallel(stiffness, yield_slide) -> Element:
 
 
 def masing(stiffness, yield_slide, slide) -> tuple:
-    """(force at the turns [N], area [J]) of the steady loops of elements (t,) side by side at amplitudes of the slide
-    [m], of any shape: k min(u, w) each, and 4 k w (u - w) where one slips."""
+    """Return the force at the reversals [N] and the area [J] of the steady loops of elements.
+
+    The elements (t,) are in parallel; the displacement amplitudes u [m] have any shape. An element has the force
+    k min(u, w), and the area 4 k w (u - w) where it slips.
+    """
     slips = np.maximum(np.asarray(slide)[..., None] - yield_slide, 0.0)
     return slide * np.sum(stiffness) - slips @ stiffness, 4 * slips @ (stiffness * yield_slide)
 
 
 def loop_from_keys(friction, load: float, slide) -> tuple:
-    """`masing` of the law of a [friction] table under a load [N]."""
+    """Return `masing` for the law of a [friction] table under a load [N]."""
     return masing(
         np.array([friction.static * load / friction.bond_length]),
         np.array([friction.bond_length]),
@@ -114,5 +121,5 @@ def loop_from_keys(friction, load: float, slide) -> tuple:
 
 
 def from_keys(friction, load: float) -> ElasticPlastic:
-    """The elastic-plastic law of a [friction] table, with its bond length as the length; load [N] is not used."""
+    """Return the elastic-plastic law of a [friction] table; load [N] is not used."""
     return ElasticPlastic(friction.static, friction.bond_length)

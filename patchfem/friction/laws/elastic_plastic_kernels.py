@@ -1,4 +1,4 @@
-"""Elastic-plastic elements side by side (eq. 3.12 with its reversal), compiled. NumPy form: `elastic_plastic`.
+"""Parallel elastic-plastic elements (eq. 3.12), compiled. NumPy form: `elastic_plastic`.
 
 numbers: number t of elements, their stiffness (t,) [N/m], their yield slide (t,) [m]; memory: force [N], stored energy
 [J], stretch [m] averaged with the slip forces as weights, then the stretch (t,) [m] of every element.
@@ -15,7 +15,7 @@ from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..protocol_kernels import Reading, StepSolution
 from ..protocol_kernels import step_bond_length as step_bond_length
 
-MIN_INCREMENT = 1e-290  # smaller increments are not divided by: the quotient would overflow
+MIN_INCREMENT = 1e-290  # increment below which a quotient by it would overflow
 
 
 class Stretch(NamedTuple):
@@ -97,7 +97,7 @@ def solve_step(numbers, memory, free, compliance):
     linear = direction * free - soft * limit
     missing = limit - direction * start
     root = sqrt(linear * linear + 2 * soft * missing * missing)
-    # the root whose terms do not cancel; the other one follows from the product of both
+    # this root has no cancellation; the other one follows from their product
     if linear > 0:
         path = 0.5 * (linear + root)
     else:
@@ -108,7 +108,7 @@ def solve_step(numbers, memory, free, compliance):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
-    """Move the elements over an increment; each dissipates its slip force times its slip.
+    """Advance the elements by an increment; each dissipates its slip force times its slip.
 
     Returns
     -------
@@ -151,7 +151,7 @@ def read_memory(numbers, memory, rel_disp, velocity):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_springs(stretch_force, springs, load):
-    """Put a point at rest under another load.
+    """Change the load of a point at rest.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def spring_end(stretch_force, springs, load, increment, length):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def spring_step(stretch_force, springs, load, increment, length):
-    """Move a point over an increment; springs beyond the load break as it slips.
+    """Advance a point by an increment; springs beyond the load break as it slips.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Segalman's four-parameter Iwan model (J. Appl. Mech. 72, 752, 2005): sliders side by side under one slide.
+"""Segalman's four-parameter Iwan model of parallel sliders (J. Appl. Mech. 72, 752, 2005).
 
 Sliders of unit stiffness that yield at a stretch phi are spread with the density
 
@@ -18,9 +18,9 @@ from ...core import frozen_array
 from ..protocol import Element
 from .elastic_plastic import parallel
 
-CELLS = 768  # of the power law, each one element with its stiffness and force: forces to 1e-6 of the slip force
-SMALL = 1e-5  # of phi_max: the smallest slider that has a cell of its own
-LOW = 0.25  # share of the cells that are spread evenly over the decades, for small cycles
+CELLS = 768  # number of cells of the power law, each a Jenkins element; the forces are exact to 1e-6 of the slip force
+SMALL = 1e-5  # fraction of phi_max of the smallest slider that has a separate cell
+LOW = 0.25  # fraction of the cells that are spread evenly over the decades, for small cycles
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,13 +32,14 @@ class Iwan:
     yield_slide: np.ndarray
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N], as the loops take it: the parallel elements of
-        `elastic_plastic`."""
+        """Return the Element under a constant load [N]: the parallel elements of `elastic_plastic`."""
         return parallel(self.stiffness * load, self.yield_slide)
 
 
 def largest(force: float, stiffness: float, chi: float, beta: float) -> float:
-    """phi_max [m], the slide from which on every slider slips, of a slip force F_S [N] and a stiffness K_T [N/m].
+    """Return phi_max [m], the displacement from which on every slider slips.
+
+    force: slip force F_S [N]; stiffness: K_T [N/m].
 
     phi_max = F_S (1 + beta)/(K_T (beta + (chi + 1)/(chi + 2))), with -1 < chi the exponent and beta >= 0 the share of
     the last slider (Segalman 2005).
@@ -47,7 +48,9 @@ def largest(force: float, stiffness: float, chi: float, beta: float) -> float:
 
 
 def sliders(force: float, stiffness: float, chi: float, beta: float) -> tuple:
-    """(stiffness (t,) [N/m], yield slide (t,) [m]) of the sliders: cells of the power law, then the last slider.
+    """Return stiffness [N/m] and yield displacement [m] of the sliders, each (t,).
+
+    The cells of the power law come first, then the last slider.
 
     Each cell keeps the stiffness and the slip force of its part of the density, so those of all are exact, as is the
     force of a first loading at every border of a cell. The cells are as narrow as the root of the density asks for, the
@@ -59,8 +62,8 @@ def sliders(force: float, stiffness: float, chi: float, beta: float) -> tuple:
 
 @lru_cache(32)
 def _shape(chi: float, beta: float) -> tuple:
-    """The `sliders` of unit stiffness and unit phi_max, which a sweep of forces and stiffnesses shares."""
-    low, power = np.log(SMALL), 1 / (1 + beta)  # of the power law alone
+    """Return the `sliders` of unit stiffness and unit phi_max, shared by a sweep of both."""
+    low, power = np.log(SMALL), 1 / (1 + beta)  # the power law without the last slider
     x = np.concatenate([[0.0], np.exp(np.linspace(low, 0.0, 20 * CELLS + 1))])
     share = (1 - LOW) * x ** (1 + chi / 2) + LOW * np.clip(
         1 - np.log(np.maximum(x, SMALL)) / low, 0.0, 1.0

@@ -27,7 +27,7 @@ class LuGre:
     viscous: float = 0.0
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N], as the loops take it (`protocol.Element`), of form "flow"."""
+        """Return the `protocol.Element` of a contact under a constant load [N], of form "flow"."""
         share = np.array(
             [self.stiffness, self.kinetic, self.static, 0.0, self.micro_damping, self.viscous]
         )
@@ -45,14 +45,18 @@ class LuGre:
         )
 
     def limit(self, speed):
-        """g/N [1] at a speed [m/s]: the steady friction force per newton of load, at least 1e-9 mu_s, as z divides by
-        it."""
+        """Return g/N [1] at a speed [m/s], the steady friction force / load.
+
+        It is at least 1e-9 mu_s, because the rate of z divides by it.
+        """
         rise = (self.static - self.kinetic) * np.exp(-((speed / self.speed) ** 2))
         return np.maximum(self.kinetic + rise, 1e-9 * self.static)
 
 
 def from_keys(friction, load: float) -> LuGre:
-    """The LuGre law of a [friction] table under a load [N] of the whole contact, to which stiffness and damping refer.
+    """Return the LuGre law of a [friction] table under a load [N] of the whole contact.
+
+    Stiffness and damping refer to this load.
 
     A load of 0 counts as 1 N. Without a kinetic coefficient it is the static one.
     """

@@ -21,17 +21,15 @@ from ..protocol_kernels import solve_step as solve_step
 from ..protocol_kernels import step_bond_length as step_bond_length
 from .exponential_kernels import exp_minus
 
-NUMBER_UNITS = (
-    "N/m N N m/s N_s/m N_s/m"  # units of `numbers`, for batches that scale time and force
-)
-STRIBECK_END = (
-    6.0  # velocity over v_s beyond which the limit is the kinetic force, since exp(-36) rounds off
-)
+# units of `numbers`, for batches that scale time and force
+NUMBER_UNITS = "N/m N N m/s N_s/m N_s/m"
+# velocity over v_s beyond which the limit is the kinetic force, since exp(-36) rounds off
+STRIBECK_END = 6.0
 MIN_LIMIT = 1e-9  # smallest limit over the static force; z relaxes over limit/stiffness, which must not be 0
 
 
 class _Relaxation(NamedTuple):
-    """Stretch after a step and its path mean [m], their derivatives over the increment, those of the first besides."""
+    """Stretch after a step [m], its mean over the path [m], and their derivatives."""
 
     end: float
     mean: float
@@ -43,7 +41,7 @@ class _Relaxation(NamedTuple):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def _relaxation_length(numbers, velocity):
-    """Return the length g/stiffness [m] over which z relaxes at a velocity, and its derivative over it [s]."""
+    """Return the length g/stiffness [m] over which z relaxes, and its velocity derivative [s]."""
     ratio = velocity / numbers[4]
     rise = (numbers[3] - numbers[2]) * exp_minus(ratio * ratio)
     limit = max(numbers[2] + rise, MIN_LIMIT * numbers[3])
@@ -75,7 +73,7 @@ def _relax(numbers, stretch, increment, dt):
     direction = 1.0 if increment > 0 else -1.0
     path = abs(increment)
     length = max(numbers[2], MIN_LIMIT * numbers[3]) / numbers[1]
-    bend = 0.0  # derivative of the length over the path
+    bend = 0.0  # derivative of the length with respect to the path
     if dt > 0:
         length, bend = _relaxation_length(numbers, path / dt)
         bend /= dt
@@ -121,7 +119,7 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
-    """Move z over an increment; what the force does not store is dissipated.
+    """Advance z by an increment; work that is not stored is dissipated.
 
     Returns
     -------
@@ -162,7 +160,9 @@ def relax_stretch(numbers, stretch, increment, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_motion(numbers, memory, direction, states):
-    """Set the state z; below STRIBECK_END v_s the limit rises, and no step from beyond sees this rise.
+    """Set the state z, and return where the rates have a kink.
+
+    Below STRIBECK_END v_s the limit rises, and no step from beyond sees this rise.
 
     Returns
     -------

@@ -13,14 +13,17 @@ from typing import NamedTuple
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
 
-MAX_ITERATIONS = 100  # a step whose Newton iteration takes more counts as failed
+MAX_ITERATIONS = 100  # largest number of Newton iterations; a step that needs more has failed
 MIN_PATH = 1e-150  # shorter increments have no direction: their square underflows
-ROUND_OFF = 4e-16  # of the terms of a residual, relative
+ROUND_OFF = 4e-16  # rounding error of a residual / its largest terms
 MIN_DAMPING = 1e-3  # factor of a Newton step below which a larger residual is accepted
 
 
 class Slope(NamedTuple):
-    """Derivatives [N/m] of the mean force over the increment: the first letter is the direction of the force."""
+    """Derivatives [N/m] of the mean force with respect to the increment.
+
+    The first letter of a field is the direction of the force.
+    """
 
     xx: float
     xy: float
@@ -51,7 +54,7 @@ class PlaneStep(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def slide_straight(spring, stretch, increment):
-    """Move an element along a straight increment.
+    """Advance an element by a straight increment.
 
     Parameters
     ----------
@@ -91,12 +94,12 @@ def slide_straight(spring, stretch, increment):
     end = start * decay
     square = 1 + end * end
     lost = w * (slip - w * log1p(-start * start * expm1(-2 * slip / w) / square))
-    # integrals of the stretch over the path, along the increment and across it
+    # integrals of the stretch over the path, along and across the increment
     u = elastic * (along + 0.5 * elastic) + lost
     v = elastic * across + 2 * w * w * atan(-start * expm1(-slip / w) / (1 + start * end))
     end_u = w * (1 - end * end) / square
     end_v = 2 * w * end / square
-    # derivatives of both over `along` and `across`, which change as the increment turns
+    # derivatives of both with respect to `along` and `across`, which change as the increment turns
     u_across = (2 * w * end * decay / square - across) * cosine / (1 + cosine)
     v_across = elastic + w * cosine * (1 - 2 * decay / ((1 + cosine) * square))
     uu = (end_u - u / path) / path
@@ -187,7 +190,7 @@ def solve_plane_step(free, compliance, spring, stretch, guess, tolerance):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_plane_memory(numbers, memory_x, memory_y, increment):
-    """Move the memories of the two directions of an element; that of x has the energy stored in both.
+    """Advance the memory of an element in both directions; that of x holds the stored energy.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
-"""Points of eq. 2.17 in the stretch reading with p = 1 as elements of the engines; the law is `bonds.recursion`."""
+"""Points with the law `bonds.recursion` (eq. 2.17, reading="stretch", p = 1) as elements."""
 
 import numpy as np
 
 from ..bonds.parameters import Bonds
 from ..protocol import Element
 
-N_HEAD = 9  # numbers of an element before those of its points
+N_HEAD = 9  # number of values of an element before those of its points
 CONSTANT_LENGTH = -1.0  # value of a_s that marks a constant bond length
 
 

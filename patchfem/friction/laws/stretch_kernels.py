@@ -1,4 +1,4 @@
-"""Bonds of eq. 2.17 in the stretch reading with p = 1, compiled, at points that all slide alike.
+"""Bonds of eq. 2.17 with reading="stretch" and p = 1 for points that move alike, compiled.
 
 Every point moves in proportion to its pressure, so one point under 1 Pa stands for all of them. Equations and NumPy
 form: `friction.bonds.recursion`.
@@ -68,7 +68,7 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
-    """Move the bonds over an increment and let them grow.
+    """Advance the bonds by an increment, including their growth.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _move_bonds(numbers, memory, increment, bond_length):
-    """Move m, z, s2 and play over an increment; return the dissipated energy [J]."""
+    """Advance m, z, s2 and play by an increment; return the dissipated energy [J]."""
     if numbers[BREAKAWAY] > 0:
         half = numbers[BREAKAWAY] * bond_length
         moved, memory[5] = elastic_bond_step(
@@ -143,7 +143,7 @@ def integrate_stretch(numbers, stretch, mean_square, increment, direction):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_memory(numbers, memory, rel_disp, velocity):
-    """Return the force, the energy of the bonds and the slip: what the mean stretch leaves.
+    """Return the force, the energy of the bonds, and the slip: displacement minus mean stretch.
 
     Returns
     -------
@@ -200,7 +200,7 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
     z = states[2]
     speed = motion[0] * velocity
     floor = numbers[GROWTH + 2]
-    # a stage above the kink may overshoot to below the floor
+    # a Runge-Kutta stage above the kink may overshoot to below the floor
     healing_speed = max(speed, 0.5 * floor) if motion[2] > 0 else floor
     healing = numbers[GROWTH] / healing_speed * (numbers[GROWTH + 3] - eps)
     breaking = speed / eps
@@ -213,7 +213,9 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Move the memory over the increment of a motion; return the dissipated energy [J], nan where it follows from the work.
+    """Advance the memory by the increment of a motion; return the dissipated energy [J].
+
+    The energy is nan if it has to be computed from the work.
 
     Returns
     -------

@@ -122,9 +122,9 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
-    """Move the bonds under the pressures of the last `mean_force`.
+    """Advance the bonds by an increment under the pressures that `mean_force` has just computed.
 
-    Where a point comes to a position without pressure, its bonds are lost with what they store.
+    Where a point reaches a position without pressure, its bonds and their stored energy are lost.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The rate law of eq. 2.4: friction that follows the slip speed and never holds."""
+"""The rate law of eq. 2.4: friction depends on the slip speed and holds no load at rest."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -18,8 +18,7 @@ class Rate(LastTraction):
     holds: ClassVar[bool] = False
 
     def element(self, load: float) -> Element:
-        """The law of a contact under a constant load [N], as the loops take it (`protocol.Element`), of form
-        "speed"."""
+        """Return the `protocol.Element` of a contact under a constant load [N], of form "speed"."""
         return Element(
             "friction.laws.tanh_kernels",
             np.array([0.0, self.static * load, 1 / self.speed]),
@@ -30,18 +29,20 @@ class Rate(LastTraction):
         )
 
     def share(self, dq, dt):
-        """Share [1] of the limit that is carried in increments dq [m] over dt [s]; a jump in no time has no speed
-        limit."""
+        """Return the fraction of the limit that is carried in increments dq [m] over dt [s].
+
+        For dt = 0 it is the sign of dq, because the speed is infinite.
+        """
         with np.errstate(divide="ignore", invalid="ignore"):
             part = np.tanh(np.divide(dq, dt) / self.speed)
         return np.where(np.greater(dt, 0), part, np.sign(dq))[()]
 
     def limit(self, sigma, way: float):
-        """Largest traction mu sigma (m,) [Pa], >= 0, of a motion of either sign under a pressure sigma (m,) [Pa]."""
+        """Return the largest traction mu sigma (m,) [Pa] of a motion of either sign."""
         return self.static * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] in dt [s] under a pressure that goes from s0 to s1 (m,) [Pa] (eq. 2.4).
+        """Advance by dq [m] in dt [s] while the pressure changes from s0 to s1 (m,) [Pa] (eq. 2.4).
 
         The mean traction is that of the mean speed and the mean pressure of the step; all work is dissipated.
         """
@@ -51,5 +52,5 @@ class Rate(LastTraction):
 
 
 def from_keys(friction, load: float) -> Rate:
-    """The rate law of a [friction] table; load [N] is not used."""
+    """Return the rate law of a [friction] table; load [N] is not used."""
     return Rate(friction.static, friction.reference_speed)

@@ -1,4 +1,4 @@
-"""Alignment of a second trace on a first one: choice of the unworn floor, worn parts, and final fit."""
+"""Alignment of a second trace to a first one: unworn floor, worn parts and final fit."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,23 +13,25 @@ from .model import BENT, DATUM, MIN_HEIGHTS, RIGID, STRAIGHT, Parameter, TraceMo
 from .robust import MAX_NOISE, MAX_UNWORN, MIN_UNWORN, find_floors, fit_biweight, solve_weighted
 from .section import find_flank_ends, noise_threshold
 
-MAX_SCALE_RATIO = 1.5  # scale of a floor / that of the quietest one; rougher floors are dropped
-BEND_GAIN = 0.8  # scale with / without a bend, below which the bend is subtracted
-MIN_UNWORN_FRACTION = 0.7  # fraction of the heights of an unworn end that lie on the floor
-LONG_FLANK = 0.05  # length of a flank / length of the trace that tells a scar from a bent datum
-SHORT_FLANK = 0.02  # length of a flank / length of the trace with which a scar is possible
+MAX_SCALE_RATIO = 1.5  # scale of a floor / that of the quietest floor; rougher floors are dropped
+BEND_GAIN = 0.8  # scale with / without a bend of the datum; below it, the bend is subtracted
+MIN_UNWORN_FRACTION = 0.7  # fraction of the heights of an unworn end that must lie on the floor
+LONG_FLANK = 0.05  # length of a flank / length of the trace; from this ratio on, a scar is distinguished from a bent datum
+SHORT_FLANK = 0.02  # length of a flank / length of the trace; below this ratio, a scar is excluded
 MAX_CHI2 = 30.0  # chi-squared of a flank's bow, with two or three degrees of freedom
-FLANK_PARTS = 6  # parts of the trace, of N_PARTS, on either side of a shallow track
-MIN_PARTS = 3  # parts of the narrowest shallow track
+FLANK_PARTS = 6  # parts of the trace (of N_PARTS) that remain on either side of a shallow track
+MIN_PARTS = 3  # smallest number of parts in a shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
-MIN_STEP = 8.0  # standard deviations of the depth of a shallow track; 2 % of random walks have more
-N_THINNED = 2000  # samples of the subset with which the starts of a fit are refined
-MEAN_WINDOWS = (4, 16)  # samples of the means that show wear below the noise of a height
-MIN_WIDE_RUN = 64  # samples of a worn run whose flanks may leave the floor slowly
+MIN_STEP = 8.0  # depth / standard deviation from which a box is a shallow track; 2 % of random walks have more
+# number of samples in the subset with which the starting points of a fit are refined
+N_THINNED = 2000
+# samples in the running means that detect wear below the noise of a single height
+MEAN_WINDOWS = (4, 16)
+MIN_WIDE_RUN = 64  # samples of a worn run from which its flanks may leave the floor slowly
 # width beside a worn run / width of the run; slight wear there would be taken for a drift
 MARGIN_FRACTION = 0.2
-MARGIN_SAMPLES = 8  # smallest width beside a worn run in samples
-MAX_ROUNDS = 4  # rounds of fit and detection of wear, fewer if the worn heights stay
+MARGIN_SAMPLES = 8  # smallest width of the margin beside a worn run, in samples
+MAX_ROUNDS = 4  # largest number of alternating fits and detections of wear; fewer if the worn heights stay the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +99,7 @@ class Alignment:
 
     @cached_property
     def errors(self) -> DrawnErrors:
-        """Predicted drift of the datum, with bootstrap errors of the corrected depth and of the parameters."""
+        """Predicted drift of the datum, with bootstrap errors of corrected depth and parameters."""
         degree = 2 if Parameter.BEND in self.free else 1
         return draw_errors(
             self.depth, self.noise_at, self.unworn, self.clear, self.jacobian, degree
@@ -110,7 +112,7 @@ class Alignment:
 
     @property
     def agreed(self) -> float:
-        """Fraction of the heights that agree in both traces, on this floor or on that of the rival."""
+        """Fraction of the heights that agree in both traces, on this floor or the rival floor."""
         other = self if self.rival is None else self.rival
         return float(max(self.unworn.mean(), other.unworn.mean()))
 
@@ -121,13 +123,13 @@ class Alignment:
         return threshold if np.isfinite(threshold) else None
 
     def error_of(self, parameter: Parameter) -> float:
-        """Standard deviation of a fitted parameter, NaN where it was not fitted."""
+        """Return the standard deviation of a fitted parameter, NaN if it was not fitted."""
         if parameter not in self.free:
             return float("nan")
         return float(self.errors.parameters[:, self.free.index(parameter)].std())
 
     def back(self, place: float) -> float:
-        """Map a place [m] in the second trace to the first one."""
+        """Map a position [m] along the second trace to the first one."""
         return self.middle + (place - self.middle) / (1 + self.stretch) - self.shift
 
     def has_unworn_ends(self) -> tuple:
@@ -140,7 +142,7 @@ class Alignment:
 
 
 def align(before: Profile, after: Profile, shift: float, is_straight: bool = False) -> Alignment:
-    """Align the second trace on the unworn heights of the first one.
+    """Align the second trace with the unworn heights of the first one.
 
     Floors with a small scale are found from elemental subsets of blocks, without and, unless the datum
     is declared straight, with a bend. Of those, a floor with an unworn end of the trace and with few
@@ -248,7 +250,7 @@ def _make_alignment(model, state, free, scale: float, worn) -> Alignment:
 
 
 def find_worn_samples(depth, scale: float) -> np.ndarray:
-    """Find the worn heights, (n,) bool, by single heights, by means of 4 and 16, and by boxes.
+    """Find the worn heights, (n,) bool, by single heights, running means of 4 and 16, and boxes.
 
     A box over some of 60 parts of the trace shows a track that is shallower than the noise.
     """
@@ -266,11 +268,11 @@ def find_worn_samples(depth, scale: float) -> np.ndarray:
     track, _ = find_shallow_track(depth, scale)
     if track is not None:
         worn[track[0] : track[1] + 1] = True
-    return np.convolve(worn, np.ones(3), "same") > 0.5  # the wear runs out in the neighbours
+    return np.convolve(worn, np.ones(3), "same") > 0.5  # wear runs out in the neighbouring samples
 
 
 def widen_to_flank_ends(depth, scale: float, worn) -> np.ndarray:
-    """Widen wide worn runs (n,) bool to the places where their flanks leave the floor."""
+    """Widen wide worn runs (n,) bool to the positions where their flanks leave the floor."""
     out = worn.copy()
     noise = np.full(depth.size, scale)
     quiet = ~worn & (np.abs(depth) <= MAX_UNWORN * scale)
@@ -285,7 +287,7 @@ def widen_to_flank_ends(depth, scale: float, worn) -> np.ndarray:
 
 
 def find_shallow_track(depth, scale: float) -> tuple:
-    """Find a track that is shallower than the noise of a height, by the means of 60 parts.
+    """Find a track shallower than the noise of single heights, from averages over 60 parts.
 
     Each box is fitted together with a cubic, which a datum may add. The best box is a track if its depth
     is eight times its standard deviation, which follows from the residuals and their correlation, so
@@ -322,7 +324,7 @@ def find_shallow_track(depth, scale: float) -> tuple:
 def _fit_line_through_ends(
     model, best: Alignment, state, free: tuple, flank: float
 ) -> Alignment | None:
-    """Fit a line through both ends of a trace; None unless they are unworn and all between is lost.
+    """Fit a line through the ends of a trace; None unless only heights between them are worn.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-N_PARTS = 60  # parts of a trace; their means show wear and drift below the noise of a height
+N_PARTS = 60  # number of parts of a trace, whose means show wear and drift below the noise of a single height
 
 
 class Boxes(NamedTuple):
@@ -25,7 +25,7 @@ class Boxes(NamedTuple):
 
 @cache
 def make_boxes(n_parts: int, n_beside: int, n_inside: int, degree: int) -> Boxes:
-    """Make all boxes over the parts of a trace that leave room for a flank on either side.
+    """Make all boxes over the parts of a trace that leave a flank on either side.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ from .worn import (
     split_at_tracks,
 )
 
-# definitions of the quantities that a user reads
+# definitions of the quantities, which the user reads
 SHIFT = "shift: the point at x in the first trace (before wear) is at x + shift in the second trace (after wear)"
 STRETCH = (
     "length of the second trace (after wear) divided by the length of the first trace for the same stretch of "
@@ -65,11 +65,11 @@ SLOPE = (
     "root mean square slope between neighbouring samples: value after wear divided by value before"
 )
 
-# relative difference in length below which no note reports it, even if it is significant
+# relative length difference below which no note reports it, even if it is significant
 MIN_STRETCH = 1e-4
-# noise / surface in a mean square, from which a ratio is that of the noise
+# noise / surface in mean squares; above this ratio, the measured ratio is that of the noise
 MAX_NOISE_FRACTION = 1.0
-# alignments after specks were removed; the second shows specks beside the first ones
+# number of alignments after specks were removed; the second one shows specks next to the first ones
 N_SPECK_ROUNDS = 2
 
 
@@ -217,12 +217,12 @@ def compare_traces(
 
 
 def _name_track_sizes(sizes) -> dict:
-    """Return the sizes of a track by the names that a comparison has for them."""
+    """Return the dimensions of a track by their names in a comparison."""
     return {f"track_{name.removesuffix('_mean')}": size for name, size in sizes.items()}
 
 
 def are_identical(before, after) -> bool:
-    """Whether two surfaces have the same heights at the same places, as a file has with itself."""
+    """Whether two surfaces have equal heights at equal positions, as if a file was given twice."""
     if type(before) is not type(after):
         return False
     names = [name for name in "xyz" if hasattr(before, name)]
@@ -250,7 +250,7 @@ def _remove_specks(place: Place, is_straight: bool) -> Place:
 
 
 class _Wear(NamedTuple):
-    """What is known of the wear of aligned traces; fields as those of `Comparison`."""
+    """Wear of aligned traces; fields as those of `Comparison`."""
 
     worn: Worn
     tracks: Tracks
@@ -262,7 +262,7 @@ class _Wear(NamedTuple):
 
 
 def _compare_aligned(place: Place, direction: str) -> Comparison:
-    """Compare two traces of the same place."""
+    """Compare two traces of the same part of a surface."""
     before, after, alignment = place.before, place.after, place.alignment
     if are_identical(before, after):  # except for rounding the fit finds no shift and no tilt
         alignment = replace(alignment, state=frozen_array(np.zeros(5)))
@@ -294,7 +294,7 @@ def _compare_aligned(place: Place, direction: str) -> Comparison:
 
 
 def _measure_wear(alignment: Alignment, section: Section) -> _Wear:
-    """Measure the worn depth and tracks of aligned traces, or refuse them where no reference is known."""
+    """Measure worn depth and tracks of aligned traces, or give the reason why they are unknown."""
     reference = find_reference(alignment, section)
     grew = has_grown(alignment, section)
     reading = find_ambiguity(
@@ -379,7 +379,7 @@ def _divide_aligned(alignment: Alignment, tracks: Tracks, step: float) -> Ratios
 
 
 def _compare_apart(place: Place, direction: str) -> Comparison:
-    """Compare two traces without a common place."""
+    """Compare two traces that have no part of the surface in common."""
     before, after, reason = place.before, place.after, place.reason
     step = _common_step(before, after)
     notes = _note_steps(before, after)
@@ -422,14 +422,17 @@ def _compare_apart(place: Place, direction: str) -> Comparison:
 
 
 def _divide_apart(sizes: tuple) -> Ratios:
-    """Return the ratios of amplitude and slope of two traces that were taken at different places."""
+    """Return the ratios of amplitude and slope of two traces from different parts of a surface."""
     before, after = sizes
     amplitude = divide_sizes("amplitude", AMPLITUDE, after, before)
     return Ratios(amplitude, divide_sizes("slope", SLOPE, after, before), sizes)
 
 
 def _check_flanks(comparison: Comparison, shift: float | None, is_straight: bool) -> Comparison:
-    """Refuse the depth below flanks that the first trace shows to be worn, at a known or clear shift [m]."""
+    """Mark the depth below the flanks as unknown if the first trace shows that they are worn.
+
+    shift [m]: known shift between the traces; None takes that of a clear match.
+    """
     match = comparison.match
     if shift is None and match is not None and not match.is_ambiguous and match.is_clear:
         shift = match.shift
@@ -470,7 +473,10 @@ def _note_steps(before: Profile, after: Profile) -> list:
 
 
 def _pool(pieces, step: float) -> Size:
-    """Pool the sizes of the pieces of a trace, weighted by length; the spectrum is that of the longest."""
+    """Pool amplitude, slope and degrees of freedom of the pieces of a trace, weighted by length.
+
+    The spectrum is that of the longest piece.
+    """
     sizes = [measure_size(piece, step, BAND) for piece in pieces]
     weights = _length_fractions(pieces)
     squares = weights @ np.array([(size.amplitude**2, size.slope**2) for size in sizes])
@@ -480,12 +486,12 @@ def _pool(pieces, step: float) -> Size:
 
 
 def _pool_sides(pairs: list, step: float) -> tuple:
-    """Pool the sizes of pairs of pieces, before and after wear."""
+    """Pool amplitude and slope of the pieces before wear, and of those after wear."""
     return tuple(_pool(side, step) for side in zip(*pairs))
 
 
 def _pool_with_scatter(pieces: list, step: float) -> Size:
-    """Pool sizes, with no more degrees of freedom than their scatter along the trace shows."""
+    """Pool as `_pool`, with no more degrees of freedom than the scatter along the trace shows."""
     size = _pool(pieces, step)
     scatter = np.sum([estimate_freedom(piece, step, BAND) for piece in pieces], axis=0)
     freedom = tuple(min(own, other) for own, other in zip(size.freedom, scatter))
@@ -523,7 +529,7 @@ def _note_stretch(alignment: Alignment) -> list:
 def compare_areal_scans(
     before: Areal, after: Areal, direction: str = "x", *, keep_spikes: bool = False
 ) -> list[Comparison]:
-    """Compare two areal scans, place by place and by their waves in each direction.
+    """Compare two areal scans height by height, and their waves in each direction.
 
     Parameters
     ----------
@@ -547,11 +553,14 @@ def _other_direction(direction: str) -> str:
 
 
 def _compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
-    """Compare the waves of two scans in one direction; `fill_missing` are both scans without missing heights."""
+    """Compare the waves of two scans in one direction.
+
+    `fill_missing` are both scans without missing heights.
+    """
     reason = "areal scans are compared point by point in x and y together"
     try:
         ratios = _divide_apart(tuple(measure_scan_size(*scan, direction, BAND) for scan in filled))
-    except PatchfemError as error:  # a scan may be too short for the waves of the band
+    except PatchfemError as error:  # a scan may be too short for the longest waves of the band
         unknown = [make_unknown("1", text, str(error)) for text in (AMPLITUDE, SLOPE)]
         ratios = Ratios(*unknown, ())
     return Comparison(*scans, direction, "", _refuse_motion(reason), refuse_worn(reason), ratios)
@@ -665,7 +674,7 @@ def _check_surfaces(surfaces: list, shift: float | None, datum: str) -> bool:
 
 
 def _refuse_if(*rules: tuple) -> None:
-    """Raise the message of the first rule (condition, message) that holds."""
+    """Raise PatchfemError with the message of the first rule (condition, message) that holds."""
     for is_wrong, message in rules:
         if is_wrong:
             raise PatchfemError(f"compare: {message}")

@@ -22,10 +22,12 @@ TWICE_SMOOTHNESS = (
     5.0,
 )
 MIN_HEIGHTS = 4  # mean number of heights of a part; shorter traces have fewer parts
-MIN_KNOWN = 0.5  # fraction of the heights of a part that must be unworn, or the part is not used
-MIN_PARTS = 8  # parts that are used; if there are fewer, every part with an unworn height is used
+MIN_KNOWN = 0.5  # fraction of the heights of a part that must be unworn for the part to be used
+# number of parts that are used; if there are fewer, every part with an unworn height is used
+MIN_PARTS = 8
 MIN_WEIGHT = 1e-4  # posterior weight; covariances with less are left out of the prediction
-JITTER = 1e-8  # relative to the variance; added to the diagonal before the Cholesky factorization
+# fraction of the variance that is added to the diagonal before the Cholesky factorization
+JITTER = 1e-8
 
 
 class Parts(NamedTuple):
@@ -74,7 +76,7 @@ class Drift(NamedTuple):
     draws: np.ndarray
 
     def remove(self, values) -> np.ndarray:
-        """Subtract from values (..., n) the datum and drift that are predicted from their own means."""
+        """Subtract from values (..., n) the datum and drift predicted from their means."""
         return values - self.parts.spread(self.parts.average(values) @ self.smoother.T)
 
 
@@ -154,7 +156,7 @@ def _matern(distance, root: float, length: float) -> np.ndarray:
 
 
 def _datum(place, degree: int) -> np.ndarray:
-    """Return the polynomials (m, degree + 1) of the datum at places (m,) from 0 to 1."""
+    """Return the polynomials (m, degree + 1) of the datum at positions (m,) from 0 to 1."""
     return np.vander(2 * place - 1, degree + 1)
 
 
@@ -205,7 +207,7 @@ def _fit_covariances(centres, means, noise, degree: int) -> list:
 
 
 def _predict(covariance: _Covariance, centres, places, noise, degree: int) -> np.ndarray:
-    """Return the kriging matrix (m, k) from means at centres (k,) to datum and drift at places (m,)."""
+    """Return the kriging matrix (m, k) from part means at (k,) to datum and drift at (m,)."""
     root, length, ratio = covariance[:3]
     forms = _datum(centres, degree)
     total = ratio * _matern(_distances(centres, centres), root, length) + np.diag(noise)
@@ -217,7 +219,7 @@ def _predict(covariance: _Covariance, centres, places, noise, degree: int) -> np
 
 
 def _draw_drift(covariance: _Covariance, places, freedom: int, count: int, random) -> np.ndarray:
-    """Draw drifts (count, m) [m] at places (m,); their variance is scaled inverse chi-squared."""
+    """Draw drifts (count, m) [m] at positions (m,); the variance is scaled inverse chi-squared."""
     root, length, ratio = covariance[:3]
     correlation = _matern(_distances(places, places), root, length)
     factor = np.linalg.cholesky(correlation + JITTER * np.eye(places.size))

@@ -15,7 +15,7 @@ from ..quantity import LEVEL, SIDE
 from .drift import model_drift
 from .robust import BIWEIGHT, MAX_UNWORN
 
-N_DRAWS = 200  # draws of the bootstrap; they give a standard deviation to 5 %
+N_DRAWS = 200  # number of bootstrap draws, which gives a standard deviation to 5 %
 TRUNCATED_VARIANCE = 0.911  # variance of normal noise that is cut off at REACH
 SEED = 1989
 
@@ -123,14 +123,14 @@ def block_length(correlation: float, count: int) -> int:
 
 
 def student_factor(blocks: float) -> float:
-    """Return the width of Student's interval from a number of blocks over that of a normal one."""
+    """Return the width of Student's interval for a number of blocks / that of a normal interval."""
     from scipy.special import stdtrit
 
     return float(stdtrit(max(blocks - 1, 1.0), (1 + LEVEL) / 2)) / SIDE
 
 
 def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErrors:
-    """Predict the drift of the datum, and draw the errors of the depth without it.
+    """Predict the drift of the datum, and draw the errors of the remaining depth.
 
     Parameters
     ----------

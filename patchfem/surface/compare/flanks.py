@@ -14,11 +14,11 @@ from .boxes import average_parts, make_boxes, part_edges, running_mean
 from .robust import BIWEIGHT
 from .search import MIN_SAMPLES
 
-PARTS = 40  # parts of the trace; the ends of a track are known to one part
-FLANK_PARTS = 4  # parts of the shortest flank
-PART_SAMPLES = 8  # samples of a part of the second trace; the mean of fewer is too uncertain
-N_DRAWS = 100  # random traces, into which the track is cut for the intervals
-INTERVAL_FACTOR = 1.4  # widening for the estimated spectrum; without it 85 of 100 intervals hold
+PARTS = 40  # number of parts of the trace; the ends of a track are known to within one part
+FLANK_PARTS = 4  # number of parts in the shortest flank
+PART_SAMPLES = 8  # samples in a part of the second trace; the mean of fewer is too uncertain
+N_DRAWS = 100  # number of random traces into which the track is cut for the intervals
+INTERVAL_FACTOR = 1.4  # factor for the estimated spectrum; without it only 85 of 100 intervals contain the true value
 MIN_CLEARANCE = 1.2  # depth or roughness / the largest one of random traces without a track
 
 
@@ -55,7 +55,7 @@ class Flanks:
 
 
 class _Track(NamedTuple):
-    """Line of the flanks, depth (n,) [m] below it, and the samples of the track."""
+    """Line through the flanks, depth (n,) [m] below it, and the samples of the track."""
 
     line: tuple
     depth: np.ndarray
@@ -102,7 +102,7 @@ def find_flanks(before: Profile, after: Profile) -> Flanks | None:
 
 
 def _find_track(x, z, box: tuple) -> _Track:
-    """Find the track that a box shows, below the line through the flanks beside it."""
+    """Find the track at a box, below the line through the flanks on both sides."""
     is_beside = _find_beside(x.size, box)
     offset, slope = _fit_line(x[is_beside], z[is_beside])
     depth = offset + slope * x - z
@@ -110,7 +110,7 @@ def _find_track(x, z, box: tuple) -> _Track:
 
 
 def _find_beside(size: int, box: tuple) -> np.ndarray:
-    """Return the samples (size,) bool of the flanks, which begin a part away from the box."""
+    """Return the samples (size,) bool of the flanks, which begin one part away from the box."""
     edges = part_edges(size, PARTS)
     is_beside = np.ones(size, bool)
     is_beside[edges[max(box[0] - 1, 1)] : edges[min(box[1] + 1, PARTS - 1)]] = False
@@ -156,10 +156,11 @@ def _smooth(depth) -> np.ndarray:
 
 
 def _find_span(depth, box: tuple) -> slice:
-    """Find the samples of the track: from its deepest place to where the running mean is zero."""
+    """Find the samples of the track: from its deepest point to where the running mean is zero."""
     edges = part_edges(depth.size, PARTS)
     smooth = _smooth(depth)
-    outside = np.flatnonzero(smooth <= 1e-9 * smooth.max())  # zero except for rounding
+    # a running mean this small is zero to within rounding
+    outside = np.flatnonzero(smooth <= 1e-9 * smooth.max())
     deepest = edges[box[0]] + int(np.argmax(smooth[edges[box[0]] : edges[box[1]]]))
     before = outside[outside < deepest]
     after = outside[outside > deepest]
@@ -168,7 +169,7 @@ def _find_span(depth, box: tuple) -> slice:
 
 
 def _measure_flanks(second: Profile, box: tuple, traces) -> Flanks:
-    """Measure a track; intervals come from tracks of this shape that are cut into random traces."""
+    """Measure a track; its intervals come from copies of it that are cut into random traces."""
     x = second.x
     step = second.step
     track = _find_track(x, second.z, box)
@@ -187,7 +188,7 @@ def _measure_flanks(second: Profile, box: tuple, traces) -> Flanks:
         area_interval = Interval(
             area, float(np.clip(area - high, 0.0, area)), float(max(area - low, area))
         )
-        # the highest or lowest place of the roughness may lie anywhere in the track
+        # the highest or lowest point of the roughness may lie anywhere in the track
         error = float(np.quantile(np.abs(traces[:, track.span]).max(axis=1), 1 - tail))
         largest = Interval(peak, max(peak - error, 0.0), peak + error)
     start, end = float(x[track.span.start]), float(x[track.span.stop - 1])

@@ -1,14 +1,17 @@
-"""Gain of the instrument: one factor between all heights of the second trace and of the first."""
+"""Gain of the instrument: a common factor of all heights of the second trace."""
 
 import numpy as np
 
 from .alignment import Alignment
 
-MAX_REMAINDER = 0.8  # scatter without / with the effect of the gain; wear leaves a larger one
+MAX_REMAINDER = 0.8  # scatter without / with the effect of the gain; wear leaves a larger ratio
 
 
 def find_gain(alignment: Alignment) -> float | None:
-    """Fit the heights after / before wear; None if this factor does not explain their difference."""
+    """Fit the ratio of the heights after wear to those before wear (the gain of the instrument).
+
+    Returns None if this factor does not explain the difference of the heights.
+    """
     parabolas = np.vander(np.linspace(-1, 1, alignment.x.size), 3)
     heights, depth = (
         z - parabolas @ np.linalg.lstsq(parabolas, z, rcond=None)[0]

@@ -11,12 +11,14 @@ from .boxes import part_edges
 from .robust import MAX_OUTLIER
 from .section import Section
 
-MIN_WINDOW = 5  # samples of the shortest window
-MAX_WINDOW = 1025  # samples of the longest window
-N_PARTS = 8  # parts of a window; the parabola must also fit their means
-MAX_MISFIT = 2.5  # standard deviations of a misfit; with this limit 97 % of windows of noise fit
-PENALTY = 3.0  # standard deviations that are subtracted from a depth when the largest is chosen
-LONG_WINDOW = 64  # samples; beside a longer window, a quarter of it shows the slopes
+MIN_WINDOW = 5  # number of samples in the shortest window
+MAX_WINDOW = 1025  # number of samples in the longest window
+N_PARTS = 8  # number of parts of a window, whose means the parabola must also fit
+MAX_MISFIT = 2.5  # standard deviations of a misfit; with this limit the parabola fits 97 % of the windows of pure noise
+# standard deviations that are subtracted from a depth when the largest depth is chosen
+PENALTY = 3.0
+# samples; for longer windows, a quarter of the window on either side shows the slopes
+LONG_WINDOW = 64
 
 
 class _Windows(NamedTuple):
@@ -27,7 +29,7 @@ class _Windows(NamedTuple):
 
 
 class _Group(NamedTuple):
-    """Samples of a window, the depths that are read from it, and their rows of its parabolas."""
+    """Samples of a window, and the depths evaluated from it with their rows of its parabolas."""
 
     samples: slice
     members: np.ndarray
@@ -96,7 +98,7 @@ def _draw_peaks(section: Section, groups: list, clean, penalty) -> np.ndarray:
 
 
 def _shrink_scatter(smooth, deviation, near) -> np.ndarray:
-    """Shrink the smooth depths (n,) to their mean by the part of their scatter that is noise.
+    """Shrink smooth depths (n,) to their mean by the fraction of their scatter that is noise.
 
     Depths of a flat floor, which differ by noise alone, become equal, so that draws about them show the
     whole bias of a maximum. Those of a round scar hardly change.
@@ -129,7 +131,7 @@ def _limit_corner(depth, window: slice, noise: float) -> float:
     slope = (before - after) / 2
     curvature = -2 * float(np.polyfit(np.arange(length), depth[window], 2)[0])
     expected = curvature * ((length + count) / 2)
-    # 27 is the factor of both slopes for white noise
+    # 27 is the factor of the variance of both slopes for white noise
     min_difference = 3 * 27 * noise / length**1.5 if length >= LONG_WINDOW else 0.0
     if slope <= 0 or expected - slope <= min_difference:
         return 0.0
@@ -138,7 +140,7 @@ def _limit_corner(depth, window: slice, noise: float) -> float:
 
 
 def _group_by_window(windows: _Windows, depths) -> Iterator[_Group]:
-    """Group depths (indices) by the window that they are read from."""
+    """Group depths (indices) by the window from which they are evaluated."""
     start, size = windows
     order = depths[np.lexsort((start[depths], size[depths]))]
     ends = np.flatnonzero(np.diff(start[order]) | np.diff(size[order])) + 1
@@ -157,7 +159,7 @@ def _parabolas(length: int) -> np.ndarray:
 
 
 def _fit_windows(depth, noise, correlation: float) -> _Windows:
-    """Find the longest window around each depth that a parabola fits; a single sample if none fits.
+    """Find the longest window around each depth that a parabola fits, at least a single sample.
 
     Of the windows of a length, the one with the nearest middle is taken. A depth is read from the half
     of the window around it.
@@ -176,7 +178,7 @@ def _fit_windows(depth, noise, correlation: float) -> _Windows:
         pair = fitting[np.clip(np.stack([after - 1, after]), 0, fitting.size - 1)]
         distance = np.abs(pair + length // 2 - here)
         nearest = np.where(distance[0] <= distance[1], pair[0], pair[1])
-        # a corner beside the window would lift its outer heights
+        # a corner next to the window would lift its outer heights
         is_inside = distance.min(axis=0) <= length // 4
         start[is_inside] = nearest[is_inside]
         size[is_inside] = length

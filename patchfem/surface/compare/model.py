@@ -1,4 +1,4 @@
-"""Model of a second trace: where its places lie on the first one, and how its datum differs.
+"""Model of a second trace: position along the first one, and difference of the datums.
 
 A place x of the second trace lies on the first one at c + (x - c) / (1 + stretch) - shift, with c the
 middle of the common part. The depth of the second trace below the first one there is
@@ -14,10 +14,10 @@ import numpy as np
 from ...core import PatchfemError
 from ..profile import Profile, level, resample_evenly
 
-MIN_HEIGHTS = 12  # common heights; fewer do not determine the parameters
-N_BLOCKS = 20  # blocks of a trace, whose modes give the starts of a fit
+MIN_HEIGHTS = 12  # number of common heights; fewer do not determine the parameters
+N_BLOCKS = 20  # number of blocks of a trace, whose modes give the starting points of a fit
 ROUNDING = 1e-5  # fraction of the rms height; a smaller scale is round-off of the file
-MAX_WINDOW = 51  # samples of the longest parabola that gives a slope
+MAX_WINDOW = 51  # number of samples of the longest parabola that gives a slope
 SLOPE_NOISE = 0.05  # noise / rms slope that the smoothed slopes should reach
 MAX_STEP = 4.0  # samples or pixels; largest displacement in one step of the fit
 
@@ -77,7 +77,7 @@ class TraceModel:
         self.middle = float(self.x[inside][0] + self.x[inside][-1]) / 2
 
     def start(self, shift: float) -> np.ndarray:
-        """Return the state with a shift [m] alone."""
+        """Return a state in which only the shift [m] is not zero."""
         return np.array([0.0, 0.0, shift, 0.0, 0.0])
 
     def places(self, state) -> np.ndarray:
@@ -86,7 +86,7 @@ class TraceModel:
         return self.middle + from_middle / (1 + state[Parameter.STRETCH]) - state[Parameter.SHIFT]
 
     def overlap(self, at) -> np.ndarray:
-        """Return whether each place (k,) [m] lies on the first trace and not in a gap of it."""
+        """Return whether each position (k,) [m] lies on the first trace and not in a gap of it."""
         edge = 1e-9 * self.half
         inside = (at >= self.before.x[0] - edge) & (at <= self.before.x[-1] + edge)
         x, lost = self.gaps
@@ -107,7 +107,7 @@ class TraceModel:
         return depth, np.column_stack(columns)
 
     def limit_step(self, step, free) -> np.ndarray:
-        """Limit the displacement by a step of shift and stretch to a few samples."""
+        """Limit a step of shift and stretch so that no sample moves by more than a few samples."""
         limits = {
             Parameter.SHIFT: MAX_STEP * self.step,
             Parameter.STRETCH: MAX_STEP * self.step / self.half,
@@ -122,7 +122,7 @@ class TraceModel:
         return np.array([scale, scale, moved, moved / self.half, scale])
 
     def blocks(self, count: int) -> list:
-        """Return the blocks of samples whose modes give the starts of a fit."""
+        """Return the blocks of samples whose modes give the starting points of a fit."""
         return np.array_split(np.arange(count), N_BLOCKS)
 
     def smooth_slope(self, scale: float) -> None:

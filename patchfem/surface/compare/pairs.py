@@ -9,7 +9,7 @@ from ...inputs.cells import TableFormat, parse_header, read_text, split_cells
 from ..quantity import Quantity, average_quantities
 
 COLUMNS = ("before", "after")  # columns that every table has
-# what the answer of a pair is based on, in words; means are taken over pairs of the same kind only
+# basis of the answer for a pair, in words; means are taken only over pairs of the same kind
 KINDS = {
     "scans": "areal scans",
     "run": "results folders",
@@ -17,7 +17,7 @@ KINDS = {
     "flanks": "traces compared by the unworn flanks of a track",
     "nothing": "traces that cannot be registered to each other",
 }
-# quantities that have a mean; places have none, as they depend on where a trace begins
+# quantities that have a mean; positions have none, because they depend on where a trace begins
 AVERAGED = (
     "worn_volume",
     "grown_volume",
@@ -57,7 +57,7 @@ class TableLine(NamedTuple):
 
 
 class Group(NamedTuple):
-    """What the pairs of a mean have in common.
+    """Properties that all pairs of a mean share.
 
     label: cell of the column group; direction: "x", "y" or ""; kind: key of `KINDS`. Depths that count
     from a place, from flanks, or over an area are different quantities, and so are computed ones.

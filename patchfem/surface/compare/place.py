@@ -1,4 +1,4 @@
-"""Decision whether two traces share a place, by their correlation and the heights that agree there."""
+"""Decision whether two traces show the same part of a surface."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -24,18 +24,19 @@ from .search import (
 from .worn import wear_balance
 
 MAX_NOISE = 0.1  # noise / rms height; a larger noise may be due to wear of the valleys
-MAX_LOW_NOISE = 0.02  # same ratio, below which a smaller clearance is enough
+MAX_LOW_NOISE = 0.02  # same ratio; below it, a smaller clearance suffices
 MIN_LOW_CLEARANCE = 2.5  # this smaller clearance, in standard deviations of random traces
-MAX_WHITE_NOISE = 0.3  # noise / rms height if the noise is white, as only that of instruments is
-MAX_WHITE_NOISE_AT_MARK = 0.5  # same ratio at a shift that the user gave
-MAX_WHITE_LENGTH = 1.5  # correlation length of white noise in samples
-MIN_WEAR_BALANCE = 0.9  # (lost - grown) / (lost + grown) area with which wear explains all of it
-MIN_AGREED = 0.6  # fraction of the heights that agree; unrelated traces reach 0.41
+MAX_WHITE_NOISE = 0.3  # noise / rms height of white noise, which only instruments cause
+MAX_WHITE_NOISE_AT_MARK = 0.5  # noise / rms height of white noise at a shift that the user gave
+MAX_WHITE_LENGTH = 1.5  # correlation length in samples; noise with a longer one is not white
+# (lost - grown) / (lost + grown) area; above it, wear alone explains the change
+MIN_WEAR_BALANCE = 0.9
+MIN_AGREED = 0.6  # fraction of the heights that agree; traces of different surfaces reach 0.41
 USE_SAME_MARK = "if both traces were measured from the same mark, use --shift '0 mm'"
 
 
 class Place(NamedTuple):
-    """Place that two traces share, or the reason why there is none.
+    """Common part of two traces, or the reason why there is none.
 
     - match: result of the search; None if the shift is given.
     - alignment: alignment at this place, None if the traces share no place.
@@ -66,7 +67,7 @@ class _Candidate(NamedTuple):
 def find_place(
     before: Profile, after: Profile, shift: float | None = None, *, is_straight: bool = False
 ) -> Place:
-    """Find the place that two traces share, as given or with the second one mirrored.
+    """Find the common part of two traces, with the second one as given or mirrored.
 
     Traces of a periodic surface, and traces at a known shift, are not mirrored.
 
@@ -95,7 +96,7 @@ def find_place(
 def find_place_as_given(
     before: Profile, after: Profile, shift: float | None = None, *, is_straight: bool = False
 ) -> Place:
-    """Find the place that two traces share, by their valleys or part by part.
+    """Find the common part of two traces as given, by their valleys or part by part.
 
     The correlation must exceed that of chance at a single shift, and the unworn heights must agree there
     within 10 % of the rms height, or within 30 % if their differences are white noise. Parameters are
@@ -111,7 +112,7 @@ def find_place_as_given(
 
 
 def _search_place(before: Profile, after: Profile, is_straight: bool) -> _Candidate:
-    """Search the place by the valleys, and if they do not show it, part by part."""
+    """Search for the common part by the valleys, and part by part if the valleys do not show it."""
     match = search_shift(before, after)
     valleys = match
     alignment = None
@@ -128,7 +129,7 @@ def _search_place(before: Profile, after: Profile, is_straight: bool) -> _Candid
 def try_align(
     before: Profile, after: Profile, shift: float, is_straight: bool = False
 ) -> Alignment | None:
-    """Align two traces (`align`); None if hardly any heights agree."""
+    """Align two traces (`align`); return None if hardly any heights agree."""
     try:
         return align(before, after, shift, is_straight=is_straight)
     except PatchfemError:
@@ -138,7 +139,7 @@ def try_align(
 def _align_at_match(
     before: Profile, after: Profile, match: Match, is_straight: bool
 ) -> Alignment | None:
-    """Align two traces at a match; None if their unworn heights do not agree there."""
+    """Align two traces at a match; return None if their unworn heights do not agree there."""
     if not match.clearance > min(MIN_CLEARANCE, MIN_LOW_CLEARANCE):
         return None
     alignment = try_align(before, after, match.shift, is_straight)
@@ -148,7 +149,7 @@ def _align_at_match(
 
 
 def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: bool) -> Place:
-    """Align two traces at a known shift [m]; the reason tells if they do not agree near it."""
+    """Align two traces at a known shift [m], or state the reason why they do not agree near it."""
     start = f"at the given shift of {format_length(shift)}, "
     alignment = try_align(before, after, shift, is_straight)
     if alignment is None:
@@ -169,7 +170,7 @@ def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: b
 
 
 def _has_enough_unworn(alignment: Alignment) -> bool:
-    """Whether enough heights agree for a reference; for a straight datum, more than two flanks."""
+    """Whether enough heights agree for a reference; with a straight datum, more than two flanks."""
     return alignment.agreed > (2 * SHORT_FLANK if alignment.is_straight else MIN_UNWORN)
 
 
@@ -184,7 +185,7 @@ def _relative_noise(alignment: Alignment) -> float:
 
 
 def _is_same_place(alignment: Alignment, match: Match) -> bool:
-    """Whether enough unworn heights agree closely enough for the places to be the same."""
+    """Whether enough unworn heights agree closely enough for a common part of the surface."""
     if _agrees_closely(alignment, match):
         return True
     is_quiet = _is_quiet(alignment, MAX_WHITE_NOISE) and _has_enough_unworn(alignment)
@@ -192,7 +193,7 @@ def _is_same_place(alignment: Alignment, match: Match) -> bool:
 
 
 def _has_high_agreement(alignment: Alignment) -> bool:
-    """Whether more heights agree than those of unrelated traces."""
+    """Whether more heights agree than in traces of different surfaces."""
     height = _rms_height(alignment.x, alignment.first)
     return alignment.agreed > MIN_AGREED and alignment.noise < MAX_WHITE_NOISE * height
 
@@ -245,7 +246,7 @@ def _describe_noise(alignment: Alignment) -> str:
 
 
 def _describe_failure(before: Profile, after: Profile, match: Match, valleys: Match) -> str:
-    """Describe why no place was found and what to do."""
+    """Describe why no common part was found and what the user can do."""
     if valleys.is_ambiguous and valleys.is_clear and match is valleys:
         return (
             f"the surface is periodic, with a period of {format_length(find_period(before, after))}, so shifts that are far "

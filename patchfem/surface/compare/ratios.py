@@ -14,14 +14,14 @@ from ..roughness.parameters import Heights
 from ..roughness.spectrum import BAND, Spectrum, band_amplitude, estimate_spectrum, refuse_band
 from .boxes import average_parts, part_edges
 
-RATIO_ERROR = 0.004  # standard deviation of a ratio by tip, interpolation and datum, which noise does not show
+RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation and datum, in addition to the noise
 MAX_MISSING = 1 / 3  # fraction of the heights of a line of a scan that may be missing
-MAX_LINES = 256  # lines of a scan that are read; more are nearly equal to their neighbours
-N_PARTS = 6  # parts of a trace whose mean squares show the scatter from place to place
+MAX_LINES = 256  # largest number of lines of a scan that are read; further ones nearly equal their neighbours
+N_PARTS = 6  # number of parts of a trace whose mean squares show the scatter along the trace
 
 
 class Size(NamedTuple):
-    """Amplitude of the band [m], root mean square slope [1], degrees of freedom of each, and spectrum."""
+    """Amplitude in the band [m], rms slope [1], degrees of freedom of each, and spectrum."""
 
     amplitude: float
     slope: float
@@ -73,7 +73,7 @@ def resample(trace: Profile, step: float) -> tuple:
 
 
 def fill_scan(scan: Areal) -> tuple:
-    """Level a scan and fill its missing heights smoothly; returns it and the missing heights (m, n)."""
+    """Level a scan and fill its missing heights smoothly; returns it and a mask (m, n) of these."""
     flat = level_plane(scan)
     return replace(flat, z=fill_missing(flat.z, flat.missing)), flat.missing
 
@@ -121,7 +121,10 @@ def measure_scan_size(scan: Areal, missing, direction: str, band: tuple = BAND) 
 
 
 def _count_independent(values) -> float:
-    """Estimate the number of independent values: n / (1 + 2 sum of correlations up to the first zero)."""
+    """Estimate the number of independent values, n / (1 + 2 sum of correlations).
+
+    The sum ends at the first zero.
+    """
     deviation = values - values.mean()
     power = float(deviation @ deviation)
     if power == 0:
@@ -173,7 +176,7 @@ def divide_sizes(
 
 
 def widen_ratio(ratio: Quantity, error: float) -> Quantity:
-    """Widen the interval of a ratio by a further standard deviation of its logarithm."""
+    """Widen the interval of a ratio by an additional standard deviation of its logarithm."""
     if ratio.value is None or ratio.value <= 0:
         return ratio
     limits = (max(ratio.low, 1e-300), ratio.high)
@@ -184,7 +187,7 @@ def widen_ratio(ratio: Quantity, error: float) -> Quantity:
 
 
 def noise_fractions(sizes: tuple, noise: float, step: float, band: tuple) -> tuple:
-    """Return the relative errors of the amplitude and the slope that noise adds.
+    """Return the relative errors of amplitude and slope that noise causes.
 
     Half of the mean square of white noise counts in the amplitude, as the noise of both traces differs,
     and all of it in the slope, from which interpolation between samples takes most.
@@ -227,13 +230,13 @@ def estimate_freedom(trace: Profile, step: float, band: tuple = BAND) -> tuple:
 
 
 def _is_in_band(count: int, step: float, band: tuple) -> np.ndarray:
-    """Return which frequencies of the Fourier transform of so many samples lie in the band."""
+    """Return which of the Fourier frequencies of this number of samples lie in the band."""
     frequency = np.fft.rfftfreq(count, step)
     return (frequency >= 1 / band[1]) & (frequency <= 1 / band[0])
 
 
 def correlate_traces(first, second, step: float, band: tuple = BAND) -> tuple:
-    """Return the correlation of two aligned traces in their band, and that of their slopes.
+    """Return the correlation of two aligned traces in the band, and that of their slopes.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Ambiguous traces: a scar or a bent datum, a scar or growth, wear or a datum that drifts.
+"""Ambiguous traces: scar or bent datum, scar or growth, wear or a drifting datum.
 
 A reading is one of the floors that the fit finds (`alignment`). If two readings explain the traces
 equally well, no worn depth is given, and a sentence states the numbers of both.
@@ -17,32 +17,33 @@ from .flanks import Flanks
 from .robust import MAX_NOISE
 from .section import median_of_five
 
-# headlines of traces that two readings explain
+# headlines of traces that have two interpretations
 BENT = "a scar or a bent datum, both are possible"
 GREW = "a scar or material that grew at the ends, both are possible"
 NOISE = "a scar or noise, both are possible"
 DRIFT = "a scar or a datum that drifts, both are possible"
-# depth of a scar / standard deviation of the drift: three times the width of +-2 deviations
+# depth of a scar / standard deviation of the drift: three times the width of an interval of +-2 deviations
 MIN_DEPTH_OVER_DRIFT = 12.0
-# covariance of neighbouring unworn parts / their variance; it is near 1 for a drift, 0 for noise
+# covariance of neighbouring unworn parts / their variance, which is near 1 for a drift and 0 for noise
 MIN_SLOW_FRACTION = 0.5
-# slow differences of the flanks / depth of the track; with larger ones the flanks are worn
+# slow height differences of the flanks / depth of the track; above it, the flanks are worn
 MAX_FLANK_ERROR = 0.1
-N_WAVES = 8  # cosines of up to this many half waves describe a drift along the trace
-# residual of these cosines / noise; below it a drift explains the whole difference of the traces
+N_WAVES = 8  # largest number of half waves of the cosines that describe a drift along the trace
+# residual of these cosines / noise; below it, a drift explains the whole difference of the traces
 MAX_SCATTER_RATIO = 1.3
-MIN_BLOCKS = 12.0  # independent unworn heights; fewer do not show how large their error is
+# number of independent unworn heights; fewer do not show how large their error is
+MIN_BLOCKS = 12.0
 
 
 class Reading(NamedTuple):
-    """What is possible, as a headline ("" for a single reading), and why there is no depth."""
+    """Headline of an ambiguity ("" for a single interpretation), and why no depth is given."""
 
     headline: str
     reason: str
 
 
 def find_ambiguity(alignment: Alignment, *, is_referenced: bool, is_changed: bool) -> Reading:
-    """Find out whether two readings explain the traces equally well.
+    """Check whether two interpretations explain the traces equally well.
 
     Parameters
     ----------
@@ -65,7 +66,7 @@ def find_ambiguity(alignment: Alignment, *, is_referenced: bool, is_changed: boo
 
 
 def _have_different_areas(one: Alignment, other: Alignment) -> bool:
-    """Whether two readings give different worn or grown areas, as printed."""
+    """Whether two interpretations give different worn or grown areas, as printed."""
     has_other_loss = _describe_loss(one) != _describe_loss(other)
     return has_other_loss or _format_grown_area(one) != _format_grown_area(other)
 
@@ -77,7 +78,7 @@ def _name_ambiguity(bow: Alignment) -> str:
 
 
 def detrended_means(depth, unworn=None) -> np.ndarray:
-    """Average the (unworn) depths in parts of the trace, and subtract the line through the means [m]."""
+    """Average the (unworn) depths [m] in parts of the trace, and subtract a line from the means."""
     edges = part_edges(depth.size, N_PARTS)[:-1]
     unworn = np.ones(depth.size, bool) if unworn is None else unworn
     count = np.add.reduceat(unworn.astype(float), edges)
@@ -111,7 +112,7 @@ def may_be_drift(alignment: Alignment) -> bool:
 
 
 def describe_both(bow: Alignment, line: Alignment) -> str:
-    """State why there is no worn depth, with the numbers of both possible readings."""
+    """State why no worn depth is given, with the numbers of both interpretations."""
     if bow.bend and not _has_grown_more(bow):
         other = (
             f"the datum bent by {format_length(bow.bend, 3)} (sag over the common length) and "
@@ -132,18 +133,18 @@ def describe_both(bow: Alignment, line: Alignment) -> str:
 
 
 def _has_changed(alignment: Alignment) -> bool:
-    """Whether anything that can be printed grew or wore off in a reading."""
+    """Whether an interpretation has growth or wear that is large enough to be printed."""
     return any(format_number(1e12 * area, 3) != "0" for area in _measure_areas(alignment))
 
 
 def _has_grown_more(alignment: Alignment) -> bool:
-    """Whether more material grew than wore off in a reading."""
+    """Whether more material grew than wore off in an interpretation."""
     lost, grown = _measure_areas(alignment)
     return grown > lost
 
 
 def _measure_areas(alignment: Alignment) -> tuple:
-    """Return the lost and the grown area [m2] of a reading."""
+    """Return the area [m2] of lost and of deposited material in an interpretation of the traces."""
     step = float(np.ptp(alignment.x)) / (alignment.x.size - 1)
     deposit = alignment.depth < -MAX_NOISE * alignment.noise_at
     lost = max(float(alignment.depth[~deposit].sum()) * step, 0.0)
@@ -155,7 +156,7 @@ def _format_grown_area(alignment: Alignment) -> str:
 
 
 def _describe_loss(alignment: Alignment) -> str:
-    """Describe the worn area, mean and largest depth of a reading."""
+    """Describe the worn area, mean depth and largest depth of an interpretation."""
     lost = _measure_areas(alignment)[0]
     deepest = max(float(median_of_five(alignment.depth).max()), 0.0)
     return (
@@ -166,7 +167,7 @@ def _describe_loss(alignment: Alignment) -> str:
 
 
 def describe_drift(alignment: Alignment) -> str:
-    """State why there is no worn depth if the datum may drift, with the numbers of both readings."""
+    """State why no worn depth is given if the datum may drift, with both interpretations."""
     along = np.linspace(-1, 1, alignment.depth.size)
     seen = float(np.ptp(detrended_means(np.asarray(alignment.depth) - alignment.bend * along**2)))
     bent = ""
@@ -230,7 +231,7 @@ def find_worn_flanks(
 
 
 def describe_other(alignment: Alignment | None) -> list:
-    """Describe the reading of the traces that was not taken in a sentence; an empty list without one."""
+    """Describe the rejected interpretation in a sentence; an empty list if there is none."""
     if (
         alignment is None
         or alignment.rival is None

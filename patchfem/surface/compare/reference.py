@@ -15,14 +15,14 @@ from .robust import MAX_UNWORN, MIN_UNWORN
 from .section import Section, median_of_five
 
 MIN_SAMPLES = 40  # samples of the shortest unworn part
-MIN_WORN_DEPTH = 2 * MAX_UNWORN  # standard deviations of the deepest height of a worn place
-SPECK_SAMPLES = (
-    16  # samples at half of its depth; a narrower place may be an error of interpolation
-)
-NARROW_SAMPLES = 5  # samples of a scratch at half of its depth
-MIN_SCRATCH = 20.0  # standard deviations of the depth of a scratch
-MIN_TOPS = 8  # worn tops, between which the valleys are a reference
-# mean fraction of unworn heights that are lower than a worn one before wear: 1 if only tops wore off
+# standard deviations; the deepest height of a worn part is at least this deep
+MIN_WORN_DEPTH = 2 * MAX_UNWORN
+# samples at half depth; a narrower valley may be an interpolation error
+SPECK_SAMPLES = 16
+NARROW_SAMPLES = 5  # samples of a scratch at half depth
+MIN_SCRATCH = 20.0  # standard deviations; smallest depth of a scratch
+MIN_TOPS = 8  # number of worn tops from which the valleys between them are a reference
+# mean fraction of unworn heights that were lower than a worn one before wear; it is 1 if only tops wore off
 MIN_HIGHER = 0.65
 HIDDEN_TEXT = (
     "largest mean depth of wedge-shaped wear that is possible if the tilt between the traces (upper end of its "
@@ -45,7 +45,7 @@ class Reference(NamedTuple):
 
 
 def find_reference(alignment: Alignment, section: Section) -> Reference:
-    """Find the unworn parts or valleys of aligned traces that the worn depth can be measured from.
+    """Find unworn parts or valleys of aligned traces from which the worn depth can be measured.
 
     Unworn parts are at least a twentieth of the length (a fiftieth if the datum is straight), straight, and
     beside worn places; slight wear bends a part. Valleys are a reference if they lie between at least eight
@@ -76,7 +76,7 @@ def find_reference(alignment: Alignment, section: Section) -> Reference:
 
 
 def find_deep_runs(relative) -> list:
-    """Find runs (first, last) of depths (n,) [standard deviations] that are beyond noise."""
+    """Find runs (first, last) of depths (n,) [standard deviations] that exceed the noise."""
     runs = find_runs(relative > MAX_UNWORN)
     return [
         (first, last) for first, last in runs if relative[first : last + 1].max() > MIN_WORN_DEPTH
@@ -84,13 +84,13 @@ def find_deep_runs(relative) -> list:
 
 
 def _shallow_runs(alignment: Alignment) -> list:
-    """Return the runs that the fit found to be worn although single heights do not show it."""
+    """Return the runs that the fit found worn although no single height shows it."""
     is_shallow = ~alignment.unworn & (np.abs(alignment.depth) <= MAX_UNWORN * alignment.noise)
     return [(first, last) for first, last in find_runs(is_shallow) if last - first > MIN_SAMPLES]
 
 
 def _has_wear(alignment: Alignment, relative, places: list) -> bool:
-    """Whether a deep place is wider than an error of interpolation, or as deep as a scratch."""
+    """Whether a deep run is wider than an interpolation error, or as deep as a scratch."""
     if _shallow_runs(alignment) or _is_wide(relative, places):
         return True
     for first, last in places:
@@ -101,13 +101,13 @@ def _has_wear(alignment: Alignment, relative, places: list) -> bool:
 
 
 def _is_wide(relative, places: list) -> bool:
-    """Whether one of the deep places is wider than an error of interpolation."""
+    """Whether one of the deep runs is wider than an interpolation error."""
     parts = [relative[first : last + 1] for first, last in places]
     return any((deep > deep.max() / 2).sum() >= SPECK_SAMPLES for deep in parts)
 
 
 def _higher_fraction(alignment: Alignment, relative) -> float:
-    """Return the mean fraction of unworn heights that are lower than a worn one before wear."""
+    """Return the mean fraction of unworn heights that were lower than a worn one before wear."""
     height = subtract_line(alignment.x, alignment.first)
     unworn = np.sort(height[relative <= MAX_UNWORN])
     n_lower = np.searchsorted(unworn, height[relative > MIN_WORN_DEPTH])
@@ -120,7 +120,8 @@ def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
     min_length = (SHORT_FLANK if alignment.is_straight else LONG_FLANK) * (x[-1] - x[0])
     if x[last] - x[first] < min_length or last - first < MIN_SAMPLES:
         return False
-    margin = (last - first) // 10  # the wear may begin in the outermost tenth beside it
+    # wear may begin in the tenth of the run that is next to the track
+    margin = (last - first) // 10
     start = first + margin if first else 0
     stop = last + 1 - margin if last < x.size - 1 else last + 1
     unworn = alignment.unworn[start:stop]
@@ -136,13 +137,13 @@ def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
 
 
 def has_grown(alignment: Alignment, section: Section) -> bool:
-    """Whether a place stands clearly above the first trace and is wider than an error of interpolation."""
+    """Whether material above the first trace is clearly wider than an interpolation error."""
     relative = median_of_five(-section.depth / section.noise)
     return _is_wide(relative, find_deep_runs(relative))
 
 
 def limit_hidden_wear(alignment: Alignment | None, reference: Reference | None) -> Quantity:
-    """Estimate the mean depth [m] of a wedge of wear that the tilt may be due to.
+    """Estimate the mean depth [m] of wedge-shaped wear that may have caused the tilt.
 
     The tilt between both traces comes from their mounting or from a wedge that wore off, whose mean depth
     is half of the tilt times the length. There is no upper limit, because uniform wear of any depth, or a
@@ -159,7 +160,7 @@ def limit_hidden_wear(alignment: Alignment | None, reference: Reference | None) 
 
 
 def cut_at_wear(reference: Reference, extent) -> Reference:
-    """Cut off the unworn parts at the first and the last worn place (`worn.Extent` or None)."""
+    """Cut off the unworn parts at the first and last worn position (`worn.Extent` or None)."""
     if extent is None:
         return reference
     wear_start, wear_end = (end.value for end in extent.after)
@@ -175,7 +176,7 @@ def cut_at_wear(reference: Reference, extent) -> Reference:
 
 
 def describe_reference(reference: Reference) -> str:
-    """Describe from which parts of the traces the worn depths are measured."""
+    """Describe the parts of the traces from which the worn depths are measured."""
     if reference.kind == "valleys":
         return (
             "Depths are measured from the valleys between the worn tops. These valleys "
@@ -197,7 +198,7 @@ def describe_reference(reference: Reference) -> str:
 
 
 def describe_hidden_wear(alignment: Alignment, hidden: Quantity) -> str:
-    """Describe which wear may be hidden without a reference, and which measurement would show it."""
+    """Describe what wear may be hidden without a reference, and what measurement would show it."""
     bow = ""
     if alignment.bend:
         bow = (

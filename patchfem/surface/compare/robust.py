@@ -15,27 +15,27 @@ import numpy as np
 
 from ..profile import robust_deviation
 
-# fraction of the heights that least trimmed squares fits; only few may be unworn
+# fraction of the heights that least trimmed squares fits; it is small because only few may be unworn
 TRIMMED_FRACTION = 0.2
 MIN_UNWORN = 0.08  # smallest fraction of unworn heights that can serve as a reference surface
-BIWEIGHT = (
-    4.685  # scales; heights farther off have no weight, with 95 % efficiency for normal noise
-)
-MAX_UNWORN = 2.5  # scales; an unworn height is at most so far from the floor
-MAX_NOISE = 4.0  # standard deviations to which noise is clipped; a height farther off is no noise
-MAX_OUTLIER = 8.0  # standard deviations that the noise of no height reaches
-SHORTH_FRACTION = 0.3  # fraction of the heights of a block in the interval that gives its mode
-MAX_SUBSETS = 1200  # elemental subsets of blocks that are tried, which limits the time
-MAX_FLOORS = 3  # floors that are sought, each in the blocks that lie on none before it
-MIN_DETERMINANT = (
-    1e-3  # of an elemental subset; with a smaller one its blocks lie too close together
-)
-N_JUDGED = 1000  # heights whose trimmed squares rank the subsets
-SEED = 1985  # seed of the random subsets, and of random traces
+# distance from the floor in scales; farther heights have no weight, with 95 % efficiency for normal noise
+BIWEIGHT = 4.685
+MAX_UNWORN = 2.5  # largest distance of an unworn height from the floor, in scales
+MAX_NOISE = 4.0  # standard deviations to which noise is clipped; a height farther away is not noise
+MAX_OUTLIER = 8.0  # standard deviations that noise never reaches
+# fraction of the heights of a block in the interval that gives the mode of the block
+SHORTH_FRACTION = 0.3
+MAX_SUBSETS = 1200  # largest number of subsets of blocks that are tried, which limits the time
+# largest number of floors, each sought in the blocks that lie on none of the floors before
+MAX_FLOORS = 3
+# determinant of a subset; below it, the blocks of the subset lie too close together
+MIN_DETERMINANT = 1e-3
+N_JUDGED = 1000  # number of heights whose trimmed squares rank the subsets
+SEED = 1985  # seed of the random subsets and of the random traces
 
 
 class Floor(NamedTuple):
-    """Surface of the model that many heights of the second surface lie on.
+    """Candidate for the unworn surface: a fitted model on which many measured heights lie.
 
     - state: parameters of the model, (k,).
     - scale: standard deviation [m] of the heights on the floor.
@@ -56,7 +56,7 @@ class Fit(NamedTuple):
 
 
 def estimate_scale(depth) -> float:
-    """Estimate the standard deviation [m] of noise about zero from the half with less wear or growth."""
+    """Estimate the standard deviation [m] of noise about zero from the less worn or grown half."""
     sides = depth[depth > 0], -depth[depth < 0]
     return min((robust_deviation(side) for side in sides if side.size > 3), default=0.0)
 
@@ -75,7 +75,7 @@ def solve_weighted(jacobian, depth, weight) -> np.ndarray:
 
 
 def concentrate(model, state, free, rounds: int = 12) -> np.ndarray:
-    """Improve a start by C-steps of least trimmed squares."""
+    """Improve a starting point by C-steps of least trimmed squares."""
     for _ in range(rounds):
         depth, jacobian = model.linearize(state)
         off = np.abs(depth)
@@ -121,7 +121,7 @@ def fit_biweight(model, state, free, worn=None, rounds: int = 60, max_scale: flo
 
 
 def find_floors(model, state, free, form) -> list:
-    """Find the floors that heights of the second surface lie on.
+    """Find the floors on which heights of the second surface lie.
 
     Each further floor is sought in the blocks that lie on none of those before it.
 
@@ -156,7 +156,7 @@ def find_floors(model, state, free, form) -> list:
 
 
 def _make_floor(model, fit: Fit) -> Floor:
-    """Make the floor of a fit."""
+    """Make the `Floor` of a fit."""
     depth, _ = model.linearize(fit.state)
     unworn = float((np.abs(depth) <= MAX_UNWORN * fit.scale).mean())
     return Floor(fit.state, fit.scale, unworn, float((depth < -2 * MAX_UNWORN * fit.scale).mean()))
@@ -170,7 +170,7 @@ def _lies_on(model, floor: Floor, block) -> bool:
 
 
 def _find_starts(model, state, form, blocks) -> list:
-    """Find the parameters (k,) of the two best elemental subsets (exact fits to a few blocks)."""
+    """Find the parameters (k,) of the two best subsets of blocks, each fitted exactly."""
     depth, jacobian = model.linearize(state)
     centres = np.array([estimate_mode(depth[block]) for block in blocks])
     base = np.array([jacobian[block][:, form].mean(axis=0) for block in blocks])
@@ -206,7 +206,7 @@ def _choose_subsets(count: int, size: int) -> list:
 
 
 def estimate_mode(values) -> float:
-    """Estimate the mode as the mean of the shortest interval that holds 30 % of the values (shorth)."""
+    """Estimate the mode by the mean of the shortest interval with 30 % of the values (shorth)."""
     values = np.sort(values)
     kept = max(int(SHORTH_FRACTION * values.size), 2)
     widths = values[kept - 1 :] - values[: values.size - kept + 1]

@@ -14,17 +14,20 @@ from ..roughness.filter import mean_line
 from .boxes import running_mean
 from .robust import SEED
 
-MAX_SAMPLES = 8192  # samples of a trace in the search; longer traces are averaged
-MIN_SAMPLES = 16  # samples of a trace, or of a part of it; fewer give no correlation
+MAX_SAMPLES = 8192  # largest number of samples in the search; longer traces are averaged
+# number of samples of a trace, or of a part of it; fewer give no useful correlation
+MIN_SAMPLES = 16
 MIN_OVERLAP = 0.5  # fraction of the shorter trace that must lie on the other one
-MAX_WAVE = 0.25  # fraction of the shorter trace; longer waves and the tilt are filtered off
-N_RANDOM = 100  # random traces, whose correlations are due to chance
-MIN_CLEARANCE = 5.0  # standard deviations above these; 1 of 1000 unrelated pairs has more
-MIN_LEAD = 0.3  # Fisher's z of the best shift less that of the second; 150 pairs had 0.64 or more
-MAX_SECOND = 0.97  # correlation of the second-best shift; periodic surfaces have a larger one
-N_PARTS = 12  # parts of the first trace that are correlated one by one
-N_BEST_PARTS = 4  # parts with the largest correlations, which give the score of a shift
-MAX_CORRELATION = 0.999  # limit of the correlation of a part, as no single part proves a place
+MAX_WAVE = 0.25  # fraction of the shorter trace; longer waves and the tilt are filtered out
+N_RANDOM = 100  # number of random traces, whose correlations are due to chance
+# standard deviations above the correlations of random traces; 1 of 1000 unrelated pairs has more
+MIN_CLEARANCE = 5.0
+MIN_LEAD = 0.3  # difference of Fisher's z of the best and second-best shift; 150 related pairs had 0.64 or more
+MAX_SECOND = 0.97  # correlation of the second-best shift; only periodic surfaces have a larger one
+N_PARTS = 12  # number of parts of the first trace that are correlated one by one
+N_BEST_PARTS = 4  # number of parts whose correlations, the largest ones, give the score of a shift
+# largest correlation that is counted for a part, because no single part proves a match
+MAX_CORRELATION = 0.999
 
 
 class Chance(NamedTuple):
@@ -79,7 +82,7 @@ class Resampled(NamedTuple):
 
 
 def search_shift(before: Profile, after: Profile) -> Match:
-    """Search the shift at which the valleys of two traces correlate best.
+    """Search for the shift at which the valleys of two traces correlate best.
 
     Long waves are filtered off, and heights above the median are clipped, as wear removes them. Random
     traces have the spectrum of the first trace and random phases.
@@ -100,7 +103,7 @@ def search_shift(before: Profile, after: Profile) -> Match:
 
 
 def search_shift_in_parts(before: Profile, after: Profile) -> Match | None:
-    """Search the shift at which single parts of the first trace agree best with the second one.
+    """Search for the shift at which separate parts of two traces agree best.
 
     Each of 12 parts is laid on the second trace at every shift. The score of a shift is the mean of
     Fisher's z of the four parts that correlate best; its tanh is the correlation of the match.
@@ -130,7 +133,7 @@ def search_shift_in_parts(before: Profile, after: Profile) -> Match | None:
 
 
 def resample_both(before: Profile, after: Profile) -> Resampled:
-    """Resample two traces at a common even step and filter off their long waves.
+    """Resample two traces at a common even step and filter out their long waves.
 
     Raises
     ------
@@ -157,7 +160,7 @@ def decorrelation_lag(z) -> int:
 
 
 def find_period(before: Profile, after: Profile) -> float:
-    """Find the length [m] after which the first trace resembles itself most."""
+    """Find the lag [m] at which the first trace is most similar to itself."""
     first, _, step, _ = resample_both(before, after)
     correlation = _autocorrelate(first)[: first.size // 2]
     start = min(decorrelation_lag(first), correlation.size - 1)
@@ -175,7 +178,7 @@ def _autocorrelate(z) -> np.ndarray:
 
 
 def _overlapping_lags(count: int, other: int) -> np.ndarray:
-    """Return the lags at which traces of two numbers of samples overlap enough."""
+    """Return the lags at which traces of two lengths in samples overlap enough."""
     lags = np.arange(1 - count, other)
     common = np.minimum(count, other - lags) - np.maximum(0, -lags)
     return lags[common >= MIN_OVERLAP * min(count, other)]
@@ -195,7 +198,7 @@ def _cut_to_valleys(z) -> np.ndarray:
 
 
 def _draw_chance(first, best_score) -> Chance:
-    """Compute the largest Fisher's z, best_score(z), of random traces with the spectrum of the first."""
+    """Compute the largest Fisher's z, best_score(z), for random traces with the first spectrum."""
     random = np.random.default_rng(SEED)
     z = np.array([best_score(_randomize_phases(first, random)) for _ in range(N_RANDOM)])
     return Chance(float(z.mean()), float(z.std(ddof=1)))
@@ -217,7 +220,7 @@ class _Best(NamedTuple):
 
 
 class _ValleySearch:
-    """Correlation of a fixed trace with others at all lags with enough overlap, by Fourier transforms."""
+    """Correlations of a fixed trace with others at all lags with enough overlap, by FFT."""
 
     def __init__(self, count: int, fixed):
         from scipy.fft import next_fast_len, rfft
@@ -259,7 +262,7 @@ class _ValleySearch:
 
 
 class _PartSearch:
-    """Scores of the parts of a trace on a fixed one at the lags, by Fourier transforms."""
+    """Scores of the parts of a trace against a fixed trace at the lags, by FFT."""
 
     def __init__(self, fixed, size: int, lags):
         from scipy.fft import next_fast_len, rfft

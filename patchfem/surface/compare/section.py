@@ -1,4 +1,4 @@
-"""Section through a worn surface: ends of a track, and its sizes with their intervals.
+"""Section through a worn surface: ends of a track, and its dimensions with their intervals.
 
 A trace is a single section; a scan gives several across its track. The ends are places at which the
 worn depth leaves zero: change points between unworn heights and a flank, by profile likelihood.
@@ -16,23 +16,27 @@ from .robust import MAX_NOISE, MAX_OUTLIER, MAX_UNWORN
 
 # fraction of unworn traces in which noise alone is reported as wear
 FALSE_POSITIVE_RATE = 1e-3
-N_TESTS = 4  # tests of each height: by itself, and by means of 4, 16 and 64 samples
+N_TESTS = 4  # number of tests of each height: by itself, and by means of 4, 16 and 64 samples
 # deviance (twice the fall of the log-likelihood) at the bounds of the interval of an end; SIDE^2
 # holds for smooth models, and a change point needs more
 MAX_DEVIANCE = 1.5 * SIDE**2
-MIN_DEEP = 10.0  # standard deviations of the depth at which a flank ends, or to which a cliff falls
+# standard deviations of the depth at which a flank ends, or which a steep edge reaches
+MIN_DEEP = 10.0
 MIN_FLANK_SAMPLES = 12  # samples of a flank, and of the unworn heights beside it
-MAX_CANDIDATES = 160  # samples that are tried as the first worn one, which limits the time
+# largest number of samples that are tried as the first worn one, which limits the time
+MAX_CANDIDATES = 160
 MIN_PILE_UP = 3.0  # standard deviations above the first trace from which a height is pile-up
-# samples between the place where a smooth flank leaves zero and its first worn sample
+# samples between the point where a smooth flank leaves zero and its first worn sample
 OFFSETS = (1 / 3, 2 / 3, 1.0)
-MIN_STEP_DEVIANCE = 12.0  # fall of the deviance from which a flank begins with a step
-MAX_BLOCKS = 8  # blocks of the bootstrap of a mean section; more would not show its slow errors
-N_FIFTHS = 5  # parts of a track, the deepest of which is its floor
+MIN_STEP_DEVIANCE = 12.0  # decrease of the deviance from which a flank begins with a step
+# largest number of bootstrap blocks of a mean section; more would not show its slow errors
+MAX_BLOCKS = 8
+N_FIFTHS = 5  # number of parts of a track; the deepest part is the floor
 MAX_CUT_SAMPLES = 5  # samples between a track and the end of the section, where it may be cut off
-MIN_WORN_FRACTION = 0.85  # fraction of worn heights in a track; worn tops between valleys have less
+# fraction of worn heights in a track; worn tops between valleys have a smaller one
+MIN_WORN_FRACTION = 0.85
 MAX_GAP_FRACTION = 0.05  # unworn gap / width of the track, up to which both sides are one track
-MIN_WAVES_PER_TRACK = 3.0  # length of the shortest track, in longest waves of the band
+MIN_WAVES_PER_TRACK = 3.0  # length of the shortest track / longest wave of the band
 
 _ONE_SIDE = "area above the first trace (before wear) within one track width"
 TEXTS = {
@@ -68,7 +72,7 @@ class Section(NamedTuple):
 
     @property
     def widths(self) -> np.ndarray:
-        """Length (n,) [m] that each sample stands for."""
+        """Length (n,) [m] that each sample represents."""
         return sample_lengths(self.x)
 
     def integrate(self, inside) -> tuple:
@@ -98,7 +102,7 @@ def noise_threshold(count: int, n_tests: int = N_TESTS) -> float:
 
 
 def section_from_depths(x, depth, outside) -> Section:
-    """Make a section whose noise is estimated outside of its track.
+    """Make a section whose noise is estimated outside the track.
 
     Parameters
     ----------
@@ -131,7 +135,7 @@ class FlankEnd(NamedTuple):
 
 
 def sample_lengths(x) -> np.ndarray:
-    """Return the length (n,) [m] that each sample stands for: half of the distances to its neighbours."""
+    """Return the length (n,) [m] of each sample: half of the distances to its neighbours."""
     edges = np.concatenate(
         [[1.5 * x[0] - x[1] / 2], (x[1:] + x[:-1]) / 2, [1.5 * x[-1] - x[-2] / 2]]
     )
@@ -151,7 +155,7 @@ def find_worn_heights(section: Section) -> np.ndarray:
     for window in (4, 16, 64):
         if window > relative.size // 4:
             break
-        # deep heights would lift the means beside them
+        # deep heights would lift the means next to them
         shallow = np.clip(np.where(worn, 0.0, relative), -MAX_OUTLIER, MAX_OUTLIER)
         mean = np.convolve(shallow, np.full(window, 1 / window), "valid")
         for k in np.flatnonzero(mean > threshold * np.sqrt(section.correlation / window)):
@@ -234,7 +238,7 @@ def _outside_deviances(depth, noise) -> np.ndarray:
     squares = np.where(depth < -MIN_PILE_UP * noise, 1.0, (depth / noise) ** 2)
     terms = np.minimum(squares, MAX_NOISE**2) + 2 * np.log(noise)
     sums = np.concatenate([[0.0], np.cumsum(terms)])
-    # the last unworn height counts in full: beside a flank it is no speck
+    # the last unworn height counts in full, because a speck would not be next to a flank
     sums[1:] += np.maximum(squares - MAX_NOISE**2, 0.0)
     return sums
 
@@ -252,13 +256,13 @@ def _flank_deviances(depth, noise) -> np.ndarray:
         t = (samples + offset) / depth.size
         base = np.column_stack([t**power, t ** (power + 1)]) / noise[:, None]
         shape = np.linalg.solve(base.T @ base, base.T @ weighted)
-        if shape[0] < 0:  # the flank would rise out of the surface first
+        if shape[0] < 0:  # the flank would rise above the surface first
             curved = base[:, 1]
             shape = np.array([0.0, max(float(curved @ weighted) / float(curved @ curved), 0.0)])
         residuals.append(float(((weighted - base @ shape) ** 2).sum()))
     base = np.column_stack([np.ones(depth.size), t, t * t]) / noise[:, None]
     shape = np.linalg.lstsq(base, weighted, rcond=None)[0]
-    is_down = shape[0] >= 0  # a step up is pile-up, where no track begins
+    is_down = shape[0] >= 0  # an upward step is pile-up, where no track begins
     residuals.append(float(((weighted - base @ shape) ** 2).sum()) if is_down else np.inf)
     squares = np.array(residuals)
     mean_square = squares / depth.size
@@ -304,7 +308,7 @@ def find_tracks(section: Section, worn, longest: float) -> list:
 
 
 def _max_gap(first: int, last: int) -> float:
-    """Return the longest unworn gap [samples] that is bridged beside a track."""
+    """Return the longest unworn gap [samples] that is bridged next to a track."""
     return max(MAX_GAP_FRACTION * (last - first), MAX_CUT_SAMPLES)
 
 
@@ -364,14 +368,14 @@ def find_flank_ends(depth, noise, correlation: float, first: int, last: int) -> 
 
 
 def _locate_end(x, flank: FlankEnd, name: str) -> Quantity:
-    """Return the place of a flank's beginning; x (n,) [m] is ordered from outside to inside."""
+    """Return the position where a flank begins; x (n,) [m] is ordered from outside to inside."""
     back = (x[0] - x[1]) * flank.offset
     value, *bounds = (float(x[sample] + back) for sample in (flank.first, flank.low, flank.high))
     return Quantity(value, min(bounds), max(bounds), "m", TEXTS[name])
 
 
 def measure_track(section: Section, span: tuple, free: tuple) -> dict:
-    """Measure a track: ends, width, depths, lost area and pile-up, each a `Quantity`.
+    """Measure a track: ends, width, depths, lost area and pile-up, each as a `Quantity`.
 
     Parameters
     ----------
@@ -423,7 +427,7 @@ def measure_track(section: Section, span: tuple, free: tuple) -> dict:
 
 
 def _refuse_cut(values: dict, x, is_cut: tuple) -> dict:
-    """Refuse what a track that leaves the section does not show; the rest is a lower bound."""
+    """Mark quantities as unknown or as lower bounds for a track that leaves the section."""
     ends = [format_length(float(x[k]), 4) for k, is_end in zip((0, -1), is_cut) if is_end]
     why = (
         "the track reaches the end of the common part of the traces at "
@@ -445,7 +449,7 @@ def _refuse_cut(values: dict, x, is_cut: tuple) -> dict:
 
 
 def _measure_pile_up(section: Section, span: tuple, name: str) -> Quantity:
-    """Measure the area above the first surface beside a track, between two places [m]."""
+    """Measure the area above the first surface beside a track, between two positions [m]."""
     near = np.flatnonzero((section.x > span[0]) & (section.x < span[1]))
     inward = near if name == "pile_up_left" else near[::-1]
     outer_edge = None
@@ -494,7 +498,7 @@ def _measure_floor(section: Section, start: float, width: float) -> Quantity:
     error = float(np.var(np.mean(drawn, axis=0)))
     scatter = float(np.mean([floor.scatter for floor in floors]))
     roughness = max(scatter**2 - noise**2, 0.0)
-    # a parabola through n independent values has at most, at its ends, 9 / n times their variance
+    # a parabola through n independent values has at most 9 / n times their variance, which occurs at its ends
     correlated = min(9.0 * section.correlation / deepest[0].size, 1.0)
     value = float(np.mean([floor.depth for floor in floors]))
     return make_quantity(value, float(np.sqrt(error + roughness * correlated)), "m", text, 0.0)

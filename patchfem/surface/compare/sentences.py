@@ -11,13 +11,14 @@ from .compare import Comparison, are_identical
 from .readings import describe_other
 from .reference import describe_bow_area, describe_hidden_wear, describe_reference
 
-MIN_DEPOSITED = 0.05  # deposited / worn area from which material above the first trace is reported
-ROUNDING = 1e-6  # distance of a ratio from 1 that is rounding
+# deposited / worn area; from this ratio on, material above the first trace is reported
+MIN_DEPOSITED = 0.05
+ROUNDING = 1e-6  # distance of a ratio from 1 that is round-off
 SQUARE_UM = 1e12  # um^2 in a m^2
 
 
 def describe_comparisons(parts: list, directions: list) -> list:
-    """Return the sentences of one or two comparisons.
+    """Return the sentences that describe one or two comparisons.
 
     Parameters
     ----------
@@ -41,7 +42,7 @@ def describe_comparisons(parts: list, directions: list) -> list:
 
 
 def describe_ratio_change(ratio: Quantity) -> str:
-    """Return the change that a ratio of after over before shows: reduced, increased, none, or not known."""
+    """Describe the change by a ratio of after to before: reduced, increased, none or unknown."""
     if ratio.value is None:
         return "not known"
     if ratio.high < 1 - ROUNDING:
@@ -50,7 +51,10 @@ def describe_ratio_change(ratio: Quantity) -> str:
 
 
 def compute_confidence(ratio: Quantity) -> float:
-    """Return the confidence [1] at which the interval of a ratio just reaches 1, by its width in the logarithm."""
+    """Return the confidence level at which the interval of a ratio just includes 1.
+
+    It follows from the width of the interval of the logarithm.
+    """
     from scipy.special import ndtr
 
     end = ratio.high if ratio.value < 1 else ratio.low
@@ -66,17 +70,17 @@ def _describe_confidence(ratio: Quantity) -> str:
 
 
 def is_sure(mean: Quantity) -> bool:
-    """Whether a mean depth is known to be above zero."""
+    """Whether a mean depth is significantly above zero."""
     return mean.value is not None and mean.low > 0
 
 
 def is_elsewhere(part: Comparison) -> bool:
-    """Whether two traces have no place in common."""
+    """Whether two traces have no part of the surface in common."""
     return isinstance(part.before, Profile) and part.alignment is None
 
 
 def is_gain(part: Comparison) -> bool:
-    """Whether all heights changed by one factor, and waves or slopes with them."""
+    """Whether a single factor explains all heights and changed waves or slopes."""
     changes = {
         describe_ratio_change(part.ratios.amplitude),
         describe_ratio_change(part.ratios.slope),
@@ -85,7 +89,7 @@ def is_gain(part: Comparison) -> bool:
 
 
 def _describe_traces(part: Comparison, name: str) -> list:
-    """Return what two traces show of wear; name: their direction in words."""
+    """Describe the wear that two traces show; name: their direction in words."""
     out = []
     if part.is_mirrored:
         out.append(
@@ -101,7 +105,7 @@ def _describe_traces(part: Comparison, name: str) -> list:
 
 
 def _describe_wear(part: Comparison, name: str) -> str:
-    """Return a sentence on the worn depth of the second surface, or on why it is not known."""
+    """Describe the worn depth of the second surface, or why it is not known."""
     if are_identical(part.before, part.after):
         return f"Worn depth{name}: none; the heights before and after wear are the same."
     mean = part.worn.mean
@@ -127,7 +131,7 @@ def _describe_wear(part: Comparison, name: str) -> str:
 
 
 def _describe_deposits(part: Comparison) -> str:
-    """Return how much material lies above the first trace, "" for little."""
+    """Describe the material above the first trace, "" if there is little."""
     deposited = part.worn.deposited
     if deposited <= 0 or deposited <= MIN_DEPOSITED * (part.worn.area.value or 0.0):
         return ""
@@ -138,7 +142,7 @@ def _describe_deposits(part: Comparison) -> str:
 
 
 def _describe_extent(part: Comparison) -> str:
-    """Return from where to where a trace is worn that has no track."""
+    """Describe where wear begins and ends in a trace that has no track."""
     before, after = (_format_span(*(end.value for end in ends)) for ends in part.worn.extent[:2])
     text = f" Worn from x = {before} in the first trace (before wear), that is from {after} in the second"
     within = part.worn.within
@@ -148,7 +152,7 @@ def _describe_extent(part: Comparison) -> str:
 
 
 def _describe_datum(part: Comparison) -> list:
-    """Return what the depth counts from, and a bow that was taken out."""
+    """Describe the surface from which the depth is measured, and a bow that was subtracted."""
     if part.alignment is None or not part.reference.kind:
         return []
     out = [describe_reference(part.reference)]
@@ -178,7 +182,7 @@ def _describe_other_tracks(part: Comparison) -> list:
 
 
 def _describe_track(part: Comparison) -> str:
-    """Return the beginning of the sentence on the longest track, "" without a track."""
+    """Begin the sentence on the longest track; "" without a track."""
     if part.flanks is not None:
         span = _format_span(part.flanks.start, part.flanks.end)
         return f"a track from about x = {span} in the second trace (after wear); "
@@ -186,7 +190,7 @@ def _describe_track(part: Comparison) -> str:
 
 
 def _describe_sizes(sizes: dict) -> str:
-    """Return the beginning of a sentence on a track with these sizes, "" without a track."""
+    """Begin a sentence on a track with these dimensions; "" without a track."""
     if not sizes:
         return ""
     start, end = sizes["from"].value, sizes["to"].value
@@ -204,7 +208,7 @@ def _describe_sizes(sizes: dict) -> str:
 
 
 def _describe_remarks(part: Comparison) -> list:
-    """Return remarks: edges that the ratios exclude, and a valley in the second trace alone."""
+    """Describe edges that the ratios exclude, and a valley that only the second trace has."""
     out = []
     if part.tracks.spans or part.flanks is not None:
         out.append("Amplitude and slope are computed without the edges of the track.")
@@ -219,7 +223,7 @@ def _describe_remarks(part: Comparison) -> list:
 
 
 def _describe_waves(part: Comparison, name: str) -> list:
-    """Return how waves and slopes changed."""
+    """Describe how waves and slopes changed."""
     if isinstance(part.before, Areal) and not part.ratios.sizes:
         return [f"Waves{name}: not available; {part.ratios.amplitude.reason}."]
     out = [
@@ -253,7 +257,7 @@ def _describe_slope(ratio: Quantity, name: str) -> str:
 
 
 def _compare_directions(when: str, amplitude: Quantity, slope: Quantity) -> str:
-    """Return how waves and slopes along x differ from those along y."""
+    """Describe how waves and slopes along x differ from those along y."""
     texts = []
     for name, ratio in (("amplitude", amplitude), ("slope", slope)):
         if ratio.value is None:
@@ -269,7 +273,7 @@ def _compare_directions(when: str, amplitude: Quantity, slope: Quantity) -> str:
 
 
 def describe_visible_depth(depth: float) -> str:
-    """Return from which mean depth [m] a track would have been found, as a sentence."""
+    """Describe the mean depth [m] from which a track would have been found."""
     return (
         "A track over the middle third of the common length, with both of its flanks unworn, would have been found "
         f"from a mean depth of {format_length(depth, 2)} on."
@@ -281,7 +285,7 @@ def _format_ratio(ratio: Quantity) -> str:
 
 
 def _format_span(first: float, last: float) -> str:
-    """Return two places [m] as words, both to the last of four digits of the farther one."""
+    """Format two positions [m], both to the fourth digit of the larger one."""
     step = 10.0 ** (np.floor(np.log10(max(abs(first), abs(last), 1e-12))) - 3)
     return " to ".join(
         format_length(float(np.round(place / step)) * step) for place in (first, last)

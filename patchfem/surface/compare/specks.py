@@ -12,9 +12,10 @@ from .section import noise_threshold
 
 N_AROUND = 101  # samples whose height differences give the roughness around a speck
 N_MEDIAN = 41  # samples of the running median from which specks deviate
-MAX_WIDTH = 12  # samples of a speck at half of its height; wider places are features of the surface
-MIN_WALL = 5.0  # height difference at both walls / its robust deviation along the surface
-MIN_OUTSIDE_WALL = 1.5  # same ratio for a height that no wear explains
+MAX_WIDTH = 12  # width of a speck at half height in samples; wider ones are features of the surface
+# height difference at both walls / robust deviation of these differences along the surface
+MIN_WALL = 5.0
+MIN_OUTSIDE_WALL = 1.5  # same ratio at heights that wear cannot explain, so smaller walls suffice
 MAX_DUST_STEPS = 9.0  # height of a dust particle / height difference at its wall
 MAX_DROPOUT_STEPS = 2.0  # depth of a dropout / height difference at its wall
 
@@ -41,9 +42,10 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
     if depth.size < 2 * N_MEDIAN:
         return before, after
     deviation = depth - _running_median(depth)
-    sure = noise_threshold(2 * depth.size, 1)  # each height may be above or below
+    # each height may be above or below, so there are two tests per height
+    sure = noise_threshold(2 * depth.size, 1)
     step = robust_deviation(np.diff(first)) + 1.5 * alignment.noise
-    # a jump is roughness where most neighbours jump, as on a rough floor
+    # a jump is roughness if most of its neighbours jump too, as on a rough floor
     jumps = np.abs(np.diff(depth, append=depth[-1]))
     steps = np.maximum(step, MAD_TO_DEVIATION * median_filter(jumps, N_AROUND, mode="nearest"))
     surfaces = (first, first - depth)
@@ -75,13 +77,13 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
 def _min_wall_step(
     alignment: Alignment, at: int, height: float, step: float, *, is_deep: bool
 ) -> float:
-    """Return the smallest step [m] of both walls that makes a place of a height [m] a speck.
+    """Return the smallest step [m] at both walls from which a height [m] is a speck.
 
     step [m]: robust deviation of the steps of the surface there.
     """
     depth = alignment.depth[at]
     first = alignment.first[at]
-    if not is_deep:  # unworn heights between worn tops are no dust
+    if not is_deep:  # unworn heights between worn tops are not dust
         is_dust = depth < -height / 2
         return max(MIN_OUTSIDE_WALL * step, height / MAX_DUST_STEPS) if is_dust else float("inf")
     near = alignment.first[max(at - N_MEDIAN, 0) : at + N_MEDIAN + 1]

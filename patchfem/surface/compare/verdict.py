@@ -13,7 +13,7 @@ NO_WAVE_CHANGE = "no change detected in the amplitude of the waves"
 
 
 class Judgement(NamedTuple):
-    """What two or four files show.
+    """Comparison of two or four files, and its headline.
 
     parts: `Comparison` of each direction; verdict: headline and sentences; directions: ratios along x
     over those along y before and after (`compare_directions`).
@@ -53,7 +53,7 @@ def compose_verdict(parts: list, directions: list = ()) -> tuple:
 
 
 class _Facts(NamedTuple):
-    """What the rules ask for.
+    """Conditions on which the rules for the headline depend.
 
     parts: list of `Comparison`; waves: change of the waves in words; scan_headline: that of the two
     scans, "" of traces; is_worn: whether a worn depth is shown; is_flatter: whether a slope fell.
@@ -67,7 +67,7 @@ class _Facts(NamedTuple):
 
     @property
     def change(self) -> str:
-        """Verdict on wear and waviness, without place and order of the surfaces."""
+        """Headline on wear and waviness, without place and order of the surfaces."""
         if self.scan_headline and self.waves == "not known":
             is_plain = self.scan_headline in (scans.WORN, scans.NONE)
             return self.scan_headline if is_plain else "waves not known"
@@ -98,7 +98,7 @@ def _has_grown(facts: _Facts) -> bool:
 
 
 def _has_no_place(facts: _Facts) -> bool:
-    """Whether the two surfaces have no place in common."""
+    """Whether the two surfaces have no part in common."""
     return facts.scan_headline == ELSEWHERE or any(is_elsewhere(part) for part in facts.parts)
 
 
@@ -137,7 +137,7 @@ def _find_headline(parts: list) -> str:
 
 
 def _describe_variant(parts: list[Comparison]) -> str:
-    """Return what was mirrored or inverted, "" for nothing."""
+    """Describe what was mirrored or inverted; "" for nothing."""
     if parts[0].change is not None:
         return scans.describe_variant(parts[0].change)
     is_mirrored = any(part.is_mirrored for part in parts)

@@ -29,7 +29,7 @@ from .section import (
     measure_track,
 )
 
-# definitions of the quantities that a user reads
+# definitions of the quantities, which the user reads
 LARGEST_TEXT = "largest worn depth, corrected for noise"
 MEAN_TEXT = "mean worn depth over the common length"
 AREA_TEXT = "worn area of the section, which is the worn volume per unit of width"
@@ -39,17 +39,16 @@ WITHIN_TEXT = (
 )
 END_TEXTS = ("x of the first worn place", "x of the last worn place")
 
-# fraction of the whole lost area of a worn run; the ends of smaller runs are no ends of the wear
+# fraction of the total lost area; the ends of worn runs with less are not ends of the wear
 MIN_AREA_FRACTION = 0.01
-FORM_WAVES = (
-    2.5  # cut-off / longest wave of the band; longer waves of the depth are the form of a track
-)
-MIN_VALLEY = 10.0  # standard deviations of the depth of a new valley below the first trace
-N_BESIDE = 5  # samples beside a track, where the running median may still show the track
+# cut-off / longest wave of the band; longer waves of the depth are the form of a track
+FORM_WAVES = 2.5
+MIN_VALLEY = 10.0  # standard deviations; smallest depth of a new valley below the first trace
+N_BESIDE = 5  # samples next to a track, where the running median may still show the track
 
 
 class Extent(NamedTuple):
-    """First and last worn place.
+    """First and last worn position.
 
     - before, after: both places in x of the first and of the second trace.
     - is_cut: whether each place is an end of the common part, so that the wear may go on there.
@@ -61,7 +60,7 @@ class Extent(NamedTuple):
 
     @property
     def known(self) -> "Extent":
-        """The extent with those places refused at which only the common part ends."""
+        """Extent in which an end is unknown if only the common part of the traces ends there."""
         reason = "the wear reaches the end of the common part of the traces here and may go on"
         sides = []
         for ends in (self.before, self.after):
@@ -92,7 +91,7 @@ class Worn:
 
 
 class Valley(NamedTuple):
-    """Valley that only the second trace has: place [m] and depth [m] below the first trace."""
+    """Valley that only the second trace has: position [m] and depth [m] below the first trace."""
 
     place: float
     depth: float
@@ -140,7 +139,7 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
     area, error = section.integrate(~is_deposit)
     width = section.widths
     length = float(width.sum())
-    # identical heights show no noise; the rounding of the printed digits bounds the error then
+    # identical heights show no noise; then the rounding of the printed digits bounds the error
     rounding = 0.1 * alignment.noise * float(np.sqrt((width**2).sum()))
     error = max(error, rounding)
     area = area if abs(area) > 1e-6 * alignment.noise * length else 0.0
@@ -160,7 +159,7 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
 
 
 def _measure_within(section: Section, start: Quantity, end: Quantity) -> Quantity | None:
-    """Measure the mean worn depth between two places of the second trace; None if they coincide."""
+    """Measure the mean worn depth between two positions; None if they coincide."""
     is_inside = (section.x >= start.value) & (section.x <= end.value)
     width = float(section.widths[is_inside].sum())
     if width == 0:
@@ -172,7 +171,7 @@ def _measure_within(section: Section, start: Quantity, end: Quantity) -> Quantit
 
 
 def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Extent | None:
-    """Find where the wear begins and ends; None if nothing is worn for sure.
+    """Find where the wear begins and ends; None if no wear is significant.
 
     Parameters
     ----------
@@ -242,7 +241,7 @@ def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tr
 
 
 def _name_other(track: dict) -> dict:
-    """Change the definitions of the sizes of a track that is not the longest one."""
+    """Adapt the definitions of the dimensions of a track that is not the longest one."""
     return {
         name: size._replace(text=size.text.replace(" the longest track", " this track"))
         for name, size in track.items()
@@ -252,7 +251,7 @@ def _name_other(track: dict) -> dict:
 def _find_valley(
     alignment: Alignment, section: Section, spans: tuple, longest: float
 ) -> Valley | None:
-    """Find the deepest valley outside of tracks that the first trace does not have."""
+    """Find the deepest valley outside the tracks that the first trace does not have."""
     depth = np.array(section.depth)
     noise = alignment.noise
     for first, last in spans:
@@ -272,7 +271,7 @@ def _find_valley(
 def split_at_tracks(
     alignment: Alignment, tracks: Tracks, longest: float, *, is_flat: bool = False
 ) -> list:
-    """Split aligned traces into pairs of pieces between and within the tracks, without the track edges.
+    """Split aligned traces into pairs of pieces between and within tracks, without track edges.
 
     The steps at the edges have waves of every length. Half of the longest wave on either side, or three
     samples, is left out. If no piece is three waves long, the whole common part is returned.
@@ -307,7 +306,7 @@ def split_at_tracks(
 
 
 def measure_flank_track(flanks: Flanks) -> Tracks:
-    """Measure the sizes of a track below unworn flanks; its ends are known to a part of the trace."""
+    """Measure a track below unworn flanks; its ends are known to within a part of the trace."""
     part = float(flanks.x[-1] - flanks.x[0]) / PARTS
     inside = np.asarray(flanks.depth)[(flanks.x >= flanks.start) & (flanks.x <= flanks.end)]
     fifth = max(inside.size // N_FIFTHS, 1)
@@ -350,7 +349,7 @@ def split_at_flanks(after: Profile, flanks: Flanks, longest: float) -> list:
 
 
 def _split_at_cuts(x, cuts: list, reach: float, longest: float) -> list:
-    """Return the samples (n,) bool of each long piece between the cuts [m], or all if none is long."""
+    """Return the samples (n,) bool of each long piece between the cuts [m]; all if none is long."""
     pieces = []
     for low, high in pairwise([-np.inf, *cuts, np.inf]):
         is_inside = (x > low + reach) & (x < high - reach)
@@ -370,14 +369,17 @@ def measure_flank_wear(flanks: Flanks) -> Worn:
 
 
 def refuse_worn(reason: str, deposited: float = 0.0) -> Worn:
-    """Refuse the worn depth for a reason; deposited [m2]: area above the first trace."""
+    """Return a `Worn` whose depths are unknown for a given reason.
+
+    deposited [m2]: area above the first trace.
+    """
     largest = make_unknown("m", LARGEST_TEXT, reason)
     mean = make_unknown("m", MEAN_TEXT, reason)
     return Worn(largest, mean, make_unknown("m2", AREA_TEXT, reason), deposited)
 
 
 def wear_balance(alignment: Alignment) -> float:
-    """Return (lost - grown) / (lost + grown) area of significant heights; 1 if material was only lost."""
+    """Return (lost - grown) / (lost + grown) area of significant heights; 1 if nothing grew."""
     is_clear = np.abs(alignment.depth) > MAX_NOISE * alignment.noise_at
     clear = np.where(is_clear, alignment.depth, 0.0)
     total = float(np.abs(clear).sum())
