@@ -1,6 +1,6 @@
 """Choice of the engine that sums eq. 2.17, and of its settings, from the tolerance and the cost.
 
-There are two: the recursion, exact for the stretch reading with p = 1 alone, and the list of strips (`list_kernels`)
+There are two: the recursion, exact only for reading="stretch" with p = 1, and the list of strips (`list_kernels`)
 for every law. The list has two settings, the fraction of the friction limit that its cut-off may lose and the width up
 to which it merges strips; `direct`, `truncated` and `merged` say which of them are used. Which one is cheapest depends
 on the law, the strokes and the steps.

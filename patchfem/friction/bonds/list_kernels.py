@@ -298,7 +298,7 @@ def list_energy(increment, bond_list, v0, dt):
 def _integrand(is_energy, increment, bond_list, v0, dt):
     """Return the integrand of the mean over an increment: the energy or the force.
 
-    The force of the printed law is without the initial bonds, whose mean has a closed form.
+    The force for reading="report" is without the initial bonds, whose mean has a closed form.
     """
     if is_energy:
         return list_energy(increment, bond_list, v0, dt)
@@ -311,10 +311,10 @@ def _integrand(is_energy, increment, bond_list, v0, dt):
 def list_mean(increment, bond_list, v0, dt):
     """Return the path-mean force [1] of an increment.
 
-    - Stretch reading, p = 1: closed form, `list_slope`.
-    - Stretch reading, other orders: from the energy balance, so that no step creates energy. Damage takes the part
+    - reading="stretch", p = 1: closed form, `list_slope`.
+    - reading="stretch", other orders: from the energy balance, so that no step creates energy. Damage takes the part
       dR/eps of the stored energy; the mean is the sum of this loss and of the gain of energy over the increment.
-    - Printed law: mean of the force, to which the initial bonds contribute a closed form.
+    - reading="report": mean of the force, to which the initial bonds contribute a closed form.
 
     Parameters
     ----------
@@ -351,7 +351,7 @@ def list_mean(increment, bond_list, v0, dt):
 def _suits_simpson(increment, bond_list):
     """Return whether Simpson's rule is exact enough: a short increment of a smooth force whose first value is known.
 
-    In the stretch reading, and where the initial bonds are spread, an increment that touches the place of the initial
+    For reading="stretch", and where the initial bonds are spread, an increment that touches the place of the initial
     bonds is not: their force may jump there, and its value at the place itself is that of neither side.
     """
     status = bond_list.status

@@ -41,7 +41,7 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
     ----------
     law : Bonds
     reach : float
-        Cut-off in bond lengths of path; in the stretch reading in units of damage.
+        Cut-off in bond lengths of path; for reading="stretch" in units of damage.
     merge : float
         Largest width of a merged strip of age 0 in bond lengths; 0 merges nothing.
     half_width : float

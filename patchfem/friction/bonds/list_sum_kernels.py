@@ -1,7 +1,7 @@
 """Compiled sums over a list of strips of bonds (eq. 2.17): force and stored energy at one relative displacement.
 
-Each form of the sum has a function: `sum_moments` and `sum_powers` for the stretch reading, `sum_printed` and
-`sum_growing` for the printed law; `sum_initial` adds the bonds that were there at the start. The arrays are described
+Each form of the sum has a function: `sum_moments` and `sum_powers` for reading="stretch", `sum_printed` and
+`sum_growing` for reading="report"; `sum_initial` adds the bonds that were there at the start. The arrays are described
 in `list_rows_kernels`. In a strip u is the relative displacement since a bond formed, R the path since then.
 """
 

@@ -78,7 +78,7 @@ def grown_fraction(growth, back):
 def growth_path_ratio(law: Bonds, speed: float) -> float:
     """Return the path on which a new bond grows (eq. 2.10) over its steady length (eq. 2.11), at a speed [m/s].
 
-    With this ratio a, the friction in the report reading is mu (eps/eps_0) G(a; p). Eqs. 2.18 to 2.21 hold for small a,
+    With this ratio a, the friction for reading="report" is mu (eps/eps_0) G(a; p). Eqs. 2.18 to 2.21 hold for small a,
     within 1.5 % up to 0.1 for p = 0 and 1; for a above 1 the friction itself vanishes.
     """
     if not law.grows or speed == 0:
