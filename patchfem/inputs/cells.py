@@ -45,7 +45,9 @@ def read_text(path: Path, contents: str) -> str:
 
 
 def read_line_blocks(path: Path, contents: str, remedy: str = "") -> Iterator[list]:
-    """Yield the lines of a text file in blocks; the last line is empty if the file ends with one.
+    """Yield the lines of a text file in blocks.
+
+    The last line is empty if the file ends with a line break.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ def check_file(path: Path, remedy: str, where: str = "") -> None:
 
 
 def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> list[RequestedChannel]:
-    """Parse requests such as "force=Load cell [lbf]"; a text may contain several, separated by commas.
+    """Parse requests such as "force=Load cell [lbf]", separated by commas.
 
     Raises PatchfemError for a text that is no request, for an unknown quantity or unit, and for a
     quantity that is requested twice.

@@ -33,7 +33,7 @@ class StripRows(NamedTuple):
 
 
 class MomentRows(NamedTuple):
-    """Rows of a strip in the form MOMENTS: centre [m], variance [m2] and scaled weight [m] of its bonds."""
+    """Rows of a strip in the form MOMENTS: centre [m], variance [m2] and scaled weight [m]."""
 
     centre: int = 0
     variance: int = 1
@@ -57,7 +57,10 @@ class PrintedRows(NamedTuple):
 
 
 class GrowingRows(NamedTuple):
-    """Rows of a strip in the form PRINTED_GROWING: scaled starting lengths [m] of the bonds at both Gauss points."""
+    """Rows of a strip in the form PRINTED_GROWING.
+
+    They are the scaled starting lengths [m] of the bonds at both Gauss points.
+    """
 
     length_1: int = 5
     length_2: int = 6

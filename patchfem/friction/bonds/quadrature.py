@@ -1,4 +1,4 @@
-"""Direct sum over all bonds (eq. 2.17) that formed along the path of a point, on a line or in a plane.
+"""Direct sum over all bonds on the path of a point (eq. 2.17), on a line or in a plane.
 
 Each step of the path is one straight strip of bonds that formed at the mean pressure of its ends. In rigid sliding
 all points have the same path, so a strip holds scalars of the path and one pressure per point; `strips` integrates over

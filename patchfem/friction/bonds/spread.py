@@ -1,4 +1,4 @@
-"""Fraction of the weight of a bond across the path (report, 2.15) that a pad of finite width carries.
+"""Fraction of the weight of a bond (report, 2.15) that a pad of finite width carries.
 
 A bond strip spreads its force over W(eta/rho)/rho = exp(-eta^2/(2 rho^2))/(sqrt(2 pi) rho) across the path. Of a pad of
 width b only points on the pad carry it, so the resultant keeps E = (1/b) int_0^b int_0^b W((y - y1)/rho)/rho dy dy1.

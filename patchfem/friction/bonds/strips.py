@@ -266,7 +266,7 @@ def _pieces(state: Strips, rest, law: Bonds) -> tuple:
 
 
 def _distances(state: Strips, at, law: Bonds, seen: tuple, start, wide, touching) -> tuple:
-    """Return distances (n,) [m] of parts of strips from points where the integrand is not smooth.
+    """Return distances (n,) [m] of parts of strips from points with a non-smooth integrand.
 
     The first is to the nearest point of any kind, the second is R at the end of the strip if R = 0 is such a point. Both
     are infinite if there is none. A reversal at an end of the part does not count.

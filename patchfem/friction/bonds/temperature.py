@@ -24,7 +24,7 @@ def growth_at(
     rest_activation: float | None,
     slip_activation: float | None,
 ) -> tuple:
-    """Return a_s [m s-2] and l_k [m] at a surface temperature from those at a reference temperature.
+    """Return a_s [m s-2] and l_k [m] at a surface temperature from those at a reference.
 
     surface [K]: a number, or one per point (m,); reference [K]: temperature of the values `rest` and `slip`. An
     activation [K] of None or 0 leaves its rate as it is. PatchfemError for a temperature that is not above 0 K and for

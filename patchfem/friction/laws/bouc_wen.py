@@ -1,4 +1,4 @@
-"""The Bouc-Wen law (Wen, J. Eng. Mech. Div. ASCE 102, 249, 1976), given by limit and stiffness.
+"""The Bouc-Wen law (Wen, J. Eng. Mech. Div. ASCE 102, 249, 1976).
 
     F = mu N z,    z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)),    eps = mu N/stiffness
 
@@ -19,7 +19,7 @@ PIECES = 10  # number of pieces for the integrals over a stroke
 
 @dataclass(frozen=True, slots=True)
 class BoucWen:
-    """Law object of the Bouc-Wen law: mu [1], eps [m], and n and s of the equation of the module.
+    """Bouc-Wen law object: mu [1], eps [m], and n and s of the equation of the module.
 
     All points of a contact have the same z. The pressure must stay constant. `bouc_wen_kernels` steps
     it.
@@ -78,7 +78,7 @@ class BoucWen:
 
 
 def loop_from_keys(friction, load: float, slide) -> tuple:
-    """Return the force at the reversals [N] and the area [J] of steady loops of the Bouc-Wen law.
+    """Return force at the reversals [N] and area [J] of steady loops of the Bouc-Wen law.
 
     slide: displacement amplitudes [m] of any shape. The tip y is that of a stroke 2 u/eps = int_0^y dv/(1 - (1 - 2 s)
     v^n) + int_0^y dv/(1 - v^n), which Newton's method finds as w = -ln(1 - y). Errors below 1e-12 of force and area to

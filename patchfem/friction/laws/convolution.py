@@ -32,7 +32,7 @@ def _share(order: float, x):
 
 
 def _weights(places, nodes, bare, length: float, order: float) -> np.ndarray:
-    """Return the weights (n, m) of the nodes in the averages at positions (n,), for motion to +x.
+    """Return the weights (n, m) of the nodes in averages at positions (n,), for motion to +x.
 
     bare (m - 1,): segments without pressure, beyond which nothing is averaged.
     """

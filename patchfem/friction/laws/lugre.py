@@ -1,4 +1,4 @@
-"""The LuGre law (Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Autom. Control 40, 419, 1995).
+"""The LuGre law (Canudas de Wit et al., IEEE Trans. Autom. Control 40, 419, 1995).
 
     g(v) = mu_k N + (mu_s - mu_k) N exp(-(v/v_s)^2),   z' = v - stiffness |v| z/g(v),
     F = stiffness z + micro_damping z' + viscous v

@@ -32,7 +32,7 @@ class Slope(NamedTuple):
 
 
 class Slide(NamedTuple):
-    """Straight increment of an element: mean force, its derivatives, stretch at the end, dissipated energy."""
+    """Straight increment of an element: mean force, derivatives, stretch and dissipated energy."""
 
     mean_x: float
     mean_y: float
@@ -43,7 +43,7 @@ class Slide(NamedTuple):
 
 
 class PlaneStep(NamedTuple):
-    """Solved step of an element: increment [m], mean force [N], iterations, below 0 if it failed."""
+    """Solved step of an element: increment [m], mean force [N], iterations (below 0: failed)."""
 
     increment_x: float
     increment_y: float
