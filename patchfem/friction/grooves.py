@@ -1,4 +1,6 @@
-"""Matched grooves: the load climbs their flanks z = A (1 - cos(k q - phase)), slope t = dz/dq = A k sin(k q - phase).
+"""Matched grooves, whose flanks the load climbs.
+
+The height is z = A (1 - cos(k q - phase)), the slope t = dz/dq = A k sin(k q - phase).
 
 Let R be the force normal to the flank and f the friction along it, against the slide. On a flank of angle a, t = tan a,
 the force against the slide and the vertical one are

@@ -11,7 +11,7 @@ import numpy as np
 from ..core import Missing, PatchfemError, frozen_array
 from .units import CHANNEL_UNITS, SI_UNITS, unit_factor
 
-MAX_BYTES = 256 * 2**20  # largest size of a file of records
+MAX_BYTES = 256 * 2**20  # largest size of a file of records [bytes]
 MAX_LISTED = 12  # channels that an error message lists
 _REQUEST = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 

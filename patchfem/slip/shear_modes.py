@@ -30,7 +30,7 @@ SAME_YIELD_TOL = 1e-11
 MAX_SORTS = 2
 # exchanges of neighbours per point, after which points are eliminated one by one; patches need at most 1
 MAX_EXCHANGES = 20
-# number of modes with which a reduction starts; without an interface layer its error is 1e-6 of the friction limit
+# number of modes with which a reduction starts; without a layer of asperities its error is 1e-6 of the friction limit
 SHEAR_MODES = 4
 # smallest number of modes of the reference with which fewer modes are compared
 N_REFERENCE_MODES = 16

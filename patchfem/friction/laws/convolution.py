@@ -1,4 +1,6 @@
-"""The average of the pressure behind a point that the report extends (Oden and Pires, J. Appl. Mech. 50, 67, 1983).
+"""Friction law with an average of the pressure behind a point, which the report extends.
+
+Source: Oden and Pires, J. Appl. Mech. 50, 67, 1983.
 
     tau(x) = mu_s sgn(v) int_0^inf phi_p(s/eps)/eps sigma_n(x - s sgn v) ds,   phi_p as in 2.14
 

@@ -1,4 +1,6 @@
-"""Elastic-plastic element that slides in a plane, compiled: F = k s, |F| <= k w, s' = q' - slip', slip along F.
+"""Elastic-plastic element in a plane, compiled: F = k s, |F| <= k w, s' = q' - slip'.
+
+The slip is along F.
 
 The stretch s (2,) of its spring follows the relative displacement until it reaches the yield slide w; then it stays on
 that circle and turns towards the direction of motion. Along a straight increment, with the angle psi between s and the
