@@ -1,4 +1,6 @@
-"""Matched grooves: the load climbs their flanks z = A (1 - cos(k q - phase)), slope t = dz/dq = A k sin(k q - phase).
+"""Matched grooves, whose flanks the load climbs.
+
+The height is z = A (1 - cos(k q - phase)), the slope t = dz/dq = A k sin(k q - phase).
 
 Let R be the force normal to the flank and f the friction along it, against the slide. On a flank of angle a, t = tan a,
 the force against the slide and the vertical one are
@@ -23,8 +25,13 @@ TERMS = 18  # number of terms of this series; 0.1^18 is round-off
 
 @dataclass(frozen=True, slots=True)
 class Grooves:
-    """Grooves of a wavelength [m] and an amplitude [m], half peak to peak, whose bottom lies at q = phase/k, phase
-    [rad]; lifted_mass [kg] rises with the load; key: of their table in the scene."""
+    """Sinusoidal grooves that match those of the other piece.
+
+    - wavelength, amplitude [m]: the amplitude is half the height from bottom to crest
+    - phase [rad]: the bottom is at the relative displacement q = phase/k
+    - lifted_mass [kg]: mass that rises with the load
+    - key: key of the table of the grooves in the scene
+    """
 
     wavelength: float
     amplitude: float
@@ -43,8 +50,9 @@ class Grooves:
         return self.amplitude * self.wave
 
     def worn(self, depth: float, upper_share: float) -> "Grooves | None":
-        """The grooves after a mean worn depth [m] of both pieces together, of which the upper one lost `upper_share`;
-        None once they are flat.
+        """Return the grooves after a mean worn depth [m] of both pieces; None once they are flat.
+
+        The upper piece lost the fraction `upper_share` of this depth.
 
         Assumed: both pieces carry the grooves; what is worn off a piece comes from above its valleys in proportion to
         the height there, so it keeps a cosine of the same valleys. Above them a piece has the volume A per area, so one
@@ -81,8 +89,10 @@ class Grooves:
         return load * self.wave**2 * self.amplitude
 
     def capacity(self, load: float, friction: float) -> float:
-        """Largest force N (A k + mu)/(1 - mu A k) [N] that the steepest flank holds under a load [N]; infinite where it
-        locks."""
+        """Return the largest force [N] that the steepest flank holds under a load N [N].
+
+        It is N (A k + mu)/(1 - mu A k), or infinite if the flank locks.
+        """
         locks = friction * self.steepest >= 1
         return (
             float("inf")

@@ -1,4 +1,4 @@
-"""Protocol of a friction law: its NumPy form for benches, and its `Element` for compiled engines.
+"""Protocol of a friction law: NumPy form for benches, and `Element` for compiled engines.
 
 A law under a pressure that changes along the path or in time has these methods. None of them changes the state that it
 is given; no traction outlives the contact, and at rest none exceeds mu sigma.
@@ -64,7 +64,7 @@ class LastTraction:
         return Step(traction, np.zeros_like(traction), traction)
 
     def traction(self, state):
-        """Return the traction (m,) [Pa] at the end of the last step, positive against slip towards +x."""
+        """Return the traction (m,) [Pa] at the end of the last step, positive against slip to +x."""
         return state
 
     def stored(self, state):

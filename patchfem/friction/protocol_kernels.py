@@ -1,4 +1,4 @@
-"""Results of the compiled functions of a law (table in `ADDING.md`), and the functions that most laws do not need.
+"""Results of the compiled functions of a law (see `ADDING.md`), and default functions.
 
 A law imports from here what it does not define. Its engines look up every name in the module of the law.
 """
@@ -15,7 +15,7 @@ HAS_SPEED_LAYER = False  # the force of the law changes within a layer of small 
 
 
 class Reading(NamedTuple):
-    """State of a law: force [N], stored energy [J], irreversible part of the relative displacement [m]."""
+    """State of a law: force [N], stored energy [J], irreversible displacement [m]."""
 
     force: float
     stored_energy: float
@@ -40,7 +40,7 @@ class RelaxedStretch(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Force [N], derivative of the stretch over the path in the direction of slip [1], derivatives of the force."""
+    """Force [N], derivative of the stretch along the slip [1], derivatives of the force."""
 
     force: float
     stretch_rate: float

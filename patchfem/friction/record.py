@@ -1,4 +1,4 @@
-"""Law objects from the keys of [friction]; the record of a law in `effects` names its module."""
+"""Law objects from the keys of [friction]; the records in `effects` name their modules."""
 
 from importlib import import_module
 from math import inf

@@ -137,7 +137,7 @@ def _are_distinct(time, poles) -> bool:
 
 
 def _columns(time, poles) -> np.ndarray:
-    """Compute the columns (k, 1 + 2n) of the linear problem: a constant, then cosine and sine of each pole."""
+    """Compute the columns (k, 1 + 2n) of the linear problem: 1, cosine and sine of each pole."""
     columns = [np.ones(time.size)]
     for omega, rate in poles.reshape(-1, 2):
         envelope = np.exp(-np.clip(rate * time, -50.0, 700.0))
@@ -176,7 +176,7 @@ def _refine(time, value, poles) -> _Refined:
 
 
 def _find_starts(time, best: _Refined) -> list:
-    """Return starts (w_r, s_r) at the highest spectral line of the residual, with several decay rates.
+    """Return starting poles (w_r, s_r) at the highest spectral line, with several decay rates.
 
     Lines near a known sinusoid are left out: what it leaves there is no further mode, but a decay that is
     not exponential, which the misfit shows.

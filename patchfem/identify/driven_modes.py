@@ -1,4 +1,4 @@
-"""Modes of one response to a recorded input, fitted to the record itself, where no window widens a peak.
+"""Modes of one response, fitted to the record itself, so no window widens a peak.
 
 x = sum_r A_r h_r * f + L f_-2 + U f + (free decays) + c, with h_r the impulse response of
 q'' + 2 zeta w q' + w^2 q = f, and with the residuals L and U of modes below and above the band as in
@@ -256,7 +256,7 @@ def _add_modes(record: _Record, estimate: Estimate) -> _Fit:
 
 
 def _find_starts(record: _Record, estimate: Estimate, residual) -> list:
-    """Return starts (w, zeta) at the line where the power of the residual follows the input most."""
+    """Return starting modes (w, zeta) at the line where the residual follows the input most."""
     response = estimate_response(
         record.step,
         record.force[record.inner],

@@ -19,7 +19,7 @@ DEFAULT_SEGMENTS = 8  # number of segment lengths in a record, if the user gives
 MIN_SEGMENT = 64  # smallest number of samples in a segment
 # fraction of the largest response; if both ends are below it, the record is a complete transient
 MAX_REST = 1e-2
-MIN_INPUT = 1e-6  # fraction of the largest input power; lines with less input are left out
+MIN_INPUT = 1e-6  # fraction of the largest input power; spectral lines with less are not excited
 MAX_FREQUENCY = 0.8  # fraction of the Nyquist frequency; filters and aliasing disturb higher lines
 # number of spectral lines by which a Hann window widens the average of a segment
 WINDOW_LINES = 1.5

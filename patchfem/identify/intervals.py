@@ -1,4 +1,7 @@
-"""95 % intervals of a least-squares fit: from the Jacobian, or from the profile if the residual is not linear."""
+"""95 % intervals of a least-squares fit, from the Jacobian or from the profile.
+
+The profile is used if the residual is not linear.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Least squares of a residual within bounds: values, 95 % intervals, and what the rows do not determine.
+"""Least squares within bounds: values, 95 % intervals, and undetermined directions.
 
 The search runs in the unit cube of the bounds, in logarithms where they are positive and wide, from several
 starts that are the same in every call. The intervals are those of the linearised problem, with Student's t of

@@ -1,4 +1,4 @@
-"""Modes of a rig, as a scene lists them, from a driven record, a free decay or measured shapes."""
+"""Modes of a rig from a driven record, a free decay or measured shapes, for a scene."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -17,12 +17,12 @@ from .swings import half_swings, sparse_after
 INPUTS = ("force", "base_acceleration")  # quantities of a record that drive the rig
 # quantities whose mode-shape components a user can name
 PLACES = ("slide", "output", "base", "normal", "pitch")
-# part of a damping ratio by which that of the windowed estimate may be larger without a note
+# fraction by which the damping ratio of the windowed estimate may be larger without a note
 MAX_WIDENING = 0.05
 MAX_ERROR_RATIO = 2.0  # half-width of the interval / damping ratio; an amplitude with a wider interval is left out
 # fraction of a driven response that the modes may leave unexplained without a note
 MAX_MISFIT = 0.1
-# part of a free decay that the sinusoids may leave unexplained without a note
+# fraction of a free decay that the sinusoids may leave unexplained without a note
 MAX_DECAY_MISFIT = 0.05
 
 
@@ -49,7 +49,7 @@ class ListedModes:
 
 
 class RecordEstimate(NamedTuple):
-    """Frequency response of a record, its time step [s], and the names of its input and its response."""
+    """Frequency response of a record, time step [s], and names of input and response."""
 
     estimate: Estimate
     step: float
@@ -178,7 +178,10 @@ def _rows_of_force(modes: DrivenModes) -> _Rows:
 
 
 def _rows_of_base(modes: DrivenModes) -> _Rows:
-    """Split each residue, minus the participation times the motion, into factors of the same size."""
+    """Split residues of a base excitation into participation and mode-shape component.
+
+    The residue is minus their product; both factors get the same size.
+    """
     product = -modes.residue
     size = np.sqrt(np.abs(product))
     # the squared participations sum to at most 1

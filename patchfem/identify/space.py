@@ -1,4 +1,4 @@
-"""The bounds of a search as a unit cube, and a residual over this cube that counts its evaluations."""
+"""The bounds of a search as a unit cube, and a residual over it that counts evaluations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Space:
     log: np.ndarray
 
     def values(self, u) -> np.ndarray:
-        """Return the values (n,) at a point u (n,) of the cube; at its ends they are exactly the bounds."""
+        """Return the values (n,) at a point u (n,) of the cube; at its ends, exactly the bounds."""
         u = np.asarray(u, float)
         inside = np.empty(u.size)
         for i, part in enumerate(u):
@@ -91,7 +91,7 @@ def space(low, high, log=None) -> Space:
 
 
 class CubeResidual:
-    """Residual as a function of a point of the unit cube, with counts of evaluations and failures.
+    """Residual as a function of a point of the unit cube; it counts evaluations and failures.
 
     A failure is a PatchfemError, an arithmetic error, or a residual that is not finite; `reason` is the
     first one. An error of type Missing is passed on.
@@ -150,7 +150,7 @@ class CubeResidual:
         return residual
 
     def with_penalty(self, u) -> np.ndarray:
-        """Evaluate the residual (r,); if it fails, return rows that are larger than all others so far."""
+        """Evaluate the residual (r,); if it fails, return rows larger than all others so far."""
         residual = self(u)
         if residual is None:
             return np.full(self.rows, PENALTY * max(self.largest, 1e-300))

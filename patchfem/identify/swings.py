@@ -1,4 +1,4 @@
-"""Half swings of a measured free decay, one after the other, by a sine that is fitted to each.
+"""Half swings of a measured free decay; a sine is fitted to each of them in turn.
 
 A half swing lies between two reversals. About its middle t_k it is a sine beside a mean m of its own. Under dry
 friction it is exactly m + S/2 sin(w (t - t_k)); in a viscous decay the sine has the factor exp(-s (t - t_k)).
@@ -13,7 +13,7 @@ from ..core import PatchfemError
 from ..response.decay_curve import HalfSwings, smooth_slopes
 
 MIN_SAMPLES = 5  # smallest number of samples in a half swing
-# part of a half period and of a half swing; error of a sine fitted to few samples
+# fraction of a half period and of the amplitude; error of a sine that is fitted to few samples
 SINE_ERROR = 3e-5
 # standard deviation / amplitude; a half swing with a larger ratio is lost in the noise
 MAX_NOISE = 0.25
@@ -112,13 +112,13 @@ def _refuse_short_decay(time, middle: float, length: float) -> None:
 
 
 def sparse_after(time, swings: HalfSwings) -> str:
-    """Describe a lack of samples after the last half swing; "" if there is none, or at the end of the record."""
+    """Describe a lack of samples after the last half swing, "" at the end of the record."""
     length = swings.middle[-1] - swings.middle[-2]
     return _describe_sparse(time, float(swings.middle[-1] + length), float(length))
 
 
 def _describe_sparse(time, middle: float, length: float) -> str:
-    """Describe a half cycle with too few samples; "" if it has enough, or reaches beyond the record."""
+    """Describe a half cycle with too few samples; "" if it has enough or exceeds the record."""
     low = middle - length / 2
     high = middle + length / 2
     count = int(np.diff(np.searchsorted(time, (low, high)))[0])
@@ -164,7 +164,10 @@ def _find_first(time, value) -> tuple:
 
 
 def _main_frequency(time, value) -> float:
-    """Return the frequency [Hz] of the highest spectral line; raise PatchfemError if nothing oscillates."""
+    """Return the frequency [Hz] of the highest spectral line.
+
+    Raises PatchfemError if nothing oscillates.
+    """
     n = time.size
     even = np.linspace(time[0], time[-1], n)
     # half of a Hann window gives most weight to the beginning of the decay

@@ -1,4 +1,4 @@
-"""Least squares of an expensive model by way of a cheap one that is corrected to agree with it at a point.
+"""Least squares of an expensive model with a cheap model that is corrected to agree with it.
 
 A cheap model that is multiplied so that it has the value of the expensive one at a point still has other
 slopes. A search with it ends where the residual is orthogonal to the wrong slopes, which is not the least

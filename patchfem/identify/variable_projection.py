@@ -1,4 +1,4 @@
-"""Variable projection: least squares in which most parameters are linear (Golub and Pereyra 1973)."""
+"""Variable projection: least squares with mostly linear parameters (Golub and Pereyra 1973)."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ class Projection(NamedTuple):
     basis: np.ndarray
 
     def jacobian(self, derivatives) -> np.ndarray:
-        """Return the derivatives (k, p) of the residual outside the span of the columns (Kaufman 1975).
+        """Return the Jacobian (k, p) of the residual, projected off the columns (Kaufman 1975).
 
         `derivatives` (k, p) are those of the model over the nonlinear parameters, with constant
         coefficients.
@@ -38,6 +38,6 @@ def project(design, value) -> Projection:
 
 
 def standard_errors(jacobian, rms: float) -> np.ndarray:
-    """Return the standard deviations (p,) of parameters from the root mean square of the residual."""
+    """Return the standard deviations (p,) of parameters from the rms of the residual."""
     variances = np.diag(np.linalg.pinv(jacobian.T @ jacobian))
     return rms * np.sqrt(np.maximum(variances, 0))

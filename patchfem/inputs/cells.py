@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from ..exceptions import Missing, PatchfemError
 
-MAX_BYTES = 64 * 2**20  # largest size of a text file
+MAX_BYTES = 64 * 2**20  # largest size of a text file [bytes]
 BLOCK_BYTES = 2**17  # bytes that are read at a time, so that a long file takes little memory
 MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
 NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -45,7 +45,9 @@ def read_text(path: Path, contents: str) -> str:
 
 
 def read_line_blocks(path: Path, contents: str, remedy: str = "") -> Iterator[list]:
-    """Yield the lines of a text file in blocks; the last line is empty if the file ends with one.
+    """Yield the lines of a text file in blocks.
+
+    The last line is empty if the file ends with a line break.
 
     Parameters
     ----------

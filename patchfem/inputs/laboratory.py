@@ -1,4 +1,4 @@
-"""Records over time from any file of a laboratory: a universal file, a MATLAB file or a table.
+"""Time records from a universal file, a MATLAB file or a table.
 
 The ending decides. A table has a header such as `Time [s],Load cell [lbf]`, with commas, semicolons or
 tabs between the cells. Of a MATLAB file, the user names a variable, a field of a structure or a column of

@@ -1,4 +1,4 @@
-"""A measured friction loop: displacement and force row by row, with time and labels if the table has them."""
+"""A measured friction loop: rows of displacement and force, and optionally time and labels."""
 
 from collections.abc import Container, Mapping
 from dataclasses import dataclass

@@ -5,7 +5,7 @@ import os
 from ..core import PatchfemError
 from . import matlab5, matlab73
 
-MAX_BYTES = 512 * 2**20  # largest size of a file
+MAX_BYTES = 512 * 2**20  # largest size of a file [bytes]
 HDF5 = b"\x89HDF\r\n\x1a\n"  # signature at the beginning of the file, or behind the user block that MATLAB puts there
 
 

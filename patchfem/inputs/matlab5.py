@@ -1,4 +1,6 @@
-"""Arrays of a MATLAB file of version 5 to 7: numbers, sparse matrices, texts, fields of single structures.
+"""Arrays of a MATLAB file of version 5 to 7.
+
+They are numbers, sparse matrices, strings and fields of single structures.
 
 Other content is ignored. Layout: "MAT-File Format", The MathWorks. A file is a list of elements; an
 element is a tag (data type, number of bytes) and its data, padded to eight bytes. A variable is an element

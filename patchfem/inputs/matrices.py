@@ -63,7 +63,7 @@ def read(path, wanted: str) -> Matrix:
 
 
 class Rounding(NamedTuple):
-    """Rounding of a matrix: digits in words, standard deviation of the error of each number (k,)."""
+    """Rounding of a matrix: digits in words, and standard deviation of the errors (k,)."""
 
     digits: str
     deviation: np.ndarray
@@ -167,7 +167,7 @@ def _spread(values, rows: np.ndarray, n: int) -> sparse.csr_array:
 
 
 def _symmetrize(path, values, wanted: str) -> sparse.csr_array:
-    """Check that a matrix is square, real, finite and symmetric up to round-off; make it symmetric."""
+    """Check that a matrix is square, real, finite and nearly symmetric; make it symmetric."""
     values = sparse.csr_array(values)
     if values.ndim != 2 or values.shape[0] != values.shape[1] or not values.shape[0]:
         raise PatchfemError(f"{path}: the {wanted} must be square, not of shape {values.shape}")

@@ -1,4 +1,4 @@
-"""A table of measured responses: frequency, input, acceleration, displacement and a flag per row."""
+"""A table of measured responses: frequency, input, acceleration, displacement and flag."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -36,7 +36,7 @@ class MeasuredRow:
 
 
 def read_table(path: Path) -> list[MeasuredRow]:
-    """Read a table of measured responses, which has a header like ``frequency [Hz],input [g],flag``.
+    """Read a table of measured responses with a header like ``frequency [Hz],input [g],flag``.
 
     Every row has frequency and input; other cells may be empty.
 

@@ -1,4 +1,4 @@
-"""Matrices that Nastran writes: OUTPUT4 files (.op4), in text or binary, and DMIG cards (.pch, .bdf, .dat).
+"""Matrices from Nastran: OUTPUT4 files (.op4) and DMIG cards (.pch, .bdf, .dat).
 
 Layouts: MSC Nastran DMAP and Quick Reference guides, OUTPUT4 and DMIG. An OUTPUT4 matrix is a header
 (columns, rows, form, type, name) and a record for each column (column, first row, words, numbers). First
@@ -92,7 +92,10 @@ def _words_per_number(number_type: int) -> int:
 
 
 def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
-    """Read Fortran records: size, content, size. The first one shows byte order and size of a word."""
+    """Read Fortran records: size, content, size.
+
+    The first record shows the byte order and the size of a word.
+    """
     order = "<" if struct.unpack_from("<i", data)[0] in (24, 48) else ">"
     (size,) = struct.unpack_from(order + "i", data)
     if size not in (24, 48):
@@ -280,7 +283,9 @@ def rank_places(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def read_dmig(path) -> dict[str, DmigMatrix]:
-    """Read the real DMIG matrices of a punch or bulk data file; component 0 is that of a scalar point.
+    """Read the real DMIG matrices of a punch or bulk data file.
+
+    Component 0 is that of a scalar point.
 
     Raises PatchfemError with the line of a card that cannot be read.
     """

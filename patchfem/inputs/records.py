@@ -11,7 +11,7 @@ import numpy as np
 from ..core import Missing, PatchfemError, frozen_array
 from .units import CHANNEL_UNITS, SI_UNITS, unit_factor
 
-MAX_BYTES = 256 * 2**20  # largest size of a file of records
+MAX_BYTES = 256 * 2**20  # largest size of a file of records [bytes]
 MAX_LISTED = 12  # channels that an error message lists
 _REQUEST = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 
@@ -77,7 +77,7 @@ def check_file(path: Path, remedy: str, where: str = "") -> None:
 
 
 def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> list[RequestedChannel]:
-    """Parse requests such as "force=Load cell [lbf]"; a text may contain several, separated by commas.
+    """Parse requests such as "force=Load cell [lbf]", separated by commas.
 
     Raises PatchfemError for a text that is no request, for an unknown quantity or unit, and for a
     quantity that is requested twice.

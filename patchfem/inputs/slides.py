@@ -1,4 +1,4 @@
-"""A prescribed slide from a table of time, displacement and, in two directions, lateral displacement.
+"""A prescribed displacement, along one or two directions, from a table over time.
 
 The slide is linear between the rows. Other columns are ignored.
 """

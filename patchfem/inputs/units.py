@@ -48,7 +48,7 @@ _PER_SECOND = {
 
 
 def normalize_unit(text: str) -> str:
-    """Spell a unit as the tables do: "m/s2", "m s-2" and "m/s²" become "m/s^2", "µm" becomes "um"."""
+    """Spell a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
     text = " ".join(text.split())
     text = _SYNONYMS.get(text.lower(), _SYNONYMS.get(text, text))
     for ending, pattern in _PER_SECOND.items():

@@ -38,7 +38,7 @@ class FunctionType(IntEnum):
 
 
 def read_datasets(path, where: str = "") -> list[dict]:
-    """Read the datasets 55, 58 and 164 of a universal file in their order, as pyuff returns them.
+    """Read the datasets 55, 58 and 164 of a universal file in order, as pyuff returns them.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ SAME_YIELD_TOL = 1e-11
 MAX_SORTS = 2
 # exchanges of neighbours per point, after which points are eliminated one by one; patches need at most 1
 MAX_EXCHANGES = 20
-# number of modes with which a reduction starts; without an interface layer its error is 1e-6 of the friction limit
+# number of modes with which a reduction starts; without a layer of asperities its error is 1e-6 of the friction limit
 SHEAR_MODES = 4
 # smallest number of modes of the reference with which fewer modes are compared
 N_REFERENCE_MODES = 16
@@ -502,7 +502,7 @@ def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
 
 
 def _block(tangential, index) -> np.ndarray:
-    """Return the compliance (a, a) between the points `index` (a,), a view if they are neighbours."""
+    """Return the compliance (a, a) between the points `index` (a,), a view if they are adjacent."""
     if index[-1] - index[0] >= index.size:
         return tangential[np.ix_(index, index)]
     span = slice(index[0], index[-1] + 1)
@@ -510,7 +510,7 @@ def _block(tangential, index) -> np.ndarray:
 
 
 class EigenPairs(NamedTuple):
-    """Eigenvalues (count,), largest first, eigenvectors (n, count) and the largest of their residuals."""
+    """Largest eigenvalues (count,), eigenvectors (n, count), and the largest residual."""
 
     values: np.ndarray
     vectors: np.ndarray
@@ -591,7 +591,9 @@ def fewest_modes(
     weakening: float = 1.0,
     max_modes: int = 64,
 ) -> ShearModes:
-    """Return the fewest modes, at least two, whose backbone agrees with that of four times as many.
+    """Return the fewest modes (at least two) that agree with four times as many.
+
+    Their backbones are compared.
 
     They may differ by MAX_MODE_ERROR of the tolerance; the remainder is left to the modes beyond.
 
@@ -679,7 +681,7 @@ def modes_on_gauss(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
 
 
 def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
-    """Return the positions (count,) and weights (count,) of the Gauss rule of a weighted sum over points.
+    """Return positions and weights (count,) of the Gauss rule for a weighted sum over points.
 
     The rule is exact for polynomials up to the order 2 count - 1. It is found by Lanczos' method, each vector being
     made orthogonal to all before it.

@@ -1,7 +1,7 @@
 """Sum over bonds of eq. 2.17, and its engines.
 
 In: bond parameters, relative displacement and pressure. Out: traction and energies. Read `parameters`, then
-`recursion`, which is exact for the stretch reading with p = 1, then `quadrature`, the direct sum for every order and
+`recursion`, which is exact for reading="stretch" with p = 1, then `quadrature`, the direct sum for every order and
 reading over the `strips` of a path. These are NumPy, along a line and in a plane alike.
 
 Compiled, along a line: `point_kernels` has the recursion, `list_kernels` the sum as one list of strips. `engines`

@@ -1,6 +1,6 @@
-"""Choice of the engine that sums eq. 2.17, and of its settings, from the tolerance and the cost.
+"""Choice of the engine that sums eq. 2.17, and of its settings, by tolerance and cost.
 
-There are two: the recursion, exact for the stretch reading with p = 1 alone, and the list of strips (`list_kernels`)
+There are two: the recursion, exact only for reading="stretch" with p = 1, and the list of strips (`list_kernels`)
 for every law. The list has two settings, the fraction of the friction limit that its cut-off may lose and the width up
 to which it merges strips; `direct`, `truncated` and `merged` say which of them are used. Which one is cheapest depends
 on the law, the strokes and the steps.
@@ -53,11 +53,11 @@ class Choice:
     seconds: float
 
     def reach(self, order: float) -> float:
-        """Return the age [bond lengths] beyond which bonds of this order are dropped; inf if none are."""
+        """Return the age [bond lengths] beyond which bonds are dropped; inf if none are."""
         return cutoff(order, self.tail) if self.tail > 0 else inf
 
     def describe(self) -> str:
-        """Return a line for a plan: engine, length of the list, cost per step, settings and bound of the error."""
+        """Describe engine, list length, cost per step, settings and error bound in a line."""
         if self.engine == "recursion":
             return f"recursion, exact, computing time {1e6 * self.seconds:.2g} us per time step"
         parts = [

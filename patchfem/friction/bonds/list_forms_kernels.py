@@ -1,4 +1,4 @@
-"""Forms of the sum over a list of strips of bonds (eq. 2.17), and the quadrature rules of its strips."""
+"""Forms of the sum over a list of strips of bonds (eq. 2.17), and their quadrature rules."""
 
 MOMENTS = 0.0  # reading="stretch" with p = 1: three moments of the strips, exact
 POWER = 1.0  # reading="stretch" with any order p: two Gauss points per strip

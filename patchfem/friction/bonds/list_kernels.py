@@ -1,4 +1,4 @@
-"""Compiled list of strips of bonds (eq. 2.17): force after an increment, its path mean, and the committed step.
+"""Compiled list of strips of bonds (eq. 2.17): force, mean force and step of an increment.
 
 One list sums eq. 2.17 along a line for every order and reading. Two numbers of `list_numbers.law_numbers` make the
 engines of `accuracy.quadrature` of it: the cut-off that drops old strips (`truncated`), and the width up to which
@@ -89,7 +89,10 @@ class Advance(NamedTuple):
 
 
 class Formation(NamedTuple):
-    """Straight increment [m] on which bonds form under a relative pressure; the reference is that of scaled numbers."""
+    """Straight increment [m] on which bonds form under a relative pressure.
+
+    The reference is that of scaled numbers.
+    """
 
     increment: float
     before: Advance
@@ -99,7 +102,7 @@ class Formation(NamedTuple):
 
 
 class Pieces(NamedTuple):
-    """Number of strips of equal length that an increment is divided into, and number of those before the cut-off."""
+    """Number of strips of equal length in an increment, and of those before the cut-off."""
 
     count: float
     kept: float
@@ -113,7 +116,10 @@ class MeanForce(NamedTuple):
 
 
 class MomentsOfStrip(NamedTuple):
-    """Weight [bond lengths], distance of the centre from the end [bond lengths] and variance [bond lengths squared]."""
+    """Weight, distance of the centre from the end [bond lengths] and variance [bond lengths^2].
+
+    The weight is in bond lengths, too.
+    """
 
     weight: float
     distance: float
@@ -156,7 +162,10 @@ def target_length(before, after, exponent):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _divide(path, eps, growth, law):
-    """Return the number of strips of an increment, for its path [m] in bond lengths eps [m] and its growth J."""
+    """Return the number of strips of an increment.
+
+    It depends on the path [m] in bond lengths eps [m] and on the growth J.
+    """
     count = max(1.0, path / (MAX_STRIP * eps))
     if law[LAW.form] == PRINTED_GROWING:
         limit = (path / law[LAW.length]) ** (1 + min(law[LAW.order], 0.0))
@@ -169,7 +178,10 @@ def _divide(path, eps, growth, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _formed_growing_force(path, before, after, law):
-    """Return the force of the growing bonds that form on an increment, from the clocks before and after it."""
+    """Return the force of the growing bonds that form on an increment.
+
+    It follows from the clocks before and after the increment.
+    """
     growth = after.growth - before[CLOCK.growth]
     target = target_length(before[CLOCK.length], after.length, growth)
     pieces = _divide(path, after.middle_length, growth, law)
@@ -298,7 +310,7 @@ def list_energy(increment, bond_list, v0, dt):
 def _integrand(is_energy, increment, bond_list, v0, dt):
     """Return the integrand of the mean over an increment: the energy or the force.
 
-    The force of the printed law is without the initial bonds, whose mean has a closed form.
+    The force for reading="report" is without the initial bonds, whose mean has a closed form.
     """
     if is_energy:
         return list_energy(increment, bond_list, v0, dt)
@@ -311,10 +323,10 @@ def _integrand(is_energy, increment, bond_list, v0, dt):
 def list_mean(increment, bond_list, v0, dt):
     """Return the path-mean force [1] of an increment.
 
-    - Stretch reading, p = 1: closed form, `list_slope`.
-    - Stretch reading, other orders: from the energy balance, so that no step creates energy. Damage takes the part
+    - reading="stretch", p = 1: closed form, `list_slope`.
+    - reading="stretch", other orders: from the energy balance, so that no step creates energy. Damage takes the part
       dR/eps of the stored energy; the mean is the sum of this loss and of the gain of energy over the increment.
-    - Printed law: mean of the force, to which the initial bonds contribute a closed form.
+    - reading="report": mean of the force, to which the initial bonds contribute a closed form.
 
     Parameters
     ----------
@@ -349,9 +361,11 @@ def list_mean(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _suits_simpson(increment, bond_list):
-    """Return whether Simpson's rule is exact enough: a short increment of a smooth force whose first value is known.
+    """Return whether Simpson's rule is exact enough for an increment.
 
-    In the stretch reading, and where the initial bonds are spread, an increment that touches the place of the initial
+    It must be short, its force smooth, and its first value known.
+
+    For reading="stretch", and where the initial bonds are spread, an increment that touches the place of the initial
     bonds is not: their force may jump there, and its value at the place itself is that of neither side.
     """
     status = bond_list.status
@@ -377,7 +391,10 @@ def _suits_simpson(increment, bond_list):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _needs_energy_balance(increment, bond_list):
-    """Return whether the mean comes from the energy: not for a tiny increment, except across the initial bonds."""
+    """Return whether the mean force is computed from the energy balance.
+
+    It is, except for a tiny increment that does not cross the initial bonds.
+    """
     clocks = bond_list.now
     law = bond_list.law
     start = clocks[CLOCK.displacement]
@@ -404,7 +421,7 @@ def _mean_from_energy(is_short, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _average_by_simpson(is_energy, last, increment, bond_list, v0, dt):
-    """Average the energy or the force over an increment by Simpson's rule, from its value at the end."""
+    """Average energy or force over an increment by Simpson's rule, given the value at the end."""
     first = _first_integrand(is_energy, bond_list)
     middle = _integrand(is_energy, 0.5 * increment, bond_list, v0, 0.5 * dt)
     return (first + 4 * middle + last) / 6
@@ -412,7 +429,10 @@ def _average_by_simpson(is_energy, last, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _average_by_gauss(is_energy, increment, bond_list, v0, dt):
-    """Average the energy or the force over an increment by panels of five Gauss points that double in length."""
+    """Average energy or force over an increment by panels of five Gauss points.
+
+    The panels double in length.
+    """
     path = abs(increment) / bond_list.now[CLOCK.length]
     if path <= MAX_PANEL:
         return _integrate_panel(is_energy, (0.0, 1.0), increment, bond_list, v0, dt)
@@ -619,7 +639,9 @@ def _append(formation, bond_list):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _extend_last_strip(formation, bonds, status):
-    """Extend the last strip by an increment of the same direction and pressure; return whether it could.
+    """Extend the last strip by an increment; return whether this was possible.
+
+    The direction and the pressure of both must agree.
 
     The sum in the form PRINTED is exact for strips of any length.
     """
@@ -642,7 +664,10 @@ def _extend_last_strip(formation, bonds, status):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _write_powers(near, count, formation, p, bonds, k):
-    """Write the damage and the scaled weights of a strip in the form POWER; near: fraction at which it ends."""
+    """Write the damage and the scaled weights of a strip in the form POWER.
+
+    near: fraction of the increment at which the strip ends.
+    """
     increment, before, after, pressure, reference = formation
     damage = after.damage - before.damage
     clock = after.damage - near * damage
@@ -688,7 +713,10 @@ def _write_moments(formation, bonds, k):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _surviving_moments(x):
-    """Return the moments of bonds of constant length that formed on a path x and decay by exp(-x) over it."""
+    """Return the moments of bonds of constant length that survive a path x.
+
+    They form on this path and decay by exp(-x) over it.
+    """
     if x < MAX_SERIES:
         return MomentsOfStrip(
             x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5)))),

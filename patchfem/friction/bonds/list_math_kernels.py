@@ -1,4 +1,4 @@
-"""Functions of one number for the compiled sums over bonds, written so that loops over them run in vector registers.
+"""Functions of a number for the compiled sums over bonds, written for vector registers.
 
 Nothing here branches inside `fexp` and `flog`: a loop that calls them costs 0.5 ns per exponential and 1 ns per power.
 """
@@ -15,7 +15,10 @@ FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 
 @njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)
 def fexp(x):
-    """exp(x) to 2.3e-16 relative for x in [-708, 709], held at exp(-708) below it (Cody-Waite and Taylor)."""
+    """Return exp(x) to 2.3e-16 relative for x in [-708, 709] (Cody-Waite and Taylor).
+
+    Below this range it is exp(-708).
+    """
     x = min(max(x, -708.0), 709.0)
     n = np.floor(x * 1.4426950408889634 + 0.5)
     r = (x - n * 0.693145751953125) - n * 1.4286068203094172e-6
@@ -56,7 +59,10 @@ def flog(x):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def gamma_p(a, x):
-    """Regularised lower incomplete gamma P(a, x), a > 0 (twin: scipy.special.gammainc), to 1e-14."""
+    """Return the regularised lower incomplete gamma function P(a, x), a > 0, to 1e-14.
+
+    Compare `scipy.special.gammainc`.
+    """
     if x <= 0:
         return 0.0
     front = exp(a * log(x) - x - lgamma(a))
@@ -102,7 +108,9 @@ def share(p, x):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def tabled(p, x, table, norm):
-    """P(p + 1, x) from its values `table` (k,) at multiples of 1/32, to 1e-10; exact where x < 1.
+    """Return P(p + 1, x) by interpolation in a table (k,) at multiples of 1/32, to 1e-10.
+
+    It is exact where x < 1.
 
     norm = 1/Gamma(p + 1). The cubic between two nodes has the slopes x^p exp(-x)/Gamma(p + 1); 4 ns.
     """

@@ -33,7 +33,9 @@ MAX_AGE = 200.0  # age in bond lengths beyond which the permitted width no longe
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def merge(bonds, status, clocks, law):
-    """Merge neighbouring strips that are narrower than merge_width eps_0 exp(R/3 eps_0) together.
+    """Merge neighbouring strips that together are narrow for their age.
+
+    The largest width is merge_width eps_0 exp(R/3 eps_0).
 
     Two strips of one pass join end to end. Strips of several passes over the same range become one spread strip, the
     oldest first.
@@ -103,7 +105,7 @@ def _step(bonds, k):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _are_end_to_end(bonds, i, k, width, law):
-    """Return whether two strips lie end to end in one direction and have densities that can be joined."""
+    """Return whether two strips lie end to end in one direction and can be joined by density."""
     form = law[LAW.form]
     if bonds[STRIP.end, i] != bonds[STRIP.start, k] or _step(bonds, i) * _step(bonds, k) <= 0:
         return False

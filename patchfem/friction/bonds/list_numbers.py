@@ -1,4 +1,4 @@
-"""Arrays of a compiled list of bonds: numbers of the law, clocks, status and table (see `list_rows_kernels`)."""
+"""Arrays of a compiled list of bonds: law, clocks, status, table (see `list_rows_kernels`)."""
 
 from math import ceil, gamma
 
@@ -25,7 +25,7 @@ def form_of(law: Bonds) -> float:
 
 
 def cutoff(order: float, tail: float) -> float:
-    """Return the path R/eps [1] beyond which all older bonds carry the fraction `tail` of the friction limit.
+    """Return the path R/eps [1] at which older bonds carry `tail` of the friction limit.
 
     It solves Q(p + 1, R/eps) = tail, with Q the regularised upper incomplete gamma function and p > -1.
     """
@@ -41,7 +41,7 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
     ----------
     law : Bonds
     reach : float
-        Cut-off in bond lengths of path; in the stretch reading in units of damage.
+        Cut-off in bond lengths of path; for reading="stretch" in units of damage.
     merge : float
         Largest width of a merged strip of age 0 in bond lengths; 0 merges nothing.
     half_width : float
@@ -69,7 +69,7 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
 
 
 def _jacobi_rule(power: float) -> np.ndarray:
-    """Return Gauss-Jacobi points in (0, 1), then their weights, for integrals of t^power times a smooth function."""
+    """Return Gauss-Jacobi points in (0, 1), then their weights, for the weight t^power."""
     from scipy.special import roots_jacobi
 
     x, weights = roots_jacobi(N_NODES, 0.0, power)

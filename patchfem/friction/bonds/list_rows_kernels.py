@@ -5,8 +5,8 @@ the array of strips depend on the form of the sum (`list_forms_kernels`): `MOMEN
 known by its moments; `POWER_ROW`, `PRINTED_ROW` and `GROWING_ROW` name what the other forms keep beside the rows of
 `STRIP`.
 
-The clock of a form is the quantity that ages a bond: the damage int dR/eps in the stretch reading, and the path R [m]
-in the printed law. A scaled number is multiplied by exp(clock - reference), so that ageing multiplies the whole sum by
+The clock of a form is the quantity that ages a bond: the damage int dR/eps for reading="stretch", and the path R [m]
+for reading="report". A scaled number is multiplied by exp(clock - reference), so that ageing multiplies the whole sum by
 one number. A relative pressure is divided by the pressure of the friction limit.
 """
 
@@ -33,7 +33,7 @@ class StripRows(NamedTuple):
 
 
 class MomentRows(NamedTuple):
-    """Rows of a strip in the form MOMENTS: centre [m], variance [m2] and scaled weight [m] of its bonds."""
+    """Rows of a strip in the form MOMENTS: centre [m], variance [m2] and scaled weight [m]."""
 
     centre: int = 0
     variance: int = 1
@@ -57,7 +57,10 @@ class PrintedRows(NamedTuple):
 
 
 class GrowingRows(NamedTuple):
-    """Rows of a strip in the form PRINTED_GROWING: scaled starting lengths [m] of the bonds at both Gauss points."""
+    """Rows of a strip in the form PRINTED_GROWING.
+
+    They are the scaled starting lengths [m] of the bonds at both Gauss points.
+    """
 
     length_1: int = 5
     length_2: int = 6

@@ -1,7 +1,7 @@
-"""Compiled sums over a list of strips of bonds (eq. 2.17): force and stored energy at one relative displacement.
+"""Compiled sums over a list of strips of bonds (eq. 2.17): force and stored energy.
 
-Each form of the sum has a function: `sum_moments` and `sum_powers` for the stretch reading, `sum_printed` and
-`sum_growing` for the printed law; `sum_initial` adds the bonds that were there at the start. The arrays are described
+Each form of the sum has a function: `sum_moments` and `sum_powers` for reading="stretch", `sum_printed` and
+`sum_growing` for reading="report"; `sum_initial` adds the bonds that were there at the start. The arrays are described
 in `list_rows_kernels`. In a strip u is the relative displacement since a bond formed, R the path since then.
 """
 
@@ -35,7 +35,7 @@ class BondSum(NamedTuple):
 
 
 class Moments(NamedTuple):
-    """Sums over bonds of the weight, the weight times u and the weight times u^2, of eq. 2.17 with p = 1."""
+    """Sums of weight, weight times u and weight times u^2 over bonds (eq. 2.17 with p = 1)."""
 
     m: float
     z: float
@@ -43,14 +43,14 @@ class Moments(NamedTuple):
 
 
 class Mature(NamedTuple):
-    """Length [m] of mature bonds now, and exp(reference - J), which undoes the scale of the starting lengths."""
+    """Length [m] of mature bonds now, and exp(reference - J), which rescales starting lengths."""
 
     length: float
     scale: float
 
 
 class Range(NamedTuple):
-    """Strips of a list: those from `head` to `first` are spread, those from `first` to `end` have one pass each."""
+    """Strips of a list: spread ones from `head` to `first`, then single passes up to `end`."""
 
     head: int
     first: int
@@ -140,7 +140,10 @@ def _integrate_jacobi(size, slope, nodes, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_power_strip(displacement, bonds, k, p, nodes, is_force):
-    """Integrate |u|^p over a strip near u = 0: each side as a difference of two integrals that begin at u = 0."""
+    """Integrate |u|^p over a strip near u = 0.
+
+    Each side is a difference of two integrals that begin at u = 0.
+    """
     start = bonds[STRIP.start, k]
     end = bonds[STRIP.end, k]
     step = end - start
@@ -191,7 +194,7 @@ def average_spread(displacement, low, high, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_linear_density(displacement, start, end, weights, p):
-    """Sum w |u|^p sgn u and w |u|^(p + 1) over a strip whose density is linear from its start to its end.
+    """Sum w |u|^p sgn u and w |u|^(p + 1) over a strip whose density is linear along it.
 
     Where u has one sign the sums for p = 0 are those of the Gauss points, so nothing jumps as the displacement
     reaches the strip.
@@ -415,7 +418,10 @@ def sum_printed(displacement, path, bonds, strips, law, table):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_lever(p, x, gamma_p, inverse_gamma):
-    """Integrate y phi(y) from 0 to x: (p + 1) P(p + 1, x) - x phi(x), with gamma_p = P(p + 1, x)."""
+    """Return the integral of y phi(y) from 0 to x: (p + 1) P(p + 1, x) - x phi(x).
+
+    gamma_p is P(p + 1, x).
+    """
     if x <= 0:
         return 0.0
     return (p + 1) * gamma_p - inverse_gamma * fexp((p + 1) * flog(x) - x)
@@ -423,7 +429,10 @@ def _integrate_lever(p, x, gamma_p, inverse_gamma):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _sum_gauss_growing(displacement, path, mature, bonds, first, end, p):
-    """Sum W/2 f(R/length) sgn u, and the same times |u|, over both Gauss points of strips of growing bonds."""
+    """Sum W/2 f(R/length) sgn u, and this times |u|, over strips of growing bonds.
+
+    Each strip has two Gauss points.
+    """
     force = 0.0
     energy = 0.0
     min_length = MIN_LENGTH * mature.length
@@ -472,7 +481,7 @@ def _sum_gauss_growing(displacement, path, mature, bonds, first, end, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_length(fraction, length_1, length_2):
-    """Interpolate the scaled length that the bonds of a strip started with, log-linearly between its Gauss points.
+    """Interpolate the scaled starting length of bonds log-linearly between the Gauss points.
 
     Parameters
     ----------
@@ -500,7 +509,7 @@ def _bond_length(fraction, mature, bonds, k):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _is_steep(p):
-    """Return whether R^p is singular at R = 0, or curves too sharply there, for two Gauss points in R."""
+    """Return whether two Gauss points do not suffice for R^p, which is too steep near R = 0."""
     return p < 2 and p != np.floor(p)
 
 

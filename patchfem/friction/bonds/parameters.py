@@ -76,9 +76,9 @@ def grown_fraction(growth, back):
 
 
 def growth_path_ratio(law: Bonds, speed: float) -> float:
-    """Return the path on which a new bond grows (eq. 2.10) over its steady length (eq. 2.11), at a speed [m/s].
+    """Return the growth path of a new bond (2.10) / its steady length (2.11) at a speed [m/s].
 
-    With this ratio a, the friction in the report reading is mu (eps/eps_0) G(a; p). Eqs. 2.18 to 2.21 hold for small a,
+    With this ratio a, the friction for reading="report" is mu (eps/eps_0) G(a; p). Eqs. 2.18 to 2.21 hold for small a,
     within 1.5 % up to 0.1 for p = 0 and 1; for a above 1 the friction itself vanishes.
     """
     if not law.grows or speed == 0:
@@ -90,7 +90,9 @@ def growth_path_ratio(law: Bonds, speed: float) -> float:
 
 
 def elastic_part(law: Bonds, play, increment, eps) -> ElasticSplit:
-    """Split an increment by the play operator (Visintin, Differential Models of Hysteresis, 1994).
+    """Split an increment by the play operator.
+
+    Source: Visintin, Differential Models of Hysteresis, 1994.
 
     The play says where the displacement stands in its elastic range, of half width breakaway eps: -1 and 1 at the ends.
     Inside, bonds stretch, and none breaks or forms; the play keeps its value if the width changes with eps. At an end
@@ -124,7 +126,7 @@ def _integrate_slowness(speed: float, floor: float) -> float:
 
 
 def growth_exponents(law: Bonds, v0: float, v1: float, increment: float, dt: float) -> tuple:
-    """Integrate a_s/max(|v|, v_h) and |v|/l_k over a step, exactly for a velocity linear in time.
+    """Integrate a_s/max(|v|, v_h) and |v|/l_k over a step, exactly for a linear velocity.
 
     Parameters
     ----------
@@ -152,7 +154,7 @@ def growth_exponents(law: Bonds, v0: float, v1: float, increment: float, dt: flo
 
 
 def grow(law: Bonds, eps, v0: float, v1: float, increment: float, dt: float):
-    """Return the bond length after a step (eq. 2.10): it relaxes towards (A eps_0 + B eps_k)/(A + B).
+    """Return the bond length after a step (2.10), which tends to (A eps_0 + B eps_k)/(A + B).
 
     A and B are the exponents of `growth_exponents`. At rest the bonds heal; a step without motion and time changes
     nothing.

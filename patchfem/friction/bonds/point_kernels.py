@@ -32,7 +32,10 @@ class ShapeFunctions(NamedTuple):
 
 
 class BondStep(NamedTuple):
-    """Sums m, z, s2 over the bonds after an increment; integral of s2 dR/eps, of which mu_s/(2 eps_0) is dissipated."""
+    """Sums m, z, s2 over the bonds after an increment, and the integral of s2 dR/eps.
+
+    mu_s/(2 eps_0) times this integral is dissipated.
+    """
 
     m: float
     z: float
@@ -69,7 +72,7 @@ def _short_shape_functions(x):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _integrate_powers(x, decay):
-    """Return the integrals from 0 to x of y exp(-y) and of y^2 exp(-y), and the integral of the latter."""
+    """Return the integrals of y exp(-y) and y^2 exp(-y) from 0 to x, and that of the latter."""
     if x < MAX_SHORT:
         return _integrate_short_powers(x, decay)
     return _powers_from_cubic(x, decay, 6 - decay * (x * x * x + 3 * x * x + 6 * x + 6))
@@ -196,7 +199,7 @@ def _step_bonds(bonds, increment, sigma, eps, shapes, powers):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _split_elastic(play, increment, half):
-    """Return the elastic part of an increment and the play after it; `parameters.elastic_part` for one point."""
+    """Return the elastic part of an increment and the play after it (`parameters.elastic_part`)."""
     start = play * half
     end = start + increment
     if end >= half:

@@ -1,19 +1,20 @@
-"""Eq. 2.17 in full: the shear of a point is the sum over the bonds that formed along its path, on a line or in a plane.
+"""Direct sum over all bonds on the path of a point (eq. 2.17), on a line or in a plane.
 
-Each step of the path is one straight strip of bonds that formed at the mean pressure of its ends. In a rigid slide all
-points share the path, so a strip holds scalars of the path and one pressure per point; `strips` integrates over them.
-A line is a plane with one component: places, directions and tractions have d = 1 or 2 components throughout.
+Each step of the path is one straight strip of bonds that formed at the mean pressure of its ends. In rigid sliding
+all points have the same path, so a strip holds scalars of the path and one pressure per point; `strips` integrates over
+them. A line is a plane with one component: positions, directions and tractions have d = 1 or 2 components throughout.
 
-Readings. `report` is 2.14-2.17 as printed: (R/eps)^p exp(-R/eps) against the direction u/|u| of the displacement since
-the bond formed, every bond growing its own length from zero (2.10); the path element is |v| dt, not the signed dX1 of
-the print. `stretch` keeps stretch apart from damage: (|u|/eps)^p exp(-int dR/eps), eps in the power frozen when the
-bond forms; it agrees with the print on every path without a turn and never creates energy for p >= 0.
+Readings (`Bonds.reading`). "report" is eqs. 2.14-2.17 as printed there: (R/eps)^p exp(-R/eps) against the direction
+u/|u| of the displacement since the bond formed, every bond growing its own length from zero (2.10); the path element is
+|v| dt, not the signed dX1 of the print. "stretch" separates stretch from damage: (|u|/eps)^p exp(-int dR/eps), eps in
+the power frozen when the bond forms; it agrees with "report" on every path without a reversal and never creates energy
+for p >= 0.
 
 Bonds older than `cutoff` bond lengths of path are left out; what they could carry is at most `tail` of mu_s sigma.
 
-Energy. A bond stores what it gives back when its stretch goes to zero at the damage of the moment: f u/(p + 1) in the
-stretch reading, f u in the print, whose force does not depend on how far it is stretched. What a step dissipates is its
-work less the gain of that store; the print makes it negative at times, which is energy created.
+Energy. A bond stores what it gives back when its stretch goes to zero at the current damage: f u/(p + 1) for "stretch",
+f u for "report", whose force does not depend on the stretch. The dissipated energy of a step is its work minus the gain
+in stored energy; for "report" it is sometimes negative, which means that energy is created.
 
 Compiled form, along a line: `list_kernels`.
 """
@@ -72,8 +73,8 @@ class Quadrature:
     def step(self, state: Strips, dq, s0, s1, dt: float) -> Step:
         """Advance by a straight increment dq [m] in dt [s]; pressure from s0 to s1 (m,) [Pa].
 
-        The mean traction is exact for p = 1 stretch. Otherwise it comes from five Gauss points, and its part along the
-        increment in the stretch reading from the energy, so that no step creates any.
+        The mean traction is exact for reading="stretch" and p = 1. Otherwise it comes from five Gauss points. For
+        reading="stretch" its component along the increment comes from the energy, so no step creates energy.
         """
         dq = np.atleast_1d(np.asarray(dq, float))
         after = self.carried(state, dq, s0, s1, dt)
@@ -141,8 +142,9 @@ class Quadrature:
 
         The mean of the Step is the traction after it.
 
-        As printed, a bond keeps the pressure it formed under and none forms at rest. In the stretch reading with p = 1
-        the rule is that of `recursion.press_bonds`; with another order the last-formed bonds are let go first, one by one.
+        For reading="report" a bond keeps the pressure at which it formed, and none forms at rest. For reading="stretch"
+        and p = 1 the rule is that of `recursion.press_bonds`; with another order the last-formed bonds are lost first,
+        one by one.
         """
         after = replace(state, alive=np.where(s1 > 0, state.alive, len(state.q)))
         if self.law.reading == "stretch":

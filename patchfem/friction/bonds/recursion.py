@@ -59,7 +59,10 @@ class BondState(NamedTuple):
 
 
 class ShapeFunctions(NamedTuple):
-    """Shape functions f1 = (1 - exp(-x))/x, f2 = (1 - f1)/x and decay = exp(-x) of a path x in bond lengths."""
+    """Shape functions f1 = (1 - exp(-x))/x, f2 = (1 - f1)/x and decay = exp(-x).
+
+    x is a path in bond lengths.
+    """
 
     f1: np.ndarray
     f2: np.ndarray
@@ -113,7 +116,7 @@ def shape_functions(x) -> ShapeFunctions:
 
 
 def integrate_powers(x, decay) -> PowerIntegrals:
-    """Return the integrals of y exp(-y) and y^2 exp(-y) for x >= 0 of any shape and decay = exp(-x)."""
+    """Return the integrals of y exp(-y) and y^2 exp(-y) for x >= 0 and decay = exp(-x)."""
     series = sum((-1) ** k * x**k / (factorial(k) * (k + 4)) for k in range(13))
     closed = 6 - decay * (x**3 + 3 * x * x + 6 * x + 6)
     cubic = np.where(x < MAX_POWER_SERIES, x**4 * series, closed)
@@ -122,7 +125,7 @@ def integrate_powers(x, decay) -> PowerIntegrals:
 
 
 def direction(increment) -> tuple:
-    """Return the length [m] and the unit vector (d,) of an increment (d,) [m]; the vector is 0 without motion."""
+    """Return the length [m] and the unit vector (d,) of an increment (d,) [m]; 0 if it is zero."""
     path = float(abs(increment[0]) if len(increment) == 1 else np.hypot(*increment))
     if path > 0:
         return path, np.asarray(increment, float) / path
@@ -251,7 +254,7 @@ def press_bonds(law: Bonds, bonds, s0, s1):
 
 
 def refuse_directions(law: Bonds, directions: int) -> None:
-    """Raise PatchfemError for a law with breakaway in a plane, where its elastic range is not defined."""
+    """Raise PatchfemError for a law with breakaway in a plane, where it is not defined."""
     if directions > 1 and law.breakaway:
         raise PatchfemError(not_supported_message("breakaway in two directions", "elastic range"))
 
@@ -332,7 +335,7 @@ class Recursion:
         return Step(scale * bonds[1], released, state._replace(bonds=bonds))
 
     def traction(self, state: BondState):
-        """Return the traction mu_s z/eps_0 [Pa], positive against slip: (m,) along a line, (2, m) in a plane."""
+        """Return the traction mu_s z/eps_0 [Pa], positive against slip: (m,) or, in a plane, (2, m)."""
         z = state.bonds[1] if len(state.bonds) == 3 else state.bonds[1:-1]
         return self.law.static / self.law.length * z
 

@@ -1,4 +1,4 @@
-"""The weight of a bond across the path (report, 2.15) on a line contact: what a pad of finite width leaves of it.
+"""Fraction of the weight of a bond (report, 2.15) that a pad of finite width carries.
 
 A bond strip spreads its force over W(eta/rho)/rho = exp(-eta^2/(2 rho^2))/(sqrt(2 pi) rho) across the path. Of a pad of
 width b only points on the pad carry it, so the resultant keeps E = (1/b) int_0^b int_0^b W((y - y1)/rho)/rho dy dy1.
@@ -9,8 +9,10 @@ from math import erf, expm1, pi, sqrt
 
 
 def pad_factor(width: float, spread: float) -> float:
-    """E = erf(x/sqrt 2) - sqrt(2/pi) (1 - exp(-x^2/2))/x [1], x = b/rho, of a pad b = `width` [m] wide under the spread
-    rho [m]; the pressure is uniform across the path.
+    """Return the fraction of the friction force that a pad of finite width carries.
+
+    E = erf(x/sqrt 2) - sqrt(2/pi) (1 - exp(-x^2/2))/x [1] with x = b/rho, for a pad of width b [m] and a spread rho [m] of
+    the bonds; the pressure is uniform across the path.
     """
     x = width / spread
     if x < 1e-8:

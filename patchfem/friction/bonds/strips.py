@@ -1,4 +1,4 @@
-"""Sums over one straight strip of bonds (eq. 2.17): what it carries and what it stores, on a line or in a plane.
+"""Force and stored energy of straight strips of bonds (eq. 2.17), on a line or in a plane.
 
 Along a strip the stretch is u = a + y e, y behind its end, and R = near + y. Strips are integrated
 
@@ -9,8 +9,8 @@ Along a strip the stretch is u = a + y e, y behind its end, and R = near + y. St
   R^p, with that power as their weight; by three points on strips ten times shorter than that distance and than a bond
   length.
 
-Not smooth are: in the stretch reading |u|^p for a fractional p; off the line of the strip the direction u/|u|; in the
-print R^p for a fractional p, whatever the bonds grew.
+Not smooth are: |u|^p for a fractional p (reading="stretch"); the direction u/|u| off the line of the strip; and R^p for
+a fractional p, whether the bonds grow or not (reading="report").
 """
 
 from dataclasses import dataclass
@@ -209,8 +209,11 @@ def _own(state: Strips, at, back, law: Bonds):
 
 
 def _pieces(state: Strips, rest, law: Bonds) -> tuple:
-    """Pieces of the strips `rest`: (number in `rest`, start behind the end, length [m], which end they are steep at as
-    the power p of the distance: 1 the start, -1 the far one, 0 neither, whether they are slight), each (n,)."""
+    """Divide the strips `rest` into pieces for the Gauss rule.
+
+    Returns arrays (n,): index in `rest`, start [m] behind the end of the strip, length [m], end at which the integrand is
+    steep as the power p of the distance (1 start, -1 far end, 0 neither), and whether three Gauss points suffice.
+    """
     before, aside = _seen(state, rest)
     h, eps, straight = state.length[rest], state.eps[rest], aside == 0
     turn = np.where(straight, np.clip(-before, 0.0, h), 0.0)
@@ -263,8 +266,11 @@ def _pieces(state: Strips, rest, law: Bonds) -> tuple:
 
 
 def _distances(state: Strips, at, law: Bonds, seen: tuple, start, wide, touching) -> tuple:
-    """(distance of a part from the nearest place where its integrand is not smooth, R at its strip's end where R = 0 is
-    such a place) [m], each (n,), infinite where there is none; a turn that bounds the part is none."""
+    """Return distances (n,) [m] of parts of strips from points with a non-smooth integrand.
+
+    The first is to the nearest point of any kind, the second is R at the end of the strip if R = 0 is such a point. Both
+    are infinite if there is none. A reversal at an end of the part does not count.
+    """
     (before, aside), fractional = seen, law.order != int(law.order)
     gap = np.maximum(np.maximum(-before - start - wide, start + before), 0.0)
     smooth = touching | ((aside == 0) & (law.reading == "report" or not fractional))

@@ -24,10 +24,11 @@ def growth_at(
     rest_activation: float | None,
     slip_activation: float | None,
 ) -> tuple:
-    """(a_s [m s-2], l_k [m]) at `surface` [K], a number or one per point (m,), from their values at `reference` [K].
+    """Return a_s [m s-2] and l_k [m] at a surface temperature from those at a reference.
 
-    An activation [K] of None or 0 leaves its rate as it is. PatchfemError for a temperature that is not above 0 K and
-    for a rate that leaves the range of floating-point numbers.
+    surface [K]: a number, or one per point (m,); reference [K]: temperature of the values `rest` and `slip`. An
+    activation [K] of None or 0 leaves its rate as it is. PatchfemError for a temperature that is not above 0 K and for
+    a rate that leaves the range of floating-point numbers.
     """
     surface = np.asarray(surface, float)
     if not (surface > 0).all() or not np.isfinite(surface).all() or not reference > 0:
@@ -56,9 +57,9 @@ def _scaled(name: str, value: float, exponent, key: str):
 
 
 def surface_rise(flux: float, time: float, conductivity: float, capacity: float) -> float:
-    """Rise [K] of the face of a half-space that takes the heat `flux` [W/m2] from time 0 on: 2 q sqrt(t/(pi k rho c)).
+    """Return the temperature rise [K] of the surface of a half-space under a constant heat flux.
 
-    conductivity k [W m-1 K-1], capacity rho c [J m-3 K-1] (Carslaw and Jaeger, 2.9). One-dimensional: an upper bound
-    for a patch that is small against sqrt(k t/(rho c)).
+    It is 2 q sqrt(t/(pi k rho c)) for a flux q [W/m2] from time 0 on. conductivity k [W m-1 K-1], capacity rho c [J m-3
+    K-1] (Carslaw and Jaeger, 2.9). One-dimensional: an upper bound for a patch that is small against sqrt(k t/(rho c)).
     """
     return 2 * flux * sqrt(time / (pi * conductivity * capacity))

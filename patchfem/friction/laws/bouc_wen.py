@@ -1,9 +1,9 @@
-"""The Bouc-Wen law (Wen, J. Eng. Mech. Div. ASCE 102, 249, 1976) with its limit mu N and its first slope as numbers.
+"""The Bouc-Wen law (Wen, J. Eng. Mech. Div. ASCE 102, 249, 1976).
 
     F = mu N z,    z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)),    eps = mu N/stiffness
 
-n is the sharpness of the knee, s the share of the two terms: on unloading the slope over the first one is 1 - (1 - 2 s)
-|z|^n, so it rests on the elastic line for s = 1/2. n = 1, s = 1 is eq. 2.17 in the stretch reading. With the energy of
+n is the sharpness of the knee, s weights the two terms: on unloading the slope over the first one is 1 - (1 - 2 s)
+|z|^n, so it rests on the elastic line for s = 1/2. n = 1, s = 1 is eq. 2.17 with reading="stretch". With the energy of
 the spring, F^2/(2 stiffness), no step creates energy where s >= 1/2; below that unloading gives back more than it.
 """
 
@@ -19,9 +19,9 @@ PIECES = 10  # number of pieces for the integrals over a stroke
 
 @dataclass(frozen=True, slots=True)
 class BoucWen:
-    """The Bouc-Wen law as a law object: mu [1], eps [m], exponent n and shape s of the module's equation.
+    """Bouc-Wen law object: mu [1], eps [m], and n and s of the equation of the module.
 
-    All points of a contact share z, as all share the slide. The pressure must stay constant. `bouc_wen_kernels` steps
+    All points of a contact have the same z. The pressure must stay constant. `bouc_wen_kernels` steps
     it.
     """
 
@@ -44,9 +44,11 @@ class BoucWen:
         )
 
     def stroke(self, w) -> tuple:
-        """(slide [eps], its slope over w, area [mu N eps]) of a stroke between the tips -y and y, w = -ln(1 - y) (...).
+        """Return displacement [eps], its derivative over w, and area [mu N eps] of a stroke.
 
-        The area is int v (1/(1 - v^n) - 1/(1 - g v^n)) dv, g = 1 - 2 s: what loading takes more than unloading.
+        The stroke goes from -y to y, with w = -ln(1 - y) of any shape.
+
+        The area is int v (1/(1 - v^n) - 1/(1 - g v^n)) dv, g = 1 - 2 s: the excess of loading over unloading.
         """
         edges = np.linspace(0.0, 1.0, PIECES + 1)
         half = np.diff(edges)[:, None] / 2
@@ -76,11 +78,11 @@ class BoucWen:
 
 
 def loop_from_keys(friction, load: float, slide) -> tuple:
-    """(force at the turns [N], area [J]) of the steady loops of the law of a [friction] table at amplitudes of the
-    slide [m], (...) or a number.
+    """Return force at the reversals [N] and area [J] of steady loops of the Bouc-Wen law.
 
-    The tip y is that of a stroke 2 u/eps = int_0^y dv/(1 - (1 - 2 s) v^n) + int_0^y dv/(1 - v^n), which Newton's method
-    finds as w = -ln(1 - y). Errors below 1e-12 of force and area to an exponent of 8, 1e-9 to one of 50.
+    slide: displacement amplitudes [m] of any shape. The tip y is that of a stroke 2 u/eps = int_0^y dv/(1 - (1 - 2 s)
+    v^n) + int_0^y dv/(1 - v^n), which Newton's method finds as w = -ln(1 - y). Errors below 1e-12 of force and area to
+    an exponent of 8, 1e-9 to one of 50.
     """
     one, limit = from_keys(friction, load), friction.static * load
     wanted = 2 * np.asarray(slide, float) / one.length
@@ -95,7 +97,9 @@ def loop_from_keys(friction, load: float, slide) -> tuple:
 
 
 def from_keys(friction, load: float) -> BoucWen:
-    """The Bouc-Wen law of a [friction] table: eps = mu N/stiffness under a load N [N] of the whole contact, 1 N where
-    it is 0."""
+    """Return the Bouc-Wen law of a [friction] table under a load N [N] of the whole contact.
+
+    eps = mu N/stiffness; a load of 0 counts as 1 N.
+    """
     length = friction.static * (load or 1.0) / friction.stiffness
     return BoucWen(friction.static, length, friction.exponent, friction.shape)

@@ -33,7 +33,10 @@ MAX_NEWTON = 40  # iterations of Newton's method
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _loading_rate(w, n):
-    """Return dw/dx = (1 - y^n)/(1 - y) of w = -ln(1 - y); for a whole n up to 8 it is 1 + y + ... + y^(n - 1)."""
+    """Return dw/dx = (1 - y^n)/(1 - y) of w = -ln(1 - y).
+
+    For an integer n up to 8 it is 1 + y + ... + y^(n - 1).
+    """
     if n % 1 == 0 and n <= 8:
         y = -expm1(-w)
         total = 1.0
@@ -178,13 +181,18 @@ def rate_equation(numbers, stretch, velocity, direction):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _knee_rate(u, n, s):
-    """Return dw/dx at u = 1 - y, between 1/2 and n, so that a Runge-Kutta step of any length is stable."""
+    """Return dw/dx at u = 1 - y, which is between 1/2 and n.
+
+    A Runge-Kutta step of any length is therefore stable.
+    """
     return n * (1 - 0.5 * (n - 1) * u) if u < 1e-5 else _slope(1 - u, n, s) / u
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _follow_knee(u, x, n, s):
-    """Return u = 1 - y after a path x by a Runge-Kutta step of order 4 in w, and the integral of u by Simpson's rule.
+    """Return u = 1 - y after a path x, and the integral of u, near the limit.
+
+    A Runge-Kutta step of order 4 in w gives u, and Simpson's rule the integral.
 
     The integral over u is that of one over the rate of w.
     """
@@ -199,7 +207,9 @@ def _follow_knee(u, x, n, s):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def integrate_stretch(numbers, stretch, mean_square, increment, direction):
-    """Return the stretch after an increment of any length: exact for n = 1 on loading, otherwise of order 4.
+    """Return the stretch after an increment of any length, to order 4.
+
+    It is exact for n = 1 on loading.
 
     Returns
     -------

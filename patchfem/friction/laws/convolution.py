@@ -1,4 +1,6 @@
-"""The average of the pressure behind a point that the report extends (Oden and Pires, J. Appl. Mech. 50, 67, 1983).
+"""Friction law with an average of the pressure behind a point, which the report extends.
+
+Source: Oden and Pires, J. Appl. Mech. 50, 67, 1983.
 
     tau(x) = mu_s sgn(v) int_0^inf phi_p(s/eps)/eps sigma_n(x - s sgn v) ds,   phi_p as in 2.14
 
@@ -32,15 +34,17 @@ def _share(order: float, x):
 
 
 def _weights(places, nodes, bare, length: float, order: float) -> np.ndarray:
-    """(n, m) weights of the nodes in the averages at places (n,) for motion towards +x; bare (m - 1,): segments without
-    pressure, beyond which nothing is averaged."""
+    """Return the weights (n, m) of the nodes in averages at positions (n,), for motion to +x.
+
+    bare (m - 1,): segments without pressure, beyond which nothing is averaged.
+    """
     behind = places[:, None] - nodes
     x = np.maximum(behind, 0.0) / length
     zero, one = -np.diff(_share(order, x), axis=1), -np.diff(_share(order + 1, x), axis=1)
     near = (behind[:, :-1] * zero - (order + 1) * length * one) / np.diff(nodes)
     own = np.clip(np.searchsorted(nodes, places) - 1, 0, nodes.size - 2)
     island = np.concatenate([[0], np.cumsum(bare[1:] != bare[:-1])])
-    beyond = places > nodes[-1]  # past the end nothing holds; a bare stretch holds nothing either
+    beyond = places > nodes[-1]  # no pressure holds a bond beyond the last node
     held = (island == island[own][:, None]) & ~bare & ~beyond[:, None]
     out = np.zeros((places.size, nodes.size))
     out[:, :-1] += np.where(held, zero - near, 0.0)
@@ -49,12 +53,13 @@ def _weights(places, nodes, bare, length: float, order: float) -> np.ndarray:
 
 
 def average(places, nodes, sigma, way: float, length: float, order: float) -> np.ndarray:
-    """Averages (n,) [Pa] of the pressure behind the places (n,) [m], weighted by phi_p: the integral at the head of the
-    file.
+    """Average the pressure behind the positions (n,) [m], weighted by phi_p; returns (n,) [Pa].
+
+    This is the integral in the docstring of the module.
 
     nodes (m,) [m] rising, sigma (m,) [Pa] >= 0 linear between them and 0 outside; way: sign of the motion, +1 averages
-    over x below the place; length: eps [m]; order: p > -1. Exact but for what lies further behind than a share 1e-20 of
-    the weight. Source: Oden and Pires, J. Appl. Mech. 50, 67, 1983.
+    over x below the position; length: eps [m]; order: p > -1. Exact except for positions so far behind that they have
+    less than a fraction 1e-20 of the weight. Source: Oden and Pires, J. Appl. Mech. 50, 67, 1983.
     """
     places, nodes, sigma = (np.asarray(part, float) for part in (places, nodes, sigma))
     if way < 0:
@@ -76,7 +81,7 @@ def average(places, nodes, sigma, way: float, length: float, order: float) -> np
 
 
 def limits(nodes, sigma, weight, length: float, order: float) -> tuple:
-    """(forward, backward) resultants over mu_s [N] of the averaged law in a rigid slide towards +x and -x, both >= 0.
+    """Return friction force / mu_s [N] for rigid sliding towards +x and towards -x, both >= 0.
 
     nodes (m,) [m]; sigma (m,) [Pa]; weight: nodal areas (m,) [m2]; length: eps [m]; order: p. They differ where the
     pressure is not symmetric: each loses what its own trailing edge would carry.
@@ -91,8 +96,12 @@ def limits(nodes, sigma, weight, length: float, order: float) -> tuple:
 
 
 class Averaged(NamedTuple):
-    """traction (m,) [Pa] of the last motion, slide [m] since the start, way: sign of the last motion, 0 where the
-    traction is no longer its limit."""
+    """State of the averaged law.
+
+    - traction (m,): traction of the last motion [Pa]
+    - slide: relative displacement since the start [m]
+    - way: sign of the last motion; 0 if the traction is no longer at the limit of this motion
+    """
 
     traction: np.ndarray
     slide: float
@@ -101,9 +110,12 @@ class Averaged(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Convolution:
-    """Law object. nodes (m,) [m] of the mover, None for points without a place (their pressure is even, the average is
-    the pressure itself: Coulomb); pattern (m,) [Pa]: pressure at the same nodes of the lower piece when it stays there,
-    None when it rides on the mover."""
+    """Law object of the averaged pressure.
+
+    - nodes (m,): positions of the points of the mover [m]; None for a uniform pressure, whose average is the pressure
+      itself (Coulomb's law)
+    - pattern (m,): pressure at the same nodes of the lower piece if it stays there [Pa]; None if it moves with the mover
+    """
 
     static: float
     length: float
@@ -111,7 +123,7 @@ class Convolution:
     nodes: np.ndarray | None = None
     pattern: np.ndarray | None = None
     kept: dict = field(default_factory=dict)
-    # nothing stretches: a changing load is taken along with the motion
+    # the law has no stretch, so the load may change within a step of the motion
     at_once: ClassVar[bool] = True
     holds: ClassVar[bool] = True  # the last traction at rest
 

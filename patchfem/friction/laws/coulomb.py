@@ -58,7 +58,10 @@ class Coulomb(LastTraction):
 
 
 def from_keys(friction, load: float) -> Coulomb:
-    """Coulomb's law of a [friction] table; without a kinetic coefficient it is the static one. load [N] is not used."""
+    """Return Coulomb's law of a [friction] table; load [N] is not used.
+
+    Without a kinetic coefficient the static one is used.
+    """
     return Coulomb(
         friction.static if friction.kinetic is None else friction.kinetic, friction.static
     )

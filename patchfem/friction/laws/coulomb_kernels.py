@@ -1,4 +1,6 @@
-"""Coulomb friction, compiled. The engines call `stick` for a step, because a set-valued law has no slope.
+"""Coulomb friction, compiled.
+
+The engines call `stick` for a step, because a set-valued law has no slope.
 
 numbers: static and kinetic force [N]; memory: force of the last step [N]. NumPy form: `coulomb.Coulomb`.
 """
@@ -12,7 +14,7 @@ from ..protocol_kernels import step_bond_length as step_bond_length
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stick(free, compliance, static, kinetic):
-    """Solve one step of Coulomb's law: it sticks if the static force suffices, and slips otherwise.
+    """Solve a step of Coulomb's law: it sticks if the static force suffices, or else slips.
 
     Parameters
     ----------
@@ -36,7 +38,7 @@ def stick(free, compliance, static, kinetic):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
-    """Return the kinetic force against a prescribed increment, the last force at rest, and the slope 0.
+    """Return the kinetic force against an increment (at rest, the last force) and slope 0.
 
     Returns
     -------

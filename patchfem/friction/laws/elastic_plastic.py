@@ -12,7 +12,9 @@ from ..protocol import Element, Step
 
 @dataclass(frozen=True, slots=True)
 class ElasticPlastic:
-    """Eq. 3.12 per point: springs of stiffness mu sigma/length up to mu sigma, elastic again on reversal.
+    """Eq. 3.12 per point: springs of stiffness mu sigma/length that slip at mu sigma.
+
+    They are elastic again on reversal.
 
     Springs come unstressed where the pressure rises and go where slip breaks them, within one length of slip; a falling
     pressure only lowers the limit. So no pressure creates energy, and a force below the limit holds still.

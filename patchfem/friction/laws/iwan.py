@@ -25,8 +25,13 @@ LOW = 0.25  # fraction of the cells that are spread evenly over the decades, for
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Iwan:
-    """Elements of a contact per newton of normal load: stiffness (t,) [1/m], yield_slide (t,) [m]. All points of a
-    contact share their stretch, as all share the slide."""
+    """Parallel elements of a contact per newton of normal load.
+
+    - stiffness (t,): [1/m]
+    - yield_slide (t,): yield displacement [m]
+
+    All points of a contact have the same relative displacement and the same stretches.
+    """
 
     stiffness: np.ndarray
     yield_slide: np.ndarray
@@ -41,8 +46,8 @@ def largest(force: float, stiffness: float, chi: float, beta: float) -> float:
 
     force: slip force F_S [N]; stiffness: K_T [N/m].
 
-    phi_max = F_S (1 + beta)/(K_T (beta + (chi + 1)/(chi + 2))), with -1 < chi the exponent and beta >= 0 the share of
-    the last slider (Segalman 2005).
+    phi_max = F_S (1 + beta)/(K_T (beta + (chi + 1)/(chi + 2))), with -1 < chi the exponent and beta >= 0 the fraction
+    of the last slider (Segalman 2005).
     """
     return force * (1 + beta) / (stiffness * (beta + (chi + 1) / (chi + 2)))
 
@@ -78,8 +83,10 @@ def _shape(chi: float, beta: float) -> tuple:
 
 
 def from_keys(friction, load: float) -> Iwan:
-    """The Iwan law of a [friction] table under a load [N] of the whole contact, to which its stiffness [N/m] refers; 0
-    counts as 1 N."""
+    """Return the Iwan law of a [friction] table under a load [N] of the whole contact.
+
+    The stiffness [N/m] of the table refers to this load; a load of 0 counts as 1 N.
+    """
     k, most = sliders(
         friction.static, friction.stiffness / (load or 1.0), friction.chi, friction.beta
     )
@@ -87,8 +94,11 @@ def from_keys(friction, load: float) -> Iwan:
 
 
 def loop_from_keys(friction, load: float, slide) -> tuple:
-    """(force at the turns [N], area [J]) of the loops of the law of a [friction] table at amplitudes of the slide [m],
-    of any shape, without cells: the curve of first loading by Segalman's eq. 22, twice as large by Masing's rule."""
+    """Return the force at the reversals [N] and the area [J] of steady loops of the Iwan law.
+
+    slide: displacement amplitudes [m] of any shape. The loops have no cells: they are the curve of first loading
+    (Segalman's eq. 22), doubled by Masing's rule.
+    """
     chi, force = friction.chi, friction.static * load
     most = largest(force, friction.stiffness, chi, friction.beta)
     scale, r = force / (friction.beta + (chi + 1) / (chi + 2)), np.minimum(slide / most, 1.0)

@@ -1,10 +1,10 @@
-"""The LuGre law (Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Trans. Autom. Control 40, 419, 1995).
+"""The LuGre law (Canudas de Wit et al., IEEE Trans. Autom. Control 40, 419, 1995).
 
     g(v) = mu_k N + (mu_s - mu_k) N exp(-(v/v_s)^2),   z' = v - stiffness |v| z/g(v),
     F = stiffness z + micro_damping z' + viscous v
 
 A steady slide has the Stribeck curve F = g(v) sgn v + viscous v. With mu_k = mu_s and neither damping it is Dahl's law,
-which is eq. 2.17 in the stretch reading with eps_0 = mu N/stiffness. `lugre_kernels` steps it.
+which is eq. 2.17 with reading="stretch" and eps_0 = mu N/stiffness. `lugre_kernels` steps it.
 """
 
 from dataclasses import dataclass
@@ -16,8 +16,13 @@ from ..protocol import Element
 
 @dataclass(frozen=True, slots=True)
 class LuGre:
-    """Per newton of normal load: mu_s, mu_k, stiffness [1/m], v_s [m/s], micro_damping and viscous [s/m]. All points of
-    a contact share z, as all share the slide."""
+    """LuGre law per newton of normal load, with the same z at all points of a contact.
+
+    - static, kinetic: friction coefficients mu_s and mu_k
+    - stiffness: [1/m]
+    - speed: Stribeck velocity v_s [m/s]
+    - micro_damping, viscous: [s/m]
+    """
 
     static: float
     kinetic: float

@@ -1,4 +1,4 @@
-"""LuGre law, compiled; the form of all engines follows from `rate_equation`. Equations: `lugre`.
+"""LuGre law, compiled, in forms that follow from `rate_equation`. Equations: `lugre`.
 
 numbers: stiffness [N/m], kinetic and static force [N], Stribeck velocity v_s [m/s], micro-damping and viscous damping
 [N s/m]; memory: stretch z [m]. At the constant velocity of a step, z relaxes towards +-g/stiffness over that length of
@@ -50,7 +50,9 @@ def _relaxation_length(numbers, velocity):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rate_equation(numbers, stretch, velocity, direction):
-    """Return the force at a stretch and a velocity, and dz/dx = 1 - z/(g/stiffness) along the slip.
+    """Return the force at a stretch and a velocity, and dz/dx = 1 - z/(g/stiffness).
+
+    x increases along the slip.
 
     Returns
     -------
@@ -69,7 +71,10 @@ def rate_equation(numbers, stretch, velocity, direction):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _relax(numbers, stretch, increment, dt):
-    """Return the stretch after a step at constant velocity; without time, the limit is the kinetic force."""
+    """Return the stretch after a step at constant velocity.
+
+    If the step takes no time, the limit is the kinetic force.
+    """
     direction = 1.0 if increment > 0 else -1.0
     path = abs(increment)
     length = max(numbers[2], MIN_LIMIT * numbers[3]) / numbers[1]

@@ -1,4 +1,6 @@
-"""Elastic-plastic element that slides in a plane, compiled: F = k s, |F| <= k w, s' = q' - slip', slip along F.
+"""Elastic-plastic element in a plane, compiled: F = k s, |F| <= k w, s' = q' - slip'.
+
+The slip is along F.
 
 The stretch s (2,) of its spring follows the relative displacement until it reaches the yield slide w; then it stays on
 that circle and turns towards the direction of motion. Along a straight increment, with the angle psi between s and the
@@ -32,7 +34,7 @@ class Slope(NamedTuple):
 
 
 class Slide(NamedTuple):
-    """Straight increment of an element: mean force, its derivatives, stretch at the end, dissipated energy."""
+    """Straight increment of an element: mean force, derivatives, stretch and dissipated energy."""
 
     mean_x: float
     mean_y: float
@@ -43,7 +45,7 @@ class Slide(NamedTuple):
 
 
 class PlaneStep(NamedTuple):
-    """Solved step of an element: increment [m], mean force [N], iterations, below 0 if it failed."""
+    """Solved step of an element: increment [m], mean force [N], iterations (below 0: failed)."""
 
     increment_x: float
     increment_y: float

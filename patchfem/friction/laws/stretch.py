@@ -10,7 +10,7 @@ CONSTANT_LENGTH = -1.0  # value of a_s that marks a constant bond length
 
 
 def growth_numbers(law: Bonds) -> np.ndarray:
-    """Return the numbers (6,) of the growth of bonds (eq. 2.10) and of breakaway for compiled code.
+    """Return the numbers (6,) of bond growth (eq. 2.10) and breakaway for compiled code.
 
     They are a_s [m s-2], or -1 for a constant bond length, l_k [m], v_h [m/s], eps_0 [m], eps_k [m] and the fraction of
     the bond length that stretches without damage.
@@ -77,7 +77,10 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
 
 
 def _state_sizes(law: Bonds) -> tuple | None:
-    """Return typical magnitudes of (eps, m, z, s2); () for a constant length, None if rates cannot integrate the law."""
+    """Return typical magnitudes of (eps, m, z, s2).
+
+    They are () for a constant length, and None if rates cannot integrate the law.
+    """
     if not law.grows:
         return ()
     if law.breakaway:

@@ -99,7 +99,9 @@ def _move_bonds(numbers, memory, increment, bond_length):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def relax_stretch(numbers, stretch, increment, dt):
-    """Return the stretch of mature bonds after an increment, for harmonic balance: it relaxes over the bond length.
+    """Return the stretch of mature bonds after an increment, for harmonic balance.
+
+    It relaxes over the bond length.
 
     Returns
     -------
@@ -115,7 +117,9 @@ def relax_stretch(numbers, stretch, increment, dt):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rate_equation(numbers, stretch, velocity, direction):
-    """Return the force of mature bonds of constant length at a stretch, and dz/dx = 1 - z/eps along the slip.
+    """Return the force of mature bonds of constant length at a stretch, and dz/dx = 1 - z/eps.
+
+    x increases along the slip.
 
     Returns
     -------
@@ -158,7 +162,9 @@ def read_memory(numbers, memory, rel_disp, velocity):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_motion(numbers, memory, direction, states):
-    """Set the states; a law with breakaway has a kink at the end of its elastic range, and growth one at v_h.
+    """Set the states, and return where the rates have kinks.
+
+    A law with breakaway has a kink at the end of its elastic range, and growth has one at v_h.
 
     Returns
     -------
@@ -174,7 +180,7 @@ def start_motion(numbers, memory, direction, states):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _stretch_after(memory, motion, increment):
-    """Return z [m] after an increment at a constant bond length, elastic before the kink of the motion."""
+    """Return z [m] after an increment at constant bond length, elastic before the next kink."""
     m = memory[1]
     z = memory[2]
     if motion[1] < inf:
@@ -187,7 +193,7 @@ def _stretch_after(memory, motion, increment):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state_rates(numbers, memory, motion, increment, velocity, states, rates):
-    """Write the rates of eps, m, z and s2 where the bond length grows (eq. 2.10), and return the force [N].
+    """Write the rates of eps, m, z and s2 of growing bonds (2.10), and return the force [N].
 
     Returns
     -------

@@ -40,7 +40,7 @@ class _Points(NamedTuple):
 
 
 class _Pattern(NamedTuple):
-    """Views of the positions of the points and their pressures after the step (m,), of the nodes and theirs (p,)."""
+    """Positions and pressures of the points after the step (m,) and of the nodes (p,), as views."""
 
     position: np.ndarray
     end: np.ndarray
@@ -88,7 +88,9 @@ def _pressure(position, x, sigma):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
-    """Return the path-mean force over an increment, and its slope at fixed pressures; 20 ns per point.
+    """Return the path-mean force over an increment, and its slope at fixed pressures.
+
+    It takes 20 ns per point.
 
     It writes the pressures of the step, which `update_memory` reads.
 

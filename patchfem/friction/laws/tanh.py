@@ -10,8 +10,10 @@ from ..protocol import Element, LastTraction, Step
 
 @dataclass(frozen=True, slots=True)
 class Rate(LastTraction):
-    """Eq. 2.4 per point: tau = mu sigma tanh(v/v_0), taken at the mean speed of a step. It never holds: under a steady
-    share f of the limit it creeps at v_0 atanh(f)."""
+    """Rate law tau = mu sigma tanh(v/v_0) (eq. 2.4) per point, at the mean speed of a step.
+
+    It never sticks: under a constant fraction f of the limit it creeps at v_0 atanh(f).
+    """
 
     static: float
     speed: float

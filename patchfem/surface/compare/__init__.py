@@ -1,4 +1,4 @@
-"""Two traces before and after: where one lies on the other, what wore off, how much smaller the waves are.
+"""Comparison of traces before and after wear: alignment, worn depth and change of the waves.
 
 In: two `Profile`, or two `Areal` and a direction. Out: a `Comparison`: shift, tilt and scale, worn depth and area where
 unworn valleys or flanks give a common reference, ratios of amplitude and slope, each with its 95 % interval, and what

@@ -377,7 +377,7 @@ def _are_straight(depth, ends) -> bool:
 
 
 def _check_for_wide_scar(model, best: Alignment) -> Alignment:
-    """Return the alignment on the line through both ends if a wide scar explains the traces as well."""
+    """Return the alignment on a line through both ends if a wide scar is possible, too."""
     count = max(int(0.005 * best.depth.size), 12)
     ends = [
         float(np.median(best.depth[part])) / best.noise

@@ -74,7 +74,7 @@ N_SPECK_ROUNDS = 2
 
 
 class Ratios(NamedTuple):
-    """Ratios of amplitude and slope after / before wear, and `Size` before and after (none if unknown)."""
+    """Ratios of amplitude and slope after / before wear, and `Size` of both (none if unknown)."""
 
     amplitude: Quantity
     slope: Quantity

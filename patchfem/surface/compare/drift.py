@@ -1,4 +1,4 @@
-"""Drift of the datum of an instrument, predicted from unworn parts of a trace (universal kriging).
+"""Drift of the datum of an instrument, predicted from unworn parts (universal kriging).
 
 The depth of an unworn height is the datum (a polynomial) plus a drift (a Gaussian process) plus noise.
 Means over parts of the trace show the drift, and its best linear unbiased prediction extends it into
@@ -149,7 +149,7 @@ def model_drift(depth, unworn, degree: int, n_draws: int, random) -> Drift | Non
 
 
 def _matern(distance, root: float, length: float) -> np.ndarray:
-    """Return the Matern correlation of smoothness root / 2 at distances, both as fractions of the trace."""
+    """Return the Matern correlation of smoothness root / 2 at distances / length of the trace."""
     scaled = np.sqrt(root) * distance / length
     polynomial = {1.0: 1.0, 3.0: 1 + scaled, 5.0: 1 + scaled + scaled**2 / 3}[root]
     return polynomial * np.exp(-scaled)

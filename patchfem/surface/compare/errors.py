@@ -1,4 +1,4 @@
-"""Errors of a worn depth by a block bootstrap: noise, its correlation, and drift of the datum.
+"""Errors of a worn depth by a block bootstrap: correlated noise, and drift of the datum.
 
 The depths of the unworn heights without the drift of the datum (`drift`), divided by their noise, are
 drawn in blocks (Kuensch, Annals of Statistics 17 (1989) 1217) whose length follows their correlation.
@@ -164,7 +164,7 @@ def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErro
 
 
 def _propagate_to_parameters(errors, noise, unworn, jacobian) -> np.ndarray:
-    """Return the changes (draws, k) of the fitted parameters due to errors (draws, n) [m] of the depth."""
+    """Return the changes (draws, k) of the fitted parameters due to depth errors (draws, n) [m]."""
     off = errors[:, unworn] / noise[unworn] / BIWEIGHT
     inside = np.clip(1 - off**2, 0, None)
     influence = BIWEIGHT * off * inside**2

@@ -118,7 +118,7 @@ def _find_beside(size: int, box: tuple) -> np.ndarray:
 
 
 def _measure_roughness(x, z, box: tuple) -> float:
-    """Return the median absolute distance [m] of the flanks from a straight line (robust to pile-up)."""
+    """Return the median absolute distance [m] of the flanks from a line (robust to pile-up)."""
     is_beside = _find_beside(z.size, box)
     offset, slope = _fit_line(x[is_beside], z[is_beside])
     return float(np.median(np.abs(z[is_beside] - offset - slope * x[is_beside])))

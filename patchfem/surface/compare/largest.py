@@ -112,7 +112,7 @@ def _shrink_scatter(smooth, deviation, near) -> np.ndarray:
 
 
 def _limit_corner(depth, window: slice, noise: float) -> float:
-    """Estimate by how much [m] a corner is deeper than the parabola of a window; 0 for a round floor.
+    """Estimate how much deeper [m] a corner is than the fitted parabola; 0 for a round floor.
 
     A corner between slopes of +-s is 3/16 s h deeper than the least-squares parabola of half width h. The
     slopes are fitted beside the window, over its length, or a quarter of it if it is long. Those of a

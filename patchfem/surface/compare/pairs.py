@@ -77,7 +77,7 @@ class GroupMeans(NamedTuple):
 
 
 def read_pairs(path) -> list[TableLine]:
-    """Read the pairs of a table with the columns before and after, which name files or results folders.
+    """Read pairs from a table whose columns before and after name files or results folders.
 
     Names are relative to the folder of the table. A column direction (x, y or empty) gives the axis along
     which the traces of a pair run; other columns are kept as text, and a column group separates the means.
@@ -189,7 +189,7 @@ def parse_quantity(data: dict) -> Quantity:
 
 
 def average_pairs(rows: list) -> list[GroupMeans]:
-    """Average the quantities of the pairs of each group, in plain data as `compare_pairs` returns it."""
+    """Average the quantities of the pairs of each group, as plain data of `compare_pairs`."""
     groups = {}
     for row in rows:
         if row["outcome"] == "done":

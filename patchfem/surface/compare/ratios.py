@@ -1,4 +1,4 @@
-"""Ratios of the amplitudes and slopes of two surfaces, with the interval that a single pair allows."""
+"""Ratios of amplitudes and slopes of two surfaces, with the interval from a single pair."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -62,7 +62,7 @@ def _measure_heights(z, step: float, band: tuple) -> Size:
 
 
 def resample(trace: Profile, step: float) -> tuple:
-    """Resample a levelled trace to about the given step [m]; return the heights (n,) [m] and the step."""
+    """Resample a levelled trace to about a step [m]; return the heights (n,) [m] and the step."""
     flat = level(resample_evenly(trace))
     if step < flat.step * 1.01:
         return flat.z, flat.step

@@ -1,4 +1,6 @@
-"""Search for the shift of a second trace by correlation with the first: of all valleys, or of parts.
+"""Search for the shift of a second trace by correlation with the first one.
+
+All valleys are correlated, or separate parts of the trace.
 
 The largest correlation is compared with that of random traces of the same spectrum. Parts are correlated
 one by one because a track, a scratch or a step disturbs only the parts that it crosses.

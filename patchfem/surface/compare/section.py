@@ -76,7 +76,7 @@ class Section(NamedTuple):
         return sample_lengths(self.x)
 
     def integrate(self, inside) -> tuple:
-        """Integrate the depth over samples (n,) bool; return the area [m2] and its standard deviation."""
+        """Integrate the depth over samples (n,) bool; return area [m2] and standard deviation."""
         part = np.flatnonzero(inside)
         if not part.size:
             return 0.0, 0.0
@@ -244,7 +244,7 @@ def _outside_deviances(depth, noise) -> np.ndarray:
 
 
 def _flank_deviances(depth, noise) -> np.ndarray:
-    """Return the deviances of depths (n,) as smooth flanks, as a flat one, and as one with a step.
+    """Return the deviances of depths (n,) as smooth flanks, as a flat one and with a step.
 
     There is a smooth flank b t + c t^2 for each of OFFSETS. The flat one is b t^2 + c t^3. The scatter
     of a flank is at least that of the noise.
@@ -505,7 +505,7 @@ def _measure_floor(section: Section, start: float, width: float) -> Quantity:
 
 
 class _Vertex(NamedTuple):
-    """Largest depth of a parabola through values (n,), its weights (n,) on them, and their scatter."""
+    """Largest depth of a parabola through values (n,), weights (n,) of these, and their scatter."""
 
     depth: float
     weights: np.ndarray

@@ -1,4 +1,4 @@
-"""Sentences of a comparison: wear, tracks, what the depth counts from, waves and slopes, directions."""
+"""Sentences of a comparison on wear, tracks, reference, waves and slopes, and directions."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Dust and dropouts in one of two aligned traces: narrow places with walls steeper than the surface."""
+"""Dust and dropouts in one of two aligned traces: narrow features with very steep walls."""
 
 from dataclasses import replace
 
@@ -21,7 +21,9 @@ MAX_DROPOUT_STEPS = 2.0  # depth of a dropout / height difference at its wall
 
 
 def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tuple:
-    """Mark dust and dropouts of two aligned traces as missing; return the same traces without any.
+    """Mark dust and dropouts of two aligned traces as missing.
+
+    Returns the same traces if there are none.
 
     A speck is at most 12 samples wide at half of its height, and the difference of the traces climbs and
     falls at it by steps larger than five deviations of the steps of the first trace: tops that wore off

@@ -1,4 +1,4 @@
-"""Headline of a comparison: worn or not, and whether the waves became smaller, by the rules of a table."""
+"""Headline of a comparison: wear or none, and smaller waves or not, by a table of rules."""
 
 from typing import NamedTuple
 
@@ -114,7 +114,7 @@ PLACE_RULES = (
 
 
 def _find_headline(parts: list) -> str:
-    """Return the headline: place or order of the surfaces, wear, waves, gain, and what was mirrored."""
+    """Return the headline: surfaces exchanged or apart, wear, waves, gain, and mirrored traces."""
     facts = _collect_facts(parts)
     headline = facts.change
     for condition, words in PLACE_RULES:

@@ -1,4 +1,4 @@
-"""Worn depth of an aligned trace: mean, area and maximum, extent of the wear, and wear tracks."""
+"""Worn depth of an aligned trace: mean, area, maximum, extent of the wear, and tracks."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
