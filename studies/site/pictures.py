@@ -35,6 +35,8 @@ DPI = 190  # dots per inch: 836 pixels, the column of a README on a code host
 MAX_BYTES = 1_000_000  # bytes; with larger pictures a page is slow to load on a telephone
 SAMPLES = 25  # values kept of each curve and of each field of stresses
 CURVE_TOL = 2e-3  # difference over largest value; a smaller one cannot be seen in a picture
+# Fraction of the largest value of all curves of a picture; a curve below it is round-off.
+ROUND_OFF = 1e-9
 LOOK = STYLE | {
     "font.size": 11,
     "axes.titlesize": 11,
@@ -267,10 +269,13 @@ def read_numbers(figure: Figure) -> dict:
     return {"texts": [text for text in texts if text], "curves": curves}
 
 
-def relative_difference(old: list, new: list) -> float:
-    """Return the largest difference of two curves over the largest absolute value of the first."""
+def relative_difference(old: list, new: list, floor: float = 0.0) -> float:
+    """Return the largest difference of two curves over the largest absolute value of the first.
+
+    That value is taken as at least `floor`.
+    """
     difference = np.abs(np.subtract(old, new)).max(initial=0)
-    return float(difference / max(np.abs(old).max(initial=0), np.finfo(float).tiny))
+    return float(difference / max(np.abs(old).max(initial=0), floor, np.finfo(float).tiny))
 
 
 def find_changes(kept: dict, fresh: dict) -> list[str]:
@@ -283,8 +288,12 @@ def find_changes(kept: dict, fresh: dict) -> list[str]:
     changes += [f'the text "{text}" is new' for text in fresh["texts"] if text not in kept["texts"]]
     if [len(curve) for curve in kept["curves"]] != [len(curve) for curve in fresh["curves"]]:
         return [*changes, "the number of curves or of their points has changed"]
+    largest = max((np.abs(curve).max(initial=0) for curve in kept["curves"]), default=0)
     worst = max(
-        (relative_difference(old, new) for old, new in zip(kept["curves"], fresh["curves"])),
+        (
+            relative_difference(old, new, ROUND_OFF * largest)
+            for old, new in zip(kept["curves"], fresh["curves"])
+        ),
         default=0,
     )
     if worst > CURVE_TOL:
