@@ -77,7 +77,9 @@ def pytest_configure(config):
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config):
     """Return one worker per core for folders, none for files, single tests, -k and --lf, which end sooner without."""
-    is_selection = config.option.keyword or config.option.lf or config.option.collectonly
+    is_selection = any(
+        getattr(config.option, name, False) for name in ("keyword", "lf", "collectonly")
+    )
     if is_selection or not all(Path(word).is_dir() for word in config.args):
         config.option.dist = "no"
         return 0

@@ -214,7 +214,7 @@ def store_set(sets, name):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pivot_to_wanted(sets):
+def pivot_to_target_set(sets):
     """Pivot the tableau to the contact set `sets.wanted`; False if a pivot is not positive."""
     for i in range(sets.x.size):
         if sets.here[i] != sets.wanted[i] and not pivot(sets, i):
@@ -231,9 +231,9 @@ def build_set(sets, name):
     name: name of the set. The tableau is pivoted to it. If it has lost its digits, it is computed anew and
     pivoted once more. Cost: m^2 multiplications for each node that is exchanged.
     """
-    if not pivot_to_wanted(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
+    if not pivot_to_target_set(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
         reset_tableau(sets)
-        if not pivot_to_wanted(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
+        if not pivot_to_target_set(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
             return -1
     return store_set(sets, name)
 

@@ -333,7 +333,7 @@ def press_strips(
     problem = _holder_problem(layout, gap, loads, spring)
     with one_thread():
         if isinstance(skin, SmoothSkin):
-            solution = _press_through_skin(skin, compliance, layout, problem, approach)
+            solution = _press_with_asperities(skin, compliance, layout, problem, approach)
         else:
             solution = _press_bare(skin, compliance, layout, problem, approach)
     force = solution.force.reshape(gap.shape)
@@ -415,7 +415,9 @@ def _press_bare(skin, compliance, layout: StripLayout, problem: ContactProblem, 
     return solution
 
 
-def _press_through_skin(skin, compliance, layout: StripLayout, problem: ContactProblem, approach):
+def _press_with_asperities(
+    skin, compliance, layout: StripLayout, problem: ContactProblem, approach
+):
     """Solve strips with an asperity layer of a smooth pressure law.
 
     Each motion is scaled: the largest closing of a node per unit of motion becomes 1, and load and moments become

@@ -18,10 +18,10 @@ from ..disk import user_cache
 
 MAX_FOLDER_BYTES = 512 * 2**20  # above it the least recently used files are deleted
 # Source files from which a result is computed; their text is hashed into its key.
-REFERENCE_SOURCE = ("plane_form.py",)
-COMMON_SOURCE = ("elasticity.py", "plane_form.py", "lapack.py")
-GRID_SOURCE = (*COMMON_SOURCE, "tensor_stiffness.py", "condense.py", "grid_fronts.py")
-MESH_SOURCE = (*COMMON_SOURCE, "dissect.py", "fronts.py", "substructure.py")
+REFERENCE_SOURCE_FILES = ("plane_form.py",)
+COMMON_SOURCE_FILES = ("elasticity.py", "plane_form.py", "lapack.py")
+GRID_SOURCE_FILES = (*COMMON_SOURCE_FILES, "tensor_stiffness.py", "condense.py", "grid_fronts.py")
+MESH_SOURCE_FILES = (*COMMON_SOURCE_FILES, "dissect.py", "fronts.py", "substructure.py")
 
 
 def folder() -> Path:
@@ -49,7 +49,7 @@ def grid_key(x, depth, coating_rows: int, layers) -> str:
         32 hexadecimal digits.
     """
     arrays = (np.asarray(x, np.float64), np.asarray(depth, np.float64))
-    return _hash(arrays, (int(coating_rows),), layers, GRID_SOURCE)
+    return _hash(arrays, (int(coating_rows),), layers, GRID_SOURCE_FILES)
 
 
 def mesh_key(mesh, layers) -> str:
@@ -60,12 +60,12 @@ def mesh_key(mesh, layers) -> str:
     numbers = (mesh.triangles, mesh.quads, mesh.is_coating, mesh.interface, mesh.far)
     arrays = [np.asarray(mesh.points, np.float64)]
     arrays += [np.asarray(part, np.int64) for part in numbers]
-    return _hash(arrays, ("mesh",), layers, MESH_SOURCE)
+    return _hash(arrays, ("mesh",), layers, MESH_SOURCE_FILES)
 
 
-def reference_key() -> str:
+def reference_cell_key() -> str:
     """Return the cache key of the reference-cell matrices of `plane_form.rectangle_terms`."""
-    return _hash_source(hashlib.sha256(), REFERENCE_SOURCE)
+    return _hash_source(hashlib.sha256(), REFERENCE_SOURCE_FILES)
 
 
 def _hash(arrays, words: tuple, layers, source: tuple) -> str:

@@ -65,7 +65,7 @@ class Fronts:
         return x
 
 
-class Strainless(NotConverged):
+class ZeroEnergyMotion(NotConverged):
     """The stiffness is singular to round-off: it has a zero-energy (rigid-body) mode."""
 
 
@@ -122,7 +122,7 @@ def factorise(
 
     Raises
     ------
-    Strainless
+    ZeroEnergyMotion
         If a pivot is too small but no motion has negative energy.
     NotConverged
         If the matrix is not positive definite.
@@ -168,7 +168,7 @@ def _explain_fault(block, diagonal, min_pivot: float) -> NotConverged:
     """
     scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
     if eigvalsh(block / np.outer(scale, scale))[0] > -min_pivot:
-        return Strainless("the piece can move without any strain")
+        return ZeroEnergyMotion("the piece can move without any strain")
     return NotConverged("the stiffness of the piece is not positive definite")
 
 

@@ -313,7 +313,7 @@ def _add_updates(shape: Shape, updates) -> Blocks:
     return blocks
 
 
-def _eliminate_own(blocks: Blocks) -> None:
+def _eliminate_inner_unknowns(blocks: Blocks) -> None:
     """Eliminate the unknowns `own` of parts in place: Cholesky factorisation own_own = L L^T.
 
     own_own becomes L^T, own_ring becomes L^-1 own_ring and ring_ring becomes the update of each
@@ -486,7 +486,7 @@ def eliminate(stencil, *, keep_left: bool = False) -> GridFactor:
                 for nodes in (numbering.own, numbering.ring)
             )
             if own.size:
-                _eliminate_own(blocks)
+                _eliminate_inner_unknowns(blocks)
                 stacks.append(Stack(own, ring, blocks.own_own, blocks.own_ring))
             updates[shape] = blocks.ring_ring
         updates_below = updates
@@ -510,7 +510,7 @@ class Work(NamedTuple):
     other_entries: int
 
 
-def predicted_seconds(nx: int, ny: int, mirrored: bool) -> float:
+def predict_seconds(nx: int, ny: int, mirrored: bool) -> float:
     """Predict the CPU seconds of assembling and condensing one piece.
 
     Memory that a process touches for the first time takes up to as long again.
@@ -537,11 +537,11 @@ def predicted_seconds(nx: int, ny: int, mirrored: bool) -> float:
     )
 
 
-def predicted_bytes(nx: int, ny: int, mirrored: bool) -> float:
+def predict_bytes(nx: int, ny: int, mirrored: bool) -> float:
     """Predict the peak memory [bytes] of assembling and condensing one piece.
 
     This includes the stencil, the factors, the updates and the compliance. The parameters are those
-    of `predicted_seconds`.
+    of `predict_seconds`.
     """
     work = predict_work(nx, ny, mirrored)
     return BYTES_PER_NUMBER * (work.factor_entries + work.other_entries)
@@ -552,7 +552,7 @@ def predict_work(nx: int, ny: int, mirrored: bool) -> Work:
     """Estimate the operation count and the storage of condensing one piece.
 
     Nodes are counted but not numbered, so the estimate is cheap. The parameters are those of
-    `predicted_seconds`.
+    `predict_seconds`.
     """
     is_halved = mirrored and nx > 3
     columns = (nx + 1) // 2 if is_halved else nx

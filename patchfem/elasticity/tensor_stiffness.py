@@ -20,7 +20,7 @@ from .lapack import one_thread
 # Corners (column, row) of a cell.
 CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
 # Shape of `plane_form.rectangle_terms`: Lame constant, term A, B or C, two corners, two directions.
-TERMS_SHAPE = (2, 3, 4, 4, 2, 2)
+RECTANGLE_TERMS_SHAPE = (2, 3, 4, 4, 2, 2)
 
 
 @cache
@@ -29,8 +29,8 @@ def _rectangle_terms() -> np.ndarray:
 
     Only the first run on a machine imports scikit-fem, which takes as long as a small patch.
     """
-    key = disk_cache.reference_key()
-    kept = disk_cache.fetch(key, {"terms": TERMS_SHAPE})
+    key = disk_cache.reference_cell_key()
+    kept = disk_cache.fetch(key, {"terms": RECTANGLE_TERMS_SHAPE})
     if kept is not None:
         return kept["terms"]
     from .plane_form import rectangle_terms

@@ -18,7 +18,7 @@ MAX_UNEVENNESS = 1e-3
 DEFAULT_SEGMENTS = 8  # number of segment lengths in a record, if the user gives no length
 MIN_SEGMENT = 64  # smallest number of samples in a segment
 # fraction of the largest response; if both ends are below it, the record is a complete transient
-MAX_REST = 1e-2
+MAX_END_FRACTION = 1e-2
 MIN_INPUT = 1e-6  # fraction of the largest input power; spectral lines with less are not excited
 MAX_FREQUENCY = 0.8  # fraction of the Nyquist frequency; filters and aliasing disturb higher lines
 # number of spectral lines by which a Hann window widens the average of a segment
@@ -122,4 +122,4 @@ def _is_transient(response) -> bool:
     n_ends = max(response.size // 50, 1)
     size = np.abs(response).max(initial=0.0)
     ends = max(np.abs(response[:n_ends]).max(), np.abs(response[-n_ends:]).max())
-    return bool(ends <= MAX_REST * size)
+    return bool(ends <= MAX_END_FRACTION * size)

@@ -140,7 +140,9 @@ def modes_of_driven_record(
         motion = motion - force
     relative = estimate_response(step, force, motion, estimate.segment, estimate.window)
     modes = fit_driven_modes(step, force, motion, response, relative, band)
-    rows, mass, notes = _rows_of_force(modes) if drive == "force" else _rows_of_base(modes)
+    rows, mass, notes = (
+        _modes_of_force_residues(modes) if drive == "force" else _modes_of_base_residues(modes)
+    )
     if force.size > MAX_SAMPLES:
         notes.append(
             f"the modes are fitted to the first {MAX_SAMPLES} of {force.size} samples, a duration of "
@@ -157,7 +159,7 @@ def modes_of_driven_record(
     )
 
 
-def _rows_of_force(modes: DrivenModes) -> _Rows:
+def _modes_of_force_residues(modes: DrivenModes) -> _Rows:
     """Derive mode-shape components at the drive point, and the modal mass, from the residues.
 
     The components are relative to that of the first mode, whose residue is the reciprocal of the mass.
@@ -177,7 +179,7 @@ def _rows_of_force(modes: DrivenModes) -> _Rows:
     return _Rows({"slide": motion, "output": motion}, 1 / float(first), notes)
 
 
-def _rows_of_base(modes: DrivenModes) -> _Rows:
+def _modes_of_base_residues(modes: DrivenModes) -> _Rows:
     """Split residues of a base excitation into participation and mode-shape component.
 
     The residue is minus their product; both factors get the same size.

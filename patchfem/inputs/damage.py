@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 from ..exceptions import PatchfemError
 
-MAX_REASON = 160  # largest number of characters of the quoted reason; longer reasons are cut
+MAX_REASON_LENGTH = 160  # largest number of characters of the quoted reason; longer reasons are cut
 
 # What the readers and the libraries that they call raise for wrong bytes. A NameError, an
 # AttributeError or a TypeError is a mistake in the program and stays visible as such.
@@ -39,7 +39,7 @@ def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
     except Exception as error:
         if not isinstance(error, DAMAGE_ERRORS) and type(error) is not Exception:
             raise
-        reason = " ".join(str(error).split())[:MAX_REASON]
+        reason = " ".join(str(error).split())[:MAX_REASON_LENGTH]
         if not reason.isprintable():
             reason = type(error).__name__
         raise PatchfemError(f"{message} ({reason}){remedy}") from None

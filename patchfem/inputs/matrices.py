@@ -135,7 +135,7 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
             "same way"
         )
     if with_places:
-        places, index = nastran.rank_places(np.vstack([matrix.places for matrix in matrices]))
+        places, index = nastran.rank_dofs(np.vstack([matrix.places for matrix in matrices]))
         ends = np.cumsum([len(matrix.places) for matrix in matrices])
         parts = np.split(index, ends[:-1])
         return [
@@ -278,7 +278,7 @@ def _read_abaqus(path: Path) -> Matrix:
     labels = _whole_numbers(path, table[:, :-1])
     places = None
     if table.shape[1] == 5:
-        places, index = nastran.rank_places(labels.reshape(-1, 2))
+        places, index = nastran.rank_dofs(labels.reshape(-1, 2))
         rows, columns = index.reshape(-1, 2).T
         n = len(places)
     elif labels.min() < 1 or labels.max() > nastran.MAX_ROWS:

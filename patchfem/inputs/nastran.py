@@ -244,7 +244,7 @@ class DmigMatrix:
         except ValueError:  # a blank component, or 1.5-3 for 1.5E-3
             rows, numbers = self._parse_entries(sizes)
         columns = np.array([column[1:3] for column in self.columns], int).reshape(-1, 2)
-        places, index = rank_places(np.vstack([rows, np.repeat(columns, sizes, axis=0)]))
+        places, index = rank_dofs(np.vstack([rows, np.repeat(columns, sizes, axis=0)]))
         values = sparse.coo_array((numbers, index.reshape(2, -1)), 2 * (len(places),)).tocsr()
         return (mirror_triangle(values) if self.form == FORM_SYMMETRIC else values), places
 
@@ -266,7 +266,7 @@ def mirror_triangle(values: sparse.csr_array) -> sparse.csr_array:
     return (values + (values - sparse.diags_array(values.diagonal())).T).tocsr()
 
 
-def rank_places(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def rank_dofs(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the sorted distinct degrees of freedom (n, 2) and the index (k,) of each given one.
 
     A degree of freedom is a row of node and direction.

@@ -41,7 +41,7 @@ _SYNONYMS = {
     "μs": "us",
 }
 # Spellings of "per second squared" and of "per second" behind a unit.
-_PER_SECOND = {
+_RATE_UNIT_PATTERNS = {
     "/s^2": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?(?:\^|\*\*)?2|/ ?s²| s-2| s\^-2)"),
     "/s": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?| s-1| s\^-1)"),
 }
@@ -51,7 +51,7 @@ def normalize_unit(text: str) -> str:
     """Spell a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
     text = " ".join(text.split())
     text = _SYNONYMS.get(text.lower(), _SYNONYMS.get(text, text))
-    for ending, pattern in _PER_SECOND.items():
+    for ending, pattern in _RATE_UNIT_PATTERNS.items():
         match = pattern.fullmatch(text)
         if match:
             return _SYNONYMS.get(match[1], match[1]) + ending

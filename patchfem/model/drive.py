@@ -33,7 +33,7 @@ def has_levels(keys) -> bool:
     return find_waveform(keys).has_levels
 
 
-def run_cycles(keys, signal) -> float:
+def count_run_cycles(keys, signal) -> float:
     """Return the length of a run in drive cycles, over all levels of a drive in levels.
 
     `keys` are those of [drive], `signal` is the drive that follows from them.

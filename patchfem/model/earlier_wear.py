@@ -171,7 +171,7 @@ def _has_depth_along_patch(earlier: EarlierWear) -> bool:
     return bool(x.size > 1 and (np.diff(x) > 0).all() and earlier.depth.min() >= 0)
 
 
-def read_for_scene(path: Path, tables: Tables) -> EarlierWear:
+def read_earlier_wear(path: Path, tables: Tables) -> EarlierWear:
     """Read the end of an earlier run; raise PatchfemError unless a scene has the same pieces."""
     earlier = read(path)
     pieces_before = _describe_pieces(earlier.scene)

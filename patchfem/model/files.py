@@ -162,7 +162,7 @@ def _check_structure(path: Path, tables, whole: bool) -> None:
     structure_files.read_modes(path, tables.structure, tables.drive, needs_interface=rubs)
 
 
-def _matrix_check(key: str):
+def _make_matrix_check(key: str):
     """Return the function that checks the file of one matrix of [structure.reduced]."""
     return lambda path, tables, whole: structure_reduced.check_matrix(path, key)
 
@@ -174,7 +174,7 @@ def _check_measured(path: Path, tables, whole: bool) -> None:
 
 def _check_wear_start(path: Path, tables, whole: bool) -> tuple:
     """Check that the pieces are those of the earlier run; return a note on the worn depth."""
-    start = earlier_wear.read_for_scene(path, tables) if whole else earlier_wear.read(path)
+    start = earlier_wear.read_earlier_wear(path, tables) if whole else earlier_wear.read(path)
     return (start.sentence,)
 
 
@@ -193,7 +193,10 @@ READERS = {
     "slide.file": _check_slide,
     "drive.file": _check_drive,
     "structure.file": _check_structure,
-    **{f"structure.reduced.{key}": _matrix_check(key) for key in ("stiffness", "mass", "damping")},
+    **{
+        f"structure.reduced.{key}": _make_matrix_check(key)
+        for key in ("stiffness", "mass", "damping")
+    },
     "measured.file": _check_measured,
     "wear.start": _check_wear_start,
 }

@@ -119,7 +119,7 @@ class Gap:
         longest = np.diff(x)[beside].max(initial=0.0) or np.diff(x).max()
         return float(max(longest, self.average or profiles.sample_spacing(self.profile)))
 
-    def half_steps(self, x) -> np.ndarray:
+    def half_step_heights(self, x) -> np.ndarray:
         """Return half the height [m] of the step at a node, (m,); 0 at nodes that are no step edge."""
         heights = np.zeros(x.size)
         for _, (edge, height) in self._values("edge"):

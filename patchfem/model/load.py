@@ -12,7 +12,7 @@ from .slide import SlidePath
 
 MAX_SAMPLES = 5_000_000  # samples of a slide; more take too much memory
 # fraction of the largest load; a smaller load is round-off of zero, so the contact is lost
-ROUND_OFF_LOAD = 1e-12
+MIN_LOAD_FRACTION = 1e-12
 # periods of the load; samples that are closer differ only by round-off of the same instant
 MIN_SPACING = 1e-9
 
@@ -39,7 +39,7 @@ class PointLoad:
         load = self.load + self.amplitude * np.cos(
             2 * np.pi * self.frequency * np.asarray(time) + self.phase
         )
-        return np.where(load > ROUND_OFF_LOAD * (self.load + self.amplitude), load, 0.0)
+        return np.where(load > MIN_LOAD_FRACTION * (self.load + self.amplitude), load, 0.0)
 
     def refine_samples(self, slide: SlidePath, time, rel_disp, steps: int) -> tuple:
         """Add samples to a slide until they resolve the oscillation of the load as well.

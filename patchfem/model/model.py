@@ -178,7 +178,7 @@ def build(scene: Scene) -> Model:
         edge_motion = _find_edge_motion(scene, rig_model)
         patch_model = patch_model.with_mesh(edge_motion=edge_motion)
         if path is not None and grooves is None:
-            patch_model = _add_slip(patch_model, path, law.friction)
+            patch_model = _request_slip_mesh(patch_model, path, law.friction)
     effects = tuple(scene.named())
     model = Model(
         source=None,
@@ -232,7 +232,7 @@ def _find_edge_motion(scene: Scene, rig_model: Rig | None) -> str:
     return "load" if rig_model is not None and rig_model.friction.load_varies else ""
 
 
-def _add_slip(model: PatchModel, path: SlidePath, law: Friction | None) -> PatchModel:
+def _request_slip_mesh(model: PatchModel, path: SlidePath, law: Friction | None) -> PatchModel:
     """Request a mesh that resolves partial slip under a prescribed slide, except for bond laws."""
     if not model.interface.partial_slip or path.across is not None:
         return model

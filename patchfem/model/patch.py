@@ -384,7 +384,7 @@ def _build_interface(contact: Contact, length: float, resolve_path: Callable) ->
     """Build the interface of a table [contact] over a length [m]."""
     skin = contact.asperities
     if skin is not None and skin.law == "hertz":
-        skin = peaks.complete_skin(skin, resolve_path, shortest_wave(contact, length))
+        skin = peaks.complete_asperities(skin, resolve_path, shortest_wave(contact, length))
     strips = contact.strips
     if strips is not None:
         strips = PatchStrips(strips.count, strips.roll, strips.offset)

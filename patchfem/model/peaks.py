@@ -12,7 +12,7 @@ from .file_cache import cache_by_file
 TABLE = "contact.asperities."  # prefix of the keys in messages
 
 
-def complete_skin(
+def complete_asperities(
     table: Asperities, resolve_path: Callable, cutoff: float | None = None
 ) -> Asperities:
     """Add radius, density and standard deviation of height of the peaks to [contact.asperities].

@@ -20,7 +20,7 @@ CURVE_POINTS_PER_CELL = 16  # line segments per cell that represent a smooth pro
 MIN_HEIGHT_STD = 1e-10
 STRAIGHT_TOL = 1e-5  # standard deviation over range of heights; a straighter profile is a line
 # height difference between the ends due to the removed slope over the range of heights; a note reports a larger one
-MAX_SILENT_SLOPE = 1e-2
+MAX_UNREPORTED_SLOPE = 1e-2
 SAMPLES_PER_CUTOFF = 16  # minimum number of samples per cut-off on which a trace is filtered
 EVEN_TOL = 1e-9  # spacings that differ by a smaller fraction of the interface are equal
 CELL_TOL = 1e-2  # relative difference of the nodes' spacing from the averaging length
@@ -162,7 +162,7 @@ def _level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelle
     trace = level(raw)
     slope = float(np.polyfit(raw.x, raw.z - trace.z, 1)[0])
     notes = trace.notes
-    if abs(slope) * trace.length > MAX_SILENT_SLOPE * np.ptp(trace.z):
+    if abs(slope) * trace.length > MAX_UNREPORTED_SLOPE * np.ptp(trace.z):
         notes = (
             *notes,
             f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "

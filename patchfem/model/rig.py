@@ -10,7 +10,7 @@ from ..core import InitialState, ModalBasis
 from ..effects import Waveform, find_waveform
 from ..structure.drive_sizes import cycles_per_level, decay_rate, drive_omega, peak_speed
 from . import structure_reduced
-from .drive import build_signal, has_levels, run_cycles
+from .drive import build_signal, count_run_cycles, has_levels
 from .law import build_interface_laws, interface_names
 from .structure import (
     build_modes,
@@ -20,13 +20,13 @@ from .structure import (
     first_elastic_mode,
     has_patch_joint,
     has_varying_load,
-    has_yawing_strips,
     natural_frequencies,
+    needs_strip_displacements,
 )
 
 MAX_TRAVEL = 1e3  # m; a motion that grows without bound is not followed beyond this displacement
 # fraction of the largest slide per modal coordinate of all modes; less is round-off
-ROUND_OFF_SLIDE = 1e-9
+MIN_SLIDE_FRACTION = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,7 +249,7 @@ def _build(scene, own: ModalBasis, interfaces: tuple, joint: float | None = None
         interfaces=interfaces,
         names=tuple(interface_names(scene.structure)),
         load_varies=has_varying_load(scene),
-        strips_slide_apart=has_yawing_strips(scene),
+        strips_slide_apart=needs_strip_displacements(scene),
     )
     return Rig(
         modes=modes,
@@ -275,7 +275,7 @@ def _build_drive(scene, modes: ModalBasis) -> RigDrive:
         kind=keys.kind,
         waveform=find_waveform(keys),
         frequency=keys.frequency,
-        cycles=float(run_cycles(keys, signal)),
+        cycles=float(count_run_cycles(keys, signal)),
         force=keys.force if keys.kind == "force" else None,
         levels=levels,
     )
@@ -313,7 +313,7 @@ def _build_first_mode(scene, own: ModalBasis, modes: ModalBasis) -> FirstMode:
             own_from_modes = np.linalg.lstsq(own.shapes, modes.shapes, rcond=None)[0]
     order = [first, *(k for k in range(slide.size) if k != first)]
     contact_mass = 0.0
-    if abs(slide[first]) > ROUND_OFF_SLIDE * np.abs(slide).max(initial=0.0):
+    if abs(slide[first]) > MIN_SLIDE_FRACTION * np.abs(slide).max(initial=0.0):
         contact_mass = float(own.mass / slide[first] ** 2)
     return FirstMode(frequency, mass, contact_mass, (slide[:, None] * own_from_modes)[order])
 

@@ -177,7 +177,7 @@ def _build_listed_modes(structure, is_forced: bool) -> ModalBasis:
 
 def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
     """Add a relative displacement for each strip if a mode yaws the patch."""
-    if not has_yawing_strips(scene):
+    if not needs_strip_displacements(scene):
         return modes
     n_strips = scene.contact.strips.count
     width = scene.contact.width
@@ -299,7 +299,7 @@ def first_elastic_mode(scene, own: ModalBasis) -> tuple:
     return frequency, float(own.mass / (squared[first] if moves_output else total))
 
 
-def has_yawing_strips(scene) -> bool:
+def needs_strip_displacements(scene) -> bool:
     """Return whether a mode yaws the patch, which gives each of its strips another displacement."""
     if scene.contact is None or scene.contact.strips is None or scene.friction is None:
         return False

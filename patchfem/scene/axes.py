@@ -148,7 +148,7 @@ def read_axes(
     for text in texts:
         key, equals, values = (part.strip() for part in text.partition("="))
         if equals and key:
-            _read_into(axes, mistakes, key, values, sampled=sampled)
+            _append_axis(axes, mistakes, key, values, sampled=sampled)
         else:
             mistakes.append(
                 f"--over {text}: write table.key=v1,v2,... or table.key=low..high:n, such as "
@@ -187,7 +187,7 @@ def read_table(table: Any) -> tuple[list[Axis | Span], list[tuple[str, str]]]:
         if isinstance(values, list):
             values = ",".join(map(str, values))
         if isinstance(values, str):
-            _read_into(axes, sentences, key, values)
+            _append_axis(axes, sentences, key, values)
         else:
             sentences.append('the values must be a string, such as "0.1..0.6:6"')
         mistakes += [(f"sweep.{key}", text.removeprefix(f"{key}: ")) for text in sentences]
@@ -246,7 +246,9 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
     return Axis(key, texts, texts, "")
 
 
-def _read_into(axes: list, mistakes: list, key: str, values: str, *, sampled: bool = False) -> None:
+def _append_axis(
+    axes: list, mistakes: list, key: str, values: str, *, sampled: bool = False
+) -> None:
     """Read the axis of a key and append it to `axes`, or append its mistakes to `mistakes`."""
     try:
         axes.append(_read_axis(key, values, sampled=sampled))

@@ -19,7 +19,7 @@ from .keys import tables
 from .lines import locate_key
 from .reader import apply_set, read_tables
 from .rules.check import check
-from .rules.limits import check_combinations, not_yet_built
+from .rules.limits import check_combinations, find_unsupported_lateral_modes
 from .rules.scene_draft import SceneDraft, SceneError
 from .rules.structure import describe_hidden_modes
 from .sets import format_assignments, require_units
@@ -189,7 +189,7 @@ def finish_scene(
     is_valid = not draft.has_mistakes
     check_combinations(draft, kind)
     completed = complete(draft.tables, kind) if is_valid else None
-    for key, message in not_yet_built(completed) if completed else ():
+    for key, message in find_unsupported_lateral_modes(completed) if completed else ():
         draft.add_mistake(key, message)
     for key, message in faults(draft.tables, not draft.has_mistakes) if faults else ():
         draft.add_mistake(key, message)

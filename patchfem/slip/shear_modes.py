@@ -47,7 +47,7 @@ GAUSS_COUNTS = (16, 32, 64)
 # bond lengths by which a Newton step may move a point back; the law there is exp(2) times as steep as at rest
 MAX_BACK_STEP = 2.0
 # number of relative displacements at which backbones are compared
-N_SLIDES = 24
+N_DISPLACEMENTS = 24
 # bond lengths in the largest of these displacements, at which the force is within exp(-6) of its limit
 MAX_SLIDE_LENGTHS = 6
 
@@ -136,7 +136,7 @@ class Spectrum:
         else:
             displacement = _block(self.tangential, self.points) @ self.limit
         largest = MAX_SLIDE_LENGTHS * self.length + 2 * np.abs(displacement).max()
-        return largest * (np.arange(1, N_SLIDES + 1) / N_SLIDES) ** 2
+        return largest * (np.arange(1, N_DISPLACEMENTS + 1) / N_DISPLACEMENTS) ** 2
 
     def modes(self, count: int) -> "ShearModes":
         """Return the first `count` modes."""

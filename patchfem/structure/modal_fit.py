@@ -256,7 +256,7 @@ def fit_poles(omega, data, power) -> FittedPoles:
             break
         theta = new_theta
         cost = new_cost
-    theta = _remove_faint_modes(fit, _refine_with_noise(fit, theta, cost))
+    theta = _remove_weak_modes(fit, _refine_with_noise(fit, theta, cost))
     if not theta.size:
         raise PatchfemError(
             "structure.file: no mode is visible in the frequency responses; responses that include a "
@@ -305,7 +305,7 @@ def _refine_with_noise(fit: ModalFit, theta, cost):
     return fit.refine(theta, 1e-15)[0]
 
 
-def _remove_faint_modes(fit: ModalFit, theta):
+def _remove_weak_modes(fit: ModalFit, theta):
     """Remove modes that contribute little to the responses near their natural frequency."""
     while theta.size > 2:
         w = np.exp(np.split(theta, 2)[0])
@@ -392,7 +392,7 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     driven = places.index(reference)
     if len(places) < len(measured):
         notes.append(
-            f"of {len(measured)} frequency responses, only the {len(places)} to a force at {_place_name(reference)} are "
+            f"of {len(measured)} frequency responses, only the {len(places)} to a force at {_direction_name(reference)} are "
             "used"
         )
     is_positive = frequency > 0
@@ -403,7 +403,7 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     is_moving = np.abs(data).max(axis=0) > 0
     if not is_moving[driven]:
         raise PatchfemError(
-            f"structure.file: the response at the driven point itself, {_place_name(reference)}, is zero"
+            f"structure.file: the response at the driven point itself, {_direction_name(reference)}, is zero"
         )
     power = np.array([measured[place, reference][1] for place in places])
     poles = fit_poles(omega, data[:, is_moving], power[is_moving])
@@ -418,12 +418,12 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     is_scaled = own > MIN_DRIVEN_RESIDUE * np.abs(residues).max(axis=1)
     notes += [
         f"the mode at {w_r / (2 * np.pi):.5g} Hz does not move the driven point "
-        f"{_place_name(reference)} and is left out"
+        f"{_direction_name(reference)} and is left out"
         for w_r in w[~is_scaled]
     ]
     if not is_scaled.any():
         raise PatchfemError(
-            f"structure.file: no mode moves the driven point {_place_name(reference)} in the direction of the "
+            f"structure.file: no mode moves the driven point {_direction_name(reference)} in the direction of the "
             "force; check the sign of the response"
         )
     notes += _note_modes_below(poles, data[0, is_moving])
@@ -464,7 +464,7 @@ def _note_modes_below(poles: FittedPoles, first_response) -> list:
     ]
 
 
-def _place_name(place) -> str:
+def _direction_name(place) -> str:
     """Return the name of a measured degree of freedom for messages, such as "12:x"."""
     node, axis = place
     return f"{node}:{AXES[axis]}"
@@ -475,7 +475,7 @@ def _choose_reference(measured: dict):
     candidates = [reference for place, reference in measured if place == reference]
     if not candidates:
         references = sorted({reference for _, reference in measured})
-        names = ", ".join(_place_name(reference) for reference in references)
+        names = ", ".join(_direction_name(reference) for reference in references)
         raise PatchfemError(
             f"structure.file: a response at the driven point itself ({names}) is missing, and without "
             "this response the mode shapes have no scale; measure the response at the driven point"

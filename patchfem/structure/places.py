@@ -9,7 +9,7 @@ from ..core import ModalBasis, PatchfemError, frozen_array
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")
 PLACE_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")  # "12:+x"
-MAX_LISTED_PLACES = 12  # nodes with directions that an error message lists
+MAX_LISTED_NODES = 12  # nodes with directions that an error message lists
 # fraction of the moving mass; with more, the mass or the node of the base motion is wrong
 MAX_MASS_FRACTION = 1.05
 MIN_MASS_FRACTION = 0.8  # fraction of the moving mass; with less, a note says how much is missing
@@ -74,8 +74,8 @@ class Shapes:
 def _list_places(motion: dict) -> str:
     """List the first nodes and directions of a file for a message."""
     names = [f"{node}:{AXES[axis]}" for node, axis in sorted(motion)]
-    text = ", ".join(names[:MAX_LISTED_PLACES])
-    n_more = len(names) - MAX_LISTED_PLACES
+    text = ", ".join(names[:MAX_LISTED_NODES])
+    n_more = len(names) - MAX_LISTED_NODES
     return f"{text} and {n_more} more" if n_more > 0 else text
 
 

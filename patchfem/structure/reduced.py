@@ -20,7 +20,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..core import ModalBasis, NotConverged, PatchfemError, frozen_array
 from ..effects import MAX_COORDINATES
-from ..elasticity.fronts import Factor, Strainless
+from ..elasticity.fronts import Factor, ZeroEnergyMotion
 from ..elasticity.lapack import one_thread
 from . import masses, matrices
 
@@ -198,7 +198,7 @@ def _factorize(K) -> Factor | None:
     """Factorize a stiffness matrix K; return None if it has rigid motions."""
     try:
         return Factor(K, MIN_PIVOT)
-    except Strainless:
+    except ZeroEnergyMotion:
         return None
     except NotConverged:
         raise PatchfemError(

@@ -269,13 +269,10 @@ def read_numbers(figure: Figure) -> dict:
     return {"texts": [text for text in texts if text], "curves": curves}
 
 
-def relative_difference(old: list, new: list, floor: float = 0.0) -> float:
-    """Return the largest difference of two curves over the largest absolute value of the first.
-
-    That value is taken as at least `floor`.
-    """
+def relative_difference(old: list, new: list) -> float:
+    """Return the largest difference of two curves over the largest absolute value of the first."""
     difference = np.abs(np.subtract(old, new)).max(initial=0)
-    return float(difference / max(np.abs(old).max(initial=0), floor, np.finfo(float).tiny))
+    return float(difference / max(np.abs(old).max(initial=0), np.finfo(float).tiny))
 
 
 def find_changes(kept: dict, fresh: dict) -> list[str]:
@@ -289,13 +286,10 @@ def find_changes(kept: dict, fresh: dict) -> list[str]:
     if [len(curve) for curve in kept["curves"]] != [len(curve) for curve in fresh["curves"]]:
         return [*changes, "the number of curves or of their points has changed"]
     largest = max((np.abs(curve).max(initial=0) for curve in kept["curves"]), default=0)
-    worst = max(
-        (
-            relative_difference(old, new, ROUND_OFF * largest)
-            for old, new in zip(kept["curves"], fresh["curves"])
-        ),
-        default=0,
-    )
+    worst = 0.0
+    for old, new in zip(kept["curves"], fresh["curves"]):
+        if np.abs([old, new]).max(initial=0) > ROUND_OFF * largest:
+            worst = max(worst, relative_difference(old, new))
     if worst > CURVE_TOL:
         changes.append(f"a curve differs by {100 * worst:.2g} % of its largest value")
     return changes

@@ -6,7 +6,7 @@ from pieces import COATED
 
 from patchfem.elasticity.condense import condense
 from patchfem.elasticity.elasticity import assemble
-from patchfem.elasticity.grid_fronts import predict_work, predicted_bytes, predicted_seconds
+from patchfem.elasticity.grid_fronts import predict_bytes, predict_seconds, predict_work
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -24,11 +24,11 @@ def test_exact_predicted_work_is_that_of_the_factors(nx, ny, mirrored):
     assert (
         whole + kept <= work.factor_entries <= whole + 4 * kept
     )  # half of a middle column is held
-    assert predicted_bytes(nx, ny, mirrored) >= 8 * work.factor_entries
+    assert predict_bytes(nx, ny, mirrored) >= 8 * work.factor_entries
 
 
 def test_always_more_nodes_cost_more():
-    for predicted in (predicted_seconds, predicted_bytes):
+    for predicted in (predict_seconds, predict_bytes):
         for mirrored in (False, True):
             steps = [
                 predicted(nx, ny, mirrored)

@@ -68,14 +68,14 @@ def test_always_another_mesh_has_another_key():
 
 def test_always_a_changed_source_text_has_another_key(tmp_path, monkeypatch):
     here = cache.Path(cache.__file__).parent
-    for name in {*cache.GRID_SOURCE, *cache.MESH_SOURCE}:
+    for name in {*cache.GRID_SOURCE_FILES, *cache.MESH_SOURCE_FILES}:
         (tmp_path / name).write_bytes((here / name).read_bytes())
     monkeypatch.setattr(cache, "__file__", str(tmp_path / "cache.py"))
     keys = {cache.grid_key(X, DEPTH, 1, LAYERS)}
-    for name in cache.GRID_SOURCE:
+    for name in cache.GRID_SOURCE_FILES:
         (tmp_path / name).write_bytes(b"# changed")
         keys.add(cache.grid_key(X, DEPTH, 1, LAYERS))
-    assert len(keys) == 1 + len(cache.GRID_SOURCE)
+    assert len(keys) == 1 + len(cache.GRID_SOURCE_FILES)
 
 
 def test_refuses_damaged_and_foreign_files(place):

@@ -23,7 +23,7 @@ from scene_texts import (
     only,
 )
 
-from patchfem.scene.rules.limits import NOT_YET_BUILT
+from patchfem.scene.rules.limits import UNSUPPORTED_KEY
 from patchfem.scene.scene import SceneError, load, loads
 
 # (text, sets, key whose line is named, what the message says)
@@ -449,7 +449,7 @@ def test_refuses_nothing_unbuilt_before_the_scene_is_otherwise_valid():
 
 
 def test_refuses_the_key_not_yet_built_in_the_mode_that_has_it():
-    assert NOT_YET_BUILT == "structure.mode.lateral"
+    assert UNSUPPORTED_KEY == "structure.mode.lateral"
     assert (
         only(RIG, "structure.mode.second.lateral=0.2")
         == "--set: structure.mode.second.lateral: not supported yet"

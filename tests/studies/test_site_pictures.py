@@ -35,6 +35,20 @@ def test_always_a_picture_of_other_numbers_is_stale():
     assert pictures.find_stale([("loop", loop_of("0.3"))])  # the committed loop is that of the rig
 
 
+def test_always_a_curve_of_round_off_does_not_make_a_picture_stale():
+    """A picture with one large curve and a second curve that changes by a factor of two."""
+    figure, (axis,) = pictures.new_figure(2)
+    large = axis.plot([0, 1, 2], [0, 1, 2])
+    (small,) = axis.plot([0, 1, 2], [0, 1e-10, 2e-10])
+    assert large
+    numbers = {}
+    for size in (1e-10, 2e-10, 1e-7, 2e-7):
+        small.set_ydata([0, size, 2 * size])
+        numbers[size] = pictures.read_numbers(figure)
+    assert pictures.find_changes(numbers[1e-10], numbers[2e-10]) == []
+    assert pictures.find_changes(numbers[1e-7], numbers[2e-7])
+
+
 @pytest.mark.slow
 def test_always_no_committed_picture_is_stale():
     assert pictures.find_stale(pictures.figures()) == []

@@ -149,7 +149,9 @@ class Quadrature:
         after = replace(state, alive=np.where(s1 > 0, state.alive, len(state.q)))
         if self.law.reading == "stretch":
             keep, more = (
-                self._let_go(after, s0, s1) if not self._closed else self._thinned(after, s0, s1)
+                self._release_last_formed(after, s0, s1)
+                if not self._closed
+                else self._thinned(after, s0, s1)
             )
             q, path, damage, growth, mature = state.now
             new = (q, path, damage, growth, mature, np.zeros(1), 0.0, mature)
@@ -168,7 +170,7 @@ class Quadrature:
         keep = np.divide(kept, s2, out=np.ones_like(s2), where=s2 > 0)
         return keep, dense - keep * m
 
-    def _let_go(self, state: Strips, s0, s1) -> tuple:
+    def _release_last_formed(self, state: Strips, s0, s1) -> tuple:
         """Return the surviving fraction (k, m) of the bonds and the re-formed density (m,) [Pa].
 
         Where the pressure falls, the last-formed bonds are lost first. Bonds re-form unstretched where the pressure

@@ -86,7 +86,7 @@ def weights(state: Strips, law: Bonds) -> np.ndarray:
         return out
     if law.reading == "report" and not law.grows:
         straight = _seen(state, rest)[1] == 0
-        out[rest[straight]] = _printed(state, rest[straight], law)
+        out[rest[straight]] = _sum_report_strips(state, rest[straight], law)
         rest = rest[~straight]
     if rest.size:
         out[rest] = _gauss(state, rest, law)
@@ -137,7 +137,7 @@ def _stretch(state: Strips, rest, law: Bonds) -> np.ndarray:
     return np.column_stack([first / law.length, second / (2 * law.length)])
 
 
-def _printed(state: Strips, rest, law: Bonds) -> np.ndarray:
+def _sum_report_strips(state: Strips, rest, law: Bonds) -> np.ndarray:
     """Sum strips of reading="report" with u along them at constant eps, exactly.
 
     The sums are differences of P(p + 1, R/eps) and P(p + 2, R/eps), split where u changes sign.
@@ -161,7 +161,7 @@ def _gauss(state: Strips, rest, law: Bonds) -> np.ndarray:
         which = slight == few
         share, w = np.broadcast_to((1 + points) / 2, (which.sum(), len(points))), weight / 2
         if not few:
-            share, w = _towards(bent[which], law.order)
+            share, w = _gauss_points_of_pieces(bent[which], law.order)
         found = _points(
             state,
             rest[owner[which]],
@@ -289,7 +289,7 @@ def _weighted_points(order: float) -> tuple:
     return t, w / (2 ** (order + 1) * t**order)
 
 
-def _towards(bent, order: float) -> tuple:
+def _gauss_points_of_pieces(bent, order: float) -> tuple:
     """Return Gauss points (n, 8) in (0, 1) and weights for pieces that may be steep at an end.
 
     There the integrand grows as a power of the distance from this end, which Gauss-Jacobi points take as their weight.

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import frozen_array
-from ...elasticity.grid_fronts import predicted_seconds
+from ...elasticity.grid_fronts import predict_seconds
 from ...mesh.grading import Layout, columns, rows
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import extend_grid, rounded_edges
@@ -327,5 +327,5 @@ def seconds_of(bodies) -> float:
     for body in bodies:
         if body is not None:
             factor = 1.0 if body.base_grid is body else OTHER_FACTOR
-            total += factor * predicted_seconds(*node_counts(body), is_mirrored(body))
+            total += factor * predict_seconds(*node_counts(body), is_mirrored(body))
     return total

@@ -5,7 +5,7 @@ from math import sqrt
 from typing import NamedTuple
 
 from ... import cost_model
-from ...elasticity.grid_fronts import predicted_bytes
+from ...elasticity.grid_fronts import predict_bytes
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.pieces import piece_meshes
@@ -65,7 +65,7 @@ def expected_grids(asked, tolerance: float) -> Sizes:
         finest,
         len(levels),
         sum(map(seconds_of, levels)) * (OTHER_FACTOR if asked.mesh.file is not None else 1.0),
-        sum(predicted_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
+        sum(predict_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
         asked.pieces.has_overhang or asked.mesh.file is not None,
     )
 

@@ -117,7 +117,7 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     x = pair.compliance.interface.x
     gap, notes, seconds = asked.gap.at(x)
     gap = gap + pair.rise if worn is None else gap + pair.rise + worn
-    rim, out = asked.gap.half_steps(x), _on(asked, pair, gap, notes, seconds)
+    rim, out = asked.gap.half_step_heights(x), _on(asked, pair, gap, notes, seconds)
     if (
         pair.joint is not None
         and pair.joint.ripple > RIPPLE

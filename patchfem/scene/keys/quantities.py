@@ -143,7 +143,7 @@ EXAMPLES: dict[str, str] = {
 NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"  # regular expression of a number
 _QUANTITY = re.compile(rf"({NUMBER})[ \t]+(\S.*)")
 _BARE_NUMBER = re.compile(NUMBER)
-_WITHOUT_SPACE = re.compile(rf"({NUMBER})([^\s0-9.,#+±-].*)")
+_NUMBER_JOINED_TO_UNIT = re.compile(rf"({NUMBER})([^\s0-9.,#+±-].*)")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
 _MAX_LENGTH = 100  # characters of a quantity; a longer text is refused before it is analysed
 _MAX_SHOWN = 60  # characters of a wrong quantity that a message shows
@@ -238,7 +238,7 @@ def _not_text(value: object, kind: str) -> str:
 def _malformed(words: str, kind: str) -> str:
     """Return the sentence on a text that is not a number, a blank and a unit."""
     shown = words if len(words) <= _MAX_SHOWN else f"{words[: _MAX_SHOWN - 3]}..."
-    glued = _WITHOUT_SPACE.fullmatch(words)
+    glued = _NUMBER_JOINED_TO_UNIT.fullmatch(words)
     if _BARE_NUMBER.fullmatch(words):
         reason = f"'{shown}' is a bare number without a unit"
     elif any(sign in words for sign in ("±", "+/-", "+-")):

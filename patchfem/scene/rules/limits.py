@@ -32,7 +32,7 @@ from .rule_table import Facts, Missing, Mistake, apply_rules, unsupported
 from .scene_draft import SceneDraft
 from .view import View, view
 
-NOT_YET_BUILT = "structure.mode.lateral"  # no run supports this key yet
+UNSUPPORTED_KEY = "structure.mode.lateral"  # no run supports this key yet
 
 
 class JointFacts(Facts):
@@ -346,7 +346,7 @@ PATCH_LAW_RULES = (
 )
 
 
-def not_yet_built(tables: Tables) -> Iterator[tuple[str, str]]:
+def find_unsupported_lateral_modes(tables: Tables) -> Iterator[tuple[str, str]]:
     """Yield key and message of each mode with lateral motion, which no run supports yet."""
     for index, mode in enumerate(tables.structure.mode if tables.structure else ()):
         if mode.lateral:

@@ -35,7 +35,7 @@ def check_outlines(patch: Facts) -> None:
     for name in PIECES:
         if patch[name]:
             _check_ends(patch, name)
-            _check_beside_mesh(patch, name)
+            _check_outline_keys_with_mesh(patch, name)
     lengths = [piece_length(patch, name) for name in PIECES]
     written = [name for name in PIECES if patch.has(f"{name}.length")]
     difference = abs(lengths[0] - lengths[1])
@@ -52,7 +52,7 @@ def check_outlines(patch: Facts) -> None:
         )
 
 
-def _check_beside_mesh(patch: Facts, name: str) -> None:
+def _check_outline_keys_with_mesh(patch: Facts, name: str) -> None:
     """Report keys for the outline of a piece that are given together with a mesh file."""
     for key in ("length", *END_KEYS):
         if patch.mesh and patch.has(f"{name}.{key}"):

@@ -28,7 +28,7 @@ MATRIX_ENDINGS = (
 # wrong unit, because 1 % is 0.01.
 HEAVY_DAMPING = 0.5
 # Excess over 1 of the sum of squared base participations that round-off of the mode shapes can cause.
-BASE_SUM_SLACK = 1e-9
+BASE_PARTICIPATION_TOL = 1e-9
 PLACE_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 DESCRIPTIONS = ("mode", "masses", "file", "reduced")  # keys that describe a rig; a scene has one
 
@@ -366,7 +366,7 @@ def _check_base(draft: SceneDraft, modes: tuple) -> None:
         default = 0.0 if index else mode.slide
         base = mode.base if draft.has(f"structure.mode.{index}.base") else default
         squares.append((base or 0.0) ** 2)
-    if sum(squares) > 1 + BASE_SUM_SLACK:
+    if sum(squares) > 1 + BASE_PARTICIPATION_TOL:
         at = f"structure.mode.{squares.index(max(squares))}"
         key = "base" if draft.has(f"{at}.base") else "slide"
         draft.add_mistake(

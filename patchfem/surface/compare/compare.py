@@ -41,11 +41,11 @@ from .worn import (
     Tracks,
     Worn,
     make_section,
+    make_unknown_worn,
     measure_flank_track,
     measure_flank_wear,
     measure_tracks,
     measure_worn,
-    refuse_worn,
     split_at_flanks,
     split_at_tracks,
 )
@@ -316,7 +316,7 @@ def _measure_wear(alignment: Alignment, section: Section) -> _Wear:
             "no part of the traces is known to be unworn, so uniform, wedge-shaped or bow-shaped wear cannot be "
             "told from no wear"
         )
-        worn = refuse_worn(reason, worn.deposited if grew else 0.0)
+        worn = make_unknown_worn(reason, worn.deposited if grew else 0.0)
     is_worn = (worn.mean.low or 0.0) > 0
     is_exchanged = not reading.headline and is_mostly_deposit and grew and not is_worn
     return _Wear(worn, tracks, reference, hidden, reading, grew, is_exchanged)
@@ -397,9 +397,9 @@ def _compare_apart(place: Place, direction: str) -> Comparison:
         tracks = measure_flank_track(flanks)
         worn = measure_flank_wear(flanks)
     elif place.is_reversed:
-        worn = refuse_worn(reason)
+        worn = make_unknown_worn(reason)
     else:
-        worn = refuse_worn(
+        worn = make_unknown_worn(
             f"{reason}; the second trace shows no track between unworn flanks either; a worn depth needs one of the two"
         )
     sizes = tuple(_pool_with_scatter(side, step) for side in ([before], after_pieces))
@@ -447,7 +447,7 @@ def _check_flanks(comparison: Comparison, shift: float | None, is_straight: bool
     return replace(
         comparison,
         basis="",
-        worn=refuse_worn(reason),
+        worn=make_unknown_worn(reason),
         tracks=NO_TRACKS,
         flanks=None,
         ambiguity="" if is_straight else BENT,
@@ -563,7 +563,9 @@ def _compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
     except PatchfemError as error:  # a scan may be too short for the longest waves of the band
         unknown = [make_unknown("1", text, str(error)) for text in (AMPLITUDE, SLOPE)]
         ratios = Ratios(*unknown, ())
-    return Comparison(*scans, direction, "", _refuse_motion(reason), refuse_worn(reason), ratios)
+    return Comparison(
+        *scans, direction, "", _refuse_motion(reason), make_unknown_worn(reason), ratios
+    )
 
 
 def compare_directions(parts: list) -> list[DirectionRatios]:

@@ -103,13 +103,13 @@ def find_flanks(before: Profile, after: Profile) -> Flanks | None:
 
 def _find_track(x, z, box: tuple) -> _Track:
     """Find the track at a box, below the line through the flanks on both sides."""
-    is_beside = _find_beside(x.size, box)
+    is_beside = _find_flank_samples(x.size, box)
     offset, slope = _fit_line(x[is_beside], z[is_beside])
     depth = offset + slope * x - z
     return _Track((offset, slope), depth, _find_span(depth, box))
 
 
-def _find_beside(size: int, box: tuple) -> np.ndarray:
+def _find_flank_samples(size: int, box: tuple) -> np.ndarray:
     """Return the samples (size,) bool of the flanks, which begin one part away from the box."""
     edges = part_edges(size, PARTS)
     is_beside = np.ones(size, bool)
@@ -119,7 +119,7 @@ def _find_beside(size: int, box: tuple) -> np.ndarray:
 
 def _measure_roughness(x, z, box: tuple) -> float:
     """Return the median absolute distance [m] of the flanks from a line (robust to pile-up)."""
-    is_beside = _find_beside(z.size, box)
+    is_beside = _find_flank_samples(z.size, box)
     offset, slope = _fit_line(x[is_beside], z[is_beside])
     return float(np.median(np.abs(z[is_beside] - offset - slope * x[is_beside])))
 

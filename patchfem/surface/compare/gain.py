@@ -4,7 +4,7 @@ import numpy as np
 
 from .alignment import Alignment
 
-MAX_REMAINDER = 0.8  # scatter without / with the effect of the gain; wear leaves a larger ratio
+MAX_SCATTER_RATIO = 0.8  # scatter without / with the effect of the gain; wear leaves a larger ratio
 
 
 def find_gain(alignment: Alignment) -> float | None:
@@ -19,4 +19,4 @@ def find_gain(alignment: Alignment) -> float | None:
     )
     loss = float(heights @ depth) / max(float(heights @ heights), 1e-300)
     remainder = float(np.std(depth - loss * heights))
-    return 1 - loss if remainder < MAX_REMAINDER * float(np.std(depth)) else None
+    return 1 - loss if remainder < MAX_SCATTER_RATIO * float(np.std(depth)) else None

@@ -41,7 +41,7 @@ class _Group(NamedTuple):
         return self.samples.stop - self.samples.start
 
 
-def measure_largest(section: Section, text: str) -> Quantity:
+def measure_largest_depth(section: Section, text: str) -> Quantity:
     """Measure the largest worn depth.
 
     Depths are w + noise, and the largest of n of them is too large by about noise sqrt(2 log n). So each

@@ -30,7 +30,7 @@ MAX_SUBSETS = 1200  # largest number of subsets of blocks that are tried, which 
 MAX_FLOORS = 3
 # determinant of a subset; below it, the blocks of the subset lie too close together
 MIN_DETERMINANT = 1e-3
-N_JUDGED = 1000  # number of heights whose trimmed squares rank the subsets
+N_RANKING_HEIGHTS = 1000  # number of heights whose trimmed squares rank the subsets
 SEED = 1985  # seed of the random subsets and of the random traces
 
 
@@ -181,7 +181,7 @@ def _find_starts(model, state, form, blocks) -> list:
         return []
     shapes = np.linalg.solve(matrices[good], centres[subsets[good]][..., None])[..., 0]
     places = np.concatenate(blocks)
-    places = places[:: max(places.size // N_JUDGED, 1)]
+    places = places[:: max(places.size // N_RANKING_HEIGHTS, 1)]
     off = np.abs(depth[places] - shapes @ jacobian[places][:, form].T)
     kept = max(int(TRIMMED_FRACTION * off.shape[1]), 4)
     cost = (np.partition(off, kept - 1, axis=1)[:, :kept] ** 2).mean(axis=1)

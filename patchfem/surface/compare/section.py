@@ -423,10 +423,10 @@ def measure_track(section: Section, span: tuple, free: tuple) -> dict:
         "pile_up_left": left,
         "pile_up_right": right,
     }
-    return _refuse_cut(values, x, is_cut) if any(is_cut) else values
+    return _mark_unknown_if_cut(values, x, is_cut) if any(is_cut) else values
 
 
-def _refuse_cut(values: dict, x, is_cut: tuple) -> dict:
+def _mark_unknown_if_cut(values: dict, x, is_cut: tuple) -> dict:
     """Mark quantities as unknown or as lower bounds for a track that leaves the section."""
     ends = [format_length(float(x[k]), 4) for k, is_end in zip((0, -1), is_cut) if is_end]
     why = (

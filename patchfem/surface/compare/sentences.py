@@ -69,7 +69,7 @@ def _describe_confidence(ratio: Quantity) -> str:
     return f"with {np.floor(percent * 10) / 10:.3g} % confidence"
 
 
-def is_sure(mean: Quantity) -> bool:
+def is_significant(mean: Quantity) -> bool:
     """Whether a mean depth is significantly above zero."""
     return mean.value is not None and mean.low > 0
 
@@ -118,7 +118,7 @@ def _describe_wear(part: Comparison, name: str) -> str:
         return f"Worn depth{name}: no wear detected.{above}{seen} {hidden}"
     if mean.value is None:
         return f"Worn depth{name}: not available; {mean.reason}."
-    if not is_sure(mean):
+    if not is_significant(mean):
         return f"Worn depth{name}: no wear detected; at most {format_length(mean.high)} on average.{above}"
     over = "over the common length"
     if part.basis == "flanks":

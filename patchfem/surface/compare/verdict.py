@@ -4,7 +4,13 @@ from typing import NamedTuple
 
 from ..scans import change as scans
 from .compare import Comparison, compare_directions, compare_files
-from .sentences import describe_comparisons, describe_ratio_change, is_elsewhere, is_gain, is_sure
+from .sentences import (
+    describe_comparisons,
+    describe_ratio_change,
+    is_elsewhere,
+    is_gain,
+    is_significant,
+)
 
 GREW = scans.GREW
 ELSEWHERE = scans.ELSEWHERE
@@ -86,7 +92,7 @@ def _collect_facts(parts: list) -> _Facts:
         waves = ", ".join(word + name for word, name in zip(words, names))
     change = parts[0].change
     scan_headline = "" if change is None else scans.find_headline(change)
-    is_worn = scan_headline == scans.WORN or any(is_sure(part.worn.mean) for part in parts)
+    is_worn = scan_headline == scans.WORN or any(is_significant(part.worn.mean) for part in parts)
     is_flatter = any(describe_ratio_change(part.ratios.slope) == "reduced" for part in parts)
     return _Facts(parts, waves, scan_headline, is_worn, is_flatter)
 

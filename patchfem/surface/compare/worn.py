@@ -14,7 +14,7 @@ from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from ..roughness.filter import mean_line
 from .alignment import Alignment
 from .flanks import PARTS, Flanks
-from .largest import measure_largest
+from .largest import measure_largest_depth
 from .model import Parameter
 from .robust import MAX_NOISE
 from .search import MIN_SAMPLES
@@ -145,7 +145,7 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
     area = area if abs(area) > 1e-6 * alignment.noise * length else 0.0
     mean_error = float(np.hypot(error, area / section.x.size / SIDE)) / length
     mean = make_quantity(area / length, mean_error, "m", MEAN_TEXT, 0.0)
-    largest = measure_largest(section, LARGEST_TEXT)
+    largest = measure_largest_depth(section, LARGEST_TEXT)
     for smaller in (mean, tracks.sizes.get("depth_floor")):
         if smaller is not None and smaller.value > largest.value:
             low = min(largest.low, smaller.value)
@@ -368,7 +368,7 @@ def measure_flank_wear(flanks: Flanks) -> Worn:
     )
 
 
-def refuse_worn(reason: str, deposited: float = 0.0) -> Worn:
+def make_unknown_worn(reason: str, deposited: float = 0.0) -> Worn:
     """Return a `Worn` whose depths are unknown for a given reason.
 
     deposited [m2]: area above the first trace.

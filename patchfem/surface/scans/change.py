@@ -119,8 +119,8 @@ def compare_scans(before: Areal, after: Areal, keep_spikes: bool = False) -> Cha
 def _align_and_measure(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
     """Return alignment, volumes and number of specks; raises PatchfemError without a common place."""
     alignment = align_scans(before, after)
-    is_sure = alignment.placement.significance > MIN_SIGNIFICANCE
-    min_correlation = MIN_CORRELATION if is_sure else MIN_CORRELATION_UNSURE
+    is_significant = alignment.placement.significance > MIN_SIGNIFICANCE
+    min_correlation = MIN_CORRELATION if is_significant else MIN_CORRELATION_UNSURE
     if alignment.correlation <= min_correlation:
         raise PatchfemError(
             "the two scans show no common area: the heights that agree up to a plane have a "

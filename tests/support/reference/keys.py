@@ -17,7 +17,7 @@ from patchfem.scene.keys.types import (
     meaning,
     quantity_kind,
 )
-from patchfem.scene.rules.limits import NOT_YET_BUILT
+from patchfem.scene.rules.limits import UNSUPPORTED_KEY
 from patchfem.scene.rules.selectors import SELECTORS, split_keys
 
 FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
@@ -120,7 +120,7 @@ def _row(model: type, key: str, at: str) -> tuple:
     elif default:
         default = f"`{default}`"
     required = "yes" if field.is_required() else _needed(model, key, path.rpartition(".")[0])
-    said = meaning(model, key) + ("; not supported yet" if path == NOT_YET_BUILT else "")
+    said = meaning(model, key) + ("; not supported yet" if path == UNSUPPORTED_KEY else "")
     return f"`{key}`", _kind(model, name), default, required, said
 
 
