@@ -10,6 +10,7 @@ from house import (  # fmt: skip
     count_tokens,
     exceeded_counts,
     lower_baseline,
+    offered_names,
     read_baseline,
     style_rules,
     write_baseline,
@@ -51,16 +52,18 @@ PLANTED = {
     "F8": "def solve():\n    first, second = 1, 2",
     "F9": "def solve():\n    return lambda: 1, [lambda: 2, lambda: 3]",
     "R1": "class Rig(NamedTuple):\n" + "\n".join(f"    field{k}: int" for k in range(9)),
-    "deep": "from patchfem.export.pages import lead",
+    "deep": "from patchfem.contact.gaps import crown",
+    "inner": "from patchfem.contact.gaps import curvature",
     "private": "from patchfem import api\napi._check()",
     "monkeypatch": "def test(monkeypatch):\n    monkeypatch.setattr(module, 'name', 1)",
 }
+OFFERED = frozenset({"patchfem.contact.gaps.crown"})
 
 
 def broken_rules(text: str) -> set:
-    return {
-        rule for rules in (style_rules, border_rules) for rule, _, _ in rules(ast.parse(text), text)
-    }
+    tree = ast.parse(text)
+    found = (*style_rules(tree, text), *border_rules(tree, OFFERED))
+    return {rule for rule, _, _ in found}
 
 
 def test_always_no_count_exceeds_the_baseline():
@@ -74,7 +77,30 @@ def test_exact_a_clean_module_breaks_no_rule():
 
 @pytest.mark.parametrize("rule", PLANTED)
 def test_exact_a_planted_breach_is_seen(rule):
-    assert broken_rules(PLANTED[rule]) == {rule}
+    # an import from behind a border is a deep import too
+    implied = {"deep"} if rule == "inner" else set()
+    assert broken_rules(PLANTED[rule]) == {rule} | implied
+
+
+def test_exact_a_folder_offers_the_names_that_other_folders_use(tmp_path):
+    modules = {
+        "patchfem/contact/gaps.py": "from .edges import closed_length\n",
+        "patchfem/contact/edges.py": "",
+        "patchfem/runs/patch/press.py": (
+            "from ...contact import edges\nfrom ...contact.gaps import crown\nfrom . import ladder\n"
+            "edges.find_edges(crown)\n"
+        ),
+        "patchfem/runs/patch/ladder.py": "",
+    }
+    for name, text in modules.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, "utf-8")
+    assert offered_names(tmp_path) == {
+        "patchfem.contact.edges",
+        "patchfem.contact.edges.find_edges",
+        "patchfem.contact.gaps.crown",
+    }
 
 
 def test_exact_comments_and_docstrings_are_no_tokens():
