@@ -17,7 +17,7 @@ than the softer body has nodes, a stiff body follows the kinks of the other one,
 ripples. Where the coarser piece changes along the interface, the grid changes, too.
 
 The caller condenses each piece, calls `join_pieces`, solves contact and shear on `Mortar.x` with
-the weights `tributary` and the joint compliances, and asks `forces` for the nodal forces of each
+the weights `tributary_lengths` and the joint compliances, and asks `forces` for the nodal forces of each
 piece before it computes the fields inside.
 """
 
@@ -74,7 +74,7 @@ class Mortar:
     - ``side``: "lower" or "upper" if `x` are the nodes of that piece ("lower" if they match), else
       "both"
     - ``x``: (m,) [m]
-    - ``tributary``: (m,) [m] length that belongs to each node
+    - ``tributary_lengths``: (m,) [m] length that belongs to each node
     - ``to_lower``, ``to_upper``: (m, n) sparse matrix T of each piece
     - ``compliance``: (m, m) [m2/N] of both pieces together, with the signs of the lower one
     - ``ripple``: largest expected ripple of the pressure over its peak
@@ -83,7 +83,7 @@ class Mortar:
 
     side: str
     x: np.ndarray
-    tributary: np.ndarray
+    tributary_lengths: np.ndarray
     to_lower: csr_array
     to_upper: csr_array
     compliance: InterfaceCompliance

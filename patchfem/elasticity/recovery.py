@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import frozen_array
-from ..mesh.nodal_averages import Gathered, Patches, patches
+from ..mesh.nodal_averages import GroupedPatches, Patches, collect_patches
 from .elasticity import Layers, Piece, hooke
 
 # A patch whose correlations of (1, x, y) have a smaller determinant takes in the cells around it.
@@ -110,14 +110,14 @@ class Recovery:
 
     - ``cells``: the Cells
     - ``node``, ``is_coating``: (s,) node number and material of each recovery point
-    - ``corner_place``: recovery point of every corner, in the order of `Cells.corners`
+    - ``recovery_point``: recovery point of every corner, in the order of `Cells.corners`
     - ``fit``: cells and weights of every recovery point; the weights add up to 1
     """
 
     cells: Cells
     node: np.ndarray
     is_coating: np.ndarray
-    corner_place: np.ndarray
+    recovery_point: np.ndarray
     fit: Patches
 
     def __call__(self, values) -> np.ndarray:
@@ -138,27 +138,31 @@ def fit_recovery(cells: Cells) -> Recovery:
     it stays thin, as in a coating of one row, the fit has no slope across it.
     """
     owner = cells.owner()
-    key, corner_place = np.unique(
+    key, recovery_point = np.unique(
         2 * cells.corners() + cells.is_coating[owner], return_inverse=True
     )
     node = key // 2
-    near = patches(corner_place, owner)
+    near = collect_patches(recovery_point, owner)
     centres = cells.centres()
     fit, is_thin = _fit_planes(near, cells.points[node], centres)
     if is_thin.any():
         thin = np.flatnonzero(is_thin)
         own = near.select(thin)
-        touched = patches(near.cells, near.row).select(own.cells)  # points near these cells
+        touched = collect_patches(near.cells, near.point_of_entry).select(
+            own.cells
+        )  # points near these cells
         beyond = near.select(touched.cells)
-        widened = patches(own.row[touched.row][beyond.row], beyond.cells)
+        widened = collect_patches(
+            own.point_of_entry[touched.point_of_entry][beyond.point_of_entry], beyond.cells
+        )
         more, _ = _fit_planes(widened, cells.points[node[thin]], centres)
-        is_kept = ~is_thin[fit.row]
-        fit = patches(
-            np.concatenate([fit.row[is_kept], thin[more.row]]),
+        is_kept = ~is_thin[fit.point_of_entry]
+        fit = collect_patches(
+            np.concatenate([fit.point_of_entry[is_kept], thin[more.point_of_entry]]),
             np.concatenate([fit.cells[is_kept], more.cells]),
             np.concatenate([fit.weights[is_kept], more.weights]),
         )
-    return Recovery(cells, node, key % 2 == 1, corner_place, fit)
+    return Recovery(cells, node, key % 2 == 1, recovery_point, fit)
 
 
 def _fit_planes(near: Patches, points, centres) -> tuple[Patches, np.ndarray]:
@@ -170,7 +174,7 @@ def _fit_planes(near: Patches, points, centres) -> tuple[Patches, np.ndarray]:
     """
     starts = near.starts[:-1]
     counts = np.diff(near.starts)
-    row = near.row
+    row = near.point_of_entry
     offset = centres[near.cells] - points[row]
     size = np.maximum.reduceat(np.abs(offset), starts)
     offset /= np.where(size > 0, size, 1.0)[row]
@@ -329,8 +333,8 @@ def estimate_error(recovery: Recovery, u, stress, rules: list) -> StressError:
         frame_norms = partial(_quadrature_norms, recovery, rules)
     else:
         rectangles = Rectangles(
-            recovery.fit.gather(),
-            np.ascontiguousarray(recovery.corner_place.reshape(-1, 4).T),
+            recovery.fit.group_by_size(),
+            np.ascontiguousarray(recovery.recovery_point.reshape(-1, 4).T),
             np.ascontiguousarray(cells.blocks[0].T),
             sides,
         )
@@ -361,12 +365,12 @@ class Rectangles(NamedTuple):
     """Recovery on cells that are rectangles.
 
     - ``fit``: weights of the recovery
-    - ``places``, ``nodes``: (4, t) recovery points and nodes of the corners
+    - ``recovery_points``, ``nodes``: (4, t) recovery points and nodes of the corners
     - ``sides``: (2, t) lengths [m] along x and inward
     """
 
-    fit: Gathered
-    places: np.ndarray
+    fit: GroupedPatches
+    recovery_points: np.ndarray
     nodes: np.ndarray
     sides: np.ndarray
 
@@ -387,7 +391,7 @@ def _rectangle_norms(rectangles: Rectangles, u, stress, lam, mu) -> Norms:
     xx, yy, xy = stress.T
     constant = np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear])
     recovered = rectangles.fit(constant)
-    a, b, c, d = (recovered.take(places, axis=1) for places in rectangles.places)
+    a, b, c, d = (recovered.take(points, axis=1) for points in rectangles.recovery_points)
     displacement = np.ascontiguousarray(u.T)
     u_a, u_b, u_c, u_d = (displacement.take(nodes, axis=1) for nodes in rectangles.nodes)
     # twice the terms of the displacements in xi eta, from which the linear stresses follow
@@ -417,7 +421,7 @@ def _rectangle_norms(rectangles: Rectangles, u, stress, lam, mu) -> Norms:
 
 def _quadrature_norms(recovery: Recovery, rules: list, u, stress, lam, mu) -> Norms:
     """Compute the `Norms` of the stress at one instant by quadrature, on cells of any shape."""
-    at_corners = recovery(stress)[recovery.corner_place]
+    at_corners = recovery(stress)[recovery.recovery_point]
     errors = []
     energy = 0.0
     first_corner = 0

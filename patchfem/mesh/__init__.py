@@ -2,7 +2,7 @@
 
 In: sizes and layers, or a file with tagged cells and edges. Out: a `TensorGrid`, `ShapedGrid` or
 `PieceMesh` for each piece, with its interface nodes, materials and fixed nodes. All three have `x`,
-`row`, `height`, `coating`, `tributary()`, `refine()` and `base_grid`.
+`height`, `first_row_height`, `coating_thickness`, `tributary_lengths()`, `refine()` and `base_grid`.
 
 - Read `tensor` first: a grid of columns and rows that grow with depth. `grading` divides a length
   into cells of target lengths, which grow with the distance from bands of small cells.

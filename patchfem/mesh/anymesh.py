@@ -16,8 +16,8 @@ from .grading import LENGTH_TOL, tributary_lengths
 
 # Slope of a rounded edge at which the normal and the vertical gap differ by half a percent.
 MAX_SLOPE = 0.1
-CELLS = ("upper_substrate", "upper_coating", "lower_substrate", "lower_coating")
-EDGES = ("upper_interface", "lower_interface", "upper_far", "lower_far")
+CELL_TAGS = ("upper_substrate", "upper_coating", "lower_substrate", "lower_coating")
+EDGE_TAGS = ("upper_interface", "lower_interface", "upper_far", "lower_far")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -28,7 +28,7 @@ class TaggedMesh:
     - ``triangles``: (t, 3), ``quads``: (q, 4) node numbers
     - ``names``: (t + q,) tag of every cell, triangles first
     - ``nodes``: node numbers by the tag of an edge
-    - ``how``: how files of this format contain tags, for messages
+    - ``tag_help``: how files of this format contain tags, for messages
     """
 
     points: np.ndarray
@@ -36,7 +36,7 @@ class TaggedMesh:
     quads: np.ndarray
     names: np.ndarray
     nodes: dict
-    how: str
+    tag_help: str
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,12 +63,12 @@ class PieceMesh:
         return self.points[self.interface, 0]
 
     @property
-    def rise(self) -> np.ndarray:
+    def interface_depths(self) -> np.ndarray:
         """Depth of the interface nodes (m,) [m], >= 0, which rounded edges add to the gap."""
         return self.points[self.interface, 1]
 
     @property
-    def row(self) -> float:
+    def first_row_height(self) -> float:
         """Median height [m] of the cells along the interface: area over interface edge length."""
         position = np.full(len(self.points), -2)
         position[self.interface] = np.arange(self.interface.size)
@@ -94,7 +94,7 @@ class PieceMesh:
         return float(self.points[self.far, 1].max())
 
     @property
-    def coating(self) -> float:
+    def coating_thickness(self) -> float:
         """Mean thickness of the coating [m], area over extent along x; 0 without a coating."""
         if not self.is_coating.any():
             return 0.0
@@ -114,7 +114,7 @@ class PieceMesh:
         parts = [_signed_areas(self.points[cells]) for cells in (self.triangles, self.quads)]
         return np.concatenate(parts)
 
-    def tributary(self) -> np.ndarray:
+    def tributary_lengths(self) -> np.ndarray:
         """Return the tributary length (m,) [m] of each interface node."""
         return tributary_lengths(self.x)
 
@@ -167,7 +167,7 @@ class PairMesh:
     upper: PieceMesh
 
     @property
-    def matching(self) -> bool:
+    def has_matching_nodes(self) -> bool:
         """Whether both pieces have their interface nodes at the same x, to 1e-9 of the length."""
         a = self.lower.x
         b = self.upper.x
@@ -196,14 +196,14 @@ def cell_edges(mesh: PieceMesh) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(nodes), np.concatenate(owners)
 
 
-def build_pair(mesh: TaggedMesh, where) -> PairMesh:
+def build_pair(mesh: TaggedMesh, source) -> PairMesh:
     """Build both pieces of a tagged mesh and check them.
 
     Parameters
     ----------
     mesh : TaggedMesh
-    where : object
-        The file; begins every message.
+    source : object
+        The file; it begins every message.
 
     Returns
     -------
@@ -216,22 +216,22 @@ def build_pair(mesh: TaggedMesh, where) -> PairMesh:
         or cells coincide, a piece falls apart, an interface is not at y = 0 or has a hole, a far
         face is inside its piece, or the interfaces have different ends.
     """
-    _check_tags(mesh, where)
-    _check_numbers(mesh, where)
+    _check_tags(mesh, source)
+    _check_numbers(mesh, source)
     is_lower, lower_nodes = _select_piece(mesh, "lower")
     is_upper, upper_nodes = _select_piece(mesh, "upper")
     n_shared = np.intersect1d(lower_nodes, upper_nodes).size
     if n_shared:
         raise PatchfemError(
-            f"{where}: the two pieces share {n_shared} nodes; each piece needs its own interface nodes"
+            f"{source}: the two pieces share {n_shared} nodes; each piece needs its own interface nodes"
         )
-    lower = _build_piece(mesh, "lower", is_lower, lower_nodes, where)
-    upper = _build_piece(mesh, "upper", is_upper, upper_nodes, where)
+    lower = _build_piece(mesh, "lower", is_lower, lower_nodes, source)
+    upper = _build_piece(mesh, "upper", is_upper, upper_nodes, source)
     distance = np.abs(lower.x[[0, -1]] - upper.x[[0, -1]]).max()
     if distance > LENGTH_TOL * lower.length:
         fault = f"lengths {lower.length:.9g} and {upper.length:.9g} m, with ends up to {distance:.6g} m apart"
         raise PatchfemError(
-            f"{where}: lower_interface and upper_interface do not match ({fault}); let both interfaces "
+            f"{source}: lower_interface and upper_interface do not match ({fault}); let both interfaces "
             "begin and end at the same x (the nodes between may differ)"
         )
     middle = [(lower.x[0] + lower.x[-1]) / 2, 0.0]
@@ -252,44 +252,44 @@ def freeze_piece(mesh: PieceMesh) -> PieceMesh:
     )
 
 
-def _check_tags(mesh: TaggedMesh, where) -> None:
+def _check_tags(mesh: TaggedMesh, source) -> None:
     """Raise PatchfemError if a required tag is missing or a cell has an unknown tag."""
     names = set(np.unique(mesh.names).tolist())
     missing = {"upper_substrate", "lower_substrate"} - names
-    missing |= {edge for edge in EDGES if not len(mesh.nodes.get(edge, ()))}
+    missing |= {edge for edge in EDGE_TAGS if not len(mesh.nodes.get(edge, ()))}
     if missing:
         raise PatchfemError(
-            f"{where}: no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: "
-            f"{mesh.how})"
+            f"{source}: no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: "
+            f"{mesh.tag_help})"
         )
-    unknown = names - set(CELLS)
+    unknown = names - set(CELL_TAGS)
     if unknown:
         shown = ", ".join(sorted(name or "no tag" for name in unknown)[:4])
         raise PatchfemError(
-            f"{where}: some cells have an unknown tag ({shown}); possible tags are {', '.join(CELLS)}"
+            f"{source}: some cells have an unknown tag ({shown}); possible tags are {', '.join(CELL_TAGS)}"
         )
 
 
-def _check_numbers(mesh: TaggedMesh, where) -> None:
+def _check_numbers(mesh: TaggedMesh, source) -> None:
     """Raise PatchfemError unless node numbers exist and the nodes lie in a plane."""
     n_points = len(mesh.points)
-    for group in (mesh.triangles, mesh.quads, *(mesh.nodes[edge] for edge in EDGES)):
+    for group in (mesh.triangles, mesh.quads, *(mesh.nodes[edge] for edge in EDGE_TAGS)):
         if group.size and (group.min() < 0 or group.max() >= n_points):
             wrong = group.min() if group.min() < 0 else group.max()
             raise PatchfemError(
-                f"{where}: a cell names node {int(wrong)}, but the file has {n_points} nodes"
+                f"{source}: a cell names node {int(wrong)}, but the file has {n_points} nodes"
             )
     if not np.isfinite(mesh.points).all():
-        raise PatchfemError(f"{where}: a node has a coordinate that is not finite")
+        raise PatchfemError(f"{source}: a node has a coordinate that is not finite")
     used = mesh.points[np.unique(np.concatenate([mesh.triangles.ravel(), mesh.quads.ravel()]))]
     span = np.ptp(used, axis=0)
     if span.size > 2 and span[2] > LENGTH_TOL * span[:2].max():
         raise PatchfemError(
-            f"{where}: the mesh is not plane: its z values span {span[2]:.6g} m; draw the mesh in x "
+            f"{source}: the mesh is not plane: its z values span {span[2]:.6g} m; draw the mesh in x "
             "and y"
         )
     if not np.abs(used[:, :2]).max() < 1e150:  # squares of larger numbers overflow
-        raise PatchfemError(f"{where}: a node lies beyond 1e150 m")
+        raise PatchfemError(f"{source}: a node lies beyond 1e150 m")
 
 
 def _select_piece(mesh: TaggedMesh, side: str) -> tuple[np.ndarray, np.ndarray]:
@@ -301,38 +301,38 @@ def _select_piece(mesh: TaggedMesh, side: str) -> tuple[np.ndarray, np.ndarray]:
     return is_cell, np.unique(np.concatenate([triangles.ravel(), quads.ravel()]))
 
 
-def _build_piece(mesh: TaggedMesh, side: str, is_cell, used, where) -> PieceMesh:
+def _build_piece(mesh: TaggedMesh, side: str, is_cell, used, source) -> PieceMesh:
     """Build a piece from its cells and the nodes that they use, with y as depth; check it."""
     n_triangles = len(mesh.triangles)
     points = mesh.points[used, :2] * [1.0, -1.0 if side == "lower" else 1.0]
     triangles = np.searchsorted(used, mesh.triangles[is_cell[:n_triangles]])
     quads = np.searchsorted(used, mesh.quads[is_cell[n_triangles:]])
-    triangles = _turn_counterclockwise(points, triangles, where)
-    quads = _turn_counterclockwise(points, quads, where)
+    triangles = _turn_counterclockwise(points, triangles, source)
+    quads = _turn_counterclockwise(points, quads, source)
     ends = {}
     for name in ("interface", "far"):
         nodes = np.unique(mesh.nodes[f"{side}_{name}"])
         n_strange = int((~np.isin(nodes, used)).sum())
         if n_strange:
             raise PatchfemError(
-                f"{where}: {side}_{name} contains {n_strange} nodes that belong to no cell of the {side} "
+                f"{source}: {side}_{name} contains {n_strange} nodes that belong to no cell of the {side} "
                 "piece"
             )
         ends[name] = np.searchsorted(used, nodes)
     interface = ends["interface"]
     interface = interface[np.argsort(points[interface, 0], kind="stable")]
-    _check_interface(points, interface, side, where)
+    _check_interface(points, interface, side, source)
     if np.abs(points[interface, 1]).max() <= LENGTH_TOL * np.ptp(points[interface, 0]):
         points[interface, 1] = 0.0
     np.maximum(points[:, 1], 0.0, out=points[:, 1])
     far = ends["far"]
     if far.size < 2 or np.isin(far, interface).any():
         raise PatchfemError(
-            f"{where}: {side}_far must contain two nodes or more, none of them at the interface"
+            f"{source}: {side}_far must contain two nodes or more, none of them at the interface"
         )
     is_coating = mesh.names[is_cell] == f"{side}_coating"
     piece = PieceMesh(points, triangles, quads, is_coating, interface, far)
-    _check_connections(piece, side, where)
+    _check_connections(piece, side, source)
     return piece
 
 
@@ -345,7 +345,7 @@ def _signed_areas(corners) -> np.ndarray:
     return (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]).sum(axis=1) / 2
 
 
-def _turn_counterclockwise(points, cells, where) -> np.ndarray:
+def _turn_counterclockwise(points, cells, source) -> np.ndarray:
     """Return the cells counterclockwise; PatchfemError if one is not convex or has no area."""
     is_clockwise = _signed_areas(points[cells]) < 0
     cells = np.where(is_clockwise[:, None], cells[:, ::-1], cells)
@@ -357,13 +357,13 @@ def _turn_counterclockwise(points, cells, where) -> np.ndarray:
     if is_wrong.any():
         x, y = points[cells[np.argmax(is_wrong)]].mean(axis=0)
         raise PatchfemError(
-            f"{where}: {is_wrong.sum()} cells are twisted or have no area, the first at "
+            f"{source}: {is_wrong.sum()} cells are twisted or have no area, the first at "
             f"x = {x:.6g} m, {abs(y):.6g} m from the interface"
         )
     return cells
 
 
-def _check_interface(points, nodes, side: str, where) -> None:
+def _check_interface(points, nodes, side: str, source) -> None:
     """Raise PatchfemError unless an interface is the line y = 0 or slopes gently from it.
 
     nodes: interface nodes by increasing x. Nodes must not coincide, and none may lie beyond y = 0.
@@ -371,7 +371,7 @@ def _check_interface(points, nodes, side: str, where) -> None:
     name = f"{side}_interface"
     if nodes.size < 3:
         raise PatchfemError(
-            f"{where}: {name} contains {nodes.size} nodes; three or more are needed"
+            f"{source}: {name} contains {nodes.size} nodes; three or more are needed"
         )
     x, y = points[nodes].T
     cells = np.diff(x)
@@ -379,7 +379,7 @@ def _check_interface(points, nodes, side: str, where) -> None:
     shortest = int(np.argmin(cells))
     if cells[shortest] <= close and np.ptp(x) > 0:
         raise PatchfemError(
-            f"{where}: {name} has two nodes at x = {x[shortest]:.6g} m; merge these nodes"
+            f"{source}: {name} has two nodes at x = {x[shortest]:.6g} m; merge these nodes"
         )
     is_flat = np.abs(y) <= close
     slope = np.diff(y) / np.maximum(cells, 1e-300)
@@ -387,24 +387,24 @@ def _check_interface(points, nodes, side: str, where) -> None:
     is_wrong = (np.abs(slope) > MAX_SLOPE) | is_concave
     if not is_flat.any() and not is_wrong.any():
         raise PatchfemError(
-            f"{where}: no node of {name} lies on y = 0, where rounded faces touch; the nearest "
+            f"{source}: no node of {name} lies on y = 0, where rounded faces touch; the nearest "
             f"node is {abs(y).min():.6g} m away"
         )
     if is_wrong.any() or not is_flat.any():
         node = int(np.argmax(is_wrong)) if is_flat.any() else int(np.argmax(np.abs(y)))
         raise PatchfemError(
-            f"{where}: {name} is not the straight line y = 0 (rounded edges may reach a slope of "
+            f"{source}: {name} is not the straight line y = 0 (rounded edges may reach a slope of "
             f"{MAX_SLOPE:g}): the node at x = {x[node]:.6g} m lies {abs(y[node]):.6g} m away "
             "from this line; give the shape of a surface by [contact.crown] or [contact.tilt]"
         )
     if points[:, 1].min() < -close:
         raise PatchfemError(
-            f"{where}: the {side} piece reaches {-points[:, 1].min():.6g} m across y = 0; the lower "
+            f"{source}: the {side} piece reaches {-points[:, 1].min():.6g} m across y = 0; the lower "
             "piece must lie at y <= 0, and the upper piece at y >= 0"
         )
 
 
-def _check_connections(mesh: PieceMesh, side: str, where) -> None:
+def _check_connections(mesh: PieceMesh, side: str, source) -> None:
     """Raise PatchfemError unless the cells of a piece are connected edge to edge.
 
     The interface and the far face must lie on the border of the piece.
@@ -414,12 +414,12 @@ def _check_connections(mesh: PieceMesh, side: str, where) -> None:
     if len(near):
         x, y = mesh.points[near[0, 0]]
         raise PatchfemError(
-            f"{where}: {len(near)} pairs of nodes of the {side} piece coincide, the first at x = "
+            f"{source}: {len(near)} pairs of nodes of the {side} piece coincide, the first at x = "
             f"{x:.6g} m, {y:.6g} m from the interface; merge these nodes"
         )
     edges, owner = cell_edges(mesh)
     if np.unique(edges[:, 0] * n_points + edges[:, 1]).size < len(edges):
-        raise PatchfemError(f"{where}: cells of the {side} piece overlap")
+        raise PatchfemError(f"{source}: cells of the {side} piece overlap")
     key = edges.min(axis=1) * n_points + edges.max(axis=1)
     order = np.argsort(key, kind="stable")
     is_repeated = key[order][1:] == key[order][:-1]
@@ -430,16 +430,16 @@ def _check_connections(mesh: PieceMesh, side: str, where) -> None:
     n_parts, _ = connected_components(links, False)
     if n_parts > 1:
         raise PatchfemError(
-            f"{where}: the {side} piece falls into {n_parts} parts that share no edge"
+            f"{source}: the {side} piece falls into {n_parts} parts that share no edge"
         )
     is_border = np.ones(len(key), bool)
     is_border[first] = False
     is_border[second] = False
-    _check_hanging_nodes(mesh, edges[is_border], side, where)
+    _check_hanging_nodes(mesh, edges[is_border], side, source)
     inside = np.setdiff1d(mesh.far, edges[is_border])
     if inside.size:
         raise PatchfemError(
-            f"{where}: {side}_far contains {inside.size} nodes inside the {side} piece; tag only nodes "
+            f"{source}: {side}_far contains {inside.size} nodes inside the {side} piece; tag only nodes "
             "on the border"
         )
     steps = np.sort(np.stack([mesh.interface[:-1], mesh.interface[1:]], axis=1), axis=1)
@@ -447,12 +447,12 @@ def _check_connections(mesh: PieceMesh, side: str, where) -> None:
     if is_missing.any():
         x = mesh.x[np.argmax(is_missing)]
         raise PatchfemError(
-            f"{where}: {side}_interface has a hole or leaves out nodes after x = {x:.6g} m; make the "
+            f"{source}: {side}_interface has a hole or leaves out nodes after x = {x:.6g} m; make the "
             "interface one continuous edge"
         )
 
 
-def _check_hanging_nodes(mesh: PieceMesh, border, side: str, where) -> None:
+def _check_hanging_nodes(mesh: PieceMesh, border, side: str, source) -> None:
     """Raise PatchfemError if a node of the border lies inside another edge (e, 2) of the border."""
     nodes = np.unique(border)
     begin = mesh.points[border[:, 0]]
@@ -470,6 +470,6 @@ def _check_hanging_nodes(mesh: PieceMesh, border, side: str, where) -> None:
     if distance.min() <= LENGTH_TOL * mesh.length:
         x, y = point[np.argmin(distance)]
         raise PatchfemError(
-            f"{where}: cells of the {side} piece do not meet edge to edge: a node lies inside an edge "
+            f"{source}: cells of the {side} piece do not meet edge to edge: a node lies inside an edge "
             f"at x = {x:.6g} m, {y:.6g} m from the interface"
         )

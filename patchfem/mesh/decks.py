@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from .anymesh import CELLS, EDGES, TaggedMesh
+from .anymesh import CELL_TAGS, EDGE_TAGS, TaggedMesh
 
 HOW_TAGGED = (
     "for the cells, names of *ELSET; for `interface` and `far`, names of *NSET or of *ELSET made of "
@@ -20,9 +20,9 @@ PLANE_ELEMENT = re.compile(
 )
 LINE_ELEMENT = re.compile(r"(?:T2D2|T3D2|B21|B31|R2D2|RAX2|SAX1)H?$")
 UNSUPPORTED_KEYWORDS = ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY")
-# Members of a set over the nodes and elements of the deck, above which the set is refused. A set may
-# repeat the members of other sets, so a short deck could otherwise name any number of members.
-MAX_REPETITIONS = 4
+# Largest number of members of a set over the number of nodes and elements. A set may repeat the
+# members of other sets, so a short deck could otherwise name any number of members.
+MAX_SET_SIZE_RATIO = 4
 
 
 class DeckBlock(NamedTuple):
@@ -91,7 +91,7 @@ class Deck:
                     raise PatchfemError(f"a set names the unknown set {word}")
                 else:
                     members += sets[word.lower()]
-                    if len(members) > MAX_REPETITIONS * (len(self.nodes) + len(self.elements)):
+                    if len(members) > MAX_SET_SIZE_RATIO * (len(self.nodes) + len(self.elements)):
                         raise PatchfemError("a set names more members than the deck has")
         return members
 
@@ -100,6 +100,7 @@ class Deck:
         position = {number: k for k, number in enumerate(self.nodes)}
 
         def find_nodes(owner: str, numbers) -> list[int]:
+            """Return the positions of nodes by their numbers; `owner` begins the message."""
             for number in numbers:
                 if number not in position:
                     raise PatchfemError(
@@ -111,7 +112,7 @@ class Deck:
         if dimensions - {2} and dimensions - {3}:
             raise PatchfemError("either all nodes need two coordinates, or all nodes need three")
         tag_of_element = {}
-        for tag in CELLS:
+        for tag in CELL_TAGS:
             for number in self.element_sets.get(tag, ()):
                 if tag_of_element.setdefault(number, tag) != tag:
                     raise PatchfemError(
@@ -124,7 +125,7 @@ class Deck:
                 cells[len(corners)].append(find_nodes(f"element {number}", corners))
                 names[len(corners)].append(tag_of_element.get(number, ""))
         edges = {}
-        for tag in EDGES:
+        for tag in EDGE_TAGS:
             numbers = list(self.node_sets.get(tag, ()))
             for number in self.element_sets.get(tag, ()):
                 corners = self.elements.get(number, ())

@@ -22,18 +22,20 @@ class End:
     kind: str = "sharp"
     size: float = 0.0
 
-    def bearing(self, length: float) -> float:
+    def half_contact_length(self, length: float) -> float:
         """Return half the length [m] of the face that can be in contact.
 
-        length: length of the piece [m]. A chamfer does not touch. A rounding touches up to the
+        A chamfer does not touch. A rounding touches up to the
         slope `MAX_INTERFACE_SLOPE`.
-        """
-        flat = length / 2 - self.size
-        if self.kind != "radius":
-            return flat
-        return flat + self.size * MAX_INTERFACE_SLOPE / hypot(1, MAX_INTERFACE_SLOPE)
 
-    def drop(self, x, length: float) -> np.ndarray:
+        length: length of the piece [m].
+        """
+        half_flat_length = length / 2 - self.size
+        if self.kind != "radius":
+            return half_flat_length
+        return half_flat_length + self.size * MAX_INTERFACE_SLOPE / hypot(1, MAX_INTERFACE_SLOPE)
+
+    def face_depth(self, x, length: float) -> np.ndarray:
         """Return the depth of the end face below the level of the flat face.
 
         At the distance s beyond the flat part the circle lies R - sqrt(R^2 - s^2) deep. It is

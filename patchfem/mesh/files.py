@@ -93,7 +93,7 @@ def read_bodies(path: Path) -> tuple:
 def read_pieces(path: Path) -> PairMesh:
     """Read both pieces of a tagged mesh of triangles and quads: .msh, .vtu, .inp or .med.
 
-    The interfaces need the same ends; their nodes between may differ (`PairMesh.matching`).
+    The interfaces need the same ends; their nodes between may differ (`PairMesh.has_matching_nodes`).
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def read_pieces(path: Path) -> PairMesh:
             fault = f"{type(error).__name__}: {error}"
             raise PatchfemError(f"{path}: not a readable {path.suffix} file ({fault})") from None
     elif path.suffix in (".msh", ".vtu", ".med"):
-        mesh = _convert(path, _load(path))
+        mesh = _convert_mesh(path, _read_with_meshio(path))
     elif path.suffix == ".unv":
         raise PatchfemError(
             f"{path}: the reader of .unv meshes was removed in patchfem 1.0; use .med or .msh"
@@ -139,12 +139,12 @@ class _Tags(NamedTuple):
 
     - ``names``: name by (1 for lines or 2 for cells, code)
     - ``codes``: an array for each block of cells, or None
-    - ``how``: how files of this format contain tags, for messages
+    - ``tag_help``: how files of this format contain tags, for messages
     """
 
     names: dict
     codes: list | None
-    how: str
+    tag_help: str
 
 
 def _read_tags(path: Path, mesh) -> _Tags:
@@ -159,9 +159,9 @@ def _read_tags(path: Path, mesh) -> _Tags:
     if path.suffix == ".med":
         names = {}
         for family, groups in mesh.cell_tags.items():
-            names[1, family] = names[2, family] = _known_group(groups)
-        how = "names of groups of faces and of edges"
-        return _Tags(names, mesh.cell_data.get("cell_tags"), how)
+            names[1, family] = names[2, family] = _select_group(groups)
+        tag_help = "names of groups of faces and of edges"
+        return _Tags(names, mesh.cell_data.get("cell_tags"), tag_help)
     names = {(2, code): name for name, code in CELL_TAGS.items()}
     names |= {(1, code): name for name, code in EDGE_TAGS.items()}
     numbers = ", ".join(f"{code} {name}" for name, code in (CELL_TAGS | EDGE_TAGS).items())
@@ -169,7 +169,7 @@ def _read_tags(path: Path, mesh) -> _Tags:
     return _Tags(names, codes, f"the cell array `tag`: {numbers}")
 
 
-def _convert(path: Path, mesh) -> TaggedMesh:
+def _convert_mesh(path: Path, mesh) -> TaggedMesh:
     """Convert a meshio mesh: collect triangles, quads and edge nodes by their tags."""
     tags = _read_tags(path, mesh)
     cells = {"triangle": [np.empty((0, 3), np.int64)], "quad": [np.empty((0, 4), np.int64)]}
@@ -199,17 +199,17 @@ def _convert(path: Path, mesh) -> TaggedMesh:
         np.concatenate(cells["quad"]).astype(np.int64),
         np.concatenate([*labels["triangle"], *labels["quad"]]),
         nodes,
-        tags.how,
+        tags.tag_help,
     )
 
 
-def _known_group(groups: list) -> str:
+def _select_group(groups: list) -> str:
     """Return the group of a family that is a tag of a piece, else its first group."""
     names = [name.strip().lower() for name in groups]
     return next((name for name in names if name in CELL_TAGS | EDGE_TAGS), names[0])
 
 
-def _load(path: Path):
+def _read_with_meshio(path: Path):
     """Read a file with meshio, which may print to stdout and call sys.exit."""
     import meshio
 

@@ -17,41 +17,43 @@ class Layout:
     - ``bands``: (from, to, length) [m] each. A cell has this length within the band and grows by
       `slope` per distance from it.
     - ``span``: (from, to) [m] that is loaded
-    - ``inside``, ``largest``: maximum lengths [m] within the span and far from it
+    - ``max_loaded_length``, ``max_length``: maximum cell lengths [m] within the span and far from it
     """
 
     start: float
     stop: float
     bands: tuple
     span: tuple
-    inside: float
-    largest: float
+    max_loaded_length: float
+    max_length: float
     slope: float
 
-    def size(self, x) -> np.ndarray:
+    def cell_lengths(self, x) -> np.ndarray:
         """Return the target cell lengths (k,) [m] at positions (k,) [m]."""
         x = np.asarray(x, float)
-        out = np.full(x.shape, self.largest)
+        out = np.full(x.shape, self.max_length)
         # the lengths are computed in place, because there are many bands
         for low, high, length in self.bands:
-            wanted = _distance(x, low, high)
-            wanted *= self.slope
-            wanted += length
-            np.minimum(out, wanted, out=out)
-        return np.minimum(out, self.inside + self.slope * _distance(x, *self.span))
+            lengths = _distance_from_interval(x, low, high)
+            lengths *= self.slope
+            lengths += length
+            np.minimum(out, lengths, out=out)
+        return np.minimum(
+            out, self.max_loaded_length + self.slope * _distance_from_interval(x, *self.span)
+        )
 
-    def times(self, factor: float) -> "Layout":
+    def scale_cells(self, factor: float) -> "Layout":
         """Return the layout with all cell lengths, and the slope, multiplied by a factor."""
         return replace(
             self,
             bands=tuple((low, high, length * factor) for low, high, length in self.bands),
-            inside=self.inside * factor,
-            largest=self.largest * factor,
+            max_loaded_length=self.max_loaded_length * factor,
+            max_length=self.max_length * factor,
             slope=self.slope * factor,
         )
 
 
-def _distance(x, low: float, high: float) -> np.ndarray:
+def _distance_from_interval(x, low: float, high: float) -> np.ndarray:
     """Return the distance of positions (k,) from an interval."""
     if low == high:
         return np.abs(x - low)
@@ -61,7 +63,7 @@ def _distance(x, low: float, high: float) -> np.ndarray:
 def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) -> np.ndarray:
     """Divide a layout into cells.
 
-    The levels lie at equal steps of the integral of 1/size, so the lengths of neighbouring cells
+    The levels lie at equal steps of the integral of 1/length, so the lengths of neighbouring cells
     differ by a factor of about 1 + slope at most.
 
     Parameters
@@ -78,13 +80,13 @@ def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) 
         Both ends included.
     """
     length = layout.stop - layout.start
-    # the integral is sampled at geometric distances from every band, where 1/size changes fast
+    # 1/length changes fast near the bands, so the samples there have geometrically spaced distances
     samples = [np.linspace(layout.start, layout.stop, 2001)]
-    for low, high, size in layout.bands:
-        distances = np.append(0.0, np.geomspace(size / 16, max(length, size), 400))
+    for low, high, band_length in layout.bands:
+        distances = np.append(0.0, np.geomspace(band_length / 16, max(length, band_length), 400))
         samples += [low - distances, high + distances]
     s = np.unique(np.clip(np.concatenate(samples), layout.start, layout.stop))
-    rate = 1 / layout.size(s)
+    rate = 1 / layout.cell_lengths(s)
     steps = (rate[1:] + rate[:-1]) / 2 * np.diff(s)
     integral = np.append(0.0, np.cumsum(steps))
     wanted_cells = integral[-1] - 1e-6  # round-off must not add a cell
@@ -107,13 +109,13 @@ def tributary_lengths(x) -> np.ndarray:
     return np.append(half_cells, 0.0) + np.insert(half_cells, 0, 0.0)
 
 
-def columns(layout: Layout, through=()) -> np.ndarray:
+def divide_into_columns(layout: Layout, required_levels=()) -> np.ndarray:
     """Divide a layout into an even number of columns, four at least.
 
     Parameters
     ----------
     layout : Layout
-    through : sequence of float
+    required_levels : sequence of float
         Positions [m] at each of which a column ends.
 
     Returns
@@ -121,7 +123,7 @@ def columns(layout: Layout, through=()) -> np.ndarray:
     (k,) ndarray [m]
         Both ends included.
     """
-    inner = sorted(place for place in through if layout.start < place < layout.stop)
+    inner = sorted(level for level in required_levels if layout.start < level < layout.stop)
     parts = []
     for low, high in pairwise([layout.start, *inner, layout.stop]):
         part = replace(layout, start=low, stop=high)
@@ -130,13 +132,13 @@ def columns(layout: Layout, through=()) -> np.ndarray:
     return frozen_array(np.concatenate(parts))
 
 
-def rows(layout: Layout, coating: float) -> tuple[np.ndarray, int]:
+def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarray, int]:
     """Divide a layout in depth into rows, two at least in the coating and three below it.
 
     Parameters
     ----------
     layout : Layout
-    coating : float
+    coating_thickness : float
         Thickness of the coating [m], at whose depth a row ends.
 
     Returns
@@ -145,8 +147,8 @@ def rows(layout: Layout, coating: float) -> tuple[np.ndarray, int]:
         From the interface to the far face.
     coating_rows : int
     """
-    under = graded_levels(replace(layout, start=layout.start + coating), min_cells=3)
-    if coating <= 0:
+    under = graded_levels(replace(layout, start=layout.start + coating_thickness), min_cells=3)
+    if coating_thickness <= 0:
         return frozen_array(under), 0
-    coated = graded_levels(replace(layout, stop=layout.start + coating), min_cells=2)[:-1]
+    coated = graded_levels(replace(layout, stop=layout.start + coating_thickness), min_cells=2)[:-1]
     return frozen_array(np.concatenate([coated, under])), coated.size

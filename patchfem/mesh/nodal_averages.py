@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# NumPy sums at most this number of terms in their given order; `Gathered` uses the same order.
+# NumPy sums at most this number of terms in their given order; `GroupedPatches` uses the same order.
 MAX_ORDERED_CELLS = 8
 
 
@@ -25,7 +25,7 @@ class Patches:
     weights: np.ndarray
 
     @property
-    def row(self) -> np.ndarray:
+    def point_of_entry(self) -> np.ndarray:
         """Index (k,) of the point to which each entry of `cells` belongs."""
         return np.repeat(np.arange(self.starts.size - 1), np.diff(self.starts))
 
@@ -33,37 +33,37 @@ class Patches:
         """Return weighted sums (s, k) of values (t, k) at the cells."""
         return np.add.reduceat(self.weights[:, None] * values[self.cells], self.starts[:-1])
 
-    def gather(self) -> "Gathered":
-        """Return these patches as `Gathered`, for values that have the cells on the last axis."""
+    def group_by_size(self) -> "GroupedPatches":
+        """Return the same patches for values that have the cells on the last axis."""
         counts = np.diff(self.starts)
         groups = []
         for count in np.unique(counts[counts <= MAX_ORDERED_CELLS]):
-            places = np.flatnonzero(counts == count)
-            entries = self.starts[places] + np.arange(count)[:, None]
-            groups.append(Group(places, self.cells[entries], self.weights[entries]))
-        other_places = np.flatnonzero(counts > MAX_ORDERED_CELLS)
-        others = self.select(other_places) if other_places.size else None
-        return Gathered(counts.size, groups, other_places, others)
+            points = np.flatnonzero(counts == count)
+            entries = self.starts[points] + np.arange(count)[:, None]
+            groups.append(PatchGroup(points, self.cells[entries], self.weights[entries]))
+        other_points = np.flatnonzero(counts > MAX_ORDERED_CELLS)
+        other_patches = self.select(other_points) if other_points.size else None
+        return GroupedPatches(counts.size, groups, other_points, other_patches)
 
-    def select(self, places) -> "Patches":
+    def select(self, points) -> "Patches":
         """Return the patches of the points with given indices (p,)."""
-        counts = np.diff(self.starts)[places]
+        counts = np.diff(self.starts)[points]
         starts = np.append(0, np.cumsum(counts))
-        shifts = self.starts[:-1][places] - starts[:-1]
+        shifts = self.starts[:-1][points] - starts[:-1]
         entries = np.arange(starts[-1]) + np.repeat(shifts, counts)
         return Patches(starts, self.cells[entries], self.weights[entries])
 
 
-class Group(NamedTuple):
+class PatchGroup(NamedTuple):
     """Points (p,) with the same number c of cells each, and the cells and weights (c, p)."""
 
-    places: np.ndarray
+    points: np.ndarray
     cells: np.ndarray
     weights: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Gathered:
+class GroupedPatches:
     """Weighted sums over patches, for values that have the cells on the last axis.
 
     All points with the same number of cells are summed at once. This takes a fifth of the time of
@@ -71,13 +71,13 @@ class Gathered:
 
     - ``size``: number of points
     - ``groups``: points with up to `MAX_ORDERED_CELLS` cells
-    - ``other_places``: (p,) other points; ``others``: their Patches
+    - ``other_points``: (p,) other points; ``other_patches``: their Patches
     """
 
     size: int
-    groups: list[Group]
-    other_places: np.ndarray
-    others: Patches | None
+    groups: list[PatchGroup]
+    other_points: np.ndarray
+    other_patches: Patches | None
 
     def __call__(self, values) -> np.ndarray:
         """Return weighted sums (k, s) of values (k, t) at the cells.
@@ -92,20 +92,20 @@ class Gathered:
                 for cell, weight in zip(group.cells, group.weights)
             ]
             if len(terms) > 1:
-                out[:, group.places] = terms[0] + sum(terms[2:], terms[1])
+                out[:, group.points] = terms[0] + sum(terms[2:], terms[1])
             else:
-                out[:, group.places] = terms[0]
-        if self.others is not None:
-            out[:, self.other_places] = (self.others @ values.T).T
+                out[:, group.points] = terms[0]
+        if self.other_patches is not None:
+            out[:, self.other_points] = (self.other_patches @ values.T).T
         return out
 
 
-def patches(place, cell, weight=None) -> Patches:
+def collect_patches(point, cell, weight=None) -> Patches:
     """Collect pairs of a point and a cell into patches.
 
     Parameters
     ----------
-    place, cell : (k,) array_like of int
+    point, cell : (k,) array_like of int
         Numbers of points and of cells. A pair may occur more than once. Every point has a cell.
     weight : (k,) ndarray, optional
         By default 1.
@@ -114,7 +114,7 @@ def patches(place, cell, weight=None) -> Patches:
     -------
     Patches
     """
-    pairs, first = np.unique(np.asarray(place, np.int64) << 32 | cell, return_index=True)
+    pairs, first = np.unique(np.asarray(point, np.int64) << 32 | cell, return_index=True)
     starts = np.append(0, np.cumsum(np.bincount(pairs >> 32)))
     weights = np.ones(pairs.size) if weight is None else weight[first]
     return Patches(starts, pairs & 0xFFFFFFFF, weights)

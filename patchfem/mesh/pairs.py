@@ -8,7 +8,7 @@ from .anymesh import PieceMesh, cell_edges, freeze_piece
 from .tensor import TensorGrid
 
 
-class Block(NamedTuple):
+class CellBlock(NamedTuple):
     """Cells of one kind ("triangle", "quad", "line") as node numbers, and the tag of each."""
 
     kind: str
@@ -30,12 +30,12 @@ def as_piece(body) -> PieceMesh:
     quads = np.stack([corner.ravel() for corner in corners], axis=1)
     points = np.stack([np.repeat(body.x, ny), np.tile(body.depth, nx)], axis=1)
     triangles = np.empty((0, 3), np.int64)
-    is_coating = body.cell_is_coating().ravel()
+    is_coating = body.is_coating_cell().ravel()
     piece = PieceMesh(points, triangles, quads, is_coating, node[:, 0], node[:, -1])
     return freeze_piece(piece)
 
 
-def join_meshes(lower, upper) -> tuple[np.ndarray, list[Block]]:
+def join_meshes(lower, upper) -> tuple[np.ndarray, list[CellBlock]]:
     """Join the meshes of a pair, the lower piece at y <= 0 and first.
 
     Parameters
@@ -45,29 +45,29 @@ def join_meshes(lower, upper) -> tuple[np.ndarray, list[Block]]:
     Returns
     -------
     points : (N, 2) ndarray [m]
-    blocks : list of Block
+    blocks : list of CellBlock
         One per kind; triangles and quads are counterclockwise.
     """
     points = []
-    parts = {"triangle": [], "quad": [], "line": []}
+    pieces = {"triangle": [], "quad": [], "line": []}
     n_points = 0
     for side, sign, body in (("lower", -1.0, as_piece(lower)), ("upper", 1.0, as_piece(upper))):
         names = np.where(body.is_coating, f"{side}_coating", f"{side}_substrate")
         n_triangles = len(body.triangles)
         # mirroring at y = 0 makes a cell clockwise, so the order of its corners is reversed
-        turn = slice(None, None, -1) if sign < 0 else slice(None)
-        parts["triangle"].append((body.triangles[:, turn] + n_points, names[:n_triangles]))
-        parts["quad"].append((body.quads[:, turn] + n_points, names[n_triangles:]))
+        corner_order = slice(None, None, -1) if sign < 0 else slice(None)
+        pieces["triangle"].append((body.triangles[:, corner_order] + n_points, names[:n_triangles]))
+        pieces["quad"].append((body.quads[:, corner_order] + n_points, names[n_triangles:]))
         interface = np.stack([body.interface[:-1], body.interface[1:]], axis=1)
         for tag, edges in (("interface", interface), ("far", _far_edges(body))):
-            parts["line"].append((edges + n_points, np.full(len(edges), f"{side}_{tag}")))
+            pieces["line"].append((edges + n_points, np.full(len(edges), f"{side}_{tag}")))
         points.append(body.points * [1.0, sign])
         n_points += len(body.points)
     blocks = []
-    for kind, of_pieces in parts.items():
-        cells, names = (np.concatenate(arrays) for arrays in zip(*of_pieces))
+    for kind, cells_of_pieces in pieces.items():
+        cells, names = (np.concatenate(arrays) for arrays in zip(*cells_of_pieces))
         if len(cells):
-            blocks.append(Block(kind, cells, names))
+            blocks.append(CellBlock(kind, cells, names))
     return np.concatenate(points), blocks
 
 

@@ -30,7 +30,7 @@ def recognise_grids(pair: PairMesh) -> tuple[TensorGrid, TensorGrid | None] | No
     """
     lower = recognise_grid(pair.lower)
     upper = recognise_grid(pair.upper)
-    if lower is None or upper is None or not pair.matching:
+    if lower is None or upper is None or not pair.has_matching_nodes:
         return None
     if lower.depth.size == upper.depth.size and lower.coating_rows == upper.coating_rows:
         if np.abs(lower.depth - upper.depth).max() <= LENGTH_TOL * lower.length:
@@ -51,7 +51,7 @@ def recognise_grid(mesh: PieceMesh) -> TensorGrid | None:
     columns = x.size - 1
     rows = depth.size - 1
     has_sizes = len(mesh.quads) == columns * rows and len(mesh.points) == x.size * depth.size
-    if len(mesh.triangles) or not has_sizes or mesh.rise.any():
+    if len(mesh.triangles) or not has_sizes or mesh.interface_depths.any():
         return None
     close = LENGTH_TOL * span
     corners = mesh.points[mesh.quads]
@@ -79,7 +79,7 @@ def _grid_lines(values, span: float) -> np.ndarray:
     return values[np.append(True, np.diff(values) > GRID_LINE_TOL * span)]
 
 
-def fixed_length(mesh: PieceMesh) -> tuple[float, float]:
+def measure_fixed_length(mesh: PieceMesh) -> tuple[float, float]:
     """Measure the fixed length and the whole length of the far face.
 
     The whole face consists of every face of the border, from corner to corner, on which an edge is
@@ -90,7 +90,7 @@ def fixed_length(mesh: PieceMesh) -> tuple[float, float]:
     fixed, whole : float
         Length of the fixed part and of the whole face [m].
     """
-    border = _border(mesh)
+    border = _border_edges(mesh)
     border = border[~np.isin(border, mesh.interface).all(axis=1)]
     edges = mesh.points[border[:, 1]] - mesh.points[border[:, 0]]
     length = np.hypot(*edges.T)
@@ -114,7 +114,7 @@ def find_holes(mesh: PieceMesh) -> tuple[int, float]:
     area : float
         Of all holes [m2].
     """
-    border = _border(mesh)
+    border = _border_edges(mesh)
     n_points = len(mesh.points)
     links = coo_matrix((np.ones(len(border)), border.T), shape=(n_points, n_points))
     loop = connected_components(links, False)[1][border[:, 0]]
@@ -125,7 +125,7 @@ def find_holes(mesh: PieceMesh) -> tuple[int, float]:
     return int(is_hole.sum()), float(-area[is_hole].sum())
 
 
-def _border(mesh: PieceMesh) -> np.ndarray:
+def _border_edges(mesh: PieceMesh) -> np.ndarray:
     """Return the edges (b, 2) that belong to one cell only, counterclockwise around it."""
     edges, _ = cell_edges(mesh)
     _, first, counts = np.unique(

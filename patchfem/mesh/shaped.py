@@ -14,7 +14,7 @@ from ..core import frozen_array
 from .anymesh import PieceMesh
 from .ends import End
 from .pairs import as_piece
-from .tensor import GROWTH, TensorGrid, graded_rows, merge_levels, split_levels
+from .tensor import ROW_GROWTH, TensorGrid, graded_rows, merge_levels, split_levels
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -31,12 +31,12 @@ class ShapedGrid(PieceMesh):
     end: End
 
     @property
-    def coating(self) -> float:
+    def coating_thickness(self) -> float:
         """Thickness of the coating [m]; 0 without a coating."""
-        return self.inner.coating
+        return self.inner.coating_thickness
 
     @property
-    def flat(self) -> float:
+    def half_flat_length(self) -> float:
         """Half the length [m] of the flat face between both ends."""
         return self._piece_length() / 2 - self.end.size
 
@@ -64,7 +64,9 @@ class ShapedGrid(PieceMesh):
         return 2 * float(self.inner.x[-1] + self.outer[-1])
 
 
-def shaped_grid(inner: TensorGrid, length: float, end: End, growth: float = GROWTH) -> ShapedGrid:
+def shaped_grid(
+    inner: TensorGrid, length: float, end: End, growth: float = ROW_GROWTH
+) -> ShapedGrid:
     """Make a piece with shaped ends from the grid over the interface.
 
     The interface lies in the middle of the piece. The first column beyond the interface is as long
@@ -102,10 +104,10 @@ def _move_columns(inner: TensorGrid, outer, length: float, end: End) -> ShapedGr
         beyond[-1] = length / 2
     x = np.concatenate([-beyond[::-1], inner.x, beyond])
     grid = as_piece(TensorGrid(x, inner.depth, inner.coating_rows))
-    substrate_height = inner.height - inner.coating
+    substrate_height = inner.height - inner.coating_thickness
     fraction = np.minimum(1.0, (inner.height - inner.depth) / substrate_height)
     points = grid.points.copy()
-    points[:, 1] += np.outer(end.drop(x, length), fraction).ravel()
+    points[:, 1] += np.outer(end.face_depth(x, length), fraction).ravel()
     return ShapedGrid(
         frozen_array(points),
         grid.triangles,

@@ -14,9 +14,9 @@ from .grading import tributary_lengths
 
 # Ratio of the heights of successive rows. The relative error of the compliance is 1e-3, and 2e-3 if
 # the ratio is 1.15.
-GROWTH = 1.1
-COATING_ROWS = 4  # minimum number of rows through a coating
-SUBSTRATE_ROWS = 3  # minimum number of rows below the coating
+ROW_GROWTH = 1.1
+MIN_COATING_ROWS = 4  # minimum number of rows through a coating
+MIN_SUBSTRATE_ROWS = 3  # minimum number of rows below the coating
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -43,12 +43,12 @@ class TensorGrid:
         return float(self.depth[-1])
 
     @property
-    def row(self) -> float:
+    def first_row_height(self) -> float:
         """Height of the first row of cells [m]."""
         return float(self.depth[1])
 
     @property
-    def coating(self) -> float:
+    def coating_thickness(self) -> float:
         """Thickness of the coating [m]; 0 without a coating."""
         return float(self.depth[self.coating_rows])
 
@@ -57,11 +57,11 @@ class TensorGrid:
         """The tensor grid over the interface: this grid."""
         return self
 
-    def tributary(self) -> np.ndarray:
+    def tributary_lengths(self) -> np.ndarray:
         """Return the tributary length (nx,) [m] of each interface node."""
         return tributary_lengths(self.x)
 
-    def cell_is_coating(self) -> np.ndarray:
+    def is_coating_cell(self) -> np.ndarray:
         """Return whether each cell is coating, (nx - 1, ny - 1) bool, as columns by rows."""
         row = np.arange(self.depth.size - 1) < self.coating_rows
         return np.broadcast_to(row, (self.x.size - 1, row.size))
@@ -93,7 +93,7 @@ class TensorGrid:
 
 
 def graded_rows(
-    start: float, total: float, growth: float = GROWTH, min_rows: int = 1
+    start: float, total: float, growth: float = ROW_GROWTH, min_rows: int = 1
 ) -> np.ndarray:
     """Compute heights of rows that grow with a constant ratio and add up to a total.
 
@@ -140,8 +140,8 @@ def graded_depth(
     height: float,
     first: float,
     coating: float = 0.0,
-    growth: float = GROWTH,
-    min_rows: int = COATING_ROWS,
+    growth: float = ROW_GROWTH,
+    min_rows: int = MIN_COATING_ROWS,
 ) -> tuple[np.ndarray, int]:
     """Compute the depths of rows that grow from the interface to the far face.
 
@@ -177,7 +177,7 @@ def graded_depth(
     if coating > 0:
         rows = graded_rows(min(first, coating / min_rows), coating, growth, min_rows)
         first = rows[-1] * growth
-    under = graded_rows(first, height - coating, growth, SUBSTRATE_ROWS)
+    under = graded_rows(first, height - coating, growth, MIN_SUBSTRATE_ROWS)
     depth = np.concatenate([[0.0], np.cumsum(rows), coating + np.cumsum(under)])
     if coating > 0:
         depth[rows.size] = coating
@@ -186,7 +186,11 @@ def graded_depth(
 
 
 def graded_grid(
-    length: float, height: float, element_size: float, coating: float = 0.0, growth: float = GROWTH
+    length: float,
+    height: float,
+    element_size: float,
+    coating: float = 0.0,
+    growth: float = ROW_GROWTH,
 ) -> TensorGrid:
     """Make the grid of a piece with equal columns.
 
@@ -239,6 +243,6 @@ def split_levels(levels) -> np.ndarray:
         ratio[-1] = cells[-1] / cells[-2]
     out = np.empty(2 * levels.size - 1)
     out[::2] = levels
-    # a jump of the grading by more than a factor of four is not continued
+    # beyond a factor of four the ratio is a jump between two gradings, which halving must not spread
     out[1::2] = levels[:-1] + cells / (1 + np.sqrt(np.clip(ratio, 0.25, 4.0)))
     return out

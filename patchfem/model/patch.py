@@ -44,7 +44,7 @@ class PatchPiece:
     @property
     def half_contact_length(self) -> float:
         """Half the length [m] of the face that can touch."""
-        return self.end.bearing(self.length)
+        return self.end.half_contact_length(self.length)
 
     def corner_kind(self, half_length: float) -> str:
         """Return the kind of corner at a distance [m] from the middle, "flat" inside the face."""

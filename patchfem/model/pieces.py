@@ -6,7 +6,7 @@ from ..closed_forms import contact
 from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
 from ..mesh import files, shaped
-from ..mesh.tensor import GROWTH, TensorGrid, graded_grid
+from ..mesh.tensor import ROW_GROWTH, TensorGrid, graded_grid
 from .patch import PatchModel, PatchPiece
 
 # fraction of the length of the interface; mesh files contain coordinates of few digits
@@ -39,7 +39,7 @@ def _even_grid(patch: PatchModel, piece: PatchPiece):
     return extend_grid(patch, piece, grid)
 
 
-def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: float = GROWTH):
+def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: float = ROW_GROWTH):
     """Extend a grid over the interface to the ends of its piece.
 
     Parameters
@@ -118,7 +118,7 @@ def _check_mesh_size(patch: PatchModel, side: str, body) -> None:
     for key, in_file, in_scene in (
         ("length", body.length, patch.pieces.length),
         ("height", body.height, piece.height),
-        ("coating.thickness", body.coating, piece.thickness),
+        ("coating.thickness", body.coating_thickness, piece.thickness),
     ):
         if abs(in_file - in_scene) > MESH_FILE_TOL * patch.pieces.length:
             raise PatchfemError(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem.mesh.grading import Layout, columns
+from patchfem.mesh.grading import Layout, divide_into_columns
 from patchfem.mesh.tensor import TensorGrid, graded_depth
 from patchfem.model.model import build
 from patchfem.model.patch import PatchModel
@@ -54,7 +54,7 @@ def pair(halvings: int = 2) -> Pair:
     """The condensed pieces on the coarsest mesh (110 columns) with its cells halved so many times."""
     asked = case(0.0)
     half = asked.pieces.length / 2
-    x = columns(
+    x = divide_into_columns(
         Layout(-half, half, ((-half, -half, 1.2e-6),), (-half, half), half / 30, half / 30, 0.06)
     )
     depth, rows = graded_depth(

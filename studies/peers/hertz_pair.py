@@ -89,7 +89,9 @@ def condensed(grid: TensorGrid, bodies: int) -> Compliance:
     parts = [interface_compliance(assemble(grid.x, grid.depth, 0, layers)) for _ in range(bodies)]
     low, high = parts[0], parts[-1]
     return Compliance(
-        Interface(grid.x, frozen_array(grid.tributary()), 1.0), low[0] + high[0], low[1] + high[1]
+        Interface(grid.x, frozen_array(grid.tributary_lengths()), 1.0),
+        low[0] + high[0],
+        low[1] + high[1],
     )
 
 

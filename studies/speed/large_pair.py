@@ -84,7 +84,7 @@ def once(name: str, columns: int = COLUMNS, rows: int = ROWS) -> dict:
     clock.append((perf_counter(), process_time()))
     nn, tt, _ = map(sum, zip(*(interface_compliance(one) for one in pieces)))
     clock.append((perf_counter(), process_time()))
-    x, weight = bodies[0].x, bodies[0].tributary()
+    x, weight = bodies[0].x, bodies[0].tributary_lengths()
     # tilted by 10 urad
     found = press(Compliance(Interface(x, weight, 1.0), nn, tt), 1e-5 * x, LOAD)
     clock.append((perf_counter(), process_time()))

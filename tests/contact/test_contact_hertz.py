@@ -56,7 +56,11 @@ def test_order_hertz_pressure_in_the_mean_square_is_one():
         peak = 2 * LOAD / (np.pi * A)
         hertz = peak * np.sqrt(np.maximum(1 - (grid.x / A) ** 2, 0))
         errors.append(
-            np.sqrt(grid.tributary() @ (state.sigma_n - hertz) ** 2 / (grid.tributary() @ hertz**2))
+            np.sqrt(
+                grid.tributary_lengths()
+                @ (state.sigma_n - hertz) ** 2
+                / (grid.tributary_lengths() @ hertz**2)
+            )
         )
     order = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
     assert order == pytest.approx(1.0, abs=0.1)

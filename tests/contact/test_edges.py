@@ -51,7 +51,7 @@ def block():
 def block_of(grid) -> tuple:
     """(compliance of two pieces of titanium on a grid, height [m] of its first row)."""
     nn, tt, _ = interface_compliance(assemble(grid.x, grid.depth, 0, bare(TITANIUM)))
-    interface = Interface(grid.x, frozen_array(grid.tributary() * WIDTH), WIDTH)
+    interface = Interface(grid.x, frozen_array(grid.tributary_lengths() * WIDTH), WIDTH)
     return Compliance(interface, frozen_array(2 * nn / WIDTH), frozen_array(2 * tt / WIDTH)), float(
         grid.depth[1]
     )

@@ -115,7 +115,7 @@ def pieces() -> tuple:
         interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, layers))
         for grid, layers in ((coated, COATED), (plain, bare(TITANIUM)))
     ]
-    return coated.x, coated.tributary() * WIDTH, both
+    return coated.x, coated.tributary_lengths() * WIDTH, both
 
 
 @RUNS

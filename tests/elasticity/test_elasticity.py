@@ -69,9 +69,9 @@ def test_exact_slim_column_shortens_with_the_modulus_of_its_plane(plane, modulus
     grid = TensorGrid(np.linspace(-5e-4, 5e-4, 11), np.linspace(0, 6e-3, 61), 0)
     piece = piece_of(grid, bare(TITANIUM, plane))
     pressure = 1e8
-    u = displacement(piece, np.zeros((1, 11)), pressure * grid.tributary()[None])[0].reshape(
-        11, 61, 2
-    )
+    u = displacement(piece, np.zeros((1, 11)), pressure * grid.tributary_lengths()[None])[
+        0
+    ].reshape(11, 61, 2)
     shortening = u[:, 0, 1] - u[:, 20, 1]
     assert np.abs(shortening / (pressure * grid.depth[20] / modulus) - 1).max() <= 1e-7
 

@@ -123,7 +123,7 @@ def hertz(per_half_width):
         ),
     )
     nn, tt, _ = condense(Substructure(mesh, bare(TITANIUM)))
-    pair = Compliance(Interface(mesh.x, mesh.tributary(), 1.0), 2 * nn, 2 * tt)
+    pair = Compliance(Interface(mesh.x, mesh.tributary_lengths(), 1.0), 2 * nn, 2 * tt)
     modulus = TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
     state = press(pair, crown(mesh.x, np.pi * modulus * a**2 / (4 * load)), load)
     return mesh, state, a, 2 * load / (np.pi * a)
@@ -138,7 +138,7 @@ def test_exact_hertz_on_triangles_within_one_percent():
     assert np.sqrt(-top / slope) == pytest.approx(a, rel=1e-2)
     shape = peak * np.sqrt(1 - (mesh.x[inside] / a) ** 2)
     assert np.abs(state.sigma_n[inside] - shape).max() <= 1e-2 * peak
-    assert state.sigma_n @ mesh.tributary() == pytest.approx(9107.0, rel=1e-9)
+    assert state.sigma_n @ mesh.tributary_lengths() == pytest.approx(9107.0, rel=1e-9)
 
 
 def harmonic_error(wave, cells):
@@ -182,5 +182,5 @@ def test_refuses_a_bare_piece_too_slender_for_its_cells_by_their_length_and_long
     ):
         condense(Substructure(fine, layers))
     normal, *_ = condense(Substructure(coarse, layers))
-    share = coarse.tributary() / length
+    share = coarse.tributary_lengths() / length
     assert share @ normal @ share == pytest.approx(height / (young * length), rel=1e-3)

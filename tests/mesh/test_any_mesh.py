@@ -25,10 +25,10 @@ def test_exact_every_format_gives_the_same_pair(form, kind, tmp_path):
     pair = stored(drawn(kind), tmp_path, form)
     for piece in (pair.lower, pair.upper):
         assert np.abs(piece.x - GRID.x).max() <= 1e-12 * GRID.length
-        assert (piece.length, piece.height, piece.coating) == pytest.approx(
-            (GRID.length, GRID.height, GRID.coating)
+        assert (piece.length, piece.height, piece.coating_thickness) == pytest.approx(
+            (GRID.length, GRID.height, GRID.coating_thickness)
         )
-        assert piece.tributary() == pytest.approx(GRID.tributary(), rel=1e-9)
+        assert piece.tributary_lengths() == pytest.approx(GRID.tributary_lengths(), rel=1e-9)
         assert np.all(piece.points[piece.interface, 1] == 0) and piece.points[:, 1].min() == 0
         assert np.abs(piece.points[piece.far, 1] - GRID.height).max() <= 1e-12
         assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(
@@ -39,7 +39,7 @@ def test_exact_every_format_gives_the_same_pair(form, kind, tmp_path):
         )
         split = {"quads": 0, "triangles": 1, "mixed": 0.5}[kind]
         assert (len(piece.triangles), len(piece.quads)) == pytest.approx(
-            np.array([2 * split, 1 - split]) * GRID.cell_is_coating().size, abs=1
+            np.array([2 * split, 1 - split]) * GRID.is_coating_cell().size, abs=1
         )
 
 
@@ -48,7 +48,7 @@ def test_exact_a_written_grid_is_read_as_any_mesh(name, tmp_path):
     write_mesh(GRID, tmp_path / name)
     pair = read_pieces(tmp_path / name)
     assert np.array_equal(pair.lower.points, pair.upper.points)
-    assert pair.lower.is_coating.sum() == GRID.cell_is_coating().sum()
+    assert pair.lower.is_coating.sum() == GRID.is_coating_cell().sum()
 
 
 def test_exact_gently_rounded_edges_are_read_with_their_rise(tmp_path):
@@ -57,14 +57,14 @@ def test_exact_gently_rounded_edges_are_read_with_their_rise(tmp_path):
     m.points[:, 1] += np.where(np.arange(len(lift)) < len(lift) // 2, -1, 1) * lift
     pair = stored(m, tmp_path)
     for piece in (pair.lower, pair.upper):
-        assert piece.rise == pytest.approx(
+        assert piece.interface_depths == pytest.approx(
             np.maximum(np.abs(GRID.x) - 0.5e-3, 0) ** 2 / 0.02, abs=1e-15
         )
-        assert np.array_equal(piece.refine().rise[::2], piece.rise)
-        assert piece.refine().rise[1::2] == pytest.approx(
-            (piece.rise[1:] + piece.rise[:-1]) / 2, abs=1e-18
+        assert np.array_equal(piece.refine().interface_depths[::2], piece.interface_depths)
+        assert piece.refine().interface_depths[1::2] == pytest.approx(
+            (piece.interface_depths[1:] + piece.interface_depths[:-1]) / 2, abs=1e-18
         )
-    assert np.all(stored(drawn("mixed"), tmp_path).lower.rise == 0)
+    assert np.all(stored(drawn("mixed"), tmp_path).lower.interface_depths == 0)
 
 
 @pytest.mark.parametrize("name", ["pair.msh", "pair.vtu"])
@@ -86,11 +86,11 @@ def test_exact_unlike_grids_are_written_as_the_pieces_they_are(tmp_path):
     back = read_pieces(tmp_path / "pair.msh")
     for piece, grid in ((back.lower, GRID), (back.upper, other)):
         assert np.array_equal(piece.x, grid.x) and piece.height == grid.height
-        assert piece.coating == pytest.approx(grid.coating, rel=1e-12)
+        assert piece.coating_thickness == pytest.approx(grid.coating_thickness, rel=1e-12)
         assert np.array_equal(
             np.sort(piece.quads, axis=1)[np.argsort(piece.is_coating, kind="stable")],
             np.sort(as_piece(grid).quads, axis=1)[
-                np.argsort(grid.cell_is_coating().ravel(), kind="stable")
+                np.argsort(grid.is_coating_cell().ravel(), kind="stable")
             ],
         )
 
@@ -132,7 +132,7 @@ def test_exact_halved_piece_fills_the_same_place_with_four_times_the_cells(kind,
     assert fine.areas().min() > 0
     assert fine.areas() == pytest.approx(np.repeat(piece.areas() / 4, 4), rel=1e-9)
     assert np.all(np.diff(fine.x) > 0) and np.array_equal(fine.x[::2], piece.x)
-    assert fine.coating == pytest.approx(piece.coating)
+    assert fine.coating_thickness == pytest.approx(piece.coating_thickness)
     assert fine.far.size == 2 * piece.far.size - 1 and np.all(
         fine.points[fine.far, 1] == piece.height
     )

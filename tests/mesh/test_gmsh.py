@@ -35,9 +35,11 @@ def test_exact_geometry_of_rounded_pieces(radius, flat, quads, tmp_path):
     piece, flat = pair.lower, flat or 1.5e-3
     assert np.array_equal(piece.points[piece.interface], pair.upper.points[pair.upper.interface])
     beyond = np.maximum(np.abs(piece.x) - flat, 0)
-    assert piece.rise == pytest.approx(radius - np.sqrt(radius**2 - beyond**2), abs=1e-12)
-    assert piece.rise.max() > 0 and np.count_nonzero(piece.rise == 0) > 10
-    assert np.abs(np.diff(piece.rise) / np.diff(piece.x)).max() <= 0.1
+    assert piece.interface_depths == pytest.approx(
+        radius - np.sqrt(radius**2 - beyond**2), abs=1e-12
+    )
+    assert piece.interface_depths.max() > 0 and np.count_nonzero(piece.interface_depths == 0) > 10
+    assert np.abs(np.diff(piece.interface_depths) / np.diff(piece.x)).max() <= 0.1
     assert (len(piece.quads) > len(piece.triangles)) == quads and piece.height == pytest.approx(
         2e-3
     )
@@ -50,9 +52,9 @@ def test_exact_geometry_of_rounded_pieces(radius, flat, quads, tmp_path):
     assert piece.areas()[piece.is_coating].sum() == pytest.approx(4e-3 * 1.524e-4, rel=1e-2)
     write_mesh(pair.lower, tmp_path / "rounded.msh", pair.upper)
     back = read_pieces(tmp_path / "rounded.msh")
-    assert np.array_equal(back.upper.rise, pair.upper.rise) and np.array_equal(
-        back.lower.x, pair.lower.x
-    )
+    assert np.array_equal(
+        back.upper.interface_depths, pair.upper.interface_depths
+    ) and np.array_equal(back.lower.x, pair.lower.x)
 
 
 @needs_gmsh
@@ -64,9 +66,11 @@ def test_exact_rounded_punch_within_one_percent(quads):
     pair = rounded_pair(12e-3, 6e-3, 0.0, radius, flat / 40, 0.6e-3, flat=flat, quads=quads)
     low = condense(Substructure(pair.lower, Layers(TITANIUM, TITANIUM, "strain")))
     nn, tt = (2 * part for part in low[:2])
-    x, weight = pair.lower.x, pair.lower.tributary()
+    x, weight = pair.lower.x, pair.lower.tributary_lengths()
     state = press(
-        Compliance(Interface(x, weight, 1.0), nn, tt), pair.lower.rise + pair.upper.rise, load
+        Compliance(Interface(x, weight, 1.0), nn, tt),
+        pair.lower.interface_depths + pair.upper.interface_depths,
+        load,
     )
     half = rounded_punch_half_width(load, flat, radius / 2, modulus)
     wanted = rounded_punch_pressure(x, load, flat, radius / 2, modulus)

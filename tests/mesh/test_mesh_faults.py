@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from any_mesh_cases import GRID, of_grid
 
-from patchfem.mesh.recognise import fixed_length
+from patchfem.mesh.recognise import measure_fixed_length
 
 
 @pytest.mark.parametrize(("turn", "right_half"), [(28.0, 1e-3), (32.0, 0.0)])
@@ -19,4 +19,4 @@ def test_exact_a_far_face_ends_where_its_border_turns_by_thirty_degrees(turn, ri
     points[:, 1] *= 1 + slope * np.maximum(-points[:, 0], 0) / 1e-3
     inclined = replace(piece, points=points, far=np.flatnonzero(is_fixed))
     fixed = 1e-3 * np.hypot(1, slope)
-    assert fixed_length(inclined) == pytest.approx((fixed, fixed + right_half), rel=1e-12)
+    assert measure_fixed_length(inclined) == pytest.approx((fixed, fixed + right_half), rel=1e-12)

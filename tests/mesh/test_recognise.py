@@ -9,7 +9,7 @@ from any_mesh_cases import FORMATS, GRID, drawn, of_grid
 from patchfem.core import PatchfemError
 from patchfem.mesh.anymesh import PieceMesh
 from patchfem.mesh.files import EDGE_TAGS, read_bodies
-from patchfem.mesh.recognise import find_holes, fixed_length, recognise_grid
+from patchfem.mesh.recognise import find_holes, measure_fixed_length, recognise_grid
 
 
 def bodies(m, folder, form):
@@ -45,8 +45,10 @@ def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
     m = drawn("quads")
     low, high = bodies(without(m, far_edges(m)[2:]), tmp_path, form)
     assert isinstance(low, PieceMesh) and isinstance(high, PieceMesh)
-    assert fixed_length(low) == pytest.approx((5e-4, 2e-3), rel=1e-12)  # 2 edges of 0.25 mm on 2 mm
-    assert fixed_length(high) == pytest.approx((2e-3, 2e-3), rel=1e-12)
+    assert measure_fixed_length(low) == pytest.approx(
+        (5e-4, 2e-3), rel=1e-12
+    )  # 2 edges of 0.25 mm on 2 mm
+    assert measure_fixed_length(high) == pytest.approx((2e-3, 2e-3), rel=1e-12)
 
 
 @pytest.mark.parametrize("form", ["gmsh 2.2 binary", "vtu", "inp lines", "med"])
@@ -72,17 +74,17 @@ def test_refuses_twin_nodes_and_tags_of_the_wrong_piece_or_inside_it_in_every_fo
 
 def test_exact_the_fixed_length_follows_a_far_face_up_to_its_corners():
     piece = of_grid(GRID, 0.5, 3)
-    assert fixed_length(piece) == pytest.approx((2e-3, 2e-3), rel=1e-12)
+    assert measure_fixed_length(piece) == pytest.approx((2e-3, 2e-3), rel=1e-12)
     bottom, left = piece.points[:, 1] == 1e-3, piece.points[:, 0] == -1e-3
     sides = replace(piece, far=np.flatnonzero(left & (piece.points[:, 1] > 0)))
     first = piece.points[left, 1]
     first = np.sort(first)[1]  # the edge that touches the interface is held at one end alone
-    assert fixed_length(sides) == pytest.approx((1e-3 - first, 1e-3 + 2e-3), rel=1e-12)
+    assert measure_fixed_length(sides) == pytest.approx((1e-3 - first, 1e-3 + 2e-3), rel=1e-12)
     points = piece.points.copy()
     points[:, 1] *= 1 + 40 * np.abs(points[:, 0]) / 2  # two slopes of 0.02, no corner between them
     slanted = replace(piece, points=points, far=np.flatnonzero(bottom & (points[:, 0] <= 0)))
     side = np.hypot(1e-3, 2e-5)
-    assert fixed_length(slanted) == pytest.approx((side, 2 * side), rel=1e-12)
+    assert measure_fixed_length(slanted) == pytest.approx((side, 2 * side), rel=1e-12)
 
 
 def test_always_a_grid_is_recognised_whatever_its_numbers_are():

@@ -19,25 +19,30 @@ ENDS = {"sharp": SHARP_END, "chamfer": End("chamfer", 0.7e-3), "radius": End("ra
 def made(end, shorter=0.0, cell=0.31e-3, coating=COATING):
     """A piece LENGTH long on an interface as long as its face, less `shorter` at either end."""
     return shaped_grid(
-        graded_grid(2 * (end.bearing(LENGTH) - shorter), HEIGHT, cell, coating), LENGTH, end
+        graded_grid(2 * (end.half_contact_length(LENGTH) - shorter), HEIGHT, cell, coating),
+        LENGTH,
+        end,
     )
 
 
 def test_exact_a_rounded_end_is_a_circle_to_sixty_degrees_then_its_tangent():
     end, start = ENDS["radius"], LENGTH / 2 - ENDS["radius"].size
     s = np.linspace(0, 1, 200) * end.size
-    drop, last = end.drop(start + s, LENGTH), np.sqrt(3) / 2 * end.size
+    drop, last = end.face_depth(start + s, LENGTH), np.sqrt(3) / 2 * end.size
     on = s <= last
     assert np.allclose(s[on] ** 2 + (end.size - drop[on]) ** 2, end.size**2, rtol=1e-12)
     assert np.allclose(drop[~on], end.size / 2 + np.sqrt(3) * (s[~on] - last), rtol=1e-12)
-    assert np.array_equal(drop, end.drop(-start - s, LENGTH)) and end.drop(start, LENGTH) == 0.0
+    assert (
+        np.array_equal(drop, end.face_depth(-start - s, LENGTH))
+        and end.face_depth(start, LENGTH) == 0.0
+    )
 
 
 @pytest.mark.parametrize("kind", ENDS)
 def test_exact_the_face_that_can_touch_ends_at_the_corner_or_where_it_is_steep(kind):
     end = ENDS[kind]
-    half, step = end.bearing(LENGTH), 1e-9
-    slope = (end.drop(half + step, LENGTH) - end.drop(half - step, LENGTH)) / (2 * step)
+    half, step = end.half_contact_length(LENGTH), 1e-9
+    slope = (end.face_depth(half + step, LENGTH) - end.face_depth(half - step, LENGTH)) / (2 * step)
     flat = {"sharp": LENGTH / 2, "chamfer": LENGTH / 2 - end.size}
     assert (
         half == flat[kind]
@@ -51,12 +56,12 @@ def test_exact_the_face_that_can_touch_ends_at_the_corner_or_where_it_is_steep(k
 def test_exact_cells_fill_the_outline_and_a_sprayed_coating_is_as_thick_everywhere(kind, shorter):
     body = made(ENDS[kind], shorter)
     x = np.unique(body.points[:, 0])
-    drop = ENDS[kind].drop(x, LENGTH)
+    drop = ENDS[kind].face_depth(x, LENGTH)
     lost = ((drop[1:] + drop[:-1]) / 2 * np.diff(x)).sum()
     assert body.areas().min() > 0
     assert body.areas().sum() == pytest.approx(LENGTH * HEIGHT - lost, rel=1e-12)
     assert body.areas()[body.is_coating].sum() == pytest.approx(LENGTH * COATING, rel=1e-12)
-    assert body.coating == pytest.approx(COATING, rel=1e-12) and body.height == HEIGHT
+    assert body.coating_thickness == pytest.approx(COATING, rel=1e-12) and body.height == HEIGHT
     if kind == "chamfer":
         assert lost == pytest.approx(ENDS[kind].size ** 2, rel=1e-12)
 
@@ -91,7 +96,7 @@ def test_exact_finer_and_coarser_keep_the_outline_and_the_interface_of_the_plan(
 )
 def test_always_cells_are_convex_and_columns_grow_gently(size, shorter, cell, kind):
     end = End(kind, size * min(LENGTH / 2, HEIGHT - COATING))
-    half = end.bearing(LENGTH) * (1 - shorter)
+    half = end.half_contact_length(LENGTH) * (1 - shorter)
     body = shaped_grid(
         graded_grid(2 * half, HEIGHT, max(2 * half * cell, LENGTH / 60), COATING)
         if half > LENGTH / 120

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
-from patchfem.mesh.tensor import COATING_ROWS, GROWTH, graded_grid, graded_rows
+from patchfem.mesh.tensor import MIN_COATING_ROWS, ROW_GROWTH, graded_grid, graded_rows
 
 lengths = st.floats(1e-6, 1.0)
 growths = st.floats(1.02, 1.6)
@@ -46,21 +46,21 @@ def test_always_grid_has_the_asked_size_and_four_rows_in_the_coating(piece):
     assert grid.length == pytest.approx(length, rel=1e-14)
     assert grid.x[0] == pytest.approx(-grid.x[-1], rel=1e-14)
     assert grid.height == height and grid.depth[0] == 0
-    assert grid.coating == coating
+    assert grid.coating_thickness == coating
     assert np.diff(grid.x).max() <= min(size, length / 2) * (1 + 1e-9)
     assert np.ptp(np.diff(grid.x)) <= 1e-12 * length
-    assert grid.coating_rows >= COATING_ROWS if coating else grid.coating_rows == 0
+    assert grid.coating_rows >= MIN_COATING_ROWS if coating else grid.coating_rows == 0
     rows = np.diff(grid.depth)
     assert rows.min() > 0
-    assert np.all(rows[1:] <= rows[:-1] * GROWTH * (1 + 1e-5))
-    assert grid.cell_is_coating().shape == (grid.x.size - 1, rows.size)
-    assert np.all(grid.cell_is_coating() @ rows == pytest.approx(coating, rel=1e-12))
+    assert np.all(rows[1:] <= rows[:-1] * ROW_GROWTH * (1 + 1e-5))
+    assert grid.is_coating_cell().shape == (grid.x.size - 1, rows.size)
+    assert np.all(grid.is_coating_cell() @ rows == pytest.approx(coating, rel=1e-12))
 
 
 @given(pieces())
 def test_exact_tributary_lengths_add_up_to_the_length(piece):
     grid = graded_grid(*piece)
-    share = grid.tributary()
+    share = grid.tributary_lengths()
     assert share.sum() == pytest.approx(piece[0], rel=1e-13)
     assert share.min() > 0
     # the nodal areas integrate a straight line exactly

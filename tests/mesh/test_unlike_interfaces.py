@@ -43,25 +43,25 @@ FINER = graded_grid(2e-3, 1.5e-3, 1e-4, 1e-4)
 @pytest.mark.parametrize("form", FORMATS)
 def test_exact_both_pieces_keep_their_own_nodes(form, tmp_path):
     pair = stored(unlike(drawn("quads"), drawn("triangles", FINER)), tmp_path, form)
-    assert not pair.matching
+    assert not pair.has_matching_nodes
     for piece, grid in ((pair.lower, GRID), (pair.upper, FINER)):
         assert np.abs(piece.x - grid.x).max() <= 1e-12 * grid.length
         assert piece.areas().sum() == pytest.approx(grid.length * grid.height, rel=1e-12)
-        assert piece.tributary().sum() == pytest.approx(grid.length, rel=1e-12)
+        assert piece.tributary_lengths().sum() == pytest.approx(grid.length, rel=1e-12)
     assert (pair.lower.height, pair.upper.height) == pytest.approx((1e-3, 1.5e-3))
     assert abs(pair.upper.refine().x[0] - pair.lower.refine().x[0]) <= 1e-12 * GRID.length
 
 
 def test_exact_alike_pieces_match_and_one_node_aside_does_not(tmp_path):
-    assert stored(drawn("mixed"), tmp_path).matching
+    assert stored(drawn("mixed"), tmp_path).has_matching_nodes
     near, aside = drawn("quads"), drawn("quads")
     move(near, interface_node(near), (1e-13, 0))
     move(aside, interface_node(aside), (1e-7, 0))
-    assert stored(near, tmp_path).matching
+    assert stored(near, tmp_path).has_matching_nodes
     pair = stored(aside, tmp_path)
-    assert not pair.matching and np.abs(pair.upper.x - pair.lower.x).max() == pytest.approx(
-        1e-7, rel=1e-6
-    )
+    assert not pair.has_matching_nodes and np.abs(
+        pair.upper.x - pair.lower.x
+    ).max() == pytest.approx(1e-7, rel=1e-6)
 
 
 @given(cells=st.lists(st.floats(0.1, 1.0), min_size=2, max_size=20), shift=st.floats(-1.0, 1.0))

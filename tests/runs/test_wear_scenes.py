@@ -201,7 +201,12 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
     nn, _, _ = interface_compliance(
         assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
     )
-    x, area, gap, load = grid.x, grid.tributary() * width, grid.x**2 / 2 / radius, line * width
+    x, area, gap, load = (
+        grid.x,
+        grid.tributary_lengths() * width,
+        grid.x**2 / 2 / radius,
+        line * width,
+    )
     pair = Compliance(Interface(x, area, width), 2 * nn / width, 2 * nn / width)
 
     def press(worn, softening):

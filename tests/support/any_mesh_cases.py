@@ -30,7 +30,7 @@ def of_grid(grid, split=0.0, seed=None):
         [part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])],
         axis=1,
     )
-    coat = grid.cell_is_coating().ravel()
+    coat = grid.is_coating_cell().ravel()
     cut = np.random.default_rng(1).random(len(quads)) < split
     triangles = quads[cut][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     return PieceMesh(

@@ -30,7 +30,7 @@ def pair_of(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Complianc
     piece = assemble(grid.x, grid.depth, grid.coating_rows, layers)
     nn, tt, _ = interface_compliance(piece)
     return Compliance(
-        Interface(grid.x, grid.tributary() * width, width), 2 * nn / width, 2 * tt / width
+        Interface(grid.x, grid.tributary_lengths() * width, width), 2 * nn / width, 2 * tt / width
     )
 
 

@@ -1,7 +1,7 @@
 """Two alike coated pieces with rounded edges, meshed by Gmsh, finest where the flat ends.
 
 The interface is the flat and as much of each fillet as is not steep; the coating follows it. The height of the fillet
-is part of the mesh and enters the contact through `PieceMesh.rise`.
+is part of the mesh and enters the contact through `PieceMesh.interface_depths`.
 """
 
 from math import atan, sin

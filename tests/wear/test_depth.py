@@ -197,7 +197,7 @@ def test_exact_worn_hertz_contact_at_two_paths():
     nn, _, _ = interface_compliance(
         assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
     )
-    x, area = grid.x, grid.tributary() * width
+    x, area = grid.x, grid.tributary_lengths() * width
     press, even = pressing(2 * nn / width, x, x**2 / 2 / radius, line * width), np.ones(x.size)
     for alone, wide, peak in ((2.207, 2.315, 1.060), (3.891, 3.959, 1.023)):
         path = (alone * half) ** 3 / (1.5 * radius * line)

@@ -89,7 +89,7 @@ def write_fields(result, path: Path) -> dict:
         "x": patch.x,
         "pressure": patch.pressure.sigma_n,
         "depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
-        "coating": (patch.pair.grid.coating, patch.pair.upper_grid.coating),
+        "coating": (patch.pair.grid.coating_thickness, patch.pair.upper_grid.coating_thickness),
         "mises": [body["mises"][shown].reshape(shape) for body in (low, high)],
     }
 

@@ -49,7 +49,7 @@ class Pair:
     @property
     def row(self) -> float:
         """Mean height [m] of the cells along the interface of both pieces."""
-        return float(self.grid.row + self.upper_grid.row) / 2
+        return float(self.grid.first_row_height + self.upper_grid.first_row_height) / 2
 
     @property
     def rounding(self) -> float:
@@ -99,10 +99,10 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
         upper = finite_elements(upper_grid, elastic_layers(asked, asked.pieces.upper))
     low = compliance_of(grid, piece, fresh)
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
-    joint, x, share = None, grid.x, grid.tributary()
+    joint, x, share = None, grid.x, grid.tributary_lengths()
     if upper_grid is not None and not _match(x, upper_grid.x):
         joint = mortar.join_pieces(mortar.Body(x, low), mortar.Body(upper_grid.x, high))
-        x, share, parts = joint.x, joint.tributary, joint.compliance
+        x, share, parts = joint.x, joint.tributary_lengths, joint.compliance
     else:  # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
         parts = (low.nn + high.nn, low.tt + high.tt, low.nt - high.nt)
     normal, tangential, closing = (frozen_array(part / width) for part in parts)
@@ -170,7 +170,7 @@ def pair_beside(asked, pair: Pair) -> Pair:
 
 
 def _rise(body, x) -> np.ndarray:
-    rise = getattr(body, "rise", None)
+    rise = getattr(body, "interface_depths", None)
     return np.zeros(x.size) if rise is None else np.interp(x, body.x, rise)
 
 

@@ -21,7 +21,7 @@ from ...contact.half_space.point_compliance import (
 from ...core import NotConverged
 from ...elasticity.elasticity import assemble
 from ...elasticity.lapack import one_thread
-from ...mesh.grading import Layout, columns, rows
+from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...model import profile
 from ...model.pieces import elastic_layers
 from .measures import OFFSET, Hidden, combined, least_of
@@ -152,7 +152,7 @@ def _ends(asked, level: int) -> list:
         MIDDLE_CELL * length,
         GROWTH,
     ).times(0.5**level)
-    places, changes = columns(layout), 0.0
+    places, changes = divide_into_columns(layout), 0.0
     for piece, share in _bodies(asked):
         depth, coated = _rows(piece, layout)
         changes = changes + share * np.array(
@@ -189,11 +189,13 @@ def _rows(piece, layout: Layout) -> tuple:
     height, thick, least = piece.height, piece.thickness, layout.bands[0][2]
     bands = [
         (0.0, 0.0, least),
-        (height, height, height * layout.largest / (layout.stop - layout.start) / 2),
+        (height, height, height * layout.max_length / (layout.stop - layout.start) / 2),
     ]
     bands += [(thick, thick, max(thick * layout.slope / 4, least))] if thick else []
-    most = 2 * height * layout.largest / (layout.stop - layout.start)
-    return rows(Layout(0.0, height, tuple(bands), (0.0, height), most, most, layout.slope), thick)
+    most = 2 * height * layout.max_length / (layout.stop - layout.start)
+    return divide_into_rows(
+        Layout(0.0, height, tuple(bands), (0.0, height), most, most, layout.slope), thick
+    )
 
 
 def _level(asked, ends: tuple, count: int, start) -> PointLevel:

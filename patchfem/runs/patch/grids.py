@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core import frozen_array
 from ...elasticity.grid_fronts import predict_seconds
-from ...mesh.grading import Layout, columns, rows
+from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import extend_grid, rounded_edges
 from . import slip_zones, store
@@ -129,7 +129,7 @@ def _shows_slip(zones: tuple, x, layout: Layout) -> bool:
     middle, long = (x[1:] + x[:-1]) / 2, np.diff(x)
     for low, high in zones:
         inside = (x[1:] > low) & (x[:-1] < high)
-        if (long[inside] > MAX_SEARCH_CELL * layout.size(middle[inside])).any():
+        if (long[inside] > MAX_SEARCH_CELL * layout.cell_lengths(middle[inside])).any():
             return False
     return True
 
@@ -138,7 +138,7 @@ def _shows_crests(asked, x, layout: Layout) -> bool:
     """Whether columns x (k,) [m] are no longer than a layout wants them at the crests of a pressure on waves."""
     if _longest(asked) == np.inf or x.size > MAX_COLUMNS:
         return True
-    return bool((np.diff(x) <= 2 * layout.size((x[1:] + x[:-1]) / 2)).all())
+    return bool((np.diff(x) <= 2 * layout.cell_lengths((x[1:] + x[:-1]) / 2)).all())
 
 
 def _longest(asked) -> float:
@@ -284,10 +284,10 @@ def grids_of(asked, layout: Layout) -> list:
 
 def columns_of(asked, layout: Layout) -> np.ndarray:
     """Columns (k,) [m] of a layout, MAX_COLUMNS at most."""
-    x = columns(layout, asked.gap.jumps)
+    x = divide_into_columns(layout, asked.gap.jumps)
     while x.size > MAX_COLUMNS + 1 and layout.bands:
-        layout = layout.times(x.size / MAX_COLUMNS)
-        x = columns(layout, asked.gap.jumps)
+        layout = layout.scale_cells(x.size / MAX_COLUMNS)
+        x = divide_into_columns(layout, asked.gap.jumps)
     return x
 
 
@@ -302,7 +302,7 @@ def grid_on(asked, x, piece) -> TensorGrid:
     if thick:
         bands.append((thick, thick, max(thick / 4, top)))
     layout = Layout(0.0, height, tuple(bands), (0.0, height), cap, cap, SLOPE[asked.mesh.is_static])
-    depth, coated = rows(layout, thick)
+    depth, coated = divide_into_rows(layout, thick)
     return TensorGrid(frozen_array(x), depth, coated)
 
 

@@ -456,12 +456,14 @@ def offset(pair, cell):
     """
     out = OFFSET
     for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
-        if grid.coating > 0:
+        if grid.coating_thickness > 0:
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
             stiffer = 1 - min(ratio, 1 / ratio)
             out = np.maximum(
                 out,
-                edges.edge_offset_fraction(1.0) * np.minimum(1.0, cell / grid.coating) * stiffer,
+                edges.edge_offset_fraction(1.0)
+                * np.minimum(1.0, cell / grid.coating_thickness)
+                * stiffer,
             )
     return out
 
@@ -472,7 +474,11 @@ def corner_layer(pair, sigma, cells):
     They are not resolved by cells longer than the coating is thick, and fall with the square of the cells. sigma
     (..., 2) [Pa], cells (2,) [m]: at both ends.
     """
-    thick = [grid.coating for grid in (pair.grid, pair.upper_grid) if grid.coating > 0]
+    thick = [
+        grid.coating_thickness
+        for grid in (pair.grid, pair.upper_grid)
+        if grid.coating_thickness > 0
+    ]
     if not thick:
         return np.zeros(np.shape(sigma)[:-1])
     return (CORNER * sigma * np.minimum(1.0, (cells / min(thick)) ** 2)).max(axis=-1)

@@ -82,7 +82,7 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
         return None
     while True:
         share, shares = shares[0], shares[1:]
-        bodies = grids.grids_of(asked, layout.times(share))
+        bodies = grids.grids_of(asked, layout.scale_cells(share))
         if shares:
             own = own or grids.grids_of(asked, layout)
             if bodies[0].x.size >= own[0].x.size:  # both have the most columns
@@ -208,7 +208,7 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
             return None
         layout = _merged(
             [
-                grids.layout_of(one, [found]).times(0.5 ** halvings.get(_numbers(one), 0))
+                grids.layout_of(one, [found]).scale_cells(0.5 ** halvings.get(_numbers(one), 0))
                 for one, found in seen
             ],
             between,
@@ -229,7 +229,7 @@ def _loaded(asked, pair, patch):
 
 def _merged(layouts: list, between: bool) -> Layout:
     """The layout whose cells are nowhere longer than those of any of `layouts`."""
-    bands = {band for one in layouts for band in (*one.bands, (*one.span, one.inside))}
+    bands = {band for one in layouts for band in (*one.bands, (*one.span, one.max_loaded_length))}
     if between:
         bands |= set(_filled(layouts))
     first, bands = layouts[0], sorted(bands, key=lambda band: (band[2], band))
@@ -238,7 +238,7 @@ def _merged(layouts: list, between: bool) -> Layout:
         first.stop,
         (),
         (first.start, first.stop),
-        *2 * [min(one.largest for one in layouts)],
+        *2 * [min(one.max_length for one in layouts)],
         min(one.slope for one in layouts),
     )
     low, high, _ = np.array(bands).T
@@ -251,7 +251,7 @@ def _merged(layouts: list, between: bool) -> Layout:
     for k, band in enumerate(bands):
         if (size[k] > band[2] * (1 + 1e-9)).any():
             kept.append(band)
-            size = np.minimum(size, replace(out, bands=(band,)).size(places))
+            size = np.minimum(size, replace(out, bands=(band,)).cell_lengths(places))
     return replace(out, bands=tuple(kept))
 
 

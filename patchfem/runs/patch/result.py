@@ -294,7 +294,7 @@ def drawn_otherwise(pair) -> list:
                 f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
                 "all; if a hole is not intended, close it in the mesh"
             )
-        fixed, whole = recognise.fixed_length(body)
+        fixed, whole = recognise.measure_fixed_length(body)
         if fixed < WHOLE * whole:
             out.append(
                 f"contact.mesh: the held nodes `{side}_far` cover {fixed:.6g} m of a face of {whole:.6g} m, "

@@ -241,7 +241,7 @@ def unresolved_rounding(patch: Patch) -> float:
     if not rounded or not loaded.size or patch.pieces is not pair.compliance:
         return 0.0
     flat, radius = (
-        min(body.flat for body in rounded),
+        min(body.half_flat_length for body in rounded),
         1 / sum(1 / body.end.size for body in rounded),
     )
     modulus = 1 / sum(
@@ -265,7 +265,7 @@ def open_ends(patch: Patch) -> float:
     contact."""
     rounded = _rounded(patch.pair)
     return (
-        patch.active[[0, -1]].sum() * (patch.x[-1] - min(body.flat for body in rounded))
+        patch.active[[0, -1]].sum() * (patch.x[-1] - min(body.half_flat_length for body in rounded))
         if rounded
         else 0.0
     )
@@ -287,5 +287,5 @@ def _rounded(pair) -> list:
         for body in (pair.grid, pair.upper_grid)
         if getattr(body, "end", None) is not None
         and body.end.kind == "radius"
-        and body.rise[-1] > 0
+        and body.interface_depths[-1] > 0
     ]
