@@ -1,6 +1,8 @@
-"""Numbers read off a run.
+"""Compute measures from a run: numbers with names, units and errors.
 
-In: histories, and what an engine integrated over the last cycles itself (`dynamics.integrated`). Out: measures by name
-with their errors from coarser runs, the outcome, events of sticking and slipping, ringing. Read `rows` first: `Seen` is
-what every row reads, the engine's own number before the one that samples show; `measures` has how samples are read.
+In: histories of a run, and the measures that an engine integrated over the last cycles itself
+(`dynamics.integrated`). Out: measures by name with their errors from coarse runs, the outcome,
+the events of stick and slip, and the ringing. Read `rows` first: every row of its table reads a
+`Seen`, and takes the value of the engine before the value from the samples. `measures` has the
+functions that evaluate samples.
 """

@@ -1,7 +1,9 @@
-"""Errors of a run from coarser runs of the same model: one estimate for every engine.
+"""Errors of a run from coarse runs of the same model: one estimate for every engine.
 
-An engine names its ladder: the ways in which a run is coarser, in time, in space, in modes or in its sum over bonds.
-Each says which runs it takes and how their measures become an error. A run that several of them take is made once.
+In: a ladder, i.e. the list of `CoarserRuns` of an engine (coarser in time, in space, in modes
+or in the sum over bonds), and a function that solves a variant. Each `CoarserRuns` names its
+runs and the rule that turns their measures into an error (`errors`). A run that several of them
+need is solved once. Out: errors by measure name.
 """
 
 from collections.abc import Callable
@@ -13,11 +15,14 @@ from .errors import coarser_errors, orders
 
 
 class CoarserRuns(NamedTuple):
-    """One way in which a run can be coarser.
+    """Coarse runs of one kind, and the rule that turns their measures into errors.
 
-    runs: variants, hashable arguments of `solve`, coarse to coarser; rule(values of the run beside, *values of the
-    runs) -> error by measure; beside: the variant that they are compared with, None: the run itself; of: what is
-    coarser: "steps", "mesh", "modes", "bonds" or "cells", "own" where it is nothing that a scene names.
+    - runs: variants (hashable arguments of `solve`), from fine to coarse.
+    - rule: function (values of the reference run, *values of the coarse runs) -> error by measure
+      name.
+    - beside: variant of the reference run; None: the run itself.
+    - of: what is coarser: "steps", "mesh", "modes", "bonds" or "cells"; "own" for anything that no
+      key of a scene sets.
     """
 
     runs: tuple
@@ -27,14 +32,22 @@ class CoarserRuns(NamedTuple):
 
 
 def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
-    """Errors by measure name, one dict per `CoarserRuns`, and the seconds of the coarser runs.
+    """Return errors by measure name, one dict per `CoarserRuns`, and the CPU time [s] they took.
 
-    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: of
-    `CoarserRuns`; made: variant -> run, those that are made already; it is filled.
+    Parameters
+    ----------
+    solve : callable
+        Returns the run of a variant; a run has `values`.
+    fine : dict
+        Measures of the run itself by name.
+    ladder : sequence of CoarserRuns
+    made : dict, optional
+        Runs by variant that are solved already; the new ones are added.
     """
     begin, made = perf_counter(), {} if made is None else made
 
     def values(variant) -> dict:
+        """Return the measures of a variant, solved on the first call."""
         if variant not in made:
             made[variant] = solve(variant)
         return made[variant].values
@@ -47,10 +60,23 @@ def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> t
 
 
 def left_open(kinds, errors, runs) -> dict:
-    """What leaves the measures of a run open: errors by name under each of `kinds`, and the `orders` of the steps.
+    """Return the errors by kind and measure name, and the observed `orders` of the time step.
 
-    kinds: what each of the ladder makes coarser, "end" for a run that ends beside the asked end; errors: by name, one
-    dict per kind; runs: measures of the run, at half and at a quarter of its steps, fewer where it has no steps.
+    Parameters
+    ----------
+    kinds : sequence of str
+        What each entry of the ladder makes coarser; "end" for a run that does not end exactly at
+        the requested time.
+    errors : sequence of dict
+        Errors by measure name, one dict per kind.
+    runs : sequence of dict
+        Measures of the run, and of those with half and a quarter of its steps; fewer for a method
+        without steps.
+
+    Returns
+    -------
+    dict
+        "parts": errors by kind and name; "orders": observed orders by name.
     """
     out: dict = {}
     for kind, part in zip(kinds, errors, strict=True):
@@ -61,8 +87,8 @@ def left_open(kinds, errors, runs) -> dict:
 
 
 def coarser_space(coarser, beside=None, of: str = "mesh") -> CoarserRuns:
-    """Return the `CoarserRuns` whose one run has a mesh twice as coarse, or fewer modes, at second order.
+    """Return a `CoarserRuns` of second order with one run that has wider cells or fewer modes.
 
-    coarser, beside, of: as in `CoarserRuns`.
+    The parameters are fields of `CoarserRuns`.
     """
     return CoarserRuns((coarser,), partial(coarser_errors, order=2.0), beside, of)

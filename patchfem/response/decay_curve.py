@@ -1,11 +1,14 @@
-"""Frequency and damping of a decay over its amplitude with intervals, from its half swings, computed or measured.
+"""Frequency and damping ratio of a decay against its amplitude, with 95 % intervals.
 
-A computed motion has its turns by the cubic between samples (`turns`), a measured one its half swings by a sine fitted
-to each (`identify.swings`). Half swing k has a middle t_k and a size S_k, from turn to turn. Over 2 m + 1 of them the
-slope of ln S_k tells the logarithmic decrement of half a cycle, pi zeta/(1 - zeta^2)^(1/2), the slope of t_k half a
-period. Of a viscous decay both are exact for any m, of any other they are means over the span. What noise leaves falls
-with m^(-3/2), what the bend leaves grows with m^2: the span is the longest whose value those of all shorter ones allow
-(Lepski 1991).
+In: the half swings of a decay, i.e. the motion from one turning point to the next. The turning
+points of a computed motion come from the cubic between samples (`turns`), the half swings of a
+measured one from a sine fitted to each (`identify.swings`). Out: a `DecayCurve`.
+
+Half swing k has a middle t_k and a size S_k. Over 2 m + 1 half swings, the slope of ln S_k is
+the logarithmic decrement of half a cycle, pi zeta/(1 - zeta^2)^(1/2), and the slope of t_k is
+half a period. Both are exact for a viscous decay and any m, and are means over the span for any
+other decay. The error by noise falls with m^(-3/2), the error by the curvature grows with m^2:
+the span is the longest one whose slope agrees with those of all shorter ones (Lepski, 1991).
 """
 
 from typing import NamedTuple
@@ -13,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-# half swings m on both sides of a point
+# numbers m of half swings on both sides of a point that are tried as spans
 SPANS = (
     1,
     2,
@@ -32,22 +35,28 @@ SPANS = (
     192,
     256,
 )
-APART = 2.0  # standard deviations by which the values of two spans may differ
-SURE = 2.5  # standard deviations of an interval of 95 %, with what choosing the span adds
-BESIDE = 8  # half swings on both sides whose third differences show noise
-NEAR = 4  # points on both sides that show what samples leave open
-NEWTON = 3  # steps to a turn
-ROUND = 1e-12  # of a value, what round-off leaves
-REST = 1e-12  # of the largest speed, one below which a sample is a turn itself
-FAINT = 1e-9  # of the largest half swing, one below which is round-off
-EDGE = 1e-9  # of a step, by which round-off may lay a turn outside it
-WIGGLE = 0.25  # of the range of a motion in a period, a way back below which another mode makes it
-CLOSE = 1e-6  # of an amplitude, by which a curve reaches beyond its ends
+APART = 2.0  # standard deviations by which the slopes of two spans may differ
+SURE = 2.5  # standard deviations of a 95 % interval, widened because the span is chosen by the data
+BESIDE = 8  # half swings on both sides whose third differences estimate the noise
+NEAR = 4  # points on both sides over which the largest sampling error is taken
+NEWTON = 3  # Newton steps to a turning point
+ROUND = 1e-12  # round-off of a value, relative
+REST = 1e-12  # relative to the largest speed; a slower sample is a turning point itself
+FAINT = 1e-9  # relative to the largest half swing; a smaller one is round-off
+EDGE = 1e-9  # fraction of a step by which round-off may move a turning point outside the step
+# relative to the range in one period; a smaller reversal is attributed to a faster mode
+WIGGLE = 0.25
+CLOSE = 1e-6  # relative; a curve is evaluated this far beyond its end points
 
 
 class HalfSwings(NamedTuple):
-    """Half swings of a decay: middle (k,) [s], size (k,) [m], from one turn to the next, and the standard deviations
-    (k,) that noise leaves in both, 0 of a computed motion."""
+    """Half swings of a decay, each from one turning point to the next.
+
+    - middle (k,): time of the middle [s].
+    - size (k,): distance between the two turning points [m].
+    - middle_noise, size_noise (k,): standard deviations of both by noise [s], [m]; 0 for a computed
+      motion.
+    """
 
     middle: np.ndarray
     size: np.ndarray
@@ -56,8 +65,14 @@ class HalfSwings(NamedTuple):
 
 
 class DecayCurve(NamedTuple):
-    """Of a decay, largest amplitude first: time (k,) [s], amplitude (k,) [m], frequency (k,) [Hz] as it is seen and
-    damping ratio (k,) [1], each with the half-width (k,) of its interval of 95 %."""
+    """Frequency and damping ratio of a decay against amplitude, largest amplitude first.
+
+    - time (k,): [s].
+    - amplitude (k,): [m].
+    - frequency (k,): frequency of the damped motion [Hz].
+    - damping (k,): damping ratio [1].
+    - frequency_error, damping_error (k,): half-widths of the 95 % intervals [Hz], [1].
+    """
 
     time: np.ndarray
     amplitude: np.ndarray
@@ -67,12 +82,15 @@ class DecayCurve(NamedTuple):
     damping_error: np.ndarray
 
     def at(self, pick) -> "DecayCurve":
-        """Some of its points."""
+        """Return the points of the curve that indices, a slice or booleans select."""
         return DecayCurve(*(part[pick] for part in self))
 
     def over(self, amplitudes) -> "DecayCurve":
-        """The curve at other amplitudes (k,) [m], by cubics over their logarithms, with what straight lines change in
-        its errors; NaN outside it."""
+        """Return the curve at other amplitudes (k,) [m]; NaN outside its range.
+
+        Monotone cubics over the logarithm of the amplitude are used. Their difference from linear
+        interpolation is added to the errors.
+        """
         if not self.amplitude.size:
             return DecayCurve(*np.full((6, len(amplitudes)), np.nan))._replace(
                 amplitude=np.asarray(amplitudes)
@@ -90,8 +108,13 @@ class DecayCurve(NamedTuple):
         )._replace(amplitude=np.asarray(amplitudes))
 
     def unsampled(self, other: "DecayCurve") -> "DecayCurve":
-        """The curve with what its samples leave open in its errors, where coarser runs have as many: what the curve of
-        `turns_from_outside` differs by, at most, at the points around."""
+        """Return the curve with the error of sampling added.
+
+        it.
+
+        The error is the largest difference from the curve of `turns_from_outside` at the points
+        around.
+        """
         beside, out = other.over(self.amplitude), {}
         for name in ("frequency", "damping"):
             change = np.nan_to_num(np.abs(getattr(self, name) - getattr(beside, name)))
@@ -103,9 +126,15 @@ class DecayCurve(NamedTuple):
         return self._replace(**out)
 
     def widened(self, one: "DecayCurve", other: "DecayCurve") -> "DecayCurve":
-        """The curve with what two curves at its amplitudes differ by in its errors; infinite where one has no value."""
+        """Return the curve with the difference of two other curves added to its errors.
+
+        errors.
+
+        An error is infinite where one of both curves has no value.
+        """
 
         def wider(name: str) -> np.ndarray:
+            """Return the error of a field with the difference of both curves added."""
             change = np.abs(getattr(one, name) - getattr(other, name))
             return getattr(self, f"{name}_error") + np.where(np.isnan(change), np.inf, change)
 
@@ -113,9 +142,15 @@ class DecayCurve(NamedTuple):
 
 
 def turns(time, place, speed) -> tuple:
-    """(times (k,) [s], places (k,) [m]) where a motion turns, by the cubic between the samples on both sides.
+    """Return the times (k,) [s] and positions (k,) [m] of the turning points of a motion.
 
-    time, place [m], speed [m/s]: (n,) of samples, however far apart, where each turn lies between two or at one.
+    The cubic through the samples on both sides is used.
+
+    Parameters
+    ----------
+    time, place, speed : (n,)
+        Samples of time [s], position [m] and speed [m/s] at any spacing, with every turning point
+        at a sample or alone between two of them.
     """
     speed = np.where(np.abs(speed) <= REST * np.abs(speed).max(initial=0.0), 0.0, speed)
     still, k = np.flatnonzero(speed == 0), np.flatnonzero(speed[:-1] * speed[1:] < 0)
@@ -125,23 +160,35 @@ def turns(time, place, speed) -> tuple:
     times = np.concatenate([time[still], time[k] + share * span])
     found = np.concatenate([place[still], _cubic(places, speeds, share)])
     order = np.lexsort((found, times))
-    # a force that jumps at a turn has samples on both sides of it
+    # the samples before and after a jump of the force at a turning point have the same time
     apart = ROUND * float(np.ptp(time))
     order = order[np.diff(times[order], prepend=-np.inf) > apart]
     return times[order], found[order]
 
 
 def last_swing(time, place, speed, period: float) -> float | None:
-    """Half the peak-to-peak [m] of the last whole cycle of a motion, from one turn to the next but one; half its range
-    in the last period where it rests, None where it has fewer than three turns.
+    """Return half the peak-to-peak value [m] of the last whole cycle of a motion.
 
-    time, place [m], speed [m/s]: (n,) as of `turns`; period [s]. A way back of less than WIGGLE of its range in the
-    last period is no turn but that of a faster mode beside it.
+    The cycle reaches from a turning point to the next but one. A smaller reversal than WIGGLE of
+    the range in the last period is that of a faster mode and is ignored.
+
+    Parameters
+    ----------
+    time, place, speed : (n,)
+        Samples, as in `turns`.
+    period : float
+        Period [s].
+
+    Returns
+    -------
+    float or None
+        Half the range in the last period if the motion is at rest there; None if it has fewer than
+        three turning points.
     """
     late = float(np.ptp(place[time >= time[-1] - period * (1 + EDGE)]))
     if late <= FAINT * np.ptp(place):
         return late / 2
-    # turns from the end on; the farthest place since the last of them
+    # turning points, from the end; direction; farthest position since the last turning point
     found, way, far = (
         [],
         0,
@@ -162,16 +209,27 @@ def last_swing(time, place, speed, period: float) -> float | None:
 
 
 def turns_from_outside(time, place, speed) -> tuple:
-    """`turns`, those between samples by the cubics of the steps before and after, continued, in the middle of both.
+    """Return the turning points as `turns` does, from the cubics of the neighbouring steps.
 
-    A law that turns its force with the speed in less than a step does so at the turn: both cubics know the force
-    beside it, where the cubic between both samples is bent by its jump.
+    The times between two samples are the means of the zeros of the speed on the continued cubics of
+    the steps before and after. If the force of a law reverses with the speed within less than a
+    step, it does so at the turning point: each of these cubics contains the force on its own side,
+    whereas the cubic between the two samples is distorted by the jump.
+
+    Parameters
+    ----------
+    time, place, speed : (n,)
+        Samples, as in `turns`.
     """
     times, places = turns(time, place, speed)
     k = np.flatnonzero(speed[1:-2] * speed[2:-1] < 0) + 1
     share = speed[k] / (speed[k] - speed[k + 1])
 
     def found(step, near):
+        """Return the time [s] at which the speed on the cubic of a step vanishes (Newton's method).
+
+        near: initial guess as a fraction of the step, outside 0 to 1.
+        """
         span = time[step + 1] - time[step]
         a, b, c, d = place[step], place[step + 1], speed[step] * span, speed[step + 1] * span
         two, three = 2 * (3 * (b - a) - 2 * c - d), 3 * (2 * (a - b) + c + d)
@@ -180,15 +238,25 @@ def turns_from_outside(time, place, speed) -> tuple:
         return time[step] + near * span
 
     at = (found(k - 1, 1 + share) + found(k + 1, share - 1)) / 2
-    # round-off may lay a turn at the sample before it
+    # round-off may move a turning point to the sample before it
     between = (at >= time[k]) & (at <= time[k + 1])
     times[np.searchsorted(times, time[k])[between]] = at[between]
     return times, places
 
 
 def of_turns(times, places, size=None) -> HalfSwings:
-    """Half swings between the turns (k,) [s], (k,) [m] of a computed motion, as far as each is smaller than the one
-    before and no round-off of the first; size (k - 1,) [m]: theirs at another point than the places."""
+    """Return the half swings between the turning points of a computed motion.
+
+    They end before the first one that is not smaller than its predecessor or that is round-off of
+    the largest.
+
+    Parameters
+    ----------
+    times, places : (k,)
+        Turning points: times [s] and positions [m].
+    size : (k - 1,), optional
+        Sizes of the half swings at another point of the structure [m]; None: distances of `places`.
+    """
     own = np.abs(np.diff(places))
     ends = np.flatnonzero(
         (np.diff(own, prepend=np.inf) >= 0) | (own <= FAINT * own.max(initial=0.0))
@@ -201,7 +269,7 @@ def of_turns(times, places, size=None) -> HalfSwings:
 
 
 def curve_of(swings: HalfSwings) -> DecayCurve:
-    """Return frequency and damping against amplitude from the half swings of a decay.
+    """Return frequency and damping ratio against amplitude from the half swings of a decay.
 
     A computed decay has a point at each inner half swing, a measured one at half swings whose spans
     overlap by half. Fewer than three half swings give no point.
@@ -229,7 +297,7 @@ def curve_of(swings: HalfSwings) -> DecayCurve:
 
 
 def _overlap_by_half(span) -> np.ndarray:
-    """Choose inner places (n,) so that the spans about them overlap by half."""
+    """Choose inner half swings so that the spans (n,) around them overlap by half."""
     out = [0]
     while (place := out[-1] + max(1, int(span[out[-1]]))) < span.size:
         out.append(place)
@@ -237,7 +305,7 @@ def _overlap_by_half(span) -> np.ndarray:
 
 
 def _smooth_levels(values, places, span) -> np.ndarray:
-    """Return the least-squares parabola over the span about each place, at the place."""
+    """Evaluate at each index the least-squares parabola over the span around it."""
     out = np.empty(places.size)
     for m in np.unique(span):
         here = span == m
@@ -246,24 +314,26 @@ def _smooth_levels(values, places, span) -> np.ndarray:
 
 
 class Slopes(NamedTuple):
-    """Slopes (k,) per half swing, the half-widths of their intervals, and their spans."""
+    """Slopes (k,) per half swing, the half-widths of their intervals, and their spans m."""
 
     slope: np.ndarray
     error: np.ndarray
     span: np.ndarray
 
     def at(self, pick) -> "Slopes":
-        """Return some of the slopes."""
+        """Return the slopes that indices, a slice or booleans select."""
         return Slopes(*(part[pick] for part in self))
 
 
 def fit_slopes(values, noise) -> Slopes:
-    """Fit the slope at each inner place of a series, over the longest span that all shorter ones allow.
+    """Fit the slope at each inner point over the longest span that agrees with all shorter ones.
 
-    A span ends before one whose slope differs from that of a shorter one by more than the noise of both
-    allows (Lepski 1991). The error is that by noise, and what the slope may be off by as it is a mean:
-    its change over the next longer span m', of whose bias it has the share (m/m')^2; at the ends, its
-    change over the next shorter one.
+    ones.
+
+    Spans grow until the slope differs from that of a shorter span by more than the noise of both
+    allows (Lepski, 1991). The error is the sum of two parts: the noise, and the bias of a mean. The
+    bias is estimated from the change over the next longer span m', multiplied by (m/m')^2; near the
+    ends, from the change over the next shorter span.
 
     Parameters
     ----------
@@ -275,7 +345,7 @@ def fit_slopes(values, noise) -> Slopes:
     Returns
     -------
     Slopes
-        At the n - 2 inner places.
+        At the n - 2 inner points.
     """
     count = values.size - 2
     slope = np.empty(count)
@@ -311,7 +381,7 @@ def fit_slopes(values, noise) -> Slopes:
         tried.append((wide, wide_spread))
     at_end = np.isnan(bias)
     bias[at_end] = shorter_change[at_end]
-    # Next to an end there is no other span; the second difference tells of the bend if nothing is noisy.
+    # Next to an end there is no other span; the second difference estimates the bias without noise.
     only = np.isnan(bias)
     bend = np.abs(np.diff(values, 2)) / 2
     bias[only] = np.where(spread > 0, 0.0, bend)[only]
@@ -319,8 +389,11 @@ def fit_slopes(values, noise) -> Slopes:
 
 
 def _between_turns(found: DecayCurve) -> DecayCurve:
-    """The curve with what it changes over delta^2/8 of its amplitude: half a half swing is cosh(delta/2) times the
-    amplitude in its middle, delta the decrement of half a cycle."""
+    """Widen the errors by the change of the curve over delta^2/8 of its amplitude.
+
+    Half of a half swing is cosh(delta/2) times the amplitude at its middle, where delta is the
+    decrement of half a cycle.
+    """
     delta = np.pi * found.damping / np.sqrt(np.maximum(1 - found.damping**2, ROUND))
     share = (
         delta**2
@@ -337,14 +410,17 @@ def _between_turns(found: DecayCurve) -> DecayCurve:
 
 
 def smooth_slopes(values, noise) -> np.ndarray:
-    """Return the slopes (n,) per half swing of values (n,); at both ends that of the neighbour."""
+    """Return the slopes (n,) of values (n,) per half swing; both ends repeat their neighbour."""
     slope = fit_slopes(values, noise).slope
     return np.concatenate([slope[:1], slope, slope[-1:]])
 
 
 def _at_least(noise, values) -> np.ndarray:
-    """Standard deviations (n,), not below what third differences of values (n,) show, of which a parabola has none, and
-    white noise 20 times its variance; of values without noise 0."""
+    """Return standard deviations (n,) that are not below those estimated from third differences.
+
+    Third differences of a parabola vanish, those of white noise have 20 times its variance. Values
+    without noise keep 0.
+    """
     if not noise.any() or values.size < 4:
         return noise
     seen = np.diff(values, 3) ** 2 / 20
@@ -356,7 +432,7 @@ def _at_least(noise, values) -> np.ndarray:
 
 
 def _parabola(m: int) -> np.ndarray:
-    """Weights (2 m + 1,) of values by which the parabola through them, of least squares, has its middle."""
+    """Return the weights (2 m + 1,) that give the middle of the least-squares parabola."""
     x = np.arange(-m, m + 1)
     x2, n = x**2, x.size
     return (
@@ -367,8 +443,10 @@ def _parabola(m: int) -> np.ndarray:
 
 
 def _by_cubics(x, own, values) -> np.ndarray:
-    """Values (n,) at rising places own (n,) read at others x (k,), inside them, by cubics that rise and fall with the
-    values (Fritsch and Butland 1984)."""
+    """Interpolate values (n,) at increasing positions own (n,) to x (k,) by monotone cubics.
+
+    Fritsch and Butland (1984); x is clipped to the range of `own`.
+    """
     from scipy.interpolate import PchipInterpolator
 
     x = np.clip(x, own[0], own[-1])
@@ -376,13 +454,16 @@ def _by_cubics(x, own, values) -> np.ndarray:
 
 
 def _cubic(place, speed, share):
-    """Places (k,) at a share (k,) of the step by the cubics of both ends; speed over the step."""
+    """Return positions (k,) at fractions (k,) of a step on the cubics; speed is times the step."""
     (a, b), (c, d), s = place, speed, share
     return a + s * (c + s * (3 * (b - a) - 2 * c - d + s * (2 * (a - b) + c + d)))
 
 
 def _zero(place, speed) -> np.ndarray:
-    """Share (k,) of the step where the cubics turn; their speeds at both ends have opposite signs."""
+    """Return the fraction (k,) of the step at which the cubics have a turning point.
+
+    The speeds at both ends have opposite signs.
+    """
     (a, b), (c, d) = place, speed
     two, three = 2 * (3 * (b - a) - 2 * c - d), 3 * (2 * (a - b) + c + d)
     both = -(two + np.copysign(np.sqrt(np.maximum(two**2 - 4 * three * c, 0.0)), two)) / 2

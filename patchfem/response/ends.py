@@ -1,7 +1,8 @@
-"""What a run leaves open that ends at a sample beside the end that was asked for.
+"""Errors of a run that ends at a sample next to the requested end.
 
-A record or a sweep ends where it ends, a march at a whole step. All coarser runs of it end at the same place, so they
-do not show what that changes.
+In: the samples of the last cycles, and by how many steps their end misses the requested end.
+Out: errors by measure name. A recorded drive or a sweep ends at a given time, a march at a
+whole step. All coarse runs end at the same sample, so that they do not show this error.
 """
 
 import numpy as np
@@ -11,9 +12,18 @@ from .run_events import slips_of
 
 
 def end_error(window: Response, period: float, offset: float) -> dict:
-    """Change by name of what is read off the last cycles where they lie `offset` [steps] elsewhere.
+    """Return the change of each measure, by name, if the window lies `offset` steps elsewhere.
 
-    window: equally spaced samples (k,); period [s]. Extremes change where they lie at an end of the window only.
+    An extreme value changes only if it lies at an end of the window.
+
+    Parameters
+    ----------
+    window : Response
+        Equally spaced samples (k,).
+    period : float
+        Period of the drive [s].
+    offset : float
+        Distance of the last sample from the requested end, in steps.
     """
     if abs(offset) < 1e-9 or window.time.size < 4:
         return {}
@@ -44,7 +54,7 @@ def end_error(window: Response, period: float, offset: float) -> dict:
 
 
 def _edge(values) -> float:
-    """Change over a step of the largest value (k,) where it lies at an end, else 0."""
+    """Return the change of the largest value (k,) over one step if it lies at an end; else 0."""
     top = int(np.argmax(values))
     return (
         abs(float(values[0] - values[1]))
@@ -56,7 +66,11 @@ def _edge(values) -> float:
 
 
 def _of_drift(slide, cycles: float) -> float:
-    """Change of the drift over a step: that of the motion from end to end, or of the means of two cycles."""
+    """Return the change of the drift per cycle [m] if the window moves by one step.
+
+    As in `loops.drift`, below 1.5 cycles the drift is the motion between the ends of the window,
+    else the difference between the means of two cycles.
+    """
     if cycles < 1.5:
         return abs(float((slide[-1] - slide[-2]) - (slide[1] - slide[0]))) / cycles
     each = round((len(slide) - 1) / cycles)

@@ -21,7 +21,7 @@ SAFETY = 3.0  # Roache's factor for two runs; it covers runs that are too coarse
 MIN_ORDER = 1.0  # lowest order that is believed
 MAX_ORDER = 2.0  # highest order that is believed, that of the methods
 MAX_FALL = 16.0  # ratio of two changes, of order 4; above it the last is small by chance
-MIN_FALL = 0.5  # order from which an error is said to fall with the step
+MIN_FALL = 0.5  # lowest observed order at which an error counts as decreasing with the step
 ROUND = 1e-12  # relative round-off of a long sum
 MEAN_ROUND = 1e-13  # round-off of a mean over the motion, relative to the amplitude
 GAPS = ("energy_balance", "work_check")  # measures that are errors themselves
@@ -72,8 +72,8 @@ def convergence_error(last, before=None):
 def convergence_errors(*values: dict) -> dict:
     """Return the error of each measure from its values in runs of halved steps or cells.
 
-    A further run does not widen an error whose interval holds its value, and narrows it by no
-    more than the highest order does.
+    If the interval of a further run contains the value, this run does not widen the error, and
+    narrows it by no more than the highest order allows.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def convergence_errors(*values: dict) -> dict:
 
 
 def _ladder_error(changes: list) -> float:
-    """Error on the finest mesh from the changes of a value, fine to coarse."""
+    """Return the error on the finest mesh from the changes of a value, fine to coarse."""
     if len(changes) == 1:
         return convergence_error(changes[0])
     error = convergence_error(*changes[-2:])
@@ -160,10 +160,12 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
 
 
 class FrictionScale(NamedTuple):
-    """Sizes of a run that a fraction of the friction limit acts on.
+    """Sizes in a run to which a relative error of the friction force refers.
 
-    static [1]: coefficient of friction; limit [N]: friction limit; bond_length [m]; work, cycle_work [J]: what friction
-    exchanges to and fro in the whole run and in a cycle.
+    - static: coefficient of friction [1].
+    - limit: friction limit [N].
+    - bond_length: length of a bond at the limit [m].
+    - work, cycle_work: sum of |work| that friction exchanges in the whole run and in a cycle [J].
     """
 
     static: float
@@ -174,10 +176,11 @@ class FrictionScale(NamedTuple):
 
 
 def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict:
-    """Return errors by name of measures whose friction force is uncertain by a fraction of the friction limit.
+    """Return errors by name that a relative error of the friction force causes in the measures.
 
-    Forces and slip have it directly, work as that fraction of what went to and fro, the store as that of a bond length
-    at the limit, and every other measure as that fraction of its value.
+    Forces and slip change by this fraction of their own scale, work by this fraction of the
+    exchanged work, the stored energy by this fraction of the energy of a bond at the limit, and
+    every other measure by this fraction of its value.
 
     Parameters
     ----------
@@ -206,11 +209,19 @@ def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict
 
 
 def orders(fine: dict, half: dict, quarter: dict) -> dict:
-    """Return the order [1] at which each measure was seen to change with the step, at most 2.
+    """Return the observed order [1] at which each measure changes with the time step, at most 2.
 
-    From runs at some steps per cycle, half and a quarter of them. A measure whose change did not
-    fall by the order MIN_FALL, and one that not all runs have, is left out: more steps are not
-    known to make it more accurate.
+    Parameters
+    ----------
+    fine, half, quarter : dict
+        Measures by name of runs with some number of steps per cycle, with a half and with a quarter
+        of it.
+
+    Returns
+    -------
+    dict
+        Orders by name. A measure whose change falls with an order below MIN_FALL, or that a run
+        does not have, is left out: more steps are not known to make it more accurate.
     """
     last, before = change(fine, half), change(half, quarter)
     found = {
@@ -222,10 +233,20 @@ def orders(fine: dict, half: dict, quarter: dict) -> dict:
 
 
 def with_errors(values: dict, *errors: dict, least: float = 0.0, size: float = np.inf) -> dict:
-    """Return measures by name whose error is the sum of the given errors, plus `least` of the value.
+    """Return measures by name with the sum of the given errors, plus `least` of the value.
 
-    A measure that a coarser run does not have is as uncertain as it is large. size [m]: as
-    `floor_of` takes it.
+    The error of a measure that a coarse run does not have is its absolute value.
+
+    Parameters
+    ----------
+    values : dict
+        Values by name.
+    errors : dict
+        Errors by name; the dicts are added.
+    least : float
+        Fraction of the value that is added [1].
+    size : float
+        Displacement that the drive itself causes [m], as in `floor_of`.
     """
     out, amplitude = {}, values.get("relative_displacement_amplitude", 0.0)
     for name, value in values.items():
@@ -242,18 +263,21 @@ def total_error(name: str, value, parts, least: float, size):
 
     Parameters
     ----------
+    name : str
+    value : float or (n,)
+        Value of the measure.
     parts : sequence
         Errors that add up.
     least : float
-        Share of the value that is added.
+        Fraction of the value that is added [1].
     size : float or (n,)
         Amplitude of the output [m].
     """
     error = sum(parts) + np.abs(value) * least
     if name == "slip_start_phase":  # a phase modulo pi cannot be farther off
         return np.minimum(error, np.pi / 2)
-    if name in GAPS:  # the value itself is what is missing
+    if name in GAPS:  # the value itself is an error
         return np.maximum(error, np.abs(value))
-    if name == "drift_per_cycle":  # a difference of means over the motion
+    if name == "drift_per_cycle":  # a difference of means, which has their round-off
         return error + max(MEAN_ROUND, least) * np.abs(size)
     return error

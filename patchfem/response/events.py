@@ -1,4 +1,9 @@
-"""Events of a run as a table, from the samples of a march or a comparison method; stick intervals between events."""
+"""Table of the events of a run, detected in samples, and the stick intervals between events.
+
+In: samples of slip and slide, or rows of a log. Out: `Events`, and intervals of stick. Samples
+are those of a march or of a comparison method; the log of the exact engine is read in
+`run_events`.
+"""
 
 from dataclasses import dataclass
 
@@ -13,10 +18,15 @@ MOST = 100_000
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Events:
-    """The last events of a run in order, at most MOST of them.
+    """Last events of a run in order of time, at most MOST of them.
 
-    count: how many there were; time: (k,) [s]; interface: (k,), from 1, 0 for a border of the drive; kind: (k,) as
-    MEANINGS, up: towards positive slip; slide: (k,) [m]; source: a sentence on where they come from.
+    - time (k,): [s].
+    - interface (k,): number of the interface from 1; 0 for the border between two segments of the
+      drive.
+    - kind (k,): index of MEANINGS; "up" means towards positive slip.
+    - slide (k,): relative displacement [m].
+    - count: number of all events of the run.
+    - source: sentence on how the events were found.
     """
 
     time: np.ndarray
@@ -28,9 +38,16 @@ class Events:
 
 
 def table(rows, count: int | None = None, source: str = "") -> Events:
-    """Events from rows (time [s], interface, kind, slide [m]) in any order; the last MOST of them are kept.
+    """Return the Events of rows (time [s], interface, kind, slide [m]) in any order.
 
-    count: how many there were, None for len(rows); source: a sentence on where they come from.
+    Parameters
+    ----------
+    rows : sequence
+        Rows; the last MOST of them in time are kept.
+    count : int, optional
+        Number of all events of the run; None: that of the rows.
+    source : str
+        Sentence on how the events were found.
     """
     rows = np.array(rows, float).reshape(-1, 4)
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
@@ -46,11 +63,23 @@ def table(rows, count: int | None = None, source: str = "") -> Events:
 
 
 def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) -> Events:
-    """Events seen in samples: stops, releases and reversals of every interface, and the borders of the drive.
+    """Return the events in samples: stops, releases and reversals, and the borders of the drive.
 
-    A stop or a release is where the slip speed passes 1e-2 of its peak in the cycle, a reversal where it changes sign
-    without a stop between samples. time: (k,) [s]; slips, slides: (k, i) irreversible and whole motion [m]; period [s]
-    of the drive; held [m]: a cycle that slips less sticks; borders [s] of the drive.
+    A stop or a release is where the slip speed passes 1e-2 of its peak in the cycle, a reversal
+    where it changes sign without a stop between two samples.
+
+    Parameters
+    ----------
+    time : (k,)
+        Times [s].
+    slips, slides : (k, i)
+        Slip and relative displacement of each interface [m].
+    period : float
+        Period of the drive [s].
+    held : float
+        Slip in a cycle [m] below which the interface sticks in it.
+    borders : sequence of float
+        Times [s] at which a segment of the drive ends and the next one starts.
     """
     rows = [(at, 0, BORDER, np.nan) for at in borders if time[0] < at < time[-1]]
     for number in range(slips.shape[1]):
@@ -63,14 +92,28 @@ def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) 
 
 
 def states(time, slip, period: float, held: float = 0.0) -> tuple:
-    """State between the samples, (k - 1,) each: slip speed over its peak in the cycle, and +1, -1 slipping, 0 sticking.
+    """Return the relative slip speed (k - 1,) [1] and the state (k - 1,) between the samples.
 
-    time: (k,) [s]; slip: (k,) irreversible motion [m]; period [s] of the drive; held [m]: a cycle that slips less
-    sticks.
+    Parameters
+    ----------
+    time : (k,)
+        Times [s].
+    slip : (k,)
+        Slip [m].
+    period : float
+        Period of the drive [s].
+    held : float
+        Slip in a cycle [m] below which the interface sticks in it.
+
+    Returns
+    -------
+    tuple
+        Slip speed over its peak in the cycle, and the state: +1 or -1 for slip in this direction, 0
+        for stick.
     """
     step = np.diff(time)
     rate = np.divide(np.diff(slip), step, out=np.zeros(step.size), where=step > 0)
-    # 1e-6: round-off of the times
+    # 1e-6 of a cycle allows for round-off of the times
     cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(int)
     peak, low, high = (np.full(cycle.max(initial=0) + 1, start) for start in (0.0, np.inf, -np.inf))
     np.maximum.at(peak, cycle, np.abs(rate))
@@ -83,6 +126,7 @@ def states(time, slip, period: float, held: float = 0.0) -> tuple:
 
 
 def _one(time, slip, slide, period: float, held: float, number: int) -> list:
+    """Return the event rows of one interface from its samples; `number` is its number from 1."""
     share, state = states(time, slip, period, held)
     k, at = np.flatnonzero(state[1:] != state[:-1]), (time[1:] + time[:-1]) / 2
     before, after, low, rise = state[k], state[k + 1], share[k], share[k + 1] - share[k]
@@ -101,10 +145,18 @@ def _one(time, slip, slide, period: float, held: float, number: int) -> list:
 
 
 def sticks(events: Events, begin: float, end: float, moves) -> list:
-    """Stick intervals [(from, to)] [s] of the first interface within [begin, end], between events.
+    """Return the stick intervals [(start, end)] [s] of the first interface, bounded by events.
 
-    Of several sets of stuck interfaces those of the one that lasts longest are taken. moves: (i,) whether an interface
-    without any event slips all the time.
+    If other interfaces stick during some of them only, the intervals with the combination of states
+    that lasts longest in total are taken.
+
+    Parameters
+    ----------
+    events : Events
+    begin, end : float
+        Time span that is searched [s].
+    moves : (i,) of bool
+        Whether an interface without any event slips all the time.
     """
     count = len(moves)
     sliding = [bool(m) for m in moves]
@@ -112,7 +164,7 @@ def sticks(events: Events, begin: float, end: float, moves) -> list:
         mine = events.kind[events.interface == number + 1]
         if mine.size:
             sliding[number] = mine[0] not in (RELEASE_UP, RELEASE_DOWN)
-    # of those before only the last of each interface counts
+    # of the events before `begin`, only the last one of each interface decides its state
     first = int(np.searchsorted(events.time, begin))
     for number in range(count):
         mine = events.kind[:first][events.interface[:first] == number + 1]

@@ -1,8 +1,11 @@
-"""Motion of an interface inside the steps of a march, for laws whose force changes within a step.
+"""Motion of an interface inside the steps of a march, for a force that changes in a step.
 
-The force of the LuGre law rises over its kinetic limit while the slide turns. That lasts less than a step where the
-slide is many times the length over which the stretch relaxes, so samples at the ends of steps do not show it. Here the
-law follows the cubic through slides and rates: every step has PARTS parts, and the turn of a slide is the end of one.
+In: samples at the ends of steps, and the LuGre law. Out: the window with samples inside the
+steps. The force of the LuGre law exceeds its kinetic limit while the slide reverses. If the
+slide is many times the length over which the stretch relaxes, this takes less than a step and
+is not visible at the ends of the steps. Here the law is integrated along the cubic through
+slides and rates: every step is divided into PARTS parts, and a reversal of the slide is the end
+of a part.
 """
 
 from dataclasses import replace
@@ -14,12 +17,12 @@ from ..core import Response
 from ..friction.laws.lugre import LuGre
 from .measures import turn_shares
 
-# parts of a step; with so many the peaks of 60 rigs change by less than those of a step do
+# Parts of a step: with 16, the peaks of 60 rigs change by less than they change with the step.
 PARTS = 16
 
 
 class Steps(NamedTuple):
-    """Parts of every step between two samples: times [s], slides [m] and speeds [m/s] at their ends, (k, PARTS)."""
+    """Ends of the parts of every step: times [s], slides [m] and speeds [m/s], (k, PARTS) each."""
 
     time: np.ndarray
     slide: np.ndarray
@@ -27,7 +30,7 @@ class Steps(NamedTuple):
 
 
 def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
-    """Return the interface of a window with the ends of all parts of its steps as samples.
+    """Return the window with the ends of all parts of its steps as samples of the interface.
 
     Parameters
     ----------
@@ -35,12 +38,13 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
         Samples (k,) at the ends of steps.
     law : LuGre
     load : float
-        Normal load [N], which stays.
+        Normal load [N], constant.
 
     Returns
     -------
     Response
-        Its time, slide, slide_rate, force and slip have (k - 1) PARTS + 1 samples; all else is that of the window.
+        time, slide, slide_rate, force and slip have (k - 1) PARTS + 1 samples; all other fields are
+        those of the window.
     """
     parts = divide_steps(window.time, window.slide, window.slide_rate)
     time, slide, speed = (
@@ -64,10 +68,20 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
 
 
 def divide_steps(time, slide, speed) -> Steps:
-    """Divide steps between samples (k,) of slide [m] and speed [m/s] at times [s] on the cubics through both.
+    """Divide the steps between samples into parts, on the cubics through slides and speeds.
 
-    A step in which the speed changes its sign has half of its parts before the turn. A turn that is closer to a sample
-    than a part stays inside one of the short parts there: shorter ones would have slides of round-off.
+    If the speed changes sign in a step, half of its parts lie before the reversal. A reversal that
+    is closer to a sample than a part stays inside one of the parts there: shorter parts would have
+    slides of the size of round-off.
+
+    Parameters
+    ----------
+    time, slide, speed : (k,)
+        Times [s], slides [m] and speeds [m/s].
+
+    Returns
+    -------
+    Steps
     """
     step = np.diff(time)
     share = np.tile(np.arange(1, PARTS + 1) / PARTS, (step.size, 1))
@@ -89,7 +103,15 @@ def divide_steps(time, slide, speed) -> Steps:
 
 
 def relax(start: float, kept, gained) -> np.ndarray:
-    """Return what start, then kept x + gained (k, p) of it, part after part, is at all their ends (k p + 1,)."""
+    """Return the values (k p + 1,) of the recursion x -> kept x + gained from part to part.
+
+    Parameters
+    ----------
+    start : float
+        First value.
+    kept, gained : (k, p)
+        Factor and increment of each part.
+    """
     factor = np.cumprod(kept, axis=1)
     term = gained.copy()
     for part in range(1, kept.shape[1]):

@@ -1,4 +1,9 @@
-"""Measures of a run whose level is raised or lowered in steps: onset, jump, hysteresis."""
+"""Measures of a run whose drive level changes in steps: onset of slip, jump, hysteresis.
+
+In: the `Level` at the end of each level of the drive, in order. Out: the bracket of the onset
+of slip, the largest jump of the amplitude, and the hysteresis between increasing and decreasing
+levels.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,17 +28,23 @@ KEPT = (
     "equivalent_damping",
 )
 AMPLITUDE = KEPT[0]
-DISTORTED = 0.03  # third over first harmonic of the acceleration: from there on a person sees it in the curve
-JUMP = 1.5  # factor beyond what the drive changed, between neighbouring levels
+# third over first harmonic of the acceleration [1], above which the distortion is visible in the
+# curve
+DISTORTED = 0.03
+# smallest factor of a jump between neighbouring levels, divided by the factor of the drive [1]
+JUMP = 1.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Level:
-    """The end of one level of the drive.
+    """State of a run at the end of one level of the drive.
 
-    drive: acceleration [m s-2], of a force drive the force over the modal mass, or the force [N] where `unit` says so;
-    stuck: nothing slipped; values: measures by name; errors: theirs, as far as they are known; outcome:
-    how the motion under this level ended, "" where only the last one was asked.
+    - drive: acceleration [m s-2]; for a force drive the force over the modal mass, or the force [N]
+      if `unit` says so.
+    - stuck: nothing slipped.
+    - values, errors: measures and their errors by name, as far as they are known.
+    - outcome: how the motion ended under this level; "" if only the outcome of the last level is
+      computed.
     """
 
     drive: float
@@ -45,10 +56,17 @@ class Level:
 
 
 def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool]:
-    """What tells whether a level lies beyond the onset, by the kind of onset that the scene asks for.
+    """Return a function that decides whether a level lies above the onset.
 
-    "slip": some irreversible motion; "distortion": H3/H1 of the acceleration above DISTORTED; "gauge": half
-    peak-to-peak at the output above `length` [m]. A motion that nothing bounds lies beyond every onset.
+    A motion that grows without bound lies above every onset.
+
+    Parameters
+    ----------
+    kind : str
+        "slip": some slip occurs; "distortion": H3/H1 of the acceleration exceeds DISTORTED;
+        "gauge": half peak-to-peak at the output exceeds `length`.
+    length : float, optional
+        Amplitude for "gauge" [m].
     """
     beyond = {
         "slip": lambda level: not level.stuck,
@@ -58,7 +76,7 @@ def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool
 
 
 def no_onset(kind: str, length: float | None = None) -> str:
-    """The reason why a run of levels has no onset; arguments as in `past_onset`."""
+    """Return the reason why a sequence of levels has no onset; parameters as in `past_onset`."""
     far = f"has an amplitude of more than {format_length(length)} at the output" if length else ""
     what = {"slip": "slips", "gauge": far}.get(
         kind,
@@ -68,9 +86,21 @@ def no_onset(kind: str, length: float | None = None) -> str:
 
 
 def bracket(levels, past: Callable[[Level], bool]) -> tuple | None:
-    """Numbers of the last level before the onset and of the first beyond it, on the way up; None where none is beyond.
+    """Return the indices of the last level below the onset and of the first one above it.
 
-    past: what tells, as `past_onset` gives it; -1 stands for the start.
+    Only the levels before the first decrease count.
+
+    Parameters
+    ----------
+    levels : sequence of Level
+    past : callable
+        Decides whether a level lies above the onset (see `past_onset`).
+
+    Returns
+    -------
+    tuple or None
+        Two indices, the first of which is -1 for the start of the run; None if no level lies above
+        the onset.
     """
     for k, level in enumerate(levels):
         if past(level):
@@ -81,10 +111,21 @@ def bracket(levels, past: Callable[[Level], bool]) -> tuple | None:
 
 
 def jump(levels, name: str = AMPLITUDE) -> tuple | None:
-    """Largest change of a measure between neighbouring levels, up or down, over what the drive itself changed.
+    """Return the largest relative change of a measure between neighbouring levels.
 
-    Returns (drive of the level after it, factor, distance of the two levels); None where no factor reaches JUMP, up or
-    down.
+    The factor of the measure is divided by the factor of the drive.
+
+    Parameters
+    ----------
+    levels : sequence of Level
+    name : str
+        Measure.
+
+    Returns
+    -------
+    tuple or None
+        Drive of the level after the jump, factor [1], and distance between the two levels in the
+        unit of the drive; None if no factor reaches JUMP, up or down.
     """
     found = []
     for a, b in pairwise(levels):
@@ -96,9 +137,18 @@ def jump(levels, name: str = AMPLITUDE) -> tuple | None:
 
 
 def hysteresis(levels, name: str = AMPLITUDE) -> tuple | None:
-    """Hysteresis of a measure between the upward and the downward series of levels, and its error.
+    """Return the largest difference of a measure between increasing and decreasing levels.
 
-    It is the largest difference at one drive that is passed both ways; None where no drive is.
+    Parameters
+    ----------
+    levels : sequence of Level
+    name : str
+        Measure.
+
+    Returns
+    -------
+    tuple or None
+        Difference at one drive, and its error; None if no drive occurs in both directions.
     """
     drives = np.array([level.drive for level in levels])
     top = int(np.argmax(drives))

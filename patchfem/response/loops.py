@@ -1,8 +1,10 @@
-"""The friction loop of the last cycles: range of the slide, stiffness and damping of the interface, mean motion.
+"""Friction loop of the last cycles: range of the slide, stiffness, damping and drift.
 
-Everything works on samples that may be unevenly spaced, as those of an exact run are, which have both sides of every
-event. Between samples values and rates make a cubic. A law with a memory turns where its samples do: between the two
-beside a turn it may give way by all it has, so nothing is read there.
+In: samples of slide, its rate and force, at any spacing; those of an exact run contain both
+sides of every event. Out: reversals, secant stiffness, the measures of the loop, and the drift
+per cycle. Values and rates define a cubic between samples. For a law with memory the force
+reverses at a sample: between the two samples at a reversal it may change by its full range, so
+the force is not interpolated there.
 """
 
 from typing import NamedTuple
@@ -12,15 +14,17 @@ import numpy as np
 from ..effects import law_has_trait
 from .measures import ROUND
 
-CLOSE = 1e-9  # of a period: nearer samples are the two sides of an event
-RESTS = 1e-9  # of the largest rate: slower is at rest
-MOVES = 1e-3  # of the largest step of the slide: a rest has ended, whatever round-off moved in it
+CLOSE = 1e-9  # fraction of a period; samples that are closer are the two sides of an event
+RESTS = 1e-9  # relative to the largest rate; a slower slide is at rest
+# relative to the largest step of the slide; a larger step ends a rest, round-off does not
+MOVES = 1e-3
 
 
 class Reversal(NamedTuple):
-    """The largest or the smallest slide of a cycle: its value [m], and the force [N] there.
+    """Largest or smallest slide of a cycle [m], and the force there [N].
 
-    force is None where the slide rests at it over an end of the window, so that one side of a jump is not known.
+    force is None if the slide rests at this value over an end of the window, so that one side of a
+    jump is not known.
     """
 
     slide: float
@@ -28,7 +32,10 @@ class Reversal(NamedTuple):
 
 
 def cycle_spans(time, period: float) -> list:
-    """Whole cycles [(from, to)] [s] of the times (k,) [s], counted back from their end, oldest first."""
+    """Return the whole cycles [(start, end)] [s] of times (k,), oldest first.
+
+    They are measured from the end, so that a partial cycle at the start is left out.
+    """
     count = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6)
     return [
         (time[-1] - (count - k) * period, time[-1] - (count - k - 1) * period) for k in range(count)
@@ -36,7 +43,7 @@ def cycle_spans(time, period: float) -> list:
 
 
 def at_turns(model) -> str:
-    """How the force is read where the slide of a Model turns, as `turns_of` takes it."""
+    """Return how the force at a reversal of the slide of a Model is evaluated, for `turns_of`."""
     law, soft = (
         model.friction.law,
         model.partial_slip
@@ -50,12 +57,19 @@ def at_turns(model) -> str:
 
 
 def turns_of(time, slide, rate, force, period: float, by: str = "rate") -> list:
-    """(smallest, largest) Turn of the slide of every whole cycle of a window, oldest first.
+    """Return the (smallest, largest) `Reversal` of the slide in every whole cycle, oldest first.
 
-    time, slide, rate, force: (k,) samples [s, m, m/s, N]; period [s]. by: what the force there is: where it "jumps" the
-    mean of the values before and after the rest; where the "slide" makes it that of the sample of the largest slide,
-    and straight on along the slide; where its "rate" counts it is straight in time. The force is None where the slide
-    is largest at a border of the cycle and turns farther than a sample from it: the force there is not that of a turn.
+    Parameters
+    ----------
+    time, slide, rate, force : (k,)
+        Samples [s], [m], [m/s], [N].
+    period : float
+        Period [s].
+    by : str
+        Force at the reversal. "jumps": mean of the forces before and after the rest; "slide": force
+        at the sample of the largest slide, extrapolated linearly in the slide; "rate": interpolated
+        linearly in time. It is None if the slide is largest at an end of the cycle and the reversal
+        is more than one sample away, because the force there is not that of a reversal.
     """
     out, near = [], CLOSE * period
     for begin, end in cycle_spans(time, period):
@@ -77,7 +91,11 @@ def turns_of(time, slide, rate, force, period: float, by: str = "rate") -> list:
 
 
 def _turn(time, y, v, near: float) -> tuple:
-    """(number of the sample before the largest y, that value, share of the way to the next sample)."""
+    """Find the largest y of the cubics through samples with rates v.
+
+    Returns the index of the sample before it, its value, and the fraction of the step to the next
+    sample.
+    """
     top = int(np.argmax(y))
     best, step = (top, float(y[top]), 0.0), np.diff(time)
     for k in (top - 1, top):  # the cubics on both sides of the largest sample
@@ -94,8 +112,13 @@ def _turn(time, y, v, near: float) -> tuple:
 
 
 def _crossed(v, at: int, first: bool) -> tuple:
-    """(number of a sample, share of the way to the next one) at which the rate v (k,) falls through 0, in the last step
-    before the sample `at` (first) or in the first one after it; (None, 0) where it does not."""
+    """Find where the rate v (k,) decreases through 0 next to a sample.
+
+    The step before the sample `at` is used if `first`, else the step after it.
+
+    Returns the index of a sample and the fraction of the step to the next one; (None, 0) if there
+    is no such point.
+    """
     k = at - 1 if first else at
     if abs(v[at]) <= RESTS * np.abs(v).max(initial=0.0):
         return at, 0.0
@@ -105,7 +128,11 @@ def _crossed(v, at: int, first: bool) -> tuple:
 
 
 def _pull(slide, force, at: int, share: float, value: float, by: str) -> float | None:
-    """Force [N] at a largest slide `value`, `share` of the way from sample `at` to the next; by: as `turns_of`."""
+    """Return the force [N] at the largest slide `value`; None if it is not known.
+
+    The largest slide lies at the fraction `share` of the step after sample `at`; `by` as in
+    `turns_of`.
+    """
     if by == "rate":
         return float(force[at] + share * (force[min(at + 1, len(force) - 1)] - force[at]))
     top = at + int(share > 0 and slide[at + 1] > slide[at])
@@ -120,7 +147,7 @@ def _pull(slide, force, at: int, share: float, value: float, by: str) -> float |
 
 
 def _beside(slide, force, at: int, value: float) -> float | None:
-    """Mean of the forces at the last sample before and the first after a rest at the slide `value`, or None."""
+    """Return the mean force [N] before and after a rest at the slide `value`, or None."""
     step = np.abs(np.diff(slide))
     moves = step > MOVES * step.max(initial=0.0)
     moves &= np.maximum(np.abs(slide[1:] - value), np.abs(slide[:-1] - value)) > ROUND * np.abs(
@@ -135,12 +162,15 @@ def _beside(slide, force, at: int, value: float) -> float | None:
 
 
 def half_range(turns) -> float:
-    """Half the range of the slide in a cycle, mean over the cycles [m]; 0 without one."""
+    """Return half the range of the slide [m], averaged over the cycles; 0 without a cycle."""
     return float(np.mean([high.slide - low.slide for low, high in turns])) / 2 if turns else 0.0
 
 
 def secant_stiffness(turns) -> float | None:
-    """(F(q_max) - F(q_min))/2A [N/m], mean over the cycles; None where no cycle slides or none has both forces."""
+    """Return the secant stiffness (F(q_max) - F(q_min))/2A [N/m], averaged over the cycles.
+
+    None if the slide changes in no cycle, or if no cycle has both forces.
+    """
     found = [
         (high.force - low.force) / (high.slide - low.slide)
         for low, high in turns
@@ -150,20 +180,37 @@ def secant_stiffness(turns) -> float | None:
 
 
 def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffness: float) -> dict:
-    """Loop area per cycle [J], equivalent stiffness Re(F1/q1) [N/m] and damping W/(2 pi K A^2) [1] of the interface.
+    """Return loop area, equivalent stiffness and equivalent damping of an interface by name.
 
-    amplitude A [m]: half the range of the slide in a cycle; q, f: first Fourier coefficients of
-    slide and force; work: W, friction work per cycle [J]; stiffness K = moving_mass
-    omega_1^2/slide_1^2 of the first mode as the contact meets it, 0 leaves the damping out. The
-    part of the force in phase with the slide is taken over the slide's own first harmonic, as a
-    balance of first harmonics does.
+    The stiffness Re(F1/q1) refers to the first harmonic of the slide, as in harmonic balance.
+
+    Parameters
+    ----------
+    amplitude : float
+        Half the range A of the slide in a cycle [m].
+    q, f : complex
+        First Fourier coefficients of slide [m] and force [N].
+    work : float
+        Friction work W per cycle [J].
+    stiffness : float
+        K = moving_mass omega_1^2/slide_1^2 of the first mode as seen by the contact [N/m]; 0 omits
+        the damping.
+
+    Returns
+    -------
+    dict
+        "loop_area" [J], "equivalent_stiffness" [N/m] and "equivalent_damping" W/(2 pi K A^2) [1];
+        only those that have a value.
     """
     found = interface_loops(amplitude, q, f, work, stiffness)
     return {name: float(value) for name, value in found.items() if not np.isnan(value)}
 
 
 def interface_loops(amplitude, q, f, work, stiffness) -> dict:
-    """What `interface_loop` gives of one loop, numbers or (n,) of many; NaN where there is no value."""
+    """Return the values of `interface_loop` as numbers, or (n,) of many loops; NaN for no value.
+
+    The parameters are those of `interface_loop`, numbers or (n,).
+    """
     moves = (np.asarray(amplitude) > 0) & (np.abs(q) > 0)
     whole = 2 * np.pi * stiffness * np.square(amplitude)
     held = moves & (np.asarray(stiffness) > 0)
@@ -175,11 +222,18 @@ def interface_loops(amplitude, q, f, work, stiffness) -> dict:
 
 
 def drift(time, slide, rate, period: float) -> float:
-    """Mean motion per cycle [m] over the window: time mean of the last cycle less that of the first, over the cycles
-    between them.
+    """Return the mean motion per cycle [m] over a window.
 
-    time: (k,) [s]; slide: (k,) [m]; rate: (k,) [m/s]; period [s]. In a window below 1.5 cycles it is the motion from
-    end to end.
+    It is the difference between the time means of the last and the first cycle, divided by the
+    number of cycles between them; below 1.5 cycles, the motion between the ends of the window per
+    cycle.
+
+    Parameters
+    ----------
+    time, slide, rate : (k,)
+        Samples [s], [m], [m/s].
+    period : float
+        Period [s].
     """
     end, start = time[-1], time[0]
     cycles = (end - start) / period
@@ -192,9 +246,16 @@ def drift(time, slide, rate, period: float) -> float:
 
 
 def time_mean(time, value, rate, begin: float, end: float) -> float:
-    """Mean over the time from `begin` to `end` [s] of the cubics through samples and their rates.
+    """Return the mean of the cubics through samples and their rates over a time span.
 
-    h (y0 + y1)/2 + h^2 (v0 - v1)/12 over each step, fourth order whatever the spacing.
+    Each step contributes h (y0 + y1)/2 + h^2 (v0 - v1)/12, of fourth order at any spacing.
+
+    Parameters
+    ----------
+    time, value, rate : (k,)
+        Samples.
+    begin, end : float
+        Time span [s].
     """
     near = CLOSE * (end - begin)
     part = slice(
@@ -204,6 +265,6 @@ def time_mean(time, value, rate, begin: float, end: float) -> float:
     step, middle = np.diff(t), t[0]
     y = y - y[0]
     area = float(np.sum(step * (y[1:] + y[:-1]) / 2 + step**2 * (v[:-1] - v[1:]) / 12))
-    # what the borders miss of the span, at the value of the border
+    # the gaps between the ends of the span and the nearest samples, at the value of these samples
     area += float(y[-1]) * (end - t[-1]) + float(y[0]) * (middle - begin)
     return float(value[part][0]) + area / (end - begin)

@@ -1,6 +1,7 @@
-"""Functions that read numbers off the last window of cycles; `rows` has their names, units and definitions.
+"""Functions that compute measures from the samples of the last cycles.
 
-Everything works on samples: values of an exact run and of a march differ only in how they were made.
+In: a `Response` of the last cycles. Out: values by name; `rows` has their names, units and
+definitions. The samples of an exact run and of a march are treated alike.
 """
 
 import numpy as np
@@ -9,20 +10,25 @@ from ..core import Response
 from ..dynamics import integrated
 from ..friction import path_work
 
-SHARE = 0.5  # irreversible part of the slide from which an interface slips
-ROUND = 1e-13  # of the largest coordinate
-NOTHING = 1e-18  # J
-# of the energy that passes through a run; less friction work than that is round-off
+SHARE = 0.5  # irreversible fraction of the change of the slide above which an interface slips [1]
+ROUND = 1e-13  # round-off, relative to the largest coordinate
+NOTHING = 1e-18  # smallest gap of an energy balance that counts [J]
+# relative to the energy that passes through a run; less friction work than this is round-off
 ROUND_OFF_WORK = 1e-10
-REST = 1e-15  # m, range of a slide below which nothing moves
-SMOOTH = 4.0  # ratio of the bends at three samples, up to which they are those of one curve
+REST = 1e-15  # range of a slide [m] below which nothing moves
+SMOOTH = 4.0  # largest ratio of second differences at neighbouring samples of one smooth curve
 
 
 def energy_balance(book: dict):
-    """Relative gap of the energy balance [1] of a run, or (n,) of many; 0 for a run without energy.
+    """Return the relative gap of the energy balance [1] of a run, or (n,) of many.
 
-    |work in - stored - dissipated| / (integral |power in| + peak stored); a gap of NOTHING is the round-off of what
-    holds still. book: energies [J] by name.
+    |work in - stored - dissipated| / (integral |power in| + peak stored). A gap of NOTHING is the
+    round-off of a system at rest; without energy the result is 0.
+
+    Parameters
+    ----------
+    book : dict
+        Energies by name [J].
     """
     miss = np.abs(book["work_in"] - book["stored"] - book["friction"] - book["viscous"])
     return ratio_or_zero(miss * (miss > NOTHING), book["power"] + book["peak_stored"])
@@ -38,13 +44,13 @@ def relative_gap(sampled, balanced, passed, energy=0.0):
     passed : float or (n,) array
         Sum of the absolute values of the friction work of all steps [J].
     energy : float or (n,) array, optional
-        Energy that passes through the whole run [J]; `ROUND_OFF_WORK` of it counts besides, so that a stuck interface
-        shows no round-off.
+        Energy that passes through the whole run [J]; `ROUND_OFF_WORK` of it is added to `passed`,
+        so that a stuck interface shows no round-off.
 
     Returns
     -------
     float or (n,) array
-        Difference of the two over the work that passed [1]; 0 where none did.
+        Difference of the two works over the exchanged work [1]; 0 if there is none.
     """
     difference = np.abs(sampled - balanced)
     return ratio_or_zero(difference * (difference > NOTHING), passed + ROUND_OFF_WORK * energy)
@@ -57,35 +63,67 @@ def ratio_or_zero(part, whole):
 
 
 def harmonic(time, weight, values, omega) -> complex:
-    """First Fourier coefficient 2/T int values exp(-i omega t) dt of samples, in the unit of the values.
+    """Return the first Fourier coefficient 2/T int values exp(-i omega t) dt of samples.
 
-    time: (k,) [s]; weight: (k,) of the quadrature; values: (k,); omega [rad/s].
+    Parameters
+    ----------
+    time : (k,)
+        Times [s].
+    weight : (k,)
+        Weights of the quadrature.
+    values : (k,)
+        Samples; the result has their unit.
+    omega : float
+        Angular frequency [rad/s].
     """
     return 2 * np.sum(weight * values * np.exp(-1j * omega * time)) / np.sum(weight)
 
 
 def step_harmonic(time, means, omega) -> complex:
-    """First Fourier coefficient of a force whose mean (k - 1,) over each step between `time` (k,) [s] is known.
+    """Return the first Fourier coefficient of a force from its mean in each step.
 
-    omega [rad/s]. It is exact for a force that is constant in each step, so a jump at a sample costs nothing.
+    It is exact for a force that is constant in each step, even if it jumps at a sample.
+
+    Parameters
+    ----------
+    time : (k,)
+        Times [s].
+    means : (k - 1,)
+        Mean of the force in each step.
+    omega : float
+        Angular frequency [rad/s].
     """
     turn = np.exp(-1j * omega * time)
     return complex(2 / (time[-1] - time[0]) * np.sum(means * np.diff(turn)) / (-1j * omega))
 
 
 def lateral(window: Response, name: str, number: int = 0):
-    """What moves in the second direction (k,) of an interface of this number that slides in a plane: its "slides",
-    "slide_rates", "forces" or "slips"; None where it does not."""
+    """Return a history (k,) of an interface in the second direction of its plane.
+
+    Parameters
+    ----------
+    window : Response
+    name : str
+        "slides", "slide_rates", "forces" or "slips".
+    number : int
+        Index of the interface.
+
+    Returns
+    -------
+    (k,) array or None
+        None if the interface does not move in the second direction.
+    """
     found = window.extra.get(f"lateral_{name}")
     return None if found is None or not found[:, number].any() else found[:, number]
 
 
 def widest(x, y=None) -> float:
-    """Largest distance between two places x (k,) [m], or (x, y) of a path in a plane."""
+    """Return the largest distance [m] between two points x (k,), or (x, y) of a path in a plane."""
     if y is None:
         return float(x.max() - x.min())
     best, angle, turns, way = 0.0, 0.0, np.pi * np.arange(180) / 180, 0
-    # the width in each direction, then in that of the widest pair until there is no wider one
+    # first the width in each of 180 directions, then in that of the widest pair until it grows no
+    # more
     while way < 200:
         turn = turns[way] if way < turns.size else angle
         along = x * np.cos(turn) + y * np.sin(turn)
@@ -100,24 +138,35 @@ def widest(x, y=None) -> float:
 
 
 def moved(x, y=None) -> np.ndarray:
-    """Distances (k - 1,) between successive places, as of `widest`."""
+    """Return the distances (k - 1,) [m] between successive points; parameters as in `widest`."""
     return np.abs(np.diff(x)) if y is None else np.hypot(np.diff(x), np.diff(y))
 
 
 def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, None)) -> dict:
-    """Slip amplitude [m], stick fraction [1] and phase of the first slip after a stick [rad, modulo pi].
+    """Return slip amplitude [m], stick fraction [1] and phase of the start of slip [rad].
 
-    From as many samples in every cycle. The interface sticks while less than SHARE of its slide is irreversible, or it
-    does not slide at all; where that share passes SHARE is found between the middles of the steps. second: slide and
-    slip (k,) [m] in a second direction, None without one.
+    The interface sticks while less than SHARE of the change of its slide is irreversible, or while
+    it does not slide at all; the instant at which this fraction passes SHARE is interpolated
+    linearly between the midpoints of the steps. The phase is that of the first slip after stick,
+    modulo pi.
+
+    Parameters
+    ----------
+    window : Response
+        Samples, as many in every cycle.
+    drive
+        Drive with `period` [s].
+    steps_per_cycle : int
+    second : tuple
+        Slide and slip (k,) [m] in a second direction; None without it.
     """
     across, beside = second
     if widest(window.slide, across) <= REST:
-        # a law without a stiffness swings its traction, and so its slip, at a rest
+        # a law without a stiffness changes its traction, and so its slip, while nothing moves
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     slip = window.slip
     out = {"slip_amplitude": widest(slip, beside) / 2}
-    # it ended where it began, or never slipped
+    # a single sample, or no slip above round-off
     if slip.size < 2 or 2 * out["slip_amplitude"] <= slip_noise(window):
         return out | {"stick_fraction": 1.0}
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
@@ -134,7 +183,7 @@ def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, N
     above = np.where(still, 0.0, slid / np.where(still, 1.0, slide)) - SHARE
     before, after = above[:-1], above[1:]
     rise = np.abs(after - before)
-    # share of each stretch between two middles that lies below, along the line between them
+    # fraction of the time between two midpoints in which the linear interpolant is below 0
     low, high = np.minimum(before, after), np.maximum(before, after)
     below = np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
     middles = (time[1:] + time[:-1]) / 2
@@ -149,29 +198,44 @@ def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, N
 
 
 def slip_noise(window: Response) -> float:
-    """Range [m] below which slip is no more than the last digit of the coordinates: 1e-13 of the largest one."""
+    """Return the round-off of the slip [m]: 1e-13 of the largest modal coordinate."""
     return ROUND * float(np.abs(window.modal).max(initial=0.0))
 
 
 def slip_start(phases) -> dict:
-    """slip_start_phase [rad] by name of starts of slip at phases (k,) [rad]; {} where they have no phase in common."""
+    """Return slip_start_phase [rad] by name from the phases (k,) [rad] of starts of slip.
+
+    Empty if the starts have no phase in common.
+    """
     found = integrated.start_phase(len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum())
     return {} if np.isnan(found) else {"slip_start_phase": float(found)}
 
 
 def ledger_measures(ledger) -> dict:
-    """Work that went in and energy stored, dissipated and created [J], by name, at the end of a ledger (4, k) [J]."""
+    """Return friction work and energies [J] by name at the end of a ledger (4, k) [J].
+
+    k).
+    """
     names = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
 
 
 def work_check(work, pairs, jumps: bool = False) -> float:
-    """Relative gap between the energy book and the run's own samples [1]; it falls with the square of the step.
+    """Return the relative gap [1] of the friction work between energy balance and samples.
 
-    |trapezoid of the forces over the slides - work| over the work that went to and fro. work: (k,) [J] running sum of
-    the book; pairs: (slide (k,) [m], force (k,) [N]) of every direction. jumps: whether the force jumps where the slide
-    starts or turns. The sample there holds the force before the jump, so the force after it is taken from the work of
-    the step that follows.
+    It is |trapezoidal rule of the forces over the slides - work| over the sum of |work| of all
+    steps, and falls with the square of the step.
+
+    Parameters
+    ----------
+    work : (k,)
+        Cumulative friction work of the energy balance [J].
+    pairs : sequence
+        (slide (k,) [m], force (k,) [N]) of every direction.
+    jumps : bool
+        Whether the force jumps where the slide starts or reverses. The sample there contains the
+        force before the jump, so the force after it is computed from the work of the following
+        step.
     """
     parts = np.diff(work)
     total = 0.0
@@ -183,9 +247,10 @@ def work_check(work, pairs, jumps: bool = False) -> float:
 
 
 def acceleration_peak(window: Response) -> float:
-    """Largest |absolute acceleration| [m s-2] at the accelerometer over equally spaced samples of the window.
+    """Return the largest |absolute acceleration| [m s-2] at the accelerometer in a window.
 
-    Between samples the parabola through the largest inner one and its neighbours is used where it is smooth.
+    The samples are equally spaced. The vertex of the parabola through the largest inner sample and
+    its neighbours is used if the curve is smooth there.
     """
     size = np.abs(window.acceleration)
     top = int(np.argmax(size))
@@ -199,19 +264,31 @@ def acceleration_peak(window: Response) -> float:
 
 
 def _smooth_at(size, top: int) -> bool:
-    """Whether samples (k,) are smooth at the largest one: there they bend no more than SMOOTH times as much as at the
-    samples on both sides. Beside a jump one of those bends the other way."""
+    """Return whether samples (k,) are smooth at the largest one.
+
+    The second difference there is at most SMOOTH times that at the samples on both sides. Next to a
+    jump, one of these has the opposite sign.
+    """
     bends = -np.diff(size[max(top - 2, 0) : top + 3], 2)
     return bool(bends.min() * SMOOTH >= bends.max())
 
 
 def peaks_between(window: Response, climbs: bool = False) -> dict:
-    """What sampled peaks may lie above their samples, by name, beside what fewer steps show.
+    """Return by how much peaks may exceed their samples, by name, as an additional error.
 
-    Where the acceleration jumps at its largest sample, its change over a step on the smooth side; of a normal load that
-    changes, an eighth of its second difference at either end of its range. climbs: over grooves the force has its peak
-    between samples, which fewer steps need not show as they fall on some of the same instants: what it changes to the
-    sample beside it.
+    step.
+
+    - Acceleration: if it jumps at its largest sample, its change over a step on the smooth side.
+    - Normal load that changes: an eighth of its second difference at its smallest and largest
+      sample.
+    - Friction force over grooves: the change to the neighbouring sample, because runs with fewer
+      steps contain some of the same instants and need not show it.
+
+    Parameters
+    ----------
+    window : Response
+    climbs : bool
+        Whether the surfaces have grooves, so that the peak of the force lies between samples.
     """
     size, out = np.abs(window.acceleration), {}
     top = int(np.argmax(size))
@@ -234,9 +311,17 @@ def peaks_between(window: Response, climbs: bool = False) -> dict:
 
 
 def turn_shares(time, place, rate) -> tuple:
-    """(numbers of the steps in which the rate changes its sign, share of the step at which the cubic turns there).
+    """Return the steps in which the rate changes sign, and the fractions of the step there.
 
-    time (k,) [s]; place (k,) [m] and rate (k,) [m/s] of samples.
+    Parameters
+    ----------
+    time, place, rate : (k,)
+        Samples of time [s], position [m] and rate [m/s]; the cubic through both is used.
+
+    Returns
+    -------
+    tuple
+        Indices of the steps, and fractions of the step [1].
     """
     step = np.diff(time)
     k = np.flatnonzero(rate[:-1] * rate[1:] < 0)
@@ -248,7 +333,13 @@ def turn_shares(time, place, rate) -> tuple:
 
 
 def half_swing(time, place, rate) -> float:
-    """Half peak-to-peak [m] of the cubics through samples of a place (k,) [m] and its rate [m/s] at times (k,) [s]."""
+    """Return half the peak-to-peak value [m] of the cubics through samples and their rates.
+
+    Parameters
+    ----------
+    time, place, rate : (k,)
+        Samples of time [s], position [m] and rate [m/s].
+    """
     h = np.diff(time)
     k, s = turn_shares(time, place, rate)
     p, q, rise = rate[k] * h[k], rate[k + 1] * h[k], place[k + 1] - place[k]
@@ -258,9 +349,14 @@ def half_swing(time, place, rate) -> float:
 
 
 def window_amplitudes(extremes, window: int) -> np.ndarray:
-    """Half peak-to-peak [m] of the output per window of `window` cycles, oldest first.
+    """Return half the peak-to-peak value [m] of the output per window, oldest first.
 
-    extremes: (c, 2) [m] per cycle; a partial window at the head is left out, unless it is all there is.
+    Parameters
+    ----------
+    extremes : (c, 2)
+        Smallest and largest output of each cycle [m].
+    window : int
+        Cycles of a window; a partial window at the start is left out, unless it is the only one.
     """
     count = len(extremes) // window
     if count == 0:
@@ -270,9 +366,16 @@ def window_amplitudes(extremes, window: int) -> np.ndarray:
 
 
 def window_ends(extremes, phasors, window: int) -> tuple:
-    """Amplitudes [m] and phasors [m] of the last cycle of each window of `window` cycles, oldest first.
+    """Return amplitudes [m] and phasors [m] of the last cycle of each window, oldest first.
 
-    extremes: (c, 2) [m] and phasors: (c,) per cycle.
+    Parameters
+    ----------
+    extremes : (c, 2)
+        Smallest and largest output of each cycle [m].
+    phasors : (c,)
+        Phasor of each cycle [m].
+    window : int
+        Cycles of a window.
     """
     pick = np.arange(len(phasors) - 1, -1, -window)[::-1]
     return (extremes[pick, 1] - extremes[pick, 0]) / 2, phasors[pick]

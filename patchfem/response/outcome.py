@@ -1,4 +1,10 @@
-"""How a coupled run ended: outcome and steady estimate, by what its drive lets settle."""
+"""Outcome of a coupled run, and the estimate of its steady amplitude.
+
+In: a Solution with the amplitudes and extremes of its cycles, its measures, the tolerance and
+the drive. Out: the outcome (`settle`), the steady amplitude with its error as a measure, and
+warnings. The kind of drive decides what steady means; `settling` has the criteria for many
+motions at once.
+"""
 
 from dataclasses import replace
 
@@ -19,30 +25,50 @@ from .settling import (
     windows_of,
 )
 
-TELLS = 0.02  # of the tolerance, from which what an amplitude will still change by is told
+# fraction of the tolerance; if the amplitude will still change by more, the page states the steady
+# estimate
+TELLS = 0.02
 UNSETTLED = "the interface sticks, but the amplitude has not settled"
 OPEN_LOOP = "the friction loop of the last cycle does not close"
-SAFE = 1.5  # times the cycles that the decay needs: the last windows of a short run beat
-MOST_MORE = 1e6  # cycles that are proposed
-# of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
+# factor on the cycles that the decay needs, because the amplitude of the last windows may beat
+SAFE = 1.5
+MOST_MORE = 1e6  # largest number of cycles that a message proposes
+# relative to the displacement a/omega^2 of the drive; a smaller change of the amplitude is
+# round-off
 SMALL = 1e-12
 
 
 def settle(
     raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0, slowest: float = 0.0
 ) -> tuple:
-    """Outcome of a run, and its measures with the steady estimate where there is one.
+    """Return the outcome of a run, and its measures with the steady estimate if there is one.
 
-    Under a periodic drive, and under levels in their last one, the amplitudes of successive windows decide
-    (`classify`), and what free motion is left in them (`left_over`). A steady one that will still change by TELLS of
-    the tolerance has the estimate too. A release or a step is steady once it is at rest, to the floor of its amplitude;
-    else the same amplitudes decide, but a release grows only where a mode gains energy. A motion whose middle moves on
-    is not steady (`moves_on`). A sweep or a recorded signal changes to the end: unless it leaves the interface stuck it
-    is transient, without a steady estimate; a random one is done where both halves of its record move as much. So is an
-    interface that holds while what it holds still rises. What rises to a motion that is known to exist, `raw.bounded`,
-    does not grow.
-    level_cycles: of each level, 0 without levels; slowest: rate [1/s] at which the slowest mode decays, below 0 where
-    one gains energy.
+    - Periodic drive, and the last level of a drive in levels: the amplitudes of successive windows
+      decide (`classify`), and the free motion that remains in them (`left_over`). A motion that is
+      steady to the tolerance, but will still change by more than TELLS of it, has a steady estimate
+      as well. If a bounded motion is known to exist (`raw.bounded`), an increasing amplitude is not
+      GROWS.
+    - Release or step: steady once it is at rest, to the floor of its amplitude; else the same
+      amplitudes decide, but a release grows only if a mode gains energy.
+    - Sweep or recorded signal: it changes until the end, so the outcome is TRANSIENT without a
+      steady estimate, unless the interface sticks.
+    - Random drive: DONE if both halves of the record have the same mean square.
+
+    A motion whose midpoint drifts is not steady (`moves_on`), nor is a stuck interface whose
+    friction force still increases.
+
+    Parameters
+    ----------
+    raw : Solution
+    measures : dict
+        Measures by name.
+    tolerance : float
+        Relative tolerance of the scene.
+    drive
+    level_cycles : float
+        Cycles of each level; 0 without levels.
+    slowest : float
+        Rate at which the slowest mode decays [1/s]; negative if a mode gains energy.
     """
     if (
         raw.outcome is Outcome.STUCK
@@ -56,7 +82,7 @@ def settle(
         return Outcome.DONE if stationary.steady(raw.window, drive) else Outcome.TRANSIENT, measures
     if not drive.segments and drive_sizes.repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, measures
-    # tones, of which a window holds whole beats
+    # several tones, of which each window contains whole beats
     if not drive.segments and not drive_sizes.is_periodic(drive):
         found = classify(
             raw.amplitudes,
@@ -113,16 +139,27 @@ def settle(
 
 
 def moves_on(drift, error, amplitude, tolerance, floor) -> np.ndarray:
-    """Whether the middle of a motion moves by more than the tolerance of its amplitude [m] in a cycle; numbers or (n,).
+    """Return whether the midpoint of a motion moves by more than the tolerance in a cycle.
 
-    drift [m], known to `error`, and the floor of what counts as one.
+    Parameters
+    ----------
+    drift, error : float or (n,)
+        Motion of the midpoint per cycle and its error [m].
+    amplitude : float or (n,)
+        Amplitude [m], of which the tolerance is a fraction.
+    tolerance : float
+    floor : float or (n,)
+        Smallest drift that counts [m].
     """
     return np.abs(drift) > tolerance * np.abs(amplitude) + error + floor
 
 
 def _middle(extremes, window: int) -> float:
-    """Motion per cycle [m] of the middle of the output from the window before the last to that, of extremes (c, 2) [m]
-    per cycle; inf where they are not known. A window of a belt holds whole stick-slips, its cycles do not."""
+    """Return the motion per cycle [m] of the midpoint of the output over the last two windows.
+
+    It is inf if they are not known. For a belt, a window contains whole stick-slip cycles, whereas
+    a cycle of the drive does not. extremes: (c, 2) [m] per cycle.
+    """
     if extremes is None or len(extremes) < 2 * window:
         return np.inf
     part = np.asarray(extremes)[-2 * window :].reshape(2, window, 2)
@@ -131,8 +168,11 @@ def _middle(extremes, window: int) -> float:
 
 
 def _held(outcome: Outcome, measures: dict, tolerance: float, middle: float = np.inf) -> Outcome:
-    """TRANSIENT in place of STEADY where the middle of the motion moves on, from cycle to cycle and by `middle` [m] in
-    each from window to window."""
+    """Return TRANSIENT instead of STEADY if the midpoint of the motion drifts.
+
+    It must move both from cycle to cycle (`drift_per_cycle`) and from window to window (`middle`
+    [m] per cycle).
+    """
     drift, amplitude = measures.get("drift_per_cycle"), measures["relative_displacement_amplitude"]
     if outcome is not Outcome.STEADY or drift is None or drift.value is None:
         return outcome
@@ -147,18 +187,36 @@ def _held(outcome: Outcome, measures: dict, tolerance: float, middle: float = np
 
 
 def without_bars(measures: dict) -> dict:
-    """Measures of a motion that grows, which have no errors: those of a later time are others."""
+    """Return the measures of a growing motion without errors: later values are different."""
     return {name: replace(one, error=None) for name, one in measures.items()}
 
 
 def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=False) -> tuple:
-    """How motions under sines ended: (numbers of CLASSES, steady amplitudes [m], their errors [m]), (n,) each.
+    """Classify motions under periodic drives and estimate their steady amplitudes.
 
-    amplitudes (n, w) [m] of successive windows of `window` cycles; extremes (n, c, 2) [m] of the output per cycle, None
-    where they are not known; steady: (values, errors), (n,) [m], of `steady_amplitudes`, NaN for none; limits:
-    (tolerance, floor [m], decay of the slowest mode over a window [1]), numbers or (n,); bounded: as in a Solution.
-    A motion is steady only if what it is known to settle to, and what free motion is left in it, are both within the
-    tolerance: near a crest of its amplitude it hardly changes from window to window, however far it has still to go.
+    A motion is steady only if the change to its steady estimate and the free motion that remains in
+    it are both within the tolerance: near a maximum of its beat the amplitude hardly changes from
+    window to window, although it is far from steady.
+
+    Parameters
+    ----------
+    amplitudes : (n, w)
+        Amplitudes of successive windows [m].
+    extremes : (n, c, 2) or None
+        Smallest and largest output of each cycle [m]; None if not known.
+    window : int
+        Cycles of a window.
+    steady : tuple
+        Values and errors (n,) [m] of `steady_amplitudes`; NaN for none.
+    limits : tuple
+        Tolerance, floor [m], and decay of the slowest mode over a window [1]; numbers or (n,).
+    bounded : bool or (n,)
+        Whether a bounded motion is known to exist (see `Solution`).
+
+    Returns
+    -------
+    tuple
+        Indices of CLASSES, steady amplitudes [m] and their errors [m], (n,) each.
     """
     (tolerance, floor, decay), (value, error) = limits, steady
     found = classes(amplitudes, tolerance, floor)
@@ -172,7 +230,8 @@ def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=Fa
         )
         none, (mean, about) = np.isnan(value), mean_amplitudes(extremes, window)
         value, error = np.where(none, mean, value), np.where(none, about, error)
-        # no tail is seen: about the cycles of the last window
+        # without a visible tail, the steady amplitude is the mean over the cycles of the last
+        # window
         none = np.isnan(value) & (found == STEADY)
         value = np.where(none, windows_of(extremes, window)[1][:, -1], value)
         error = np.where(none, left + np.abs(amplitudes[:, -1] - value), error)
@@ -180,21 +239,40 @@ def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=Fa
 
 
 def goes_on(steady, error, amplitude, tolerance) -> np.ndarray:
-    """Whether the amplitude of a motion that is steady to the tolerance will still change by a share of that which
-    tells, by the steady estimate and its error; [m], numbers or (n,)."""
+    """Return whether a motion that is steady to the tolerance will still change noticeably.
+
+    The limit is the fraction TELLS of the tolerance, against the steady estimate [m] and its error
+    [m]; numbers or (n,).
+    """
     return np.abs(steady - amplitude) + error > TELLS * tolerance * np.abs(amplitude)
 
 
 def steady_error(steady, error, amplitude, own):
-    """Error of a steady estimate [m]: its own and, in proportion, that of the amplitude of the last cycles."""
+    """Return the error of a steady estimate [m], including the numerical error of the amplitude.
+
+    Parameters
+    ----------
+    steady, error : float or (n,)
+        Steady estimate and its error by extrapolation [m].
+    amplitude, own : float or (n,)
+        Amplitude of the last cycles and its error [m], which is scaled by the ratio of both
+        amplitudes.
+    """
     return error + own * steady / np.maximum(np.abs(amplitude), 1e-300)
 
 
 def still_loads(window, period: float, tolerance: float) -> bool:
-    """Whether the force that a stuck interface holds still rises: the stick of a belt outlasts the window then.
+    """Return whether the force on a stuck interface still increases, as in a stick of a belt.
 
-    By the mean of the last cycle against that of the first, more than the tolerance of the largest force; in a window
-    of one cycle where it rises all the way. window: Response; period [s] of the drive.
+    The mean of the last cycle must exceed that of the first by more than the tolerance times the
+    largest force. In a window of one cycle, the force must increase throughout.
+
+    Parameters
+    ----------
+    window : Response
+    period : float
+        Period of the drive [s].
+    tolerance : float
     """
     time, forces = (
         window.time,
@@ -210,7 +288,8 @@ def still_loads(window, period: float, tolerance: float) -> bool:
         size = np.abs(forces)
         rises = np.all(np.diff(size, axis=0) >= -1e-9 * largest_force, axis=0)
         return bool(np.any(rises & (size[-1] - size[0] > tolerance * largest_force)))
-    near = period * (1 + 1e-9)  # round-off at its end would leave out a step
+    # without this factor, round-off at the end of a cycle would leave out a step
+    near = period * (1 + 1e-9)
     first, last = time <= time[0] + near, time >= time[-1] - near
     means = [
         np.abs(np.trapezoid(forces[part], time[part], axis=0)) / period for part in (first, last)
@@ -219,12 +298,20 @@ def still_loads(window, period: float, tolerance: float) -> bool:
 
 
 def off_the_piece(outcome: Outcome | None, reach: float, length: float) -> Outcome | None:
-    """The outcome of a run, or LEAVES_CONTACT where its largest |slide| `reach` [m] passed the length [m] of the piece.
+    """Return the outcome, or LEAVES_CONTACT if the slide exceeded the length of the piece.
 
-    From that moment on nothing overlaps, so it comes before whatever the run did later: settle, go on growing, or pass
-    the stop of the flexure, which would have ended the run before had it stood nearer. A motion that grows without
-    having passed the end within the run still `grows`. Only a solve that missed its residual comes first, since its
-    slide means nothing.
+    From that instant on nothing overlaps, so this outcome replaces any later one: steady, growing,
+    or at the stop of the flexure, which would have ended the run earlier if it were nearer. A
+    motion that grows without having passed the end of the piece remains GROWS. NOT_CONVERGED is
+    kept, because its slide means nothing.
+
+    Parameters
+    ----------
+    outcome : Outcome or None
+    reach : float
+        Largest |slide| of the run [m].
+    length : float
+        Length of the piece [m].
     """
     return (
         Outcome.LEAVES_CONTACT
@@ -234,10 +321,20 @@ def off_the_piece(outcome: Outcome | None, reach: float, length: float) -> Outco
 
 
 def unsettled(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
-    """Warning, as a list, of a motion under a sine that sticks but rings on: its amplitude is that of a transient.
+    """Return a warning, as a list, if the interface sticks but the amplitude still decays.
 
-    limits: (tolerance, rate [1/s] at which the slowest mode decays); cycles: of the run. By what the amplitude of the
-    last window will still change, with the cycles after which a free motion at that rate is below the tolerance.
+    The warning states by how much the amplitude of the last window will change, and after how many
+    cycles a free motion with the slowest decay is below the tolerance.
+
+    Parameters
+    ----------
+    raw : Solution
+    measures : dict
+    limits : tuple
+        Tolerance, and rate at which the slowest mode decays [1/s].
+    drive
+    cycles : float
+        Cycles of the run.
     """
     (tolerance, slowest), main = limits, measures["relative_displacement_amplitude"]
     if (
@@ -254,17 +351,38 @@ def unsettled(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
 
 
 def ringing_left(extremes, window: int, decay):
-    """How much of the amplitude of motions that stick [m] is free vibration, (...), by the extremes (..., c, 2) [m] of
-    their cycles: `left_over`, and the change of the last window at least; decay (...): of the slowest mode over a cycle
-    [1]."""
+    """Return how much of the amplitude of stuck motions is free vibration [m], (...).
+
+    It is `left_over`, but not less than the change of the last window.
+
+    Parameters
+    ----------
+    extremes : (..., c, 2)
+        Smallest and largest output of each cycle [m].
+    window : int
+        Cycles of a window.
+    decay : (...)
+        Decay of the slowest mode over a cycle [1].
+    """
     ends = windows_of(extremes, window)[0]
     left = left_over(extremes, window, np.maximum(decay, 0.0) * window)
     return np.maximum(left, np.abs(ends[..., -1] - ends[..., -2])) if ends.shape[-1] > 1 else left
 
 
 def rings_on(left: float, sizes: tuple, limits: tuple, cycles: float) -> list:
-    """`unsettled` of a motion that sticks, of which so much is `ringing_left` [m]; sizes: its amplitude and the floor
-    of that [m]; limits: tolerance, and the decay of its slowest mode over a cycle [1]."""
+    """Return the warning of `unsettled`, as a list, for a known amount of free vibration.
+
+    Parameters
+    ----------
+    left : float
+        Free vibration in the amplitude [m] (see `ringing_left`).
+    sizes : tuple
+        Amplitude and its floor [m].
+    limits : tuple
+        Tolerance, and decay of the slowest mode over a cycle [1].
+    cycles : float
+        Cycles of the run.
+    """
     (amplitude, floor), (tolerance, decay) = sizes, limits
     if not left > tolerance * amplitude + floor:
         return []
@@ -281,7 +399,10 @@ def rings_on(left: float, sizes: tuple, limits: tuple, cycles: float) -> list:
 
 
 def changing_note(outcome: Outcome, drive) -> list:
-    """The sentence, in a list, on measures under a drive that changes to the end; an empty list for other drives."""
+    """Return a note, as a list, on measures under a drive that changes until the end of the run.
+
+    The list is empty for other drives.
+    """
     if (
         outcome is not Outcome.TRANSIENT
         or drive.segments
@@ -295,10 +416,11 @@ def changing_note(outcome: Outcome, drive) -> list:
 
 
 def steady_of(drive, amplitudes, phasors) -> tuple:
-    """Steady amplitude and its error under a periodic drive, (None, None) under any other.
+    """Return the steady amplitude and its error [m] under a periodic drive, else (None, None).
 
-    A released or struck rig comes to rest, whatever the tail of its amplitudes looks like. Under a drive that is no
-    sine the motion may have no first harmonic, so the amplitudes are extrapolated in place of the phasors.
+    A released or struck rig comes to rest, so its amplitudes are not extrapolated. Under a drive
+    that is not a sine the motion may have no first harmonic, so the amplitudes are extrapolated
+    instead of the phasors.
     """
     if not drive_sizes.is_periodic(drive):
         return None, None

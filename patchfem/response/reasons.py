@@ -1,4 +1,8 @@
-"""Why a run has no value of a measure: sentences that stand in its place."""
+"""Reasons why a run has no value of a measure: sentences that replace the value.
+
+In: the measures that a run has, its window and its drive. Out: measures without a value by
+name, each with its reason.
+"""
 
 from dataclasses import replace
 
@@ -11,7 +15,7 @@ from .measures import lateral
 from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
-# of the slide, carried by another mode, from which no damping ratio is one of the first
+# fraction of the slide that other modes carry [1]; above it the damping ratio is not that of mode 1
 SHARED = 0.05
 IN_PLANE = "the interface slides in a plane, but this measure is defined only for one direction"
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
@@ -36,10 +40,19 @@ UNCLOSED = (
 
 
 def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dict:
-    """Measures without a value, with the reason, by name: those that a coupled run can have and this one has not.
+    """Return the measures that a coupled run could have but has not, by name, with the reasons.
 
-    values: name -> value or Measure of those it has; window: Response of its last cycles; drive; rubs: whether an
-    interface bears a load; beside: share of the slide that a mode beside the first carries.
+    Parameters
+    ----------
+    values : dict
+        Value or Measure by name of those that the run has.
+    window : Response
+        Last cycles.
+    drive
+    rubs : bool
+        Whether an interface carries a load.
+    beside : float
+        Fraction of the slide that modes other than the first carry [1].
     """
     lacking = {
         name: _of_cycles(name, values, window, drive, beside)
@@ -61,8 +74,11 @@ def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dic
 
 
 def stopping(values) -> dict:
-    """The secant stiffness without a value, by name, of rigid friction that holds at the ends of its slide: the force
-    there is no single one. values: Measure by name."""
+    """Return the secant stiffness without a value if rigid friction sticks at the largest slide.
+
+    The force there has no single value. values: Measure by name; the result is a dict, {}
+    otherwise.
+    """
     one, stuck = values.get("secant_stiffness"), values.get("stick_fraction")
     holds = (
         one is not None
@@ -74,8 +90,10 @@ def stopping(values) -> dict:
 
 
 def unsettled(values, outcome: Outcome, drive) -> dict:
-    """The steady amplitude without a value, by name, of a motion under a periodic drive that has not settled and does
-    not show what to. values: by name, those that the run has; drive."""
+    """Return the steady amplitude without a value, by name, if a transient hides its limit.
+
+    Only under a periodic drive; {} otherwise.
+    """
     return (
         {SETTLES: Measure(None, TABLE[SETTLES].unit, None, TABLE[SETTLES].floor, reason=UNSEEN)}
         if outcome is Outcome.TRANSIENT and is_periodic(drive) and SETTLES not in values
@@ -84,8 +102,10 @@ def unsettled(values, outcome: Outcome, drive) -> dict:
 
 
 def undrifting(values, drive) -> dict:
-    """The drift without a value, by name, where no drive gives the period over which a mean stands still: means over
-    other spans differ without any drift. values: Measure by name; drive."""
+    """Return the drift without a value, by name, if no period of the mean slide is known.
+
+    Means over other time spans differ without any drift. values: Measure by name.
+    """
     one = values.get("drift_per_cycle")
     return (
         {}
@@ -99,7 +119,7 @@ def undrifting(values, drive) -> dict:
 
 
 def unbounded(values) -> dict:
-    """The measures of a steady motion that does not exist, by name: without a value, but for the load that is given."""
+    """Return the measures of a steady motion that does not exist: all but the load lack a value."""
     return {
         name: replace(
             one,
@@ -111,12 +131,20 @@ def unbounded(values) -> dict:
 
 
 def unclosed(values, window, drive) -> dict:
-    """Loops without a value, with the reason, by name, where they do not close; {} where all do.
+    """Return the loop areas without a value, by name, of loops that do not close; {} if all do.
 
-    The work of friction per cycle is told as a loss. Where nothing drives the motion to repeat, as after a release, the
-    interface also gives back what it stored, or stores more: beyond what it dissipates the work is not a loss. values:
-    Measure by name; window: Response of the last cycles; drive. The energies of several interfaces are known together
-    only: one of them does not close where it gives back more than it takes while none creates energy.
+    The work per cycle is reported as a loss. If nothing forces the motion to repeat, as after a
+    release, the interface also returns or stores energy: if this exceeds the dissipation, the work
+    is not a loss. The energies of several interfaces are known only in sum: a loop does not close
+    if its interface returns more than it takes while none creates energy.
+
+    Parameters
+    ----------
+    values : dict
+        Measure by name.
+    window : Response
+        Last cycles.
+    drive
     """
     ledger, loop = window.extra.get("ledger"), values.get("loop_area")
     if ledger is None or loop is None or is_periodic(drive):
@@ -135,6 +163,7 @@ def unclosed(values, window, drive) -> dict:
 
 
 def _of_phase(values, drive) -> str:
+    """Return the reason why the start of slip has no phase."""
     if not is_sinusoidal(drive):
         return "the drive is not a sine at the end of the run, so the start of slip has no phase"
     stuck = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
@@ -146,6 +175,7 @@ def _of_phase(values, drive) -> str:
 
 
 def _of_cycles(name: str, values, window, drive, beside: float) -> str:
+    """Return the reason why a measure of the cycles under a sine has no value."""
     if not is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
     if not has_full_cycle(window.time[-1] - window.time[0], drive):

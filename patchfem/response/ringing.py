@@ -1,7 +1,12 @@
-"""Ringing of a rig while an interface sticks: a decaying sinusoid beside the forced sine and a constant.
+"""Ringing of a rig while an interface sticks: a decaying sinusoid besides the forced motion.
 
-The frequency and decay enter nonlinearly, all else linearly (variable projection, Golub and Pereyra 1973). Up to three
-sinusoids are fitted together and the one with the most energy is kept.
+motion.
+
+In: a signal during the sticks of a window. Out: `ring_frequency` and `ring_damping` with their
+errors. The model is a sum of decaying sinusoids, the forced sine and a constant. Frequency and
+decay enter nonlinearly, all else linearly (variable projection, Golub and Pereyra, 1973). Up to
+three sinusoids are fitted together, and the one with the most energy is kept. Without a sine,
+`held_modes` computes the sinusoids from the eigenvalues of the rig.
 """
 
 from dataclasses import dataclass
@@ -12,29 +17,38 @@ import numpy as np
 
 from .. import compiled
 
-LEAST_PERIODS = 1.5  # of the ring in a stick; below them frequency and decay cannot be told apart
+# periods of the ringing in a stick; with fewer, frequency and decay are not independent
+LEAST_PERIODS = 1.5
 LEAST_SAMPLES = 16
 MOST_SAMPLES, MOST_STICKS, MOST_TERMS = 600, 20, 3
-PER_PERIOD = 24  # samples of a ring that are enough
-FAINT = 1e-6  # of the largest value of the signal, below which nothing rings
-MISSED = 0.1  # share of the ring that a fit may leave over
-WIDEST = 0.5  # largest damping ratio of what is called a ring
-WHOLE = 1e-9  # of what the forced sine leaves: a fit that leaves less has found the ring, no other start is tried
+PER_PERIOD = 24  # samples per period of the ringing that are sufficient
+FAINT = 1e-6  # relative to the largest value of the signal; a smaller sinusoid is no ringing
+MISSED = 0.1  # largest root mean square of the residual over that of the ringing [1]
+WIDEST = 0.5  # largest damping ratio that counts as ringing [1]
+# residual of a fit relative to the signal without the forced sine; below it no other start is tried
+WHOLE = 1e-9
 ROUNDING = float(np.finfo(float).eps)
-# CPU seconds of a look at a fit as Python, per sample and square of columns; looks of a fit
+# CPU seconds of an evaluation of a fit in Python, per sample and squared number of columns; and
+# evaluations of a fit, for the estimate of the cost
 LOOK, LOOKS = (
     8e-7,
     2.0,
 )
 KERNELS = "response.ringing_kernels"
-STEPS = 60  # of a fit
-SHORT = 0.9  # of LEAST_PERIODS; a WHOLE fit below it is refused, and its last digits are not sought
+STEPS = 60  # largest number of steps of a fit
+# fraction of LEAST_PERIODS; a fit below it with a WHOLE residual is refused, so it is not refined
+SHORT = 0.9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ring:
-    """A decaying sinusoid: frequency [Hz] as seen, damping ratio [1], amplitude at the start, and the errors of the
-    first two."""
+    """Decaying sinusoid.
+
+    - frequency: frequency of the damped motion [Hz].
+    - damping: damping ratio [1].
+    - amplitude: amplitude at the start [unit of the signal].
+    - errors: errors of frequency [Hz] and damping [1].
+    """
 
     frequency: float
     damping: float
@@ -43,10 +57,18 @@ class Ring:
 
 
 def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | None:
-    """The ring in value (k,) at times (k,) [s] of one stick; None where none is seen.
+    """Return the ringing in a signal during one stick; None if there is none.
 
-    omega [rad/s] of a forced sine, 0 for none; size: largest value of the signal elsewhere. A line at a harmonic of the
-    drive that does not decay is forced and no ring.
+    A line at a harmonic of the drive that does not decay is forced motion and no ringing.
+
+    Parameters
+    ----------
+    time, value : (k,)
+        Times [s] and signal.
+    omega : float
+        Angular frequency of a forced sine [rad/s]; 0 for none.
+    size : float, optional
+        Largest value of the signal in the rest of the window.
     """
     if np.size(time) < LEAST_SAMPLES:
         return None
@@ -58,8 +80,9 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     rest = value - columns @ np.linalg.lstsq(columns, value, rcond=1e-12)[0]
     if np.abs(rest).max() <= FAINT * size:
         return None
-    if time.size > MOST_SAMPLES:  # of a long stick the first part: later less is left of the ring
-        # no more samples than the ring needs
+    # the first part of a long stick is used, because the ringing decays
+    if time.size > MOST_SAMPLES:
+        # a stride keeps no more samples per period than the ringing needs
         stride = max(1, int(2 * np.pi / _highest(time, rest) / (time[1] - time[0]) / PER_PERIOD))
         time, value, columns, rest = (
             part[::stride][:MOST_SAMPLES].copy() for part in (time, value, columns, rest)
@@ -101,9 +124,23 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
 
 
 def held_ring(amplitude: float, own: float, damping: float, size: float) -> dict:
-    """ring_frequency [Hz] and ring_damping [1] of a decaying sinusoid known in closed form; {} where it is too faint.
+    """Return ring_frequency [Hz] and ring_damping [1] of a sinusoid known in closed form.
 
-    amplitude [m s-2]: its largest, 0 where nothing rings; own [rad/s]; size [m s-2] of the whole signal.
+    Parameters
+    ----------
+    amplitude : float
+        Its largest acceleration [m s-2]; 0 if nothing rings.
+    own : float
+        Angular frequency [rad/s].
+    damping : float
+        Damping ratio [1].
+    size : float
+        Largest acceleration of the whole signal [m s-2].
+
+    Returns
+    -------
+    dict
+        {} if the amplitude is below FAINT of the size.
     """
     if not amplitude > FAINT * size:
         return {}
@@ -111,8 +148,13 @@ def held_ring(amplitude: float, own: float, damping: float, size: float) -> dict
 
 
 class HeldMode(NamedTuple):
-    """A mode that rings while every interface holds: begin, end [s] of the stick; frequency [Hz] as seen, damping ratio
-    [1], size at the output of its displacement [m] and of its acceleration [m s-2] at `begin`."""
+    """Mode that rings while every interface sticks.
+
+    - begin, end: time span of the stick [s].
+    - frequency: frequency of the damped motion [Hz].
+    - damping: damping ratio [1].
+    - displacement, acceleration: amplitudes at the output at `begin` [m], [m s-2].
+    """
 
     begin: float
     end: float
@@ -123,10 +165,20 @@ class HeldMode(NamedTuple):
 
 
 def held_modes(modes, stiffness, motion) -> list:
-    """The HeldModes of a motion without a sine while every interface holds by a spring, of the eigenvalues of the rig.
+    """Return the HeldModes of a motion without a forced sine while every interface sticks.
 
-    stiffness (i,) [N/m] of the interfaces; motion: Response of the stick. Two states h apart differ by c (e^(lambda h)
-    - 1) in every mode, whatever the place it swings about, so each amplitude c follows from them alone.
+    Each stuck interface is a spring, and the modes are eigenvectors of the rig with these springs.
+    Two states that are h apart differ by c (exp(lambda h) - 1) in every mode, whatever the
+    equilibrium is, so that they determine each amplitude c.
+
+    Parameters
+    ----------
+    modes
+        Modal basis of the rig.
+    stiffness : (i,)
+        Stiffness of the interfaces [N/m].
+    motion : Response
+        Samples of the stick.
     """
     n, rows = modes.omega.size, modes.interfaces
     whole = np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass
@@ -136,7 +188,7 @@ def held_modes(modes, stiffness, motion) -> list:
     turned = np.expm1(values * (motion.time[1] - motion.time[0]))
     told = (values.imag > 0) & (np.abs(turned) > FAINT)
     sizes = np.linalg.solve(shapes, (state[1] - state[0]).astype(complex))[told] / turned[told]
-    # a pair of eigenvalues makes one real sinusoid
+    # a pair of conjugate eigenvalues gives one real sinusoid
     out = 2 * np.abs(modes.output @ shapes[:n, told] * sizes)
     return [
         HeldMode(
@@ -152,10 +204,14 @@ def held_modes(modes, stiffness, motion) -> list:
 
 
 def strongest(held: list, kind: str) -> HeldMode:
-    """The one of HeldModes with the most energy over the stick, by the square of its "displacement" or its
-    "acceleration"."""
+    """Return the HeldMode with the most energy over the stick.
+
+    Energy is the time integral of the square of its "displacement" or "acceleration", as `kind`
+    says.
+    """
 
     def energy(one: HeldMode) -> float:
+        """Return the mean square of the decaying sinusoid over the stick."""
         fall = 4 * np.pi * one.damping * one.frequency * (one.end - one.begin)
         return getattr(one, kind) ** 2 * (-np.expm1(-fall) / fall if fall else 1.0)
 
@@ -163,10 +219,23 @@ def strongest(held: list, kind: str) -> HeldMode:
 
 
 def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
-    """Frequency [Hz] and damping ratio [1] of what rings in a signal, and their errors: medians over the sticks.
+    """Return frequency and damping ratio of the ringing in a signal: medians over the sticks.
 
-    Returns ({ring_frequency, ring_damping}, their errors); ({}, {}) where nothing rings. sticks: [(begin, end)] [s].
-    The error is twice what the spread leaves of the median, and that of a fit.
+    Parameters
+    ----------
+    time, value : (k,)
+        Times [s] and signal.
+    sticks : sequence
+        Time spans (start, end) [s].
+    omega : float
+        Angular frequency of a forced sine [rad/s]; 0 for none.
+
+    Returns
+    -------
+    tuple
+        ring_frequency [Hz] and ring_damping [1] by name, and their errors by name; ({}, {}) if
+        nothing rings. An error is twice the standard error of the median, plus the median error of
+        the fits.
     """
     size = float(np.abs(value).max(initial=0.0))
     found = []
@@ -192,7 +261,10 @@ def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
 
 
 def _even(time, value) -> tuple:
-    """Samples at equal steps, times from 0; the ones that stand beside them (both sides of an event) are left out."""
+    """Return the samples at equal steps, with times from 0.
+
+    Other samples, such as the second one on an event, are left out.
+    """
     if time.size < 3:
         return time, value
     step = float(np.median(np.diff(time)))
@@ -206,6 +278,7 @@ def _even(time, value) -> tuple:
 
 
 def _forced(time, omega: float) -> np.ndarray:
+    """Return the columns (k, 1 or 3) of a constant and the forced sine."""
     parts = [np.ones(time.size)]
     if omega > 0:
         parts += [np.cos(omega * time), np.sin(omega * time)]
@@ -213,7 +286,12 @@ def _forced(time, omega: float) -> np.ndarray:
 
 
 class _Fit(NamedTuple):
-    """Sinusoids fitted to a signal: poles (2 r,), their standard errors, root mean square of what is left over."""
+    """Sinusoids fitted to a signal.
+
+    - poles (2 r,): angular frequency [rad/s] and decay rate [1/s] of each.
+    - sigma (2 r,): standard errors of the poles.
+    - rms: root mean square of the residual.
+    """
 
     poles: np.ndarray
     sigma: np.ndarray
@@ -221,9 +299,13 @@ class _Fit(NamedTuple):
 
 
 def _fitted(time, value, forced, poles, *ends) -> tuple:
-    """(times that a fit was looked at, the sum of squares that the best one leaves, its room as
-    `ringing_kernels.fitted` has it, until the next call); poles (2 r,) move to the best ones, not at all without
-    `ends`."""
+    """Fit the poles (2 r,) to a signal, or evaluate the residual at them if there are no `ends`.
+
+    The poles are overwritten by the best ones.
+
+    Returns the number of evaluations, the sum of squares of the best residual, and the workspace of
+    `ringing_kernels.fitted`, which is valid until the next call.
+    """
     room = _room(forced.shape[1] + poles.size, poles.size, time.size)
     room[0][0, : forced.shape[1]] = forced.T
     fit = compiled.kernels(KERNELS).fitted
@@ -234,7 +316,7 @@ def _fitted(time, value, forced, poles, *ends) -> tuple:
 
 @lru_cache(maxsize=16)
 def _room(count: int, many: int, samples: int) -> tuple:
-    """The room of a fit of `many` poles; the same at every call, which spares the time to make and describe it."""
+    """Return the workspace of a fit of `many` poles; cached, because making it takes time."""
     return (
         np.empty((3, count, samples)),
         np.empty((count + 2, count)),
@@ -245,7 +327,7 @@ def _room(count: int, many: int, samples: int) -> tuple:
 
 
 def _share(time, value, forced, poles) -> tuple:
-    """Part of each sinusoid: (what is left over (k,), the sinusoids [(k,)])."""
+    """Return the residual (k,) and a list of the sinusoids (k,) of the poles."""
     n, (columns, few, *_) = forced.shape[1], _fitted(time, value, forced, poles)[2]
     return columns[2, 0].copy(), [
         few[-1, at : at + 2] @ columns[0, at : at + 2] for at in range(n, n + poles.size, 2)
@@ -253,7 +335,10 @@ def _share(time, value, forced, poles) -> tuple:
 
 
 def _grown(time, value, forced, rest) -> _Fit | None:
-    """The fit of the sinusoids that there are: one is added after the other while each halves what is left."""
+    """Return the fit with as many sinusoids as the signal contains.
+
+    One sinusoid is added after the other while each one at least halves the residual.
+    """
     scale = last = np.sqrt(np.mean(rest**2))
     best = None
     for _ in range(MOST_TERMS):
@@ -264,7 +349,8 @@ def _grown(time, value, forced, rest) -> _Fit | None:
             if tries[-1].rms < WHOLE * scale:
                 break
         new = min(tries, key=lambda one: one.rms)
-        if not np.isfinite(new.rms) or new.rms > last / 2:  # less gain is noise
+        # a smaller reduction of the residual is noise
+        if not np.isfinite(new.rms) or new.rms > last / 2:
             break
         best, last = new, new.rms
         if last < 1e-6 * scale or time.size < 8 * (len(best.poles) + 2):
@@ -274,7 +360,7 @@ def _grown(time, value, forced, rest) -> _Fit | None:
 
 
 def _highest(time, rest) -> float:
-    """Frequency [rad/s] of the highest line of `rest` (k,)."""
+    """Return the angular frequency [rad/s] of the highest line in the spectrum of `rest` (k,)."""
     window, size = np.hanning(time.size + 2)[1:-1], 4 * time.size
     lines = np.abs(np.fft.rfft(rest * window, size))
     lines[:2] = 0.0
@@ -282,7 +368,10 @@ def _highest(time, rest) -> float:
 
 
 def _starts(time, value, forced, poles, rest) -> list:
-    """Starting values around the highest line of what is left: the best of them by projection, with two decays."""
+    """Return two initial guesses of the next sinusoid, with different decay.
+
+    The frequency is the best one, by projection, around the highest line of the residual.
+    """
     span, top = time[-1], _highest(time, rest)
     near = [own for own in top + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if own > np.pi / span]
     sizes = [_fitted(time, value, forced, np.append(poles, (own, 0.5 / span)))[1] for own in near]
@@ -291,10 +380,11 @@ def _starts(time, value, forced, poles, rest) -> list:
 
 
 def _refined(time, value, forced, poles, whole: float = 0.0) -> _Fit:
-    """The fit to which `poles` lead, by Levenberg and Marquardt's method on the projected residual.
+    """Return the fit that starts from `poles`, by Levenberg-Marquardt on the projected residual.
 
-    It ends where the residual is rounding of the signal, where a step gains less than the rounding of the sum of
-    squares it lowers, or where less than `whole` (rms) is left by sinusoids too slow to be a ring.
+    It ends when the residual is round-off of the signal, when a step reduces the sum of squares by
+    less than its round-off, or when the rms of the residual is below `whole` with sinusoids that
+    are too slow to be ringing.
     """
     poles, scale, short = (
         poles.copy(),

@@ -1,8 +1,10 @@
-"""Compiled fit of decaying sinusoids to a signal by variable projection, beside columns that stay.
+"""Compiled fit of decaying sinusoids to a signal by variable projection, with fixed columns.
 
-Of every pair of poles, frequency [rad/s] and decay [1/s], stand two columns, exp(-decay t) cos and sin. An orthonormal
-basis of all columns is made by Gram and Schmidt's method, twice over each, which is enough to be orthogonal to round-
-off (Giraud, Langou, Rozloznik 2005); a column that the others make up counts for nothing.
+In: times, signal, and initial poles. Out: the best poles and the residual. Each pair of poles,
+angular frequency [rad/s] and decay rate [1/s], has two columns, exp(-decay t) cos and sin. The
+columns are orthonormalized by the Gram-Schmidt method, applied twice, which makes them
+orthogonal to round-off (Giraud, Langou and Rozloznik, 2005). A column that depends linearly on
+the others is ignored.
 """
 
 from math import cos, exp, inf, sin, sqrt
@@ -11,14 +13,17 @@ from ..compiled.jit import njit
 from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 EPS = 2.0**-52
-ALIKE = 1e-12  # share of a column that is left beside the others, below which they make it up
-FIRST, MOST = 1e-3, 1e9  # damping of a fit at first and at last
-CLOSE, STILL = 1e-13, 1e-15  # steps over the scales of the poles that end a fit
+# norm of a column after projection over its norm; below it the column depends on the others
+ALIKE = 1e-12
+# Levenberg-Marquardt damping at the start (times 10), and above which a fit ends
+FIRST, MOST = 1e-3, 1e9
+# steps over the scales of the poles that end a fit after a success and after a failure
+CLOSE, STILL = 1e-13, 1e-15
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def waves(time, poles, columns, first):
-    """Fill columns (c, k) from row `first` on with the sinusoids of poles (2 r,) at times (k,) [s]."""
+    """Fill columns (c, k) from row `first` with the sinusoids of poles (2 r,) at times (k,) [s]."""
     for r in range(poles.size // 2):
         own, rate = poles[2 * r], poles[2 * r + 1]
         for j in range(time.size):
@@ -31,7 +36,7 @@ def waves(time, poles, columns, first):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def dot(a, b):
-    """Sum of a (k,) times b (k,)."""
+    """Return the scalar product of a (k,) and b (k,)."""
     out = 0.0
     for j in range(a.size):
         out += a[j] * b[j]
@@ -40,15 +45,18 @@ def dot(a, b):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def less(a, share, b):
-    """Take share times b (k,) from a (k,)."""
+    """Subtract share times b (k,) from a (k,) in place."""
     for j in range(a.size):
         a[j] -= share * b[j]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def orthonormal(columns, count, basis, corner):
-    """Fill rows of basis with those of columns made orthonormal and corner (count, count) with what makes the columns
-    of them: column j = sum corner[i, j] basis[i]. A column that counts for nothing has a basis of zeros."""
+    """Compute the QR factorization of the columns by Gram-Schmidt, twice for each column.
+
+    Fills the rows of `basis` and the upper triangle `corner` (count, count) with column j = sum
+    corner[i, j] basis[i]. A dependent column has zeros as its basis vector.
+    """
     for j in range(count):
         own = basis[j]
         for at in range(own.size):
@@ -69,13 +77,16 @@ def orthonormal(columns, count, basis, corner):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def projected(value, count, basis, inside, left):
-    """Fill left (k,) with what a basis of `count` rows leaves of value (k,), inside (count,) with the shares of it."""
+    """Project a value (k,) onto a basis of `count` rows.
+
+    Fills `left` (k,) with the residual and `inside` (count,) with the coefficients.
+    """
     for at in range(value.size):
         left[at] = value[at]
     for i in range(count):
         inside[i] = dot(basis[i], left)
         less(left, inside[i], basis[i])
-    for i in range(count):  # the second time: what the first left over by rounding
+    for i in range(count):  # the second pass removes the round-off of the first
         share = dot(basis[i], left)
         inside[i] += share
         less(left, share, basis[i])
@@ -83,7 +94,7 @@ def projected(value, count, basis, inside, left):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def numbers_of(count, corner, inside, numbers):
-    """Fill numbers (count,) with what the columns are taken times, by their shares in the basis."""
+    """Solve for the coefficients (count,) of the columns by back substitution."""
     for i in range(count - 1, -1, -1):
         part = inside[i]
         for j in range(i + 1, count):
@@ -93,7 +104,10 @@ def numbers_of(count, corner, inside, numbers):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def left_over(time, value, poles, columns, few):
-    """Fill the room with what sinusoids of these poles leave of value (k,) at times (k,) [s]; its sum of squares."""
+    """Compute the residual of the sinusoids of poles for value (k,) at times (k,) [s].
+
+    Fills the workspace and returns the sum of squares of the residual.
+    """
     count = few.shape[1]
     waves(time, poles, columns[0], count - poles.size)
     orthonormal(columns[0], count, columns[1], few)
@@ -104,8 +118,11 @@ def left_over(time, value, poles, columns, few):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def derived(time, poles, scale, columns, few, slopes, normal):
-    """Fill the slopes (2 r, k) of what is left by poles over scale (2 r,), after Kaufman (1975), and normal (2 r, 2 r +
-    1): their products, and last those with what is left."""
+    """Compute the Jacobian of the residual with respect to poles over scale (Kaufman, 1975).
+
+    Fills `slopes` (2 r, k) with the Jacobian, and `normal` (2 r, 2 r + 1) with the normal matrix
+    and, in the last column, the gradient.
+    """
     many, count = poles.size, few.shape[1]
     first, numbers = count - many, few[count + 1]
     for r in range(many // 2):
@@ -128,8 +145,11 @@ def derived(time, poles, scale, columns, few, slopes, normal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stepped(normal, damping, step, lower):
-    """Fill step (m,) with -(N + damping diag N)^-1 pull of normal (m, m + 1), by Cholesky's method; a direction that
-    counts for nothing is not taken. lower: room (m, m). Returns pull times the step."""
+    """Fill step (m,) with the Levenberg-Marquardt step of normal (m, m + 1).
+
+    The step is -(N + damping diag N)^-1 g, by Cholesky factorization; a dependent direction is left
+    out. lower: workspace (m, m). Returns the product of gradient g and step.
+    """
     many = step.size
     for i in range(many):
         for j in range(i + 1):
@@ -162,14 +182,29 @@ def stepped(normal, damping, step, lower):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def fitted(time, value, poles, scale, ends, room):
-    """Fit sinusoids to value (k,) at times (k,) [s] by Levenberg and Marquardt's method: (times that a fit was looked
-    at, the sum of squares that the best one leaves).
+    """Fit sinusoids to value (k,) at times (k,) [s] by the Levenberg-Marquardt method.
 
-    poles (2 r,) move to the best ones; scale (2 r,) of their steps. ends (4,): sums of squares that are round-off, and
-    with which a fit ends whose frequencies are all below the third [rad/s]; most steps. room: columns (3, c, k), the
-    first c - 2 r of which are given, their basis, and in the first row of the last what is left; few (c + 2, c): corner
-    of the basis, then shares in it and numbers of the columns; slopes (2 r, k); normal (2 r, 2 r + 1) as in `derived`
-    at the best poles; more (2 r + 2, 2 r). Columns and few are those of the fit looked at last.
+    Parameters
+    ----------
+    time, value : (k,)
+    poles : (2 r,)
+        Initial poles; overwritten by the best ones.
+    scale : (2 r,)
+        Scales of the steps.
+    ends : (4,)
+        Sum of squares that is round-off; sum of squares with which a fit ends if all its
+        frequencies are below the third entry [rad/s]; largest number of steps (0: only evaluate).
+    room : tuple
+        Workspace: columns (3, c, k) with the columns (of which the first c - 2 r are given), their
+        basis, and the residual in the first row of the last; few (c + 2, c) with the triangle of
+        the basis, then coefficients in the basis and of the columns; slopes (2 r, k); normal (2 r,
+        2 r + 1) as in `derived` at the best poles; more (2 r + 2, 2 r). Columns and few are those
+        of the last evaluation.
+
+    Returns
+    -------
+    tuple
+        Number of evaluations, and sum of squares of the best residual.
     """
     columns, few, slopes, normal, more = room
     many, damping, looked, largest, size = poles.size, 10 * FIRST, 0, 1.0, inf
@@ -194,7 +229,8 @@ def fitted(time, value, poles, scale, ends, room):
         else:
             damping *= 10
         gain = -stepped(normal, damping, step, lower)
-        if looked > ends[3] or gain <= EPS * size:  # whether such a step is taken or not is chance
+        # round-off would decide whether a step with less gain is taken
+        if looked > ends[3] or gain <= EPS * size:
             break
         largest = 0.0
         for r in range(many):

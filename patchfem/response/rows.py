@@ -1,7 +1,9 @@
-"""Measures of a motion as rows of one table, applied to the solution of every engine alike.
+"""Table of the measures of a motion, applied to the solutions of all engines alike.
 
-A row has a name, a unit, the absolute floor of its error, a definition in one sentence, and the function that reads it
-off the last cycles of a run, or off all of it. A new measure is a new row of SINGLE_RUN_ROWS.
+In: a `Seen`, i.e. the last cycles of a run with the values that its engine integrated. Out:
+values by name, and for any name its definition, floor and larger term. A row has a name, a
+unit, the absolute floor of its error, a definition in one sentence, and the function that
+computes it from a `Seen`. A new measure is a new row of SINGLE_RUN_ROWS.
 """
 
 from collections.abc import Callable
@@ -26,24 +28,35 @@ from .measures import (
 )
 from .spectrum import FLOOR, odd_harmonics, wave_measures
 
-SAMPLED = IntegratedMeasures()  # of an engine that knows no more than its samples
+SAMPLED = IntegratedMeasures()  # for an engine that integrates no measures besides its samples
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """The last cycles of a run, with what its engine knows better than its samples.
+    """Last cycles of a run, with the values that its engine knows better than its samples.
 
-    window: histories; extremes (c, 2): of the output in every cycle of the window [m]; book:
-    energies of the whole run; load [N], None where nothing rubs; stiffness K [N/m] of the first mode as the contact
-    meets it, 0 where no damping ratio refers to it; sine: the drive ends as a sine. own: what the engine integrated
-    itself; loop: (first harmonics of slide and force, work per cycle [J]), where it is known otherwise, None where the
-    window holds no whole cycle; ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where
-    it has none. by: how the force is read where the slide turns, as `loops.turns_of` takes it; still: half range of the
-    slide [m] up to which it is round-off; even: equally spaced samples of the window, None where they are its own;
-    inside(window, number): the window of an interface with samples inside the steps, None where those at their ends are
-    enough; together: the interfaces are parts of one, which has no others beside it; number: of the interface, from 0.
-    run: histories of the whole run from t = 0 on, equally spaced samples and every reversal; None where they are not
-    kept.
+    - window: histories.
+    - drive: drive of the run.
+    - extremes (c, 2): smallest and largest output in every cycle of the window [m].
+    - book: energies of the whole run by name [J].
+    - load: normal load [N]; None without friction.
+    - stiffness: K of the first mode as seen by the contact [N/m]; 0 if no damping ratio refers to
+      it.
+    - sine: whether the drive is a sine at the end of the run.
+    - own: measures that the engine integrated itself.
+    - loop: first harmonics of slide [m] and force [N] and work per cycle [J], if they do not come
+      from `own`; None if the window contains no whole cycle.
+    - ledger (4, k): friction work and energies [J], or None.
+    - known: values by name that the engine has itself; None if it has no value of a measure.
+    - by: how the force at a reversal of the slide is evaluated (see `loops.turns_of`).
+    - still: half range of the slide [m] up to which it is round-off.
+    - even: equally spaced samples of the window; None if its own samples are.
+    - inside: function (window, number) that returns the window of an interface with samples inside
+      the steps; None if those at the ends of the steps suffice.
+    - together: whether the interfaces are parts of a single one, so that there are no others.
+    - number: index of the interface.
+    - run: histories of the whole run from t = 0, at equally spaced samples and every reversal; None
+      if they are not kept.
     """
 
     window: Response
@@ -67,22 +80,22 @@ class Seen:
 
     @cached_property
     def span(self) -> float:
-        """Time [s] of the window."""
+        """Duration of the window [s]."""
         return self.window.time[-1] - self.window.time[0]
 
     @cached_property
     def samples(self) -> Response:
-        """The window with the samples of the interface inside the steps, where the engine has them."""
+        """Window with the samples of the interface inside the steps, if the engine has them."""
         return self.window if self.inside is None else self.inside(self.window, self.number)
 
     @cached_property
     def whole(self) -> bool:
-        """Whether the window holds whole cycles of the drive."""
+        """Whether the window contains whole cycles of the drive."""
         return drive_sizes.has_full_cycle(self.span, self.drive)
 
     @cached_property
     def slip(self) -> dict:
-        """slip_amplitude [m], stick_fraction [1] and slip_start_phase [rad] by name, as far as the run has them."""
+        """slip_amplitude [m], stick_fraction [1] and slip_start_phase [rad] by name, where defined."""
         if self.load is None:
             return {}
         first = self.own.loops[0] if self.own.loops else None
@@ -105,7 +118,7 @@ class Seen:
 
     @cached_property
     def turns(self) -> list:
-        """(smallest, largest) Turn of the interface's slide in every whole cycle of the window."""
+        """Smallest and largest `Reversal` of the slide in every whole cycle of the window."""
         if self.own.reversals:
             return [tuple(Reversal(*one) for one in pair) for pair in self.own.reversals]
         w = self.samples
@@ -113,8 +126,7 @@ class Seen:
 
     @cached_property
     def harmonics(self) -> tuple | None:
-        """(first harmonics of slide and force, work per cycle [J]) of the interface; None where no whole cycle shows
-        them."""
+        """First harmonics of slide and force, and work per cycle [J]; None without a whole cycle."""
         if self.loop is not None or not self.own.loops or not self.whole:
             return self.loop
         first = self.own.loops[0]
@@ -126,9 +138,10 @@ class Seen:
 
     @cached_property
     def cycle(self) -> dict:
-        """loop_area [J], and under a sine equivalent_stiffness, secant_stiffness [N/m] and equivalent_damping [1].
+        """Measures of the friction loop by name, as far as the run has them.
 
-        By name, as far as the run has them.
+        loop_area [J]; under a sine also equivalent_stiffness and secant_stiffness [N/m] and
+        equivalent_damping [1].
         """
         if self.harmonics is None or self.load is None:
             return {}
@@ -144,8 +157,11 @@ class Seen:
 
     @cached_property
     def waves(self) -> dict:
-        """absolute_acceleration_fundamental [m s-2] and acceleration_distortion [1] by name, as far as the run has
-        them: a drive that ends as a sine, whole cycles, and of the latter an acceleration."""
+        """Harmonics of the acceleration by name, for whole cycles of a drive that ends as a sine.
+
+        absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
+        acceleration_distortion [1].
+        """
         if not (self.sine and self.whole):
             return {}
         if self.own.acceleration_harmonics is None:
@@ -156,12 +172,12 @@ class Seen:
 
     @cached_property
     def energies(self) -> dict:
-        """The measures of the ledger at its end [J] by name, empty without a ledger."""
+        """Work and energies [J] by name at the end of the ledger; empty without a ledger."""
         return {} if self.ledger is None else ledger_measures(self.ledger)
 
     @cached_property
     def shaken(self) -> dict:
-        """What a stationary random drive shows (`stationary.measures`), by name; {} under any other."""
+        """Measures of a stationary random drive by name (`stationary.measures`); {} under others."""
         found = stationary.measures(self.window, self.drive) if hasattr(self.drive, "band") else {}
         return (
             found
@@ -175,13 +191,16 @@ class Seen:
 
     @property
     def work_check(self) -> float | None:
-        """Gap [1] of the two books of friction work; None where the engine has no second one."""
+        """Relative difference [1] of the two values of the friction work; None without a second one."""
         if self.load is None or self.own.friction_works is None:
             return None
         return relative_gap(*self.own.friction_works, self.book["power"] + self.book["peak_stored"])
 
     def others(self) -> list:
-        """The interfaces after the first as last cycles of their own; of the work of each the samples tell."""
+        """Return a Seen for each interface after the first one.
+
+        The work of an interface comes from `own.loops` or, without them, from the samples.
+        """
         extra = self.window.extra
         if self.load is None or self.together or "slides" not in extra:
             return []
@@ -212,32 +231,37 @@ class Seen:
         return out
 
     def lateral(self, name: str):
-        """`measures.lateral` of the interface in the window."""
+        """Return a history of the interface in its second direction (see `measures.lateral`)."""
         return lateral(self.window, name, self.number)
 
     def of_load(self, value: Callable) -> float | None:
-        """A number of the load history (k,) [N] in the window; None where the load does not change with the motion.
+        """Return a number computed from the load history (k,) [N]; None if the load is constant.
 
-        value: function of that history.
+        value: function of the load history in the window.
         """
         load = self.window.extra.get("normal_load")
         return None if load is None or self.load is None else float(value(load))
 
 
 def lateral_work(window, number: int) -> float:
-    """Friction work [J] of an interface in its second direction over a window, by the trapezoidal rule; 0 without
-    one."""
+    """Return the friction work [J] of an interface in its second direction over a window.
+
+    By the trapezoidal rule; 0 without a second direction.
+    """
     force, slide = (lateral(window, name, number) for name in ("forces", "slides"))
     return 0.0 if force is None or slide is None else float(np.trapezoid(force, slide))
 
 
 def resultant_peak(force, across) -> float:
-    """Largest size [N] of a force (k,), of the resultant with that across it where there is one."""
+    """Return the largest magnitude [N] of a force (k,), or of its resultant with a lateral one."""
     return float((np.abs(force) if across is None else np.hypot(force, across)).max())
 
 
 def drift_of(s: Seen) -> float:
-    """Drift of the slide of an interface per cycle [m], in a plane the length of the drifts in both directions."""
+    """Return the drift of the slide of an interface per cycle [m].
+
+    If the interface slides in a plane, it is the magnitude of the drift vector.
+    """
     w, across = s.window, s.lateral("slides")
     own = drift(w.time, w.slide, w.slide_rate, s.drive.period)
     if across is None:
@@ -250,8 +274,11 @@ def drift_of(s: Seen) -> float:
 
 
 def first_harmonic(values: dict):
-    """First harmonic of the friction over that of the slide [N/m]: the part in phase and the other, W/(pi A^2), which
-    is often many times as large; values: of one run, or (n,) of many."""
+    """Return the magnitude of the ratio of the harmonics of friction force and slide [N/m].
+
+    The part in phase is the equivalent stiffness; the other part is W/(pi A^2), often many times as
+    large. values: measures of one run, or (n,) of many.
+    """
     part, reach = (
         np.abs(values["equivalent_stiffness"]),
         np.asarray(values.get("slip_amplitude", 0.0), float),
@@ -262,13 +289,17 @@ def first_harmonic(values: dict):
 
 
 def _moved(values: dict):
-    """Amplitude [m] of what drifts: of the slip, of the motion where nothing slips; values as `first_harmonic`."""
+    """Return the amplitude [m] that a drift is compared with.
+
+    It is the amplitude of the slip; without slip, that of the motion. values: as in
+    `first_harmonic`.
+    """
     slip = np.abs(np.nan_to_num(np.asarray(values.get("slip_amplitude", 0.0), float)))
     return np.where(slip > 0, slip, np.abs(values.get("relative_displacement_amplitude", 0.0)))
 
 
 def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion") -> tuple:
-    """Rows of a measure of a random drive, and of the scatter of records about it."""
+    """Return the rows of a measure of a random drive, and of its scatter between records."""
     scatter = f"{name}_scatter"
     return (
         MeasureDefinition(name, unit, floor, words, lambda s: s.shaken.get(name), group=group),
@@ -285,10 +316,10 @@ def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion
     )
 
 
-# Measures that only single runs compute. While there are any, a sweep runs each case of a rig by itself, because its
-# batches compute no others than the shipped measures.
+# Measures that only single runs compute. If there are any, a sweep runs each case of a rig by
+# itself, because its batches compute only the shipped measures.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
-CUBIC = 4.0  # order of what is read off cubics between the samples
+CUBIC = 4.0  # order of a value on cubics between the samples
 ROWS = (
     MeasureDefinition(
         "relative_displacement_amplitude",
@@ -622,7 +653,7 @@ ROWS = (
 )
 NEEDS_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in ROWS}
-# of every interface
+# measures that every interface has
 OF_EACH = (
     "slip_amplitude",
     "stick_fraction",
@@ -635,14 +666,14 @@ MOVED = (
     "slip_amplitude",
     "drift_per_cycle",
 )
-LEAST_MOVED = 1e-5  # of the displacement of a drive, above which no error of a displacement is let pass unsaid
+LEAST_MOVED = 1e-5  # largest floor of a displacement relative to the displacement of the drive
 
 
 def measures_of(seen: Seen) -> dict:
-    """Value by name of every row that the run has, in SI units, and of OF_EACH for every interface after the first with
-    its number behind the name.
+    """Return the value by name of every row that the run has, in SI units.
 
-    The engine's own value comes before the one that is read off the samples.
+    The measures OF_EACH are repeated for every further interface, with its number after the name. A
+    value of the engine is used before the one computed from samples.
     """
     out = {row.name: _value_of(row, seen) for row in ROWS}
     for number, other in enumerate(seen.others(), 1):
@@ -651,7 +682,7 @@ def measures_of(seen: Seen) -> dict:
 
 
 def _value_of(row: MeasureDefinition, seen: Seen) -> float | None:
-    """Return the value of a row; None where the run does not have it, or does not keep the histories that it needs."""
+    """Return the value of a row; None if the run does not have it or lacks its histories."""
     if row.name in seen.known:
         return seen.known[row.name]
     if row.function is None or (row.needs_run and seen.run is None):
@@ -660,26 +691,34 @@ def _value_of(row: MeasureDefinition, seen: Seen) -> float | None:
 
 
 def stuck_share(stuck, span):
-    """Share of a time span [s] that is stuck [s], 1 but for round-off of the sum of its pieces; numbers or (n,)."""
+    """Return the fraction of a time span [s] that is stuck [s]; numbers or (n,).
+
+    A fraction that differs from 1 only by the round-off of the sum of its parts is set to 1.
+    """
     return np.where(stuck >= span * (1 - 1e-12), 1.0, stuck / span)[()]
 
 
 def of_first(name: str) -> str:
-    """Name of a measure without the number of its interface: slip_amplitude_2 becomes slip_amplitude."""
+    """Return the name of a measure without interface number: slip_amplitude_2 -> slip_amplitude."""
     head, _, number = name.rpartition("_")
     return head if number.isdigit() else name
 
 
 def of_number(name: str, number: int) -> str:
-    """Name of a measure of the interface of this number, from 0; the first has none behind its name."""
+    """Return the name of a measure of the interface of this index; the first has no suffix."""
     return f"{name}_{number + 1}" if number else name
 
 
 def floor_of(name: str, size=np.inf):
-    """Floor of the error of a measure of any interface, in its unit; of a displacement at most the share LEAST_MOVED of
-    `size` [m], of what the drive of the run moves by itself.
+    """Return the floor of the error of a measure of any interface, in its unit.
 
-    size: one, or (n,) of many runs; 0 or inf where no drive moves anything.
+    The floor of a displacement is at most the fraction LEAST_MOVED of `size`.
+
+    Parameters
+    ----------
+    name : str
+    size : float or (n,)
+        Displacement that the drive alone causes [m]; 0 or inf if no drive moves anything.
     """
     floor = row_of(name).floor
     if of_first(name) not in MOVED:
@@ -688,9 +727,18 @@ def floor_of(name: str, size=np.inf):
 
 
 def larger_term(name: str, values: dict):
-    """Size of the larger terms that a measure is a difference of, in its unit; 0 where it is none.
+    """Return the size of the larger terms of which a measure is the difference, in its unit.
 
-    values: by name, of one run or (n,) of many; those of the same interface count.
+    Parameters
+    ----------
+    name : str
+    values : dict
+        Values by name of one run, or (n,) of many; those of the same interface are used.
+
+    Returns
+    -------
+    float or (n,)
+        0 if the measure is not a difference.
     """
     row, number = row_of(name), name[len(of_first(name)) :]
     if row.larger_term is None:
@@ -701,7 +749,7 @@ def larger_term(name: str, values: dict):
 
 
 def judged(found: dict, tolerance: float) -> dict:
-    """Measures by name with their final floors: those that are differences have the tolerance times the larger term."""
+    """Return measures with their final floors: tolerance times the larger term for differences."""
     values = {name: one.value for name, one in found.items() if one.value is not None}
     raised = {
         name: tolerance * float(larger_term(name, values))
@@ -716,5 +764,5 @@ def judged(found: dict, tolerance: float) -> dict:
 
 
 def row_of(name: str) -> MeasureDefinition:
-    """The row of a measure of any interface; KeyError for a name without one."""
+    """Return the row of a measure of any interface; KeyError for an unknown name."""
     return TABLE[of_first(name)]

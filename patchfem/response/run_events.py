@@ -1,4 +1,8 @@
-"""Events of a coupled run, from the log of the exact engine or from its samples, and what is read off between them."""
+"""Events of a coupled run, from the log of the exact engine or from samples, and ringing.
+
+In: the window of a run, its drive, and the EventLog of the exact engine if there is one. Out:
+`Events`, stick intervals, and the ringing during stick.
+"""
 
 from dataclasses import replace
 
@@ -29,14 +33,17 @@ OF_LOG = {
     9: BORDER,
 }
 LEAST = -min(OF_LOG)
-KINDS = np.full(LEAST + max(OF_LOG) + 1, np.nan)  # by the number of an event in a log
+KINDS = np.full(LEAST + max(OF_LOG) + 1, np.nan)  # kind of an event by its number in a log
 KINDS[np.array(list(OF_LOG)) + LEAST] = list(OF_LOG.values())
 SOURCE = "the times of stick and slip are those of the exact solution"
 
 
 def slips_of(response) -> tuple:
-    """Irreversible and whole motion, (k, i) [m] each, of every interface at the samples of a Response; of one that
-    slides in a plane the path of its irreversible motion, which only grows, and its slide in the first direction."""
+    """Return slip and slide (k, i) [m] of every interface at the samples of a Response.
+
+    For an interface that slides in a plane, the slip is the path length, which only grows, and the
+    slide is that in the first direction.
+    """
     extra = response.extra
     if "lateral_slips" in extra:
         slips = extra["slips"].copy()
@@ -50,12 +57,12 @@ def slips_of(response) -> tuple:
 
 
 def borders_of(drive) -> list:
-    """Times [s] at which a drive goes from one of its segments to the next."""
+    """Return the times [s] at which a drive changes from one of its segments to the next."""
     return [segment.start for segment in drive.segments[1:]]
 
 
 def of_log(log) -> Events:
-    """Events of an EventLog of the exact engine, as the table of `response.events`."""
+    """Return the Events of an EventLog of the exact engine."""
     part = slice(-MOST, None)
     kind = KINDS[log.what[part] + LEAST]
     slide = np.where(kind == BORDER, np.nan, log.slide[part])
@@ -67,9 +74,15 @@ def of_log(log) -> Events:
 
 
 def events_of(window, drive, log=None, held: float = 0.0) -> Events:
-    """Events of a run: all of its log, or without one those seen in the samples of its last cycles.
+    """Return the Events of a run: those of its log, else those detected in the last cycles.
 
-    window: Response; drive; log: EventLog or None; held [m]: a cycle that slips less sticks.
+    Parameters
+    ----------
+    window : Response
+    drive
+    log : EventLog, optional
+    held : float
+        Slip in a cycle [m] below which the interface sticks in it.
     """
     if log is not None:
         return of_log(log)
@@ -80,7 +93,10 @@ def events_of(window, drive, log=None, held: float = 0.0) -> Events:
 
 
 def moving(window, drive, log=None, held: float = 0.0) -> list:
-    """Whether each interface slips at some time in the window, [bool] (i); arguments as in `events_of`."""
+    """Return whether each interface slips at some time in the window, as a list of bool (i).
+
+    Parameters as in `events_of`.
+    """
     slips, held = slips_of(window)[0], max(held, slip_noise(window))
     if log is not None:
         return [bool(np.ptp(column) > 0) for column in slips.T]
@@ -88,7 +104,7 @@ def moving(window, drive, log=None, held: float = 0.0) -> list:
 
 
 def spans_of(window, drive, log=None, held: float = 0.0) -> list:
-    """The sticks [(from, to)] [s] of the window; arguments as in `events_of`."""
+    """Return the stick intervals [(start, end)] [s] of a window; parameters as in `events_of`."""
     return sticks(
         events_of(window, drive, log, held),
         window.time[0],
@@ -98,19 +114,31 @@ def spans_of(window, drive, log=None, held: float = 0.0) -> list:
 
 
 def of_a_cycle(spans, end: float, period: float) -> list:
-    """The sticks [(from, to)] [s] that begin in the last cycle but one before `end` and end before it: all that there
-    are of a motion that repeats, none where it holds for ever."""
+    """Return the sticks that begin in the last cycle but one before `end` and end before it.
+
+    These are all sticks of a periodic motion; there are none if the interface sticks forever.
+    """
     return [(a, b) for a, b in spans if end - 2 * period <= a < end - period and b < end]
 
 
 def rings(window, modes, drive, log=None, held: float = 0.0, repeats: bool = False) -> tuple:
-    """Ringing over the sticks of the window: (ring_frequency and ring_damping by name, their errors).
+    """Return ring_frequency [Hz] and ring_damping [1] during stick by name, and their errors.
 
-    repeats: whether each of its cycles is the same, so that the sticks of one tell those of all; what decays is no part
-    of a stick that outlasts such a cycle.
+    They are computed from the acceleration at the output. The result is ({}, {}) if nothing rings,
+    if the drive has no frequency (sweep, recorded signal), or if the samples do not resolve the
+    fastest mode.
 
-    It is read off the acceleration at the output. ({}, {}) where nothing rings, where the drive has no frequency of its
-    own (sweep, recorded), or where the samples do not resolve the fastest mode.
+    Parameters
+    ----------
+    window : Response
+    modes
+    drive
+    log : EventLog, optional
+    held : float
+        Slip in a cycle [m] below which the interface sticks in it.
+    repeats : bool
+        Whether the motion is periodic, so that the sticks of one cycle represent all others. A
+        stick that outlasts the cycle is left out, because nothing decays in it.
     """
     if not drive.segments or window.time.size < 8:
         return {}, {}
@@ -128,7 +156,7 @@ def rings(window, modes, drive, log=None, held: float = 0.0, repeats: bool = Fal
 
 
 def with_own(measures: dict, own: dict | None) -> dict:
-    """Measures with the uncertainty that the run itself leaves, own by name, added to the errors they have."""
+    """Return measures whose errors include the uncertainty `own` by name of the run itself."""
     return {
         name: replace(m, error=m.error + (own or {}).get(name, 0.0)) if m.error is not None else m
         for name, m in measures.items()
@@ -136,15 +164,20 @@ def with_own(measures: dict, own: dict | None) -> dict:
 
 
 def all_stick(window, held: float) -> bool:
-    """Whether no interface and no strip slips in the window by more than `held` [m] to either side, or the last
-    digit."""
+    """Return whether no interface or strip slips in the window by more than `held` [m].
+
+    The limit applies to half the range of the slip and is not below its round-off.
+    """
     slips = slips_of(window)[0]
     slips = np.column_stack([*([] if "lateral_slips" in window.extra else [window.slip]), slips])
     return bool(np.ptp(slips, axis=0).max() / 2 <= max(held, slip_noise(window)))
 
 
 def joined_logs(logs, shifts) -> object:
-    """One EventLog of runs one after the other, begun `shifts` [s] later than the first, with a border between them."""
+    """Return one EventLog of runs in sequence, with a border between them.
+
+    shifts: times [s] by which the runs start later than the first one.
+    """
     first = logs[0]
     columns = {name: [] for name in ("time", "phase", "interface", "what", "slide")}
     for number, (log, shift) in enumerate(zip(logs, shifts)):

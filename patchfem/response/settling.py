@@ -1,29 +1,49 @@
-"""Whether a motion has settled: by its amplitude from window to window, and by what free motion is left in all of them."""
+"""Criteria of a steady motion, from its amplitude per window and the remaining free motion.
+
+In: amplitudes, phasors or extremes of the cycles of many motions. Out: their classes
+(transient, steady, grows), steady amplitudes by extrapolation with errors, and the free motion
+that remains. `outcome` applies them.
+"""
 
 import numpy as np
 
 from ..core import Outcome
 
 CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
-STEADY, GROWS = 1, 2  # their places
-LEAST = 3  # windows by which free motion is told
-MOVES = 1e-3  # of the largest speed in a run, above which an interface slips
-# sine of the angle between differences of phasors, below which they lie along one line
+STEADY, GROWS = 1, 2  # indices of CLASSES
+LEAST = 3  # smallest number of windows from which free motion is estimated
+MOVES = 1e-3  # relative to the largest speed in a run; above it an interface slips
+# sine of the angle between differences of phasors; below it they lie along one line
 TURNS = 0.02
-TELLS = 0.1  # share that the slowest mode must have lost over a third of the run for a beat that stays to be told
+# fraction that the slowest mode must lose over a third of the run, before a beat that remains
+# counts as periodic
+TELLS = 0.1
 
 
 def classify(amplitudes, tolerance: float, floor: float = 0.0) -> Outcome:
-    """Class of a motion by the amplitudes (w,) of successive windows, as `classes` has it of many motions."""
+    """Return the class of a motion by the amplitudes (w,) of successive windows (see `classes`)."""
     return CLASSES[classes(np.asarray(amplitudes, float)[None], tolerance, floor)[0]]
 
 
 def classes(a, tolerance: float, floor=0.0) -> np.ndarray:
-    """Class of motions by the amplitudes (n, w) [m] of successive windows: (n,) numbers of CLASSES.
+    """Classify motions by the amplitudes of successive windows.
 
-    floor [m], or (n,): a change that is none, a small share of what the drive itself moves.
-    steady: the last change stays below the tolerance, and so does what a geometric tail would still add. Without a
-    shrinking change the motion grows when it still rises; anything else is transient.
+    STEADY: the last change and the remaining sum of a geometric series are both below the
+    tolerance. GROWS: the changes do not shrink and the amplitude still increases. Anything else is
+    transient.
+
+    Parameters
+    ----------
+    a : (n, w)
+        Amplitudes of successive windows [m].
+    tolerance : float
+    floor : float or (n,)
+        Smallest change that counts [m], a small fraction of the displacement by the drive alone.
+
+    Returns
+    -------
+    (n,) array
+        Indices of CLASSES.
     """
     out = np.zeros(len(a), int)
     if a.shape[1] == 1:
@@ -34,22 +54,26 @@ def classes(a, tolerance: float, floor=0.0) -> np.ndarray:
         return out
     rest = np.abs(tails(a[:, -3:]))
     ends, rises = np.isfinite(rest), _rises(a)
-    endless = rises & (change > 0.05 * scale)  # 0.05: slower is steady
+    endless = rises & (change > 0.05 * scale)  # 0.05 of the limit: slower growth is steady
     out[rises & ~ends] = GROWS
     out[(change <= scale) & np.where(ends, rest <= scale, ~endless)] = STEADY
     return out
 
 
 def tail(three) -> complex | None:
-    """Rest of a geometric series through three equally spaced values, as `tails` has it; None where it has none."""
+    """Return the remaining sum of a geometric series through three values, or None.
+
+    See `tails`.
+    """
     rest = tails(np.asarray(three) + 0.0)
     return None if np.isnan(rest) else rest
 
 
 def tails(three):
-    """Rest of geometric series through three equally spaced values (..., 3): what they still add to the last (Aitken).
+    """Return the remaining sum of geometric series through three values (Aitken extrapolation).
 
-    NaN where the changes do not shrink. Complex values carry a beat: its ratio is complex.
+    It is what the series still adds to the last of three equally spaced values (..., 3), and NaN if
+    the changes do not shrink. A beat is a series of complex values with a complex ratio.
     """
     before, change = three[..., 1] - three[..., 0], three[..., 2] - three[..., 1]
     ratio = np.divide(change, before, out=np.zeros_like(change), where=before != 0)
@@ -58,9 +82,9 @@ def tails(three):
 
 
 def steady_amplitude(amplitudes, phasors) -> tuple:
-    """Steady amplitude of one motion by extrapolation, and its error, as `steady_amplitudes` has them of many.
+    """Return the steady amplitude of a motion [m] and its error [m]; see `steady_amplitudes`.
 
-    (None, None) where no bounded tail can be seen.
+    (None, None) if no bounded limit can be estimated.
     """
     return _one(
         steady_amplitudes(np.asarray(amplitudes, float)[None], np.asarray(phasors, complex)[None])
@@ -68,15 +92,29 @@ def steady_amplitude(amplitudes, phasors) -> tuple:
 
 
 def steady_amplitudes(a, p) -> tuple:
-    """Steady amplitudes by extrapolation, and their errors, (n,) [m] each; NaN where no bounded tail can be seen.
+    """Extrapolate the steady amplitudes of motions, and estimate their errors.
 
-    amplitudes, phasors: (n, w) of the last cycle of successive windows; the phasor is the drive-frequency part of the
-    motion. What is left of the free motion of a linear rig turns and shrinks by one complex factor per window, so the
-    phasors are extrapolated (Aitken). Friction resists a change of the amplitude otherwise than one of the phase, so
-    that what is left moves by a map of the plane (`plane_tails`): its end is taken where it is known, and how far the
-    two lie apart is part of the error. The waveform, amplitude over |phasor|, settles with the size of the factor. The
-    error is besides the spread of the last estimates, six times of Aitken's and twice of the plane's, plus twice what
-    the waveform still changes; where it is as large as what was added there is no estimate.
+    In a linear rig the remaining free motion is multiplied by one complex factor per window, so
+    that Aitken's method extrapolates the phasors. Friction acts differently on changes of the
+    amplitude and of the phase, so that the remaining motion follows a linear map of the plane
+    (`plane_tails`). The limit by the map is used if it exists, and its distance from Aitken's limit
+    is part of the error. The waveform, amplitude over |phasor|, converges with the magnitude of the
+    factor.
+
+    The error contains the spread of the last estimates, six times for Aitken's and twice for those
+    by the map, and twice the remaining change of the waveform. If it is as large as the
+    extrapolated change, there is no estimate.
+
+    Parameters
+    ----------
+    a, p : (n, w)
+        Amplitudes [m] and phasors [m] of the last cycle of successive windows; a phasor is the part
+        of the motion at the drive frequency.
+
+    Returns
+    -------
+    tuple
+        Steady amplitudes and their errors (n,) [m]; NaN if no bounded limit can be estimated.
     """
     count, w = a.shape
     if w < 5:
@@ -108,31 +146,42 @@ def steady_amplitudes(a, p) -> tuple:
 
 
 def plane_tails(p) -> np.ndarray:
-    """What points of the complex plane (n, 4) still add to the last if one linear map of the plane takes each of their
-    differences to the next, (n,); NaN where the differences all lie along one line or the map does not shrink them.
+    """Return the remaining sums (n,) of differences that one linear map of the plane generates.
 
-    d3 = t d2 - q d1 by Cayley and Hamilton, with the trace t and the determinant q of the map; the sum of all that
-    follow is ((t - q) d3 - q d2)/(1 - t + q).
+    By the Cayley-Hamilton theorem d3 = t d2 - q d1, with the trace t and the determinant q of the
+    map; the sum of all further differences is ((t - q) d3 - q d2)/(1 - t + q). NaN if all
+    differences lie along one line or if the map does not shrink them. p: points of the complex
+    plane (n, 4).
     """
     d1, d2, d3 = np.diff(np.asarray(p, complex), axis=1).T
     area = (d1.conj() * d2).imag
     known = np.abs(area) > TURNS * np.abs(d1) * np.abs(d2)
     area = np.where(known, area, 1.0)
     t, q = (d1.conj() * d3).imag / area, (d2.conj() * d3).imag / area
-    # both its multipliers are within the unit circle
+    # both eigenvalues of the map lie inside the unit circle
     known &= (np.abs(q) < 1) & (np.abs(t) < 1 + q)
     return np.where(known, ((t - q) * d3 - q * d2) / np.where(known, 1 - t + q, 1.0), np.nan)
 
 
 def _one(found: tuple) -> tuple:
-    """Value and error (1,) of one motion as floats; None where they are NaN."""
+    """Return value and error (1,) of one motion as floats; None for NaN."""
     return tuple(None if np.isnan(one[0]) else float(one[0]) for one in found)
 
 
 def windows_of(extremes, window: int) -> tuple:
-    """Half peak-to-peak over windows of `window` cycles, and the mean of that of their cycles, (..., w) [m] each.
+    """Return half the peak-to-peak value of windows, and the mean of that of their cycles [m].
 
-    extremes: (..., c, 2) [m] of the output per cycle; a partial window at the head is left out.
+    Parameters
+    ----------
+    extremes : (..., c, 2)
+        Smallest and largest output of each cycle [m].
+    window : int
+        Cycles of a window; a partial window at the start is left out.
+
+    Returns
+    -------
+    tuple
+        Two arrays (..., w) [m].
     """
     given = np.asarray(extremes, float)
     count = given.shape[-2] // window
@@ -144,14 +193,24 @@ def windows_of(extremes, window: int) -> tuple:
 
 
 def left_over(extremes, window: int, decay=0.0):
-    """How much of the amplitude of the last window [m] is free motion that will still go, by all windows of the run.
+    """Return how much of the amplitude of the last window [m] is free motion that will decay.
 
-    A free motion beside the drive beats. Where the beat is short, cycles of one window differ: what the window's
-    amplitude is above the mean of its cycles goes with the beat, unless it stays while even the slowest mode decays
-    (a motion that repeats after several cycles). Where the beat is long, windows differ: their distance from the last
-    one in the last third of the run, less what the third before shows that a third takes off, but no more than the
-    slowest mode surely loses in it: a ring-up ends fast and leaves what goes slowly. extremes: (..., c, 2) [m] per
-    cycle; decay (...): of the slowest mode over a window [1].
+    A free motion at a frequency near that of the drive beats. If the beat is short, the cycles of
+    one window differ: the excess of the amplitude of the window over the mean of its cycles
+    vanishes with the beat, unless it remains while even the slowest mode decays (a motion that
+    repeats after several cycles). If the beat is long, the windows differ: their largest distance
+    from the last one in the last third of the run is taken, reduced by the ratio to the same
+    distance in the third before, but by no more than the slowest mode surely loses in a third,
+    because a motion may first decay fast and leave a part that decays slowly.
+
+    Parameters
+    ----------
+    extremes : (..., c, 2)
+        Smallest and largest output of each cycle [m].
+    window : int
+        Cycles of a window.
+    decay : (...)
+        Decay of the slowest mode over a window [1].
     """
     amplitude, mean = windows_of(extremes, window)
     count = amplitude.shape[-1]
@@ -173,10 +232,23 @@ def left_over(extremes, window: int, decay=0.0):
 
 
 def mean_amplitudes(extremes, window: int) -> tuple:
-    """Steady amplitudes [m] about which a short beat swings, and their errors, (n,) each; NaN where there is none.
+    """Return the steady amplitudes around which a short beat oscillates, and their errors [m].
 
-    The mean of the cycles of the last third of the windows. The error is how far its windows lie from it, twice what
-    its halves differ by, and the square of the beat over the amplitude. extremes: (n, c, 2) [m].
+    The amplitude is the mean over the cycles of the last third of the windows. The error is the sum
+    of three parts: the largest distance of these windows from the mean, twice the difference
+    between their halves, and the square of the beat over the amplitude.
+
+    Parameters
+    ----------
+    extremes : (n, c, 2)
+        Smallest and largest output of each cycle [m].
+    window : int
+        Cycles of a window.
+
+    Returns
+    -------
+    tuple
+        Two arrays (n,); NaN if there is no estimate.
     """
     amplitude, mean = windows_of(extremes, window)
     third = amplitude.shape[1] // 3
@@ -193,24 +265,29 @@ def mean_amplitudes(extremes, window: int) -> tuple:
 
 
 def slip_period(time, rate) -> float:
-    """Longest time [s] from the start of one slip to that of the next, of the last three of a run; 0 where there are
-    fewer than two slips, or where the last one is further back than half as much again: it came to hold.
+    """Return the longest time [s] between the starts of successive slips, of the last three.
 
-    time (k,) [s]; rate (k,) [m/s] of the slide; it slips where that is above MOVES of the largest. A motion that never
-    holds has two slips a cycle, from one turn to the next.
+    It is 0 if there are fewer than two slips, or if the last one is more than 1.5 times this long
+    ago, because the interface then sticks. The interface slips while its rate exceeds MOVES of the
+    largest. A motion without stick has two slips per cycle, from one reversal to the next.
+
+    Parameters
+    ----------
+    time, rate : (k,)
+        Times [s] and rates of the slide [m/s].
     """
     rate = np.asarray(rate, float)
     way = np.sign(rate) * (np.abs(rate) > MOVES * np.abs(rate).max(initial=0.0))
     time = np.asarray(time, float)
     begins = np.flatnonzero((way[1:] != 0) & (way[1:] != way[:-1]))
-    # what holds starts at its last sample without a slip
+    # after a stick, the slip starts at the last sample of the stick
     starts = time[begins + (way[begins] != 0)]
     longest = float(np.diff(starts[-4:]).max(initial=0.0))
     return longest if starts.size and time[-1] - starts[-1] <= 1.5 * longest else 0.0
 
 
 def _rises(a) -> np.ndarray:
-    """Whether the last windows (n, w) rise one after the other by like steps, as noise does not, (n,)."""
+    """Return whether the last windows (n, w) increase by similar steps, which noise does not do."""
     steps = np.diff(a[:, -6:], axis=1)
     if a.shape[1] < 4:
         return np.zeros(len(a), bool)

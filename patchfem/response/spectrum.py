@@ -1,33 +1,62 @@
-"""Harmonics of the drive in the motion of the last cycles, the distortion that a gauge sees, and what an accelerometer
-shows: a reading acts on what was computed and never on the model."""
+"""Harmonics of the motion of the last cycles, distortion, and the readings of instruments.
+
+In: a window of a run under a drive that ends as a sine. Out: Fourier coefficients of motion,
+acceleration and friction; the distortion of the acceleration; and its reading by an instrument,
+which acts on the computed motion and never on the model.
+"""
 
 import numpy as np
 
-ROUND = 1e-12  # of the largest acceleration of the drive
-FLOOR = 1e-4  # of a first harmonic [m s-2], below which the output stands still
+ROUND = 1e-12  # round-off relative to the largest acceleration of the drive
+FLOOR = 1e-4  # smallest first harmonic [m s-2]; below it the output is at rest
 READINGS = ("peak", "fundamental", "rms", "lowpass")
-HARMONICS = 64  # that a low pass is taken of
-SAMPLES = 1024  # of a cycle behind it
+HARMONICS = 64  # number of harmonics that pass through the low-pass filter
+SAMPLES = 1024  # number of samples of a cycle after the filter
 PLACES, WEIGHTS = np.polynomial.legendre.leggauss(4)
-PLACES, WEIGHTS = (1 + PLACES) / 2, WEIGHTS / 2  # of a step
+PLACES, WEIGHTS = (1 + PLACES) / 2, WEIGHTS / 2  # Gauss points and weights of a step of length 1
 
 
 def waves(time, omega: float) -> list:
-    """What `motion_harmonic` weighs the motion with at the Gauss points of the steps between samples (k,) [s]: weights
-    (k - 1,) [s] and waves exp(-i omega t) (k - 1,), which take most of its time; omega [rad/s]."""
+    """Return the factors by which `motion_harmonic` weights the motion at the Gauss points.
+
+    They take most of its time, so that several motions share them.
+
+    Parameters
+    ----------
+    time : (k,)
+        Times of the samples [s].
+    omega : float
+        Angular frequency [rad/s].
+
+    Returns
+    -------
+    list
+        Weights (k - 1,) [s] and waves exp(-i omega t) (k - 1,) of each of four Gauss points.
+    """
     step = np.diff(time)
     waves = np.exp(-1j * omega * time[:-1])
-    # one wave, turned, serves all four points
+    # at equal steps, one wave times a constant phase serves all four points
     even = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
     turns = [np.exp(-1j * omega * s * (step.mean() if even else step)) for s in PLACES]
     return [(weight * step, waves * turn) for turn, weight in zip(turns, WEIGHTS)]
 
 
 def motion_harmonic(time, value, rate, omega: float, known: list | None = None) -> complex:
-    """First Fourier coefficient 2/T int y exp(-i omega t) dt of the cubics through samples and their rates.
+    """Return the Fourier coefficient 2/T int y exp(-i omega t) dt of cubics through samples.
 
-    time: (k,) [s], as uneven as it likes; value, rate: (k,); omega [rad/s]. Four Gauss points a step, so that only the
-    cubic is approximate, h^4/384 of the fourth derivative. known: the `waves` of these arguments.
+    Four Gauss points per step are used, so that only the cubic is approximate: h^4/384 of the
+    fourth derivative.
+
+    Parameters
+    ----------
+    time : (k,)
+        Times [s], at any spacing.
+    value, rate : (k,)
+        Samples of y and its rate.
+    omega : float
+        Angular frequency [rad/s].
+    known : list, optional
+        `waves` of the same times and frequency.
     """
     step, rise = np.diff(time), np.diff(value)
     p, q = rate[:-1] * step, rate[1:] * step
@@ -39,16 +68,16 @@ def motion_harmonic(time, value, rate, omega: float, known: list | None = None) 
 
 
 def acceleration_harmonic(time, value, rate, omega: float) -> complex:
-    """First Fourier coefficient of y'' [m s-2] from samples of y and y', by parts over whole cycles.
+    """Return the Fourier coefficient of y'' [m s-2] from y and y', by integration by parts.
 
-    The acceleration of a rubbing rig jumps, its motion does not, so nothing is lost at a jump. Arguments as
-    `motion_harmonic`.
+    The acceleration of a rig with friction jumps, but its motion does not, so that a jump causes no
+    error. Parameters as in `motion_harmonic`, over whole cycles.
     """
     return _by_parts(time, value, rate, omega, motion_harmonic(time, value, rate, omega))
 
 
 def _by_parts(time, value, rate, omega: float, first: complex) -> complex:
-    """`acceleration_harmonic` of a motion with this first Fourier coefficient."""
+    """Return `acceleration_harmonic` for a known Fourier coefficient `first` of the motion."""
     span, wave = time[-1] - time[0], np.exp(-1j * omega * time[[0, -1]])
     border = (rate[-1] + 1j * omega * value[-1]) * wave[1] - (
         rate[0] + 1j * omega * value[0]
@@ -57,7 +86,7 @@ def _by_parts(time, value, rate, omega: float, first: complex) -> complex:
 
 
 def odd_harmonics(window, drive) -> tuple:
-    """Sizes [m s-2] of the first and the third harmonic of the absolute acceleration at the output.
+    """Return the magnitudes of harmonics 1 and 3 of the acceleration at the output [m s-2].
 
     window: Response over whole cycles of a drive that ends as a sine.
     """
@@ -73,8 +102,15 @@ def odd_harmonics(window, drive) -> tuple:
 
 
 def wave_measures(first: float, third: float, size: float = 0.0) -> dict:
-    """absolute_acceleration_fundamental [m s-2] and acceleration_distortion [1] by name, from the sizes of the first
-    and the third harmonic; the latter None where `distorted` has no value; size: of the drive [m s-2]."""
+    """Return absolute_acceleration_fundamental [m s-2] and acceleration_distortion [1] by name.
+
+    Parameters
+    ----------
+    first, third : float
+        Magnitudes of the first and the third harmonic [m s-2].
+    size : float
+        Acceleration of the drive [m s-2]; the distortion is None if `distorted` has no value.
+    """
     ratio = distorted(first, third, size)
     return {
         "absolute_acceleration_fundamental": float(first),
@@ -83,21 +119,35 @@ def wave_measures(first: float, third: float, size: float = 0.0) -> dict:
 
 
 def distorted(first, third, size):
-    """Third over first harmonic of an acceleration (3.4); NaN where it is a ratio of zeros: the first is 0 within its
-    floor, or round-off beside the drive's `size`.
+    """Return the ratio of third to first harmonic of an acceleration (3.4); NaN for 0/0.
 
-    first, third: sizes of the harmonics [m s-2]; all of them numbers or (n,).
+    It is NaN if the first harmonic is below its floor or the round-off of the drive.
+
+    Parameters
+    ----------
+    first, third : float or (n,)
+        Magnitudes of the harmonics [m s-2].
+    size : float or (n,)
+        Acceleration of the drive [m s-2].
     """
     there = np.asarray(first) > np.maximum(ROUND * np.asarray(size), FLOOR)
     return np.where(there, third / np.where(there, first, 1.0), np.nan)[()]
 
 
 def friction_harmonic(window, modes, drive) -> complex:
-    """First Fourier coefficient [N] of the friction of the one interface, from the balance of every coordinate.
+    """Return the Fourier coefficient [N] of the friction force from the equation of motion.
 
-    F1 = m sum_i s_i r_i / sum_i s_i^2 with r = -base a1 - (z'')1 - D (z')1 - omega^2 z1 (3.4) and slide s. It holds
-    what acts within a step as a whole, the blow that ends a slide too. window: Response over whole cycles of a drive
-    that ends as a sine, without forces beside drive and friction.
+    F1 = m sum_i s_i r_i / sum_i s_i^2, where r = -base a1 - (z'')1 - D (z')1 - omega^2 z1 (3.4) and
+    s_i is the participation of the slide. It contains impulses within a step, such as the one that
+    ends a slip.
+
+    Parameters
+    ----------
+    window : Response
+        Whole cycles of a drive that ends as a sine, with no other forces than drive and friction.
+    modes
+        Modal basis with one interface.
+    drive
     """
     last = [part for part in drive.segments if part.start < window.time[-1]][-1]
     time, omega = window.time, last.omega
@@ -113,12 +163,26 @@ def friction_harmonic(window, modes, drive) -> complex:
 
 
 def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None = None) -> float:
-    """Size [m s-2] of the absolute acceleration in a window, as an instrument shows it.
+    """Return the absolute acceleration [m s-2] of a window as an instrument displays it.
 
-    window: Response over whole cycles of the drive, a core.SineDrive; peak: its largest size [m s-2]. kind: "peak" is
-    that; "fundamental" is |a_1|, the amplitude at the drive's frequency; "rms" is sqrt(mean a^2); "lowpass" is the
-    largest size behind a Butterworth low pass of second order, 1/(1 + sqrt2 s + s^2) with s = i f/cutoff, of the
-    harmonics to HARMONICS; cutoff [Hz]. ValueError for a kind that is none of READINGS.
+    Parameters
+    ----------
+    window : Response
+        Whole cycles of the drive.
+    drive : core.SineDrive
+    peak : float
+        Largest acceleration [m s-2].
+    kind : str
+        "peak": `peak`; "fundamental": |a_1|, the amplitude at the drive frequency; "rms": sqrt(mean
+        a^2); "lowpass": largest acceleration after a Butterworth low-pass filter of second order,
+        1/(1 + sqrt2 s + s^2) with s = i f/cutoff, for HARMONICS harmonics.
+    cutoff : float, optional
+        Cutoff frequency of the filter [Hz].
+
+    Raises
+    ------
+    ValueError
+        If the kind is not in READINGS.
     """
     if kind == "peak":
         return peak
@@ -142,7 +206,10 @@ def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None
 
 
 def _harmonic(window, drive, n: int) -> complex:
-    """Complex harmonic n [m s-2] of the absolute acceleration, from the motion by parts: nothing is lost at a jump."""
+    """Return the complex harmonic n [m s-2] of the absolute acceleration, from the motion.
+
+    By integration by parts, so that a jump of the acceleration causes no error.
+    """
     place, rate = (
         window.extra.get(name, own)
         for name, own in (("sensor", window.output), ("sensor_rate", window.output_rate))

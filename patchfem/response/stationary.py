@@ -1,10 +1,14 @@
-"""What a stationary random drive leaves behind: root mean squares, spectra, frequency response, each with its scatter.
+"""Measures of a stationary random drive: root mean squares, spectra and frequency response.
 
-Segments of a sixteenth of the record overlap by half under Hann's window (Welch 1967). Their H1 = G_ax/G_aa is in the
-mean the transform of the response h(t) times the window's own correlation r(t) (Bendat and Piersol, Random Data, ch. 9
-and 11). So h r of a mode is fitted to the largest peak, and no window widens it. By how much another record of the same
-spectrum would differ is told by mean squares of parts of the record, and of the fit by leaving parts out (jackknife).
-Intervals are of 95 % by Student's t.
+In: the window of a run and its drive. Out: measures by name, each with its scatter between
+records (half-width of the 95 % interval by Student's t).
+
+Segments of 1/16 of the record overlap by half and have Hann's window (Welch, 1967). The
+expected value of their H1 = G_ax/G_aa is the transform of the response h(t) times the
+correlation r(t) of the window (Bendat and Piersol, Random Data, ch. 9 and 11). Therefore h r of
+a mode is fitted to the largest peak, so that the window does not widen it. The scatter of a
+mean square is estimated from parts of the record, that of the fit by leaving out parts
+(jackknife).
 """
 
 from typing import NamedTuple
@@ -16,15 +20,24 @@ from scipy.special import stdtrit
 
 from .welch import CrossDensities, Segments, average_segments, transform_segments
 
-PARTS = 16  # lengths of a segment in the record
-GROUPS = 10  # parts of the record by which its scatter is told; of segments, each left out in turn
-WIDE = 6.0, 8.0  # half-width of the band of a fit, in half-power widths and in lines
-ENOUGH = 50.0  # decay times of the mode in a record, below which its parts hang together
-LEAST = 64  # samples of a segment
+PARTS = 16  # length of the record over that of a segment
+# number of parts of the record from which the scatter is estimated; groups of segments, each left
+# out once
+GROUPS = 10
+WIDE = 6.0, 8.0  # half-width of the band of a fit, in half-power widths and in spectral lines
+# length of a record in decay times of the mode; in a shorter one the parts are correlated
+ENOUGH = 50.0
+LEAST = 64  # smallest number of samples of a segment
 
 
 class Record(NamedTuple):
-    """Even samples, `step` [s] apart: drive (k,) [m s-2]; place [m] and acceleration [m s-2] of the output, (k,)."""
+    """Equally spaced samples of a record.
+
+    - step: time step [s].
+    - drive (k,): acceleration of the drive [m s-2].
+    - place (k,): displacement of the output [m].
+    - acceleration (k,): acceleration of the output [m s-2].
+    """
 
     step: float
     drive: np.ndarray
@@ -33,8 +46,15 @@ class Record(NamedTuple):
 
 
 class Spectra(NamedTuple):
-    """One-sided densities over frequency (q,) [Hz], of drive and acceleration [m2 s-3], of the place [m2 Hz-1]; H1 of
-    the place over the drive (q,) [s2], complex, and its coherence (q,)."""
+    """One-sided spectral densities over frequency, and the frequency response.
+
+    - frequency (q,): [Hz].
+    - drive, acceleration (q,): densities of the drive and of the acceleration of the output [m2
+      s-3].
+    - place (q,): density of the displacement of the output [m2 Hz-1].
+    - gain (q,): complex H1 of the displacement over the drive [s2].
+    - coherence (q,): of displacement and drive [1].
+    """
 
     frequency: np.ndarray
     drive: np.ndarray
@@ -45,7 +65,10 @@ class Spectra(NamedTuple):
 
 
 def record_of(window, drive) -> Record:
-    """The Record of a Response `window`, as often as the rows of its drive: cubics through places and rates."""
+    """Return the Record of a window at the sampling rate of its drive.
+
+    The displacement comes from cubics through positions and rates.
+    """
     kept = np.append(True, np.diff(window.time) > 1e-9 * drive.time[1])
     time, step = window.time[kept], float(drive.time[1])
     grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step * (1 + 1e-12)))
@@ -54,7 +77,7 @@ def record_of(window, drive) -> Record:
 
 
 def measures(window, drive) -> dict:
-    """Values by name of the rows that a stationary drive alone has, as far as the record shows them."""
+    """Return the measures of a stationary random drive by name, as far as the record has them."""
     record, out = record_of(window, drive), {}
     for name, values, even in (
         ("relative_displacement_rms", window.output, record.place),
@@ -73,7 +96,10 @@ def measures(window, drive) -> dict:
 
 
 def short(found: dict, window) -> list:
-    """The sentence, in a list, on a record (a Response) that is short beside the mode it shows; found: Measure by name."""
+    """Return a warning, as a list, if a record is short compared with the decay of its mode.
+
+    found: Measure by name; window: Response.
+    """
     names = "response_frequency", "response_damping"
     if any(name not in found or not found[name].value for name in names):
         return []
@@ -88,16 +114,20 @@ def short(found: dict, window) -> list:
 
 
 def rms(time, values) -> float:
-    """Root mean square about the mean of samples (k,) at times (k,) [s], by the trapezoidal rule."""
+    """Return the root mean square about the mean of samples (k,) at times (k,) [s].
+
+    By the trapezoidal rule.
+    """
     span = time[-1] - time[0]
     mean = np.trapezoid(values, time) / span
     return float(np.sqrt(np.trapezoid((values - mean) ** 2, time) / span))
 
 
 def rms_scatter(values) -> float:
-    """Half-width of the interval of `rms` of even samples (k,), from the mean squares of GROUPS parts of them.
+    """Return the half-width of the interval of `rms` of equally spaced samples (k,).
 
-    The interval of the mean square is one of its logarithm, as few swings have a skew one; its upper half counts.
+    It comes from the mean squares of GROUPS parts. The interval is one of the logarithm of the mean
+    square, because few oscillations have a skewed distribution; its upper half counts.
     """
     if values.size < GROUPS:
         return np.nan
@@ -113,32 +143,42 @@ def rms_scatter(values) -> float:
 
 
 def power(time, work) -> tuple:
-    """(mean power [W], half-width of its interval) of work (k,) [J] done up to times (k,) [s], the latter from the
-    means over GROUPS parts of equal length."""
+    """Return the mean power [W] and the half-width of its interval [W] from cumulative work.
+
+    The half-width comes from the means over GROUPS parts of equal length.
+
+    Parameters
+    ----------
+    time : (k,)
+        Times [s].
+    work : (k,)
+        Work done since the start [J].
+    """
     edges = np.linspace(time[0], time[-1], GROUPS + 1)
     parts = np.diff(np.interp(edges, time, work)) / np.diff(edges)
     return parts.mean(), stdtrit(GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(GROUPS)
 
 
 def steady(window, drive) -> bool:
-    """Whether the mean squares of both halves of a Response differ by no more than their scatter lets them."""
+    """Return whether the rms of both halves of a window agree within their scatter."""
     place = record_of(window, drive).place
     half = place.size // 2
     first, last = place[:half], place[half:]
-    # an interval of a half has 2 standard errors, a difference of two in 4 of its own
+    # the half-widths are 2 standard errors, so a difference of up to 4 of its standard errors
+    # passes
     return bool(
         abs(first.std() - last.std()) <= 2 * np.hypot(rms_scatter(first), rms_scatter(last))
     )
 
 
 def segments(record: Record) -> Segments:
-    """Transform drive, place and acceleration over segments of a sixteenth of a record."""
+    """Transform drive, displacement and acceleration over segments of 1/16 of a record."""
     size = max(min(LEAST, record.place.size), 2 * (record.place.size // (2 * PARTS)))
     return transform_segments(record.step, record[1:], size)
 
 
 def spectra(window, drive) -> Spectra:
-    """The Spectra of a Response `window`, up to twice the highest frequency of the drive."""
+    """Return the Spectra of a window, up to twice the highest frequency of the drive."""
     frequency, (push, place, acceleration) = segments(record_of(window, drive))
     low, high = drive.band
     shown = (frequency > 0) & (frequency <= 2 * high)
@@ -152,9 +192,19 @@ def spectra(window, drive) -> Spectra:
 
 
 def peak(record: Record, band: tuple) -> tuple | None:
-    """((frequency [Hz], damping ratio), half-widths of both) of the largest peak of H1 in a band [Hz] of the drive.
+    """Return frequency [Hz] and damping ratio of the largest peak of H1, and their half-widths.
 
-    None where the band shows no peak: it is at an end, or no mode fits it, or the record is too short for segments.
+    Parameters
+    ----------
+    record : Record
+    band : tuple
+        Lowest and highest frequency of the drive [Hz].
+
+    Returns
+    -------
+    tuple or None
+        (frequency, damping ratio) and the half-widths of both. None if the band contains no peak:
+        the largest value is at an end of the band, no mode fits, or the record is too short.
     """
     if record.place.size < 2 * LEAST:
         return None
@@ -172,7 +222,7 @@ def peak(record: Record, band: tuple) -> tuple | None:
     left, right = high[high < top].max(initial=0), high[high > top].min(initial=f.size - 1)
     width = float(f[right] - f[left])
     theta = np.log([2 * np.pi * f[top], max(0.3 * width, 0.05 * line) / (2 * f[top])])
-    for _ in range(3):  # the band follows the width of the peak
+    for _ in range(3):  # the band of the fit follows the width of the peak
         at, half = np.exp(theta[0]) / (2 * np.pi), np.exp(theta.sum()) / (2 * np.pi)
         near = np.abs(f - at) <= max(WIDE[0] * half, WIDE[1] * line)
         theta = _fitted(f[near], gain[near], span, theta)
@@ -193,8 +243,19 @@ def peak(record: Record, band: tuple) -> tuple | None:
 
 
 def _fitted(f, gain, span: float, theta) -> np.ndarray:
-    """ln of (omega [rad/s], damping ratio) of the mode whose `blurred` response fits H1 (q,) at f (q,) [Hz], with a
-    complex constant beside it; theta: a start; span [s]: of a segment."""
+    """Return ln of (omega [rad/s], damping ratio) of the mode whose `blurred` response fits H1.
+
+    A complex constant is fitted as well, for the other modes.
+
+    Parameters
+    ----------
+    f, gain : (q,)
+        Frequencies [Hz] and H1 [s2].
+    span : float
+        Duration of a segment [s].
+    theta : (2,)
+        Initial guess.
+    """
     size = np.abs(gain).max()
 
     def left(theta):
@@ -217,13 +278,25 @@ def _fitted(f, gain, span: float, theta) -> np.ndarray:
 
 
 def blurred(f, omega: float, zeta: float, span: float) -> np.ndarray:
-    """Response (q,) [s2] of x'' + 2 zeta omega x' + omega^2 x = a at f (q,) [Hz] as segments of `span` [s] under Hann's
-    window show it in the mean: int_0^span h(t) r(t) exp(-2 pi i f t) dt, r the window's correlation, in closed form."""
+    """Return the expected H1 [s2] of a mode from segments with Hann's window, in closed form.
+
+    int_0^span h(t) r(t) exp(-2 pi i f t) dt, where h is the response of x'' + 2 zeta omega x' +
+    omega^2 x = a and r the correlation of the window.
+
+    Parameters
+    ----------
+    f : (q,)
+        Frequencies [Hz].
+    omega, zeta : float
+        Natural angular frequency [rad/s] and damping ratio.
+    span : float
+        Duration of a segment [s].
+    """
     own = omega * np.sqrt(complex(1 - zeta * zeta))
     turn, out = 2j * np.pi / span, 0.0
     for pole, sign in ((-zeta * omega + 1j * own, 1), (-zeta * omega - 1j * own, -1)):
         q = pole - 2j * np.pi * f
-        late = np.exp(q * span) - 1  # the same at q +- turn
+        late = np.exp(q * span) - 1  # exp(turn span) = 1, so this is the same at q +- turn
         ramp = sum(
             share * (late / s - span) / (s * span)
             for share, s in ((2 / 3, q), (1 / 6, q + turn), (1 / 6, q - turn))

@@ -24,7 +24,7 @@ class CrossDensities(NamedTuple):
     cross: np.ndarray
 
     def coherence(self) -> np.ndarray:
-        """Return the share (q,) of the output that follows the input linearly."""
+        """Return the coherence (q,): the fraction of the output that depends linearly on the input."""
         size = np.abs(self.cross)
         return (size / np.maximum(self.input, 1e-300)) * (size / np.maximum(self.output, 1e-300))
 
@@ -37,7 +37,7 @@ def transform_segments(step: float, records, size: int, *, has_window: bool = Tr
     step : float
         Time between two samples [s].
     records : (r, k) array
-        Even samples.
+        Equally spaced samples.
     size : int
         Samples of a segment.
     has_window : bool
@@ -59,7 +59,7 @@ def transform_segments(step: float, records, size: int, *, has_window: bool = Tr
 
 
 def average_segments(driven, response) -> CrossDensities:
-    """Return the densities of an input and an output with transforms (m, q)."""
+    """Return the spectral densities of an input and an output from transforms (m, q)."""
     return CrossDensities(
         input=2 * np.mean(np.abs(driven) ** 2, axis=0),
         output=2 * np.mean(np.abs(response) ** 2, axis=0),
