@@ -34,7 +34,10 @@ class Keeper:
     """
 
     def __init__(self, path, key: str, resume: bool):
-        self.path, self.key, self.resume, self.begun = path, key, resume, 0
+        self.path = path
+        self.key = key
+        self.resume = resume
+        self.begun = 0
 
 
 @contextmanager
@@ -58,14 +61,12 @@ class Samples:
     """
 
     def __init__(self, last):
-        self.last, self.kept, self.kept_at, self.extremes, self.phasors, self.again = (
-            last,
-            [],
-            [],
-            [],
-            [],
-            False,
-        )
+        self.last = last
+        self.kept = []
+        self.kept_at = []
+        self.extremes = []
+        self.phasors = []
+        self.again = False
         self.marks = []
 
     @property
@@ -92,10 +93,13 @@ class Samples:
         cycles, self.extremes = _cycles("last", found)
         self.last.extend(cycles)
         if "kept" in found:
-            self.kept, self.kept_at = [found["kept"]], [found["kept_at"]]
-        self.phasors, self.again = found["phasors"].tolist(), bool(found["again"])
+            self.kept = [found["kept"]]
+            self.kept_at = [found["kept_at"]]
+        self.phasors = found["phasors"].tolist()
+        self.again = bool(found["again"])
         while f"mark{len(self.marks)}.first" in found:
-            name, run = f"mark{len(self.marks)}", fresh()
+            name = f"mark{len(self.marks)}"
+            run = fresh()
             _into(run, f"{name}.run", found)
             self.marks.append((run.fork(run.drive), *_cycles(name, found)))
 
@@ -111,7 +115,8 @@ def _of_cycles(name: str, cycles, extremes) -> dict:
 
 def _cycles(name: str, found: dict) -> tuple:
     """(cycles, extremes) as they were."""
-    firsts, works = found[f"{name}.first"].tolist(), found[f"{name}.work"].tolist()
+    firsts = found[f"{name}.first"].tolist()
+    works = found[f"{name}.work"].tolist()
     return [
         (first, found[f"{name}.{k}"], work) for k, (first, work) in enumerate(zip(firsts, works))
     ], [tuple(one) for one in found[f"{name}.extremes"].tolist()]
@@ -121,7 +126,9 @@ class Slot:
     """The file of one march; without a path nothing is kept."""
 
     def __init__(self, path: Path | None, key: str):
-        self.path, self.key, self.next = path, key, perf_counter() + SECONDS
+        self.path = path
+        self.key = key
+        self.next = perf_counter() + SECONDS
 
     def offer(self, run, samples: Samples) -> None:
         """Write the state between two cycles where it is time to; where there is no room nothing is kept any more."""
@@ -148,7 +155,8 @@ def slot_of(run, asked: tuple, samples: Samples, fresh) -> Slot:
     if keeper is None:
         return Slot(None, "")
     keeper.begun += 1
-    path, key = keeper.path(keeper.begun), _key_of(keeper.key, run, asked)
+    path = keeper.path(keeper.begun)
+    key = _key_of(keeper.key, run, asked)
     if keeper.resume and path.is_file():
         load(path, key, run, samples, fresh)
     return Slot(path, key)

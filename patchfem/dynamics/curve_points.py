@@ -22,7 +22,8 @@ def adapted(find: Callable, places, share: float = 0.01, most: int = 2000) -> tu
     the larger value at hand, or over LEAST of the largest. most: points, at which it ends. A value that is not finite
     bends nothing.
     """
-    places, found = [float(place) for place in places], []
+    places = [float(place) for place in places]
+    found = []
     for place in places:
         found.append(find(place, found[-1] if found else None))
     while True:

@@ -17,12 +17,10 @@ def thinned(rows, run, even: int = 0) -> list:
 
     even: equally spaced samples of a whole cycle that are kept besides, at least.
     """
-    n, output, (count, size), flat = (
-        run.modes.omega.size,
-        run.modes.output,
-        rows.shape[:2],
-        rows.reshape(-1, rows.shape[2]),
-    )
+    n = run.modes.omega.size
+    output = run.modes.output
+    count, size = rows.shape[:2]
+    flat = rows.reshape(-1, rows.shape[2])
     speeds, slips = run.watched(flat)
     speeds = np.concatenate([speeds.T, (flat[:, n : 2 * n] @ output)[None]]).reshape(
         -1, count, size
@@ -77,14 +75,21 @@ def _carrier(first: int, count: int, around: int) -> np.ndarray:
 def hermite_extremes(y, v, dt) -> tuple:
     """Smallest and largest value (...) of the piecewise cubic through values y (..., k) with rates v at spacing dt
     [s]."""
-    before, y, v = y.shape[:-1], y.reshape(-1, y.shape[-1]), v.reshape(-1, y.shape[-1])
-    low, high = y.min(axis=1), y.max(axis=1)
+    before = y.shape[:-1]
+    y = y.reshape(-1, y.shape[-1])
+    v = v.reshape(-1, y.shape[-1])
+    low = y.min(axis=1)
+    high = y.max(axis=1)
     # a rate that is zero but for round-off, as at a stop, turns nothing: the cubic would swing beyond it
     row, at = np.nonzero(v[:, :-1] * v[:, 1:] < -REST * (v**2).max(axis=1, keepdims=True))
     if at.size:
-        a, b, p, q = y[row, at], y[row, at + 1], v[row, at] * dt, v[row, at + 1] * dt
+        a = y[row, at]
+        b = y[row, at + 1]
+        p = v[row, at] * dt
+        q = v[row, at + 1] * dt
         # derivative 3 s^2 A + 2 s B + p of a + p s + B s^2 + A s^3
-        big, mid = 2 * (a - b) + p + q, 3 * (b - a) - 2 * p - q
+        big = 2 * (a - b) + p + q
+        mid = 3 * (b - a) - 2 * p - q
         root = np.sqrt(np.maximum(mid**2 - 3 * big * p, 0))
         denominator = mid + SIGNS * root
         there = denominator != 0

@@ -33,7 +33,8 @@ def solve(a, b):
 
     By columns: the unknowns below one do not wait for each other.
     """
-    n, product = b.size, 0.0
+    n = b.size
+    product = 0.0
     for k in range(n):
         here = b[k] * a[k, k]
         b[k] = here

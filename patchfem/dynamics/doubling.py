@@ -34,7 +34,8 @@ def short_step(square, damping, push, parts: dict, quadratic) -> Step:
     far, near = push
     stay = -far @ square  # what z keeps falls short of 1 by this: no difference of large numbers
     change = np.block([[stay, near], [-near @ square, stay - near @ damping]])
-    n, m = len(far), len(parts["z"])
+    n = len(far)
+    m = len(parts["z"])
     work, lost = np.zeros((2, 3 * n + m, 3 * n + m))
     for form, names, own in (
         (work, ("wz", "wv", "wf"), "work"),
@@ -53,12 +54,17 @@ def doubled(step: Step, halves) -> Step:
     """The Step of twice the length; halves: two (m, m), the drive at the nodes of each half from that at those of the
     whole."""
     first, second = halves
-    size, n, m = len(step.change), step.push.shape[1], len(first)
-    one, two = np.eye(size + n + m), np.eye(size + n + m)
-    one[size + n :, size + n :], two[size + n :, size + n :] = first, second
+    size = len(step.change)
+    n = step.push.shape[1]
+    m = len(first)
+    one = np.eye(size + n + m)
+    two = np.eye(size + n + m)
+    one[size + n :, size + n :] = first
+    two[size + n :, size + n :] = second
     begun = step.drive @ first
     two[:size, :size] += step.change
-    two[:size, size : size + n], two[:size, size + n :] = step.push, begun
+    two[:size, size : size + n] = step.push
+    two[:size, size + n :] = begun
     return Step(
         2 * step.change + step.change @ step.change,
         2 * step.push + step.change @ step.push,

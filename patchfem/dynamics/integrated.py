@@ -50,7 +50,9 @@ def accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
 def histories(modes: ModalBasis, drive, time, motion: tuple, face: tuple, extra: dict) -> Response:
     """The Response at times (k,) [s] of motion (z, rate), (k, n) each, and of the first interface: face (slide, its
     speed, force, slip), (k,) each."""
-    (z, rate), (slide, speed, force, slip), push = motion, face, drive.values(time)
+    z, rate = motion
+    slide, speed, force, slip = face
+    push = drive.values(time)
     base = push if drive.moving else np.zeros_like(push)
     accel = accelerations(modes, push, z, rate, np.outer(force, modes.slide))
     return Response(

@@ -24,12 +24,12 @@ from .harmonic.point import balance_of
 
 SAMPLES = 4096  # of a cycle, that its largest motion is read from
 PLACES = 48  # amplitudes at which the damping of a free motion is looked at
-LOW, HIGH = 1e-6, 4.0  # the first and the last of them, over 4 F/(pi |c| omega)
+# the first and the last of them, over 4 F/(pi |c| omega)
+LOW = 1e-6
+HIGH = 4.0
 # the first amplitude where smaller motions cannot be followed, and how many are looked at
-SLIDING, FEWER = (
-    0.02,
-    16,
-)
+SLIDING = 0.02
+FEWER = 16
 LOST = (
     "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
     "amplitude at which friction dissipates what the mode gains"
@@ -77,7 +77,8 @@ def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
 
 def _turning(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
     """Cycles of `of_relay` whose frequency is near that of the coordinate `mode`; forces (2,) [N] as there."""
-    out, half = [], np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
+    out = []
+    half = np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
     rest = _speeds(modes, row, forces[0], half)
     for k in np.flatnonzero(rest[:-1] * rest[1:] <= 0):
         t = brentq(
@@ -150,7 +151,8 @@ def _flow(modes: ModalBasis, t) -> np.ndarray:
 
 def _speeds(modes: ModalBasis, row, force: float, half) -> np.ndarray:
     """Slide rate at the turn (k,), over that of its swing, of half periods (k,) [s]: as of `_turn`, all at once."""
-    n, eye = modes.omega.size, np.eye(2 * modes.omega.size)
+    n = modes.omega.size
+    eye = np.eye(2 * modes.omega.size)
     rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
     flow = _flow(modes, half)
     y = np.einsum("kab,kb->ka", np.linalg.pinv(flow + eye, rcond=1e-14), (flow - eye) @ rest)
@@ -159,7 +161,8 @@ def _speeds(modes: ModalBasis, row, force: float, half) -> np.ndarray:
 
 def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:
     """(state (2n,) at the turn, slide rate there over that of its swing, state of rest under the force) of T/2 = t."""
-    n, eye = modes.omega.size, np.eye(2 * modes.omega.size)
+    n = modes.omega.size
+    eye = np.eye(2 * modes.omega.size)
     rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
     flow = _flow(modes, [t])[0]
     y = np.linalg.lstsq(flow + eye, (flow - eye) @ rest, rcond=None)[0]
@@ -168,17 +171,20 @@ def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:
 
 def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | None:
     """The Cycle of half period t [s], None where the slide turns or holds on the way."""
-    (slides, holds), n = forces, modes.omega.size
+    slides, holds = forces
+    n = modes.omega.size
     y, _, rest = _turn(modes, row, slides, t)
     times = np.linspace(0, t, SAMPLES // 2 + 1)
     path = rest + _flow(modes, times) @ (y - rest)
-    rate, swing = path[:, n:] @ row, float(np.abs(row) @ np.abs(y[:n]))
+    rate = path[:, n:] @ row
+    swing = float(np.abs(row) @ np.abs(y[:n]))
     pull = -modes.mass * (modes.omega**2 * y[:n] + modes.damping_matrix @ y[n:]) @ row / (row @ row)
     if rate[1:-1].max() > 1e-9 * swing / t or -pull <= holds:
         return None
     motion = path[:, :n] @ modes.output
     cycle = np.concatenate([motion, -motion[1:]])
-    found, coarse = _highest(cycle), _highest(cycle[::2])
+    found = _highest(cycle)
+    coarse = _highest(cycle[::2])
     # a turn later or earlier takes part of what is off with it: the map from turn to turn
     speed = np.concatenate([path[-1, n:], _rates(modes, path[-1], row, slides)])
     face = np.concatenate([np.zeros(n), row])
@@ -211,13 +217,15 @@ def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
     path then begins where the interface slides, at the mode without friction, SLIDING times the amplitude of den
     Hartog's balance. NotConverged where no free motion is found on this way either.
     """
-    out, least = [], 0.0
+    out = []
+    least = 0.0
     for mode in unstable_modes(modes):
         if limit * abs(row[mode]) > 0:
             found, low = _of_mode(
                 modes, group, int(mode), balanced_amplitude(modes, row, limit, mode)
             )
-            out, least = out + found, max(least, low * abs(modes.output[mode]))
+            out = out + found
+            least = max(least, low * abs(modes.output[mode]))
     return sorted(out), least
 
 
@@ -282,7 +290,8 @@ def _unknowns(equations: FreeBalance, one: Free) -> np.ndarray:
 
 def _between(equations: FreeBalance, low: Free, high: Free) -> Free:
     """The free motion without damping between two of unlike sign, by the secant kept between them (Illinois)."""
-    ends, last = [(np.log(one.amplitude), one.zeta, one) for one in (low, high)], 0
+    ends = [(np.log(one.amplitude), one.zeta, one) for one in (low, high)]
+    last = 0
     for _ in range(60):
         (a, below, start), (b, above, _) = ends
         at = (a * above - b * below) / (above - below)

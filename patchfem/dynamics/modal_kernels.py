@@ -23,7 +23,8 @@ def free_slide(state, reach, port, table, at):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_rate(state, row, free, dense, table, at):
     """Rate of the slide `row` (n,) at the end of a step without interface forces [m/s]."""
-    n, out = row.size, 0.0
+    n = row.size
+    out = 0.0
     for i in range(n):
         end = table[at, n + i]
         if dense.size == 0:
@@ -62,14 +63,19 @@ def move(state, free, push, loss, dense, dense_loss, table, at, accel, scratch, 
     arrays of a step are passed one by one, because a tuple of them would be counted anew in every step.
     """
     n = state.shape[1]
-    work, lost = table[at, 8 * n], table[at, 8 * n + 1]
+    work = table[at, 8 * n]
+    lost = table[at, 8 * n + 1]
     for i in range(n):
-        z, v, f = state[0, i], state[1, i], accel[i]
+        z = state[0, i]
+        v = state[1, i]
+        f = accel[i]
         work += table[at, 2 * n + i] * z + table[at, 3 * n + i] * v + table[at, 4 * n + i] * f
         lost += table[at, 5 * n + i] * z + table[at, 6 * n + i] * v + table[at, 7 * n + i] * f
     if dense.size == 0:
         for i in range(n):
-            z, v, f = state[0, i], state[1, i], accel[i]
+            z = state[0, i]
+            v = state[1, i]
+            f = accel[i]
             lost += (
                 (loss[0, i] * z + loss[1, i] * v + loss[3, i] * f) * z
                 + (loss[2, i] * v + loss[4, i] * f) * v
@@ -177,13 +183,17 @@ def sample(row, state, slide, output):
     Returns (slide, its speed, output).
     """
     n = slide.size
-    q, v, out = 0.0, 0.0, 0.0
+    q = 0.0
+    v = 0.0
+    out = 0.0
     for k in range(n):
-        row[k], row[n + k] = state[0, k], state[1, k]
+        row[k] = state[0, k]
+        row[n + k] = state[1, k]
         q += slide[k] * state[0, k]
         v += slide[k] * state[1, k]
         out += output[k] * state[0, k]
-    row[2 * n], row[2 * n + 1] = q, v
+    row[2 * n] = q
+    row[2 * n + 1] = v
     return q, v, out
 
 
@@ -194,7 +204,10 @@ def note(row, force, energy, slip, out, travel, total, ledger):
     Returns 0, or 1 beyond the travel and 3 for a motion that is not finite.
     """
     n = row.size - 4
-    row[n], row[n + 1], row[n + 2], row[n + 3] = force, slip, force, energy
+    row[n] = force
+    row[n + 1] = slip
+    row[n + 2] = force
+    row[n + 3] = energy
     ledger[4] = max(ledger[4], total)
     if not np.isfinite(row[n - 2] + row[n - 1] + force):
         return 3
@@ -215,7 +228,8 @@ def ended(state, free, push, dense, table, at, accel, out):
     """Coordinates and rates at the end of a step under `accel` (n,), into out (2, n); nothing is moved or booked."""
     n = state.shape[1]
     for i in range(n):
-        z, v = table[at, i], table[at, n + i]
+        z = table[at, i]
+        v = table[at, n + i]
         if dense.size == 0:
             z += free[0, i] * state[0, i] + free[1, i] * state[1, i] + push[0, i] * accel[i]
             v += free[2, i] * state[0, i] + free[3, i] * state[1, i] + push[1, i] * accel[i]
@@ -231,4 +245,5 @@ def ended(state, free, push, dense, table, at, accel, out):
                     + dense[n + i, n + k] * state[1, k]
                     + dense[n + i, 2 * n + k] * accel[k]
                 )
-        out[0, i], out[1, i] = z, v
+        out[0, i] = z
+        out[1, i] = v

@@ -59,7 +59,8 @@ class Mapped:
 
     def step(self) -> np.ndarray:
         """Newton's step (m,), least squares where a slide may rest anywhere."""
-        scale, out = self.scale, np.zeros(self.scale.size)
+        scale = self.scale
+        out = np.zeros(self.scale.size)
         left = (self.slope - np.eye(scale.size)) * scale / scale[:, None]
         if not len(self.kept):
             return solve_linear(left)(self.gap) * scale
@@ -85,7 +86,8 @@ class Grows(NotConverged):
         super().__init__(
             "dynamics: no periodic motion was found, because the motion grows from period to period"
         )
-        self.mapped, self.steps = mapped, steps
+        self.mapped = mapped
+        self.steps = steps
 
 
 class Shooting:
@@ -132,10 +134,8 @@ class Shooting:
             if better is not None:
                 mapped = better
                 continue
-            mapped, periods = (
-                self.mapped(self.after(mapped, periods[0])),
-                (min(2 * periods[0], periods[1]), periods[1]),
-            )
+            mapped = self.mapped(self.after(mapped, periods[0]))
+            periods = (min(2 * periods[0], periods[1]), periods[1])
             if self.grows(mapped):
                 raise Grows(mapped, used + 1)
         raise NotConverged(

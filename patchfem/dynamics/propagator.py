@@ -14,8 +14,12 @@ import numpy as np
 from ..core import ModalBasis
 from . import doubling
 
-LEAST, MOST = 8, 48  # Gauss points of a step
-KEPT, FEW = 4, 32  # propagators that are kept, and coordinates of each at most: more take room
+# Gauss points of a step
+LEAST = 8
+MOST = 48
+# propagators that are kept, and coordinates of each at most: more take room
+KEPT = 4
+FEW = 32
 STIFF = 20.0  # radians or decays of the fastest motion in a step, beyond which that many points do not see it
 SHORT = 4.0  # of them in the short step that is doubled then
 
@@ -124,26 +128,30 @@ def _of_interfaces(basis: _Basis, period: float, steps_per_cycle: int) -> Propag
 def _made(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propagator:
     dt = period / steps_per_cycle
     fastest = max(fastest_rate(modes), 2 * np.pi / period)
-    n, coupled = modes.omega.size, modes.damping is not None
+    n = modes.omega.size
+    coupled = modes.damping is not None
     if fastest * dt > STIFF:
         (at_end, push, parts, quadratic), nodes = _stiff(modes, dt, fastest, 2 * np.pi / period)
     else:
         # two points more for each radian of the fastest motion
         nodes, weight = _gauss(dt, int(np.clip(LEAST + 2 * np.ceil(fastest * dt), LEAST, MOST)))
-        at_end, inside = (
-            [part[0] for part in free_motion(modes, np.array([dt]))],
-            free_motion(modes, nodes),
-        )
+        at_end = [part[0] for part in free_motion(modes, np.array([dt]))]
+        inside = free_motion(modes, nodes)
         push = _push(modes, dt, nodes, weight)
         parts, quadratic = _parts(modes, dt, nodes, weight, inside)
     if coupled:
         block = np.block([[at_end[0], at_end[1]], [at_end[2], at_end[3]]])
         dense = np.concatenate([block, np.concatenate(push)], axis=1)
         reach = rows @ (block - np.eye(2 * n))[:n]
-        beta, free, loss = rows @ push[0] @ rows.T / modes.mass, np.zeros((4, n)), np.zeros((6, n))
+        beta = rows @ push[0] @ rows.T / modes.mass
+        free = np.zeros((4, n))
+        loss = np.zeros((6, n))
         short = np.zeros((2, n))
     else:
-        dense, short, free, loss = np.zeros((0, 0)), np.array(push), np.array(at_end), quadratic
+        dense = np.zeros((0, 0))
+        short = np.array(push)
+        free = np.array(at_end)
+        loss = quadratic
         reach = np.concatenate([rows * (at_end[0] - 1), rows * at_end[1]], axis=1)
         beta = (rows * push[0]) @ rows.T / modes.mass
     return Propagator(
@@ -183,9 +191,12 @@ def _stiff(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tupl
     times = max(0, int(np.ceil(np.log2(fastest * dt / SHORT))))
     count = int(np.clip(LEAST + 2 * np.ceil(max(SHORT, slowest * dt)), LEAST, MOST))
     whole = replace(modes, damping=modes.damping_matrix)
-    n, (nodes, weight) = modes.omega.size, _gauss(dt, count)
-    h, shrink = dt / 2**times, 1 / 2**times
-    near, light = nodes * shrink, weight * shrink
+    n = modes.omega.size
+    nodes, weight = _gauss(dt, count)
+    h = dt / 2**times
+    shrink = 1 / 2**times
+    near = nodes * shrink
+    light = weight * shrink
     step = doubling.short_step(
         np.diag(modes.omega**2),
         modes.damping_matrix,
@@ -197,12 +208,11 @@ def _stiff(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tupl
         step = doubling.doubled(step, halves)
     parts, quadratic = doubling.as_parts(step)
     flow = step.change + np.eye(2 * n)
-    blocks, push = (
-        [flow[:n, :n], flow[:n, n:], flow[n:, :n], flow[n:, n:]],
-        (step.push[:n], step.push[n:]),
-    )
+    blocks = [flow[:n, :n], flow[:n, n:], flow[n:, :n], flow[n:, n:]]
+    push = (step.push[:n], step.push[n:])
     if modes.damping is None:
-        blocks, push = [np.diag(part) for part in blocks], tuple(np.diag(part) for part in push)
+        blocks = [np.diag(part) for part in blocks]
+        push = tuple(np.diag(part) for part in push)
         pairs = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
         quadratic = np.stack(
             [
@@ -218,7 +228,8 @@ def free_motion(modes: ModalBasis, times) -> tuple:
     times = np.asarray(times, float)
     if modes.damping is None:
         return _single(modes.omega, modes.zeta, times[:, None])
-    n, scale = modes.omega.size, max(float(modes.omega.max()), 1 / float(times.max()))
+    n = modes.omega.size
+    scale = max(float(modes.omega.max()), 1 / float(times.max()))
     # rates over `scale`: all entries of like size
     a = np.block(
         [[np.zeros((n, n)), scale * np.eye(n)], [-np.diag(modes.omega**2) / scale, -modes.damping]]
@@ -229,7 +240,8 @@ def free_motion(modes: ModalBasis, times) -> tuple:
 
 def _single(omega, zeta, t) -> tuple:
     """Blocks zz, zv, vz, vv of single coordinates (n,) after times t (k, 1), in closed form for any damping."""
-    decay, root = zeta * omega, omega * np.sqrt(np.abs(zeta**2 - 1))
+    decay = zeta * omega
+    root = omega * np.sqrt(np.abs(zeta**2 - 1))
     x = root * t
     small = x < 1e-3
     under = np.where(small | (zeta < 1), x, 0.0)
@@ -237,10 +249,12 @@ def _single(omega, zeta, t) -> tuple:
     sign = np.where(zeta < 1, -1.0, 1.0)
     square = sign * x * x
     fade = np.exp(-decay * t)
-    c, s = fade * np.cos(under), fade * np.sinc(under / np.pi)
+    c = fade * np.cos(under)
+    s = fade * np.sinc(under / np.pi)
     c = np.where(small, fade * (1 + square / 2 * (1 + square / 12)), c)
     s = np.where(small, fade * (1 + square / 6 * (1 + square / 20)), s)
-    slow, fast = np.exp(-decay * t + over), np.exp(-decay * t - over)
+    slow = np.exp(-decay * t + over)
+    fast = np.exp(-decay * t - over)
     c = np.where(over > 0, (slow + fast) / 2, c)
     s = np.where(over > 0, (slow - fast) / (2 * np.where(over > 0, over, 1.0)), s)
     zv = t * s
@@ -254,7 +268,8 @@ def exponentials(a) -> np.ndarray:
     """
     norm = float(np.abs(a).sum(axis=2).max()) if a.size else 0.0
     halvings = max(0, int(np.ceil(np.log2(max(4 * norm, 1e-300)))))
-    x, unit = a / 2.0**halvings, np.eye(a.shape[1])
+    x = a / 2.0**halvings
+    unit = np.eye(a.shape[1])
     out = np.broadcast_to(unit, x.shape)
     for k in range(13, 0, -1):
         out = unit + x @ out / k
@@ -275,7 +290,10 @@ def _push(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
 
 def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
     """Weights on the drive at the Gauss points of what `tables` returns, and the quadratic form of the viscous loss."""
-    n, base, mass, m = modes.omega.size, modes.base, modes.mass, nodes.size
+    n = modes.omega.size
+    base = modes.base
+    mass = modes.mass
+    m = nodes.size
     _, zv, vz, vv = inside
     coupled = modes.damping is not None
     back = free_motion(modes, dt - nodes)

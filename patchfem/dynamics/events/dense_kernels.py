@@ -17,24 +17,23 @@ def unfold(row, h, modal_system, time_state, workspace):
 
     What holds is found again where it is not what workspace.mask has; workspace.held[0] < 0 before the first row.
     """
-    n, faces = len(modal_system.square), len(modal_system.reach)
+    n = len(modal_system.square)
+    faces = len(modal_system.reach)
     segment = time_state.segments[int(row[3])]
     start = HEAD + 2 * n
-    place, speed = row[HEAD : HEAD + n], row[HEAD + n : start]
+    place = row[HEAD : HEAD + n]
+    speed = row[HEAD + n : start]
     for f in range(faces):
-        workspace.polys[faces, f], workspace.springs[f] = (
-            row[start + EACH * f],
-            row[start + EACH * f + 1],
-        )
+        workspace.polys[faces, f] = row[start + EACH * f]
+        workspace.springs[f] = row[start + EACH * f + 1]
         holds = 1.0 if workspace.springs[f] == RIGID else 0.0
         if workspace.mask[f] != holds:
-            workspace.mask[f], workspace.held[0] = holds, -1.0
+            workspace.mask[f] = holds
+            workspace.held[0] = -1.0
     if workspace.held[0] < 0.0:
         constrain(modal_system, workspace)
-    own, rate = (
-        fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0,
-        rate_of(segment, time_state.period[0]),
-    )
+    own = fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0
+    rate = rate_of(segment, time_state.period[0])
     if own * h > REACH * (1 + 1e-9):
         at_reach(
             segment,
@@ -82,12 +81,17 @@ def evaluate(rows, owner, tau, modal_system, time_state, workspace, out):
     out (j, 2 n + 1 + 6 i): z, v, drive [m s-2], then of every interface slide [m], rate [m/s], force [N], slip [m],
     work and loss [J].
     """
-    n, faces, last, top, h = len(modal_system.square), len(modal_system.reach), -1, 0, 1.0
+    n = len(modal_system.square)
+    faces = len(modal_system.reach)
+    last = -1
+    top = 0
+    h = 1.0
     workspace.held[0] = -1.0
     for j in range(owner.size):
         row = rows[owner[j]]
         if owner[j] != last:
-            last, h = owner[j], max(row[1], 1e-300)
+            last = owner[j]
+            h = max(row[1], 1e-300)
             top = unfold(row, h, modal_system, time_state, workspace)
         u = tau[j] / h
         for i in range(n):
@@ -98,20 +102,22 @@ def evaluate(rows, owner, tau, modal_system, time_state, workspace, out):
             out[j, n + i] = rate / h
         out[j, 2 * n] = value(workspace.waves[0], 0, top, u)
         for f in range(faces):
-            at, to = HEAD + 2 * n + EACH * f, 2 * n + 1 + 6 * f
+            at = HEAD + 2 * n + EACH * f
+            to = 2 * n + 1 + 6 * f
             if workspace.springs[f] == RIGID:
-                out[j, to], out[j, to + 1] = row[at + 8], 0.0
+                out[j, to] = row[at + 8]
+                out[j, to + 1] = 0.0
                 out[j, to + 2] = value(workspace.reactions[f], 0, top - 2, u)
-                out[j, to + 3], out[j, to + 4], out[j, to + 5] = (
-                    row[at + 4],
-                    row[at + 5],
-                    row[at + 6],
-                )
+                out[j, to + 3] = row[at + 4]
+                out[j, to + 4] = row[at + 5]
+                out[j, to + 5] = row[at + 6]
                 continue
-            step, place = moved(workspace.polys[f], top, u), 0.0
+            step = moved(workspace.polys[f], top, u)
+            place = 0.0
             for i in range(n):
                 place += modal_system.faces[f, i] * out[j, i]
-            out[j, to], out[j, to + 1] = place, value(workspace.polys[f], 0, top - 1, u) / h
+            out[j, to] = place
+            out[j, to + 1] = value(workspace.polys[f], 0, top - 1, u) / h
             out[j, to + 2] = row[at] + row[at + 1] * step
             out[j, to + 3] = row[at + 4] + row[at + 2] * step
             out[j, to + 4] = row[at + 5] + (row[at] + 0.5 * row[at + 1] * step) * step
@@ -122,7 +128,9 @@ def evaluate(rows, owner, tau, modal_system, time_state, workspace, out):
 def peak(rows, modal_system, time_state, moving, workspace, reactions):
     """Largest |acceleration| [m s-2] of the output over the pieces of rows, that of a moving base included; reactions
     (i,) [N] becomes the largest of every interface while a rigid element holds it."""
-    best, poly, faces = 0.0, workspace.polys[len(modal_system.reach)], len(modal_system.reach)
+    best = 0.0
+    poly = workspace.polys[len(modal_system.reach)]
+    faces = len(modal_system.reach)
     workspace.held[0] = -1.0
     for f in range(faces):
         reactions[f] = 0.0

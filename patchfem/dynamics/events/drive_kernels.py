@@ -12,7 +12,11 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .series_kernels import TWICE
 
-SINE, LINE, CHIRP, LOG_CHIRP = 0.0, 1.0, 2.0, 3.0  # kinds of a segment
+# kinds of a segment
+SINE = 0.0
+LINE = 1.0
+CHIRP = 2.0
+LOG_CHIRP = 3.0
 (
     CYCLE,
     OFFSET,
@@ -46,7 +50,8 @@ def rate_of(segment, period):
 def phase_of(segment, cycle, offset, period):
     """Phase of the drive [rad], modulo 2 pi; along a straight line that of the cycle."""
     if segment[KIND] == SINE:
-        theta, gone = segment[PHASE] + segment[OMEGA] * offset, cycle - segment[CYCLE]
+        theta = segment[PHASE] + segment[OMEGA] * offset
+        gone = cycle - segment[CYCLE]
         if segment[TURNS] != 0.0:
             extra = gone * segment[TURNS]
             theta += 2 * pi * (extra - floor(extra) + gone * segment[TURNS_LEFT])
@@ -64,11 +69,9 @@ def phase_of(segment, cycle, offset, period):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def value_now(segment, cycle, offset, period):
     """Drive [m s-2] of a segment at a time (cycle, offset)."""
-    kind, theta, time = (
-        segment[KIND],
-        phase_of(segment, cycle, offset, period),
-        since(segment, cycle, offset, period),
-    )
+    kind = segment[KIND]
+    theta = phase_of(segment, cycle, offset, period)
+    time = since(segment, cycle, offset, period)
     if kind == LINE:
         return segment[CONSTANT] + segment[SLOPE] * time
     size = segment[AMPLITUDE]
@@ -88,10 +91,13 @@ def drive_series(segment, cycle, offset, period, h, top, waves):
 
     waves (3, >= top + 1): the rest is room.
     """
-    wave, kind, theta = waves[0], segment[KIND], phase_of(segment, cycle, offset, period)
+    wave = waves[0]
+    kind = segment[KIND]
+    theta = phase_of(segment, cycle, offset, period)
     if kind == SINE:
         turn = segment[OMEGA] * h
-        wave[0], wave[1] = segment[AMPLITUDE] * sin(theta), segment[AMPLITUDE] * cos(theta) * turn
+        wave[0] = segment[AMPLITUDE] * sin(theta)
+        wave[1] = segment[AMPLITUDE] * cos(theta) * turn
         for k in range(2, top + 1):
             wave[k] = -wave[k - 2] * (turn * turn * TWICE[k])
         wave[0] += segment[CONSTANT]
@@ -100,7 +106,8 @@ def drive_series(segment, cycle, offset, period, h, top, waves):
     if kind == LINE:
         for k in range(top + 1):
             wave[k] = 0.0
-        wave[0], wave[1] = segment[CONSTANT] + segment[SLOPE] * time, segment[SLOPE] * h
+        wave[0] = segment[CONSTANT] + segment[SLOPE] * time
+        wave[1] = segment[SLOPE] * h
         return
     omega = (
         segment[OMEGA] + segment[SLOPE] * time
@@ -120,22 +127,29 @@ def swept(kind, omega, theta, slope, h, top, waves):
 
     omega [rad/s] and theta: here; slope: of omega [rad/s] over u, or of its logarithm.
     """
-    wave, cosine, rate = waves[0], waves[1], waves[2]
-    wave[0], cosine[0], rate[0] = sin(theta), cos(theta), omega * h
+    wave = waves[0]
+    cosine = waves[1]
+    rate = waves[2]
+    wave[0] = sin(theta)
+    cosine[0] = cos(theta)
+    rate[0] = omega * h
     for k in range(1, top + 1):
         rate[k] = rate[k - 1] * slope / k if kind == LOG_CHIRP else slope * h if k == 1 else 0.0
     for k in range(top):
-        s, c = 0.0, 0.0
+        s = 0.0
+        c = 0.0
         for j in range(min(k + 1, 2) if kind == CHIRP else k + 1):
             s += rate[j] * cosine[k - j]
             c -= rate[j] * wave[k - j]
-        wave[k + 1], cosine[k + 1] = s / (k + 1), c / (k + 1)
+        wave[k + 1] = s / (k + 1)
+        cosine[k + 1] = c / (k + 1)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def squared(kind, omega, slope, top, waves):
     """Multiply waves[0] by the series of the swept omega squared."""
-    wave, square = waves[0], waves[2]
+    wave = waves[0]
+    square = waves[2]
     square[0] = omega * omega
     for k in range(1, top + 1):
         if kind == LOG_CHIRP:

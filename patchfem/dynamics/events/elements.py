@@ -41,7 +41,8 @@ def elements_of(stiffness, yield_slide) -> Elements:
 
     PatchfemError for values below zero or not finite.
     """
-    k, y = np.asarray(stiffness, float), np.asarray(yield_slide, float)
+    k = np.asarray(stiffness, float)
+    y = np.asarray(yield_slide, float)
     if not (np.isfinite(k).all() and np.isfinite(y).all() and (k >= 0).all() and (y >= 0).all()):
         raise PatchfemError(
             "friction: the stiffness and the yield slide of each element must be finite and >= 0"
@@ -52,7 +53,8 @@ def elements_of(stiffness, yield_slide) -> Elements:
     order = order[np.argsort(y[order], kind="stable")]
     new = np.ones(order.size, bool)
     new[1:] = np.diff(y[order]) > SAME * y[order][1:]
-    place, first = np.cumsum(new) - 1, np.flatnonzero(new)
+    place = np.cumsum(new) - 1
+    first = np.flatnonzero(new)
     rank = np.full(k.size, -1, np.int64)
     rank[order] = place
     stiff = np.add.reduceat(k[order], first) if first.size else np.zeros(0)
@@ -76,7 +78,8 @@ def coulomb(static: float, kinetic: float | None = None) -> Elements:
 def merged(parts: Elements, count: int = 2, first: int = 0) -> Elements:
     """Fewer elements: each `count` that yield one after the other as one of their stiffness and limit together, from
     the number `first` on, and those before it; of an odd number the last one stays."""
-    k, limit = parts.stiffness, parts.stiffness * parts.yield_slide
+    k = parts.stiffness
+    limit = parts.stiffness * parts.yield_slide
     if not k.size:
         return parts
     last = k.size % 2
@@ -121,7 +124,8 @@ def table_of(groups) -> Table:
     reach = np.full((len(groups), most + 1), np.inf)
     sums = np.zeros((3, len(groups), most + 1))
     for i, one in enumerate(groups):
-        k, y = one.stiffness, one.yield_slide
+        k = one.stiffness
+        y = one.yield_slide
         reach[i, : y.size] = y
         for j, part in enumerate((k, k * y, k * y * y)):
             sums[j, i, 1 : y.size + 1] = np.cumsum(part)
@@ -194,7 +198,8 @@ def stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
 
 def sorted_stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
     """Stretch (t,) [m] of every element in the order of the yield slides, of the interface `face`."""
-    out, y = np.zeros(group.yield_slide.size), group.yield_slide
+    out = np.zeros(group.yield_slide.size)
+    y = group.yield_slide
     first = int(memory.slipping[face])
     out[:first] = memory.way[face] * y[:first]
     for k in range(int(memory.depth[face]) - 1, -1, -1):

@@ -4,7 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-STOP, RELEASE, REVERSAL, BORDER = 0, 1, 2, 9
+STOP = 0
+RELEASE = 1
+REVERSAL = 2
+BORDER = 9
 ROOM = 400_000
 
 

@@ -32,7 +32,9 @@ CORNERS = 400_000  # turning points kept from before the window
 SHOWN = 1000  # cycles among those that repeat whose turning points are kept
 NOISE = 64 * 2.0**-52  # of what a speed is added from, below which it rests
 REPEATS = 2  # of `Past.about`
-LARGEST, SLIPPED = 5, 7  # of the ledger, no sums
+# of the ledger, no sums
+LARGEST = 5
+SLIPPED = 7
 SLIPS = 0.5  # share of the slide that is irreversible from which an interface slips
 WHOLE = 3  # cycles of a motion that repeats, which hold every stick of one of them whole
 
@@ -94,10 +96,8 @@ def expect(modes: ModalBasis, drive, groups, cycles: float, window: int, runs: i
     groups: Elements of every interface; cycles: of the drive in a run; window: of them kept whole.
     """
     march, dense, read = warm_up()
-    stiff, shown = (
-        max((float(one.stiffness.sum()) for one in groups), default=0.0),
-        min(cycles, window),
-    )
+    stiff = max((float(one.stiffness.sum()) for one in groups), default=0.0)
+    shown = min(cycles, window)
     each = python_seconds(modes, drive, stiff, sum(one.stiffness.size for one in groups))
     march.march.expect(runs * cycles * each)
     march.stored.expect(runs * each)
@@ -113,7 +113,8 @@ def is_loop_kept(modes: ModalBasis, drive) -> bool:
     """
     modal_system = plant_of(modes)
     table = table_of([coulomb(1.0)] * len(modal_system.faces))
-    motion, rows = np.zeros((2, modes.omega.size)), np.zeros((1, 1))
+    motion = np.zeros((2, modes.omega.size))
+    rows = np.zeros((1, 1))
     memory = virgin(table, np.zeros(len(modal_system.faces)))
     march = kernels(f"{HERE}.march_kernels").march
     return march.is_kept(
@@ -188,7 +189,8 @@ def briefly(cases, cycles: int, window: int) -> list:
 
     cases: (modes, drive, groups, start) of each. NotConverged where events pile up in one.
     """
-    out, run = [], None
+    out = []
+    run = None
     for modes, drive, groups, start in cases:
         run = _Run(modes, drive, groups, cycles, window, np.inf, start, None, run)
         out.append(run.brief())
@@ -215,10 +217,16 @@ class _Run:
     """
 
     def __init__(self, modes, drive, groups, cycles, window, travel, start, memory, like=None):
-        self.modes, self.drive, self.groups, self.window = modes, drive, tuple(groups), window
+        self.modes = modes
+        self.drive = drive
+        self.groups = tuple(groups)
+        self.window = window
         self.kernels, self.dense, self.reader = warm_up()
-        self.modal_system, old = plant_of(modes), like.arrays if like is not None else (None,) * 5
-        n, count, table = modes.omega.size, max(1, ceil(cycles - 1e-9)), table_of(self.groups)
+        self.modal_system = plant_of(modes)
+        old = like.arrays if like is not None else (None,) * 5
+        n = modes.omega.size
+        count = max(1, ceil(cycles - 1e-9))
+        table = table_of(self.groups)
         if np.any(~self.modal_system.faces.any(axis=1) & (table.static > 0)):
             raise PatchfemError(
                 "structure.mode.slide: no mode moves the interface, so friction cannot act"
@@ -239,18 +247,30 @@ class _Run:
         self.arrays = tuple(map(into, old, new))
         self.table, self.memory, self.past, self.time_state, self.books = self.arrays
         if like is not None and like.modal_system.faces.shape == self.modal_system.faces.shape:
-            self.workspace, self.scratch = cleared(like.workspace), like.scratch
+            self.workspace = cleared(like.workspace)
+            self.scratch = like.scratch
         else:
-            self.workspace, self.scratch = room_of(self.modal_system), room_of(self.modal_system)
-        self.motion, self.cycles, self.period = motion, cycles, drive.period
+            self.workspace = room_of(self.modal_system)
+            self.scratch = room_of(self.modal_system)
+        self.motion = motion
+        self.cycles = cycles
+        self.period = drive.period
         self.width = self.kernels.HEAD + 2 * n + self.kernels.EACH * len(self.groups)
-        self.early, self.even, self.kept, self.events, self.count = [], [], 0, [], 0
-        self.rigid, self.outcome, self.snapshots = bool(self.table.static.any()), None, []
+        self.early = []
+        self.even = []
+        self.kept = 0
+        self.events = []
+        self.count = 0
+        self.rigid = bool(self.table.static.any())
+        self.outcome = None
+        self.snapshots = []
         self.before = self._ways(
             self.modal_system.faces @ self.motion[1],
             np.abs(self.modal_system.faces) @ np.abs(self.motion[1]),
         )
-        self.passed, self.repeats, self.marked = False, False, np.zeros(0, bool)
+        self.passed = False
+        self.repeats = False
+        self.marked = np.zeros(0, bool)
         self.begun = self.kernels.stored(self.motion, self.modal_system, self.table, self.memory)
         still = self.kernels.stored(
             np.zeros_like(self.motion), self.modal_system, self.table, self.memory
@@ -266,10 +286,8 @@ class _Run:
 
         Where the motion repeats and rows are not wanted one by one, the cycles left are the last one.
         """
-        stop, rows = (
-            place(cycles * self.period, self.period),
-            self.rows[:0] if keep is None else self.rows,
-        )
+        stop = place(cycles * self.period, self.period)
+        rows = self.rows[:0] if keep is None else self.rows
         while not self.passed:
             code, done = self._march(stop, rows)
             if keep is not None:
@@ -291,7 +309,8 @@ class _Run:
         """(code, rows done (k, w)) of the compiled loop. What it sums is added as a whole: a million cycles of four
         pieces, added one by one, left the energies 6e-11 apart."""
         sums = self.books.ledger[:LARGEST]
-        before, sums[:] = sums.copy(), 0.0
+        before = sums.copy()
+        sums[:] = 0.0
         code, used = self.kernels.march(
             stop,
             self.motion,
@@ -349,7 +368,8 @@ class _Run:
             nonlocal last
             self._note(rows)
             if len(rows):
-                rows, last = np.concatenate([last, rows]), rows[-1:].copy()
+                rows = np.concatenate([last, rows])
+                last = rows[-1:].copy()
                 grid = step * np.arange(
                     ceil(rows[0, 0] / step), ceil((rows[-1, 0] + rows[-1, 1]) / step)
                 )
@@ -360,7 +380,9 @@ class _Run:
     def _count_on(self, end: int, rows) -> None:
         """Count the cycles up to the last one before the number `end`, or before the next segment of the drive, as the
         next one, bit by bit, of a motion that repeats; rows: room, where that cycle wants more all are run."""
-        books, begin, k = self.books, int(self.time_state.now[0]), int(self.time_state.now[2]) + 1
+        books = self.books
+        begin = int(self.time_state.now[0])
+        k = int(self.time_state.now[2]) + 1
         if k < len(self.time_state.segments):
             end = min(end, int(self.time_state.segments[k, 0]))
         end -= 1  # the last one is run: it crosses the border
@@ -368,11 +390,9 @@ class _Run:
         if many < 1:
             return
         sums = books.ledger, self.memory.worked, self.memory.lost
-        before, noted, asked = (
-            [part.copy() for part in sums],
-            (len(self.events), self.count),
-            books.wanted[begin],
-        )
+        before = [part.copy() for part in sums]
+        noted = (len(self.events), self.count)
+        asked = books.wanted[begin]
         books.wanted[begin] = 1.0
         code, done = self._march((begin + 1.0, 0.0), rows)
         books.wanted[begin] = asked
@@ -394,10 +414,8 @@ class _Run:
     def _again(self, rows, many: int, first: int, count: int, gained) -> None:
         """Keep the rows (k, w) of a cycle, of at most SHOWN of them, and its events from the list's number `first` on
         for `many` cycles more; gained: work and loss (i,) [J] of the elements in a cycle."""
-        turned, cycles = (
-            rows[self.marked],
-            np.unique(np.linspace(1, many, min(many, SHOWN)).round()),
-        )
+        turned = rows[self.marked]
+        cycles = np.unique(np.linspace(1, many, min(many, SHOWN)).round())
         again = _later(turned, self.period * cycles)
         for column, each in zip((5, 6), gained):
             for f, part in enumerate(each):
@@ -458,13 +476,12 @@ class _Run:
 
     def go(self, frames: int, progress, *, even: bool = False) -> PieceRun | None:
         """The whole run; None where its output passed the travel. even: as of `simulate`."""
-        end, wide, late, even = (
-            self.cycles,
-            [],
-            [],
-            stored_samples_per_cycle(self.drive, self.cycles, wanted=even),
-        )
-        first, last = max(0.0, end - self.window), max(0.0, end - 1)
+        end = self.cycles
+        wide = []
+        late = []
+        even = stored_samples_per_cycle(self.drive, self.cycles, wanted=even)
+        first = max(0.0, end - self.window)
+        last = max(0.0, end - 1)
         begin = max(0.0, min(first, end - 2))
         if begin > 0:
             self.until(begin, self._evenly(self.period / even) if even else self._keep, progress)
@@ -481,7 +498,8 @@ class _Run:
 
     def brief(self) -> PieceRun:
         """The run without histories and events; of a motion that repeats few cycles are read."""
-        end, late = self.cycles, []
+        end = self.cycles
+        late = []
         self.until(end - self.window)
         self.repeats = bool(self.past.about[REPEATS])
         if self.repeats:
@@ -502,18 +520,14 @@ class _Run:
 
     def _ended(self, late) -> np.ndarray:
         """Rows (k + 1, w) of the window, and one of no length for its end."""
-        head, each, n, memory = (
-            self.kernels.HEAD,
-            self.kernels.EACH,
-            self.modes.omega.size,
-            self.memory,
-        )
+        head = self.kernels.HEAD
+        each = self.kernels.EACH
+        n = self.modes.omega.size
+        memory = self.memory
         row = np.zeros((1, self.width))
-        row[0, 0], row[0, 3], row[0, 5:7] = (
-            self.now,
-            self.time_state.now[2],
-            self.time_state.now[:2],
-        )
+        row[0, 0] = self.now
+        row[0, 3] = self.time_state.now[2]
+        row[0, 5:7] = self.time_state.now[:2]
         row[0, head : head + n], row[0, head + n : head + 2 * n] = self.motion
         for k, part in (
             (0, memory.force),
@@ -549,7 +563,9 @@ class _Run:
 
     def _found(self, rows) -> PieceRun:
         """What the run shows without histories, off the rows of its window."""
-        begun, stop, faces = rows[0, 0], rows[-1, 0], len(self.groups)
+        begun = rows[0, 0]
+        stop = rows[-1, 0]
+        faces = len(self.groups)
         span = stop - begun
         numbers = np.zeros(OF_RUN), np.zeros((faces, OF_FACE))
         cycles = max(1, round(span / self.period))
@@ -584,7 +600,8 @@ class _Run:
             InitialState(*self.motion.copy()),
             type(self.memory)(*(part.copy() for part in self.memory)),
         )
-        ledger, phasors = self.books.ledger, self.books.phasors[done] @ [1, 1j]
+        ledger = self.books.ledger
+        phasors = self.books.phasors[done] @ [1, 1j]
         return PieceRun(
             self.books.extremes[done].copy(),
             phasors,
@@ -601,8 +618,12 @@ class _Run:
 
     def _close(self, wide, rows) -> PieceRun:
         """Everything kept, as a PieceRun."""
-        none, late, begun, stop = np.empty((0, self.width)), rows[:-1], rows[0, 0], rows[-1, 0]
-        early, wide = np.concatenate([none, *self.early]), np.concatenate([none, *wide])
+        none = np.empty((0, self.width))
+        late = rows[:-1]
+        begun = rows[0, 0]
+        stop = rows[-1, 0]
+        early = np.concatenate([none, *self.early])
+        wide = np.concatenate([none, *wide])
         number = max(LEAST, round((stop - begun) / self.period * SAMPLES) + 1)
         window = self.sample(late, np.linspace(begun, stop, number))
         parts = (
@@ -665,8 +686,11 @@ class _Run:
 
     def _as_response(self, out, time) -> Response:
         """Histories at `time` (k,) [s] from the columns of `dense_values`."""
-        modes, n = self.modes, self.modes.omega.size
-        z, v, push = out[:, :n].copy(), out[:, n : 2 * n].copy(), out[:, 2 * n]
+        modes = self.modes
+        n = self.modes.omega.size
+        z = out[:, :n].copy()
+        v = out[:, n : 2 * n].copy()
+        push = out[:, 2 * n]
         slides, rates, forces, slips, works, losses = (out[:, 2 * n + 1 + k :: 6] for k in range(6))
         base = push if self.drive.moving else np.zeros_like(push)
         accel = (
@@ -675,7 +699,8 @@ class _Run:
             - z * self.modal_system.square
             - forces @ self.modal_system.faces / modes.mass
         )
-        work, lost = works.sum(axis=1), losses.sum(axis=1)
+        work = works.sum(axis=1)
+        lost = losses.sum(axis=1)
         extra = {"ledger": np.stack([work, self.stretched + work - lost, lost, 0 * lost])}
         if len(self.groups) > 1:
             extra |= {"slides": slides, "slide_rates": rates, "forces": forces, "slips": slips}

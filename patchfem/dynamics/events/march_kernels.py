@@ -27,10 +27,21 @@ from .stick_kernels import LAST, at_rest, keep, settle
 from .sum_kernels import sums
 
 # how `march` returns; OPEN: no choice of what holds obeys the law
-DONE, FULL, TRAVEL, PILED, OPEN, REPEATS = 0, 1, 2, 3, 4, 5
-HEAD, EACH = 8, 9  # columns of a row: of the piece, then of every interface behind z and v
+DONE = 0
+FULL = 1
+TRAVEL = 2
+PILED = 3
+OPEN = 4
+REPEATS = 5
+# columns of a row: of the piece, then of every interface behind z and v
+HEAD = 8
+EACH = 9
 # what begins a row: nothing, a yield, a turning point, a change of stick and slip, a border of the drive
-ON, YIELDED, TURNED, SWITCHED, BORDERED = 0, 1, 2, 3, 4
+ON = 0
+YIELDED = 1
+TURNED = 2
+SWITCHED = 3
+BORDERED = 4
 AT_ONCE = 1e-12  # share of a piece in which what stood still stands still: two turning points at one place
 MOST_IDLE = 1000.0  # events in a row without progress
 
@@ -38,7 +49,8 @@ MOST_IDLE = 1000.0  # events in a row without progress
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def left_of(time_state, stop):
     """Time [s] to the next border: of the drive's segments, of the cycle, or `stop` (cycle, offset)."""
-    now, period = time_state.now, time_state.period[0]
+    now = time_state.now
+    period = time_state.period[0]
     left = period - now[1]
     if stop[0] == now[0]:
         left = min(left, stop[1] - now[1])
@@ -51,13 +63,12 @@ def left_of(time_state, stop):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def arrive(time_state, stop, left):
     """Step onto the border `left` [s] away; whether the drive changes there: to another sine, or by a jump."""
-    before, cycle, offset, changes = (
-        int(time_state.now[2]),
-        time_state.now[0],
-        time_state.now[1] + left,
-        False,
-    )
-    now, period = time_state.now, time_state.period[0]
+    before = int(time_state.now[2])
+    cycle = time_state.now[0]
+    offset = time_state.now[1] + left
+    changes = False
+    now = time_state.now
+    period = time_state.period[0]
     k = int(now[2]) + 1
     after = (
         k < time_state.segments.shape[0]
@@ -65,13 +76,16 @@ def arrive(time_state, stop, left):
         and time_state.segments[k, 1] - now[1] <= left
     )
     if after:
-        now[1], now[2] = time_state.segments[k, 1], k
+        now[1] = time_state.segments[k, 1]
+        now[2] = k
     elif stop[0] == now[0] and stop[1] - now[1] <= left:
         now[1] = stop[1]
     else:
-        now[0], now[1] = now[0] + 1, 0.0
+        now[0] = now[0] + 1
+        now[1] = 0.0
     if now[1] >= period:
-        now[0], now[1] = now[0] + 1, 0.0
+        now[0] = now[0] + 1
+        now[1] = 0.0
     k = int(now[2]) + 1
     if (
         k < time_state.segments.shape[0]
@@ -97,21 +111,22 @@ def write(row, motion, span, theta, first, modal_system, table, memory, time_sta
     every interface force, springs, share that slips, its limit, slip, work, loss, direction, slide."""
     n = len(modal_system.square)
     row[0] = time_state.now[0] * time_state.period[0] + time_state.now[1]
-    row[1], row[2], row[3], row[4], row[5], row[6] = (
-        span,
-        theta,
-        time_state.now[2],
-        first,
-        time_state.now[0],
-        time_state.now[1],
-    )
+    row[1] = span
+    row[2] = theta
+    row[3] = time_state.now[2]
+    row[4] = first
+    row[5] = time_state.now[0]
+    row[6] = time_state.now[1]
     for i in range(n):
-        row[HEAD + i], row[HEAD + n + i] = motion[0, i], motion[1, i]
+        row[HEAD + i] = motion[0, i]
+        row[HEAD + n + i] = motion[1, i]
     for f in range(len(modal_system.reach)):
         at = HEAD + 2 * n + EACH * f
         row[at] = memory.force[f]
         row[at + 1], row[at + 2], row[at + 3] = tangent(f, table, memory)
-        row[at + 4], row[at + 5], row[at + 6] = memory.slip[f], memory.worked[f], memory.lost[f]
+        row[at + 4] = memory.slip[f]
+        row[at + 5] = memory.worked[f]
+        row[at + 6] = memory.lost[f]
         row[at + 7] = (
             memory.way[f]
             if table.static[f] == 0.0
@@ -126,7 +141,9 @@ def write(row, motion, span, theta, first, modal_system, table, memory, time_sta
 def advance(u, h, top, motion, modal_system, table, memory, time_state, books, workspace):
     """Move coordinates, slides and elements to u, with the energies that the elements take; whether the output passes
     the travel."""
-    n, coefs, ledger = len(modal_system.square), workspace.coefs, books.ledger
+    n = len(modal_system.square)
+    coefs = workspace.coefs
+    ledger = books.ledger
     for f in range(len(modal_system.reach)):
         if holds(f, table, memory):
             memory.force[f] = value(workspace.reactions[f], 0, top - 2, u)
@@ -144,7 +161,8 @@ def advance(u, h, top, motion, modal_system, table, memory, time_state, books, w
             ledger[7] = 1.0
     out = 0.0
     for i in range(n):
-        place, rate = coefs[top, i], top * coefs[top, i]
+        place = coefs[top, i]
+        rate = top * coefs[top, i]
         for k in range(top - 1, 0, -1):
             place = place * u + coefs[k, i]
             rate = rate * u + k * coefs[k, i]
@@ -187,7 +205,8 @@ def stored(motion, modal_system, table, memory):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def enter(motion, modal_system, table, memory, time_state, workspace):
     """`settle` from here on, the guess and what rests being noted; whether a choice was found."""
-    segment, now = time_state.segments[int(time_state.now[2])], time_state.now
+    segment = time_state.segments[int(time_state.now[2])]
+    now = time_state.now
     for f in range(len(modal_system.reach)):
         stiff = tangent(f, table, memory)[0]
         workspace.springs[f] = (
@@ -206,7 +225,8 @@ def begin(motion, modal_system, table, memory, time_state, workspace):
     found."""
     rigid = False
     for f in range(len(modal_system.reach)):
-        speed, size = 0.0, 0.0
+        speed = 0.0
+        size = 0.0
         for i in range(len(modal_system.square)):
             part = modal_system.faces[f, i] * motion[1, i]
             speed += part
@@ -217,7 +237,8 @@ def begin(motion, modal_system, table, memory, time_state, workspace):
         )
         workspace.resting[f] = 1.0 if table.static[f] > 0.0 and not moves else 0.0
         rigid = rigid or table.static[f] > 0.0
-        workspace.orders[f, 0], workspace.orders[f, 1] = 0.0, 0.0
+        workspace.orders[f, 0] = 0.0
+        workspace.orders[f, 1] = 0.0
         if table.static[f] > 0.0:
             memory.head[f] = workspace.signs[f]
     return enter(motion, modal_system, table, memory, time_state, workspace) if rigid else True
@@ -268,11 +289,9 @@ def happen(what, face, sign, modal_system, table, memory, time_state):
 def piece_series(h, rate, slow, motion, force, modal_system, time_state, workspace):
     """Fill the workspace with the series of a piece of h [s] from here on; its highest power. rate: the fastest [1/s]; slow:
     as of `followed`, whose series the workspace has where it is not 0."""
-    top, now, segment = (
-        powers(rate * h),
-        time_state.now,
-        time_state.segments[int(time_state.now[2])],
-    )
+    top = powers(rate * h)
+    now = time_state.now
+    segment = time_state.segments[int(time_state.now[2])]
     if slow > 0.0:
         shortened(slow * h / REACH, top, len(modal_system.reach), workspace)
     else:
@@ -298,7 +317,8 @@ def passed(top, modal_system, motion, workspace, travel, u):
     faces = len(modal_system.reach)
     poly = workspace.polys[faces + 1]
     speed_series(modal_system.output, len(modal_system.square), workspace.coefs, top, poly)
-    here, step = output_of(motion, modal_system), moved(poly, top, u)
+    here = output_of(motion, modal_system)
+    step = moved(poly, top, u)
     if abs(here + step) <= travel or step == 0.0:
         return NONE
     return crossing(poly, top, (travel if step > 0 else -travel) - here, u, workspace.polys[faces])
@@ -327,7 +347,8 @@ def begin_piece(left, motion, modal_system, table, memory, time_state, workspace
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def cross_border(what, left, stop, motion, modal_system, table, memory, past, time_state):
     """Pass the end of a cycle or of a part of the drive: (whether the drive changes, whether the motion repeats)."""
-    changes, came = arrive(time_state, stop, left), False
+    changes = arrive(time_state, stop, left)
+    came = False
     if time_state.now[1] == 0.0 and what == NOTHING:
         came = come_back(motion, modal_system, memory, time_state, past)
     elif time_state.now[1] == 0.0:
@@ -346,8 +367,12 @@ def march(stop, motion, modal_system, table, memory, past, time_state, books, wo
     OPEN, or REPEATS at the first border from where on every cycle is the last one bit by bit, rows used). Where it goes
     on does not change a bit. Cost: 0.2 to 0.5 us a piece of one mode.
     """
-    used, now, came, faces = 0, time_state.now, False, len(modal_system.reach)
-    first, now[3] = max(now[3], float(YIELDED)), 0.0
+    used = 0
+    now = time_state.now
+    came = False
+    faces = len(modal_system.reach)
+    first = max(now[3], float(YIELDED))
+    now[3] = 0.0
     if workspace.orders[0, 0] < 0.0 and not begin(
         motion, modal_system, table, memory, time_state, workspace
     ):
@@ -358,7 +383,9 @@ def march(stop, motion, modal_system, table, memory, past, time_state, books, wo
     now[5] = 0.0
     while now[0] < stop[0] or (now[0] == stop[0] and now[1] < stop[1]):
         if used == rows.shape[0] and used > 0:
-            now[3], now[5] = first, 1.0  # the forces go on as they are
+            # the forces go on as they are
+            now[3] = first
+            now[5] = 1.0
             return FULL, used
         left = left_of(time_state, stop)
         theta = phase_of(time_state.segments[int(now[2])], now[0], now[1], time_state.period[0])
@@ -368,8 +395,10 @@ def march(stop, motion, modal_system, table, memory, past, time_state, books, wo
         if books.limits[0] < 1e300 and u > 0:
             root = passed(top, modal_system, motion, workspace, books.limits[0], u)
             if root <= u:
-                u, what = root, STOPS
-        switches, changes = (what == TURNS or what == RELEASES) and table.static[face] > 0.0, False
+                u = root
+                what = STOPS
+        switches = (what == TURNS or what == RELEASES) and table.static[face] > 0.0
+        changes = False
         if switches or whole:
             at_rest(u, h, top, modal_system, table, memory, workspace)
         if u > 0:
@@ -385,7 +414,8 @@ def march(stop, motion, modal_system, table, memory, past, time_state, books, wo
                 for f in range(faces + 1):
                     time_state.rest[f] = 0.0
             for f in range(faces):
-                workspace.orders[f, 0], workspace.orders[f, 1] = 0.0, 0.0
+                workspace.orders[f, 0] = 0.0
+                workspace.orders[f, 1] = 0.0
             advance(u, h, top, motion, modal_system, table, memory, time_state, books, workspace)
             # an event on the border, to the last digit
             if whole and (u == 1.0 or now[1] + u * h >= now[1] + left):

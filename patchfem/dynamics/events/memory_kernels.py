@@ -21,7 +21,8 @@ RIGID = inf  # stiffness of an element that holds the slide
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def threshold(face, way, table, memory):
     """Slide [m] at which the next element of an interface slips in the direction `way`; infinite where all slip."""
-    first, top = memory.slipping[face], memory.depth[face] - 1
+    first = memory.slipping[face]
+    top = memory.depth[face] - 1
     return (
         memory.at[face, top] + (way - memory.side[face, top]) * table.reach[face, first]
         if first < table.count[face] and memory.side[face, top] != way
@@ -79,15 +80,14 @@ def pulled(face, table, memory):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def carried(face, table, memory):
     """(force [N], elastic energy [J]) of the elements of an interface, group by group."""
-    first, place = memory.slipping[face], memory.place[face]
+    first = memory.slipping[face]
+    place = memory.place[face]
     force = memory.way[face] * table.limit[face, first]
     energy = table.twice[face, first]
     for top in range(memory.depth[face] - 1, -1, -1):
-        end, side, far = (
-            memory.upto[face, top],
-            memory.side[face, top],
-            place - memory.at[face, top],
-        )
+        end = memory.upto[face, top]
+        side = memory.side[face, top]
+        far = place - memory.at[face, top]
         stiff = table.stiff[face, end] - table.stiff[face, first]
         limit = table.limit[face, end] - table.limit[face, first]
         force += side * limit + far * stiff
@@ -102,15 +102,16 @@ def carried(face, table, memory):
 def tangent(face, table, memory):
     """(stiffness [N/m] of the elements that hold, share of the friction limit of those that slip, their limit [N]); of
     a rigid element that holds the stiffness is infinite. What has no elements slips freely."""
-    first, all_of = memory.slipping[face], table.count[face]
-    limit, whole = table.limit[face, first], table.limit[face, all_of]
-    stiff, slips = (
-        max(table.stiff[face, all_of] - table.stiff[face, first], 0.0),
-        1.0 if all_of == 0 else 0.0,
-    )
+    first = memory.slipping[face]
+    all_of = table.count[face]
+    limit = table.limit[face, first]
+    whole = table.limit[face, all_of]
+    stiff = max(table.stiff[face, all_of] - table.stiff[face, first], 0.0)
+    slips = 1.0 if all_of == 0 else 0.0
     if table.static[face] > 0.0:
         if memory.head[face] == 0.0:
             return RIGID, 0.0, 0.0
         slips = 1.0 if abs(memory.head[face]) == 1.0 else 0.0
-        limit, whole = limit + slips * table.kinetic[face], whole + table.kinetic[face]
+        limit = limit + slips * table.kinetic[face]
+        whole = whole + table.kinetic[face]
     return stiff, limit / whole if whole > 0 else slips, limit

@@ -9,7 +9,8 @@ from ...core import ModalBasis, PatchfemError
 from .elements import Memory, Table, virgin
 
 SLOW = 0.02  # of the slowest rate of the modes
-kinds, series = kernels("dynamics.events.drive_kernels"), kernels("dynamics.events.series_kernels")
+kinds = kernels("dynamics.events.drive_kernels")
+series = kernels("dynamics.events.series_kernels")
 
 
 class ModalSystem(NamedTuple):
@@ -42,7 +43,8 @@ class ModalSystem(NamedTuple):
 
 def plant_of(modes: ModalBasis) -> ModalSystem:
     """The Plant of a basis."""
-    damping, faces = np.array(modes.damping_matrix, float), np.array(modes.interfaces, float)
+    damping = np.array(modes.damping_matrix, float)
+    faces = np.array(modes.interfaces, float)
     output = np.array(modes.output, float)
     along = next(
         (
@@ -54,11 +56,13 @@ def plant_of(modes: ModalBasis) -> ModalSystem:
     )
     coupled = len(damping) > 1 and bool(np.any(damping != np.diag(np.diag(damping))))
     most = np.linalg.norm(damping, 2) if coupled else np.abs(damping).max()
-    square, reach = np.array(modes.omega, float) ** 2, (faces**2).sum(axis=1) / modes.mass
+    square = np.array(modes.omega, float) ** 2
+    reach = (faces**2).sum(axis=1) / modes.mass
     least = float(square.min())
     slow = SLOW * min(np.sqrt(least), least / max(most, 1e-300)) if np.diag(damping).all() else 0.0
     if faces.shape == (1, 1):
-        square, reach = tuple(square.tolist()), tuple(reach.tolist())
+        square = tuple(square.tolist())
+        reach = tuple(reach.tolist())
     return ModalSystem(
         square,
         np.ascontiguousarray(damping),
@@ -103,7 +107,8 @@ def segments_of(drive) -> np.ndarray:
         rows = (_swept if hasattr(drive, "low") else _lines)(drive)
     out = np.zeros((len(rows), 12))
     for row, (start, *numbers) in zip(out, rows):
-        row[:2], row[2 : 2 + len(numbers)] = place(start, period), numbers
+        row[:2] = place(start, period)
+        row[2 : 2 + len(numbers)] = numbers
     return out
 
 
@@ -140,7 +145,9 @@ def _sine(part, period: float) -> tuple:
 
 def _swept(sweep) -> list:
     """The sweep, then the sine at its last frequency."""
-    low, high, span = 2 * np.pi * sweep.low, 2 * np.pi * sweep.high, sweep.duration
+    low = 2 * np.pi * sweep.low
+    high = 2 * np.pi * sweep.high
+    span = sweep.duration
     log = sweep.logarithmic and high != low
     slope = np.log(high / low) / span if log else (high - low) / span
     moved = sweep.displacement is not None

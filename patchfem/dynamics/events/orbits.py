@@ -36,16 +36,20 @@ class Orbits:
     """
 
     def __init__(self, modes: ModalBasis, groups):
-        self.kernels, self.one = load("dynamics.events.march_kernels"), PeriodMap(modes, groups)
-        self.march, self.peak = self.kernels.march, load("dynamics.events.dense_kernels").peak
+        self.kernels = load("dynamics.events.march_kernels")
+        self.one = PeriodMap(modes, groups)
+        self.march = self.kernels.march
+        self.peak = load("dynamics.events.dense_kernels").peak
         self.wide = self.kernels.HEAD + 2 * modes.omega.size + self.kernels.EACH * len(groups)
-        self.rows, self.books = np.zeros((ROWS, self.wide)), books_of(1, np.ones(1))
+        self.rows = np.zeros((ROWS, self.wide))
+        self.books = books_of(1, np.ones(1))
         self.forces = np.zeros(len(groups))
         self.past = past_of(self.one.modal_system, self.one.table)
         self._given(modes)
 
     def _given(self, modes: ModalBasis) -> None:
-        self.modes, self.held = modes, {}
+        self.modes = modes
+        self.held = {}
         self.gauge = None if modes.gauge is None else plant_of(replace(modes, output=modes.gauge))
 
     def renewed(self, modes: ModalBasis, groups) -> bool:
@@ -73,7 +77,8 @@ class Orbits:
 
     def window(self, drive, point: Point) -> Response:
         """Histories of the period from a Point on."""
-        n, memory = self.one.n, self.one.placed(point)
+        n = self.one.n
+        memory = self.one.placed(point)
         start = InitialState(point.motion[:n], point.motion[n:])
         return histories.simulate(
             self.modes, drive, self.one.groups, 1.0, 1, np.inf, 0, None, start, memory
@@ -81,7 +86,8 @@ class Orbits:
 
     def _fits(self, near: Point | None) -> bool:
         """Whether a Point is one of these modes and elements."""
-        still, count = self.one.still, self.one.table.count
+        still = self.one.still
+        count = self.one.table.count
         return (
             near is not None
             and near.motion.size == 2 * self.one.n
@@ -92,16 +98,16 @@ class Orbits:
     def _half(self, drive, point: Point, modal_system) -> tuple:
         """(pieces, largest output [m]) of half a period from a Point, the pieces in `rows`; the other half turns
         over."""
-        one, books, stop = self.one, self.books, (0.0, drive.period / 2)
+        one = self.one
+        books = self.books
+        stop = (0.0, drive.period / 2)
         while True:
             one.begin(drive, point)
             self.march.expect(one.seconds / 2)
-            books.ledger[:], books.phasors[:], books.limits[1], books.extremes[:] = (
-                0.0,
-                0.0,
-                0.0,
-                (np.inf, -np.inf),
-            )
+            books.ledger[:] = 0.0
+            books.phasors[:] = 0.0
+            books.limits[1] = 0.0
+            books.extremes[:] = (np.inf, -np.inf)
             code, used = self.march.call_with_bound_args(self._held("march", modal_system), stop)
             if code == self.kernels.DONE:
                 return used, float(max(books.extremes[0, 1], -books.extremes[0, 0]))
@@ -110,11 +116,13 @@ class Orbits:
                     "dynamics: within a period the contact changes between stick and slip again and "
                     "again without time passing"
                 )
-            self.rows, self.held = np.zeros((2 * len(self.rows), self.wide)), {}
+            self.rows = np.zeros((2 * len(self.rows), self.wide))
+            self.held = {}
 
     def _held(self, name: str, modal_system, moving: float = 0.0) -> tuple:
         """What a compiled function is called with."""
-        one, key = self.one, (name, id(modal_system), moving)
+        one = self.one
+        key = (name, id(modal_system), moving)
         if key not in self.held:
             self.held[key] = (
                 self.peak.held(modal_system, one.time_state, moving, one.workspace, self.forces)

@@ -43,7 +43,9 @@ class Point(NamedTuple):
 
     def moved(self, numbers) -> "Point":
         """The Point of other numbers in a row, the same elements in every group."""
-        memory, count, turned = copied(self.memory), self.motion.size, self.turned
+        memory = copied(self.memory)
+        count = self.motion.size
+        turned = self.turned
         memory.at[turned] = numbers[count:]
         return Point(np.array(numbers[:count]), memory, turned)
 
@@ -86,24 +88,30 @@ class PeriodMap:
     """
 
     def __init__(self, modes: ModalBasis, groups):
-        self.follow, self.n = load("dynamics.events.slope_kernels").follow, modes.omega.size
+        self.follow = load("dynamics.events.slope_kernels").follow
+        self.n = modes.omega.size
         self._given(modes, groups)
         faces = len(self.groups)
-        self.workspace, self.books = room_of(self.modal_system), books_of(2, np.zeros(2))
+        self.workspace = room_of(self.modal_system)
+        self.books = books_of(2, np.zeros(2))
         self.scratch = np.zeros((2, self.n)), np.zeros(faces), np.zeros_like(self.workspace.coefs)
-        self.motion, self.memory = np.zeros((2, self.n)), copied(self.still)
-        self.seen, self.carried = np.zeros((2, faces), np.int64), {}
-        self.drive, self.time_state, self.clocks, self.seconds = None, None, {}, 0.0
+        self.motion = np.zeros((2, self.n))
+        self.memory = copied(self.still)
+        self.seen = np.zeros((2, faces), np.int64)
+        self.carried = {}
+        self.drive = None
+        self.time_state = None
+        self.clocks = {}
+        self.seconds = 0.0
 
     def _given(self, modes: ModalBasis, groups) -> None:
         """Take modes and elements."""
-        self.modes, self.groups, self.modal_system, self.table = (
-            modes,
-            tuple(groups),
-            plant_of(modes),
-            table_of(groups),
-        )
-        self.faces, self.held = self.modal_system.faces, {}
+        self.modes = modes
+        self.groups = tuple(groups)
+        self.modal_system = plant_of(modes)
+        self.table = table_of(groups)
+        self.faces = self.modal_system.faces
+        self.held = {}
         self.still = virgin(self.table, np.zeros(len(self.groups)))
 
     def renewed(self, modes: ModalBasis, groups) -> bool:
@@ -141,13 +149,18 @@ class PeriodMap:
         """
         if drive is not self.drive:
             self._under(drive)
-        time_state, books = self.time_state, self.books
+        time_state = self.time_state
+        books = self.books
         self.motion[:] = point.motion.reshape(2, self.n)
         for mine, given in zip(self.memory, point.memory):
             mine[...] = given
         self.memory.place[:] = self.faces @ self.motion[0]
-        time_state.now[:], time_state.rest[:], books.ledger[:], books.limits[1] = 0.0, 0.0, 0.0, 0.0
-        books.extremes[:], self.workspace.orders[:] = (np.inf, -np.inf), -1.0
+        time_state.now[:] = 0.0
+        time_state.rest[:] = 0.0
+        books.ledger[:] = 0.0
+        books.limits[1] = 0.0
+        books.extremes[:] = (np.inf, -np.inf)
+        self.workspace.orders[:] = -1.0
 
     def _under(self, drive) -> None:
         """Set the clock to a sine; it is made once for each of the last drives."""
@@ -166,23 +179,26 @@ class PeriodMap:
         if self.time_state is None:
             self.time_state = Clock(*(part.copy() for part in time_state))
         self.drive = drive
-        self.time_state.segments[:], self.time_state.period[:] = (
-            time_state.segments,
-            time_state.period,
-        )
+        self.time_state.segments[:] = time_state.segments
+        self.time_state.period[:] = time_state.period
 
     def __call__(self, drive, point: Point, half: bool, slopes: bool = True) -> Map:
         """The Map of a Point over a period of a sine, or over half of one. NotConverged where events pile up,
         PatchfemError for a drive that does not repeat; without `slopes` that of the Map is empty."""
         self.begin(drive, point)
-        n, memory, seen, period = self.n, self.memory, self.seen, drive.period
+        n = self.n
+        memory = self.memory
+        seen = self.seen
+        period = drive.period
         face, group = point.turned
         size = 2 * n + face.size if slopes else 0
         slope, marks, unit = self._carried(size)
         if slopes:
-            slope[:], marks[:, : memory.depth.max(initial=0)] = unit, 0.0
+            slope[:] = unit
+            marks[:, : memory.depth.max(initial=0)] = 0.0
             marks[face, group, np.arange(2 * n, size)] = 1.0
-        seen[0], seen[1] = memory.slipping, memory.depth
+        seen[0] = memory.slipping
+        seen[1] = memory.depth
         self.follow.expect(self.seconds * (SLOPES if slopes else 1.0) / (1 + half))
         if size not in self.held:
             self.held[size] = self.follow.held(

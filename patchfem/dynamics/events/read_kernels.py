@@ -56,14 +56,12 @@ RESTS = 1e-9  # of the largest rate: slower is at rest
 MOVES = 1e-13  # of the range: a piece with less motion is a rest
 NEAR = 0.003  # of a period, in which a turn beyond the border of a cycle counts for it
 # columns of an interface in a row, behind its force
-SPRING, SHARE, SLIP, WORKED, WAY, PLACE = (
-    1,
-    2,
-    4,
-    5,
-    7,
-    8,
-)
+SPRING = 1
+SHARE = 2
+SLIP = 4
+WORKED = 5
+WAY = 7
+PLACE = 8
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -99,7 +97,8 @@ def closing_force(rows, j, face, modal_system):
 def acceleration(top, h, modal_system, moving, workspace, best):
     """The larger of `best` and the largest |acceleration| [m s-2] of the output over the piece in the workspace, whose
     series is left in the last row but one of workspace.polys; moving: 1 where the base moves."""
-    poly, whole = workspace.polys[len(modal_system.reach) + 1], 0.0
+    poly = workspace.polys[len(modal_system.reach) + 1]
+    whole = 0.0
     for k in range(top - 1):
         part = 0.0
         for i in range(len(modal_system.square)):
@@ -113,28 +112,32 @@ def acceleration(top, h, modal_system, moving, workspace, best):
 def integrals(row, h, top, border, modal_system, time_state, workspace, run, faces):
     """Add the integrals over the piece of a row, in the workspace, to the numbers; border: (whether it lies in the first
     cycle, in the last)."""
-    omega, own = (
-        2 * pi / time_state.period[0],
-        fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0,
-    )
+    omega = 2 * pi / time_state.period[0]
+    own = fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0
     count = points(0.5 * h * (max(own, time_state.segments[int(row[3]), RATE]) + 3 * omega))
     friction_force = workspace.polys[len(modal_system.reach) + 1]
     for g in range(count):
-        u, w = _PLACE[count, g], h * _WEIGHT[count, g]
+        u = _PLACE[count, g]
+        w = h * _WEIGHT[count, g]
         angle = omega * (row[6] + h * u)
-        cosine, sine, gain = cos(angle), sin(angle), w * value(friction_force, 0, top - 2, u)
+        cosine = cos(angle)
+        sine = sin(angle)
+        gain = w * value(friction_force, 0, top - 2, u)
         run[A_COS] += gain * cosine
         run[A_SIN] += gain * sine
         run[A3_COS] += gain * cosine * (4 * cosine * cosine - 3)
         run[A3_SIN] += gain * sine * (3 - 4 * sine * sine)
         for f in range(len(modal_system.reach)):
-            at, out = first_of(f, modal_system), faces[f]
-            slide, pull = w * slide_of(row, f, modal_system), 0.0
+            at = first_of(f, modal_system)
+            out = faces[f]
+            slide = w * slide_of(row, f, modal_system)
+            pull = 0.0
             if workspace.springs[f] == RIGID:
                 pull = w * value(workspace.reactions[f], 0, top - 2, u)
             else:
                 step = moved(workspace.polys[f], top, u)
-                slide, pull = slide + w * step, w * (row[at] + row[at + SPRING] * step)
+                slide = slide + w * step
+                pull = w * (row[at] + row[at + SPRING] * step)
                 out[PASSED] += abs(pull * value(workspace.polys[f], 0, top - 1, u)) / h
             out[Q_COS] += slide * cosine
             out[Q_SIN] += slide * sine
@@ -157,7 +160,8 @@ def ends(row, modal_system, run, faces):
         run[REACH] = max(run[REACH], abs(row[HEAD + i]))
     run[OUT_LOW], run[OUT_HIGH] = min(run[OUT_LOW], out), max(run[OUT_HIGH], out)
     for f in range(len(modal_system.reach)):
-        one, at = faces[f], first_of(f, modal_system)
+        one = faces[f]
+        at = first_of(f, modal_system)
         slide = slide_of(row, f, modal_system)
         one[LOW], one[HIGH] = min(one[LOW], slide), max(one[HIGH], slide)
         one[SLIP_LOW], one[SLIP_HIGH] = (
@@ -170,13 +174,15 @@ def ends(row, modal_system, run, faces):
 def forces(rows, j, top, modal_system, workspace, faces):
     """Take the forces over the row j, whose piece is in the workspace, and the work by its ends."""
     for f in range(len(modal_system.reach)):
-        one, at = faces[f], first_of(f, modal_system)
+        one = faces[f]
+        at = first_of(f, modal_system)
         if rows[j, at + SHARE] < SLIPS:
             one[STUCK] += rows[j, 1]
         if workspace.springs[f] == RIGID:
             one[FORCE] = largest(workspace.reactions[f], top - 2, one[FORCE], workspace.hulls)
             continue
-        force, last = rows[j, at], closing_force(rows, j, f, modal_system)
+        force = rows[j, at]
+        last = closing_force(rows, j, f, modal_system)
         one[FORCE] = max(one[FORCE], abs(force), abs(last))
         one[TURNED] += (
             0.5
@@ -189,7 +195,8 @@ def forces(rows, j, top, modal_system, workspace, faces):
 def force_at(rows, j, used, face, modal_system, least):
     """Force [N] of an interface at a turn where the row j begins: the mean of what it is before and after the slide
     rests there, NaN where it jumps and one of both is not known; least [m]: less is no motion."""
-    back, on = j - 1, j
+    back = j - 1
+    on = j
     while (
         back >= 0
         and abs(
@@ -228,12 +235,17 @@ def turn_near(rows, j, used, forward, face, modal_system, period, slow):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def turns(rows, used, cycles, face, modal_system, period, out):
     """Mean range [m] and secant stiffness [N/m] of the cycles of an interface."""
-    fast, seen, low, begun = 0.0, 0, 0, rows[0, 0]
+    fast = 0.0
+    seen = 0
+    low = 0
+    begun = rows[0, 0]
     for j in range(used + 1):
         fast = max(fast, abs(rate_of(rows[j], face, modal_system)))
     least = MOVES * (out[HIGH] - out[LOW])
     for k in range(cycles):
-        top, bottom, high = low, low, low
+        top = low
+        bottom = low
+        high = low
         while high < used and rows[high, 0] + 0.5 * rows[high, 1] < begun + (k + 1) * period:
             high += 1
             slide = slide_of(rows[high], face, modal_system)
@@ -263,7 +275,9 @@ def turns(rows, used, cycles, face, modal_system, period, out):
 def rung(rows, first, last, modal_system, segment, out):
     """Note what rings over the rows first to last - 1, a stick of one mode behind one interface: the angle by which
     free motion turns, and by the rule of `response.ringing` its largest acceleration."""
-    swing, row, damp = 0.0, rows[first], modal_system.damping[0, 0]
+    swing = 0.0
+    row = rows[first]
+    damp = modal_system.damping[0, 0]
     spring = first_of(0, modal_system) + SPRING
     for j in range(first, last):
         swing += (
@@ -278,21 +292,25 @@ def rung(rows, first, last, modal_system, segment, out):
             * rows[j, 1]
         )
     out[SWING] = max(out[SWING], swing)
-    beta, omega = modal_system.square[0] + row[spring] * modal_system.reach[0], segment[OMEGA]
-    own, far, side = beta - 0.25 * damp * damp, beta - omega * omega, damp * omega
+    beta = modal_system.square[0] + row[spring] * modal_system.reach[0]
+    omega = segment[OMEGA]
+    own = beta - 0.25 * damp * damp
+    far = beta - omega * omega
+    side = damp * omega
     whole = far * far + side * side
     if own <= 0.0 or whole <= 1e-18 * beta * beta:
         return
     own = sqrt(own)
-    push, pull = (
-        modal_system.base[0] * segment[AMPLITUDE],
-        modal_system.faces[0, 0] * row[spring - 1] / modal_system.mass,
-    )
-    sine, cosine = -push * sin(row[2]), -push * cos(row[2])
+    push = modal_system.base[0] * segment[AMPLITUDE]
+    pull = modal_system.faces[0, 0] * row[spring - 1] / modal_system.mass
+    sine = -push * sin(row[2])
+    cosine = -push * cos(row[2])
     rest = -modal_system.base[0] * segment[CONSTANT] - modal_system.square[0] * row[HEAD] - pull
     z = -rest / beta - (far * sine - side * cosine) / whole
     v = row[HEAD + 1] - omega * (far * cosine + side * sine) / whole
-    other, ratio, span = (v + 0.5 * damp * z) / own, own / omega, rows[last, 0] - row[0]
+    other = (v + 0.5 * damp * z) / own
+    ratio = own / omega
+    span = rows[last, 0] - row[0]
     damping = 0.5 * damp / sqrt(beta)
     forced = span * omega > 3 * pi and damping < 1e-3 and abs(ratio - round(ratio)) < 1e-2
     if span * own >= 3 * pi and damping < 0.5 and not forced:
@@ -302,9 +320,14 @@ def rung(rows, first, last, modal_system, segment, out):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def changes(rows, used, modal_system, time_state, out):
     """Releases and sticks of the first interface."""
-    begun, period, at = rows[0, 0], time_state.period[0], first_of(0, modal_system)
+    begun = rows[0, 0]
+    period = time_state.period[0]
+    at = first_of(0, modal_system)
     alone = len(modal_system.square) == 1 and len(modal_system.reach) == 1
-    waits, phase, begun_at, segment = False, 0.0, begun, time_state.segments[int(rows[0, 3])]
+    waits = False
+    phase = 0.0
+    begun_at = begun
+    segment = time_state.segments[int(rows[0, 3])]
     last = rows[0, at + WAY] if rows[0, at + SHARE] >= SLIPS else 0.0
     held = 0 if last == 0.0 else -1
     for j in range(used + 1):
@@ -315,11 +338,9 @@ def changes(rows, used, modal_system, time_state, out):
             out[STARTS] += 1.0
             out[START_COS] += cos(2 * phase)
             out[START_SIN] += sin(2 * phase)
-        waits, phase, begun_at = (
-            last == 0.0 and way != 0.0 and rows[j, 0] > begun,
-            rows[j, 2],
-            rows[j, 0],
-        )
+        waits = last == 0.0 and way != 0.0 and rows[j, 0] > begun
+        phase = rows[j, 2]
+        begun_at = rows[j, 0]
         if held >= 0 and (way != 0.0 or j == used):
             if alone and rows[held, at + SPRING] < RIGID:
                 rung(rows, held, j, modal_system, segment, out)
@@ -336,16 +357,22 @@ def read(rows, cycles, modal_system, time_state, moving, workspace, run, faces):
     rows (k + 1, w): as `march_kernels.march` writes them, and one of no length for the end; cycles: whole ones among
     them, each of which ends with a piece; moving: 1 where the base moves. Cost: 1 us a piece of one mode.
     """
-    used, period = rows.shape[0] - 1, time_state.period[0]
-    run[:], faces[:], workspace.held[0] = 0.0, 0.0, -1.0
-    run[OUT_LOW], run[OUT_HIGH] = inf, -inf
+    used = rows.shape[0] - 1
+    period = time_state.period[0]
+    run[:] = 0.0
+    faces[:] = 0.0
+    workspace.held[0] = -1.0
+    run[OUT_LOW] = inf
+    run[OUT_HIGH] = -inf
     for f in range(len(modal_system.reach)):
-        one, at = faces[f], first_of(f, modal_system)
-        one[LOW], one[HIGH], one[SLIP_LOW], one[SLIP_HIGH] = inf, -inf, inf, -inf
-        one[BEGIN], one[END] = (
-            slide_of(rows[0], f, modal_system),
-            slide_of(rows[used], f, modal_system),
-        )
+        one = faces[f]
+        at = first_of(f, modal_system)
+        one[LOW] = inf
+        one[HIGH] = -inf
+        one[SLIP_LOW] = inf
+        one[SLIP_HIGH] = -inf
+        one[BEGIN] = slide_of(rows[0], f, modal_system)
+        one[END] = slide_of(rows[used], f, modal_system)
         one[WORK] = rows[used, at + WORKED] - rows[0, at + WORKED]
     for j in range(used + 1):
         ends(rows[j], modal_system, run, faces)

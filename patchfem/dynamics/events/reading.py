@@ -99,10 +99,8 @@ def ring_of(modal_system, table, reading: Reading) -> tuple | None:
     """
     if table.count[0] > 1:
         return (0.0, 0.0, 0.0) if reading.run[at.SWING] < RINGS else None
-    beta, half = (
-        modal_system.square[0] + table.stiff[0, -1] * modal_system.reach[0],
-        modal_system.damping[0, 0] / 2,
-    )
+    beta = modal_system.square[0] + table.stiff[0, -1] * modal_system.reach[0]
+    half = modal_system.damping[0, 0] / 2
     own = np.sqrt(max(beta - half**2, 0.0))
     return (
         (float(reading.run[at.RING]), float(own), float(half / np.sqrt(beta)))

@@ -13,7 +13,9 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .drive_kernels import KIND, SINE
 
-NEAR, FAR = 1e-14, 1e-10  # of the size of the motion
+# of the size of the motion
+NEAR = 1e-14
+FAR = 1e-10
 SOON = 9000.0  # cycles from FAR to NEAR at most: what is left is then below 1000 NEAR, 1e-11 of the motion
 SEGMENT, APART, REPEATS = range(3)  # of `Past.about`
 
@@ -22,10 +24,14 @@ SEGMENT, APART, REPEATS = range(3)  # of `Past.about`
 def apart(motion, modal_system, memory, time_state, past):
     """(largest difference of the state from that one period before, size of the motion), both [m]; the difference is
     endless where other elements slip or stay, or where the drive is no sine."""
-    omega, most, size, segment = 2 * pi / time_state.period[0], 0.0, 0.0, int(time_state.now[2])
+    omega = 2 * pi / time_state.period[0]
+    most = 0.0
+    size = 0.0
+    segment = int(time_state.now[2])
     for i in range(len(modal_system.square)):
         rate = max(omega, sqrt(modal_system.square[i]))
-        z, v = past.motion[0, i], past.motion[1, i]
+        z = past.motion[0, i]
+        v = past.motion[1, i]
         size = max(size, max(abs(z), abs(motion[0, i])), max(abs(v), abs(motion[1, i])) / rate)
         most = max(most, abs(motion[0, i] - z), abs(motion[1, i] - v) / rate)
     if past.about[SEGMENT] != segment or time_state.segments[segment, KIND] != SINE:
@@ -51,7 +57,8 @@ def apart(motion, modal_system, memory, time_state, past):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def forget(past):
     """Let no state be noted."""
-    past.about[SEGMENT], past.about[REPEATS] = -1.0, 0.0
+    past.about[SEGMENT] = -1.0
+    past.about[REPEATS] = 0.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -60,33 +67,35 @@ def come_back(motion, modal_system, memory, time_state, past):
 
     Then, and at all borders from there on, it takes the digits of that state; else it is noted in past.
     """
-    about, old = past.about, past.memory
+    about = past.about
+    old = past.memory
     most, size = apart(motion, modal_system, memory, time_state, past)
     if most > FAR * size:
         about[APART] = time_state.now[0]
     if most <= NEAR * size and (about[REPEATS] == 1.0 or time_state.now[0] - about[APART] <= SOON):
         for i in range(len(modal_system.square)):
-            motion[0, i], motion[1, i] = past.motion[0, i], past.motion[1, i]
+            motion[0, i] = past.motion[0, i]
+            motion[1, i] = past.motion[1, i]
         for f in range(len(modal_system.reach)):
             memory.place[f] = old.place[f]
             for k in range(memory.depth[f]):
                 memory.at[f, k] = old.at[f, k]
-        first, about[REPEATS] = about[REPEATS] == 0.0, 1.0
+        first = about[REPEATS] == 0.0
+        about[REPEATS] = 1.0
         return first
-    about[SEGMENT], about[REPEATS] = time_state.now[2], 0.0
+    about[SEGMENT] = time_state.now[2]
+    about[REPEATS] = 0.0
     for i in range(len(modal_system.square)):
-        past.motion[0, i], past.motion[1, i] = motion[0, i], motion[1, i]
+        past.motion[0, i] = motion[0, i]
+        past.motion[1, i] = motion[1, i]
     for f in range(len(modal_system.reach)):
-        old.place[f], old.slipping[f], old.way[f] = (
-            memory.place[f],
-            memory.slipping[f],
-            memory.way[f],
-        )
-        old.depth[f], old.head[f] = memory.depth[f], memory.head[f]
+        old.place[f] = memory.place[f]
+        old.slipping[f] = memory.slipping[f]
+        old.way[f] = memory.way[f]
+        old.depth[f] = memory.depth[f]
+        old.head[f] = memory.head[f]
         for k in range(memory.depth[f]):
-            old.upto[f, k], old.at[f, k], old.side[f, k] = (
-                memory.upto[f, k],
-                memory.at[f, k],
-                memory.side[f, k],
-            )
+            old.upto[f, k] = memory.upto[f, k]
+            old.at[f, k] = memory.at[f, k]
+            old.side[f, k] = memory.side[f, k]
     return False

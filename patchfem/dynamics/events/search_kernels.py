@@ -12,7 +12,13 @@ from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .memory_kernels import holds, threshold
 from .series_kernels import EPS, NONE, OVER, first_root, polish
 
-NOTHING, YIELDS, TURNS, OUTPUT_TURNS, STOPS, RELEASES = 0, 1, 2, 3, 4, 5  # what ends a piece
+# what ends a piece
+NOTHING = 0
+YIELDS = 1
+TURNS = 2
+OUTPUT_TURNS = 3
+STOPS = 4
+RELEASES = 5
 TINY = 1e-14  # of the terms of a speed: below it a slide at a turning point has no acceleration
 
 
@@ -62,7 +68,8 @@ def crossing(poly, top, distance, limit, scratch):
     scratch[0] = way * distance
     for k in range(top):
         scratch[k + 1] = -way * poly[k] * OVER[k + 1]
-    start, square = limit * distance / end, scratch[1] * scratch[1] - 4 * scratch[0] * scratch[2]
+    start = limit * distance / end
+    square = scratch[1] * scratch[1] - 4 * scratch[0] * scratch[2]
     # the root of the first three terms
     if square > 0 and 2 * scratch[0] < limit * (sqrt(square) - scratch[1]):
         start = 2 * scratch[0] / (sqrt(square) - scratch[1])
@@ -73,14 +80,13 @@ def crossing(poly, top, distance, limit, scratch):
 def released(face, top, limit, workspace):
     """(u, side) at which the reaction of a slide that is held first passes its limit [N], +1 or -1; NONE for u if it
     does not."""
-    react, scratch, size = (
-        workspace.reactions[face],
-        workspace.polys[workspace.react.shape[0]],
-        limit,
-    )
+    react = workspace.reactions[face]
+    scratch = workspace.polys[workspace.react.shape[0]]
+    size = limit
     for k in range(top - 1):
         size += abs(react[k])
-    best, to = NONE, 0.0
+    best = NONE
+    to = 0.0
     if size < 2 * limit and workspace.orders[face, 0] == 0.0 and workspace.orders[face, 1] == 0.0:
         return best, to
     for side in (1, -1):
@@ -93,14 +99,16 @@ def released(face, top, limit, workspace):
                 scratch[0] = max(scratch[0], 0.0)
         root = first_root(scratch, order, top - 2, workspace.hulls) if order < top - 1 else NONE
         if root < best:
-            best, to = root, float(side)
+            best = root
+            to = float(side)
     return best, to
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rest(face, head, poly, top, workspace):
     """u at which the slip of a rigid element first rests; NONE if it does not. poly: series of its speed."""
-    scratch, order = workspace.polys[workspace.react.shape[0]], int(workspace.orders[face, 0])
+    scratch = workspace.polys[workspace.react.shape[0]]
+    order = int(workspace.orders[face, 0])
     if order == 0 and head * poly[0] <= 0.0:
         return 0.0
     for k in range(order, top):
@@ -114,15 +122,22 @@ def next_event(top, modal_system, table, memory, time_state, workspace):
 
     u = 0: the state changes before anything moves.
     """
-    faces, polys = len(modal_system.reach), workspace.polys
-    u, what, face, sign = 1.0, NOTHING, 0, 0.0
+    faces = len(modal_system.reach)
+    polys = workspace.polys
+    u = 1.0
+    what = NOTHING
+    face = 0
+    sign = 0.0
     for f in range(faces):
         poly = polys[f]
         speed_series(modal_system.faces[f], len(modal_system.square), workspace.coefs, top, poly)
         if holds(f, table, memory):
             root, way = released(f, top, table.static[f], workspace)
             if root <= u:
-                u, what, face, sign = root, RELEASES, f, way
+                u = root
+                what = RELEASES
+                face = f
+                sign = way
             continue
         if table.static[f] > 0.0:
             way = memory.head[f]
@@ -130,7 +145,10 @@ def next_event(top, modal_system, table, memory, time_state, workspace):
                 continue
             root = rest(f, way, poly, top, workspace)
             if root <= u:
-                u, what, face, sign = root, TURNS, f, -way
+                u = root
+                what = TURNS
+                face = f
+                sign = -way
             if table.count[f] == 0 or u == 0.0:
                 continue
         else:
@@ -144,20 +162,30 @@ def next_event(top, modal_system, table, memory, time_state, workspace):
                 scratch[k] = way * poly[k]
             root = first_root(scratch, order, top - 1, workspace.hulls)
             if root < u:
-                u, what, face, sign = root, TURNS, f, -way
+                u = root
+                what = TURNS
+                face = f
+                sign = -way
         gap = threshold(f, way, table, memory) - memory.place[f]
         if way * gap <= 0:
             return 0.0, YIELDS, f, way
         root = crossing(poly, top, gap, u, polys[faces])
         if root <= u:
-            u, what, face, sign = root, YIELDS, f, way
+            u = root
+            what = YIELDS
+            face = f
+            sign = way
     if modal_system.along < 0:
-        poly, scratch = polys[faces + 1], polys[faces]
+        poly = polys[faces + 1]
+        scratch = polys[faces]
         speed_series(modal_system.output, len(modal_system.square), workspace.coefs, top, poly)
         order, way = heading(poly, top, time_state.rest[faces] == 1.0)
         for k in range(order, top):
             scratch[k] = way * poly[k]
         root = first_root(scratch, order, top - 1, workspace.hulls) if way != 0.0 else NONE
         if root < u:
-            u, what, face, sign = root, OUTPUT_TURNS, faces, -way
+            u = root
+            what = OUTPUT_TURNS
+            face = faces
+            sign = -way
     return u, what, face, sign

@@ -48,7 +48,8 @@ _GAUSS = np.array(
 _PLACE, _WEIGHT = np.zeros((2, _NODES + 1, _NODES))
 for _g in range(1, _NODES + 1):
     _x, _w = np.polynomial.legendre.leggauss(_g)
-    _PLACE[_g, :_g], _WEIGHT[_g, :_g] = (1 + _x) / 2, _w / 2
+    _PLACE[_g, :_g] = (1 + _x) / 2
+    _WEIGHT[_g, :_g] = _w / 2
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -83,13 +84,15 @@ def fastest(modal_system, springs):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def single_series(place, rate, force, spring, modal_system, wave, h, top, coefs):
     """`motion_series` of one mode with one interface, three times as fast."""
-    face, squared, base = modal_system.faces[0, 0] / modal_system.mass, h * h, modal_system.base[0]
-    stiff, damp = (
-        squared * (modal_system.square[0] + spring * modal_system.reach[0]),
-        h * modal_system.damping[0, 0],
-    )
-    here, after = place[0], h * rate[0]
-    coefs[0, 0], coefs[1, 0] = here, after
+    face = modal_system.faces[0, 0] / modal_system.mass
+    squared = h * h
+    base = modal_system.base[0]
+    stiff = squared * (modal_system.square[0] + spring * modal_system.reach[0])
+    damp = h * modal_system.damping[0, 0]
+    here = place[0]
+    after = h * rate[0]
+    coefs[0, 0] = here
+    coefs[1, 0] = after
     here, after = (
         after,
         -0.5
@@ -109,29 +112,30 @@ def single_series(place, rate, force, spring, modal_system, wave, h, top, coefs)
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def double_series(place, rate, force, spring, modal_system, wave, h, top, coefs):
     """`motion_series` of two modes with one interface and dampers of their own, all in registers."""
-    squared, face_1, face_2, base_1, base_2 = (
-        h * h,
-        modal_system.faces[0, 0],
-        modal_system.faces[0, 1],
-        modal_system.base[0],
-        modal_system.base[1],
-    )
+    squared = h * h
+    face_1 = modal_system.faces[0, 0]
+    face_2 = modal_system.faces[0, 1]
+    base_1 = modal_system.base[0]
+    base_2 = modal_system.base[1]
     # no constant: of one mode, where nothing comes here, it would not compile
     second = len(modal_system.square) - 1
-    stiff_1, stiff_2, stiff = (
-        squared * modal_system.square[0],
-        squared * modal_system.square[second],
-        squared * spring / modal_system.mass,
-    )
-    damp_1, damp_2, pull = (
-        h * modal_system.damping[0, 0],
-        h * modal_system.damping[1, 1],
-        squared * force / modal_system.mass,
-    )
-    here_1, here_2, after_1, after_2 = place[0], place[1], h * rate[0], h * rate[1]
-    coefs[0, 0], coefs[0, 1], coefs[1, 0], coefs[1, 1] = here_1, here_2, after_1, after_2
+    stiff_1 = squared * modal_system.square[0]
+    stiff_2 = squared * modal_system.square[second]
+    stiff = squared * spring / modal_system.mass
+    damp_1 = h * modal_system.damping[0, 0]
+    damp_2 = h * modal_system.damping[1, 1]
+    pull = squared * force / modal_system.mass
+    here_1 = place[0]
+    here_2 = place[1]
+    after_1 = h * rate[0]
+    after_2 = h * rate[1]
+    coefs[0, 0] = here_1
+    coefs[0, 1] = here_2
+    coefs[1, 0] = after_1
+    coefs[1, 1] = after_2
     for k in range(top - 1):
-        push, count = squared * wave[k], k + 1
+        push = squared * wave[k]
+        count = k + 1
         new_1 = -TWICE[k + 2] * (
             stiff_1 * here_1 + base_1 * push + face_1 * pull + damp_1 * count * after_1
         )
@@ -139,8 +143,12 @@ def double_series(place, rate, force, spring, modal_system, wave, h, top, coefs)
             stiff_2 * here_2 + base_2 * push + face_2 * pull + damp_2 * count * after_2
         )
         pull = stiff * (face_1 * after_1 + face_2 * after_2)
-        here_1, here_2, after_1, after_2 = after_1, after_2, new_1, new_2
-        coefs[k + 2, 0], coefs[k + 2, 1] = new_1, new_2
+        here_1 = after_1
+        here_2 = after_2
+        after_1 = new_1
+        after_2 = new_2
+        coefs[k + 2, 0] = new_1
+        coefs[k + 2, 1] = new_2
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -151,7 +159,8 @@ def still_series(place, force, modal_system, wave, top, coefs, workspace):
         for i in range(n):
             coefs[k, i] = place[i] if k == 0 else 0.0
     for f in range(len(modal_system.reach)):
-        level, share = 0.0, 0.0
+        level = 0.0
+        share = 0.0
         for i in range(n):
             part = modal_system.square[i] * place[i]
             for g in range(len(modal_system.reach)):
@@ -187,7 +196,10 @@ def motion_series(place, rate, force, springs, modal_system, wave, h, top, coefs
     place, rate (n,): coordinates [m] and rates [m/s] at first; force (i,) [N] there; springs (i,) [N/m]; wave: series
     of a; workspace: with react and held as `stick_kernels.constrain` leaves them.
     """
-    n, faces, squared, pull = len(modal_system.square), modal_system.faces, h * h, workspace.pull
+    n = len(modal_system.square)
+    faces = modal_system.faces
+    squared = h * h
+    pull = workspace.pull
     held = workspace.held[0] > 0.0
     if workspace.held[1] == 1.0:
         still_series(place, force, modal_system, wave, top, coefs, workspace)
@@ -199,11 +211,13 @@ def motion_series(place, rate, force, springs, modal_system, wave, h, top, coefs
         double_series(place, rate, force[0], springs[0], modal_system, wave, h, top, coefs)
         return
     for i in range(n):
-        coefs[0, i], coefs[1, i] = place[i], h * rate[i]
+        coefs[0, i] = place[i]
+        coefs[1, i] = h * rate[i]
     for f in range(len(modal_system.reach)):
         pull[f] = force[f] / modal_system.mass if springs[f] < RIGID else 0.0
     for k in range(top - 1):
-        scale, damp = TWICE[k + 2] * squared, TWICE[k + 2] * h * (k + 1)
+        scale = TWICE[k + 2] * squared
+        damp = TWICE[k + 2] * h * (k + 1)
         if k > 0:
             for f in range(len(modal_system.reach)):
                 part = 0.0
@@ -228,7 +242,11 @@ def motion_series(place, rate, force, springs, modal_system, wave, h, top, coefs
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def value(poly, low, top, u):
     """Sum of poly[k] u^(k - low) for k from low to top."""
-    square, even, odd, k = u * u, poly[top], 0.0, top - 1  # two chains of half the length
+    # two chains of half the length
+    square = u * u
+    even = poly[top]
+    odd = 0.0
+    k = top - 1
     while k > low:
         odd = odd * square + poly[k]
         even = even * square + poly[k - 1]
@@ -239,15 +257,23 @@ def value(poly, low, top, u):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def value_and_slope(poly, low, top, u):
     """The sum of `value` and its derivative over u."""
-    square, k = u * u, top - 1
-    even, odd, even_slope, odd_slope = poly[top], 0.0, 0.0, 0.0  # slopes over u^2
+    square = u * u
+    k = top - 1
+    # slopes over u^2
+    even = poly[top]
+    odd = 0.0
+    even_slope = 0.0
+    odd_slope = 0.0
     while k > low:
-        odd_slope, odd = odd_slope * square + odd, odd * square + poly[k]
-        even_slope, even = even_slope * square + even, even * square + poly[k - 1]
+        odd_slope = odd_slope * square + odd
+        odd = odd * square + poly[k]
+        even_slope = even_slope * square + even
+        even = even * square + poly[k - 1]
         k -= 2
     if k < low:
         return even + u * odd, odd + 2 * u * (even_slope + u * odd_slope)
-    odd_slope, odd = odd_slope * square + odd, odd * square + poly[low]
+    odd_slope = odd_slope * square + odd
+    odd = odd * square + poly[low]
     return odd + u * even, even + 2 * u * (odd_slope + u * even_slope)
 
 
@@ -272,14 +298,17 @@ def polish(poly, low, top, left, right, u):
             step < 0.01 * last and step * (step / last) ** 2 <= 0.1 * EPS * u
         ):
             return new
-        u, last = new, step
+        u = new
+        last = step
     return u
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bernstein(poly, low, top, hull):
     """Fill hull (top - low + 1,) with the Bernstein coefficients of poly[low] ... poly[top] on [0, 1]."""
-    degree, wide = top - low, (top - low) // 4 * 4 + 4  # whole registers
+    # whole registers
+    degree = top - low
+    wide = (top - low) // 4 * 4 + 4
     for i in range(wide):
         hull[i] = poly[low]
     for k in range(1, degree + 1):
@@ -292,7 +321,8 @@ def bernstein(poly, low, top, hull):
 def first_look(poly, low, top, hull):
     """u near which the Bernstein coefficients of the first FEW + 1 terms, in hull, come down to what all others can
     add; NONE where they stay above it, so that there is no root."""
-    rest, wide = 0.0, FEW // 4 * 4 + 4
+    rest = 0.0
+    wide = FEW // 4 * 4 + 4
     for k in range(low + FEW + 1, top + 1):
         rest += abs(poly[k])
     for i in range(wide):
@@ -332,7 +362,9 @@ def lone_root(poly, low, top, u, workspace):
         )
         last = step
         if done:
-            power, rows, total = 1.0, workspace[0], 0.0
+            power = 1.0
+            rows = workspace[0]
+            total = 0.0
             for k in range(low, top + 1):
                 rows[k - low] = power * poly[k]
                 power *= u
@@ -352,11 +384,9 @@ def first_root(poly, low, top, hulls):
     A dip of round-off below zero is passed over. hulls: workspace (DEEP + 2, WIDE).
     """
     # as they are: the compiler then knows that no index is negative
-    rest, low, top = (
-        0.0,
-        low & 31,
-        top & 31,
-    )
+    rest = 0.0
+    low = low & 31
+    top = top & 31
     for k in range(low + 1, top + 1):
         rest += abs(poly[k])
     if poly[low] > rest:
@@ -369,11 +399,17 @@ def first_root(poly, low, top, hulls):
             return NONE
         if u < NONE:
             return u
-    noise, degree = 4 * EPS * (rest + abs(poly[low])), top - low
+    noise = 4 * EPS * (rest + abs(poly[low]))
+    degree = top - low
     bernstein(poly, low, top, hulls[0])
-    left, width, depth = 0.0, 1.0, 0
+    left = 0.0
+    width = 1.0
+    depth = 0
     while True:
-        hull, least, changes, at = hulls[depth], 0.0, 0, 0
+        hull = hulls[depth]
+        least = 0.0
+        changes = 0
+        at = 0
         for k in range(degree + 1):
             least = min(least, hull[k])
             if k > 0 and (hull[k] < 0) != (hull[k - 1] < 0):
@@ -392,7 +428,8 @@ def first_root(poly, low, top, hulls):
         if depth == DEEP:
             return left
         _halve(hull, hulls[depth + 1], degree, True)
-        depth, width = depth + 1, width / 2
+        depth = depth + 1
+        width = width / 2
         hulls[depth, WIDE - 1] = 0.0
 
 
@@ -429,9 +466,15 @@ def largest(poly, top, best, hulls):
     left out, and of one that turns once that turn is what counts."""
     best = max(best, abs(poly[0]), abs(value(poly, 0, top, 1.0)))
     bernstein(poly, 0, top, hulls[0])
-    depth, left, width, rate = 0, 0.0, 1.0, hulls[DEEP + 1]
+    depth = 0
+    left = 0.0
+    width = 1.0
+    rate = hulls[DEEP + 1]
     while True:
-        hull, most, turns, at = hulls[depth], abs(hulls[depth, 0]), 0, 0
+        hull = hulls[depth]
+        most = abs(hulls[depth, 0])
+        turns = 0
+        at = 0
         for k in range(1, top + 1):
             most = max(most, abs(hull[k]))
             if k > 1 and (hull[k] < hull[k - 1]) != (hull[k - 1] < hull[k - 2]):
@@ -441,7 +484,8 @@ def largest(poly, top, best, hulls):
         if not known and turns < 2:  # Descartes: one turn at most; the ends have been looked at
             if turns == 1:
                 sense = 1.0 if hull[1] > hull[0] else -1.0
-                before, after = hull[at - 1] - hull[at - 2], hull[at] - hull[at - 1]
+                before = hull[at - 1] - hull[at - 2]
+                after = hull[at] - hull[at - 1]
                 for k in range(top):
                     rate[k] = sense * (k + 1) * poly[k + 1]
                 share = (at - 2 + before / (before - after)) / (top - 1)
@@ -455,6 +499,7 @@ def largest(poly, top, best, hulls):
                 return best
             continue
         _halve(hull, hulls[depth + 1], top, True)
-        depth, width = depth + 1, width / 2
+        depth = depth + 1
+        width = width / 2
         hulls[depth, WIDE - 1] = 0.0
         best = max(best, abs(hulls[depth, top]))

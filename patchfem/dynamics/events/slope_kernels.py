@@ -33,12 +33,16 @@ def carry(u, h, top, slopes, marks, modal_system, table, memory, workspace, scra
     scratch: the slopes of one number (2, n), the force on them (i,), their series (terms, n).
     """
     one, force, coefs = scratch
-    n, faces, zero = len(modal_system.square), len(modal_system.reach), workspace.waves[1]
+    n = len(modal_system.square)
+    faces = len(modal_system.reach)
+    zero = workspace.waves[1]
     for s in range(slopes.shape[2]):
         for i in range(n):
-            one[0, i], one[1, i] = slopes[0, i, s], slopes[1, i, s]
+            one[0, i] = slopes[0, i, s]
+            one[1, i] = slopes[1, i, s]
         for f in range(faces):
-            first, moved = memory.slipping[f], 0.0
+            first = memory.slipping[f]
+            moved = 0.0
             for i in range(n):
                 moved += modal_system.faces[f, i] * one[0, i]
             force[f] = workspace.springs[f] * moved
@@ -50,7 +54,8 @@ def carry(u, h, top, slopes, marks, modal_system, table, memory, workspace, scra
             one[0], one[1], force, workspace.springs, modal_system, zero, h, top, coefs, workspace
         )
         for i in range(n):
-            place, rate = coefs[top, i], top * coefs[top, i]
+            place = coefs[top, i]
+            rate = top * coefs[top, i]
             for k in range(top - 1, 0, -1):
                 place = place * u + coefs[k, i]
                 rate = rate * u + k * coefs[k, i]
@@ -80,11 +85,15 @@ def follow(
     """
     for f in range(len(modal_system.reach)):
         memory.force[f] = pulled(f, table, memory)
-    now, faces, n, pieces = time_state.now, len(modal_system.reach), len(modal_system.square), 0
+    now = time_state.now
+    faces = len(modal_system.reach)
+    n = len(modal_system.square)
+    pieces = 0
     for k in range(workspace.waves.shape[1]):
         workspace.waves[1, k] = 0.0
     while now[0] < stop[0] or (now[0] == stop[0] and now[1] < stop[1]):
-        left, segment = left_of(time_state, stop), time_state.segments[int(now[2])]
+        left = left_of(time_state, stop)
+        segment = time_state.segments[int(now[2])]
         for f in range(faces):
             workspace.springs[f] = tangent(f, table, memory)[0]
             seen[0, f] = max(seen[0, f], memory.slipping[f])

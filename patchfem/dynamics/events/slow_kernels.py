@@ -24,7 +24,8 @@ def compliances(springs, modal_system, workspace):
 
     The rows workspace.turned stand for the slides: of those that are held as `constrain` leaves them, 0 without force.
     """
-    n, faces = len(modal_system.square), len(modal_system.reach)
+    n = len(modal_system.square)
+    faces = len(modal_system.reach)
     for f in range(faces):
         size = 0.0
         for i in range(n):
@@ -83,16 +84,15 @@ def slow_series(place, rate, force, springs, modal_system, h, top, workspace):
     does but with the motion that
     follows the drive alone; what rings besides, as a share of it. place, rate (n,): the motion at first; the others as
     there; workspace.waves[0]: series of the drive over h [s]."""
-    n, faces, coefs, wave, pull = (
-        len(modal_system.square),
-        len(modal_system.reach),
-        workspace.coefs,
-        workspace.waves[0],
-        workspace.scales[0],
-    )
+    n = len(modal_system.square)
+    faces = len(modal_system.reach)
+    coefs = workspace.coefs
+    wave = workspace.waves[0]
+    pull = workspace.scales[0]
     compliances(springs, modal_system, workspace)
     for i in range(n):
-        coefs[top + 1, i], coefs[top + 2, i] = 0.0, 0.0
+        coefs[top + 1, i] = 0.0
+        coefs[top + 2, i] = 0.0
     for k in range(top, -1, -1):
         for i in range(n):
             pull[i] = -modal_system.base[i] * wave[k] - (k + 1) * (k + 2) * coefs[k + 2, i] / (
@@ -115,7 +115,8 @@ def slow_series(place, rate, force, springs, modal_system, h, top, workspace):
                 workspace.reactions[f, k] += (
                     modal_system.mass * workspace.react[f, i] * workspace.scales[1, i]
                 )
-    rings, follows = 0.0, 0.0
+    rings = 0.0
+    follows = 0.0
     for i in range(n):
         size = abs(place[i]) + abs(modal_system.base[i] * wave[0]) / modal_system.square[i]
         for k in range(1, top + 1):
@@ -140,7 +141,8 @@ def at_reach(segment, cycle, offset, period, place, rate, force, modal_system, w
 
     Kept for itself and called: it is rare, and compiled once for all that read pieces.
     """
-    h, top = REACH / rate_of(segment, period), powers(REACH)
+    h = REACH / rate_of(segment, period)
+    top = powers(REACH)
     drive_series(segment, cycle, offset, period, h, top, workspace.waves)
     return slow_series(place, rate, force, workspace.springs, modal_system, h, top, workspace)
 
@@ -149,11 +151,9 @@ def at_reach(segment, cycle, offset, period, place, rate, force, modal_system, w
 def followed(motion, force, modal_system, time_state, workspace):
     """Rate [1/s] of the drive where the motion merely follows it, its series in the workspace as `at_reach` leaves it; 0
     elsewhere. now[4]: pieces since the last event or look."""
-    now, segment, period = (
-        time_state.now,
-        time_state.segments[int(time_state.now[2])],
-        time_state.period[0],
-    )
+    now = time_state.now
+    segment = time_state.segments[int(time_state.now[2])]
+    period = time_state.period[0]
     if rate_of(segment, period) > modal_system.slow:
         return 0.0
     now[4] += 1

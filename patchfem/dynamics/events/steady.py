@@ -69,7 +69,8 @@ def settled(modes: ModalBasis, drive, groups, start: InitialState, memory: Memor
     """The periodic motion that the run from a state at phase 0 of the drive settles to, as far as its elements have
     slipped for the last time. NotConverged as in `steady`."""
     one = PeriodMap(modes, groups)
-    shooting, point = Yields(one, drive, False), Point(np.concatenate([start.z, start.v]), memory)
+    shooting = Yields(one, drive, False)
+    point = Point(np.concatenate([start.z, start.v]), memory)
     return _result(one, *shooting.repeating(point), False)
 
 
@@ -89,23 +90,27 @@ class Yields(Shooting):
     def __init__(self, one: PeriodMap, drive, half: bool):
         part = drive.segments[0]
         moved = abs(part.amplitude) / part.omega**2 * float(np.abs(one.modal_system.base).max())
-        self.one, self.drive, self.half, self.moved_by = one, drive, half, max(moved, 1e-300)
+        self.one = one
+        self.drive = drive
+        self.half = half
+        self.moved_by = max(moved, 1e-300)
         self.rows = np.maximum(np.abs(one.faces).sum(axis=1), 1e-300)
 
     def mapped(self, point: Point) -> Mapped:
         """The map of a Point. NotConverged where events pile up."""
-        found, n, omega = (
-            self.one(self.drive, point, self.half),
-            self.one.n,
-            self.drive.segments[0].omega,
-        )
-        a, b = point.motion, found.end.motion
+        found = self.one(self.drive, point, self.half)
+        n = self.one.n
+        omega = self.drive.segments[0].omega
+        a = point.motion
+        b = found.end.motion
         both = np.abs([a, b])
         width = max(float(both[:, :n].max()), float(both[:, n:].max()) / omega, 1e-300)
-        scale, alike = np.repeat([width, width * omega], n), _alike(point, found.end)
+        scale = np.repeat([width, width * omega], n)
+        alike = _alike(point, found.end)
         if alike:
             scale = np.concatenate([scale, width * self.rows[point.turned[0]]])
-            a, b = point.numbers, found.end.numbers
+            a = point.numbers
+            b = found.end.numbers
         return Mapped(
             point,
             found,
@@ -144,18 +149,17 @@ class Yields(Shooting):
                     part[f, 1 : 1 + memory.depth[f] - least] = part[
                         f, least : memory.depth[f]
                     ].copy()
-                memory.upto[f, 0], memory.at[f, 0], memory.side[f, 0] = (
-                    self.one.table.count[f],
-                    0.0,
-                    0.0,
-                )
+                memory.upto[f, 0] = self.one.table.count[f]
+                memory.at[f, 0] = 0.0
+                memory.side[f, 0] = 0.0
                 memory.depth[f] += 1 - least
         return Point(found.end.motion, memory)
 
 
 def _alike(point: Point, end: Point) -> bool:
     """Whether two Points have the same numbers: turning places of the same kind."""
-    a, b = point.memory, end.memory
+    a = point.memory
+    b = end.memory
     deep = a.depth.tolist()
     return deep == b.depth.tolist() and all(
         x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.side, b.side, deep)
@@ -164,7 +168,8 @@ def _alike(point: Point, end: Point) -> bool:
 
 def _same(point: Point, end: Point) -> bool:
     """Whether two Points that are alike hold the same elements in every group, and let the same ones slip."""
-    a, b = point.memory, end.memory
+    a = point.memory
+    b = end.memory
     return (
         a.slipping.tolist() == b.slipping.tolist()
         and a.way.tolist() == b.way.tolist()
@@ -175,9 +180,12 @@ def _same(point: Point, end: Point) -> bool:
 
 
 def _result(one: PeriodMap, mapped: Mapped, used: int, half: bool) -> Steady:
-    point, found, values = mapped.point, mapped.found, mapped.multipliers()
+    point = mapped.point
+    found = mapped.found
+    values = mapped.multipliers()
     low, high = found.extremes
-    limit, n = one.table.limit, one.n
+    limit = one.table.limit
+    n = one.n
     share = sum(row[k] for row, k in zip(limit, found.most)) / max(limit[:, -1].sum(), 1e-300)
     start = InitialState(frozen_array(point.motion[:n]), frozen_array(point.motion[n:]))
     return Steady(

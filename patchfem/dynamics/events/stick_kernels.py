@@ -27,7 +27,8 @@ EXCHANGES = 8  # exchanges for each slide, after which a choice by exchange is g
 def turned_rows(modal_system, workspace):
     """Turn the rows of the masked slides until they are orthogonal (one-sided Jacobi), workspace.turned = mix slide; the
     length of the longest."""
-    n, faces = len(modal_system.square), len(modal_system.reach)
+    n = len(modal_system.square)
+    faces = len(modal_system.reach)
     for f in range(faces):
         for i in range(n):
             workspace.turned[f, i] = modal_system.faces[f, i] if workspace.mask[f] == 1.0 else 0.0
@@ -37,7 +38,9 @@ def turned_rows(modal_system, workspace):
         quiet = True
         for f in range(faces):
             for g in range(f + 1, faces):
-                a, b, c = 0.0, 0.0, 0.0
+                a = 0.0
+                b = 0.0
+                c = 0.0
                 for i in range(n):
                     a += workspace.turned[f, i] ** 2
                     b += workspace.turned[g, i] ** 2
@@ -49,17 +52,15 @@ def turned_rows(modal_system, workspace):
                 slope = (1.0 if steep >= 0 else -1.0) / (abs(steep) + sqrt(1 + steep * steep))
                 cosine = 1 / sqrt(1 + slope * slope)
                 for i in range(n):
-                    p, q = workspace.turned[f, i], workspace.turned[g, i]
-                    workspace.turned[f, i], workspace.turned[g, i] = (
-                        cosine * (p - slope * q),
-                        cosine * (slope * p + q),
-                    )
+                    p = workspace.turned[f, i]
+                    q = workspace.turned[g, i]
+                    workspace.turned[f, i] = cosine * (p - slope * q)
+                    workspace.turned[g, i] = cosine * (slope * p + q)
                 for h in range(faces):
-                    p, q = workspace.mix[f, h], workspace.mix[g, h]
-                    workspace.mix[f, h], workspace.mix[g, h] = (
-                        cosine * (p - slope * q),
-                        cosine * (slope * p + q),
-                    )
+                    p = workspace.mix[f, h]
+                    q = workspace.mix[g, h]
+                    workspace.mix[f, h] = cosine * (p - slope * q)
+                    workspace.mix[g, h] = cosine * (slope * p + q)
         if quiet:
             break
     most = 0.0
@@ -79,14 +80,16 @@ def constrain(modal_system, workspace):
     their rows turned over (0 in those of the others), tied (i,) 1 where they hold a slide, and held: (how many there
     are, whether nothing can move).
     """
-    n, faces = len(modal_system.square), len(modal_system.reach)
+    n = len(modal_system.square)
+    faces = len(modal_system.reach)
     count = 0.0
     for f in range(faces):
         count += workspace.mask[f]
         workspace.tied[f] = 0.0
         for i in range(n):
             workspace.react[f, i] = 0.0
-    workspace.held[0], workspace.held[1] = count, 0.0
+    workspace.held[0] = count
+    workspace.held[1] = 0.0
     if count == 0.0:
         return
     most = turned_rows(modal_system, workspace)
@@ -113,7 +116,8 @@ def constrain(modal_system, workspace):
     if frees < 1e-9:
         workspace.held[1] = 1.0
     for f in range(faces):
-        left, size = 0.0, 0.0
+        left = 0.0
+        size = 0.0
         for j in range(n):
             part = modal_system.faces[f, j]
             for g in range(faces):
@@ -164,16 +168,16 @@ def keep(motion, modal_system, memory, workspace):
 def round_off(motion, force, springs, modal_system, h, workspace):
     """Fill scales (LAST + 2, n) with the magnitudes that the terms of a motion are added from, spans (i, LAST) with
     those of the reactions [N]; arguments as of `motion_series`."""
-    n, faces, squared, wave = (
-        len(modal_system.square),
-        modal_system.faces,
-        h * h,
-        workspace.waves[0],
-    )
+    n = len(modal_system.square)
+    faces = modal_system.faces
+    squared = h * h
+    wave = workspace.waves[0]
     for i in range(n):
-        workspace.scales[0, i], workspace.scales[1, i] = abs(motion[0, i]), abs(h * motion[1, i])
+        workspace.scales[0, i] = abs(motion[0, i])
+        workspace.scales[1, i] = abs(h * motion[1, i])
     for k in range(LAST):
-        scale, damp = TWICE[k + 2] * squared, TWICE[k + 2] * h * (k + 1)
+        scale = TWICE[k + 2] * squared
+        damp = TWICE[k + 2] * h * (k + 1)
         for f in range(len(modal_system.reach)):
             workspace.pull[f] = 0.0
             if springs[f] < RIGID and k == 0:
@@ -184,11 +188,10 @@ def round_off(motion, force, springs, modal_system, h, workspace):
                         abs(faces[f, i]) * workspace.scales[k, i] * springs[f] / modal_system.mass
                     )
         for i in range(n):
-            part, lost = (
-                modal_system.square[i] * workspace.scales[k, i]
-                + abs(modal_system.base[i] * wave[k]),
-                0.0,
+            part = modal_system.square[i] * workspace.scales[k, i] + abs(
+                modal_system.base[i] * wave[k]
             )
+            lost = 0.0
             for f in range(len(modal_system.reach)):
                 part += abs(faces[f, i]) * workspace.pull[f]
             for j in range(n):
@@ -210,7 +213,8 @@ def round_off(motion, force, springs, modal_system, h, workspace):
 def leaves(face, sign, noise, modal_system, workspace):
     """(order, sign) of the first term of sign * speed of a slide that is above its round-off; (LAST, 0) without."""
     for k in range(1, LAST):
-        rate, size = 0.0, 0.0
+        rate = 0.0
+        size = 0.0
         for i in range(len(modal_system.square)):
             rate += modal_system.faces[face, i] * workspace.coefs[k + 1, i]
             size += abs(modal_system.faces[face, i]) * workspace.scales[k + 1, i]
@@ -224,9 +228,11 @@ def margin(face, side, noise, limit, workspace):
     """(order, sign) of the first term of limit - side * reaction of a slide that is above its round-off; (LAST, 0)
     without."""
     for k in range(LAST):
-        left, size = -side * workspace.reactions[face, k], workspace.spans[face, k]
+        left = -side * workspace.reactions[face, k]
+        size = workspace.spans[face, k]
         if k == 0:
-            left, size = left + limit, size + limit
+            left = left + limit
+            size = size + limit
         if abs(left) > noise * size:
             return float(k), 1.0 if left > 0 else -1.0
     return float(LAST), 0.0
@@ -255,7 +261,8 @@ def judge(noise, motion, modal_system, table, memory, h, workspace):
             memory.head[f] = 2.0 * workspace.guess[f] if others else workspace.guess[f]
         memory.force[f] = pulled(f, table, memory)
         workspace.springs[f] = tangent(f, table, memory)[0]
-        workspace.orders[f, 0], workspace.orders[f, 1] = 0.0, 0.0
+        workspace.orders[f, 0] = 0.0
+        workspace.orders[f, 1] = 0.0
     motion_series(
         motion[0],
         motion[1],
@@ -307,19 +314,24 @@ def exchanged(noise, motion, modal_system, table, memory, h, workspace):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def every(noise, motion, modal_system, table, memory, h, workspace):
     """Whether one of all choices of the slides at rest holds, those with few that slip first."""
-    faces, count, codes = len(modal_system.reach), 0, 1
+    faces = len(modal_system.reach)
+    count = 0
+    codes = 1
     for f in range(faces):
         if workspace.resting[f] == 1.0:
-            count, codes = count + 1, codes * 3
+            count = count + 1
+            codes = codes * 3
     for slips in range(count + 1):
         for code in range(codes):
-            left, found = code, 0
+            left = code
+            found = 0
             for f in range(faces - 1, -1, -1):
                 workspace.guess[f] = workspace.signs[f]
                 if workspace.resting[f] == 1.0:
                     digit = left % 3
                     workspace.guess[f] = -1.0 if digit == 2 else float(digit)
-                    left, found = left // 3, found + (digit > 0)
+                    left = left // 3
+                    found = found + (digit > 0)
             if (
                 found == slips
                 and judge(noise, motion, modal_system, table, memory, h, workspace)[0] < 0
@@ -337,7 +349,8 @@ def settle(motion, modal_system, table, memory, h, workspace):
     workspace.waves[0]: series of the drive over h [s]. Rates of the resting slides are taken out of
     the motion.
     """
-    faces, count = len(modal_system.reach), 0
+    faces = len(modal_system.reach)
+    count = 0
     for f in range(faces):
         workspace.mask[f] = workspace.resting[f]
     constrain(modal_system, workspace)
@@ -373,7 +386,9 @@ def at_rest(u, h, top, modal_system, table, memory, workspace):
         workspace.resting[f] = 1.0 if table.static[f] > 0.0 else 0.0
         if holds(f, table, memory) or table.static[f] == 0.0 or abs(head) == 2.0:
             continue
-        speed, size, power = 0.0, 0.0, 1.0
+        speed = 0.0
+        size = 0.0
+        power = 1.0
         for k in range(1, top + 1):
             for i in range(len(modal_system.square)):
                 part = modal_system.faces[f, i] * workspace.coefs[k, i] * (k * power)

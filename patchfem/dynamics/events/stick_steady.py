@@ -63,22 +63,30 @@ class Stretch:
     """
 
     def __init__(self, run, row, after, span: float):
-        modes, modal_system, n = run.modes, run.modal_system, run.modes.omega.size
-        self.run, self.row, self.after, self.span = run, row, after, span
+        modes = run.modes
+        modal_system = run.modal_system
+        n = run.modes.omega.size
+        self.run = run
+        self.row = row
+        self.after = after
+        self.span = span
         at = run._at(0, 0)
         columns = row[at:].reshape(len(run.groups), run.kernels.EACH)
-        self.held, self.signs = np.isinf(columns[:, 1]), columns[:, 7]
+        self.held = np.isinf(columns[:, 1])
+        self.signs = columns[:, 7]
         rows = modal_system.faces[self.held]
         self.pinv = np.linalg.pinv(rows, rcond=1e-10)
         self.project = np.eye(n) - self.pinv @ rows
         if len(rows) and np.abs(self.project).max() < 1e-9:
             self.project = np.zeros((n, n))
         self.given = np.where(self.held, 0.0, columns[:, 0]) @ modal_system.faces / modes.mass
-        self.square, self.dampers = np.diag(modes.omega**2), np.asarray(modes.damping_matrix, float)
+        self.square = np.diag(modes.omega**2)
+        self.dampers = np.asarray(modes.damping_matrix, float)
 
     def slope(self) -> np.ndarray:
         """Derivative (2n, 2n) of the state at the end to that at the start."""
-        n, p = len(self.square), self.project
+        n = len(self.square)
+        p = self.project
         left = np.block([[np.zeros((n, n)), p], [-p @ self.square, -p @ self.dampers]])
         return exponential(left * self.span) @ self.taken_out()
 
@@ -96,25 +104,28 @@ class Stretch:
     def saltation(self, later: "Stretch") -> tuple:
         """(derivative (2n, 2n) of the state after the event at the end to that before it, whether only one slide
         changed by itself)."""
-        run, modes, n = self.run, self.run.modes, len(self.square)
+        run = self.run
+        modes = self.run.modes
+        n = len(self.square)
         row = later.row
-        z, v = (
-            row[run.kernels.HEAD : run.kernels.HEAD + n],
-            row[run.kernels.HEAD + n : run.kernels.HEAD + 2 * n],
-        )
+        z = row[run.kernels.HEAD : run.kernels.HEAD + n]
+        v = row[run.kernels.HEAD + n : run.kernels.HEAD + 2 * n]
         part = run.drive.segments[0]
         push = part.constant + part.amplitude * np.sin(row[2])
         rise = part.amplitude * part.omega * np.cos(row[2])
         before, pull = self.acceleration(z, v, push)
         changed = self.signs != later.signs
         face, stops = _what_happened(self, later, changed, modes.mass * pull @ self.pinv)
-        gradient, static, kinetic = np.zeros(2 * n), run.table.static[face], run.table.kinetic[face]
+        gradient = np.zeros(2 * n)
+        static = run.table.static[face]
+        kinetic = run.table.kinetic[face]
         if stops:
             gradient[n:] = run.modal_system.faces[face]
             speed = float(run.modal_system.faces[face] @ before)
         else:
             react = self.pinv[:, np.flatnonzero(self.held) == face][:, 0]
-            gradient[:n], gradient[n:] = -react @ self.square, -react @ self.dampers
+            gradient[:n] = -react @ self.square
+            gradient[n:] = -react @ self.dampers
             speed = float(gradient[:n] @ v + gradient[n:] @ before - react @ modes.base * rise)
         jump = np.zeros(2 * n)
         if stops or static != kinetic:  # else nothing jumps at a release
@@ -133,13 +144,15 @@ def exponential(left) -> np.ndarray:
 
     That of SciPy wakes the threads of its linear algebra, which takes up to milliseconds for two rows.
     """
-    half, sizes = len(left) // 2, np.abs(left)
+    half = len(left) // 2
+    sizes = np.abs(left)
     # of rates
     scale = np.sqrt(max(float(sizes.max()), 1e-300) / max(float(sizes[:half].max()), 1e-300))
     weight = np.repeat([scale, 1.0], half)
     even = left * (weight[:, None] / weight)
     times = max(0, int(np.ceil(np.log2(max(float(np.abs(even).sum(axis=0).max()), 1e-300)))) + 1)
-    even, out = even / 2.0**times, np.eye(len(left))
+    even = even / 2.0**times
+    out = np.eye(len(left))
     for k in range(16, 0, -1):
         out = np.eye(len(left)) + even @ out / k
     for _ in range(times):
@@ -177,16 +190,19 @@ def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map
         Stretch(run, rows[a], None, float(rows[a:b, 1].sum()))
         for a, b in zip(begins, [*begins[1:], len(rows)])
     ]
-    slope, alone = parts[0].slope(), True
+    slope = parts[0].slope()
+    alone = True
     for before, after in pairwise(parts):
         if np.any(before.signs != after.signs):
             jump, own = before.saltation(after)
-            slope, alone = jump @ slope, alone and own
+            slope = jump @ slope
+            alone = alone and own
         slope = after.slope() @ slope
     owner = np.repeat(np.arange(len(rows)), 3)
     dense = run.dense_values(rows, owner, np.tile([0.0, 0.5, 1.0], len(rows)) * rows[owner, 1])
     sizes = [max(float(np.abs(part).max()), 1e-300) for part in (dense[:, :n], dense[:, n : 2 * n])]
-    low, high = run.books.extremes[:, 0].min(), run.books.extremes[:, 1].max()
+    low = run.books.extremes[:, 0].min()
+    high = run.books.extremes[:, 1].max()
     return Map(
         run.motion.ravel().copy(),
         slope,
@@ -231,7 +247,10 @@ class Slips(Shooting):
     """The map from event to event over whole periods of a drive; arguments as `steady`."""
 
     def __init__(self, modes: ModalBasis, drive, groups, periods: int = 1):
-        self.modes, self.drive, self.groups, self.periods = modes, drive, groups, periods
+        self.modes = modes
+        self.drive = drive
+        self.groups = groups
+        self.periods = periods
         part = drive.segments[0]
         self.moved_by = max(
             abs(part.amplitude) / part.omega**2 * float(np.abs(modes.base).max()), 1e-300
@@ -251,7 +270,8 @@ class Slips(Shooting):
 
     def moved(self, mapped: Mapped, step):
         """The state a step away, whose held slides stay at rest."""
-        n, out = self.modes.omega.size, mapped.point + step
+        n = self.modes.omega.size
+        out = mapped.point + step
         out[n:] = mapped.found.first @ out[n:]
         return out
 
@@ -270,13 +290,16 @@ class Slips(Shooting):
 
 
 def _result(mapped: Mapped, n: int, regime, used: int) -> Steady:
-    one, state = mapped.found, mapped.point
+    one = mapped.found
+    state = mapped.point
     stops = tuple(
         int(k) for k in np.count_nonzero((one.signs[:-1] != 0) & (one.signs[1:] == 0), axis=0)
     )
     if regime is None:
-        signs, most = one.signs[:, one.rubs], max(stops)
-        slips, rests = bool(np.any(signs != 0)) or signs.shape[1] == 0, bool(np.any(signs == 0))
+        signs = one.signs[:, one.rubs]
+        most = max(stops)
+        slips = bool(np.any(signs != 0)) or signs.shape[1] == 0
+        rests = bool(np.any(signs == 0))
         regime = (
             "stuck"
             if not slips

@@ -13,7 +13,10 @@ def at_four(poly, low, top, u):
     a = b = c = d = poly[top]
     for k in range(top - 1, low - 1, -1):
         part = poly[k]
-        a, b, c, d = a * u[0] + part, b * u[1] + part, c * u[2] + part, d * u[3] + part
+        a = a * u[0] + part
+        b = b * u[1] + part
+        c = c * u[2] + part
+        d = d * u[3] + part
     return a, b, c, d
 
 
@@ -23,15 +26,23 @@ def rates_at_four(coefs, i, top, u):
     a = b = c = d = top * coefs[top, i]
     for k in range(top - 1, 0, -1):
         part = k * coefs[k, i]
-        a, b, c, d = a * u[0] + part, b * u[1] + part, c * u[2] + part, d * u[3] + part
+        a = a * u[0] + part
+        b = b * u[1] + part
+        c = c * u[2] + part
+        d = d * u[3] + part
     return a, b, c, d
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def sums(x, u, h, top, modal_system, time_state, books, workspace):
     """Add the work of the drive, the viscous loss and the phasor of a piece up to u to the books, by Gauss points."""
-    n, count, ledger, nodes = len(modal_system.square), points(x * u), books.ledger, workspace.nodes
-    work, lost, passed_by = 0.0, 0.0, 0.0
+    n = len(modal_system.square)
+    count = points(x * u)
+    ledger = books.ledger
+    nodes = workspace.nodes
+    work = 0.0
+    lost = 0.0
+    passed_by = 0.0
     for g in range(0, count, 4):  # four points at a time in registers
         place = (
             u * _PLACE[count, g],
@@ -79,7 +90,8 @@ def sums(x, u, h, top, modal_system, time_state, books, workspace):
         for g in range(count):
             share = u * _PLACE[count, g]
             at = time_state.now[1] + h * share
-            out, angle = 0.0, 2 * pi * at / time_state.period[0]
+            out = 0.0
+            angle = 2 * pi * at / time_state.period[0]
             for i in range(n):
                 out += modal_system.output[i] * value(workspace.coefs[:, i], 0, top, share)
             out *= 2 * u * h * _WEIGHT[count, g] / time_state.period[0]

@@ -16,7 +16,12 @@ from ..march.varying_load import PLASTIC, Rubbing, plastic, rub_of
 HERE = "dynamics.grooves.contact_kernels"
 STIFF = 0.1  # of tolerance times the slide at which pieces let go: a bond length that is 1.7 of it off in force at most
 SHORT = 1e-3  # of that slide: the shortest bonds by which shear modes are chosen
-RISE, VERTICAL, LIFTS, BEFORE, NORMAL = 0, 1, 4, 12, 13  # of Climbing.now_at
+# of Climbing.now_at
+RISE = 0
+VERTICAL = 1
+LIFTS = 4
+BEFORE = 12
+NORMAL = 13
 
 
 def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
@@ -61,14 +66,15 @@ def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -
     tolerance) times as stiff, a bond length STIFF tolerance mu N/K_t: on flat ground the force is then off by at most
     0.17 of the tolerance, over the friction limit, from the exact elements (`slip.shear_modes.jenkins_set`).
     """
-    law, force = model.law, patch.pressure.sigma_n * patch.pieces.interface.weight
-    limit, weakening, length = law.static * force, 1.0, law.length
+    law = model.law
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    limit = law.static * force
+    weakening = 1.0
+    length = law.length
     if not length:
         reach = limit.sum() / tangential_stiffness(patch.giving, force > 0)
-        law, length = (
-            plastic(law.static, STIFF * tolerance * reach),
-            max(STIFF * tolerance, SHORT) * reach,
-        )
+        law = plastic(law.static, STIFF * tolerance * reach)
+        length = max(STIFF * tolerance, SHORT) * reach
     if law.growth[0] >= 0:
         weakening = law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf
     found = (
@@ -84,7 +90,10 @@ class FlankModel:
     `static` [1]."""
 
     __slots__ = ()
-    joints, laws, loading = (), (), ""  # nothing beside it, and the loop knows of a load that stays
+    # nothing beside it, and the loop knows of a load that stays
+    joints = ()
+    laws = ()
+    loading = ""
 
     @property
     def limit(self) -> float:
@@ -157,17 +166,16 @@ class ClimbingModel(FlankModel):
         of the vertical force [N], (3, a); nothing of one point, which has no field."""
         if self.shear is None:
             return {}
-        top, bottom = contact.memory[0], contact.memory[1]
+        top = contact.memory[0]
+        bottom = contact.memory[1]
         if self.law.kind == PLASTIC:
-            force, over = (
-                self.law.static * top,
-                self.law.length * np.divide(top, bottom, where=bottom > 0, out=np.zeros_like(top)),
+            force = self.law.static * top
+            over = self.law.length * np.divide(
+                top, bottom, where=bottom > 0, out=np.zeros_like(top)
             )
         else:
-            force, over = (
-                self.law.static / self.law.length * bottom,
-                np.divide(bottom, top, where=top > 0, out=np.zeros_like(top)),
-            )
+            force = self.law.static / self.law.length * bottom
+            over = np.divide(bottom, top, where=top > 0, out=np.zeros_like(top))
         return {
             "nodes": np.stack(
                 [force, over + contact.b @ contact.modes, contact.share * contact.now_at[VERTICAL]]
@@ -180,7 +188,9 @@ class GroovesRun(Run):
 
     def response(self, rows, number) -> Response:
         """Histories; with a lifted mass `extra` has normal_load [N], the vertical force N + m (t q'' + t' q'^2)."""
-        out, g, modes = super().response(rows, number), self.model.grooves, self.modes
+        out = super().response(rows, number)
+        g = self.model.grooves
+        modes = self.modes
         if not g.lifted_mass:
             return out
         along = (
@@ -209,9 +219,11 @@ class ClimbingRun(GroovesRun):
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
-        q, v = self.modes.slide @ self.state[0], self.modes.slide @ self.state[1]
+        q = self.modes.slide @ self.state[0]
+        v = self.modes.slide @ self.state[1]
         slope = float(model.grooves.slope(q))
-        contact, now_at = self.contact, self.contact.now_at
+        contact = self.contact
+        now_at = self.contact.now_at
         normal = model.load * np.hypot(1.0, slope)
         contact.memory[:] *= normal / now_at[NORMAL]
         contact.pressed[:] *= normal / now_at[NORMAL]

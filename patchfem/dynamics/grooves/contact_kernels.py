@@ -57,7 +57,8 @@ def path_over(flank, q, dq):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def over(flank, q, dq):
     """(mean slope dz/dq, mean of sqrt(1 + t^2), ds/dq) over the slide dq [m] from q [m]."""
-    half, middle = 0.5 * flank[WAVE] * dq, flank[WAVE] * (q + 0.5 * dq) - flank[PHASE]
+    half = 0.5 * flank[WAVE] * dq
+    middle = flank[WAVE] * (q + 0.5 * dq) - flank[PHASE]
     share = sin(half) / half if abs(half) > STEEP else 1 - half * half / 6
     return flank[AMPLITUDE] * flank[WAVE] * sin(middle) * share, path_over(flank, q, dq)
 
@@ -78,8 +79,10 @@ def climb(dq, q, dt, flank, at):
 def resist(pulled, gain, middle, dt, flank, at):
     """Write the mean force against a slide, and its slope [N/m], into `at`; pulled [N], gain [N/m]: mean force along
     the flank and its slope; middle [m]: of the slide."""
-    slope, path = at[MEAN_SLOPE], at[PATH]
-    at[ALONG], at[PULL] = pulled, at[HELD] * slope + pulled * path
+    slope = at[MEAN_SLOPE]
+    path = at[PATH]
+    at[PULL] = at[HELD] * slope + pulled * path
+    at[ALONG] = pulled
     bend = (
         0.5
         * flank[AMPLITUDE]
@@ -104,7 +107,9 @@ def pull(dq, q, dt, c):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve(free, beta, q, v, dt, c, goal):
     """(dq [m], mean force [N], iterations) of a step with dq = free - beta force, as of `contacts.element_kernels`."""
-    at, low, high = c.now_at, -np.inf, np.inf
+    at = c.now_at
+    low = -np.inf
+    high = np.inf
     t = steep(c.flank, q)
     points.begun(c, v * sqrt(1 + t * t), dt)
     dq = 2 * at[LAST] - at[LAST_BUT_ONE]
@@ -114,7 +119,8 @@ def solve(free, beta, q, v, dt, c, goal):
         digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(at[PULL]))
         if abs(miss) <= 0.01 * goal * beta + digit:
             return dq, at[PULL], count
-        gain, here = max(1 + beta * at[PULL_SLOPE], 0.1), dq
+        gain = max(1 + beta * at[PULL_SLOPE], 0.1)
+        here = dq
         low, high, dq = narrowed(low, high, dq, miss, gain, count - 40)
         if high - low <= digit:
             return here, at[PULL], count if abs(miss) <= goal * beta + 8 * gain * digit else -count
@@ -134,15 +140,20 @@ def given(dq, q, v, dt, c, goal):
 def commit(dq, force, q, v0, v1, dt, c):
     """Keep the solved step of mean force [N]; (energy dissipated along the flank [J], True)."""
     at = c.now_at
-    t0, t1 = steep(c.flank, q), steep(c.flank, q + dq)
-    v0, v1 = v0 * sqrt(1 + t0 * t0), v1 * sqrt(1 + t1 * t1)
+    t0 = steep(c.flank, q)
+    t1 = steep(c.flank, q + dq)
+    v0 = v0 * sqrt(1 + t0 * t0)
+    v1 = v1 * sqrt(1 + t1 * t1)
     along = (force - at[HELD] * at[MEAN_SLOPE]) / at[PATH]
     lost, fine = points.commit(at[PATH] * dq, along, v0, v1, dt, c)
     if c.flank[LIFTED] > 0.0:
         at[RISE] = 2 * at[MEAN_SLOPE] * dq / dt - at[RISE]
         at[LIFTS] = max(at[LIFTS], 0.0 if at[HELD] > 0.0 else 1.0)
-    at[VERTICAL], at[LAST_BUT_ONE], at[LAST] = at[HELD], at[LAST], dq
-    at[BEFORE], at[PLACE] = at[NORMAL], points.state(c, 0.0)[0]
+    at[VERTICAL] = at[HELD]
+    at[LAST_BUT_ONE] = at[LAST]
+    at[LAST] = dq
+    at[BEFORE] = at[NORMAL]
+    at[PLACE] = points.state(c, 0.0)[0]
     return lost, fine
 
 
@@ -150,7 +161,8 @@ def commit(dq, force, q, v0, v1, dt, c):
 def state(c, q, v):
     """(force against the slide [N], energy stored in height, lifted mass and law [J], irreversible slip [m]) at the
     slide q [m] and the speed v [m/s]."""
-    at, t = c.now_at, steep(c.flank, q)
+    at = c.now_at
+    t = steep(c.flank, q)
     length = sqrt(1 + t * t)
     half = sin(0.5 * (c.flank[WAVE] * q - c.flank[PHASE]))
     along, energy, kept = points.state(c, q)

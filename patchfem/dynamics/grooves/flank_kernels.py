@@ -21,14 +21,17 @@ LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, STATIC, KINETIC, SPEED = range(1, 9)  # of
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def flank(numbers, q):
     """(slope t of the flank [1], its rate t' over the slide [1/m]) at the slide q [m]."""
-    steep, turn = numbers[AMPLITUDE] * numbers[WAVE], numbers[WAVE] * q - numbers[PHASE]
+    steep = numbers[AMPLITUDE] * numbers[WAVE]
+    turn = numbers[WAVE] * q - numbers[PHASE]
     return steep * sin(turn), steep * numbers[WAVE] * cos(turn)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def holds(numbers, turn):
     """(smallest, largest) force [N] with which the flank holds the slide at rest, as `turn` has it."""
-    t, mu, load = flank(numbers, turn[PLACE])[0], numbers[STATIC], numbers[LOAD]
+    t = flank(numbers, turn[PLACE])[0]
+    mu = numbers[STATIC]
+    load = numbers[LOAD]
     return load * (t - mu) / (1 + mu * t), load * (t + mu) / (1 - mu * t)
 
 
@@ -55,10 +58,15 @@ def state_rates(numbers, memory, turn, dq, v, y, out):
     and F = V c are linear in F, c = (t + phi)/(1 - phi t): F (1 + m_l t c s) = c (N + m_l (t' q'^2 + t a)).
     """
     steep, bend = flank(numbers, turn[PLACE])
-    load, free, share, heavy = numbers[LOAD], turn[FREE], turn[EASE], numbers[LIFTED]
-    out[1], normal = 1.0, load
+    load = numbers[LOAD]
+    free = turn[FREE]
+    share = turn[EASE]
+    heavy = numbers[LIFTED]
+    out[1] = 1.0
+    normal = load
     if turn[0] == 0.0 and numbers[SPEED] == 0.0:
-        turn[PULL], out[0] = free / share, 0.0
+        turn[PULL] = free / share
+        out[0] = 0.0
         low, high = holds(numbers, turn)
         out[1] = min(high - turn[PULL], turn[PULL] - low)
     else:
@@ -73,7 +81,8 @@ def state_rates(numbers, memory, turn, dq, v, y, out):
         )
         normal += heavy * (steep * (free - share * turn[PULL]) + bend * v * v)
         out[0] = phi * (1 + steep * steep) / (1 - phi * steep) * normal * v
-    out[2], turn[UPRIGHT] = normal, normal
+    out[2] = normal
+    turn[UPRIGHT] = normal
     if turn[0] == 0.0:
         turn[RELEASE_DIRECTION] = release_direction(numbers, turn)
     memory[0] = turn[PULL]
@@ -83,7 +92,8 @@ def state_rates(numbers, memory, turn, dq, v, y, out):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_memory(numbers, memory, q, v):
     """Return the last force, the energy of the load's height and of the mass that rises, and the slide q."""
-    half, rise = sin(0.5 * (numbers[WAVE] * q - numbers[PHASE])), flank(numbers, q)[0] * v
+    half = sin(0.5 * (numbers[WAVE] * q - numbers[PHASE]))
+    rise = flank(numbers, q)[0] * v
     height = 2 * numbers[LOAD] * numbers[AMPLITUDE] * half * half
     return Reading(memory[0], height + 0.5 * numbers[LIFTED] * rise * rise, q)
 

@@ -20,8 +20,12 @@ from ..interfaces.shear_points_kernels import SLOPE
 from ..interfaces.shear_solve_kernels import GRADIENT, STEP, descend, halfway, hessian
 from ..interfaces.shear_solve_kernels import pulled as drawn
 
-LOAD, KIND = 0, 5  # of contacts.arrays.Climbing.flank, as in `contact_kernels`
-PLACE, NORMAL = 11, 13  # of now_at
+# of contacts.arrays.Climbing.flank, as in `contact_kernels`
+LOAD = 0
+KIND = 5
+# of now_at
+PLACE = 11
+NORMAL = 13
 TINY = 1e-13  # of the friction limit, to which pieces that give way are solved
 
 
@@ -35,9 +39,14 @@ def begun(c, v, dt):
 def drag(ds, flat, end, dt, c):
     """(mean force [N] along the flank over the path ds [m] in dt [s], its slope [N/m]); c.pressed become shares of the
     normal force flat + f end at the end, on a slope `end`, where f is the force there."""
-    kind, pulled, gain, at, gives = int(c.flank[KIND]), 0.0, 0.0, c.now_at, c.kappa.size > 0
+    kind = int(c.flank[KIND])
+    pulled = 0.0
+    gain = 0.0
+    at = c.now_at
+    gives = c.kappa.size > 0
     close = (1e-12 if gives else 1e-14) * c.flank[LOAD]
-    tried, missed = 0.0, 0.0
+    tried = 0.0
+    missed = 0.0
     for count in range(60):
         before = at[NORMAL]
         press_all(kind, c)
@@ -60,7 +69,8 @@ def drag(ds, flat, end, dt, c):
             load(c, max(before - miss * (before - tried) / (miss - missed), 0.0))
         else:
             load(c, now)
-        tried, missed = before, miss
+        tried = before
+        missed = miss
         if abs(miss) <= close:
             break
     return pulled, stiff(c) if gives else gain
@@ -77,7 +87,9 @@ def load(c, normal):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stiff(c):
     """Slope [N/m] of the force over the slide of the holder, of points behind shear modes that have been solved for."""
-    hess, p, total = c.hess[0], c.workspace[STEP], 0.0
+    hess = c.hess[0]
+    p = c.workspace[STEP]
+    total = 0.0
     for j in range(int(c.count[0])):
         total += c.points[SLOPE, j]
     if c.ready[0] == 0.0:
@@ -102,11 +114,13 @@ def bent(hess, p, workspace):
 def commit(ds, along, v0, v1, dt, c):
     """Keep the step over the path ds [m] under the mean force `along` [N] between the speeds v0, v1 [m/s] along the
     flank; (energy dissipated [J], whether points and pieces agree)."""
-    kind, fine = int(c.flank[KIND]), True
+    kind = int(c.flank[KIND])
+    fine = True
     lost = rub_commit(ds, along, v0, v1, dt, kind, c)
     if c.kappa.size:
         more, count = spring_back(kind, c, c.force[0] * c.flank[LOAD] * 1e-11)
-        lost, fine = lost + more, count > 0
+        lost = lost + more
+        fine = count > 0
     for j in range(c.pressed.shape[1]):
         c.pressed[0, j] = c.pressed[1, j]
     return lost, fine

@@ -74,7 +74,8 @@ class SampledRun(GroovesRun):
 
     def _begin(self) -> None:
         """Begin the motion from the state as it stands, at the start of the drive."""
-        g, model = self.model.grooves, self.model
+        g = self.model.grooves
+        model = self.model
         numbers = [
             1.0,
             model.load,
@@ -91,13 +92,17 @@ class SampledRun(GroovesRun):
             self.modes, self.drive, element, 1.0, TOLERANCE, start=InitialState(*self.state)
         )
         self.motion_of.ends_only(1)
-        n, least = self.modes.omega.size, self.motion_of.moving.work[24]
-        least[:n], least[n : 2 * n] = REST / g.wave, REST / g.wave * self.motion_of.moving.now[PACE]
+        n = self.modes.omega.size
+        least = self.motion_of.moving.work[24]
+        least[:n] = REST / g.wave
+        least[n : 2 * n] = REST / g.wave * self.motion_of.moving.now[PACE]
         self.booked = self._sums_of()
 
     def _sums_of(self) -> np.ndarray:
         """Work of the drive, viscous loss, its |work|, friction's own loss, steps and work of the slide [J]."""
-        y, own, n = self.motion_of.moving.y, self.motion_of.kept.counters, 2 * self.modes.omega.size
+        y = self.motion_of.moving.y
+        own = self.motion_of.kept.counters
+        n = 2 * self.modes.omega.size
         return np.array([y[-3], y[-2], own[POWER], y[n], own[DONE], y[-1]])
 
     def fork(self, drive):
@@ -111,8 +116,10 @@ class SampledRun(GroovesRun):
 
     def _steps(self, count: int, rows) -> tuple:
         """As of a Run: the motion is sampled; rows have friction's own loss in the step besides."""
-        n, dt = self.modes.omega.size, float(self.prop.dt)
-        times, motion = (self.done + np.arange(count + 1)) * dt, self.motion_of
+        n = self.modes.omega.size
+        dt = float(self.prop.dt)
+        times = (self.done + np.arange(count + 1)) * dt
+        motion = self.motion_of
         if motion.time != times[0] or not np.array_equal(
             motion.moving.y[: 2 * n], self.state.ravel()
         ):
@@ -131,26 +138,25 @@ class SampledRun(GroovesRun):
         if 0 < last < len(seen) - 1:  # the sums and the state are those of the last sample
             motion = self.motion_of = begun
             motion.until(times[last], times[: last + 1])
-        seen, work, slip_path = (
-            seen[: last + 1],
-            np.diff(seen[: last + 1, -1]),
-            np.diff(seen[: last + 1, 2 * n + 1]),
-        )
+        seen = seen[: last + 1]
+        work = np.diff(seen[:, -1])
+        slip_path = np.diff(seen[:, 2 * n + 1])
         part = rows[: last + 1]
-        part[:, : 2 * n + 2], part[:, 2 * n + 2], part[:, 2 * n + 3] = (
-            seen[:, 1 : 2 * n + 3],
-            seen[:, 2 * n + 3],
-            seen[:, 2 * n + 4],
-        )
-        part[:, 2 * n + 4], part[:, 2 * n + 5] = seen[:, 2 * n + 3], seen[:, 2 * n + 5]
+        part[:, : 2 * n + 2] = seen[:, 1 : 2 * n + 3]
+        part[:, 2 * n + 2] = seen[:, 2 * n + 3]
+        part[:, 2 * n + 3] = seen[:, 2 * n + 4]
+        part[:, 2 * n + 4] = seen[:, 2 * n + 3]
+        part[:, 2 * n + 5] = seen[:, 2 * n + 5]
         part[:-1, 2 * n + 4] = np.divide(
             work, slip_path, out=seen[:-1, 2 * n + 3].copy(), where=slip_path != 0
         )
-        part[:-1, 2 * n + 6], part[:-1, 2 * n + 7] = work, work - np.diff(seen[:, 2 * n + 5])
+        part[:-1, 2 * n + 6] = work
+        part[:-1, 2 * n + 7] = work - np.diff(seen[:, 2 * n + 5])
         self.state[:] = motion.moving.y[: 2 * n].reshape(2, n)
         sums = self._sums_of()
         self.ledger[[0, 1, 2, 3, 5, 8]] += sums - self.booked
-        self.ledger[4], self.booked = max(self.ledger[4], motion.kept.counters[STORED]), sums
+        self.ledger[4] = max(self.ledger[4], motion.kept.counters[STORED])
+        self.booked = sums
         return last, status
 
     def _sampled(self, rows) -> np.ndarray:
@@ -179,6 +185,8 @@ class SampledRun(GroovesRun):
 
     def strained(self) -> float:
         """Energy of the height of the load and of the speed of what rises [J]."""
-        g, (z, v) = self.model.grooves, self.state
-        q, rate = float(self.modes.slide @ z), float(self.modes.slide @ v)
+        g = self.model.grooves
+        z, v = self.state
+        q = float(self.modes.slide @ z)
+        rate = float(self.modes.slide @ v)
         return float(self.model.load * g.height(q) + 0.5 * g.lifted_mass * (g.slope(q) * rate) ** 2)

@@ -39,18 +39,25 @@ class FreeBalance:
     """
 
     def __init__(self, balance: Balance, mode: int, harmonics: int, scale: float):
-        self.balance, self.mode, self.h, self.scale = balance, mode, harmonics, scale
+        self.balance = balance
+        self.mode = mode
+        self.h = harmonics
+        self.scale = scale
 
     def linear(self, omega: float, zeta: float) -> LinearPart:
         """The modes at omega [rad/s] with the damping -2 zeta omega besides, the given coordinate free."""
-        m, k = self.balance.modes, np.arange(self.h + 1)[:, None, None]
-        eye, keep = np.eye(m.omega.size), np.arange(m.omega.size) != self.mode
+        m = self.balance.modes
+        k = np.arange(self.h + 1)[:, None, None]
+        eye = np.eye(m.omega.size)
+        keep = np.arange(m.omega.size) != self.mode
         p = (
             np.diag(m.omega**2)
             - (k * omega) ** 2 * eye
             + 1j * k * omega * (m.damping_matrix - 2 * zeta * omega * eye)
         )
-        inverse, right, left = np.zeros_like(p), eye[self.mode] + 0j, eye[self.mode] + 0j
+        inverse = np.zeros_like(p)
+        right = eye[self.mode] + 0j
+        left = eye[self.mode] + 0j
         inverse[np.arange(self.h + 1) != 1] = _inverse(p[np.arange(self.h + 1) != 1])
         inverse[np.ix_([1], keep, keep)] = np.linalg.inv(p[1][np.ix_(keep, keep)])
         right -= inverse[1] @ p[1][:, self.mode]
@@ -60,7 +67,9 @@ class FreeBalance:
 
     def system(self, x, amplitude: float) -> System:
         """The equations at unknowns x (N,) and the amplitude of the mode's coordinate [m], lengths over it."""
-        omega, zeta, balance = x[-2] * self.scale, x[-1], self.balance
+        omega = x[-2] * self.scale
+        zeta = x[-1]
+        balance = self.balance
         if not omega > 0:
             return System(np.full(x.size, np.inf), np.eye(x.size), None, None, None)
         here = self.linear(omega, zeta)
@@ -89,7 +98,8 @@ class FreeBalance:
                 f"backbone: no free motion with the amplitude {format_length(amplitude, 3)} was found by "
                 "following the motion from smaller amplitudes"
             )
-        x, one = found[0], self.system(found[0], amplitude)
+        x = found[0]
+        one = self.system(found[0], amplitude)
         slides = self.balance.lift @ unpack(x[:-2] * amplitude, self.balance.lift.shape[1])
         return x, Free(amplitude, x[-2] * self.scale, x[-1], slides, one.fold.force, one.modal)
 
@@ -99,7 +109,8 @@ class FreeBalance:
         stops = [float(target)]
         while stops:
             try:
-                x, done = self.solve(x, stops[-1])[0], stops.pop()
+                x = self.solve(x, stops[-1])[0]
+                done = stops.pop()
             except NotConverged:
                 if len(stops) > STEPS:
                     raise
@@ -121,11 +132,13 @@ def _inverse(p) -> np.ndarray:
 def trace(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
     """Free motions along rising amplitudes (k,) [m] from a linear mode (omega, shape (n,)); steps in between where one
     is too wide."""
-    balance, h = equations.balance, equations.h
+    balance = equations.balance
+    h = equations.h
     y = np.zeros((balance.lift.shape[1], h + 1), complex)
     y[:, 1] = balance.faces @ shape
     x = np.append(pack(y), [omega / equations.scale, 0.0])
-    done, out = None, []
+    done = None
+    out = []
     for target in amplitudes:
         x = equations.towards(x, done, target) if out else x
         x, free = equations.solve(x, float(target))

@@ -99,7 +99,8 @@ def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> 
 
     The forces are the laws' own at each instant, so the accelerations have no ringing of cut-off harmonics.
     """
-    omega, group = periodic.omega, periodic.group
+    omega = periodic.omega
+    group = periodic.group
     inner = samples * max(1, -(-2 * periodic.samples // samples))
     every = inner // samples
 

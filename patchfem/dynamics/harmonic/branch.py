@@ -93,7 +93,8 @@ def _along(parameter: str, modes, drives, group, how: How, stability: bool) -> B
 
 
 def _listed(modes, drives, group, parameter, how: How) -> Branch:
-    points, last = [], how.start
+    points = []
+    last = how.start
     for drive in drives:
         last = point(modes, drive, group, how.harmonics, how.tolerance, last)
         points.append(last)
@@ -181,7 +182,8 @@ def between(modes, drive, one: Periodic, other: Periodic, share: float, width: f
     """
     balance = balance_of(modes, one.group, one.base_samples)
     step, size = _step(one, other, width)
-    h, length = one.harmonics, float(np.linalg.norm(step))
+    h = one.harmonics
+    length = float(np.linalg.norm(step))
     found = correct(
         lambda x, p: by_omega(balance, x, p, drive.acceleration, h),
         one.unknowns + share * size * step[:-1],
@@ -250,7 +252,8 @@ def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Bac
 
     It starts from the mode of the held contact of the same number. PatchfemError for amplitudes that do not rise.
     """
-    group, wanted = group_of(modes, group), np.asarray(amplitudes, float)
+    group = group_of(modes, group)
+    wanted = np.asarray(amplitudes, float)
     if (
         wanted.size == 0
         or not np.isfinite(wanted).all()

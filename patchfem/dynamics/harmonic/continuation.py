@@ -50,17 +50,21 @@ def follow(
     count 1. The last point lies on the bound. NotConverged where the first point cannot be reached.
     """
     width = bounds[1] - bounds[0]
-    x, p = np.array(x, float), float(p)
+    x = np.array(x, float)
+    p = float(p)
     size = scale or float(np.linalg.norm(x)) or 1.0
     x = correct(system, x, p, np.zeros(x.size), 1.0, size, width, goal, p)
     if x is None:
         raise NotConverged(
             "accuracy.method: the first point of the curve was not found near the given start"
         )
-    x, p = x[0], x[1]
+    p = x[1]
+    x = x[0]
     tangent = _tangent(system, x, p, None, size, width, forward)
     found = [(x, p, tangent[1], 0.0)]
-    signs, ended, arc = [tangent[0]], "points", 0.0
+    signs = [tangent[0]]
+    ended = "points"
+    arc = 0.0
     while len(found) < most:
         if not scale:
             size = max(size, 0.5 * float(np.linalg.norm(x)))
@@ -110,13 +114,16 @@ def follow(
 def _bordered(jacobian, by_p, t, size, width) -> np.ndarray:
     n = by_p.size
     matrix = np.empty((n + 1, n + 1))
-    matrix[:n, :n], matrix[:n, n], matrix[n] = jacobian, by_p * (width / size), t
+    matrix[:n, :n] = jacobian
+    matrix[:n, n] = by_p * (width / size)
+    matrix[n] = t
     return matrix
 
 
 def correct(system, x, p, tx, tp, size, width, goal, fixed=None):
     """Newton across the tangent from a guess: (x, p, iterations) or None; fixed: the parameter stays there."""
-    t, before = np.append(tx, tp), np.inf
+    t = np.append(tx, tp)
+    before = np.inf
     for count in range(1, 13):
         residual, jacobian, by_p = system(x, p)
         if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
@@ -163,10 +170,12 @@ def _folds(found, width) -> tuple:
         if t0[-1] * t1[-1] >= 0:
             continue
         h = s1 - s0
-        a, b = t0[-1] * h, t1[-1] * h / max(float(t0 @ t1), 0.1)
+        a = t0[-1] * h
+        b = t1[-1] * h / max(float(t0 @ t1), 0.1)
         rise = (p1 - p0) / width
         # derivative of the cubic: a + 2 s (3 rise - 2 a - b) + 3 s^2 (a + b - 2 rise)
-        c, d = 3 * (a + b - 2 * rise), 2 * (3 * rise - 2 * a - b)
+        c = 3 * (a + b - 2 * rise)
+        d = 2 * (3 * rise - 2 * a - b)
         roots = np.roots([c, d, a]) if abs(c) > 1e-9 * (abs(a) + abs(b)) else np.zeros(0)
         s = next((r.real for r in roots if abs(r.imag) < 1e-9 and 0 <= r.real <= 1), a / (a - b))
         out.append(

@@ -14,12 +14,17 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def slide_at(re, im, angle):
     """(value, first and second derivative) of Re sum X_k exp(i k angle)."""
-    c, s = np.cos(angle), np.sin(angle)
-    value, rate, bend = re[0], 0.0, 0.0
-    a, b = 1.0, 0.0
+    c = np.cos(angle)
+    s = np.sin(angle)
+    value = re[0]
+    rate = 0.0
+    bend = 0.0
+    a = 1.0
+    b = 0.0
     for k in range(1, re.size):
         a, b = a * c - b * s, a * s + b * c
-        even, odd = re[k] * a - im[k] * b, re[k] * b + im[k] * a
+        even = re[k] * a - im[k] * b
+        odd = re[k] * b + im[k] * a
         value += even
         rate -= k * odd
         bend -= k * k * even
@@ -33,7 +38,8 @@ def turning_points(re, im, rate, angle, place, cell):
     Fills angle, place (N,) and cell (N,), the sample before each, in order; returns their number and the direction at
     the first sample. A rate within rounding of zero has no direction of its own.
     """
-    n, count = rate.size, 0
+    n = rate.size
+    count = 0
     floor = 0.0
     for i in range(n):
         floor = max(floor, 1e-13 * abs(rate[i]))
@@ -56,7 +62,8 @@ def turning_points(re, im, rate, angle, place, cell):
         after = 1.0 if b > 0 else -1.0
         if after == sign:
             continue
-        low, high = i * width, (i + 1) * width
+        low = i * width
+        high = (i + 1) * width
         a = rate[i]
         at = low + width * (a / (a - b) if a * b < 0 else 0.0)
         for _ in range(60):
@@ -72,7 +79,9 @@ def turning_points(re, im, rate, angle, place, cell):
                 at = new
                 break
             at = new
-        angle[count], place[count], cell[count] = at, slide_at(re, im, at)[0], i
+        angle[count] = at
+        place[count] = slide_at(re, im, at)[0]
+        cell[count] = i
         count += 1
         sign = after
     return count, start
@@ -89,10 +98,18 @@ def jenkins_cycle(
     slope (N,) of the elements that stick, hold (R, N): minus the stiffness that hangs on each turning point, stretch
     (N,): sum of k limit stretch. Two turns from the virgin state: the second is periodic.
     """
-    t, n, r = limit.size, q.size, turns.size
+    t = limit.size
+    n = q.size
+    r = turns.size
     depth = 1
-    end, mark, sign, base = workspace[0][0], workspace[0][1], workspace[1][0], workspace[1][1]
-    end[0], mark[0], sign[0], base[0] = t, -1, 0.0, 0.0
+    end = workspace[0][0]
+    mark = workspace[0][1]
+    sign = workspace[1][0]
+    base = workspace[1][1]
+    end[0] = t
+    mark[0] = -1
+    sign[0] = 0.0
+    base[0] = 0.0
     p = 0
     g = 1.0 if q[0] > 0 else -1.0
     depth, p = _slide(q[0], g, p, depth, end, sign, base, limit)
@@ -104,7 +121,8 @@ def jenkins_cycle(
         for i in range(n):
             depth, p = _slide(q[i], g, p, depth, end, sign, base, limit)
             if turn:
-                f, s = g * full[p], g * square[p]
+                f = g * full[p]
+                s = g * square[p]
                 low = p
                 for d in range(depth - 1, -1, -1):
                     k = stiff[end[d]] - stiff[low]
@@ -114,7 +132,9 @@ def jenkins_cycle(
                     if mark[d] >= 0:
                         hold[mark[d], i] -= k
                     low = end[d]
-                force[i], stretch[i], slope[i] = f, s, stiff[t] - stiff[p]
+                force[i] = f
+                stretch[i] = s
+                slope[i] = stiff[t] - stiff[p]
             while at < r and cells[at] == i:
                 depth, p = _slide(turns[at], g, p, depth, end, sign, base, limit)
                 depth, p = _turn(turns[at], g, p, depth, end, sign, base, mark, at)
@@ -139,6 +159,9 @@ def _slide(q, g, p, depth, end, sign, base, limit):
 def _turn(q, g, p, depth, end, sign, base, mark, number):
     """Hang the slipping elements on a turning point."""
     if p > 0:
-        end[depth], sign[depth], base[depth], mark[depth] = p, g, q, number
+        end[depth] = p
+        sign[depth] = g
+        base[depth] = q
+        mark[depth] = number
         depth += 1
     return depth, 0

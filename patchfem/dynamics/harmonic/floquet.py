@@ -49,13 +49,16 @@ def monodromy(
 
     rows (i, n); slope, by_rate (i, N): means per cell of the local stiffness [N/m] and damping [N s/m] of every row.
     """
-    n, count = modes.omega.size, slope.shape[1]
+    n = modes.omega.size
+    count = slope.shape[1]
     remembered = [
         np.broadcast_to(part, count) for one in fading for part in (one.gain, one.loss, one.limit)
     ]
     first = _runs([slope, by_rate, *(mark.hold for mark in marks), *remembered], marks)
-    width, cells = np.diff(first, append=count) * (2 * np.pi / count), first.size
-    slope, by_rate = slope[:, first], by_rate[:, first]
+    width = np.diff(first, append=count) * (2 * np.pi / count)
+    cells = first.size
+    slope = slope[:, first]
+    by_rate = by_rate[:, first]
     size = 2 * n + len(marks) + len(fading)
     a = np.zeros((cells, size, size))
     grip = rows.T / (modes.mass * omega**2)

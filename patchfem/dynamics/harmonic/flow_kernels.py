@@ -22,12 +22,16 @@ def cycle(num, q, speed, dt, z, steps, force, slopes):
     force (M,) [N] and its slopes over z and the speed (2, M). The first cycle is that of a virgin contact; Newton's
     steps on the memory at the first node follow, where a cycle forgets any of it.
     """
-    n, whole = q.size, 0.0
+    n = q.size
+    whole = 0.0
     for i in range(n):
         whole += dt[i]
-    start, last = law.relax_stretch(num[0], 0.0, q[0], whole).stretch, inf
+    start = law.relax_stretch(num[0], 0.0, q[0], whole).stretch
+    last = inf
     for turn in range(TURNS):
-        now, kept, largest = start, 1.0, abs(start)
+        now = start
+        kept = 1.0
+        largest = abs(start)
         for i in range(n):
             z[i] = now
             now, steps[0, i], steps[1, i], steps[2, i] = law.relax_stretch(
@@ -55,7 +59,9 @@ def tangents(steps, out):
     them: the increment of the slide, in the last column that of the time; steps as of `cycle`."""
     n, p = out.shape
     for k in range(p):
-        by, kept, now = 2 if k == p - 1 else 1, 1.0, 0.0
+        by = 2 if k == p - 1 else 1
+        kept = 1.0
+        now = 0.0
         for i in range(n):
             now = steps[0, i] * now + steps[by, i] * out[i, k]
             kept *= steps[0, i]

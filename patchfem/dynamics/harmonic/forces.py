@@ -8,7 +8,9 @@ from ...core import PatchfemError, frozen_array
 from .harmonic import Fold
 from .laws import Jenkins, Track, analysis, law_of_model, synthesis
 
-FEWEST, MOST = 256, 65536  # samples of a cycle
+# samples of a cycle
+FEWEST = 256
+MOST = 65536
 
 
 class Group:
@@ -21,7 +23,8 @@ class Group:
     """
 
     def __init__(self, modes, parts, samples: int = 0):
-        rows, laws = {}, {}
+        rows = {}
+        laws = {}
         for part in parts if isinstance(parts, list) else [parts]:
             row, law = part if isinstance(part, tuple) else (0, part)
             law = law_of_model(law) if hasattr(law, "fields") else law
@@ -36,16 +39,16 @@ class Group:
             laws.setdefault(key, []).append(law)
         if not rows:
             raise PatchfemError("harmonic balance needs a friction law on at least one interface")
-        self.rows, self.laws = (
-            frozen_array(np.array(list(rows.values()))),
-            [tuple(v) for v in laws.values()],
-        )
+        self.rows = frozen_array(np.array(list(rows.values())))
+        self.laws = [tuple(v) for v in laws.values()]
         self.samples = samples
 
     def with_samples(self, samples: int) -> "Group":
         """The same laws on the same rows, on a grid of `samples` per cycle."""
         other = object.__new__(Group)
-        other.rows, other.laws, other.samples = self.rows, self.laws, samples
+        other.rows = self.rows
+        other.laws = self.laws
+        other.samples = samples
         return other
 
     def remade(self, change) -> "Group":
@@ -97,7 +100,8 @@ class Group:
         samples: per cycle, 0: those of the group or as many as H asks for.
         """
         n = samples or self.samples or self.samples_for(q.shape[1] - 1)
-        values, rates = synthesis(q, n), synthesis(1j * np.arange(q.shape[1]) * q, n)
+        values = synthesis(q, n)
+        rates = synthesis(1j * np.arange(q.shape[1]) * q, n)
         return [Track(x, omega, n, v, r) for x, v, r in zip(q, values, rates)]
 
     def forces(self, q, omega: float, samples: int = 0) -> np.ndarray:
@@ -126,8 +130,11 @@ def fold(tracks: list, sampled: list) -> Fold:
     The local slope K(theta) enters by its harmonics up to 2 H, a Toeplitz and a Hankel part; a turning point s by the
     harmonics of its share and the basis at its angle: no product over the samples, one transform for all rows.
     """
-    x, samples, omega = np.array([t.x for t in tracks]), tracks[0].samples, tracks[0].omega
-    rows, h = len(tracks), x.shape[1] - 1
+    x = np.array([t.x for t in tracks])
+    samples = tracks[0].samples
+    omega = tracks[0].omega
+    rows = len(tracks)
+    h = x.shape[1] - 1
 
     def added(name):
         return [
@@ -149,16 +156,19 @@ def fold(tracks: list, sampled: list) -> Fold:
     found = analysis(
         np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h
     )
-    slope, rate = local(found[rows : 2 * rows]), np.zeros((rows, h + 1), complex)
+    slope = local(found[rows : 2 * rows])
+    rate = np.zeros((rows, h + 1), complex)
     turns = moving or any(s.tangent is not None for laws in sampled for s in laws)
-    at, k = 2 * rows, np.arange(1, h + 1)
+    at = 2 * rows
+    k = np.arange(1, h + 1)
 
     def by_omega(turned, change):
         parts = np.concatenate([np.zeros((rows, 1)), change.real, change.imag], axis=1)
         return np.einsum("ikl,il->ik", turned, parts)
 
     if moving:
-        turned, at = local(found[at : at + rows]), at + rows
+        turned = local(found[at : at + rows])
+        at = at + rows
         slope[..., 1 : h + 1] += turned[..., h + 1 :] * (k * omega)
         slope[..., h + 1 :] -= turned[..., 1 : h + 1] * (k * omega)
         rate += by_omega(turned, 1j * k * x[:, 1:])
@@ -183,7 +193,8 @@ def _sum(arrays: list):
 
 @lru_cache(maxsize=16)
 def _places(h: int) -> tuple:
-    row, column = np.arange(h + 1)[:, None], np.arange(h + 1)[None, :]
+    row = np.arange(h + 1)[:, None]
+    column = np.arange(h + 1)[None, :]
     return row - column + 2 * h, row + column + 2 * h
 
 

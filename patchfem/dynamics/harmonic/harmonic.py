@@ -67,7 +67,8 @@ class LinearPart:
 
 def linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
     """The linear part (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0..harmonics at omega [rad/s]."""
-    n, k = modes.omega.size, np.arange(harmonics + 1)
+    n = modes.omega.size
+    k = np.arange(harmonics + 1)
     around = k * omega
     slope = (-2 * k * around)[:, None, None] * np.eye(n) + 1j * k[
         :, None, None
@@ -137,7 +138,9 @@ class Balance:
                 "balance is not needed; give a mode the key `slide`"
             )
         full = rank == rows.shape[0]
-        self.modes, self.rows, self.contact = modes, rows, contact
+        self.modes = modes
+        self.rows = rows
+        self.contact = contact
         self.lift = np.eye(rank) if full else u[:, :rank]
         self.faces = rows if full else s[:rank, None] * vt[:rank]
         self._linear = {}
@@ -182,7 +185,8 @@ class Balance:
 
     def _coordinates(self, x, here: LinearPart, harmonics) -> list:
         rest = x[self.lift.shape[1] * (2 * harmonics + 1) :]
-        out, at = [], 0
+        out = []
+        at = 0
         for k, *_ in here.free:
             out.append(complex(rest[at], rest[at + 1] if k else 0.0))
             at += 2 if k else 1
@@ -202,7 +206,9 @@ class Balance:
     ) -> System:
         """Residual [m] and derivatives at unknowns x, frequency omega [rad/s] and drive amplitude level [m s-2]; here:
         a linear part other than that of the modes."""
-        h, r, mass = harmonics, self.lift.shape[1], self.modes.mass
+        h = harmonics
+        r = self.lift.shape[1]
+        mass = self.modes.mass
         here = here or self.linear(omega, h)
         coordinates = self._coordinates(x, here, h)
         y = unpack(x[: r * (2 * h + 1)], r)
@@ -270,7 +276,9 @@ class Balance:
 
     def _free(self, here, coordinates, jacobian, parts, fold, z, level, linked, omega, size):
         """Rows and columns of the coordinates without receptance, equations over omega^2 [m]."""
-        h, r, at = z.shape[0] - 1, self.lift.shape[1], size
+        h = z.shape[0] - 1
+        r = self.lift.shape[1]
+        at = size
         for (k, right, left, stiffness), c in zip(here.free, coordinates):
             w = left @ self.rows.T / self.modes.mass / omega**2
             drive = left @ self.modes.base / omega**2 if k == 1 else 0.0
@@ -304,7 +312,8 @@ def damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple | None:
     for count in range(1, most + 1):
         solve = solve_linear(here.jacobian)
         step = -solve(here.residual)
-        length, size = float(np.linalg.norm(step)), float(np.linalg.norm(x))
+        length = float(np.linalg.norm(step))
+        size = float(np.linalg.norm(x))
         if not np.isfinite(length):
             break
         if length <= goal * max(size, 1e-300) or length < 1e-300:
@@ -313,7 +322,8 @@ def damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple | None:
                 if met(here, here.residual + here.jacobian @ step, size)
                 else None
             )
-        share, best = 1.0, None
+        share = 1.0
+        best = None
         while True:
             tried = x + share * step
             there = system(tried)

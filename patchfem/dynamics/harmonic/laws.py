@@ -60,7 +60,9 @@ class Track:
     """
 
     def __init__(self, x, omega: float, samples: int, q=None, rate=None):
-        self.x, self.omega, self.samples = x, omega, samples
+        self.x = x
+        self.omega = omega
+        self.samples = samples
         self.q = synthesis(x, samples) if q is None else q
         self.rate = synthesis(1j * np.arange(x.size) * x, samples) if rate is None else rate
 
@@ -68,8 +70,11 @@ class Track:
     def turning(self) -> tuple:
         """(angles, places, sample before each, direction at the first sample)."""
         n = self.samples
-        angle, place, cell = np.empty(n), np.empty(n), np.empty(n, np.int64)
-        re, im = np.ascontiguousarray(self.x.real), np.ascontiguousarray(self.x.imag)
+        angle = np.empty(n)
+        place = np.empty(n)
+        cell = np.empty(n, np.int64)
+        re = np.ascontiguousarray(self.x.real)
+        im = np.ascontiguousarray(self.x.imag)
         count, start = kernels().turning_points(re, im, self.rate, angle, place, cell)
         return angle[:count], place[:count], cell[:count], start
 
@@ -128,7 +133,8 @@ class Jenkins(Law):
                 "each Jenkins element needs a finite stiffness > 0 and a finite limit slide >= 0"
             )
         order = np.argsort(w, kind="stable")
-        k, w = k[order], w[order]
+        k = k[order]
+        w = w[order]
         object.__setattr__(self, "stiffness", frozen_array(k))
         object.__setattr__(self, "limit_slide", frozen_array(w))
         object.__setattr__(
@@ -150,13 +156,12 @@ class Jenkins(Law):
     def sample(self, track: Track) -> Sampled:
         """The periodic steady state that a virgin contact reaches."""
         _, places, cells, start = track.turning
-        n, (stiff, full, square) = track.samples, self.sums
-        force, slope, stretch, hold = (
-            np.empty(n),
-            np.empty(n),
-            np.empty(n),
-            np.zeros((places.size, n)),
-        )
+        n = track.samples
+        stiff, full, square = self.sums
+        force = np.empty(n)
+        slope = np.empty(n)
+        stretch = np.empty(n)
+        hold = np.zeros((places.size, n))
         workspace = np.empty((2, 2 * places.size + 3), np.int64), np.empty((2, 2 * places.size + 3))
         kernels().jenkins_cycle(
             track.q,
@@ -229,7 +234,8 @@ class OfSpeed(Law):
 
     def sample(self, track: Track) -> Sampled:
         """Force and slope at the samples."""
-        force, slope = np.empty(track.samples), np.empty(track.samples)
+        force = np.empty(track.samples)
+        slope = np.empty(track.samples)
         speed_kernels(self.element.kernels).along(
             self.element.numbers[None], track.omega * track.rate, force, slope
         )
@@ -259,22 +265,20 @@ class Flow(Law):
     def along(self, track: Track) -> "Nodes":
         """The periodic state, that of a virgin contact where several are, at samples and turning points."""
         angles, places, cells, _ = track.turning
-        n, own = track.samples, np.ones(track.samples + len(cells), bool)
+        n = track.samples
+        own = np.ones(track.samples + len(cells), bool)
         own[cells + 1 + np.arange(len(cells))] = False
         angle, q, speed = np.zeros((3, own.size))  # the slide rests at a turn
-        angle[own], q[own], speed[own] = (
-            np.arange(n) * (2 * np.pi / n),
-            track.q,
-            track.omega * track.rate,
-        )
-        angle[~own], q[~own] = angles, places
+        angle[own] = np.arange(n) * (2 * np.pi / n)
+        q[own] = track.q
+        speed[own] = track.omega * track.rate
+        angle[~own] = angles
+        q[~own] = places
         dt = np.maximum(np.diff(angle, append=2 * np.pi) / track.omega, 1e-300)
-        z, steps, force, slopes = (
-            np.empty(q.size),
-            np.empty((3, q.size)),
-            np.empty(q.size),
-            np.empty((2, q.size)),
-        )
+        z = np.empty(q.size)
+        steps = np.empty((3, q.size))
+        force = np.empty(q.size)
+        slopes = np.empty((2, q.size))
         flow_kernels(self.element.kernels).cycle(
             self.element.numbers[None], q, speed, dt, z, steps, force, slopes
         )
@@ -284,7 +288,9 @@ class Flow(Law):
         """Force at the samples of the periodic state. Where the law knows no time its slopes are those over the slide
         and the turning places, else those over the harmonics."""
         one = self.along(track)
-        own, force, stretch = one.own, one.force[one.own], self.element.limit * one.z[one.own]
+        own = one.own
+        force = one.force[one.own]
+        stretch = self.element.limit * one.z[one.own]
         if one.steps[2].any() or one.slopes[1].any():
             return Sampled(
                 force,
@@ -293,7 +299,8 @@ class Flow(Law):
                 tangent=lambda: self._tangent(track, one),
             )
         # at the end of a step dz/dq is its slope over the slide; at its start, over what it keeps of z, besides
-        before, after = np.roll(one.steps[1], 1), one.steps[1] / np.maximum(one.steps[0], 1e-300)
+        before = np.roll(one.steps[1], 1)
+        after = one.steps[1] / np.maximum(one.steps[0], 1e-300)
         hold = one.kept_from(np.flatnonzero(~own)) * (before - after)[~own, None]
         return Sampled(
             force,
@@ -306,13 +313,15 @@ class Flow(Law):
 
     def _tangent(self, track: Track, one: "Nodes") -> tuple:
         """Derivatives of the force at the samples as of `Sampled.tangent`."""
-        k, own = np.arange(track.x.size), one.own
+        k = np.arange(track.x.size)
+        own = one.own
         turned = np.exp(1j * np.outer(one.angle, k))
         wave, rate = (
             np.concatenate([x.real, -x.imag[:, 1:]], axis=1) for x in (turned, 1j * k * turned)
         )
         out = np.empty((one.angle.size, wave.shape[1] + 1))
-        out[:, :-1], out[:, -1] = np.roll(wave, -1, axis=0) - wave, -one.dt / track.omega
+        out[:, :-1] = np.roll(wave, -1, axis=0) - wave
+        out[:, -1] = -one.dt / track.omega
         flow_kernels(self.element.kernels).tangents(one.steps, out)
         out = out[own] * one.slopes[0, own, None]
         out[:, :-1] += one.slopes[1, own, None] * track.omega * rate[own]
@@ -348,7 +357,8 @@ class Nodes(NamedTuple):
     def by_cell(self) -> tuple:
         """(what a cell from sample to sample keeps of the stretch, its slope over an even slide), both (N,)."""
         kept, by_slide, _ = self.steps
-        first, turns = np.flatnonzero(self.own), ~self.own
+        first = np.flatnonzero(self.own)
+        turns = ~self.own
         share = np.ones(self.z.size)
         share[turns] = self.dt[turns]
         share[np.roll(turns, -1)] = self.dt[np.roll(turns, -1)]

@@ -18,10 +18,8 @@ CLOSE = 1e-8  # of the largest state, to which a motion repeats
 STILL = 1e-9  # of what the drive moves a free mass by: a smaller motion is none
 NUDGE = 1e-6  # of the largest state: a small disturbance
 # cycles in which the contact takes up a disturbance, and those that are seen in all
-TAKEN_UP, SEEN = (
-    2,
-    8,
-)
+TAKEN_UP = 2
+SEEN = 8
 FORGOTTEN = 1e-3  # of the largest disturbances, on the root mean square: what is smaller is not told from none
 NOTHING = 1e-5  # of a disturbance, which then has died out
 
@@ -31,14 +29,18 @@ def settled(run) -> float:
 
     It is more than CLOSE where no motion repeats within MOST cycles; `run.outcome` is set where the march ended.
     """
-    size, done, before = 2 * run.state.shape[1] + 2, 0, _state(run)
+    size = 2 * run.state.shape[1] + 2
+    done = 0
+    before = _state(run)
     least = (
         STILL
         * float(np.abs(run.drive.values(np.linspace(0, run.drive.period, 9))).max())
         / _pace(run) ** 2
     )
     least = max(least * _size(run.modes.base), 1e-300)
-    change, misses, still = np.inf, 0, 0
+    change = np.inf
+    misses = 0
+    still = 0
     while done < MOST and run.outcome is None:
         kept = [before]
         for _ in range((LEAD if done == 0 else REST) + size):
@@ -47,7 +49,8 @@ def settled(run) -> float:
             kept.append(_state(run))
             if run.outcome is not None:
                 break
-        last, change = change, _size(kept[-1] - kept[-2]) / max(_size(kept[-1]), least)
+        last = change
+        change = _size(kept[-1] - kept[-2]) / max(_size(kept[-1]), least)
         if change <= CLOSE or run.outcome is not None:
             break
         if still == 0:  # the cycles since the last guess
@@ -78,10 +81,12 @@ def multipliers(run) -> np.ndarray:
     takes up the disturbance; the map of a cycle is that which fits those that follow, SEEN in all, in least squares.
     Memories that fade slowly bend the fit: none counts as larger than 1 that was not seen to grow so.
     """
-    here, found = _state(run), []
+    here = _state(run)
+    found = []
     nudge = NUDGE * max(_size(here), 1e-300)
     for k in range(-1, here.size):
-        twin, there = run.fork(run.drive), here.copy()
+        twin = run.fork(run.drive)
+        there = here.copy()
         there[k] += nudge if k >= 0 else 0.0
         twin.placed(*_apart(run, there))
         states = []
@@ -95,7 +100,8 @@ def multipliers(run) -> np.ndarray:
     last = TAKEN_UP + int(np.argmax(np.append(sizes[TAKEN_UP:] < NOTHING, True)))
     first = min(TAKEN_UP, last) - 1
     if last - first < 2:
-        first, last = 0, 2
+        first = 0
+        last = 2
     pairs = [
         (after[k] / sizes[k], after[k + 1] / sizes[k])
         for k in range(first, last - 1)

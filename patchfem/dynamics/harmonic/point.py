@@ -74,7 +74,8 @@ class Periodic:
         angles, places, _, _ = Track(self.coefficients[0], self.omega, self.samples).turning
         if not angles.size:
             return ()
-        k, out = np.arange(self.coefficients.shape[1]), []
+        k = np.arange(self.coefficients.shape[1])
+        out = []
         for at in (
             np.argmin(places),
             np.argmax(places),
@@ -113,7 +114,9 @@ def top(y) -> float:
     """Largest value of a cycle y (N,), between the samples by a parabola: the largest of 4096 samples of a sine can be
     (pi/4096)^2/2 = 3e-7 of it smaller."""
     k = int(np.argmax(y))
-    a, b, c = y[k - 1], y[k], y[(k + 1) % y.size]
+    a = y[k - 1]
+    b = y[k]
+    c = y[(k + 1) % y.size]
     bend = a - 2 * b + c
     return float(b - (a - c) ** 2 / (8 * bend)) if bend < 0 else float(b)
 
@@ -141,10 +144,8 @@ def point(
     x, near = (start.unknowns, start.base_samples) if isinstance(start, Periodic) else (start, 0)
     if harmonics is not None:
         return _solved(modes, drive, group, harmonics, x, 1, near=near)
-    found, least = (
-        None,
-        start.harmonics if isinstance(start, Periodic) else _least(modes, drive, group),
-    )
+    found = None
+    least = start.harmonics if isinstance(start, Periodic) else _least(modes, drive, group)
     for h in [h for h in LADDER if h >= least] or LADDER[-1:]:
         try:
             found = _solved(modes, drive, group, h, x, WIDER, tolerance, near)
@@ -190,7 +191,8 @@ def cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
 def finer(found: Periodic, modes, drive) -> Periodic:
     """The same motion with twice its harmonics, three of one (a law alike both ways has no even ones), and twice its
     samples, those above following where they do. NotConverged where it is not found."""
-    h, x = found.harmonics, found.unknowns
+    h = found.harmonics
+    x = found.unknowns
     top = max(2 * (found.coefficients.shape[1] - 1), 3)
     balance = balance_of(modes, found.group, 2 * found.base_samples)
     here = balance.system(x, drive.omega, drive.acceleration, h)
@@ -219,7 +221,8 @@ def _solved(modes, drive, group, h, x, wider, tolerance=TOLERANCE, near=0) -> Pe
 def _reach(balance, x, drive, h: int):
     """`newton` from a start of any number of harmonics, from the held contact, what one harmonic would do, or along
     weaker drives."""
-    omega, level = drive.omega, drive.acceleration
+    omega = drive.omega
+    level = drive.acceleration
     for start in _starts(balance, x, omega, level, h):
         try:
             return newton(balance, start, omega, level, h)
@@ -248,7 +251,8 @@ def _climbed(balance, omega, level, h: int) -> np.ndarray:
     for more in [k for k in CLIMB if below < k < h] + [h] * (h > below):
         try:
             start = cut(balance, balance.slides(x, omega, below), x, below, more)
-            x, below = newton(balance, start, omega, level, more)[0], more
+            x = newton(balance, start, omega, level, more)[0]
+            below = more
         except NotConverged:
             pass
     return x if below == h else _along_levels(balance, omega, level, h)
@@ -329,7 +333,9 @@ def _widened(balance, start: Reached, drive, h, wider, tolerance) -> Periodic:
     The last sweep takes twice the samples. changes: of the slides per sweep [m], first those that follow alone.
     """
     x, here, count, known = start
-    omega, level, top = drive.omega, drive.acceleration, h * wider
+    omega = drive.omega
+    level = drive.acceleration
+    top = h * wider
     solve = solve_linear(here.jacobian)
     probe = max(top, 2 * h)  # harmonics that tell what is left out
     q = np.zeros((len(balance.rows), probe + 1), complex)
@@ -337,7 +343,8 @@ def _widened(balance, start: Reached, drive, h, wider, tolerance) -> Periodic:
         q[:, : known.shape[1]] = known[:, : probe + 1]
     q[:, : h + 1] = balance.slides(x, omega, h)
     samples = fine = balance.contact.samples
-    size, changes = float(np.linalg.norm(q)), []
+    size = float(np.linalg.norm(q))
+    changes = []
     for sweep in range(SWEEPS):
         force = balance.contact.force(q, omega, probe, fine)
         z = balance.motion(x, omega, level, h, force)
@@ -382,7 +389,8 @@ def _diverged(balance, start: Reached, drive, h, samples) -> Periodic:
 
 def _missed(balance, x, omega, level, h, force, z) -> np.ndarray:
     """Residual (N,) under forces (i, K + 1) that come from more harmonics than the unknowns have."""
-    low, at = balance.lift.shape[1] * (2 * h + 1), 0
+    low = balance.lift.shape[1] * (2 * h + 1)
+    at = 0
     y = unpack(x[:low], balance.lift.shape[1])
     out = [pack(y - (z[: h + 1] @ balance.faces.T).T)]
     for k, _, left, stiffness in balance.linear(omega, h).free:
@@ -394,7 +402,9 @@ def _missed(balance, x, omega, level, h, force, z) -> np.ndarray:
 
 
 def _periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> Periodic:
-    omega, level, group = drive.omega, drive.acceleration, balance.contact
+    omega = drive.omega
+    level = drive.acceleration
+    group = balance.contact
     q = q[:, : top + 1]
     fine = group.forces(q, omega, 2 * samples)
     used = group.force(q, omega, top, samples)
@@ -402,7 +412,8 @@ def _periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> Pe
     scale = float(np.sqrt(np.mean(fine**2)))
     residual = float(np.sqrt(np.mean(left**2))) / scale if scale > 0 else 0.0
     z = balance.motion(x, omega, level, h, used)
-    error, left = max(changes), 0.0
+    error = max(changes)
+    left = 0.0
     if top > h:
         # what is left of the sweeps, and what lies beyond the top: as below it, falling like k^-5/2
         ratio = (

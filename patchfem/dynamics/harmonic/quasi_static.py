@@ -88,8 +88,10 @@ def along(
     """
     if follows_speed(group, float(np.abs(group.rows).max()) * float(np.max(shares))):
         raise PatchfemError(RATE)
-    (omega, shape), out = held, []
-    near, of = np.append(shape, 1.0), shape / (shape @ shape) if of is None else of
+    omega, shape = held
+    out = []
+    near = np.append(shape, 1.0)
+    of = shape / (shape @ shape) if of is None else of
     for share in shares:
         try:
             near = _balanced(modes, group, (*held, of), float(share), near, samples)
@@ -98,7 +100,8 @@ def along(
                 Static(float(share), np.nan, np.nan, np.full(modes.omega.size, np.nan), np.nan)
             )
             continue
-        z, alpha = near[:-1] * share, float(near[-1]) * omega**2 * share
+        z = near[:-1] * share
+        alpha = float(near[-1]) * omega**2 * share
         loss = sum(
             loops(laws, abs(one), samples).area for one, laws in zip(group.rows @ z, group.laws)
         )
@@ -109,9 +112,13 @@ def along(
 def through(modes: ModalBasis, row, held: tuple, slides, found) -> list:
     """Static motions of a mode whose one interface, of slide `row` (n,) per coordinate, runs through loops that are
     known: slides (k,) [m], found: as many `Loops`. held as of `along`."""
-    shape, n, out = held[1], modes.omega.size, []
+    shape = held[1]
+    n = modes.omega.size
+    out = []
     matrix = np.zeros((n + 1, n + 1))
-    matrix[:n, :n], matrix[:n, n], matrix[n, :n] = np.diag(modes.omega**2), -shape, row
+    matrix[:n, :n] = np.diag(modes.omega**2)
+    matrix[:n, n] = -shape
+    matrix[n, :n] = row
     for slide, one in zip(slides, found):
         x = np.linalg.solve(matrix, np.append(-np.asarray(row) * one.tip / modes.mass, slide))
         out.append(_read(modes, shape, (x[:n], float(x[n]), one.area)))
@@ -120,7 +127,9 @@ def through(modes: ModalBasis, row, held: tuple, slides, found) -> list:
 
 def _balanced(modes, group, held: tuple, share: float, near, samples: int) -> np.ndarray:
     """(z/share, alpha/(omega^2 share)) of the equilibrium at a share [m], from one nearby; held: omega, shape, `of`."""
-    (omega, shape, of), m, n = held, modes.mass, modes.omega.size
+    omega, shape, of = held
+    m = modes.mass
+    n = modes.omega.size
     stiff = np.diag(modes.omega**2) / omega**2
 
     def left(x):

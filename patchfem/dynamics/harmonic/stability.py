@@ -23,9 +23,11 @@ def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
 
     cells: of the cycle, in each of which the slopes of the laws are constant; 0 as in `with_stability`.
     """
-    group, n = periodic.group, cells or max(1024, 2 ** (periodic.samples - 1).bit_length())
+    group = periodic.group
+    n = cells or max(1024, 2 ** (periodic.samples - 1).bit_length())
     slope, by_rate = np.zeros((2, len(group.rows), n))
-    marks, fading = [], []
+    marks = []
+    fading = []
     for i, (track, laws) in enumerate(
         zip(group.tracks(periodic.coefficients, periodic.omega, n), group.laws)
     ):
@@ -57,7 +59,8 @@ def _weights(track, found):
     if found.by_rate is not None:
         return 0.5 if found.hold is None else _turned(track, np.full(track.samples, 0.5))
     after = np.roll(found.slope, -1)
-    rise, jump = np.roll(track.q, -1) - track.q, after - found.slope
+    rise = np.roll(track.q, -1) - track.q
+    jump = after - found.slope
     firm = (np.abs(rise) > 1e-9 * np.ptp(track.q)) & (
         np.abs(jump) > 1e-9 * np.abs(found.slope).max()
     )

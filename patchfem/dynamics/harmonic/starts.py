@@ -22,7 +22,8 @@ def one_harmonic(balance, omega: float, level: float, count: int = 240) -> list:
     size = float(np.linalg.norm(linear))
     if size == 0:
         return []
-    along, receptance = linear / size, through @ balance.rows.T / balance.modes.mass
+    along = linear / size
+    receptance = through @ balance.rows.T / balance.modes.mass
 
     def left(log):
         q = np.zeros((balance.lift.shape[0], 2), complex)

@@ -54,8 +54,11 @@ def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1, load=None
 
     lanes: m is filled up to a multiple of it by points that bear and move nothing; load (m,) [Pa]: one that stays.
     """
-    (m, r), size = psi.shape, 1 + len(kappa)
-    more, points, drag = -m % lanes, np.zeros((8, m + -m % lanes)), np.zeros((3, size))
+    m, r = psi.shape
+    size = 1 + len(kappa)
+    more = -m % lanes
+    points = np.zeros((8, m + -m % lanes))
+    drag = np.zeros((3, size))
     if load is not None:
         points[4, :m] = load
         pull = length * weight * load

@@ -44,7 +44,8 @@ def law_of(laws: tuple):
     """
     if len(laws) == 1:
         return compiled.load(laws[0])
-    numbers, text = number_of(laws), ""
+    numbers = number_of(laws)
+    text = ""
     for name, signature in SIGNATURES.items():
         calls = [f"    return law_{numbers[law]}.{name}({signature})\n" for law in laws]
         asked = [

@@ -14,8 +14,10 @@ def solve_element(free, beta, numbers, memory, q, eps, dt, guess, bound, goal):
     if closed.is_solved:
         return closed.increment, closed.mean_force, 1
     reach = 1.001 * beta * bound  # a contact that slides all the way lies inside, not on the edge
-    low, high = free - reach, free + reach
-    dq, force = min(max(guess, low), high), 0.0
+    low = free - reach
+    high = free + reach
+    dq = min(max(guess, low), high)
+    force = 0.0
     for count in range(1, 200):
         force, slope = law.mean_force(numbers, memory, q, dq, eps, dt)
         miss = dq - free + beta * force

@@ -23,7 +23,8 @@ def answer(dq, c, v0, dt):
     if c.law[LAW.form] == MOMENTS:
         mean, slope = list_slope(dq, c, v0, dt)
         return mean, slope
-    mean, short = list_mean(dq, c, v0, dt), SHORT * c.law[LAW.length]
+    mean = list_mean(dq, c, v0, dt)
+    short = SHORT * c.law[LAW.length]
     if abs(dq) > short:
         return mean, (list_force(dq, c, v0, dt) - mean) / dq
     return mean, (list_force(short, c, v0, dt) - list_force(-short, c, v0, dt)) / (4 * short)
@@ -44,8 +45,12 @@ def pulled(dq, c, v0, dt):
 def solve(free, beta, q, v, dt, c, goal):
     """(dq, path-mean force, iterations) of a step with dq = free - beta force, by secants; iterations < 0 when it
     failed."""
-    here, gain = 2 * c.last[0] - c.last[1], 1 + beta * c.force[0] / c.law[LAW.length]
-    low, high, last, last_miss = -np.inf, np.inf, here, 0.0
+    here = 2 * c.last[0] - c.last[1]
+    gain = 1 + beta * c.force[0] / c.law[LAW.length]
+    low = -np.inf
+    high = np.inf
+    last = here
+    last_miss = 0.0
     for count in range(1, 300):
         force = pulled(here, c, v, dt)[0]
         miss = here - free + beta * force
@@ -54,7 +59,8 @@ def solve(free, beta, q, v, dt, c, goal):
         if count > 1:
             gain = (miss - last_miss) / (here - last) if here != last else 1.0
             gain = gain if gain > 0.1 else 1.0
-        last, last_miss = here, miss
+        last = here
+        last_miss = miss
         low, high, here = narrowed(low, high, here, miss, gain, count - 8)
     return last, force, -300
 

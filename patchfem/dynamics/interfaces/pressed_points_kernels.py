@@ -31,7 +31,9 @@ TIGHT = 0.01  # share of the goal down to which pieces that give way are solved:
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def load_points(part, contact):
     """Gather the points under load that share of the way through the step, their loads and the modes there."""
-    count, under, same = 0, contact.under, True
+    count = 0
+    under = contact.under
+    same = True
     for j in range(contact.pressed.shape[1]):
         load = (1 - part) * contact.pressed[0, j] + part * contact.pressed[1, j]
         if load > 0.0:
@@ -50,7 +52,8 @@ def load_points(part, contact):
 def press_all(kind, contact):
     """The memory after half of the change of load, and the mean load, in the points."""
     load_points(0.5, contact)
-    memory, points = contact.memory, contact.points
+    memory = contact.memory
+    points = contact.points
     for i in range(contact.count[0]):
         j = contact.under[i]
         if kind == PLASTIC:
@@ -71,7 +74,8 @@ def press_all(kind, contact):
 def rub_force(dq, kind, contact):
     """Path-mean friction force [N] and slope [N/m] of a rigid slide increment."""
     set_slides(dq, contact.b, contact)
-    force, slope = respond(kind, False, contact), 0.0
+    force = respond(kind, False, contact)
+    slope = 0.0
     for i in range(contact.count[0]):
         slope += contact.points[SLOPE, i]
     return force, slope
@@ -119,14 +123,14 @@ def state(c, q, v):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rub_commit(dq, used, v0, v1, dt, kind, contact):
     """Move the memory by the solved step; returns the energy dissipated [J], that of the changing load included."""
-    length, memory, points = (
-        contact.force[LENGTH],
-        contact.memory,
-        contact.points,
-    )
+    length = contact.force[LENGTH]
+    memory = contact.memory
+    points = contact.points
     lost = used * dq + held_energy(kind, contact) if kind == PLASTIC else 0.0
     for i in range(contact.count[0]):
-        j, load, xi = contact.under[i], points[LOAD, i], points[SLIDE, i]
+        j = contact.under[i]
+        load = points[LOAD, i]
+        xi = points[SLIDE, i]
         if kind == PLASTIC:
             y, springs = spring_step(points[DENSITY, i], points[STRETCH, i], load, xi, length)
             memory[0, j], memory[1, j] = press_springs(y, springs, contact.pressed[1, j])
@@ -159,18 +163,20 @@ def rub_commit(dq, used, v0, v1, dt, kind, contact):
 def spring_back(kind, contact, goal):
     """Bring pieces and points to balance while the holder stands, after the load of the step. Returns (energy lost [J],
     iterations), < 0: failed."""
-    memory, points, y = contact.memory, contact.points, contact.y[1]
+    memory = contact.memory
+    points = contact.points
+    y = contact.y[1]
     load_points(1.0, contact)
     before = held_energy(kind, contact)
     for i in range(contact.count[0]):
-        points[DENSITY, i], points[STRETCH, i] = (
-            memory[0, contact.under[i]],
-            memory[1, contact.under[i]],
-        )
+        points[DENSITY, i] = memory[0, contact.under[i]]
+        points[STRETCH, i] = memory[1, contact.under[i]]
     y[:] = 0.0
     count = descend(0.0, 0.0, kind, True, contact, TIGHT * goal)[1]
     for i in range(contact.count[0]):
-        j, load, xi = contact.under[i], points[LOAD, i], points[SLIDE, i]
+        j = contact.under[i]
+        load = points[LOAD, i]
+        xi = points[SLIDE, i]
         if kind == PLASTIC:
             a, b = spring_step(memory[0, j], memory[1, j], load, xi, contact.force[LENGTH])
             memory[0, j], memory[1, j] = press_springs(a, b, load)
@@ -186,12 +192,10 @@ def spring_back(kind, contact, goal):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def held_energy(kind, contact):
     """Elastic energy of the memory and of the pieces [J]."""
-    out, mu, length, memory = (
-        0.0,
-        contact.force[MU],
-        contact.force[LENGTH],
-        contact.memory,
-    )
+    out = 0.0
+    mu = contact.force[MU]
+    length = contact.force[LENGTH]
+    memory = contact.memory
     for k in range(contact.b.size):
         out += 0.5 * contact.kappa[k] * contact.b[k] * contact.b[k]
     for i in range(contact.count[0]):
@@ -207,13 +211,13 @@ def held_energy(kind, contact):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rub_state(kind, contact, q):
     """(friction force [N], stored energy [J], irreversible slip [m]) as they stand."""
-    mu, length, memory, points = (
-        contact.force[MU],
-        contact.force[LENGTH],
-        contact.memory,
-        contact.points,
-    )
-    force, slip, total = 0.0, 0.0, 0.0
+    mu = contact.force[MU]
+    length = contact.force[LENGTH]
+    memory = contact.memory
+    points = contact.points
+    force = 0.0
+    slip = 0.0
+    total = 0.0
     load_points(1.0, contact)
     set_slides(q, contact.b, contact)
     for i in range(contact.count[0]):

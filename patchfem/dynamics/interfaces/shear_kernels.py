@@ -33,7 +33,9 @@ def solve(free, beta, q, v, dt, c, goal):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def dragged(free, beta, c):
     """Whether all points drag on in this step; c.y[0] is then its solution, kappa (b + db/2) = psi^T f of the modes."""
-    way, y, least = c.flow[WAY], c.y[0], 0.0
+    way = c.flow[WAY]
+    y = c.y[0]
+    least = 0.0
     dq = free - beta * way * c.drag[PULL, 0]
     for k in range(c.b.size):
         y[k + 1] = 2 * (way * c.drag[PULL, k + 1] / c.kappa[k] - c.b[k])
@@ -57,7 +59,9 @@ def given(dq, q, v, dt, c, goal):
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def commit(dq, force, q, v0, v1, dt, c):
     """Move points and pieces by the solved step; (energy dissipated [J], True)."""
-    way, length, lost = c.flow[WAY], c.eps[1], 0.0
+    way = c.flow[WAY]
+    length = c.eps[1]
+    lost = 0.0
     c.flow[SLID] += dq
     if way != 0.0:
         for k in range(c.y.shape[1]):
@@ -76,7 +80,8 @@ def commit(dq, force, q, v0, v1, dt, c):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def dragging(way, c):
     """The way of the drag, 0 where a point does not drag that way."""
-    points, length = c.points, c.eps[0]
+    points = c.points
+    length = c.eps[0]
     for j in range(c.weight.size):
         load = points[LOAD, j]
         if not (
@@ -92,7 +97,8 @@ def dragging(way, c):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def moved_short(c, length):
     """Move all points by their slides, none beyond MAX_SHORT bond lengths [m]; twice the energy that they dissipate [J]."""
-    points, lost = c.points, 0.0
+    points = c.points
+    lost = 0.0
     for j in range(c.weight.size):
         xi = points[SLIDE, j]
         points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], part = short_step(
@@ -108,16 +114,22 @@ def moved(c, loose, length):
 
     loose: half the elastic range of their bonds, length: of a bond [m].
     """
-    points, lost = c.points, 0.0
+    points = c.points
+    lost = 0.0
     for j in range(c.weight.size):
-        m, z, s2, xi = points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], points[SLIDE, j]
+        m = points[DENSITY, j]
+        z = points[STRETCH, j]
+        s2 = points[SQUARE, j]
+        xi = points[SLIDE, j]
         if loose > 0.0:
             (m, z, s2, part), points[PLAY, j] = elastic_bond_step(
                 m, z, s2, points[PLAY, j], loose, xi, points[LOAD, j], length
             )
         else:
             m, z, s2, part = bond_step(m, z, s2, xi, points[LOAD, j], length)
-        points[DENSITY, j], points[STRETCH, j], points[SQUARE, j] = m, z, s2
+        points[DENSITY, j] = m
+        points[STRETCH, j] = z
+        points[SQUARE, j] = s2
         lost += c.weight[j] * part
     return lost
 
@@ -125,7 +137,9 @@ def moved(c, loose, length):
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) of points and pieces as they stand."""
-    way, energy, slip = c.flow[WAY], 0.0, c.flow[SLID]
+    way = c.flow[WAY]
+    energy = 0.0
+    slip = c.flow[SLID]
     for k in range(c.b.size):
         energy += 0.5 * c.kappa[k] * c.b[k] ** 2
         slip -= c.drag[MEAN, k + 1] * c.b[k]
@@ -139,9 +153,15 @@ def state(c, q, v):
 def bonds(c):
     """(force [N], stored energy [J], sums of the mean stretch of a point times its load [N m] and of those loads [N])
     of the points."""
-    points, force, energy, stretch, total = c.points, 0.0, 0.0, 0.0, 0.0
+    points = c.points
+    force = 0.0
+    energy = 0.0
+    stretch = 0.0
+    total = 0.0
     for j in range(c.weight.size):
-        m, z, share = points[DENSITY, j], points[STRETCH, j], c.weight[j] * points[LOAD, j]
+        m = points[DENSITY, j]
+        z = points[STRETCH, j]
+        share = c.weight[j] * points[LOAD, j]
         force += c.weight[j] * z
         energy += 0.5 * c.weight[j] * points[SQUARE, j]
         stretch += share * (z / m) if m > 0.0 else 0.0

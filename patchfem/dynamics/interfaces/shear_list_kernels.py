@@ -45,11 +45,15 @@ def commit(dq, force, q, v0, v1, dt, c):
 
     The lists book by themselves what they dissipate and create.
     """
-    points, before, fine, changes = c.points, stored(c), True, varies(c)
+    points = c.points
+    before = stored(c)
+    fine = True
+    changes = varies(c)
     c.flow[SLID] += dq
     for j in range(int(c.count[0])):
         look_at(j, c)
-        xi, energy = points[SLIDE, j], c.status[STATUS.energy]
+        xi = points[SLIDE, j]
+        energy = c.status[STATUS.energy]
         speed = abs(xi) / dt
         fine = list_step(xi, c, speed, speed, dt) and fine
         if changes:
@@ -87,7 +91,9 @@ def stored(c):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(c, q, v):
     """(force [N], stored energy [J], irreversible slip [m]) of lists and pieces as they stand."""
-    force, total, slip = 0.0, 0.0, c.flow[SLID]
+    force = 0.0
+    total = 0.0
+    slip = c.flow[SLID]
     if varies(c):
         slip = 0.0
         for j in range(int(c.count[0])):

@@ -15,11 +15,9 @@ from .list_kernels import answer
 from .shear_points_kernels import FORCE, LOAD, SLIDE, SLOPE
 
 # sums change their rule with the length of a step, by 1e-8 and less
-SLACK, FALLS, CALM = (
-    1e4,
-    True,
-    1 / 16,
-)
+SLACK = 1e4
+FALLS = True
+CALM = 1 / 16
 PACE, WENT, TRIED, PULLED = range(4)  # of `points`
 
 __all__ = ["CALM", "FALLS", "FORCE", "SLACK", "SLIDE", "SLOPE", "respond"]
@@ -49,7 +47,8 @@ def pressure_at(x, pattern):
     last = pattern.shape[1] - 1
     if x < pattern[0, 0] or x > pattern[0, last]:
         return 0.0
-    low, high = 0, last
+    low = 0
+    high = last
     while high - low > 1:
         middle = (low + high) // 2
         if pattern[0, middle] > x:
@@ -98,9 +97,12 @@ def begin(dt, c):
 )  # else that of its caller goes on to all that it calls
 def respond(kind, ending, c):
     """Write path-mean force [N] and slope [N/m] of every point at its slide; returns the friction force [N]."""
-    points, dt, force = c.points, c.time[0], 0.0
+    points = c.points
+    dt = c.time[0]
+    force = 0.0
     for j in range(int(c.count[0])):
-        xi, status = points[SLIDE, j], c.statuses[j]
+        xi = points[SLIDE, j]
+        status = c.statuses[j]
         is_empty = status[STATUS.head] == status[STATUS.end]
         is_unpressed = status[STATUS.pressure] == 0.0 and status[STATUS.initial_pressure] == 0.0
         if is_empty and is_unpressed:
@@ -112,7 +114,9 @@ def respond(kind, ending, c):
         if xi != points[TRIED, j]:
             steep = (f - points[PULLED, j]) / (xi - points[TRIED, j])
             s = steep if steep > s else s
-        points[TRIED, j], points[PULLED, j] = xi, f
-        points[FORCE, j], points[SLOPE, j] = c.weight[j] * f, c.weight[j] * s
+        points[TRIED, j] = xi
+        points[PULLED, j] = f
+        points[FORCE, j] = c.weight[j] * f
+        points[SLOPE, j] = c.weight[j] * s
         force += points[FORCE, j]
     return force

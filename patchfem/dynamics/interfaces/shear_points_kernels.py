@@ -15,8 +15,12 @@ from ...friction.bonds.point_kernels import (
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
 
-PLASTIC, POINTS = 1, 2
-SLACK, FALLS, CALM = 100.0, False, 0.0  # as `shear_solve_kernels` has them
+PLASTIC = 1
+POINTS = 2
+# as `shear_solve_kernels` has them
+SLACK = 100.0
+FALLS = False
+CALM = 0.0
 # elastic-plastic: traction/mu, springs
 DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(8)
 
@@ -24,7 +28,8 @@ DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(8)
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short(c, length):
     """Whether no point slides farther than MAX_SHORT bond lengths `length` [m]; not where one slides as far as nan."""
-    points, near = c.points, 0.0
+    points = c.points
+    near = 0.0
     for j in range(int(c.count[0])):
         # a sum, which unlike a maximum is vectorised
         near += 1.0 if abs(points[SLIDE, j]) <= MAX_SHORT * length else 0.0
@@ -34,13 +39,17 @@ def short(c, length):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def respond(kind, ending, c):
     """Write force [N] and slope [N/m] >= 0 of every point at its slide; returns the friction force [N]."""
-    points, weight, length, force = c.points, c.weight, c.eps[0 if ending else 1], 0.0
+    points = c.points
+    weight = c.weight
+    length = c.eps[0 if ending else 1]
+    force = 0.0
     if kind == POINTS and not ending and c.growth[5] == 0.0 and short(c, length):
         for j in range(int(c.count[0])):
             f, s = short_mean(
                 points[DENSITY, j], points[STRETCH, j], points[SLIDE, j], points[LOAD, j], length
             )
-            points[FORCE, j], points[SLOPE, j] = weight[j] * f, weight[j] * max(s, 0.0)
+            points[FORCE, j] = weight[j] * f
+            points[SLOPE, j] = weight[j] * max(s, 0.0)
             force += weight[j] * f
         return force
     return answer(kind, ending, c, length)
@@ -49,9 +58,15 @@ def respond(kind, ending, c):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def answer(kind, ending, c, length):
     """`respond` of any law and slide, at a bond length [m]."""
-    points, weight, loose, force = c.points, c.weight, c.growth[5] * length, 0.0
+    points = c.points
+    weight = c.weight
+    loose = c.growth[5] * length
+    force = 0.0
     for j in range(int(c.count[0])):
-        m, z, load, xi = points[DENSITY, j], points[STRETCH, j], points[LOAD, j], points[SLIDE, j]
+        m = points[DENSITY, j]
+        z = points[STRETCH, j]
+        load = points[LOAD, j]
+        xi = points[SLIDE, j]
         if kind == PLASTIC:
             f, s = (
                 spring_end(m, z, load, xi, length)
@@ -65,6 +80,7 @@ def answer(kind, ending, c, length):
         else:
             f, s = bond_mean(m, z, xi, load, length)
         f *= weight[j]
-        points[FORCE, j], points[SLOPE, j] = f, weight[j] * max(s, 0.0)
+        points[FORCE, j] = f
+        points[SLOPE, j] = weight[j] * max(s, 0.0)
         force += f
     return force

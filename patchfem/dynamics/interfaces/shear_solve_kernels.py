@@ -21,12 +21,15 @@ from ..dense_kernels import factor, solve
 from ..modal_kernels import safe_point
 from . import shear_points_kernels as law
 
-FORCE, SLIDE, SLOPE = law.FORCE, law.SLIDE, law.SLOPE
+FORCE = law.FORCE
+SLIDE = law.SLIDE
+SLOPE = law.SLOPE
 GRADIENT, STEP, TRIAL = range(3)
 NEAR = 4e-6  # half its square is below the goal of a march, 1e-11
 # times the goal: a residual that round-off keeps from falling further is taken below it
 SLACK = law.SLACK
-FALLS, CALM = law.FALLS, law.CALM
+FALLS = law.FALLS
+CALM = law.CALM
 # iterations: points that turn to and fro about one place take up to 100
 MOST = 1000 if FALLS else 200
 
@@ -40,11 +43,17 @@ def halfway(v, dt, c):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def set_slides(q, moved, c):
     """Write the slides [m] of the points where the holder slides by q and the coordinates move by `moved` (r,)."""
-    psi, points, count, r = c.psi, c.points, int(c.count[0]), moved.size
+    psi = c.psi
+    points = c.points
+    count = int(c.count[0])
+    r = moved.size
     for j in range(count):
         points[SLIDE, j] = q
     for k in range(0, r - 3, 4):  # four modes in one pass: a pass reads and writes every point
-        one, two, three, four = moved[k], moved[k + 1], moved[k + 2], moved[k + 3]
+        one = moved[k]
+        two = moved[k + 1]
+        three = moved[k + 2]
+        four = moved[k + 3]
         for j in range(count):
             points[SLIDE, j] -= (
                 psi[k, j] * one + psi[k + 1, j] * two + psi[k + 2, j] * three + psi[k + 3, j] * four
@@ -60,14 +69,20 @@ def pulled(row, psi, points, count, out):
     """Write psi^T of a row of the points, (r,), into out (1 + r,) from its second place on."""
     r = psi.shape[0]
     for k in range(0, r - 3, 4):
-        one, two, three, four = 0.0, 0.0, 0.0, 0.0
+        one = 0.0
+        two = 0.0
+        three = 0.0
+        four = 0.0
         for j in range(count):
             value = points[row, j]
             one += psi[k, j] * value
             two += psi[k + 1, j] * value
             three += psi[k + 2, j] * value
             four += psi[k + 3, j] * value
-        out[k + 1], out[k + 2], out[k + 3], out[k + 4] = one, two, three, four
+        out[k + 1] = one
+        out[k + 2] = two
+        out[k + 3] = three
+        out[k + 4] = four
     for k in range(r - r % 4, r):
         total = 0.0
         for j in range(count):
@@ -78,7 +93,8 @@ def pulled(row, psi, points, count, out):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def gradient(y, free, beta, kind, ending, c, out):
     """Residual (1 + r,) at y = (dq, db); beta = 0 or `ending`: the slide is given. Returns the friction force [N]."""
-    part, calm = 1.0 if ending else 0.5, 0.0 if ending else CALM
+    part = 1.0 if ending else 0.5
+    calm = 0.0 if ending else CALM
     set_slides(y[0], y[1:], c)
     force = law.respond(kind, ending, c)
     pulled(FORCE, c.psi, c.points, int(c.count[0]), out)
@@ -94,7 +110,11 @@ def gradient(y, free, beta, kind, ending, c, out):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def hessian(beta, ending, c, hess):
     """Lower half of the Hessian (1 + r, 1 + r) at the slopes of the points, over their forces."""
-    psi, points, count, given, total = c.psi, c.points, int(c.count[0]), ending or beta == 0.0, 0.0
+    psi = c.psi
+    points = c.points
+    count = int(c.count[0])
+    given = ending or beta == 0.0
+    total = 0.0
     for j in range(count):
         total += points[SLOPE, j]
     pulled(SLOPE, psi, points, count, hess[0])
@@ -104,19 +124,20 @@ def hessian(beta, ending, c, hess):
             points[FORCE, j] = points[SLOPE, j] * psi[k, j]
         last = (k + 1) % 4
         for l in range(0, k + 1 - last, 4):
-            one, two, three, four = 0.0, 0.0, 0.0, 0.0
+            one = 0.0
+            two = 0.0
+            three = 0.0
+            four = 0.0
             for j in range(count):
                 value = points[FORCE, j]
                 one += value * psi[l, j]
                 two += value * psi[l + 1, j]
                 three += value * psi[l + 2, j]
                 four += value * psi[l + 3, j]
-            hess[k + 1, l + 1], hess[k + 1, l + 2], hess[k + 1, l + 3], hess[k + 1, l + 4] = (
-                one,
-                two,
-                three,
-                four,
-            )
+            hess[k + 1, l + 1] = one
+            hess[k + 1, l + 2] = two
+            hess[k + 1, l + 3] = three
+            hess[k + 1, l + 4] = four
         for l in range(k + 1 - last, k + 1):
             dot = 0.0
             for j in range(count):
@@ -156,15 +177,18 @@ def descend(free, beta, kind, ending, c, goal):
     A Newton step that is short enough is the last one, and no residual is asked for after it.
     """
     which = 1 if ending else 0
-    y, hess, g, p, trial = (
-        c.y[which],
-        c.hess[which],
-        c.workspace[GRADIENT],
-        c.workspace[STEP],
-        c.workspace[TRIAL],
-    )
+    y = c.y[which]
+    hess = c.hess[which]
+    g = c.workspace[GRADIENT]
+    p = c.workspace[STEP]
+    trial = c.workspace[TRIAL]
     noise = 4e-16 * abs(free) / beta if beta > 0.0 else 0.0
-    size, least, fall, force, stale, stall = np.inf, np.inf, 0.0, 0.0, True, 0
+    size = np.inf
+    least = np.inf
+    fall = 0.0
+    force = 0.0
+    stale = True
+    stall = 0
     for i in range(y.size):
         p[i] = 0.0
     for count in range(
@@ -181,7 +205,8 @@ def descend(free, beta, kind, ending, c, goal):
                     hessian(beta, ending, c, hess)
                     if not factor(hess):
                         return force, -count
-                c.ready[which], stale = 1.0, False
+                c.ready[which] = 1.0
+                stale = False
             for i in range(y.size):
                 p[i] = -g[i]
             fall = -solve(hess, p)
@@ -190,7 +215,9 @@ def descend(free, beta, kind, ending, c, goal):
                     y[i] += p[i]
                 set_slides(y[0], y[1:], c)
                 return (free - y[0]) / beta, count
-        part, low, high = 1.0, 0.0, np.inf
+        part = 1.0
+        low = 0.0
+        high = np.inf
         for _ in range(40):
             for i in range(y.size):
                 trial[i] = y[i] + part * p[i]
@@ -214,18 +241,21 @@ def descend(free, beta, kind, ending, c, goal):
             stale = c.ready[which] == 1.0
             if stall >= 4 and new <= SLACK * goal:
                 return force, count
-        size, least = new, min(least, new)
+        size = new
+        least = min(least, new)
     return force, -MOST
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def went_on(c):
     """Move the coordinates of the pieces by the solved step and leave the next guess, as the last three went on."""
-    y, last = c.y[0], c.last
+    y = c.y[0]
+    last = c.last
     for k in range(c.b.size):
         c.b[k] += y[k + 1]
     for k in range(y.size):
         here = y[k]
         y[k] = 3 * (here - last[0, k]) + last[1, k]
-        last[0, k], last[1, k] = here, last[0, k]
+        last[1, k] = last[0, k]
+        last[0, k] = here
     c.ready[:] = 0.0

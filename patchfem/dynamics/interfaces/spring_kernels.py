@@ -19,14 +19,19 @@ def mean_force(numbers, memory, q, dq, eps, dt):
 
     (V(q + dq) - V(q))/dq, written without a difference of large numbers; memory, eps and dt are not used.
     """
-    b, cubic, stiffness = q + dq, 0.25 * numbers[1], numbers[2]
-    force, slope = cubic * (b + q) * (b * b + q * q), cubic * (3 * b * b + 2 * b * q + q * q)
+    b = q + dq
+    cubic = 0.25 * numbers[1]
+    stiffness = numbers[2]
+    force = cubic * (b + q) * (b * b + q * q)
+    slope = cubic * (3 * b * b + 2 * b * q + q * q)
     if stiffness == 0.0:
         return force, slope
     turn = 2 * pi / numbers[3]
-    half, centre = 0.5 * turn * dq, turn * (q + 0.5 * dq)
+    half = 0.5 * turn * dq
+    centre = turn * (q + 0.5 * dq)
     if abs(half) < 1e-4:  # the series is off by 1e-4^4/120 there, the quotients lose digits
-        ratio, bend = 1 - half * half / 6, -half / 3
+        ratio = 1 - half * half / 6
+        bend = -half / 3
     else:
         ratio = sin(half) / half
         bend = (cos(half) - ratio) / half
@@ -43,7 +48,9 @@ def update_memory(numbers, memory, dq, force, v0, v1, dt, eps):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_memory(numbers, memory, q, v):
     """Return the force, the stored energy V(q) and the slide q of the springs."""
-    force, energy, stiffness = numbers[1] * q**3, 0.25 * numbers[1] * q**4, numbers[2]
+    force = numbers[1] * q**3
+    energy = 0.25 * numbers[1] * q**4
+    stiffness = numbers[2]
     if stiffness == 0.0:
         return Reading(force, energy, q)
     turn = 2 * pi / numbers[3]

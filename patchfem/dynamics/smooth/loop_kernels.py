@@ -40,7 +40,9 @@ from .arrays import (
 
 NOTHING, STOP, KINK, KNEE, TRAVEL, RELEASE, LIFT = range(7)  # what ends a step
 FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED, LIFTED = range(7)  # how a call ends
-SLOWER, FASTER = 0.2, 8.0  # bounds of the change of a step
+# bounds of the change of a step
+SLOWER = 0.2
+FASTER = 8.0
 TURNING = 2.0  # of now[BEGUN]: the motion was left at a reversal
 FORGET = 3.0  # cycles over which a largest value is forgotten
 CALL = 50_000  # tries of a call, a tenth of a second: no signal is heard inside compiled code
@@ -48,16 +50,15 @@ GETS_ON = 1e-3  # of the time of the fastest motion: what CALL tries must come o
 INSTANT = 1e-13  # of a period: what lies nearer together happens at once
 STUCK = 0.02  # of a period: longest step of what holds, as nothing else tells when it lets go
 # of a motion that has not moved on from a stop: it is there, it was found to go the other way
-STANDS, FLIPPED = (
-    1,
-    2,
-)
+STANDS = 1
+FLIPPED = 2
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def left(m, what, y, slopes, travel):
     """(what is left until an end, > 0 before it; its rate [1/s]; its round-off) in a state with its slopes."""
-    n, way = m.rows.shape[1], m.turn[0]
+    n = m.rows.shape[1]
+    way = m.turn[0]
     q, v = steps.slide_of(m, y)
     gain = 0.0
     for i in range(n):
@@ -93,7 +94,8 @@ def possible(m, what, travel):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def first_end(m, h, travel, skip):
     """(what ends the step of h [s] first, guess of the share of it) by cubics through both ends; NOTHING, 1."""
-    found, where = NOTHING, 1.0
+    found = NOTHING
+    where = 1.0
     for what in range(STOP, LIFT + 1 if law.IS_SET_VALUED else TRAVEL + 1):
         if what == skip or not possible(m, what, travel):
             continue
@@ -101,8 +103,11 @@ def first_end(m, h, travel, skip):
         if b >= -noise:
             continue
         a, rate_a, _ = left(m, what, m.y, m.work[0], travel)
-        a, low, high = max(a, 0.0), 0.0, 1.0
-        p, r = rate_a * h, rate_b * h
+        a = max(a, 0.0)
+        low = 0.0
+        high = 1.0
+        p = rate_a * h
+        r = rate_b * h
         if a == 0:
             low = high = back_of(p, b, r)
         for _ in range(40 if a > 0 else 0):
@@ -114,7 +119,8 @@ def first_end(m, h, travel, skip):
             else:
                 high = s
         if found == NOTHING or high < where:
-            found, where = what, high
+            found = what
+            where = high
     return found, where
 
 
@@ -125,7 +131,8 @@ def back_of(p, b, r):
     p, r: its slopes at the ends over the step. Less the zero at the start it is p + mid s + big s^2; of the two
     zeros of that it is the one where it falls.
     """
-    mid, big = 3 * b - 2 * p - r, p + r - 2 * b
+    mid = 3 * b - 2 * p - r
+    big = p + r - 2 * b
     root = mid * mid - 4 * big * p
     if root < 0:
         return 0.0
@@ -137,7 +144,9 @@ def back_of(p, b, r):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def located(m, h, what, share, travel):
     """Length [s] of the step that ends there, within a step of h [s]; m.work[steps.TRIAL] is the state at its end."""
-    low, high, at = 0.0, h, max(share, 1e-12) * h
+    low = 0.0
+    high = h
+    at = max(share, 1e-12) * h
     for turn in range(60):
         steps.step(m, at)
         value, rate, noise = left(m, what, m.work[steps.TRIAL], m.work[12], travel)
@@ -159,11 +168,10 @@ def let_go(m, h, what, travel):
     """Length [s] of the step that ends just beyond where a hold or a load is used up, within a step of h [s] whose end
     is beyond it; m.work[steps.TRIAL] is the state at its end. Regula falsi with halved ends (Illinois), then halving.
     """
-    a, b = (
-        max(left(m, what, m.y, m.work[0], travel)[0], 0.0),
-        left(m, what, m.work[steps.TRIAL], m.work[12], travel)[0],
-    )
-    low, high = 0.0, h
+    a = max(left(m, what, m.y, m.work[0], travel)[0], 0.0)
+    b = left(m, what, m.work[steps.TRIAL], m.work[12], travel)[0]
+    low = 0.0
+    high = h
     for turn in range(80):
         if high - low <= 1e-15 * (m.now[TIME] + high) or high - low <= 1e-13 * h:
             break
@@ -174,9 +182,13 @@ def let_go(m, h, what, travel):
         steps.step(m, at)
         value = left(m, what, m.work[steps.TRIAL], m.work[12], travel)[0]
         if value < 0:
-            high, b, a = at, value, 0.5 * a
+            high = at
+            b = value
+            a = 0.5 * a
         else:
-            low, a, b = at, value, 0.5 * b
+            low = at
+            a = value
+            b = 0.5 * b
     steps.step(m, high)
     return high
 
@@ -201,7 +213,9 @@ def dip_of(a, p, b, r):
     """
     if p >= 0 or r <= 0 or a <= 0 or b <= 0:
         return 0.0
-    big, mid = 2 * (a - b) + p + r, 3 * (b - a) - 2 * p - r  # a + p s + mid s^2 + big s^3
+    # a + p s + mid s^2 + big s^3
+    big = 2 * (a - b) + p + r
+    mid = 3 * (b - a) - 2 * p - r
     root = mid * mid - 3 * big * p
     if root <= 0:
         return 0.0
@@ -223,7 +237,8 @@ def enter(m, way):
     """Begin a motion in the direction `way` from the state as it stands: the law's states, and the slopes there."""
     n = m.rows.shape[1]
     q, v = steps.slide_of(m, m.y)
-    m.now[ORIGIN], m.turn[0] = q, way
+    m.now[ORIGIN] = q
+    m.turn[0] = way
     states = m.y[2 * n : m.y.size - 3]
     m.turn[1], floor = law.start_motion(m.num[0], m.mem[0], way, states)
     m.turn[2] = 1.0 if way * v > floor else 0.0
@@ -234,7 +249,8 @@ def enter(m, way):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def leave(m, k):
     """End the motion in one direction: move the memory of the law and book what it dissipated."""
-    n, size = m.rows.shape[1], m.y.size
+    n = m.rows.shape[1]
+    size = m.y.size
     q, v, _, before, _ = watching.state_of(m, m.y)
     lost = law.end_motion(m.num[0], m.mem[0], m.turn, q - m.now[ORIGIN], v, m.y[2 * n : size - 3])
     if np.isnan(lost):
@@ -246,7 +262,8 @@ def leave(m, k):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def heading(m):
     """Direction of a motion that starts: that of its speed, of its acceleration at rest, or of what comes next."""
-    n, t = m.rows.shape[1], m.now[TIME]
+    n = m.rows.shape[1]
+    t = m.now[TIME]
     v = steps.slide_of(m, m.y)[1]
     if v != 0:
         return 1.0 if v > 0 else -1.0
@@ -275,7 +292,9 @@ def lets_go(m):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def rest(m):
     """Take the last digits of the speed of a slide that has stopped from the rates."""
-    n, v, size = m.rows.shape[1], steps.slide_of(m, m.y)[1], 0.0
+    n = m.rows.shape[1]
+    v = steps.slide_of(m, m.y)[1]
+    size = 0.0
     for i in range(n):
         size += m.rows[steps.SLIDE, i] * m.rows[steps.SLIDE, i]
     for i in range(n):
@@ -289,16 +308,22 @@ def turns_around(m, period):
     Where speed and acceleration vanish together the next derivative decides: the motion has the direction of its speed
     an INSTANT of the period [s] after the stop, v + a t + j t^2/2. What is opposed to that ends within the instant.
     """
-    n, t, way = m.rows.shape[1], m.now[TIME], -m.turn[0]
+    n = m.rows.shape[1]
+    t = m.now[TIME]
+    way = -m.turn[0]
     enter(m, way)
-    ahead, near, gain, later = INSTANT * period, 1e-3 * m.now[STEP], 0.0, 0.0
+    ahead = INSTANT * period
+    near = 1e-3 * m.now[STEP]
+    gain = 0.0
+    later = 0.0
     for c in range(m.y.size):
         m.work[steps.TRIAL, c] = m.y[c] + near * m.work[0, c]
     steps.slope(m, t + near, m.work[steps.TRIAL], m.work[1])
     for i in range(n):
         gain += m.rows[steps.SLIDE, i] * m.work[0, n + i]
         later += m.rows[steps.SLIDE, i] * m.work[1, n + i]
-    v, jerk = steps.slide_of(m, m.y)[1], (later - gain) / near
+    v = steps.slide_of(m, m.y)[1]
+    jerk = (later - gain) / near
     if way * (v + ahead * (gain + 0.5 * ahead * jerk)) >= 0:
         return True
     enter(m, -way)
@@ -426,12 +451,14 @@ def advance(m, k, until, edge, tolerance, travel):
     """
     if m.now[BEGUN] == 0:
         begin(m, k)
-    end, fresh = min(until, edge), went_on(m)
+    end = min(until, edge)
+    fresh = went_on(m)
     if m.now[STOOD] != m.now[PIECE]:  # the drive has changed
         steps.slope(m, m.now[TIME], m.y, m.work[0])
         m.now[STOOD] = m.now[PIECE]
     sampled(m, k)
-    begun, tried = m.now[TIME], k.counters[DONE] + k.counters[REFUSED]
+    begun = m.now[TIME]
+    tried = k.counters[DONE] + k.counters[REFUSED]
     while m.now[TIME] < end:
         full = (
             k.counters[TURNS] >= k.turns.shape[0]

@@ -21,7 +21,8 @@ FINEST = np.linspace(0.0, 1.0, 257)
 BEST = 6  # steps with the largest values at FINER, which are looked at closely
 RISES = 0.5  # of what a number changes by in a step, by which it may rise above its places
 GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(12)
-GAUSS, WEIGHTS = (1 + GAUSS) / 2, WEIGHTS / 2
+GAUSS = (1 + GAUSS) / 2
+WEIGHTS = WEIGHTS / 2
 HALVINGS = 30  # of the stretch of a step in which slip begins or ends
 SHARE = 0.5  # irreversible part of the slide from which an interface slips, as `response.measures` has it
 ROUND = 1e-13  # of the largest slide: round-off of what it changes by in a step, off its polynomial
@@ -35,7 +36,8 @@ def onto(places) -> np.ndarray:
 
 def along(terms, share):
     """Values (k,) of k polynomials with terms (k, NODES) in the powers of 2 share - 1 at shares (k,) of their steps."""
-    x, out = 2 * share - 1, terms[:, -1]
+    x = 2 * share - 1
+    out = terms[:, -1]
     for power in range(NODES - 2, -1, -1):
         out = out * x + terms[:, power]
     return out
@@ -52,16 +54,20 @@ TERMS = np.linalg.inv(chebyshev.chebvander(2 * ENDS - 1, NODES - 1))
 SLOPES = chebyshev.chebvander(2 * ENDS - 1, NODES - 2) @ (2 * chebyshev.chebder(TERMS))
 # values to terms in powers of 2 share - 1
 POWERS = np.linalg.inv(np.vander(2 * ENDS - 1, NODES, increasing=True))
-CLOSE, CLOSEST, INSIDE = onto(FINER), onto(FINEST), onto(GAUSS)
+CLOSE = onto(FINER)
+CLOSEST = onto(FINEST)
+INSIDE = onto(GAUSS)
 
 
 class Parts:
     """The last cycles of a motion as steps: `response`, a Response of all its places one after the other."""
 
     def __init__(self, response, period: float):
-        self.period, self.response = period, response
+        self.period = period
+        self.response = response
         self.time = response.time.reshape(-1, NODES)
-        self.begin, self.length = self.time[:, 0], np.diff(self.time[:, [0, -1]])[:, 0]
+        self.begin = self.time[:, 0]
+        self.length = np.diff(self.time[:, [0, -1]])[:, 0]
 
     def of(self, name: str) -> np.ndarray:
         """A number of the response at the places of every step (k, NODES)."""
@@ -69,12 +75,14 @@ class Parts:
 
     def largest(self, values) -> tuple:
         """(largest of values (k, NODES) between the places, what the last terms of its polynomial leave open)."""
-        top, least = values.max(axis=1), values.min(axis=1)
+        top = values.max(axis=1)
+        least = values.min(axis=1)
         steps = np.flatnonzero(top + RISES * (top - least) >= top.max())
         if steps.size > BEST:
             steps = steps[np.argsort(places_of(values[steps], CLOSE).max(axis=1))[-BEST:]]
         seen = places_of(values[steps], CLOSEST)
-        every, at = np.arange(len(steps)), np.clip(np.argmax(seen, axis=1), 1, FINEST.size - 2)
+        every = np.arange(len(steps))
+        at = np.clip(np.argmax(seen, axis=1), 1, FINEST.size - 2)
         left, mid, right = (seen[every, at + side] for side in (-1, 0, 1))
         bend = np.minimum(left - 2 * mid + right, 0.0)
         rise = np.where(
@@ -107,7 +115,8 @@ class Parts:
         """Time mean of a number from `begin` to `end` [s]."""
         length = np.maximum(self.length, 1e-300)  # of a step at an event, 0
         low, high = (np.clip((edge - self.begin) / length, 0.0, 1.0) for edge in (begin, end))
-        part, total = np.flatnonzero(high > low), 0.0
+        part = np.flatnonzero(high > low)
+        total = 0.0
         cut = part[(low[part] > 0) | (high[part] < 1)]
         whole = np.setdiff1d(part, cut)
         total = float((self.weights[whole] * places_of(self.of(name)[whole], INSIDE)).sum())
@@ -122,14 +131,13 @@ class Parts:
 
     def drift(self) -> float | None:
         """Time mean of the slide in the last cycle less that in the first, per cycle between them [m]."""
-        begin, end = self.time[0, 0], self.time[-1, -1]
+        begin = self.time[0, 0]
+        end = self.time[-1, -1]
         cycles = (end - begin) / self.period
         if cycles < 1.5:
             return None
-        first, last = (
-            self.mean("slide", begin, begin + self.period),
-            self.mean("slide", end - self.period, end),
-        )
+        first = self.mean("slide", begin, begin + self.period)
+        last = self.mean("slide", end - self.period, end)
         return (last - first) / (cycles - 1)
 
     def holds(self) -> tuple:
@@ -151,15 +159,19 @@ class Parts:
         last_moving = np.maximum.accumulate(np.where(still, 0, np.arange(FINER.size)), axis=1)
         beside = np.maximum(last_moving, np.argmin(still, axis=1)[:, None])
         seen = np.take_along_axis((moves - SHARE * slides)[shows], beside, axis=1)
-        before, after = seen[:, :-1], seen[:, 1:]
+        before = seen[:, :-1]
+        after = seen[:, 1:]
         turns = (before < 0) != (after < 0)
         steps, at = np.nonzero(turns)
-        low, high, below = FINER[at], FINER[at + 1], before[steps, at] < 0
+        low = FINER[at]
+        high = FINER[at + 1]
+        below = before[steps, at] < 0
         one, other = (places_of(rates[steps], POWERS) for rates in (slip, slide))
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
             same = (np.abs(along(one, middle)) < SHARE * np.abs(along(other, middle))) == below
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
+            low = np.where(same, middle, low)
+            high = np.where(same, high, middle)
         part = (before < 0) * np.diff(FINER) * ~turns
         part[steps, at] = np.where(below, low - FINER[at], FINER[at + 1] - low)
         times = begin[steps] + low * length[steps]
@@ -174,12 +186,14 @@ def integrated(response, drive, ends) -> tuple:
     ends (2, 4): time [s], output [m], its rate [m/s] and friction work [J] where they begin and end.
     """
     period = drive.period
-    parts, (before, after) = Parts(response, period), ends
+    parts = Parts(response, period)
+    before, after = ends
     peaks = {
         name: [parts.largest(way * parts.of(name)) for way in (1, -1)]
         for name in ("acceleration", "force", "slip", "output")
     }
-    (gain, unsure), (pull, loose) = max(peaks["acceleration"]), max(peaks["force"])
+    gain, unsure = max(peaks["acceleration"])
+    pull, loose = max(peaks["force"])
     slip, swing = ((up + down) / 2 for (up, _), (down, _) in (peaks["slip"], peaks["output"]))
     held, starts = parts.holds()
     loop = InterfaceLoop(

@@ -91,19 +91,25 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
     element: the law with its numbers and the sizes of its memory; start: core.InitialState, at rest without.
     The first step is FIRST over the fastest rate of modes and drive.
     """
-    n, l = modes.omega.size, len(element.sizes)
-    size, damping = 2 * n + l + 3, np.zeros((0, 0)) if modes.damping is None else modes.damping
+    n = modes.omega.size
+    l = len(element.sizes)
+    size = 2 * n + l + 3
+    damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
     state = np.zeros(size)
     if start is not None:
-        state[:n], state[n : 2 * n] = start.z, start.v
+        state[:n] = start.z
+        state[n : 2 * n] = start.v
     pace = max(
         float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)),
         2 * np.pi / drive.period,
     )
-    now, counters, work = np.zeros(15), np.zeros(10), np.zeros((26, size))
+    now = np.zeros(15)
+    counters = np.zeros(10)
+    work = np.zeros((26, size))
     now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
     now[STIFF] = element.limit / element.length if element.length else 0.0
-    now[[DRIVEN, MOVES]], counters[PERIOD] = (drive.period, drive.moving), drive.period
+    now[[DRIVEN, MOVES]] = (drive.period, drive.moving)
+    counters[PERIOD] = drive.period
     work[24, 2 * n : -3] = element.sizes
     rows = np.stack(
         [modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output]
@@ -112,7 +118,9 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
     own = (rows, damping, segments_of(drive), *law, state, work, now)
     moving = Moving(*(np.array(part, float, order="C") for part in own))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
-    cycles[0], cycles[1], width = np.inf, -np.inf, 2 * n + 7
+    cycles[0] = np.inf
+    cycles[1] = -np.inf
+    width = 2 * n + 7
     return moving, Kept(
         cycles,
         np.zeros((0, width)),
@@ -126,7 +134,9 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
 def response_of(modes, drive, rows, stored: float) -> Response:
     """Histories of sample rows (k, 2 n + 7) of a motion; stored: its largest stored energy [J]."""
     n = modes.omega.size
-    time, z, rate = rows[:, 0], rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n]
+    time = rows[:, 0]
+    z = rows[:, 1 : 1 + n]
+    rate = rows[:, 1 + n : 1 + 2 * n]
     held, work = rows[:, 5 + 2 * n :].T
     lost = np.diff(work - held, prepend=0.0)
     noise = 1e-8 * max(stored, float(np.abs(work).max(initial=0.0)))
@@ -165,31 +175,35 @@ class Motion:
         travel: float = np.inf,
         start=None,
     ):
-        self.modes, self.drive, self.element, self.tolerance, self.travel = (
-            modes,
-            drive,
-            element,
-            tolerance,
-            travel,
-        )
-        self.cycles, self.loops = cycles, loops_of(element.kernels)
+        self.modes = modes
+        self.drive = drive
+        self.element = element
+        self.tolerance = tolerance
+        self.travel = travel
+        self.cycles = cycles
+        self.loops = loops_of(element.kernels)
         self.moving, self.kept = started(modes, drive, element, cycles, start)
-        self.turns, self.parts, self.begun, self.unlike = [], [], 0.0, 0.0
-        self.outcome, self.message, self.progress = None, "", None
+        self.turns = []
+        self.parts = []
+        self.begun = 0.0
+        self.unlike = 0.0
+        self.outcome = None
+        self.message = ""
+        self.progress = None
         self.until(0.0)
-        self.first, self.begun = self.settled()[0], float(self.kept.counters[STORED])
+        self.first = self.settled()[0]
+        self.begun = float(self.kept.counters[STORED])
 
     def fork(self, drive):
         """A copy of the motion as it stands that goes on by itself, under another drive."""
         twin = copy(self)
         twin.progress = None
         twin.moving = type(self.moving)(*(array.copy() for array in self.moving))
-        twin.kept, twin.turns = (
-            type(self.kept)(*(array.copy() for array in self.kept)),
-            list(self.turns),
-        )
+        twin.kept = type(self.kept)(*(array.copy() for array in self.kept))
+        twin.turns = list(self.turns)
         if drive is not self.drive:
-            twin.drive, twin.moving = drive, twin.moving._replace(pieces=segments_of(drive))
+            twin.moving = twin.moving._replace(pieces=segments_of(drive))
+            twin.drive = drive
             twin._enter(int(np.searchsorted(twin._starts(), twin.time, side="right")) - 1)
         return twin
 
@@ -220,12 +234,12 @@ class Motion:
 
         whole: all steps are kept in `parts`.
         """
-        times, width = np.asarray(times, float), self.kept.turns.shape[1]
-        samples, parts = (
-            np.zeros((times.size, width)),
-            np.zeros((STEPS if whole else 0, NODES, width)),
-        )
-        samples[:, 0], self.kept = times, self.kept._replace(samples=samples, parts=parts)
+        times = np.asarray(times, float)
+        width = self.kept.turns.shape[1]
+        samples = np.zeros((times.size, width))
+        parts = np.zeros((STEPS if whole else 0, NODES, width))
+        samples[:, 0] = times
+        self.kept = self.kept._replace(samples=samples, parts=parts)
         self.kept.counters[SAMPLE] = 0
         ends = np.append(self._starts()[1:], np.inf)
         while self.outcome is None:
@@ -250,7 +264,9 @@ class Motion:
         `repeats` says when it is looked at, and what it will change by yet. Its books go on as in the last quarter of
         these cycles, so that change itself has to be as small. The last cycle has to be as the one before it.
         """
-        period, far, before = self.drive.period, 2 * APART, None
+        period = self.drive.period
+        far = 2 * APART
+        before = None
         first = ceil(max(self.time, self._starts()[-1]) / period - 1e-9)
         if not self._swings() or (first + far) * period >= time:
             self.until(time)
@@ -262,14 +278,17 @@ class Motion:
             self.until((first + far - far // 4) * period)
             books = self._sums()
             self.until((first + far) * period)
-            change, left = self._changed(last), int(time / period + 1e-9) - first - far
+            change = self._changed(last)
+            left = int(time / period + 1e-9) - first - far
             if before is not None and self.outcome is None and left > 0:
                 unlike = ahead(change, before, left, far)
                 if unlike <= REPEATS * self.tolerance and self._alike(first + far):
                     self._leave_out(left, (self._sums() - books) / (far // 4))
                     self.unlike = unlike
                     break
-            last, before, far = self.moving.y.copy(), change, 2 * far
+            last = self.moving.y.copy()
+            before = change
+            far = 2 * far
         self.until(time)
 
     def _swings(self) -> bool:
@@ -281,7 +300,9 @@ class Motion:
     def _changed(self, last) -> float:
         """Largest change [1] since the state `last` (N,): of coordinates and rates over the largest of late, of states
         of the law over their sizes; the tolerance at least, as more is round-off."""
-        now, n, sizes = self.moving.now, self.modes.omega.size, self.moving.work[24]
+        now = self.moving.now
+        n = self.modes.omega.size
+        sizes = self.moving.work[24]
         scale = np.concatenate([np.repeat(now[[CREST, CREST_SPEED]], n), sizes[2 * n : -3]])
         return max(
             float(np.max(np.abs(self.moving.y - last)[:-3] / np.maximum(scale, 1e-300))),
@@ -303,10 +324,8 @@ class Motion:
     def _leave_out(self, count: int, sums) -> None:
         """Go on by `count` cycles that are as the last one; sums (5,): what `_sums` grows by in one."""
         period = self.drive.period
-        at, turns = (
-            round(self.time / period),
-            np.concatenate([self.kept.turns[:0], *self.turns[-2:]]),
-        )
+        at = round(self.time / period)
+        turns = np.concatenate([self.kept.turns[:0], *self.turns[-2:]])
         self.moving.y[-3:] += count * sums[:3]
         self.moving.now[LEFT] += count * sums[2]
         self.kept.counters[[POWER, LOST]] += count * sums[3:]
@@ -314,10 +333,8 @@ class Motion:
         turns = turns[turns[:, 0] > self.time - period * (1 - 1e-9)]
         shown = min(count, max(0, MOST_KEPT - sum(map(len, self.turns))) // max(1, len(turns)))
         later = np.zeros((shown, 1, turns.shape[1]))
-        later[:, 0, 0], later[:, 0, -1] = (
-            period * np.arange(1, shown + 1),
-            sums[2] * np.arange(1, shown + 1),
-        )
+        later[:, 0, 0] = period * np.arange(1, shown + 1)
+        later[:, 0, -1] = sums[2] * np.arange(1, shown + 1)
         self.turns.append((turns + later).reshape(-1, turns.shape[1]))
         self.moving.now[TIME] = (at + count) * period
 
@@ -366,13 +383,16 @@ class Motion:
     def response(self, rows) -> Response:
         """Histories of sample rows (k, 2 n + 7). No force passes the limit of its law; the extension of a step may."""
         if self.element.bounded:
-            rows, force = rows.copy(), 2 * self.modes.omega.size + 3
+            rows = rows.copy()
+            force = 2 * self.modes.omega.size + 3
             np.clip(rows[:, force], -self.element.limit, self.element.limit, out=rows[:, force])
         return response_of(self.modes, self.drive, rows, float(self.kept.counters[STORED]))
 
     def ends(self) -> np.ndarray:
         """Where the motion stands: time [s], output [m], its rate [m/s], friction work [J]."""
-        n, y, output = self.modes.omega.size, self.moving.y, self.modes.output
+        n = self.modes.omega.size
+        y = self.moving.y
+        output = self.modes.output
         return np.array([self.time, y[:n] @ output, y[n : 2 * n] @ output, y[-1]])
 
     def last(self, end: float, window: float, shots=(), seen: list | None = None) -> tuple:
@@ -382,11 +402,15 @@ class Motion:
         """
         begin = max(end - window, self.time)
         self.onward(begin)
-        since, tolerance, self.parts = self.ends(), self.tolerance, []
+        since = self.ends()
+        tolerance = self.tolerance
+        self.parts = []
         self.tolerance *= CLOSER  # the extension of a step errs more than the step does
         self.moving.now[STEP] *= CLOSER**0.125
         count = max(LEAST, round((end - begin) / self.drive.period * SAMPLES) + 1)
-        times, rows, after = np.linspace(begin, end, count), [], -np.inf
+        times = np.linspace(begin, end, count)
+        rows = []
+        after = -np.inf
         for shot in [*[t for t in shots if begin <= t < end], end]:
             rows.append(self.until(shot, times[(times > after) & (times <= shot)], True))
             after = shot
@@ -394,7 +418,8 @@ class Motion:
                 seen.append(self._snapshot())
             if self.outcome is not None:
                 break
-        self.tolerance, rows = tolerance, np.concatenate(rows)
+        self.tolerance = tolerance
+        rows = np.concatenate(rows)
         if not self.parts:
             return rows, (None, {})
         places = np.concatenate(self.parts)
@@ -434,11 +459,15 @@ def simulate(
     `wanted` of `stored_samples_per_cycle`. The outcome is set for travel and where no step meets the
     tolerance (not_converged, `message` says where).
     """
-    run, period = Motion(modes, drive, element, cycles, tolerance, travel, start), drive.period
+    run = Motion(modes, drive, element, cycles, tolerance, travel, start)
+    period = drive.period
     run.ends_only(window)
-    end, kept, shots = cycles * period, [], []
+    end = cycles * period
+    kept = []
+    shots = []
     run.progress = progress
-    whole, even = min(2.0, cycles) * period, stored_samples_per_cycle(drive, cycles, wanted=even)
+    whole = min(2.0, cycles) * period
+    even = stored_samples_per_cycle(drive, cycles, wanted=even)
     if even:
         begin = end - max(whole, window * period)
         kept.append(run.until(begin, np.arange(0, begin, period / even)))
@@ -467,7 +496,8 @@ def simulate(
             even=bool(even),
         )
         return replace(done, outcome=run.outcome, message=run.message)
-    last, turned = run.response(rows), run.response(_merged(rows, run, rows[0, 0]))
+    last = run.response(rows)
+    turned = run.response(_merged(rows, run, rows[0, 0]))
     rows = np.concatenate(
         [*_early(run, kept[0][0, 0] if kept and not even else rows[0, 0]), *kept, rows]
     )

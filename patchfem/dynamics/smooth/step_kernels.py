@@ -17,7 +17,10 @@ from ..tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THI
 from .arrays import CREST, CREST_SPEED, DRIVEN, EASE, FREE, MASS, ORIGIN, PIECE, PLACE, STIFF, TIME
 
 OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
-EXTENSION, SIZES, TRIAL = 16, 24, 25  # of Moving.work, whose first rows are the slopes
+# of Moving.work, whose first rows are the slopes
+EXTENSION = 16
+SIZES = 24
+TRIAL = 25
 LEAST = 1e-30  # of a size: at rest everything is as large as this
 NOISE = 2e-15  # of the forces of a mode's stiffness and of the law's: round-off of the acceleration where they balance
 
@@ -32,7 +35,8 @@ def push(m, t):
 def slide_of(m, y):
     """(slide [m], its speed [m/s]) of a state."""
     n = m.rows.shape[1]
-    q, v = m.rows[SLIDE, 0] * y[0], m.rows[SLIDE, 0] * y[n]
+    q = m.rows[SLIDE, 0] * y[0]
+    v = m.rows[SLIDE, 0] * y[n]
     for i in range(1, n):
         q += m.rows[SLIDE, i] * y[i]
         v += m.rows[SLIDE, i] * y[n + i]
@@ -42,7 +46,8 @@ def slide_of(m, y):
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def of_mode(m, i, y, out, drive, pull):
     """Write the slopes of a mode into out; (power of the drive, viscous power) [m2 s-3]; pull: force/mass [m s-2]."""
-    n, rate = m.rows.shape[1], y[m.rows.shape[1] + i]
+    n = m.rows.shape[1]
+    rate = y[m.rows.shape[1] + i]
     damped = m.rows[DAMP, i] * rate
     if m.damping.size > 0:
         damped = 0.0
@@ -61,7 +66,9 @@ def of_mode(m, i, y, out, drive, pull):
 def offered(m, q, y, drive):
     """Write what a law that holds has to know into m.turn: acceleration [m s-2] that the slide has without the force
     and what a newton takes of it [1/kg], slide [m]."""
-    n, free, ease = m.rows.shape[1], 0.0, 0.0
+    n = m.rows.shape[1]
+    free = 0.0
+    ease = 0.0
     for i in range(n):
         damped = m.rows[DAMP, i] * y[n + i]
         if m.damping.size > 0:
@@ -72,7 +79,9 @@ def offered(m, q, y, drive):
             damped + m.rows[OMEGA, i] * m.rows[OMEGA, i] * y[i] + m.rows[BASE, i] * drive
         )
         ease += m.rows[SLIDE, i] * m.rows[SLIDE, i] / m.now[MASS]
-    m.turn[FREE], m.turn[EASE], m.turn[PLACE] = free, ease, q
+    m.turn[FREE] = free
+    m.turn[EASE] = ease
+    m.turn[PLACE] = q
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
@@ -82,8 +91,10 @@ def slope(m, t, y, out):
     The first mode stands before the loop over the others, which a machine sets out to take several at a time: with one
     mode that is 16 ns for 53.
     """
-    n, energies = m.rows.shape[1], y.size - 3
-    drive, mass = push(m, t), m.now[MASS]
+    n = m.rows.shape[1]
+    energies = y.size - 3
+    drive = push(m, t)
+    mass = m.now[MASS]
     q, v = slide_of(m, y)
     if law.IS_SET_VALUED:
         offered(m, q, y, drive)
@@ -93,18 +104,18 @@ def slope(m, t, y, out):
     work, lost = of_mode(m, 0, y, out, drive, force / mass)
     for i in range(1, n):
         more, other = of_mode(m, i, y, out, drive, force / mass)
-        work, lost = work + more, lost + other
-    out[energies], out[energies + 1], out[energies + 2] = (
-        mass * drive * work,
-        mass * lost,
-        force * v,
-    )
+        work = work + more
+        lost = lost + other
+    out[energies] = mass * drive * work
+    out[energies + 1] = mass * lost
+    out[energies + 2] = force * v
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_INTERNAL)
 def gathered(m, stage, h, size):
     """Write the state at a stage of a step of h [s] into m.work[TRIAL], its first `size` entries."""
-    first, share = SHARES[stage, 0], SHARES[stage]
+    first = SHARES[stage, 0]
+    share = SHARES[stage]
     for c in range(size):
         part = first * m.work[0, c]
         for j in range(BEFORE[stage], stage):
@@ -116,7 +127,9 @@ def gathered(m, stage, h, size):
 def step(m, h):
     """Write the state after a step of h [s] into m.work[TRIAL], with the slopes on the way; m.work[0] is that at the
     start."""
-    t, size, last = m.now[TIME], m.y.size, m.work.shape[0] - 14
+    t = m.now[TIME]
+    size = m.y.size
+    last = m.work.shape[0] - 14
     for stage in range(1, last + 1):
         gathered(m, stage, h, size if stage == last else size - 3)
         slope(m, t + PLACES[stage] * h, m.work[TRIAL], m.work[stage])
@@ -129,11 +142,15 @@ def missed(m, h, tolerance):
     Coordinates count relative to the largest of late, rates to the fastest, states of the law to their sizes. A rate
     counts no less than what the step makes of round-off: held at a distance, it decays to that, and it is no error.
     """
-    n, size = m.rows.shape[1], m.y.size - 3
-    fifth, third, pull = 0.0, 0.0, m.now[STIFF] * abs(slide_of(m, m.y)[0]) / m.now[MASS]
+    n = m.rows.shape[1]
+    size = m.y.size - 3
+    fifth = 0.0
+    third = 0.0
+    pull = m.now[STIFF] * abs(slide_of(m, m.y)[0]) / m.now[MASS]
     for c in range(size):
         scale = m.now[CREST] if c < n else m.now[CREST_SPEED] if c < 2 * n else m.work[SIZES, c]
-        high, low = 0.0, 0.0
+        high = 0.0
+        low = 0.0
         for j in range(12):
             high += FIFTH[j] * m.work[j, c]
             low += THIRD[j] * m.work[j, c]
@@ -156,7 +173,8 @@ def missed(m, h, tolerance):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
 def extended(m, h):
     """Write the extension of a step of h [s], taken by `step`, beside the slopes; the state at its end stays."""
-    t, size = m.now[TIME], m.y.size
+    t = m.now[TIME]
+    size = m.y.size
     for c in range(size):  # the stages overwrite it
         m.work[EXTENSION + 7, c] = m.work[TRIAL, c]
     for stage in range(13, STAGES):

@@ -18,10 +18,8 @@ PLACES, SHARES = np.polynomial.legendre.leggauss(4)
 # its polynomial at ENDS
 LAST_BUT_ONE = np.cos(np.pi * (ENDS.size - 2) / (ENDS.size - 1) * np.arange(ENDS.size)[::-1])
 # last terms of the force in a part over its largest; least share of a step in a part
-SMOOTH, LEAST = (
-    1e-9,
-    2.0**-14,
-)
+SMOOTH = 1e-9
+LEAST = 2.0**-14
 MOST_PARTS = 64  # of a step, for which there is to be room
 
 
@@ -53,7 +51,9 @@ def write(m, t, y, row):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def output_of(m, y):
     """(output [m], its rate [m/s]) of a state."""
-    x, w, n = 0.0, 0.0, m.rows.shape[1]
+    x = 0.0
+    w = 0.0
+    n = m.rows.shape[1]
     for i in range(n):
         x += m.rows[steps.OUTPUT, i] * y[i]
         w += m.rows[steps.OUTPUT, i] * y[n + i]
@@ -88,17 +88,20 @@ def turning(m, k, a, b, rate):
 def bounds(m, h, k, parts):
     """Take the step of h [s] into the extremes of its cycles; parts: of it, at whose ends turns are looked for."""
     x, w = output_of(m, m.y)
-    low, high = x, x
+    low = x
+    high = x
     for part in range(1, parts + 1):
         if part < parts:
             steps.between(m, part / parts, k.workspace, m.y.size - 3)
             x1, w1 = output_of(m, k.workspace)
         else:
             x1, w1 = output_of(m, m.work[steps.TRIAL])
-        low, high = min(low, x1), max(high, x1)
+        low = min(low, x1)
+        high = max(high, x1)
         if w * w1 < 0:
             top = turning(m, k, (part - 1) / parts, part / parts, w)
-            low, high = min(low, top), max(high, top)
+            low = min(low, top)
+            high = max(high, top)
         w = w1
     extremes(k.cycles, k.counters[PERIOD], m.now[TIME] + 0.5 * h, low, high)
 
@@ -118,30 +121,29 @@ def phasor(cycles, period, t, h, begin, end):
 
     2/T int x exp(-i omega t) dt of the quintic through both, h^6/46080 of its sixth derivative.
     """
-    first, last = int(t / period), min(int((t + h) / period), cycles.shape[1] - 1)
+    first = int(t / period)
+    last = min(int((t + h) / period), cycles.shape[1] - 1)
     for cycle in range(first, last + 1):
-        low, high = max(t, cycle * period), min(t + h, (cycle + 1) * period)
+        low = max(t, cycle * period)
+        high = min(t + h, (cycle + 1) * period)
         if np.isnan(cycles[2, cycle]) or high <= low:
             continue
-        p, q, a, b, rise = (
-            begin[1] * h,
-            end[1] * h,
-            begin[2] * h * h / 2,
-            end[2] * h * h / 2,
-            end[0] - begin[0],
-        )
-        one, two, three = rise - p - a, q - p - 2 * a, 2 * (b - a)
-        cube, fourth, fifth = (
-            10 * one - 4 * two + three / 2,
-            -15 * one + 7 * two - three,
-            6 * one - 3 * two + three / 2,
-        )
+        p = begin[1] * h
+        q = end[1] * h
+        a = begin[2] * h * h / 2
+        b = end[2] * h * h / 2
+        rise = end[0] - begin[0]
+        one = rise - p - a
+        two = q - p - 2 * a
+        three = 2 * (b - a)
+        cube = 10 * one - 4 * two + three / 2
+        fourth = -15 * one + 7 * two - three
+        fifth = 6 * one - 3 * two + three / 2
         for j in range(PLACES.size):
-            time, weight = (
-                low + 0.5 * (1 + PLACES[j]) * (high - low),
-                SHARES[j] * (high - low) / period,
-            )
-            s, turn = (time - t) / h, 2 * pi * (time / period - cycle)
+            time = low + 0.5 * (1 + PLACES[j]) * (high - low)
+            weight = SHARES[j] * (high - low) / period
+            s = (time - t) / h
+            turn = 2 * pi * (time / period - cycle)
             x = begin[0] + s * (p + s * (a + s * (cube + s * (fourth + s * fifth))))
             cycles[2, cycle] += weight * x * cos(turn)
             cycles[3, cycle] -= weight * x * sin(turn)
@@ -150,11 +152,14 @@ def phasor(cycles, period, t, h, begin, end):
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def phasors(m, h, k):
     """Take the step of h [s] into the phasors."""
-    n, gain, after = m.rows.shape[1], 0.0, 0.0
+    n = m.rows.shape[1]
+    gain = 0.0
+    after = 0.0
     for i in range(n):
         gain += m.rows[steps.OUTPUT, i] * m.work[0, n + i]
         after += m.rows[steps.OUTPUT, i] * m.work[12, n + i]
-    (x, w), (y, v) = output_of(m, m.y), output_of(m, m.work[steps.TRIAL])
+    x, w = output_of(m, m.y)
+    y, v = output_of(m, m.work[steps.TRIAL])
     phasor(k.cycles, k.counters[PERIOD], m.now[TIME], h, (x, w, gain), (y, v, after))
 
 
@@ -173,7 +178,9 @@ def marks(m, h, k):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def rough(row, force):
     """Last two Chebyshev terms of the force [N] in a part, its values at ENDS in the column `force` of row."""
-    one, two, last = 0.0, 0.0, ENDS.size - 1
+    one = 0.0
+    two = 0.0
+    last = ENDS.size - 1
     for j in range(last + 1):
         weight = (0.5 if j == 0 or j == last else 1.0) * row[j, force]
         one += weight if j % 2 == 0 else -weight
@@ -184,7 +191,9 @@ def rough(row, force):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def parted(m, h, k):
     """Write the step of h [s] into `Kept.parts`, in parts in which the force is a polynomial."""
-    begin, size, force = 0.0, 1.0, 2 * m.rows.shape[1] + 3
+    begin = 0.0
+    size = 1.0
+    force = 2 * m.rows.shape[1] + 3
     while begin < 1 and k.counters[PARTS] < k.parts.shape[0]:
         row = k.parts[int(k.counters[PARTS])]
         for j in range(ENDS.size):
@@ -203,7 +212,8 @@ def parted(m, h, k):
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def stored(m, y):
     """Energy of the modes and of the interface [J]."""
-    n, out = m.rows.shape[1], 0.0
+    n = m.rows.shape[1]
+    out = 0.0
     for i in range(n):
         out += y[n + i] * y[n + i] + m.rows[steps.OMEGA, i] * m.rows[steps.OMEGA, i] * y[i] * y[i]
     return 0.5 * m.now[MASS] * out + state_of(m, y)[3]
@@ -212,7 +222,8 @@ def stored(m, y):
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def watch(m, h, k):
     """Take in a step of h [s] before the state moves on."""
-    work, at = m.y.size - 3, int(k.counters[SAMPLE])
+    work = m.y.size - 3
+    at = int(k.counters[SAMPLE])
     k.counters[POWER] += abs(m.work[steps.TRIAL, work] - m.y[work])
     k.counters[STORED] = max(k.counters[STORED], stored(m, m.work[steps.TRIAL]))
     k.counters[DONE] += 1
