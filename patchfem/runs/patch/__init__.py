@@ -1,7 +1,8 @@
-"""The static patch: condense, press, estimate errors on coarser meshes.
+"""Static patch: condense the pieces, solve the contact, estimate errors on coarser meshes.
 
-In: a `PatchModel`. Out: patches on nested meshes and static measures with errors. `grids` owns the mesh, for plans and
-runs alike; `condensed` has the pieces, `press` the pressure. `fine` has sharper measures for
-traces. `meshes` and `static` serve the patches of a sweep together, `store` keeps what runs of one patch share.
-Read `press` first, then `grids`, `ladder` and `measures`.
+In: a `PatchModel`. Out: patches on nested meshes, and static measures with errors. `grids`
+chooses the mesh, for plans and for runs; `condensed` condenses the pieces to their interface;
+`press` computes the pressure; `fine` adds more accurate measures for profiles. `meshes` and
+`static` solve the patches of a sweep together, and `store` keeps results that several runs of
+one patch share. Read `press` first, then `grids`, `ladder` and `measures`.
 """

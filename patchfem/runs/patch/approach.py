@@ -1,4 +1,9 @@
-"""A prescribed approach of a piece that is free to turn: the load that reaches it, or that none does."""
+"""Prescribed approach of a piece that is free to rotate: find the load that reaches it.
+
+In: a `PatchModel` with an approach, and a function that solves the contact under a load. Out:
+the solution under the load found by a bracketing search, or an error if no load or several
+loads belong to the approach.
+"""
 
 from dataclasses import replace
 
@@ -8,17 +13,39 @@ from ...contact.unilateral import press
 from ...core import Compliance, NotConverged, PatchfemError, frozen_array
 from ...formatting import format_length
 
-MISSED = 1e-6  # what the search may leave of the distance, over the distance
-GAP_ROUND = 1e-9  # what it may leave over the range of the gap, whose round-off it cannot go below
+MISSED = 1e-6  # largest remaining distance to the approach, over the approach
+GAP_ROUND = 1e-9  # the same over the range of the gap, whose round-off limits the search
 
 
 def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple:
-    """The pair under an approach with the rotation free: (Compliance with its skin, Pressure, skin, strips).
+    """Solve the contact under a prescribed approach with free rotation.
 
-    under(asked, pieces, gap): the same of a pair under its load; stiff: the pieces as a large load finds them. The load
-    at which the approach is reached is searched. Where a load a millionth of what flat pieces would take is too much,
-    nothing touches. PatchfemError where the middle does not close as the load grows (`refuse_opening`), NotConverged
-    where the approach jumps past the distance: one node under the load line carries at any rotation within bounds.
+    The load is searched at which the approach is reached. If even a millionth of the load that flat
+    pieces would need is too much, nothing touches.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    pieces : Compliance
+    gap : (m,) or (s, m)
+        Unloaded gap [m], of strips (s, m).
+    under : callable
+        Function (asked, pieces, gap) that solves the contact under the load of the model.
+    stiff : Compliance
+        Pieces with their skin as under a large load.
+
+    Returns
+    -------
+    tuple
+        Compliance with its skin, ContactState, skin, strips.
+
+    Raises
+    ------
+    PatchfemError
+        If the middle of the piece does not close as the load increases (`refuse_opening`).
+    NotConverged
+        If the approach jumps past the distance: a single node under the load line carries the load
+        at any rotation between two bounds.
     """
     from scipy.optimize import brentq
 
@@ -27,7 +54,8 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
     least = _least_load(asked, np.ptp(pieces.interface.x))
 
     def short(log_load: float) -> float:
-        # beyond the least load: the piece turns ever faster the nearer it is to tipping over
+        """Return by how much the approach under least load + exp(log_load) [N] exceeds the distance."""
+        # in excess of the least load: near it, the piece rotates ever faster until it tips over
         load = least + float(np.exp(log_load))
         tried.append(under(asked.with_loading(load=load, approach=None), pieces, gap))
         return tried[-1][1].approach - distance
@@ -67,7 +95,7 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
 
 
 def _least_load(asked, length: float) -> float:
-    """Load [N] below which a free piece tips over under its moment."""
+    """Return the load [N] below which a free piece tips over under its moment."""
     tips = (
         asked.loading.can_rotate
         and asked.loading.line_moment
@@ -77,19 +105,22 @@ def _least_load(asked, length: float) -> float:
 
 
 def refuse_opening(asked, pieces: Compliance) -> None:
-    """Raise PatchfemError for a load line so far off the middle that the middle opens as the load grows.
+    """Raise PatchfemError if a larger load on the load line opens the gap in the middle.
 
-    Under large loads the shapes of the surfaces no longer count. The problem of flat pieces, or of pieces on a spring,
-    has one scale: twice the load doubles forces, rotation and approach. So the approach ends as a constant times the
-    load, and that constant is the approach of flat pieces under 1 N on the same line. Where it is not positive no load
-    or more than one belongs to a distance. On pieces much softer at the surface than below (Winkler's foundation) this
-    begins at a third of the length. A moment that does not grow with the load never comes there.
+    Under large loads the shapes of the surfaces become irrelevant. The problem of flat pieces, also
+    on a rotational spring, has a single scale: twice the load doubles forces, rotation and
+    approach. Therefore the approach tends to a constant times the load, and this constant is the
+    approach of flat pieces under 1 N on the same line. If it is not positive, no load or more than
+    one belongs to a distance. For pieces much softer at the surface than below it (Winkler
+    foundation) this begins at a third of the length. A moment that does not increase with the load
+    does not have this effect.
     """
     if not asked.loading.can_rotate or not asked.loading.offset:
         return
     flat = np.zeros(pieces.interface.x.size)
 
     def closing(offset: float) -> float:
+        """Return the approach [m] of flat pieces under 1 N on a load line at `offset` [m]."""
         return press(
             pieces, flat, 1.0, float(offset), spring=asked.loading.rotational_stiffness
         ).approach

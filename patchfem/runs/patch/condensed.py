@@ -1,4 +1,9 @@
-"""The two pieces of a patch: their meshes, materials and the compliance of their common interface."""
+"""Two pieces of a patch condensed to the compliance of their common interface.
+
+In: a `PatchModel` and the meshes of its pieces. Out: a `Pair` with meshes, assembled pieces and
+compliance; large ones are cached on disk. Pieces whose interface nodes do not match are joined
+by a mortar method.
+"""
 
 from dataclasses import dataclass
 from time import perf_counter
@@ -18,17 +23,21 @@ from ...mesh.tensor import TensorGrid
 from ...model.pieces import elastic_layers
 from . import store
 
-LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
+LEAST_CACHED = 150  # number of interface nodes from which a condensed operator is kept on disk
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Pair:
-    """Two pieces condensed to their interface; nothing of it depends on a load or a shape.
+    """Two pieces condensed to their interface, independent of load and shape.
 
-    grid, piece: the lower piece; upper_grid, upper: the other one, the same objects where the pieces are alike;
-    TensorGrid with Piece, or PieceMesh with Substructure. compliance: of both pieces, all pairs together; closing: (m,
-    m) normal closing per shear force on the interface [m/N], zero for alike pieces. joint: the Mortar of pieces whose
-    interface nodes do not match, else None; rise: (m,) gap [m] that rounded interfaces leave by themselves.
+    - grid, piece: mesh and assembled piece of the lower side: TensorGrid with Piece, or PieceMesh
+      with Substructure.
+    - upper_grid, upper: the same of the upper side; identical objects if the pieces are alike.
+    - compliance: sum over both pieces, for all pairs together.
+    - closing (m, m): normal closing per shear force on the interface [m/N]; zero for alike pieces.
+    - joint: Mortar of pieces whose interface nodes do not match, else None.
+    - rise (m,): gap [m] due to rounded ends of the interface.
+    - seconds: CPU seconds by name.
     """
 
     grid: object
@@ -43,7 +52,7 @@ class Pair:
 
     @property
     def coupling(self) -> float:
-        """Largest normal closing per shear force over the largest slide per shear force [1]; 0 for mirrored pieces."""
+        """Largest normal closing over largest slide per shear force [1]; 0 for mirrored pieces."""
         return float(np.abs(self.closing).max() / np.abs(self.compliance.tangential).max())
 
     @property
@@ -53,11 +62,11 @@ class Pair:
 
     @property
     def rounding(self) -> float:
-        """Relative error of the compliance by round-off [1], 0 where it is not felt."""
+        """Relative error of the compliance by round-off [1]; 0 if it is negligible."""
         return max(self.piece.rounding, self.upper.rounding)
 
     def forces(self, nodal) -> tuple:
-        """Nodal forces (..., m) of the interface carried to the nodes of the lower and of the upper piece."""
+        """Return nodal forces (..., m) of the interface on the nodes of the lower and upper piece."""
         if self.joint is None:
             return nodal, nodal
         return self.joint.forces(nodal)
@@ -71,7 +80,15 @@ def finite_elements(body, layers: Layers):
 
 
 def compliance_of(body, piece, fresh: bool) -> InterfaceCompliance:
-    """Return the compliances (nn, tt, nt) of a piece; those of a large one come from the cache on disk unless `fresh`."""
+    """Return the compliances (nn, tt, nt) of a piece, if possible from the cache on disk.
+
+    Parameters
+    ----------
+    body : TensorGrid or PieceMesh
+    piece : Piece or Substructure
+    fresh : bool
+        Whether to ignore the cache.
+    """
     is_grid = isinstance(body, TensorGrid)
     if (body.x.size if is_grid else len(body.points) ** 0.5) < LEAST_CACHED:
         return interface_compliance(piece)
@@ -90,7 +107,20 @@ def compliance_of(body, piece, fresh: bool) -> InterfaceCompliance:
 
 
 def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
-    """Assemble and condense the pieces of a `PatchModel`: meshes from `piece_meshes`, the upper None where it is alike."""
+    """Assemble and condense the pieces of a `PatchModel`.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    grid, upper_grid : TensorGrid or PieceMesh
+        Meshes from `piece_meshes`; the upper one is None if the pieces are alike.
+    fresh : bool
+        Whether to ignore operators kept on disk.
+
+    Returns
+    -------
+    Pair
+    """
     width = asked.pieces.width * asked.pieces.pairs
     start = perf_counter()
     piece = finite_elements(grid, elastic_layers(asked, asked.pieces.lower))
@@ -103,7 +133,9 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     if upper_grid is not None and not _match(x, upper_grid.x):
         joint = mortar.join_pieces(mortar.Body(x, low), mortar.Body(upper_grid.x, high))
         x, share, parts = joint.x, joint.tributary_lengths, joint.compliance
-    else:  # shear of the upper piece moves the interface up where that of a like lower piece moves it down: nt cancels
+    # Shear of the upper piece lifts the interface where that of a like lower piece lowers it: nt
+    # cancels.
+    else:
         parts = (low.nn + high.nn, low.tt + high.tt, low.nt - high.nt)
     normal, tangential, closing = (frozen_array(part / width) for part in parts)
     interface = Interface(frozen_array(x), frozen_array(share * width), width)
@@ -130,7 +162,7 @@ def shared_pair(asked, level: int) -> Pair:
 
 
 def keep_pairs(asked, meshes, pairs) -> None:
-    """Keep condensed pieces (Pair, level by level) of `Meshes` that are just made, for `shared_pair`.
+    """Keep condensed pieces (Pair, level by level) of new shared meshes for `shared_pair`.
 
     asked: one of the patches that share the meshes.
     """
@@ -139,7 +171,7 @@ def keep_pairs(asked, meshes, pairs) -> None:
 
 
 def _pair_key(asked, name: str, level: int) -> tuple:
-    """Key of the condensed pieces of a `PatchModel` on one level of meshes of this name."""
+    """Return the key of the condensed pieces of a `PatchModel` on one level of named meshes."""
     return (
         "pair",
         name,
@@ -152,7 +184,10 @@ def _pair_key(asked, name: str, level: int) -> tuple:
 
 
 def without_factors(pair: Pair) -> Pair:
-    """Delete the factors of pieces on grids: they are far larger than the compliance, and made again for fields."""
+    """Delete the factors of pieces on grids, and return the Pair.
+
+    They need far more memory than the compliance, and are recomputed for fields.
+    """
     for piece in (pair.piece, pair.upper):
         if isinstance(piece, Piece) and not piece.rounding:
             piece.computed.clear()
@@ -160,7 +195,10 @@ def without_factors(pair: Pair) -> Pair:
 
 
 def pair_beside(asked, pair: Pair) -> Pair:
-    """Return the pieces of a `PatchModel` on the bodies of another Pair, shared ones where the bodies are shared."""
+    """Return the pieces of a `PatchModel` condensed on the meshes of another Pair.
+
+    Shared pieces are reused if the meshes are shared.
+    """
     for k, level in enumerate(() if asked.mesh.shared is None else asked.mesh.shared.levels):
         if np.array_equal(level[0].x, pair.grid.x) and (level[1] is None) == (
             pair.upper is pair.piece
@@ -170,9 +208,11 @@ def pair_beside(asked, pair: Pair) -> Pair:
 
 
 def _rise(body, x) -> np.ndarray:
+    """Return the gap (m,) [m] at x (m,) that the rounded ends of a body cause."""
     rise = getattr(body, "interface_depths", None)
     return np.zeros(x.size) if rise is None else np.interp(x, body.x, rise)
 
 
 def _match(x, other) -> bool:
+    """Return whether the interface nodes of both pieces coincide."""
     return other.size == x.size and np.abs(other - x).max() <= 1e-9 * np.ptp(x)

@@ -1,4 +1,8 @@
-"""Measures of a pressed patch, worked out once for all runs of this patch."""
+"""Measures of a pressed patch, computed once for all runs of this patch.
+
+In: a `Patch` and its coarser ones. Out: measures and notes from `measures`, kept in `store` if
+several runs share the patch.
+"""
 
 from . import store
 from .measures import measures, plane_band
@@ -6,12 +10,23 @@ from .press import Patch
 
 
 def static_measures(asked, patch: Patch, coarse, tolerance: float | None) -> dict:
-    """Return `measures.measures` of a patch and of its coarser ones."""
+    """Return the static measures of a patch with errors (see `measures.measures`).
+
+    Parameters
+    ----------
+    asked : PatchModel
+    patch : Patch
+    coarse : sequence of Patch or None
+        The patch on coarser meshes, fine to coarse.
+    tolerance : float or None
+        Tolerance that chose the mesh; None for a given mesh.
+    """
     if asked.solved is not None:
         return asked.solved.measures
     coarse = tuple(coarse)
 
     def make() -> dict:
+        """Compute the measures with errors."""
         return measures(patch, *coarse, tolerance=tolerance)
 
     return (
@@ -22,7 +37,7 @@ def static_measures(asked, patch: Patch, coarse, tolerance: float | None) -> dic
 
 
 def plane_notes(asked, patch: Patch) -> list:
-    """Return `measures.plane_band` of a patch."""
+    """Return the note on the plane state of a patch (`measures.plane_band`), as a list."""
     if asked.solved is not None:
         return asked.solved.band
     if not store.is_shared(asked):

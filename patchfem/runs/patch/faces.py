@@ -1,4 +1,8 @@
-"""The patches of the interfaces of a rig: each is pressed once, and then is elements that its interface moves."""
+"""Patches of the interfaces of a rig: pressed once, then represented by parallel elements.
+
+In: a model whose interfaces have patches. Out: `Face`s with pressed patches on two or more
+meshes, their Jenkins elements for the motion, static measures, warnings and fields.
+"""
 
 import re
 from collections.abc import Callable, Iterator
@@ -19,11 +23,13 @@ from .values import values
 
 
 class Face(NamedTuple):
-    """A patch of an interface of a rig.
+    """Patch of an interface of a rig.
 
-    number: of the interface, from 0; name: as the scene's places, "1-0"; model: of the rig, with this patch and law as
-    its own; patches: the pressed Patch and those on coarser meshes, None where one is lacking; fields: frames of the
-    interface by name, as a Result has them, None before its run.
+    - number: index of the interface.
+    - name: nodes of the interface as the scene writes them, "1-0".
+    - model: model of the rig, with this patch and friction law as its own.
+    - patches: the pressed Patch and those on coarser meshes; None for a missing one.
+    - fields: frames of the interface by name (see `Result`); None before its run.
     """
 
     number: int
@@ -34,32 +40,32 @@ class Face(NamedTuple):
 
     @property
     def patch(self) -> Patch:
-        """The pressed Patch."""
+        """Pressed Patch on the finest mesh."""
         return self.patches[0]
 
     @property
     def surface(self):
-        """The press.Surface on whose points its fields are given."""
+        """`press.Surface` on whose points the fields are given."""
         return surface_of(self.patch, self.fields or {})
 
     @property
     def folder(self) -> str:
-        """Its name as that of a folder."""
+        """Name of the interface as the name of a folder."""
         return self.name.replace(" (", "_").removesuffix(")")
 
     @property
     def partial_slip(self) -> str:
-        """What lets it slip part by part; "" where nothing does."""
+        """Key that lets the patch slip in part; "" if there is none."""
         return self.model.patch.interface.partial_slip
 
     def slide(self, response) -> np.ndarray:
-        """Slide (k,) [m] of its interface in a Response."""
+        """Return the slide (k,) [m] of the interface in a Response."""
         slides = response.extra.get("slides")
         return response.slide if slides is None else slides[:, self.number]
 
 
 def faces_of(model) -> Iterator[Face]:
-    """The interfaces of a model that have a patch, pressed."""
+    """Yield a Face for each interface of a model that has a patch, pressed."""
     rig = model.rig
     for number, one in enumerate(rig.friction.interfaces if rig is not None else ()):
         if one.patch is not None:
@@ -70,8 +76,16 @@ def faces_of(model) -> Iterator[Face]:
 
 
 def patches_of(one, tolerance: float) -> tuple:
-    """The Patch of an InterfaceLaw and those on coarser meshes, pressed once for all runs of one process that ask for
-    the same; a patch with files, which may change, once for its model. PatchfemError with the key at fault."""
+    """Return the Patch of an InterfaceLaw and those on coarser meshes.
+
+    They are computed once for all runs of a process with the same patch; a patch with files, which
+    may change, once for its model.
+
+    Raises
+    ------
+    PatchfemError
+        With the key of the interface at fault.
+    """
     asked = one.patch
     files = asked.mesh.file is not None or asked.gap.profile is not None
     key = ("face", asked if files else store.content_key(asked), tolerance)
@@ -83,7 +97,7 @@ def patches_of(one, tolerance: float) -> tuple:
 
 
 def condensed_anew(model) -> None:
-    """Condense the pieces of every interface again, whatever is kept of them."""
+    """Condense the pieces of every interface again, ignoring all kept results."""
     store.clear()
     for one in model.rig.friction.interfaces if model.rig is not None else ():
         if one.patch is not None:
@@ -91,8 +105,22 @@ def condensed_anew(model) -> None:
 
 
 def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
-    """(stiffness (t,) [N/m], yield slide (t,) [m], JenkinsSet or None of strips) of the parallel elements of an
-    InterfaceLaw whose patch gives way; coarser: on the mesh of its error. One that bears nothing yields at once."""
+    """Return the parallel elements of an InterfaceLaw whose patch slips in part.
+
+    A patch without load has one element that yields at once.
+
+    Parameters
+    ----------
+    one : InterfaceLaw
+    tolerance : float
+    coarser : bool
+        Whether to use the coarser mesh of the error estimate.
+
+    Returns
+    -------
+    tuple
+        Stiffness (t,) [N/m], yield slide (t,) [m], and the JenkinsSet (None for strips).
+    """
     patch, static = patches_of(one, tolerance)[int(coarser)], one.numbers.static
     if not patch.pressure.load > 0:
         return np.array([1 / patch.giving.mean()]), np.zeros(1), None
@@ -106,7 +134,7 @@ def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
 
 
 def meshed(model) -> list:
-    """Numbers of the interfaces whose patches have a coarser mesh, in a tuple for each patch that is another one."""
+    """Return the indices of interfaces that have a coarser mesh, one tuple per distinct patch."""
     out = {}
     for face in faces_of(model):
         if face.partial_slip and face.patches[1] is not None:
@@ -115,8 +143,17 @@ def meshed(model) -> list:
 
 
 def seen(model, shots) -> tuple:
-    """The patches of the interfaces with their frames, of one whose elements no shot of the motion shows the pressed
-    state alone; shots: of the event engine, of (slide [m], stretch (t,) [m]) for every interface."""
+    """Return the Faces of a model with their frames.
+
+    The frames of a patch without elements, or without shots, show the pressed state only.
+
+    Parameters
+    ----------
+    model : Model
+    shots : list
+        Snapshots of the event engine: time [s], and (slide [m], stretch (t,) [m]) of every
+        interface.
+    """
     out = []
     for face in faces_of(model):
         one, fields = model.rig.friction.interfaces[face.number], at_rest(face.patch)
@@ -137,13 +174,12 @@ def seen(model, shots) -> tuple:
 
 
 def known(model) -> bool:
-    """Whether every patch that gives way has a coarser mesh to tell its error."""
+    """Return whether every patch that slips in part has a coarser mesh for its error."""
     return all(face.patches[1] is not None for face in faces_of(model) if face.partial_slip)
 
 
 def probed(model) -> dict:
-    """Static measures by name of the patch of a model or of its interfaces, solved alone and without errors; {} without
-    any."""
+    """Return static measures by name of all patches of a model, without errors."""
     if model.patch is not None:
         return result.probed(model)
     with locate_errors(model.source):
@@ -155,7 +191,10 @@ def probed(model) -> dict:
 
 
 def measured(model) -> dict:
-    """Static measures of the patches by name, of an interface after the first with its number behind the name."""
+    """Return the static measures of the patches by name.
+
+    Those of an interface after the first have its number after the name.
+    """
     return {
         rows.of_number(name, face.number): found
         for face in faces_of(model)
@@ -164,7 +203,7 @@ def measured(model) -> dict:
 
 
 def warnings_of(model) -> list:
-    """Warnings of the pressed patches."""
+    """Return the warnings on the pressed patches."""
     return together(
         model,
         lambda face: [
@@ -178,13 +217,21 @@ UNKNOWN = "the interface has too few elements for an estimate of the error; leav
 
 
 def notes_of(model) -> list:
-    """Notes on what the static model of the patches leaves out."""
+    """Return notes on what the static model of the patches neglects."""
     return together(model, lambda face: result.left_out(face.model, face.patch, face.patches[1:]))
 
 
 def together(model, told: Callable) -> list:
-    """The sentences told(Face) of all patches, each once behind the names of its interfaces and with its keys as they
-    stand in the scene."""
+    """Return the sentences on all patches, each once with the names of its interfaces.
+
+    Keys are written as they occur in the scene.
+
+    Parameters
+    ----------
+    model : Model
+    told : callable
+        Function of a Face that returns its sentences.
+    """
     out: dict = {}
     for face in faces_of(model):
         for text in told(face):
@@ -196,8 +243,10 @@ def together(model, told: Callable) -> list:
 
 
 def in_scene(model, text: str) -> str:
-    """A sentence on a patch with the keys of [contact] as they stand in the scene, below their interface where the
-    model has no patch of its own."""
+    """Return a sentence on a patch with its keys of [contact] as they are in the scene.
+
+    If the model has no patch of its own, these keys belong to [structure.interface.contact].
+    """
     return (
         text
         if model.patch is not None

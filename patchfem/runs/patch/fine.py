@@ -1,8 +1,10 @@
-"""A patch under a measured trace on rows of even points, as fine as the samples of its file and finer.
+"""Patch under a measured profile on equally spaced points, as fine as the samples and finer.
 
-Waves along the interface have their compliance in closed form; the cells of the pieces are left with what the free ends
-change, which is smooth. Errors come from the changes from level to level, as those of meshes do: of cells half as long
-at the ends, and of twice the points.
+In: a `PatchModel` with a profile. Out: static measures with errors, and the pressure on the
+points. The compliance of waves along the interface is known in closed form; finite elements
+only compute the smooth change by the free ends of the pieces. Errors come from the changes from
+level to level, as for meshes: with cells half as long at the ends, and with twice as many
+points.
 """
 
 from typing import NamedTuple
@@ -38,16 +40,16 @@ GROWTH = 0.8  # growth of these cells per distance
 CONTACT_TOL = 3e-8  # relative residual of a solved contact
 MAX_ITERATIONS = 4000  # iterations of one contact
 CORNER_SPAN = 1e-3  # length of a corner over that of the interface
-# pressure at a corner over the largest; above it the corner may hold the largest
+# pressure at a corner over the largest; above it the largest pressure may be at the corner
 CORNER_PRESSURE = 0.2
-MAX_OVERLAP = 1e-6  # overlap of a solved contact over what the pressure moves
+MAX_OVERLAP = 1e-6  # largest overlap of a solved contact, over the displacement by the pressure
 
 
 class PointSolution(NamedTuple):
-    """Static measures from points of a trace, and the finest level that was solved.
+    """Static measures from points of a profile, and the finest level that was solved.
 
-    measures: name -> (value, error), {} where a level is not solved; surface, stretches: as `Patch` has
-    them, None where a level is not solved.
+    - measures: (value, error) by name; {} if a level is not solved.
+    - surface, stretches: as in `Patch`; None if a level is not solved.
     """
 
     measures: dict
@@ -61,10 +63,16 @@ class PointSolution(NamedTuple):
 
 
 class PointLevel(NamedTuple):
-    """A solved level: forces (n,) [N], its Surface, parts in contact (k, 2) [m], values by name, what its meshes may
-    hide, iterations.
+    """Solved level.
 
-    cornered: the pressure at a free corner may be the largest, which a few cells at the ends do not tell.
+    - force (n,): nodal forces [N].
+    - surface: pressure and gap on the points.
+    - stretches (k, 2): parts in contact [m].
+    - values: static measures by name.
+    - hidden: errors that the levels may share.
+    - work: iterations.
+    - cornered: whether the pressure at a free corner may be the largest; a few cells at the ends do
+      not resolve it.
     """
 
     force: np.ndarray
@@ -77,7 +85,11 @@ class PointLevel(NamedTuple):
 
 
 def takes_points(asked) -> bool:
-    """Whether a `PatchModel` is bare pieces of one length under a profile, pressed by what a row of points can take."""
+    """Return whether a `PatchModel` can be solved on equally spaced points.
+
+    These are bare pieces of equal length with a profile, under a load, or under an approach without
+    rotation.
+    """
     loading = asked.loading
     can_turn = loading.can_rotate or loading.rotational_stiffness > 0
     held = loading.approach is None or not can_turn
@@ -93,9 +105,13 @@ def takes_points(asked) -> bool:
 
 
 def solve_on_points(asked, enough) -> PointSolution:
-    """Solve a `PatchModel` on ever more points.
+    """Solve a `PatchModel` on an increasing number of points.
 
-    enough(measures) -> bool ends the climb, as do MAX_POINTS and MAX_WORK.
+    Parameters
+    ----------
+    asked : PatchModel
+    enough : callable
+        Function of the measures that ends the refinement; MAX_POINTS and MAX_WORK end it as well.
     """
     count, series, found = _first(asked), [], {}
     with one_thread():
@@ -116,18 +132,22 @@ def solve_on_points(asked, enough) -> PointSolution:
 
 
 def _first(asked) -> int:
+    """Return the number of points of the first level."""
     n_samples = asked.pieces.length / profile.sample_spacing(asked.gap.profile)
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 
 def _dear(last: PointLevel) -> bool:
-    """Whether twice the points of a level are too many, or take too many iterations."""
+    """Return whether twice the points of a level are too many, or take too many iterations."""
     return 2 * last.force.size > MAX_POINTS or 3 * last.work * last.force.size > MAX_WORK
 
 
 def _summed(coarse: list, series: list) -> dict:
-    """(value, error) by name from levels of ever finer cells at the ends, and from levels of ever more points on the
-    finest of these; what the first series lacks is added to the second."""
+    """Return (value, error) by name from two series of levels.
+
+    The first series has ever finer cells at the ends, the second ever more points with the finest
+    of these cells. The extrapolation and the error of the first are added to the second.
+    """
     mine = series[-1].values
     found = combined([one.values for one in series], least_of(series[-1].hidden, mine), True, 0.0)
     ends = combined([one.values for one in coarse], {}, True, 0.0)
@@ -140,8 +160,10 @@ def _summed(coarse: list, series: list) -> dict:
 
 
 def _ends(asked, level: int) -> list:
-    """What the free ends of the pieces change: (places (k,) [m], changes (2, k, k) [m2/N] for pressure and for shear),
-    by the cells of a level."""
+    """Return the change of compliance by the free ends of the pieces, on the cells of a level.
+
+    Returns positions (k,) [m] and changes (2, k, k) [m2/N] for pressure and for shear.
+    """
     length, sides = asked.pieces.length, (-0.5, 0.5)
     layout = Layout(
         -length / 2,
@@ -162,13 +184,22 @@ def _ends(asked, level: int) -> list:
 
 
 def _bodies(asked) -> list:
-    """(piece, times it counts) of both pieces."""
+    """Return (piece, multiplicity) for the distinct pieces."""
     pieces = asked.pieces
     return [(pieces.upper, 2)] if pieces.are_alike else [(pieces.lower, 1), (pieces.upper, 1)]
 
 
 def operators(asked, ends: tuple, count: int) -> tuple:
-    """PointCompliance for pressure and for shear of `count` even points; ends: what the free ends of the pieces change."""
+    """Return the PointCompliance for pressure and for shear of equally spaced points.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    ends : tuple
+        Change of compliance by the free ends of the pieces, from `_ends`.
+    count : int
+        Number of points.
+    """
     length, width = asked.pieces.length, asked.pieces.width * asked.pieces.pairs
     x = ((np.arange(count) + 0.5) / count - 0.5) * length
     k = np.arange(count) * np.pi / length
@@ -185,7 +216,7 @@ def operators(asked, ends: tuple, count: int) -> tuple:
 
 
 def _rows(piece, layout: Layout) -> tuple:
-    """Depths of a piece as fine as the columns at its ends, and the rows in its coating."""
+    """Return the depths [m] of the rows of a piece, and the number of rows in its coating."""
     height, thick, least = piece.height, piece.thickness, layout.bands[0][2]
     bands = [
         (0.0, 0.0, least),
@@ -199,6 +230,10 @@ def _rows(piece, layout: Layout) -> tuple:
 
 
 def _level(asked, ends: tuple, count: int, start) -> PointLevel:
+    """Solve the contact on `count` points.
+
+    start: forces (n,) [N] of the level with half as many points, or None.
+    """
     normal, shear = operators(asked, ends, count)
     x, between = (
         normal.x,
@@ -234,7 +269,11 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
 
 
 def _pressed(asked, normal: PointCompliance, gap, start) -> tuple:
-    """(forces (n,) [N], closing [m], rotation [rad] beyond that in the gap, iterations) of a level."""
+    """Solve for the forces of a level.
+
+    Returns forces (n,) [N], approach [m], rotation [rad] in addition to that in the gap, and
+    iterations.
+    """
     x, begin = normal.x, None if start is None else np.repeat(start, 2) / 2
     low = gap.min() if asked.loading.approach is None else asked.loading.approach
     moment = None if asked.loading.approach is not None else asked.loading.moment
@@ -259,7 +298,10 @@ def _pressed(asked, normal: PointCompliance, gap, start) -> tuple:
 
 
 def _values(asked, both: tuple, force, gap) -> tuple:
-    """The measures but approach and rotation, the ends of the contact, and its parts (k, 2) [m]."""
+    """Return the measures except approach and rotation, the ends of the contact, and its parts.
+
+    The parts are (k, 2) [m].
+    """
     (normal, shear), x, load = both, both[0].x, float(force.sum())
     touches, sigma = force > 0, force / normal.area
     if not touches.any():

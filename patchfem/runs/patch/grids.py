@@ -1,9 +1,10 @@
-"""The grids of a patch: graded to where its own pressure ends, to its corners, its coating and the waves of its gap.
+"""Grids of a patch, refined at ends of contact, corners, coating and waves of the gap.
 
-The coarsest grid follows from the patch alone: its contact is searched on columns that are graded to what the search
-before found; a plan searches in the same way. Every next grid splits all cells in two, so the grids of a tighter
-tolerance are those of a wider one and more. How far the ladder is climbed a run decides in `ladder`, a plan expects in
-`plan`. Read `base_grids` first, then `layout_of`.
+In: a `PatchModel`. Out: the coarsest grids of its pieces. They follow from the patch alone: the
+contact is searched on columns that are graded to the result of the previous search, in plans
+and runs alike. Every further grid splits all cells in two, so that the grids of a tighter
+tolerance contain those of a wider one. `ladder` decides how many grids a run takes, `plan`
+predicts it. Read `base_grids` first, then `layout_of`.
 """
 
 from dataclasses import dataclass
@@ -22,42 +23,50 @@ from .press import Patch, pressed
 from .values import contact_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
-# columns of the coarsest grid; a layout that wants more is made coarser everywhere
+# most columns of the coarsest grid; a layout with more is made coarser everywhere
 MAX_COLUMNS = 120
 # The tables with two entries are for a patch that stays (True) and for one whose motion takes longer with more nodes.
-SLOPE = {True: 0.5, False: 0.9}  # growth of the cells of the coarsest grid per distance
+SLOPE = {True: 0.5, False: 0.9}  # growth of the cells of the coarsest grid per distance [1]
 EDGE_CELLS = {True: 20, False: 10}  # length of a contact over the coarsest cells at its edges
-MIN_CELL = 4e-9  # shortest cell of the coarsest grid over the length: some tens of picometres, near round-off
-STEP_CELLS = 8  # cells at a step of the gap are so many times shorter than those at an edge
-MAX_PLACES = 12  # ends of a contact; one with more is many islands, for which the columns stay even
-SWING = (0.5, 1.5)  # multiples of the mean load between which a load that varies is expected
-# coarsest cell over the length of the interface where wear may move the edges anywhere
+# shortest cell of the coarsest grid over the length: some tens of picometres, near round-off
+MIN_CELL = 4e-9
+STEP_CELLS = 8  # cells at a step of the gap are this many times shorter than those at an edge
+# most ends of a contact; one with more consists of many islands and gets equal columns
+MAX_PLACES = 12
+SWING = (0.5, 1.5)  # multiples of the mean load between which a varying load is expected
+# coarsest cell over the length of the interface if wear may move the edges anywhere
 WEAR_CELL = 1 / 48
-NODE_CELLS = 64  # cells along a contact of a node or two in the search that follows
-WAVE_CELLS = 16  # cells in a wave of the gap, in the search and in the third grid
-CREST = 0.3  # cells are graded to the crests of the pressure above this fraction of the largest pressure
-CREST_CELLS = 4  # the half-width of a crest has so many cells of the coarsest grid
-# cells of the coarsest grid in a slip zone; 16 of the third grid show the work to about 1 %
+NODE_CELLS = 64  # cells along a contact of one or two nodes in the next search
+WAVE_CELLS = 16  # cells per wave of the gap, in the search and in the third grid
+# cells are graded to those maxima of the pressure that exceed this fraction of the largest
+CREST = 0.3
+CREST_CELLS = 4  # cells of the coarsest grid in the half-width of a maximum of the pressure
+# cells of the coarsest grid in a slip zone; the third grid has 16, which give the work to about 1 %
 SLIP_CELLS = 4
-MAX_SEARCH_CELL = 4.0  # cell of the search over the wanted one in a slip zone; above it the zone is searched again
-MAX_SEARCHES = 8  # each search has columns that are graded to what the one before found
+# cell of the search over the cell of the layout in a slip zone; above it the search is repeated
+MAX_SEARCH_CELL = 4.0
+# most searches; each one has columns that are graded to the result of the previous one
+MAX_SEARCHES = 8
 MIN_LEVELS = 3  # fewer nested meshes do not show an order of convergence
-# predicted seconds of condensing, above which a finer mesh is not tried
+# predicted CPU seconds of condensing, above which a finer mesh is not tried
 MAX_SECONDS = {
     True: 3.0,
     False: 0.4,
 }
-OTHER_FACTOR = 4.0  # condensing a mesh that is not a tensor grid takes so many times as long
+OTHER_FACTOR = 4.0  # condensing a mesh that is not a tensor grid takes this many times as long
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactExtent:
-    """What a search finds of a contact.
+    """Extent of a contact, found by a search.
 
-    span: (from, to) [m] of the loaded stretch; places: where the pressure ends inside the interface, or the nodes of a
-    contact too small to tell; corners: ends of the interface that bear; cell: longest cell [m] in which it ends;
-    crests: (place, half-width) [m] of the largest pressures inside it; slip_zones: (from, to) [m] of the stretches that
-    a prescribed slide lets slip.
+    - span: (start, end) [m] of the loaded part of the interface.
+    - places: positions [m] at which the pressure ends inside the interface, or the nodes of a
+      contact that is too small to resolve.
+    - corners: ends of the interface that carry pressure [m].
+    - cell: longest cell [m] in which the contact ends; inf if it is not resolved.
+    - crests: (position, half-width) [m] of the largest maxima of the pressure.
+    - slip_zones: (start, end) [m] of the parts in which a prescribed slide causes slip.
     """
 
     span: tuple
@@ -69,12 +78,15 @@ class ContactExtent:
 
     @property
     def wide(self) -> float:
-        """Length of the loaded stretch [m]."""
+        """Length of the loaded part [m]."""
         return self.span[1] - self.span[0]
 
 
 def search_pair(asked) -> Pair:
-    """Return the pieces on the columns of the first search for a contact, shared by the patches of a geometry."""
+    """Return the pieces on the columns of the first search for a contact.
+
+    Patches of the same geometry share them.
+    """
     layout = search_layout(asked)
     key = (
         "search",
@@ -90,9 +102,9 @@ def search_pair(asked) -> Pair:
 
 
 class BaseGrids(NamedTuple):
-    """The coarsest grids of a patch, one where its pieces are alike, and the contact that they are graded to.
+    """Coarsest grids of a patch, a single one if its pieces are alike, and its contact.
 
-    contact: None without a load.
+    contact: ContactExtent that they are graded to; None without a load.
     """
 
     bodies: list
@@ -102,8 +114,9 @@ class BaseGrids(NamedTuple):
 def base_grids(asked) -> BaseGrids:
     """Return the coarsest grids of a `PatchModel`, graded to the contact that is found on them.
 
-    Where a load that varies moves the edges of the contact, the columns are fine over the bands that they sweep between
-    SWING of the load; where wear does, no column is longer than WEAR_CELL of the interface.
+    If a varying load moves the edges of the contact, the columns are fine wherever the edges lie
+    between SWING times the load; if wear moves them, no column is longer than WEAR_CELL of the
+    interface.
     """
     sweep = [
         asked.with_loading(load=share * asked.loading.load)
@@ -111,7 +124,7 @@ def base_grids(asked) -> BaseGrids:
         if asked.mesh.edge_motion == "load" and asked.loading.load is not None
     ]
     layout, contact = search_layout(asked), None
-    # without a load there is no contact
+    # without a load there is no contact to search for
     for search in range(MAX_SEARCHES if asked.nominal_load > 0 else 0):
         pair = condensed(asked, *grids_of(asked, layout)) if search else search_pair(asked)
         x = pair.grid.x
@@ -125,7 +138,10 @@ def base_grids(asked) -> BaseGrids:
 
 
 def _shows_slip(zones: tuple, x, layout: Layout) -> bool:
-    """Whether the cells of columns x (k,) [m] in the slip zones are not much longer than a layout wants them."""
+    """Return whether columns x (k,) [m] resolve the slip zones.
+
+    Their cells are at most MAX_SEARCH_CELL times those of a layout.
+    """
     middle, long = (x[1:] + x[:-1]) / 2, np.diff(x)
     for low, high in zones:
         inside = (x[1:] > low) & (x[:-1] < high)
@@ -135,14 +151,17 @@ def _shows_slip(zones: tuple, x, layout: Layout) -> bool:
 
 
 def _shows_crests(asked, x, layout: Layout) -> bool:
-    """Whether columns x (k,) [m] are no longer than a layout wants them at the crests of a pressure on waves."""
+    """Return whether columns x (k,) [m] are short enough for a pressure over waves.
+
+    The limit is twice the cells of a layout.
+    """
     if _longest(asked) == np.inf or x.size > MAX_COLUMNS:
         return True
     return bool((np.diff(x) <= 2 * layout.cell_lengths((x[1:] + x[:-1]) / 2)).all())
 
 
 def _longest(asked) -> float:
-    """Longest cell [m] that shows the waves of the gap, those of a profile and of its shapes; infinite without any."""
+    """Return the longest cell [m] that resolves the waves of profile and shapes; else inf."""
     return min(
         asked.gap.wave / WAVE_CELLS,
         np.inf if asked.gap.profile is None else asked.even_element_size,
@@ -150,13 +169,16 @@ def _longest(asked) -> float:
 
 
 def search_layout(asked) -> Layout:
-    """Even columns on which a contact is looked for."""
+    """Return equal columns on which a contact is searched for."""
     half, cell = asked.pieces.length / 2, min(asked.pieces.length / SEARCH_CELLS, _longest(asked))
     return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
 
 
 def layout_of(asked, seen: list) -> Layout:
-    """Layout of the coarsest columns for the contacts `seen`, finest where one ends."""
+    """Return the layout of the coarsest columns for some contacts, finest where a contact ends.
+
+    seen: ContactExtents, of one patch under several loads or of several patches.
+    """
     length = asked.pieces.length
     half = length / 2
     span = (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
@@ -168,15 +190,16 @@ def layout_of(asked, seen: list) -> Layout:
     if asked.mesh.edge_motion == "wear":
         most = min(most, length * WEAR_CELL)
     inside = min(wide / 6, length / 24, most)
-    # a point of contact is looked at closer and closer
+    # a contact of one or two nodes is searched again with shorter cells
     along = NODE_CELLS
     if np.isfinite(max(one.cell for one in seen)):
         along = EDGE_CELLS[asked.mesh.is_static]
-    # cells of a band that an edge sweeps are many, and every one is a contact set of its own
+    # a band that an edge sweeps would have many cells, and each is a different contact set
     fine = thick / 4 if thick and asked.mesh.edge_motion != "load" else np.inf
     least = max(min(wide / along, fine), MIN_CELL * length)
     bands = _bands([one.places for one in seen], least)
-    # a jump of the gap is a node of its own: what depends on it falls with the first power of its cell
+    # a jump of the gap is a node; quantities that depend on it converge with the first power of its
+    # cell
     bands += tuple((place, place, least / STEP_CELLS) for place in asked.gap.jumps)
     known, fall = rounded_edges(asked)
     near = [place for place in known if span[0] - least <= place <= span[1] + least]
@@ -198,7 +221,7 @@ def layout_of(asked, seen: list) -> Layout:
     )
     ends = {place for one in seen for place in one.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
-    # the far corners, where a free side meets the holder
+    # the far corners, where a free side meets the holder, have singular stresses
     bands += tuple(
         (side * half, side * half, min(asked.pieces.height, length) / 20) for side in (-1, 1)
     )
@@ -206,14 +229,18 @@ def layout_of(asked, seen: list) -> Layout:
 
 
 def _bands(places: list, least: float) -> tuple:
-    """Bands of the edges: each spans what it sweeps from one contact to the next, where their number stays."""
+    """Return the bands of the edges, each with cells of at most `least` [m].
+
+    If the number of edges is the same in all contacts, a band covers the range that its edge
+    sweeps.
+    """
     if len({len(each) for each in places}) == 1:
         return tuple((min(sweep), max(sweep), least) for sweep in zip(*places, strict=True))
     return tuple((place, place, least) for each in places for place in each)
 
 
 def _coating(asked) -> float:
-    """Thickness [m] of the thinner coating, 0 where neither piece has one."""
+    """Return the thickness [m] of the thinner coating; 0 without a coating."""
     return min(
         (piece.thickness for piece in (asked.pieces.lower, asked.pieces.upper) if piece.thickness),
         default=0.0,
@@ -221,11 +248,16 @@ def _coating(asked) -> float:
 
 
 def contact_extent(patch: Patch, slip=None) -> ContactExtent:
-    """Extent of the contact of a patch; where nothing touches, the cells around the narrowest gap.
+    """Return the extent of the contact of a patch, or the cells around its smallest gap.
 
-    slip: the `PrescribedSlip` of the holders, None where nothing slips part by part.
+    A smooth skin carries pressure everywhere; the part with a thousandth of the largest pressure
+    counts.
 
-    Of a smooth skin the part that bears a thousandth of the largest pressure counts.
+    Parameters
+    ----------
+    patch : Patch
+    slip : PrescribedSlip, optional
+        Slide of the holders; None if nothing slips in part.
     """
     x, sigma = patch.x, patch.pressure.sigma_n
     if not (sigma > 0).any():
@@ -236,7 +268,7 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
     bears = strips > (1e-3 * strips.max() if patch.skin is not None else 0.0)
     index = np.flatnonzero(bears.any(axis=0))
     low, high = x[max(index[0] - 1, 0)], x[min(index[-1] + 1, x.size - 1)]
-    # a point of contact between a few nodes: look closer around it
+    # a contact of few nodes: the next search has shorter cells around it
     if index.size < 4 and index.size < x.size:
         return ContactExtent((float(low), float(high)), tuple(x[index].tolist()), (), np.inf)
     changes = np.flatnonzero((bears[:, 1:] != bears[:, :-1]).any(axis=0))
@@ -258,7 +290,10 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
 
 
 def _crests(x, sigma) -> tuple:
-    """(place, half-width) [m] of the largest pressures (m,) [Pa] inside a contact: of the parabola through three nodes."""
+    """Return (position, half-width) [m] of the maxima of pressures (m,) [Pa] inside a contact.
+
+    Each is that of the parabola through three nodes.
+    """
     top = np.flatnonzero(
         (sigma[1:-1] > CREST * sigma.max())
         & (sigma[1:-1] > sigma[:-2])
@@ -271,7 +306,7 @@ def _crests(x, sigma) -> tuple:
 
 
 def grids_of(asked, layout: Layout) -> list:
-    """Grids of the pieces, one where they are alike, with the columns of a layout, MAX_COLUMNS at most."""
+    """Return the grids of the pieces with the columns of a layout; one grid if they are alike."""
     pieces = (asked.pieces.lower, asked.pieces.upper)
     if asked.pieces.are_alike:
         pieces = pieces[:1]
@@ -283,7 +318,7 @@ def grids_of(asked, layout: Layout) -> list:
 
 
 def columns_of(asked, layout: Layout) -> np.ndarray:
-    """Columns (k,) [m] of a layout, MAX_COLUMNS at most."""
+    """Return the columns (k,) [m] of a layout, at most MAX_COLUMNS."""
     x = divide_into_columns(layout, asked.gap.jumps)
     while x.size > MAX_COLUMNS + 1 and layout.bands:
         layout = layout.scale_cells(x.size / MAX_COLUMNS)
@@ -292,11 +327,15 @@ def columns_of(asked, layout: Layout) -> np.ndarray:
 
 
 def grid_on(asked, x, piece) -> TensorGrid:
-    """Grid of one piece: rows as fine as the columns at the interface, at the coating's own face and at the holder."""
+    """Return the grid of one piece on columns x (k,) [m].
+
+    Its rows are as fine as the columns at the interface, at the inner face of the coating and at
+    the holder.
+    """
     thick, height = piece.thickness, piece.height
     top = float(np.diff(x).min())
-    # a row is at most a tenth of the length; in a piece taller than that it may be a twenty-fourth of the height, and
-    # never more than a sixth of it
+    # a row is at most a tenth of the length; in a piece taller than this it may be 1/24 of the
+    # height, and never more than 1/6 of it
     cap = min(max(asked.pieces.length / 10, height / 24), height / 6)
     bands = [(0.0, 0.0, top), (height, height, min(height, asked.pieces.length) / 60)]
     if thick:
@@ -322,7 +361,10 @@ def is_mirrored(body) -> bool:
 
 
 def seconds_of(bodies) -> float:
-    """Return the predicted seconds of condensing the bodies of a patch, (lower, upper or None) or one alike piece."""
+    """Return the predicted CPU seconds of condensing the bodies of a patch.
+
+    bodies: (lower, upper or None), or a single one for alike pieces.
+    """
     total = 0.0
     for body in bodies:
         if body is not None:

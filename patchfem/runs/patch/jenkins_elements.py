@@ -1,4 +1,8 @@
-"""Parallel Jenkins elements of a pressed patch that slips, worked out once for all runs of this patch."""
+"""Parallel Jenkins elements of a pressed patch that slips, computed once for all its runs.
+
+In: a pressed `Patch`, coefficient of friction and bond length. Out: a JenkinsSet, or
+`StripElements` of each strip (`slip.shear_modes`).
+"""
 
 from typing import NamedTuple
 
@@ -17,9 +21,10 @@ class StripElements(NamedTuple):
 
 
 def elements(patch: Patch, static: float, length: float) -> "shear_modes.JenkinsSet":
-    """Return the parallel elements of a patch whose points yield at a friction coefficient times their load.
+    """Return the parallel elements of a patch whose points yield at their friction limit.
 
-    Coulomb elements of different coefficients are the same springs, so they are made once and scaled.
+    The limit of a point is the coefficient of friction times its load. Coulomb elements of
+    different coefficients have the same springs, so they are computed once and scaled.
 
     Parameters
     ----------
@@ -27,11 +32,12 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
     static : float
         Coefficient of static friction.
     length : float
-        Length [m] of bonds in series with the pieces, 0 for Coulomb's law.
+        Length [m] of bonds in series with the pieces; 0 for Coulomb's law.
     """
     load = patch.pressure.sigma_n * patch.pieces.interface.weight
 
     def make() -> "shear_modes.JenkinsSet":
+        """Compute the elements; Coulomb elements are scaled from those of coefficient 1."""
         if length or not static > 0:
             return shear_modes.jenkins_set(patch.giving, static * load, length)
         unit_elements = store.reuse(
@@ -45,12 +51,15 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
 def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripElements, ...]:
     """Return the parallel elements of every strip of a patch in strips.
 
-    Each strip lies behind its own part of the pieces and under its own pressure, because the strips are not coupled.
-    A strip that is open has one element that yields at once. Parameters are those of `elements`.
+    The strips are not coupled: each one has its own part of the compliance of the pieces and its
+    own pressure. An open strip has one element that yields at once. The parameters are those of
+    `elements`.
     """
-    giving = patch.giving * len(patch.strips.offsets)  # each strip has its part of the width
+    # the compliance of a strip is that of its part of the width
+    giving = patch.giving * len(patch.strips.offsets)
 
     def elements_under(force) -> StripElements:
+        """Return the elements of a strip under nodal forces (m,) [N]."""
         if not (static > 0 and force.any()):
             return StripElements(np.array([1 / giving.mean()]), np.zeros(1))
         found = shear_modes.jenkins_set(giving, static * force, length)

@@ -1,4 +1,9 @@
-"""A patch on its own mesh and on coarser ones, from which its errors are estimated."""
+"""Solution of a patch on nested meshes, from which its errors are estimated.
+
+In: a `PatchModel` and a tolerance. Out: pressed patches from fine to coarse. A mesh that the
+scene does not prescribe is refined until the static measures meet the tolerance or the next
+mesh is too expensive (`climb`).
+"""
 
 from dataclasses import replace
 from functools import partial
@@ -11,12 +16,17 @@ from .grids import MAX_SECONDS, MIN_LEVELS, base_grids, seconds_of
 from .measures import measures, met
 from .press import pressed, solve
 
-TOL_OF_SECONDS = 1e-3  # up to this tolerance a slip has the seconds of a mesh that moves; ten times tighter, 3.2 times
-MAX_DECADES = 6  # decades below a tolerance in which one that asks for a finer mesh is looked for
+# Down to this tolerance, a patch that slips may take the seconds of a moving mesh; at a tenth of
+# it, 3.2 times as many.
+TOL_OF_SECONDS = 1e-3
+MAX_DECADES = 6  # decades of the tolerance that are searched for one that needs a finer mesh
 
 
 def solve_split(asked, level: int, estimate: bool) -> tuple:
-    """A patch on the mesh of its file with every edge halved `level` times, and on coarser ones as `solve_all`."""
+    """Solve a patch on the mesh of its file with every edge halved `level` times.
+
+    The coarser patches are those of `solve_all`.
+    """
     low, high = piece_meshes(asked)
     for _ in range(level):
         low, high = (None if body is None else body.refine() for body in (low, high))
@@ -24,12 +34,26 @@ def solve_split(asked, level: int, estimate: bool) -> tuple:
 
 
 def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
-    """A patch on its mesh and on coarser ones, fine to coarse; two of them at least, None where one is not wanted.
+    """Solve a patch on its mesh and on coarser ones.
 
-    A patch whose element size is not pinned climbs a ladder of nested meshes to its `tolerance`. A mesh of any cells
-    has no coarser one: its second patch is on the mesh with every edge halved. Where it shares meshes they are those;
-    but a patch under a trace that these do not resolve to its tolerance climbs its own ladder, as its single run does.
-    fresh: condense anew, whatever is kept on disk.
+    A patch without a prescribed element size is solved on a ladder of nested meshes until it meets
+    its tolerance. An unstructured mesh has no coarser one: its second patch is on the mesh with
+    every edge halved. Shared meshes are used as they are, except that a patch with a profile that
+    these do not resolve to its tolerance is solved on its own ladder, as in a single run.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    tolerance : float
+    estimate : bool
+        Whether the coarser meshes are solved as well.
+    fresh : bool
+        Whether to ignore condensed operators kept on disk.
+
+    Returns
+    -------
+    tuple
+        Patches, fine to coarse, at least two; None for each that is not solved.
     """
     if asked.solved is not None and not fresh:
         return asked.solved.patches
@@ -55,38 +79,43 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
 
 
 def _misses_trace(asked, patches: tuple, tolerance: float) -> bool:
-    """Whether a patch under a trace misses its tolerance on meshes that it shares."""
+    """Return whether a patch with a profile misses its tolerance on shared meshes."""
     if not asked.mesh.is_automatic or asked.gap.profile is None or patches[1] is None:
         return False
     return not met(measures(*patches, tolerance=tolerance), tolerance)
 
 
 def on_pairs(asked, pairs, estimate: bool = True) -> tuple:
-    """A patch pressed on condensed pieces, the first for the answer and the others for its error, as `solve_all`."""
+    """Solve a patch on condensed pieces, from fine to coarse (see `solve_all`)."""
     return _filled(pressed(asked, pair) for pair in pairs[: None if estimate else 1])
 
 
 def _filled(patches) -> tuple:
-    """Patches with None for each that three lack."""
+    """Return patches, padded with None to at least three."""
     out = tuple(patches)
     return out + (None,) * (3 - len(out))
 
 
 def _with_coarser(asked, low, high, estimate: bool, fresh: bool) -> tuple:
-    """A patch on given bodies and on coarser ones, as `solve_all`."""
+    """Solve a patch on given bodies and on coarser ones (see `solve_all`)."""
     found = [(low, high), *(meshes_beside(low, high) if estimate else ())]
     return _filled(solve(asked, *level, fresh) for level in found)
 
 
 def meshes_of_file(asked) -> list:
-    """The meshes of a patch whose elements are pinned or come from a file, as `solve_all` takes them."""
+    """Return the meshes of a patch whose elements are prescribed or come from a file.
+
+    The order is that of `solve_all`.
+    """
     low, high = piece_meshes(asked)
     return [(low, high), *meshes_beside(low, high)]
 
 
 def meshes_beside(low, high) -> list:
-    """The meshes, (lower, upper or None), that show the error of given ones: coarser grids, or a mesh of any cells
-    with every edge halved."""
+    """Return the meshes (lower, upper or None) that show the error of given ones.
+
+    They are coarser grids, or the unstructured mesh with every edge halved; empty for few columns.
+    """
     if low.x.size <= 8:
         return []
     if low.base_grid is None:
@@ -99,18 +128,34 @@ def meshes_beside(low, high) -> list:
 
 
 def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
-    """A patch on the coarsest mesh of the ladder that meets its tolerance, and on all coarser ones, fine to coarse.
+    """Solve a patch on a ladder of nested meshes until it meets its tolerance.
 
-    Where the next mesh is dear, points as fine as a trace add sharper measures; then the mesh serves fields and motion.
-    The climb ends where the next mesh would take more than the work that is spent on a patch. With a prescribed slip it
-    also has to show the work of that. Without an estimate it is the third mesh, and nothing is solved on the others.
+    If the next mesh is expensive, points as fine as the profile give more accurate measures, and
+    the mesh serves fields and motion. The refinement ends if the next mesh would exceed the work
+    that is allowed for a patch. With a prescribed slip, the meshes also have to resolve the work of
+    the slip.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    tolerance : float
+    estimate : bool
+        If False, only the third mesh is solved.
+    fresh : bool
+        Whether to ignore condensed operators kept on disk.
+
+    Returns
+    -------
+    tuple
+        Patches on all meshes, fine to coarse.
     """
     grids, out, on_points = base_grids(asked).bodies, [], None
     while True:
         try:
             wanted = estimate or len(out) == MIN_LEVELS - 1
             out.insert(0, pressed(asked, condensed(asked, *grids, fresh=fresh)) if wanted else None)
-        except NotConverged:  # cells too short for the digits there are: the meshes before stay
+        # the cells are too short for double precision: the coarser meshes are kept
+        except NotConverged:
             if not out or out[0] is None:
                 raise
             return tuple(out) if len(out) > 1 else (*out, None)
@@ -121,7 +166,7 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -
         if not estimate or nothing:
             return tuple(out)
         dear = seconds_of(grids)
-        if on_points is not None:  # the solution on points of the trace serves finer meshes as well
+        if on_points is not None:  # the solution on points of the profile is kept for finer meshes
             out[0] = replace(
                 out[0],
                 sharper=on_points.sharper,
@@ -139,10 +184,10 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -
 
 
 def most_seconds(asked, tolerance: float | None = None) -> float:
-    """Return the predicted seconds that the finest mesh of a `PatchModel` may take at a tolerance, None: at any.
+    """Return the predicted CPU seconds that the finest mesh of a `PatchModel` may take.
 
-    The motion of a prescribed slip costs little, so a tight tolerance buys it a finer mesh, up to what a static patch
-    may cost.
+    The motion of a prescribed slip is cheap, so that a tight tolerance allows a finer mesh, up to
+    the limit of a static patch. tolerance: None for the limit at any tolerance.
     """
     if asked.mesh.slip is None:
         return MAX_SECONDS[asked.mesh.is_static]
@@ -154,9 +199,10 @@ def most_seconds(asked, tolerance: float | None = None) -> float:
 
 
 def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
-    """The patch of a bench that slips part by part as a run without motion solves it, fine to coarse.
+    """Solve the patch of a bench that slips in part as a static run does, fine to coarse.
 
-    () where there is no such ladder: the mesh is pinned, shared with other cases, or solved already.
+    () if there is no such ladder: the mesh is prescribed, shared with other cases, or solved
+    already.
     """
     if (
         not asked.interface.partial_slip
@@ -170,14 +216,14 @@ def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = 
 
 
 def _shows_slip(asked, patches: list, tolerance: float) -> bool:
-    """Whether the meshes of patches, fine to coarse, show the work of a prescribed slip to the tolerance."""
+    """Return whether patches, fine to coarse, resolve the work of a prescribed slip."""
     if asked.mesh.slip is None:
         return True
     return slip_zones.slip_missed(patches, asked.mesh.slip, tolerance) <= 1
 
 
 def _finer(asked) -> bool:
-    """Whether a trace may be solved on points finer than any cells."""
+    """Return whether a profile may be solved on points finer than any cells."""
     if asked.gap.profile is None:
         return False
 
@@ -185,7 +231,7 @@ def _finer(asked) -> bool:
 
 
 def _on_points(asked, patches: list, tolerance: float):
-    """The finest of patches, fine to coarse, with what points as fine as a trace add to it."""
+    """Return the finest patch with the measures on points as fine as the profile."""
     found, first = fine.solve_on_points(asked, partial(_enough, patches, tolerance)), patches[0]
     return replace(
         first,
@@ -197,10 +243,20 @@ def _on_points(asked, patches: list, tolerance: float):
 
 
 def climbs_at(asked, patches, tolerance: float) -> float | None:
-    """The loosest tenth, hundredth, ... of a tolerance for which a patch climbs beyond its finest mesh.
+    """Return the loosest tolerance / 10^k at which a patch would be solved on a finer mesh.
 
-    patches: as `climb` returns them for that tolerance. None where the next mesh is dear, or no tolerance asks for
-    it: then the ladder has ended for good.
+    Parameters
+    ----------
+    asked : PatchModel
+    patches : sequence of Patch
+        As `climb` returns them at that tolerance.
+    tolerance : float
+
+    Returns
+    -------
+    float or None
+        None if the next mesh is too expensive or no tolerance needs it: then the ladder is
+        complete.
     """
     seconds = next_seconds(patches[0])
     if seconds > most_seconds(asked):
@@ -221,18 +277,18 @@ def climbs_at(asked, patches, tolerance: float) -> float | None:
 
 
 def next_seconds(patch) -> float:
-    """Predicted CPU seconds of condensing the pieces of a patch on the next mesh of its ladder."""
+    """Return the predicted CPU seconds of condensing the pieces of a patch on its next mesh."""
     return seconds_of([grid.refine() for grid in _grids(patch)])
 
 
 def _grids(patch) -> tuple:
-    """The bodies that a patch is pressed on, one where its pieces are alike."""
+    """Return the meshes of a patch, a single one if its pieces are alike."""
     pair = patch.pair
     return (pair.grid,) if pair.upper is pair.piece else (pair.grid, pair.upper_grid)
 
 
 def _enough(patches: list, tolerance: float, sharp: dict) -> bool:
-    """Whether patches, fine to coarse, meet the tolerance with the measures that points of a trace add."""
+    """Return whether patches meet the tolerance with measures `sharp` on points of a profile."""
     return met(
         measures(replace(patches[0], sharper=sharp), *patches[1:], tolerance=tolerance), tolerance
     )

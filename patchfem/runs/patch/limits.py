@@ -1,23 +1,31 @@
-"""Where a value goes on ever finer nested meshes, and how far it still is from there."""
+"""Limits of values on nested meshes, and their errors, by geometric extrapolation.
+
+In: values on two or more meshes, each with cells half as long as the previous one. Out: a
+`Limit` with the error of the finest value and of the extrapolated one.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 
-SECOND = 4.0  # ratio of successive changes of second order, the best that is believed
-DOUBTFUL = 2.5  # the best ratio of meshes that are not nested
-REGULAR = (2.6, 6.0)  # ratios of a series that falls by its order
-SLOWEST = 1.6  # ratio with which the remainder of a slowly falling series is taken
-GROWING = 1.3  # ratio below which a series has not begun to fall
-SAFE = 1.8  # error over the remainder of a series with a steady ratio; it covers all but 2 in 100 random scenes
-WILD = 2.0  # error over the largest change of a series without one
+SECOND = 4.0  # ratio of successive changes at second order, the largest that is used
+DOUBTFUL = 2.5  # largest ratio that is used for meshes that are not nested
+REGULAR = (2.6, 6.0)  # range of ratios in which a series converges with its order
+SLOWEST = 1.6  # smallest ratio from which the remainder is computed
+GROWING = 1.3  # series with smaller ratios do not converge yet
+# error over the remainder, for a steady ratio; the interval fails in less than 2 of 100 random
+# scenes
+SAFE = 1.8
+WILD = 2.0  # error over the largest change, for a series without a steady ratio
 
 
 class Limit(NamedTuple):
-    """What series of values on nested meshes tell, (...) each.
+    """Limit of series of values on nested meshes, (...) each.
 
-    value: of the finest mesh; error: half-width that holds the limit; extrapolated: the limit as the last ratio of the
-    changes gives it; left: half-width around that.
+    - value: value on the finest mesh.
+    - error: half-width of an interval around `value` that contains the limit.
+    - extrapolated: limit by the last ratio of the changes.
+    - left: half-width around `extrapolated`.
     """
 
     value: np.ndarray
@@ -27,12 +35,18 @@ class Limit(NamedTuple):
 
 
 def limit(values, nested: bool = True) -> Limit:
-    """Limit of a series of two values or more, each on a mesh whose cells are half as long as those of the one before;
-    of many series at once where values (n, ...) are arrays.
+    """Return the limits of series of two or more values on meshes of successively halved cells.
 
-    Three values show a ratio of successive changes. Where it is steady the rest of the geometric series is what the
-    finest value lacks. Of two values the error is twice their change. Meshes that are not nested show no more than the
-    order log2(2.5), and nothing is extrapolated from them.
+    Three values give a ratio of successive changes. If it is steady, the remainder of the geometric
+    series is the error of the finest value. With two values the error is twice their change. For
+    meshes that are not nested the order is at most log2(2.5), and nothing is extrapolated.
+
+    Parameters
+    ----------
+    values : (n, ...)
+        Values, coarse to fine, of one or many series.
+    nested : bool
+        Whether each mesh halves the cells of the previous one.
     """
     values = np.asarray(values, float)
     last, size = values[-1] - values[-2], np.abs(values[-1] - values[-2])
@@ -45,7 +59,7 @@ def limit(values, nested: bool = True) -> Limit:
         rest = np.maximum(size, np.abs(before) / DOUBTFUL) / (np.clip(ratio, SLOWEST, DOUBTFUL) - 1)
         return Limit(values[-1], WILD * rest, values[-1], WILD * rest)
     rest = last / (np.clip(ratio, SLOWEST, SECOND) - 1)
-    # the last change is small by chance where the ratio is beyond that of a regular series
+    # above the largest regular ratio, the last change is small by chance
     wild = WILD * np.where(
         ratio > REGULAR[1],
         np.maximum(size / (SECOND - 1), np.abs(before) / SECOND**2 * 2),
@@ -61,7 +75,11 @@ def limit(values, nested: bool = True) -> Limit:
 
 
 def _left(values, rest, ratio) -> np.ndarray:
-    """Half-width around the extrapolated value: how far it moved with the last mesh, a quarter of the rest at least."""
+    """Return the half-width around the extrapolated value.
+
+    It is the change of the extrapolated value by the last mesh, and at least a quarter of the
+    remainder.
+    """
     least = np.abs(rest) / np.where(ratio >= REGULAR[0], 4, 2)
     if len(values) < 4:
         return 2 * least

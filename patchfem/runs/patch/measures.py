@@ -1,4 +1,9 @@
-"""Measures of a static patch with their errors from coarser meshes."""
+"""Measures of a static patch, with errors from coarser meshes.
+
+In: a `Patch` and the same on coarser meshes. Out: measures by name with errors by `limits`,
+plus the errors that a change of the mesh does not show (`Hidden`); and the model errors by the
+plane state and by the number of strips.
+"""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -18,23 +23,26 @@ from .limits import limit
 from .press import Patch, pressed
 from .values import edge_cells, open_ends, unresolved_rounding, values
 
-CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
-FEW_NODES = 12  # the measures of a contact of fewer nodes depend on their number
-UNRESOLVED_NODES = 3  # nodes of a contact that meshes of these cells do not resolve
+# width over height of a piece that is clearly in plane strain; its inverse: in plane stress
+CLEAR = 8.0
+FEW_NODES = 12  # the measures of a contact with fewer nodes depend on this number
+UNRESOLVED_NODES = 3  # contacts with at most this many nodes are not resolved
 ROUND = 5e-12  # relative round-off of the equations of contact
-MIN_ERROR = 1e-9  # relative error below which no error is estimated, because nobody asks for less
-OFFSET = 0.012  # cells by which an edge found between nodes may lie off
-RISING = 4.0  # the pressure at a corner may still rise by so many times its last change
-CORNER = 0.15  # fraction of the pressure at the corner of a coating that cells coarser than it may leave out
-EXTRAPOLATED = 2.0  # errors that an extrapolated value may hide, over those of the finest mesh: 4/3 + 1/3, rounded up
+MIN_ERROR = 1e-9  # smallest relative error that is stated, because nobody needs less
+OFFSET = 0.012  # error of the position of an edge between nodes, in cells
+RISING = 4.0  # the pressure at a corner may still increase by this many times its last change
+# fraction of the pressure at the corner of a coating that cells longer than its thickness may miss
+CORNER = 0.15
+# hidden error of an extrapolated value over that of the finest mesh: 4/3 + 1/3, rounded up
+EXTRAPOLATED = 2.0
 BANDED = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 
 
 def plane_band(asked, patch: Patch) -> list:
-    """A sentence on the model error of the plane state, from the mesh of `patch`, as a list.
+    """Return a sentence, as a list, on the model error of the plane state of a patch.
 
-    There is none for a piece far wider than tall in plane strain or far taller than wide in plane stress. Between the
-    two no mesh narrows the band.
+    There is none for a piece that is far wider than tall in plane strain, or far taller than wide
+    in plane stress. Otherwise no mesh reduces this error.
     """
     other = other_plane(asked)
     if other is None:
@@ -50,7 +58,7 @@ def plane_band(asked, patch: Patch) -> list:
 
 
 def other_plane(asked):
-    """The `PatchModel` in the other plane state, None where its own is clearly the right one."""
+    """Return the `PatchModel` in the other plane state; None if its own is clearly right."""
     ratio = asked.pieces.width / asked.pieces.height
     if ratio >= CLEAR if asked.pieces.plane == "strain" else ratio <= 1 / CLEAR:
         return None
@@ -59,13 +67,21 @@ def other_plane(asked):
 
 
 def _assumed(asked) -> str:
+    """Return the clause on the assumed plane state."""
     pieces = asked.pieces
     ratio = pieces.width / pieces.height
     return f"plane {pieces.plane} is assumed, and the pieces are {ratio:.2g} times as wide as tall"
 
 
 def band_words(asked, mine: dict, theirs: dict) -> list:
-    """The sentence of `plane_band`, from values by name in the plane state of the model and in the other one."""
+    """Return the sentence of `plane_band` from values by name in both plane states.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    mine, theirs : dict
+        Values in the plane state of the model and in the other one.
+    """
     first = "approach" if asked.loading.approach is None else "normal_load"
     closing = (theirs["approach"] - mine["approach"]) if first == "approach" else 0.0
     parts = [f"approach by {'+' * (closing > 0)}{format_length(closing, 3)}"] if closing else []
@@ -87,9 +103,17 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
 
 
 def strip_error(asked, patch: Patch, found: dict) -> dict:
-    """Measures `found` with what the number of strips adds to their errors; those without a value stay as they are.
+    """Return measures whose errors include the effect of the number of strips.
 
-    That is the change to another number of strips on the mesh of `patch`, at second order.
+    It is the change to another number of strips on the mesh of `patch`, at second order. Measures
+    without a value are not changed.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    patch : Patch
+    found : dict
+        Measures by name.
     """
     other, ratio = other_strips(asked)
     if other is asked:
@@ -106,10 +130,10 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
 
 
 def other_strips(asked) -> tuple:
-    """Return the `PatchModel` in another number of strips, and how many times as coarse it is.
+    """Return the `PatchModel` with another number of strips, and how many times coarser it is.
 
-    It has half as many strips, or twice as many where half as many would not reach to the load line. Without strips to
-    halve it is the model itself.
+    It has half as many strips, or twice as many if half as many would not reach to the load line.
+    Without strips to halve it is the model itself.
     """
     strips = asked.interface.strips
     if strips is None or strips.count < 2:
@@ -124,11 +148,18 @@ def other_strips(asked) -> tuple:
 
 
 def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
-    """Static measures of a patch by name, each with its error.
+    """Return the static measures of a patch by name, each with its error.
 
-    coarse: the patch on coarser meshes, the finest of them first; None without one. A value is that of the finest mesh,
-    and its error what the change from mesh to mesh leaves to come (`limits`) with what no change of the mesh shows.
-    tolerance: of a patch whose mesh it chose; a value whose error exceeds it is extrapolated.
+    A value is that of the finest mesh. Its error contains the remaining change by refinement
+    (`limits`) and the errors that no change of the mesh shows.
+
+    Parameters
+    ----------
+    fine : Patch
+    coarse : Patch or None
+        The patch on coarser meshes, fine to coarse; None for a missing one.
+    tolerance : float or None
+        Tolerance of a patch whose mesh it chose; a value whose error exceeds it is extrapolated.
     """
     series, mine = [one for one in coarse if one is not None], values(fine)
     if not series:
@@ -136,7 +167,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     missed_peak = unresolved_rounding(fine)
     found = [values(one) for one in reversed(series)]
     nested = all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
-    # of meshes that pass over a rounding none shows what it does
+    # none of several meshes that do not resolve a rounding shows its effect
     rough = 2.0 if missed_peak else 1.0
     least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
     out = combined(
@@ -151,10 +182,11 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
 
 
 def _cornered(found: dict, fine: Patch, coarse: Patch) -> dict:
-    """The measures with a peak that holds the pressure at a corner under a profile, where it still rises.
+    """Return the measures with an error of the peak that contains the pressure at a corner.
 
-    Elsewhere the largest pressure may have settled, which its change from mesh to mesh shows alone. A corner that a
-    trace just reaches bears ever more on cells half as long.
+    Under a profile, the pressure at a corner may still increase with refinement, although the
+    largest pressure does not change: a corner that the profile just reaches carries ever more on
+    cells half as long.
     """
     now, before = (one.pressure.sigma_n[[0, -1]].max() for one in (fine, coarse))
     peak = found["pressure_peak"]
@@ -185,13 +217,13 @@ def converge(
     series : list of dict
         Values on two meshes or more by name, coarse to fine; numbers or (q,).
     least : dict
-        Errors that the meshes may agree to hide, by name.
+        Errors by name that all meshes may share.
     wanted : float or None
-        Tolerance; a value whose error is within it is not extrapolated, None: no value is.
+        Tolerance: a value whose error is within it is not extrapolated; None: no value is.
     nested : bool
-        Whether every mesh halves the cells of the one before.
+        Whether every mesh halves the cells of the previous one.
     alike : float
-        Relative error below which no error is estimated.
+        Smallest relative error that is stated.
     rough : float
         Factor of the errors.
     """
@@ -227,9 +259,10 @@ def combined(
     alike: float = MIN_ERROR,
     rough: float = 1.0,
 ) -> dict:
-    """Return measures by name from their values on meshes of one patch, coarse to fine; parameters as of `converge`.
+    """Return measures by name from their values on the meshes of one patch.
 
-    Without a coarser mesh there are no errors, without a load they are 0.
+    Without a coarser mesh there are no errors; without a load they are 0. The parameters are those
+    of `converge`.
     """
     mine = series[-1]
     if len(series) == 1 or not mine["normal_load"] > 0:
@@ -251,24 +284,32 @@ def combined(
 
 
 def mesh_engine(value: float, finest: float) -> str:
-    """Return what computed a value of nested meshes, of which the finest gives `finest`."""
+    """Return what computed a value: the finest mesh, if it gives `finest`, or extrapolation."""
     return patch_rows.ON_FINEST_MESH if value == finest else patch_rows.EXTRAPOLATED
 
 
 def met(found: dict, tolerance: float) -> bool:
-    """Whether the decisive measures of a patch have errors within the tolerance; a measure without a value has."""
+    """Return whether the errors of the decisive measures are within the tolerance.
+
+    A measure without a value counts as within.
+    """
     return missed(found, tolerance) <= 1
 
 
 def missed(found: dict, tolerance: float) -> float:
-    """Largest error of the decisive measures over what the tolerance allows [1]; no error counts as none."""
+    """Return the largest error of the decisive measures over the allowed error [1].
+
+    A missing error counts as 0.
+    """
     return max(found[name].error_ratio(tolerance) for name in DECISIVE)
 
 
 def _bounded(why: str, found: dict) -> dict:
-    """The measures without the numbers that no mesh bounds: the peak beside a step that bears, or at a free corner.
+    """Return the measures, with those that no mesh bounds replaced by the reason `why`.
 
-    why: there is none, "" where there is."""
+    These are the peak pressure next to a loaded step or at a free corner, and the loaded fraction;
+    "" changes nothing.
+    """
     if not why:
         return found
     return found | {
@@ -279,10 +320,10 @@ def _bounded(why: str, found: dict) -> dict:
 
 
 def _unbounded(patch: Patch) -> str:
-    """Why the pressure of a patch has no bound, "" where it has one.
+    """Return the reason why the pressure of a patch is unbounded; "" if it is bounded.
 
-    A pressure that ends at the edge of a step is that of a punch with a sharp corner, and across a step that is closed
-    it is worse. A skin yields at its peaks, so behind one the pressure stays bounded.
+    A contact that ends at the edge of a step has the pressure of a punch with a sharp corner; a
+    contact across a closed step is more singular. A skin makes the pressure bounded.
     """
     if patch.skinned:
         return ""
@@ -302,7 +343,10 @@ def _unbounded(patch: Patch) -> str:
 
 
 def of_peak(fraction, error, share):
-    """Errors of loaded fractions with at least the relative error `share` of the peak that each is divided by."""
+    """Return errors of loaded fractions that contain the relative error `share` of the peak.
+
+    The peak is the divisor of the fraction.
+    """
     return np.maximum(error, fraction * share / (1 - np.minimum(share, 0.5)))
 
 
@@ -313,7 +357,7 @@ def _of_peak(fraction: Measure, peak: Measure) -> Measure:
 
 
 def cells_halved(fine, coarse) -> bool:
-    """Whether every cell of the coarse Pair was split in two."""
+    """Return whether every cell of the coarse Pair was split in two."""
     bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
     grids = [(a.base_grid, b.base_grid) for a, b in bodies]
     return all(
@@ -323,13 +367,20 @@ def cells_halved(fine, coarse) -> bool:
 
 
 class Hidden(NamedTuple):
-    """What a pressed patch is told by that three meshes may agree to hide, or (q,) of many.
+    """Properties of a patch, or (q,) of many, that determine the errors which its meshes share.
 
-    length [m]; count: nodes in contact; cell, cells [m]: the longest of those in which the contact ends, and all of
-    them together; offset: cells by which an edge may lie off; turns: the rotation is free; spread: range of the gap and
-    largest elastic closing [m]; corner, wedge, missed: pressures [Pa] at loaded corners of a coating, beside a contact
-    of few nodes, of a rounding that is passed over; open_ends [m] of rounded faces; skin: it is smooth; between [m]: of
-    cells, those between two stretches.
+    - length: length of the interface [m].
+    - count: nodes in contact.
+    - cell, cells: longest cell in which the contact ends, and the sum of all of them [m].
+    - offset: error of the position of an edge, in cells.
+    - turns: whether the rotation is free.
+    - spread: range of the gap plus largest elastic closing [m].
+    - corner: pressure [Pa] that is missed at loaded corners of a coating.
+    - wedge: pressure [Pa] next to a contact of few nodes.
+    - missed: pressure [Pa] of a rounding that is not resolved.
+    - open_ends: length of rounded face in which the contact may end [m].
+    - skin: whether the skin is smooth.
+    - between: sum of the cells between two parts of the contact [m].
     """
 
     length: float
@@ -348,7 +399,7 @@ class Hidden(NamedTuple):
 
 
 def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
-    """Return what meshes hide of q patches on one Pair.
+    """Return what the meshes hide of q patches on one Pair.
 
     Parameters
     ----------
@@ -385,7 +436,10 @@ def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
 
 
 def _hidden(patch: Patch, missed_peak: float) -> Hidden:
-    """Return what meshes hide of a Patch under load; missed_peak [Pa]: `unresolved_rounding`."""
+    """Return what the meshes hide of a Patch under load.
+
+    missed_peak: pressure [Pa] of `unresolved_rounding`.
+    """
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     out = hidden_by_meshes(
         patch.pair,
@@ -408,10 +462,17 @@ def _hidden(patch: Patch, missed_peak: float) -> Hidden:
 
 
 def least_of(hidden: Hidden, mine: dict) -> dict:
-    """Errors that three meshes may agree to hide, by name; mine: values on the finest of them.
+    """Return the errors by name that three meshes may share.
 
-    They are a contact of few nodes, the layer at a loaded corner of a coating thinner than the cells there, a rounding
-    smaller than the cells, and round-off.
+    The changes from mesh to mesh do not show them. They are due to a contact of few nodes, the
+    layer at a loaded corner of a coating thinner than the cells there, a rounding smaller than the
+    cells, and round-off.
+
+    Parameters
+    ----------
+    hidden : Hidden
+    mine : dict
+        Values by name on the finest mesh.
     """
     length, load, count, total = (
         hidden.length,
@@ -419,7 +480,8 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
         hidden.count,
         mine["pressure_peak"],
     )
-    cell = np.maximum(hidden.cell, hidden.cells / 2)  # the average where the ends are many
+    # half the sum exceeds the longest cell only if the contact has many ends
+    cell = np.maximum(hidden.cell, hidden.cells / 2)
     few = count <= UNRESOLVED_NODES
     aside = np.where(few, cell / (2 * count**2), 1e-3 * cell)
     peak = hidden.corner + np.where((cell > 0) & (count <= FEW_NODES), total / (4 * count**2), 0.0)
@@ -431,7 +493,7 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
     fullness = np.divide(
         mine["loaded_fraction"], total, out=np.zeros(np.shape(total)), where=total != 0
     )
-    # an edge of a contact of few nodes lies anywhere in its cell
+    # an edge of a contact of few nodes may lie anywhere in its cell
     near = np.maximum(hidden.offset, np.where(few, 1.0, 1 / count**2)) * (not hidden.skin)
     off, outer = (
         near * cells + hidden.open_ends for cells in (hidden.cells, hidden.cells - hidden.between)
@@ -450,9 +512,10 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
 
 
 def offset(pair, cell):
-    """Cells by which an edge may lie off its place between two nodes of a Pair; cell [m]: the longest there.
+    """Return the error of the position of an edge between two nodes of a Pair, in cells.
 
-    A soft coating thinner than the cells is a bed of springs, whose edge lies where the pressure of a node vanishes.
+    A soft coating thinner than the cells acts as a bed of springs, whose edge is where the pressure
+    of a node vanishes. cell: longest cell in which the contact ends [m].
     """
     out = OFFSET
     for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
@@ -471,8 +534,16 @@ def offset(pair, cell):
 def corner_layer(pair, sigma, cells):
     """Return pressures (...) [Pa] that the free end of a coating may add at a loaded corner.
 
-    They are not resolved by cells longer than the coating is thick, and fall with the square of the cells. sigma
-    (..., 2) [Pa], cells (2,) [m]: at both ends.
+    They are not resolved by cells longer than the thickness of the coating, and fall with the
+    square of the cells.
+
+    Parameters
+    ----------
+    pair : Pair
+    sigma : (..., 2)
+        Pressures at both ends [Pa].
+    cells : (2,)
+        Cells at both ends [m].
     """
     thick = [
         grid.coating_thickness
@@ -485,7 +556,10 @@ def corner_layer(pair, sigma, cells):
 
 
 def _wedge(patch: Patch) -> float:
-    """Pressure [Pa] that the gap just beside a contact of few nodes allows at most: E* times its slope there."""
+    """Return the largest pressure [Pa] that the gap next to a contact of few nodes allows.
+
+    It is E* times the slope of the gap there.
+    """
     x, active = patch.x, patch.active
     ends = np.flatnonzero(active[1:] != active[:-1])
     slope = (np.abs(np.diff(patch.gap)) / np.diff(x))[..., ends].max()

@@ -1,8 +1,9 @@
-"""SharedMeshes that all cases of a sweep share: fine wherever the pressure of one of them ends.
+"""Meshes that all cases of a sweep share: fine wherever the pressure of one of them ends.
 
-A mesh of a case is graded to its own contact. That of a family has at every place the cells of the case that wants the
-shortest there, and its ladder of nested meshes is climbed until the hardest case meets the tolerance. Pieces that pin
-their elements, or come from a file, have the same meshes in every case anyway.
+In: the `PatchModel`s of the cases. Out: `SharedMeshes`. The mesh of a single case is graded to
+its own contact. The shared mesh has at each position the cells of the case that needs the
+shortest ones there, and is refined until the hardest case meets the tolerance. Pieces with
+prescribed elements, or from a file, have the same meshes in every case anyway.
 """
 
 from dataclasses import replace
@@ -21,21 +22,26 @@ from .measures import measures, missed
 from .press import pressed
 from .static import missed_on, patches_on
 
-MAX_CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart are taken
-CLIMBED_CASES = 5  # so many of them climb their own ladders where a patch slips part by part
-# each search for the contacts has columns that are graded to what the one before found
+MAX_CASES = 48  # most cases that choose the mesh; of more, those that lie farthest apart are taken
+CLIMBED_CASES = 5  # cases that are solved on their own ladders if a patch slips in part
+# most searches; each one has columns that are graded to the contacts of the previous one
 MAX_SEARCHES = 4
-MAX_NODES = 400  # nodes of the finest interface; a finer mesh would slow every case down
-MAX_ORDER = 3.0  # order by which errors of static measures fall at most: meshes too coarse by it are not tried
-# The cells of the coarsest mesh are so many times those that a case asks for. The longest are tried first, because
-# their meshes take least time; those that are too long by what the last try says are passed over.
+MAX_NODES = 400  # most nodes of the finest interface; a finer mesh would slow down every case
+# highest order at which errors of static measures fall; meshes that are too coarse by it are not
+# tried
+MAX_ORDER = 3.0
+# Cells of the coarsest mesh over those that a case needs. The longest are tried first, because
+# their meshes cost least; factors that are too large according to the last trial are skipped.
 CELL_FACTORS = (4.0, 2.8, 2.0, 1.5, 1.0)
-MAX_CELL_RATIO = 2.0  # ratio of the cells of neighbouring cases up to which one band holds what lies between them
+# ratio of the cells of neighbouring cases up to which a single band lies between them
+MAX_CELL_RATIO = 2.0
 
 
 def geometry_of(asked) -> tuple:
-    """What the meshes and the pieces of a `PatchModel` depend on beside its load and shapes; equal for patches that may
-    share them."""
+    """Return the key of all that the meshes and pieces of a `PatchModel` depend on.
+
+    It does not contain load and shapes, and is equal for patches that may share meshes.
+    """
     mesh = asked.mesh
     gap = asked.gap
     file = mesh.file
@@ -55,10 +61,20 @@ def geometry_of(asked) -> tuple:
 
 
 def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes | None:
-    """Meshes for `PatchModel`s of one geometry, whatever their order; None where no case can be pressed.
+    """Return the meshes for `PatchModel`s of one geometry, independent of their order.
 
-    tolerance: relative error of the static measures that all of them are to meet; all_: there are no other cases that
-    the meshes have to serve.
+    Parameters
+    ----------
+    patches : sequence of PatchModel
+    tolerance : float
+        Relative error of the static measures that all of them have to meet.
+    all_ : bool
+        Whether there are no further cases that the meshes have to serve.
+
+    Returns
+    -------
+    SharedMeshes or None
+        None if no case can be solved.
     """
     asked = patches[0]
     if not asked.mesh.is_automatic:
@@ -72,11 +88,13 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
     ]
     slips = any(one.interface.partial_slip for one in patches)
     halvings = _halvings(cases, tolerance) if slips else {}
-    common = min(halvings.values(), default=0)  # what all of them halve are levels of the ladder
+    # the halvings that all cases share are levels of the ladder
+    common = min(halvings.values(), default=0)
     layout = _layout(
         [*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()}
     )
-    # a contact that moves on the way, or slips part by part, has measures that its first state tells nothing of
+    # the first state of a contact that moves later, or slips in part, says nothing about its
+    # measures
     shares, own = CELL_FACTORS[-1:] if asked.mesh.edge_motion or slips else CELL_FACTORS, None
     if layout is None:
         return None
@@ -85,7 +103,7 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
         bodies = grids.grids_of(asked, layout.scale_cells(share))
         if shares:
             own = own or grids.grids_of(asked, layout)
-            if bodies[0].x.size >= own[0].x.size:  # both have the most columns
+            if bodies[0].x.size >= own[0].x.size:  # both already have the largest number of columns
                 continue
         pairs, missed_by = _climbed(
             cases, bodies, tolerance, bool(shares), grids.MIN_LEVELS + common
@@ -96,13 +114,13 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
             )
             keep_pairs(cases[0], found, pairs)
             return found
-        # times the cells, above which no mesh meets it
+        # factor of the cells above which no mesh meets the tolerance
         enough = share * missed_by ** (-1 / MAX_ORDER)
         shares = tuple(one for one in shares if one <= max(enough, CELL_FACTORS[-1]))
 
 
 def with_digest(levels) -> SharedMeshes:
-    """Meshes with the hash of their content."""
+    """Return the SharedMeshes of some levels, named by the hash of their content."""
     digest = sha256()
     for body in (body for level in levels for body in level):
         arrays = (
@@ -126,8 +144,16 @@ def with_digest(levels) -> SharedMeshes:
 
 
 def farthest_apart(patches, most: int = MAX_CASES) -> tuple:
-    """(the patches that lie farthest apart in what presses and shapes them, `most` at most, whatever their order;
-    whether these are all)."""
+    """Return the patches that differ most in loads and shapes, and whether these are all.
+
+    Farthest-point selection; the result does not depend on their order.
+
+    Parameters
+    ----------
+    patches : sequence of PatchModel
+    most : int
+        Largest number of patches.
+    """
     rows = {_numbers(one): one for one in patches}
     keys = sorted(rows)
     if len(keys) <= most:
@@ -145,7 +171,7 @@ def farthest_apart(patches, most: int = MAX_CASES) -> tuple:
 
 
 def _numbers(asked) -> tuple:
-    """What tells the contacts of two patches of one geometry apart, as numbers."""
+    """Return the numbers by which the contacts of two patches of one geometry differ."""
     shapes = [
         float(value)
         for _, part in asked.gap.shapes
@@ -171,9 +197,9 @@ def _numbers(asked) -> tuple:
 
 
 def _halvings(cases: list, tolerance: float) -> dict:
-    """Return how often the run of a case by itself halves its cells beyond the fewest levels, by `_numbers`.
+    """Return how often a single run halves the cells of a case beyond the fewest levels.
 
-    CLIMBED_CASES cases are tried.
+    The keys are `_numbers`. CLIMBED_CASES cases are tried.
     """
     out = {}
     for one in farthest_apart(cases, CLIMBED_CASES)[0]:
@@ -181,16 +207,24 @@ def _halvings(cases: list, tolerance: float) -> dict:
             out[_numbers(one)] = (
                 len(ladder.climb(one, one.mesh.tolerance or tolerance)) - grids.MIN_LEVELS
             )
-        except PatchfemError:  # its own run says why
+        except PatchfemError:  # the single run of this case reports the error
             continue
     return out
 
 
 def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
-    """The layout of the coarsest grids, that no case wants finer; None where no case can be pressed.
+    """Return the layout of the coarsest grids for all cases; None if no case can be solved.
 
-    between: there are more cases than these, and their contacts end between those of neighbouring ones; halvings: as
-    `_halvings`, beyond those of all of them; the cells of these cases are so much shorter from the first level on.
+    solved.
+
+    Parameters
+    ----------
+    cases : list of PatchModel
+    between : bool
+        Whether there are more cases, whose contacts end between those of neighbouring ones.
+    halvings : dict
+        `_halvings` beyond those of all cases; the cells of a case are shorter by these from the
+        first level.
     """
     first, along = cases[0], grids.EDGE_CELLS[cases[0].mesh.is_static]
     layout = None
@@ -219,8 +253,10 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
 
 
 def _loaded(asked, pair, patch):
-    """The contact of a case, pressed with others as `patch` or by itself; None of one that cannot be pressed: its own
-    run says why."""
+    """Return the contact of a case, from `patch` or solved by itself; None if that fails.
+
+    The single run of the case then reports the error.
+    """
     try:
         return grids.contact_extent(patch or pressed(asked, pair), asked.mesh.slip)
     except PatchfemError:
@@ -228,7 +264,7 @@ def _loaded(asked, pair, patch):
 
 
 def _merged(layouts: list, between: bool) -> Layout:
-    """The layout whose cells are nowhere longer than those of any of `layouts`."""
+    """Return the layout whose cells are nowhere longer than those of any of `layouts`."""
     bands = {band for one in layouts for band in (*one.bands, (*one.span, one.max_loaded_length))}
     if between:
         bands |= set(_filled(layouts))
@@ -243,7 +279,7 @@ def _merged(layouts: list, between: bool) -> Layout:
     )
     low, high, _ = np.array(bands).T
     places = np.linspace(low, high, 5, axis=1)
-    # of the bands that are kept: those that others make needless are many
+    # only the bands that shorten some cell are kept, because most are redundant
     size, kept = (
         out.size(places),
         [],
@@ -256,7 +292,7 @@ def _merged(layouts: list, between: bool) -> Layout:
 
 
 def _filled(layouts: list) -> list:
-    """Bands from each edge of a contact to that of the next case, with cells between those of both."""
+    """Return bands from each edge of a contact to that of the next case, with cells in between."""
     out, half = [], max(one.stop for one in layouts)
     for side in (-1, 1):
         ends = sorted(
@@ -280,9 +316,25 @@ def _filled(layouts: list) -> list:
 
 
 def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> tuple:
-    """The pieces on nested meshes from the coarsest `bodies`, fine to coarse, up to one on which every case meets the
-    tolerance, or the dearest that is worth it; and the largest error over the tolerance where a case misses it: of
-    those that press together, where all these meet it of the first other one. once: no more than the `least` levels."""
+    """Refine nested meshes until every case meets the tolerance or they are too expensive.
+
+    Parameters
+    ----------
+    cases : list of PatchModel
+    bodies : list
+        Coarsest meshes.
+    tolerance : float
+    once : bool
+        Whether to take no more than `least` levels.
+    least : int
+        Smallest number of levels.
+
+    Returns
+    -------
+    tuple
+        Pairs, fine to coarse, and the largest error over the tolerance: that of the cases that are
+        solved together; if all of them meet it, that of the first other one that does not.
+    """
     pairs, tolerance = [], cases[0].mesh.tolerance or tolerance
     while True:
         pairs.insert(0, condensed(cases[0], *bodies))
@@ -308,7 +360,7 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> t
 
 
 def _missed(asked, pairs: list, tolerance: float) -> float:
-    """Largest error of a case on these pieces over the tolerance; 0 where it cannot be pressed at all."""
+    """Return the largest error of a case over the tolerance; 0 if it cannot be solved at all."""
     try:
         return missed(measures(*ladder.on_pairs(asked, pairs), tolerance=tolerance), tolerance)
     except PatchfemError:

@@ -1,4 +1,8 @@
-"""Sizes, stiffness and groups of a patch, before it is pressed."""
+"""Predicted sizes, cost, stiffness and dimensionless groups of a patch, before it is solved.
+
+In: a `PatchModel` or a Model. Out: `Sizes`, `Cost`, the stiffness chain, and sentences for the
+plan.
+"""
 
 from dataclasses import replace
 from math import sqrt
@@ -22,21 +26,28 @@ from .grids import (
 )
 from .ladder import meshes_beside
 
-PACKAGES = 2e7  # bytes of the packages that pieces import
-CONDENSED = 0.8  # bytes that are taken over those that condensing is predicted to take
+PACKAGES = 2e7  # bytes of the packages that elastic pieces import
+CONDENSED = 0.8  # measured bytes over the predicted bytes of condensing
 OUTLINED_NODE = 4.6e3  # bytes per node of pieces with cells beyond the interface
 FRAMES_NODE = 3.5e3  # bytes per node of the frames of a motion
 STRIP_NODE = 3000.0  # bytes per strip and node of the interface
-TIGHT_TOL = 2e-3  # tolerance below which a contact that ends inside, or over a jump, is expected to take a level more
-FULL = 0.7  # of the tilt at which bars open: elastic pieces, seen at height/length 0.08 to 4, open from 0.77 on
+# tolerance below which a contact with an end inside the interface, or over a jump, needs another
+# level
+TIGHT_TOL = 2e-3
+# fraction of the tilt at which bars open: elastic pieces with height/length 0.08 to 4 open from
+# 0.77
+FULL = 0.7
 
 
 class Sizes(NamedTuple):
-    """Grids of a patch as a plan counts them.
+    """Grids of a patch, as a plan counts them.
 
-    points: nodes of the interface; finest: (columns, rows) of nodes of the finest grid of each piece, one where they
-    are alike; levels: nested grids that are solved; seconds, bytes: of condensing all of them, predicted; outlined:
-    they reach beyond the interface.
+    - points: nodes of the interface.
+    - finest: (columns, rows) of nodes of the finest grid of each piece, a single entry if they are
+      alike.
+    - levels: number of nested grids.
+    - seconds, bytes: predicted cost of condensing all of them.
+    - outlined: whether the pieces extend beyond the interface.
     """
 
     points: int
@@ -53,9 +64,9 @@ class Sizes(NamedTuple):
 
 
 def expected_grids(asked, tolerance: float) -> Sizes:
-    """Return the grids that a `PatchModel` is expected to be solved on at a tolerance.
+    """Return the grids on which a `PatchModel` is expected to be solved at a tolerance.
 
-    The coarsest grid is that of the run. A mesh file counts as one as fine as the automatic grid: it is not read.
+    The coarsest grid is that of the run. A mesh file is not read and counts as an automatic grid.
     """
     levels = _expected_levels(asked, tolerance)
     bodies = [body for body in levels[0] if body is not None]
@@ -71,7 +82,7 @@ def expected_grids(asked, tolerance: float) -> Sizes:
 
 
 def _expected_levels(asked, tolerance: float) -> list:
-    """Return the bodies of each level that a run is expected to take, fine to coarse."""
+    """Return the bodies of each expected level, fine to coarse."""
     if asked.mesh.shared is not None:
         return list(asked.mesh.shared.levels)
     if not asked.mesh.is_automatic:
@@ -89,7 +100,10 @@ def _expected_levels(asked, tolerance: float) -> list:
 
 
 def cost(model: Model) -> Cost:
-    """Return the cost of pressing the patch of a model, and those of its interfaces; equal ones are pressed once."""
+    """Return the cost of pressing the patches of a model and of its interfaces.
+
+    Equal patches of interfaces are pressed once.
+    """
     tolerance = model.accuracy.tolerance
     total = (
         Cost()
@@ -126,8 +140,8 @@ def cost(model: Model) -> Cost:
 def pressing_cost(asked, tolerance: float) -> Cost:
     """Return the cost of pressing one `PatchModel`, and of its fields.
 
-    The work of condensing its grids is known from their sizes; what a unit of it takes, with the fields and the files
-    of the finest grid, was measured over random patches.
+    The work of condensing follows from the sizes of its grids; the time per unit of work, and that
+    of the fields and files of the finest grid, was measured over random patches.
     """
     found = expected_grids(asked, tolerance)
     per_second = (
@@ -147,7 +161,10 @@ def pressing_cost(asked, tolerance: float) -> Cost:
 
 
 def chain(asked) -> dict:
-    """Links of the stiffness chain of a `PatchModel` by name [N/m], "rigid" where the scene names none."""
+    """Return the stiffness [N/m] of the links in series of a `PatchModel`, by name.
+
+    A link that the scene does not give is "rigid".
+    """
     out = {
         "holder": asked.loading.tangential_stiffness or "rigid",
         "pieces_shear": asked.pieces.shear_stiffness if asked.interface.has_shear else "rigid",
@@ -164,9 +181,10 @@ def chain(asked) -> dict:
 
 
 def groups(model: Model) -> dict:
-    """Dimensionless groups of a patch by name, and its slip length [m] where something rubs.
+    """Return dimensionless groups of a patch by name, and with friction its slip length [m].
 
-    tilt_over_first_opening: tilt over the one at which the edge of flat pieces lifts off, the pieces taken as bars.
+    tilt_over_first_opening is the tilt over the tilt at which the edge of flat pieces opens, with
+    the pieces as bars.
     """
     out, asked = {}, model.patch
     load = asked.nominal_load
@@ -179,7 +197,10 @@ def groups(model: Model) -> dict:
 
 
 def face_words(name: str, one) -> list:
-    """Sentences of a plan on the patch of an InterfaceLaw between the places that `name` says."""
+    """Return sentences for a plan on the patch of an InterfaceLaw.
+
+    name: nodes of the interface.
+    """
     shears = format_length(one.numbers.static * one.load / one.patch.pieces.shear_stiffness, 3)
     found = (
         f"the pieces shear elastically by {shears} or more before the whole patch slips"
@@ -193,7 +214,7 @@ def face_words(name: str, one) -> list:
 
 
 def assembled(asked) -> str:
-    """The sentence on what assembles the stiffness of the pieces of a `PatchModel`."""
+    """Return the sentence on how the stiffness of the pieces of a `PatchModel` is assembled."""
     if asked.mesh.file is not None:
         return (
             "scikit-fem assembles the stiffness of a piece in contact.mesh cell by cell, or, if the mesh of the "
@@ -207,10 +228,9 @@ def assembled(asked) -> str:
 
 
 def verdict(found: dict, asked) -> list:
-    """Sentences on what the tilt group says of a `PatchModel`, full contact or about which part of it, and on what
-    assembles its pieces.
+    """Return sentences on the tilt, the skin and the assembly of a `PatchModel`.
 
-    Only flat pieces: what else opens the gap decides where others touch.
+    The tilt group determines the extent of the contact of flat pieces only.
     """
     rough = (
         []
@@ -224,6 +244,7 @@ def verdict(found: dict, asked) -> list:
 
 
 def _of_tilt(found: dict, asked) -> list:
+    """Return the sentence on the tilt, as a list."""
     tilt, gap = found.get("tilt_over_first_opening"), asked.gap
     if tilt is None:
         return []

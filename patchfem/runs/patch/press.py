@@ -1,4 +1,8 @@
-"""The static patch of a scene: the pieces condensed to their interface, the gap between them, and what presses them."""
+"""Solution of the static contact of a patch: condensed pieces, gap, and load or approach.
+
+In: a `PatchModel` and its condensed pieces (`Pair`). Out: a `Patch` with pressure, gap and
+compliance.
+"""
 
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -16,14 +20,18 @@ from . import strips as strip_press
 from .approach import closed_by
 from .condensed import Pair, condensed
 
-RIPPLE = 1e-2  # ripples over the pressure on pieces whose nodes do not match, above which a note states them
+# ripples over the peak pressure on pieces whose nodes do not match, above which a note states them
+RIPPLE = 1e-2
 
 
 class Surface(NamedTuple):
-    """Pressed interface on the points on which it was solved.
+    """Pressure and gap of an interface on the points of its solution.
 
-    x: (n,) places [m]; weight: (n,) areas [m2]; sigma_n: (n,) normal stress [Pa]; gap: (n,) gap [m] that remains under
-    load; unloaded_gap: (n,) gap [m] without load, or (s, n) of strips.
+    - x (n,): positions [m].
+    - weight (n,): areas [m2].
+    - sigma_n (n,): normal stress [Pa].
+    - gap (n,): gap under load [m].
+    - unloaded_gap: gap without load (n,), or (s, n) of strips [m].
     """
 
     x: np.ndarray
@@ -35,20 +43,31 @@ class Surface(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
 class Patch:
-    """A solved patch; forces, areas and stiffnesses are of all pairs together.
+    """Solved patch; forces, areas and stiffnesses are those of all pairs together.
 
-    pieces: compliance of the pieces and of their skin, linearised at the operating point where the skin is smooth;
-    giving: (m, m) [m/N] the tangential compliance that lets the patch slip in part: of the skin, of the pieces with
-    [contact.shear], and of the holder's spring, which is the same on every entry; gap: (m,) [m] of the unloaded
-    surfaces; skin: StripsState, of one strip, of a smooth skin, else None; strips: StripsState of a patch in strips,
-    whose means over the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None where it
-    is rigid in shear; skinned: a skin of asperities lies between the pieces; jumps: places [m] where the gap steps;
-    sharp: an end of the interface is a corner that meets a face which goes on; notes: sentences for the warnings;
-    sharper: static measures by name as (value, error) that points of a trace gave in addition, {}
-    without any; averaging [m]: the length that a profile is averaged over where it bears, None without one; either: a
-    step of the gap ends at a node, half of which lies below it and half above: (weight, Patch) with the whole node
-    below, and the same with it above; () without such a node. fine: the Surface on the points of a trace, None where
-    the mesh is the finest solution; stretches: (k, 2) [m] parts in contact on these points.
+    - pair: condensed pieces.
+    - pieces: compliance of pieces and skin; a smooth skin is linearised at the operating point.
+    - giving (m, m): tangential compliance [m/N] by which the patch slips in part: that of the skin,
+      of the pieces with [contact.shear], and of the spring of the holder, which is equal in all
+      entries.
+    - gap (m,): gap of the unloaded surfaces [m].
+    - pressure: ContactState.
+    - skin: StripsState with a single strip of a smooth skin, else None.
+    - strips: StripsState of a patch in strips, whose means over the width are in `pressure`; else
+      None.
+    - tangential_ratio: k_t/k_n of the skin; None if it is rigid in shear.
+    - skinned: whether a skin of asperities lies between the pieces.
+    - jumps: positions [m] at which the gap has a step.
+    - sharp: whether an end of the interface is a corner on a face that continues.
+    - notes: sentences for the warnings.
+    - seconds: CPU seconds by name.
+    - sharper: static measures by name as (value, error) from the points of a profile; {} without
+      them.
+    - averaging: length [m] over which a profile in contact is averaged; None without a profile.
+    - either: if a step of the gap is at a node, which belongs half to each side: (weight, Patch)
+      with the whole node on the higher side, and the same on the lower side; else ().
+    - fine: Surface on the points of a profile; None if the mesh is the finest solution.
+    - stretches (k, 2): parts in contact on these points [m].
     """
 
     pair: Pair
@@ -72,19 +91,19 @@ class Patch:
 
     @property
     def on_mesh(self) -> Surface:
-        """Interface on the nodes of the mesh."""
+        """Surface on the nodes of the mesh."""
         return Surface(
             self.x, self.pieces.interface.weight, self.pressure.sigma_n, self.pressure.gap, self.gap
         )
 
     @property
     def x(self) -> np.ndarray:
-        """Places of the interface nodes (m,) [m]."""
+        """Positions of the interface nodes (m,) [m]."""
         return self.pieces.interface.x
 
     @property
     def skin_share(self) -> np.ndarray | None:
-        """Share (m,) [1] of the asperities in the compliance of each node, None of bare pieces."""
+        """Fraction (m,) [1] of the asperities in the compliance of each node; None for bare pieces."""
         if not self.skinned:
             return None
         bare = np.diag(self.pair.compliance.normal)
@@ -95,24 +114,45 @@ class Patch:
 
     @property
     def active(self) -> np.ndarray:
-        """Contact set (m,) bool: the nodes that carry."""
+        """Contact set (m,) of bool: the nodes that carry pressure."""
         return self.pressure.sigma_n > 0
 
 
 def solve(asked, grid, upper_grid=None, fresh: bool = False) -> Patch:
-    """Assemble, condense and press the pieces of a `PatchModel`.
+    """Assemble and condense the pieces of a `PatchModel`, and solve the contact.
 
-    grid, upper_grid: meshes from `piece_meshes`, the upper None where it is alike; fresh: operators kept on disk are not
-    used. Refusals as in `pressed` and of the contact.
+    Parameters
+    ----------
+    asked : PatchModel
+    grid, upper_grid : TensorGrid or PieceMesh
+        Meshes from `piece_meshes`; the upper one is None if the pieces are alike.
+    fresh : bool
+        Whether to ignore operators kept on disk.
+
+    Raises
+    ------
+    PatchfemError
+        As in `pressed`, and by the contact solver.
     """
     return pressed(asked, condensed(asked, grid, upper_grid, fresh))
 
 
 def pressed(asked, pair: Pair, worn=None) -> Patch:
-    """The pair under the shapes, the load and the holder of a `PatchModel`; the pair serves any number of them.
+    """Solve the contact of a pair with the shapes, the load and the holder of a `PatchModel`.
 
-    worn (m,) [m], of strips (s, m): depth that wear has added to the gap. PatchfemError where a profile does not fit
-    the mesh.
+    A pair serves any number of models.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    pair : Pair
+    worn : (m,) or (s, m), optional
+        Depth [m] that wear has added to the gap, of strips (s, m).
+
+    Raises
+    ------
+    PatchfemError
+        If a profile does not fit the mesh.
     """
     x = pair.compliance.interface.x
     gap, notes, seconds = asked.gap.at(x)
@@ -126,7 +166,8 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
         out = replace(out, notes=(*notes, f"contact.mesh: {pair.joint.reason}"))
     if not rim.any():
         return out
-    # a set ends half a cell less `behind` beyond its last node: the two ends lie about the step by these shares
+    # A contact set ends less than half a cell beyond its last node. The two sets, with and without
+    # the node at the step, are weighted such that the mean end is the step.
     node = int(np.argmax(rim))
     bare = 1.0 if out.skin_share is None else 1 - float(out.skin_share[node])
     lean = bare * edges.edge_offset_fraction(
@@ -143,10 +184,11 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
 
 
 def _shifts_at_step(node: int, gap, rim, worn) -> tuple:
-    """Return what is added to the gap (m,) [m] where the node at a step bears, and where it does not.
+    """Return the changes of the gap (m,) [m] for a step's node on its higher and lower side.
 
-    The worn depth of the node belongs to a gap in the middle of the step. A node that bears has worn as its neighbour
-    on the higher side of the step, a node that does not bear as its neighbour on the lower side.
+    The worn depth of the node belongs to a gap at half the height of the step. If the node carries
+    pressure, it has worn like its neighbour on the higher side of the step, else like the one on
+    the lower side.
     """
     if worn is None:
         return -rim, rim
@@ -162,8 +204,11 @@ def _shifts_at_step(node: int, gap, rim, worn) -> tuple:
 
 
 def zigzags(x, sigma) -> float:
-    """Largest zigzag of pressures sigma (m,) [Pa] at x (m,) [m] over their peak: of three loaded nodes in turn above,
-    below and above the line through their neighbours, or the other way round, half of the least distance."""
+    """Return the largest zigzag of pressures sigma (m,) [Pa] at x (m,) [m] over their peak.
+
+    Three loaded nodes in sequence lie above, below and above the lines through their neighbours, or
+    the other way round; the zigzag is half the smallest distance from these lines.
+    """
     share = np.diff(x)[:-1] / (x[2:] - x[:-2])
     off = sigma[1:-1] - (1 - share) * sigma[:-2] - share * sigma[2:]
     three = np.stack([off[:-2], -off[1:-1], off[2:]])
@@ -175,14 +220,27 @@ def zigzags(x, sigma) -> float:
 
 
 def _on(asked, pair: Pair, gap, notes: tuple, seconds: dict) -> Patch:
-    """The pair pressed on the gap (m,) [m]; notes and seconds of what made it."""
+    """Solve the contact of a pair on the gap (m,) [m]."""
     begin = perf_counter()
     how = _how(asked)(asked, pair.compliance, gap)
     return as_patch(asked, pair, gap, notes, seconds | {"press": perf_counter() - begin}, how)
 
 
 def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) -> Patch:
-    """The Patch of a pair pressed on the gap (m,) [m]; how: (Compliance with its skin, Pressure, skin, strips)."""
+    """Return the Patch of a solved pair.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    pair : Pair
+    gap : (m,)
+        Unloaded gap [m].
+    notes : tuple
+    seconds : dict
+        CPU seconds by name.
+    how : tuple
+        Compliance with its skin, ContactState, skin, strips.
+    """
     pieces, pressure, skin, strips = how
     giving = pieces.tangential
     if not asked.interface.has_shear:
@@ -209,7 +267,7 @@ def as_patch(asked, pair: Pair, gap, notes: tuple, seconds: dict, how: tuple) ->
 
 
 def areas(asked, interface) -> np.ndarray:
-    """Nodal areas (m,) [m2] of a `PatchModel` on an interface, of strips (s, m) those of each."""
+    """Return the nodal areas (m,) [m2] of a `PatchModel` on an interface; (s, m) for strips."""
     if asked.interface.strips is None:
         return interface.weight
     count = asked.interface.strips.count
@@ -217,11 +275,16 @@ def areas(asked, interface) -> np.ndarray:
 
 
 def presser(asked, pair: Pair):
-    """A function of (worn (m,) [m], softening (m,) [m/N]) -> contact forces (m,) [N] of a `PatchModel`; of strips all
-    three are (s, m).
+    """Return a function that computes the contact forces of a worn `PatchModel`.
 
-    worn adds to the gap, softening to the diagonal of the compliance; what they share is made once. PatchfemError where
-    a profile does not fit the mesh.
+    It maps worn depth (m,) [m], which is added to the gap, and softening (m,) [m/N], which is added
+    to the diagonal of the compliance, to forces (m,) [N]; all are (s, m) for strips. Everything
+    that the calls have in common is computed once.
+
+    Raises
+    ------
+    PatchfemError
+        If a profile does not fit the mesh.
     """
     gap = asked.gap.at(pair.compliance.interface.x).heights
     gap, bare = gap + pair.rise, pair.compliance
@@ -230,6 +293,7 @@ def presser(asked, pair: Pair):
         return PressedStrips(asked, bare, gap)
 
     def press(worn, softening):
+        """Return the contact forces (m,) [N] for worn depth (m,) [m] and softening (m,) [m/N]."""
         soft = replace(bare, normal=bare.normal + np.diag(softening)) if softening.any() else bare
         return how(asked, soft, gap + worn)[1].sigma_n * bare.interface.weight
 
@@ -238,11 +302,15 @@ def presser(asked, pair: Pair):
 
 @dataclass(eq=False, slots=True)
 class PressedStrips:
-    """Pressing of worn strips, each one started from the contact set of the one before it.
+    """Solver of the contact of worn strips, each solution started from the previous contact set.
 
-    `begin` sets the contact set to start from, so that the same pressings give the same bits after an interruption.
+    `begin` sets the contact set of the start, so that a run after an interruption gives the same
+    bits.
 
-    gap: (m,) [m]; warm_start: contact set and factors of the last pressing.
+    - asked: PatchModel.
+    - bare: compliance of the pieces without skin.
+    - gap (m,): unloaded gap [m].
+    - warm_start: contact set and factors of the last solution.
     """
 
     asked: object
@@ -251,7 +319,7 @@ class PressedStrips:
     warm_start: WarmStart = field(default_factory=WarmStart)
 
     def begin(self, force) -> None:
-        """Begin the next pressing from the contact set of forces (s, m) [N]."""
+        """Start the next solution from the contact set of forces (s, m) [N]."""
         self.warm_start.contact_set = np.asarray(force) > 0
 
     def __call__(self, worn, softening) -> np.ndarray:
@@ -267,8 +335,11 @@ class PressedStrips:
 
 
 def _how(asked, under=None):
-    """Function (asked, pieces, gap) -> (Compliance with its skin, Pressure, skin, strips) that presses the pair; under:
-    that of a load, None for `_under`."""
+    """Return the function (asked, pieces, gap) that solves the contact of a `PatchModel`.
+
+    It returns (Compliance with its skin, ContactState, skin, strips). under: function for a given
+    load; None for `_under`.
+    """
     under = under or _under
     if asked.loading.approach is None or not (
         asked.loading.can_rotate or asked.loading.rotational_stiffness > 0
@@ -285,8 +356,11 @@ def _how(asked, under=None):
 
 
 def _under(asked, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
-    """The pair under its load, or under its approach with the rotation held: (Compliance with its skin, Pressure, skin,
-    strips); added, warm_start: of `StripCompliance`."""
+    """Solve the contact under a load, or under an approach with fixed rotation.
+
+    Returns (Compliance with its skin, ContactState, skin, strips). added, warm_start: parameters of
+    `StripCompliance`.
+    """
     strips = skin = None
     angle, moment, spring = (
         asked.gap.angle,
@@ -310,8 +384,10 @@ def _under(asked, pieces: Compliance, gap, added=None, warm_start=None) -> tuple
 
 
 def with_linear_skin(asperities, pieces: Compliance) -> Compliance:
-    """The pieces with the diagonal compliance of a linear skin in series; a skin without a tangential ratio is rigid in
-    shear."""
+    """Return the pieces with the diagonal compliance of a linear skin in series.
+
+    A skin without a tangential ratio is rigid in shear.
+    """
     crush = 1 / (asperities.normal_stiffness * pieces.interface.weight)
     ratio = asperities.tangential_ratio
     tangential = (

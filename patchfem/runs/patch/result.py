@@ -1,5 +1,9 @@
-"""What a pressed patch hands back by itself, the warnings that it deserves, and what its static model leaves out: plane
-state, lever arms, couplings, holds."""
+"""Result of a static patch, its warnings, and notes on what its model neglects.
+
+In: a model with a patch, and the pressed `Patch`es. Out: measures with their floors, the
+`Result` of a run without motion, warnings, and notes (plane state, lever arms, couplings,
+incomplete clamping).
+"""
 
 from dataclasses import replace
 
@@ -19,8 +23,8 @@ from .ladder import solve_all, static_ladder
 from .measures import strip_error
 from .values import beyond_gentle, values
 
-LOCKS = 0.499  # Poisson's ratio; up to it the bars of locking cells hold
-SMALL = 0.02  # strain that is taken as small: what is of its second order is left out
+LOCKS = 0.499  # Poisson's ratio up to which the errors of cells that lock are reliable
+SMALL = 0.02  # largest small strain; effects of its second order are neglected
 
 __all__ = [
     "bodies",
@@ -32,21 +36,24 @@ __all__ = [
     "static_ladder",
     "strained",
 ]
-COUPLED = 0.02  # closing by shear over the tangential compliance, from which a note states it
-BENT = 0.02  # load over that under which a tall piece buckles; as much is missing from its sideways motion
-# fraction of a far face that counts as all of it, because a mesh file has few digits
+COUPLED = 0.02  # closing by shear over the tangential compliance, above which a note states it
+# load over the buckling load of a tall piece; its sideways motion lacks about this fraction
+BENT = 0.02
+# fraction of a far face that counts as complete, because a mesh file has few digits
 WHOLE = 1 - 1e-6
 
 
 def probed(model) -> dict:
-    """Static measures of the patch of a model, solved alone and without errors."""
+    """Return the static measures of the patch of a model, without errors."""
     with locate_errors(model.source):
         return values(solve_all(model.patch, model.accuracy.tolerance, False)[0])
 
 
 def bodies(model) -> tuple:
-    """Meshes of the pieces of a model, (lower, upper or None where it is alike); a mesh that the tolerance chooses is
-    the one that a run takes."""
+    """Return the meshes of the pieces of a model, (lower, upper or None if they are alike).
+
+    If the tolerance chooses the mesh, it is the one of a run.
+    """
     with locate_errors(model.source):
         if not model.patch.mesh.is_automatic:
             return piece_meshes(model.patch)
@@ -55,24 +62,33 @@ def bodies(model) -> tuple:
 
 
 def measured(model, patch, coarse) -> dict:
-    """Static measures of the patch of a model; those that miss a tolerance that chose the mesh are extrapolated.
+    """Return the static measures of the patch of a model.
 
-    A measure that is a difference of larger terms has the tolerance times those as floor: of the approach the rotation
-    times half the length, of the centre of pressure half the length, of the moment the load times that.
+    If the tolerance chose the mesh, measures that miss it are extrapolated. The floor of a measure
+    that is a difference of larger terms is the tolerance times these: for the approach the rotation
+    times half the length, for the centre of pressure half the length, for the moment the load times
+    half the length.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    coarse : sequence of Patch or None
+        The patch on coarser meshes, fine to coarse.
     """
     asked = model.patch
     tolerance = (
         (asked.mesh.tolerance or model.accuracy.tolerance) if asked.mesh.is_automatic else None
     )
     found = floored(model, derived.static_measures(asked, patch, coarse, tolerance))
-    # `wear.measures` adds that of worn strips
+    # `wear.measures` adds the error by the number of strips for worn strips
     if patch.strips is None or coarse[0] is None or model.wear is not None:
         return found
     return strip_error(model.patch, coarse[0], found)
 
 
 def floored(model, found: dict) -> dict:
-    """Measures with the floors of `measured`."""
+    """Return measures with the floors described in `measured`."""
     least = floors(
         model.patch, model.accuracy.tolerance, {name: one.value for name, one in found.items()}
     )
@@ -80,7 +96,15 @@ def floored(model, found: dict) -> dict:
 
 
 def floors(asked, tolerance: float, values: dict) -> dict:
-    """Floor of each static measure by its name, of values that are numbers or (q,) of many."""
+    """Return the floor of each static measure by name, for values that are numbers or (q,).
+
+    Parameters
+    ----------
+    asked : PatchModel
+    tolerance : float
+    values : dict
+        Values by name.
+    """
     arm = asked.pieces.length / 2
     terms = {
         "approach": abs(values["rotation"]) * arm,
@@ -93,7 +117,10 @@ def floors(asked, tolerance: float, values: dict) -> dict:
 
 
 def static(what, patch, coarse, seconds, warnings, *_) -> Result:
-    """Run a plan whose patch does not move, or a patch without contact; arguments as `run.run` has them."""
+    """Return the Result of a plan whose patch does not move, or of a patch without contact.
+
+    The parameters are those of `run.run`.
+    """
     p, extra = (
         patch.pressure,
         {"residuals": dict(patch.pressure.residuals), "iterations": patch.pressure.iterations},
@@ -107,7 +134,7 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
 
 
 def strained(asked, patch) -> list:
-    """Warnings where the answer leaves small strains, or where cells of a given size lock, and those of the gap."""
+    """Return warnings on large strains, on cells of a given size that lock, and on the gap."""
     beyond = (
         [
             "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
@@ -125,7 +152,18 @@ def strained(asked, patch) -> list:
 
 
 def strained_by(asked, top: float, approach: float, beyond=()) -> list:
-    """The warnings of `strained` from the largest nodal pressure [Pa] and the approach [m]; beyond: one in between."""
+    """Return the warnings of `strained` on strains and locking.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    top : float
+        Largest nodal pressure [Pa].
+    approach : float
+        Approach [m].
+    beyond : sequence of str
+        Warnings that are inserted before the one on locking.
+    """
     out, stuff = [], _materials(asked)
     words = (
         "the peak pressure is {:.3g} of the lowest Young's modulus",
@@ -153,7 +191,7 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
 
 
 def beyond_small_strains(asked, top, approach):
-    """Whether `strained_by` has a warning for patches, of arrays as well."""
+    """Return whether `strained_by` may have a warning, for one patch or arrays of many."""
     return (
         np.maximum(*_strains(asked, top, approach)) > SMALL
         if asked.mesh.is_automatic
@@ -162,13 +200,14 @@ def beyond_small_strains(asked, top, approach):
 
 
 def _strains(asked, top, approach) -> tuple:
-    """(largest nodal pressure over the lowest Young's modulus, approach over the height of the pieces)."""
+    """Return peak pressure over lowest Young's modulus, and approach over height of the pieces."""
     return top / min(m.young for m in _materials(asked)), approach / (
         asked.pieces.lower.height + asked.pieces.upper.height
     )
 
 
 def _materials(asked) -> list:
+    """Return the materials of the pieces and their coatings."""
     return [
         material
         for piece in (asked.pieces.lower, asked.pieces.upper)
@@ -178,10 +217,14 @@ def _materials(asked) -> list:
 
 
 def left_out(model, patch, coarse) -> list:
-    """Notes on a pressed patch that hold whatever then moves it.
+    """Return notes on a pressed patch that hold for any motion.
 
-    coarse: the patches of the error estimate, None for those that were not wanted; without the first no plane band is
-    computed.
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    coarse : sequence of Patch or None
+        Patches of the error estimate; if the first one is None, the plane state is not discussed.
     """
     asked = model.patch
     by_forms = [
@@ -226,13 +269,13 @@ def left_out(model, patch, coarse) -> list:
     if model.kind == "patch":
         out += frictionless(asked, patch)
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
-        # a mesh of any cells has no coarser one: its second patch is finer than its first
+        # an unstructured mesh has no coarser one: its second patch is finer than its first
         out += derived.plane_notes(asked, patch if coarse[-1] is None else coarse[0])
     return out
 
 
 def _of_mesh(model, patch) -> str:
-    """What a run under a trace computes on the mesh and not on the points of the trace, as a clause."""
+    """Return the clause on results that are computed on the mesh, not on points of a profile."""
     peak = (
         f"whose largest pressure is {format_quantity(float(patch.pressure.sigma_n.max()), 'Pa', 3)}"
     )
@@ -246,10 +289,10 @@ def _of_mesh(model, patch) -> str:
 
 
 def frictionless(asked, patch) -> list:
-    """A note on pieces that are unlike: Dundurs' beta of their faces, and what perfect stick would change.
+    """Return a note, as a list, on unlike pieces: Dundurs' beta and the effect of perfect stick.
 
-    Unlike faces slide on each other as they are pressed. Stick holds shear stresses against that, which stiffen the
-    contact.
+    Faces of unlike pieces slide on each other under pressure. Stick prevents this by shear
+    stresses, which stiffen the contact.
     """
     pair, held = patch.pair, np.flatnonzero(patch.active)
     if not pair.closing.any() or not held.size:
@@ -267,7 +310,7 @@ def frictionless(asked, patch) -> list:
 
 
 def _dundurs(asked) -> float:
-    """Dundurs' beta of the two faces."""
+    """Return Dundurs' beta of the two faces."""
     shear, kappa = [], []
     for piece in (asked.pieces.lower, asked.pieces.upper):
         face = piece.coating.material if piece.coating else piece.substrate
@@ -282,10 +325,10 @@ def _dundurs(asked) -> float:
 
 
 def drawn_otherwise(pair) -> list:
-    """Notes for each piece whose far face the mesh file holds in part, or that has holes inside."""
+    """Return notes on pieces of a mesh file with holes or a partly clamped far face."""
     out = []
     for side, body in (("lower", pair.grid), ("upper", pair.upper_grid)):
-        if body.base_grid is not None:  # whole, and all of its last row is held
+        if body.base_grid is not None:  # a grid has no holes, and its whole last row is clamped
             continue
 
         count, area = recognise.find_holes(body)
@@ -304,12 +347,12 @@ def drawn_otherwise(pair) -> list:
 
 
 def slender(asked, mean: float) -> list:
-    """A note for each piece so tall that its bending moves the load sideways: the lever arm that grows with it is left
-    out.
+    """Return a note for each tall piece whose bending moves the load sideways, as a list.
 
-    The measure is the load over that under which the piece buckles, clamped at the holder and free at the patch (Euler,
-    pi^2 E' L^2/48 H^2 as a mean pressure); what the motion lacks is about that share. A piece no taller than long bends
-    too little. mean [Pa]: pressure over the whole interface.
+    The model neglects that the lever arm increases. The measure is the load over the buckling load
+    of the piece, clamped at the holder and free at the patch (Euler, pi^2 E' L^2/48 H^2 as a mean
+    pressure); the motion lacks about this fraction. A piece that is not taller than long bends too
+    little. mean: pressure over the whole interface [Pa].
     """
     out = []
     for side in ("lower", "upper"):

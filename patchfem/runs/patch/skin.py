@@ -1,4 +1,8 @@
-"""Smooth skins of asperities between the pieces of a patch: the law, the pressed state, its linearised compliance."""
+"""Smooth skins of asperities between the pieces of a patch: law, solution and linearisation.
+
+In: a `PatchModel` with a skin. Out: the skin law, the pressure through it, the compliance
+linearised at the operating point, and a note on the stiffness of peaks from a profile.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +19,7 @@ from ...surface.roughness import peaks
 
 
 def skin_law(asked):
-    """The smooth law of the asperities of a patch: ExponentialSkin or HertzSkin."""
+    """Return the smooth law of the asperities of a patch: ExponentialSkin or HertzSkin."""
     part = asked.interface.skin
     if part.law == "exponential":
         pressure = (
@@ -31,7 +35,10 @@ def skin_law(asked):
 
 
 def mean_stiffness(asked, pressure: float) -> float:
-    """Normal stiffness [Pa/m] of the skin under the even `pressure` [Pa]; 0 for a smooth skin without one."""
+    """Return the normal stiffness [Pa/m] of the skin under a uniform `pressure` [Pa].
+
+    It is 0 for a smooth skin without pressure.
+    """
     if asked.interface.skin.law == "linear":
         return asked.interface.skin.normal_stiffness
     law = skin_law(asked)
@@ -41,8 +48,10 @@ def mean_stiffness(asked, pressure: float) -> float:
 
 
 def ranged(asked, pressure: float) -> list:
-    """The sentence, as a list, on how far the stiffness of peaks made from a trace, or from its root mean squares, can
-    be trusted under a mean `pressure` [Pa]; none for any other skin."""
+    """Return a sentence, as a list, on how reliable the stiffness of peaks from a profile is.
+
+    Also for peaks from root mean squares; [] for any other skin. pressure: mean pressure [Pa].
+    """
     part = asked.interface.skin
     if part is None or part.law != "hertz" or part.rms_height is None or not pressure > 0:
         return []
@@ -70,7 +79,7 @@ def ranged(asked, pressure: float) -> list:
 
 
 def _half(asked, coarse, pressure: float) -> str:
-    """The stiffness of the peaks that the Moments of every second sample of the trace tell, as words."""
+    """Return the stiffness of the peaks from every second sample of the profile, as text."""
     try:
         one = peaks.gaussian_peaks(coarse) if coarse else None
     except PatchfemError:
@@ -83,19 +92,38 @@ def _half(asked, coarse, pressure: float) -> str:
 
 
 def borne(pressure) -> np.ndarray:
-    """Pressure (..., m) [Pa] of a smooth skin, zero at the nodes below MIN_RELATIVE_PRESSURE of the largest.
+    """Return the pressure (..., m) [Pa] of a smooth skin, with 0 below MIN_RELATIVE_PRESSURE.
 
-    The law never ends, but what it leaves there is less than the balance of the load is solved to, and further out less
-    than any number.
+    The law never reaches 0, but the pressure that is cut off is below the residual of the load
+    balance, and underflows farther out. The limit is relative to the largest pressure.
     """
     return np.where(pressure > MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
 
 
 def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
-    """Press a pair through a smooth skin: (Compliance with the skin linearised at the operating point, Pressure,
-    StripsState of one strip).
+    """Solve the contact of a pair through a smooth skin.
 
-    The gap of the Pressure is the separation of the mean planes, below zero where the skin is crushed.
+    The gap of the ContactState is the separation of the mean planes, which is negative if the skin
+    is crushed.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    pieces : Compliance
+    gap : (m,)
+        Unloaded gap [m].
+    angle : float
+        Initial rotation [rad].
+    moment : float or None
+        Moment [N m]; None if the rotation is fixed.
+    spring : float
+        Rotational stiffness of the holder [N m/rad].
+
+    Returns
+    -------
+    tuple
+        Compliance with the skin linearised at the operating point, ContactState, and StripsState of
+        a single strip.
     """
     interface = pieces.interface
     by = asked.loading.approach
@@ -125,7 +153,7 @@ def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: fl
         state.residuals,
     )
     stiff = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
-    # nodes that carry nothing stay finite
+    # the lower bound keeps the compliance of unloaded nodes finite
     crush = np.diag(1 / np.maximum(stiff, MIN_RELATIVE_PRESSURE * stiff.max()))
     ratio = asked.interface.skin.tangential_ratio
     tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential

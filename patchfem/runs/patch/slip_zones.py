@@ -1,4 +1,8 @@
-"""Where a prescribed slide lets a patch slip, and how well its meshes show the work of that slip."""
+"""Zones of a patch that slip under a prescribed slide, and the errors of their work.
+
+In: pressed patches and the `PrescribedSlip`. Out: slip zones for the grading of the mesh, and
+the error of work and force of the slip over the tolerance.
+"""
 
 import numpy as np
 
@@ -10,17 +14,17 @@ from .jenkins_elements import elements
 
 
 def slip_zones(patch, slip, ends: list) -> tuple:
-    """Return the stretches (from, to) [m] in which points yield below the amplitude of a slide.
+    """Return the parts (start, end) [m] of a patch that yield below the amplitude of a slide.
 
-    Between nodes the slide at which points yield is linear. At an end of the contact between two
-    nodes, where the pressure vanishes, Coulomb points yield at once.
+    The slide at which points yield is interpolated linearly between nodes. At an end of the contact
+    between two nodes the pressure vanishes, so that Coulomb points yield at once.
 
     Parameters
     ----------
     patch : Patch
         The pressed patch.
     slip : PrescribedSlip
-        What slides it.
+        Prescribed slide.
     ends : list of contact.edges.ContactEdge
         Ends of its contact inside the interface.
     """
@@ -43,7 +47,7 @@ def slip_zones(patch, slip, ends: list) -> tuple:
 
 
 def _below(x, slides, amplitude: float) -> list:
-    """Stretches (from, to) [m] in which slides (k,) [m] at x (k,) [m] lie below an amplitude [m]."""
+    """Return the intervals of x (k,) [m] in which slides (k,) [m] are below an amplitude [m]."""
     yields = slides < amplitude
     starts = np.flatnonzero(yields & ~np.append(False, yields[:-1]))
     stops = np.flatnonzero(yields & ~np.append(yields[1:], False))
@@ -60,7 +64,7 @@ def _below(x, slides, amplitude: float) -> list:
 
 
 def _crossing(x, slides, amplitude: float) -> float:
-    """Place [m] between two nodes at which the slide of yielding equals the amplitude."""
+    """Return the position [m] between two nodes at which the slide of yielding is the amplitude."""
     share = (amplitude - slides[0]) / (slides[1] - slides[0])
     return float(x[0] + share * (x[1] - x[0]))
 
@@ -77,9 +81,14 @@ def peak_force(found: JenkinsSet, amplitude: float) -> float:
 
 
 def slip_missed(patches, slip, tolerance: float) -> float:
-    """Return the largest error of work and force of the slip over what the tolerance allows [1].
+    """Return the largest error of work and force of the slip over the allowed error [1].
 
-    patches: on nested meshes, fine to coarse, two or more.
+    Parameters
+    ----------
+    patches : sequence of Patch
+        The patch on two or more nested meshes, fine to coarse.
+    slip : PrescribedSlip
+    tolerance : float
     """
     values = []
     for patch in patches:

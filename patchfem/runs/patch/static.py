@@ -1,7 +1,8 @@
-"""Static measures of many patches on the condensed pieces that they share, as `measures` gives them one by one.
+"""Static measures of many patches on shared condensed pieces, equal to those of `measures`.
 
-It takes bare pieces, or pieces behind a linear skin, under a load: contacts of one stretch (`contact.batch`). What
-presses otherwise is left to single runs.
+In: `PatchModel`s with shared meshes. Out: measures with errors, (q,) for q patches. This module
+treats bare pieces, or pieces with a linear skin, under a load, whose contact is a single
+interval (`contact.batch`). Other patches are left to single runs.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,13 +23,17 @@ from .condensed import Pair, shared_pair, shared_pairs
 from .press import as_patch, with_linear_skin
 from .values import EdgeValues, peak_pressures, static_values
 
-BEYOND = 2  # cells beyond the end of a contact on coarser cells, in which it may end on these
+# cells beyond the end of a contact on the coarser mesh within which it may end on this one
+BEYOND = 2
 
 
 class SolvedPatch(NamedTuple):
-    """A patch solved together with others: static measures by name; band: sentences on the plane state, as
-    `measures.plane_band` has them; patches: the solved Patch on the meshes, fine to
-    coarse."""
+    """Patch that was solved together with others.
+
+    - measures: static measures by name.
+    - band: sentences on the plane state (`measures.plane_band`).
+    - patches: the solved Patch on all meshes, fine to coarse.
+    """
 
     measures: dict
     band: list
@@ -36,10 +41,14 @@ class SolvedPatch(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """What presses q patches that are alike in their pieces and in `pressing_kind`.
+    """Loads and shapes of q patches that are alike in their pieces and in `pressing_kind`.
 
-    first: the PatchModel of the first; load (q,) [N]; moment (q,) [N m], None where the rotation is held; spring (q,)
-    [N m/rad]; angle (q,) [rad] at which the upper piece is held; shapes: Gap of each, or one with columns of numbers.
+    - first: PatchModel of the first one.
+    - load (q,): [N].
+    - moment (q,): [N m]; None if the rotation is fixed.
+    - spring (q,): rotational stiffness of the holder [N m/rad].
+    - angle (q,): initial rotation of the upper piece [rad].
+    - shapes: Gap of each patch, or a single one whose numbers are columns.
     """
 
     first: object
@@ -50,17 +59,20 @@ class Asked(NamedTuple):
     shapes: tuple
 
     def gaps(self, x) -> np.ndarray:
-        """Gaps (q, m) [m] at x (m,) [m]."""
+        """Return the gaps (q, m) [m] at x (m,) [m]."""
         if len(self.shapes) == self.load.size:
             return np.array([gap.at(x).heights for gap in self.shapes])
         return np.broadcast_to(self.shapes[0].at(x[:, None])[0].T, (self.load.size, x.size))
 
 
 class Level(NamedTuple):
-    """q patches pressed on one mesh.
+    """q patches solved on one mesh.
 
-    values: static measures by name, (q,) each; pressure: a ContactState whose fields have a row or a number for each patch;
-    contacts: the stretches in contact; gap_range: (q,) [m]; x: (m,) nodes [m].
+    - values: static measures by name, (q,) each.
+    - pressure: ContactState whose fields have a row or a number for each patch.
+    - contacts: intervals in contact.
+    - gap_range (q,): range of the gap [m].
+    - x (m,): nodes [m].
     """
 
     values: dict
@@ -71,14 +83,21 @@ class Level(NamedTuple):
 
     @property
     def is_solved(self) -> np.ndarray:
-        """Whether each patch (q,) is a contact of one stretch that was found."""
+        """Whether the contact of each patch (q,) is a single interval and was found."""
         return self.contacts.residual <= RESIDUAL_TOL
 
 
 class Together(NamedTuple):
-    """Static measures of q patches: values, errors: name -> (q,); good: (q,) whether they were solved together; top:
-    (q,) largest nodal pressure [Pa]; approach: (q,) [m] on the finest mesh; planes: name -> (q,) on the second mesh in
-    the plane state of the model and in the other one, () where nobody asks; levels: of the meshes, fine to coarse."""
+    """Static measures of q patches that were solved together.
+
+    - values, errors: (q,) by name.
+    - good (q,): whether the patch was solved together with the others.
+    - top (q,): largest nodal pressure [Pa].
+    - approach (q,): on the finest mesh [m].
+    - planes: values (q,) by name on the second mesh, in the plane state of the model and in the
+      other one; () if not needed.
+    - levels: the patches on all meshes, fine to coarse.
+    """
 
     values: dict
     errors: dict
@@ -89,7 +108,7 @@ class Together(NamedTuple):
     levels: list
 
     def band(self, asked, k: int) -> list:
-        """The sentence of `measures.plane_band` on the k-th patch, a PatchModel."""
+        """Return the sentence of `measures.plane_band` on the k-th patch, of PatchModel `asked`."""
         return (
             one_by_one.band_words(
                 asked,
@@ -100,7 +119,10 @@ class Together(NamedTuple):
         )
 
     def measures(self, k: int, floors: Mapping | None = None) -> dict:
-        """The measures of the k-th patch by name; floors: name -> (q,) in place of those of the table."""
+        """Return the measures of the k-th patch by name.
+
+        floors: floors (q,) by name that replace those of the table.
+        """
         return {
             name: Measure(
                 float(column[k]),
@@ -114,7 +136,7 @@ class Together(NamedTuple):
 
 
 def not_together(asked) -> str:
-    """Why a `PatchModel` is not pressed together with others; "" where it may be."""
+    """Return the reason why a `PatchModel` is not solved with others; "" if it may be."""
     if asked.mesh.shared is None:
         return "the case has a mesh of its own"
     if not all(
@@ -131,7 +153,10 @@ def not_together(asked) -> str:
 
 
 def _not_of_one_stretch(asked) -> str:
-    """Why contacts of one stretch press no `PatchModel` on plain grids; "" where they may."""
+    """Return the reason why a `PatchModel` on plain grids cannot have a contact of one interval.
+
+    "" if it can.
+    """
     skin = asked.interface.skin
     if asked.interface.strips is not None or (skin is not None and skin.law != "linear"):
         return "strips or a smooth skin lie between the pieces"
@@ -142,18 +167,19 @@ def _not_of_one_stretch(asked) -> str:
 
 
 def pressing_kind(asked) -> tuple:
-    """What patches pressed together have in common beside their pieces."""
+    """Return the properties besides the pieces that patches solved together have in common."""
     return asked.mesh.shared.name, *_kind(asked)
 
 
 def _kind(asked) -> tuple:
+    """Return the numbers of the linear skin, and whether the rotation is fixed."""
     skin = asked.interface.skin
     numbers = None if skin is None else (skin.normal_stiffness, skin.tangential_ratio)
     return numbers, asked.loading.moment is None
 
 
 def asked_of(patches: Sequence) -> Asked:
-    """What presses `PatchModel`s."""
+    """Return the `Asked` of some `PatchModel`s."""
     loadings = [one.loading for one in patches]
     moment = None
     if loadings[0].moment is not None:
@@ -169,9 +195,10 @@ def asked_of(patches: Sequence) -> Asked:
 
 
 def asked_by_columns(patch, count: int) -> Asked:
-    """What presses `count` patches, given as one PatchModel whose numbers are columns where they differ."""
+    """Return the `Asked` of `count` patches, given as one PatchModel with columns of numbers."""
 
     def column(number) -> np.ndarray:
+        """Return a number as a column (q,)."""
         return np.broadcast_to(np.asarray(number, float), count)
 
     moment = patch.loading.moment
@@ -186,8 +213,10 @@ def asked_by_columns(patch, count: int) -> Asked:
 
 
 def patches_on(patches, pair: Pair) -> list:
-    """Each of `PatchModel`s of one geometry as a solved Patch on a Pair; None of those that do not press as this module
-    can."""
+    """Solve `PatchModel`s of one geometry on a Pair.
+
+    Returns a list of Patch; None for each that this module cannot solve.
+    """
     out, groups = [None] * len(patches), {}
     grids = (
         isinstance(pair.grid, TensorGrid)
@@ -210,8 +239,10 @@ def patches_on(patches, pair: Pair) -> list:
 
 
 def solved_patches(patches, tolerance: float) -> list:
-    """Each of `PatchModel`s alike in their pieces and in `pressing_kind` as SolvedPatch; None of those that do not
-    press as this module can. tolerance: as `pressed_together` has it."""
+    """Return each of alike `PatchModel`s as SolvedPatch; None for those not solved here.
+
+    They are alike in their pieces and in `pressing_kind`. tolerance: see `pressed_together`.
+    """
     pairs, found = shared_pairs(patches[0]), pressed_together(asked_of(patches), tolerance)
     return [
         SolvedPatch(
@@ -226,8 +257,16 @@ def solved_patches(patches, tolerance: float) -> list:
 
 
 def missed_on(patches, pairs: list, tolerance: float) -> list:
-    """For each of `PatchModel`s of one geometry on pieces, fine to coarse, its largest error over the tolerance; None
-    for those that do not press as this module can."""
+    """Return the largest error over the tolerance of each `PatchModel`; None if not solved here.
+
+    Parameters
+    ----------
+    patches : sequence of PatchModel
+        Of one geometry.
+    pairs : list of Pair
+        Condensed pieces, fine to coarse.
+    tolerance : float
+    """
     out, groups = [None] * len(patches), {}
     grids = all(
         isinstance(body, TensorGrid) for pair in pairs for body in (pair.grid, pair.upper_grid)
@@ -243,8 +282,17 @@ def missed_on(patches, pairs: list, tolerance: float) -> list:
 
 
 def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None) -> Together:
-    """Patches on the meshes that they share, with their errors; tolerance: relative error beyond which values are
-    extrapolated; pieces: those, fine to coarse, on which they are pressed without the other plane state."""
+    """Solve patches on the meshes that they share, and estimate their errors.
+
+    Parameters
+    ----------
+    asked : Asked
+    tolerance : float
+        Relative error above which values are extrapolated.
+    pieces : list of Pair, optional
+        Pieces, fine to coarse, that replace the shared ones; the other plane state is then not
+        solved.
+    """
     pairs, first, level, levels = pieces or shared_pairs(asked.first), asked.first, None, []
     with one_thread():
         for pair in reversed(pairs):
@@ -282,7 +330,7 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
 
 
 def _patch_of(asked, pair: Pair, level: Level, k: int):
-    """Return the k-th patch of a level, of the PatchModel `asked`, as `press.pressed` gives it by itself."""
+    """Return the k-th patch of a level, of PatchModel `asked`, as `press.pressed` returns it."""
     gap, notes, seconds = asked.gap.at(level.x)
     rows = level.pressure
     pressure = ContactState(
@@ -307,13 +355,13 @@ def _patch_of(asked, pair: Pair, level: Level, k: int):
 
 
 def _with_skin(asked, pair: Pair):
-    """Return the Compliance of a pair with the linear skin of a `PatchModel`, that of the pair where it has none."""
+    """Return the Compliance of a pair, in series with a linear skin if the model has one."""
     skin = asked.interface.skin
     return pair.compliance if skin is None else with_linear_skin(skin, pair.compliance)
 
 
 def _in_other_plane(asked: Asked, known: Level) -> tuple:
-    """Return the patches on the second mesh in the other plane state; () where its values in their own are enough."""
+    """Return the patches on the second mesh in the other plane state; () if it is not needed."""
     other = one_by_one.other_plane(asked.first)
     return (
         ()
@@ -323,13 +371,21 @@ def _in_other_plane(asked: Asked, known: Level) -> tuple:
 
 
 def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
-    """Press patches on one Pair; coarse: the same on coarser cells, about which the contacts end."""
+    """Solve patches on one Pair.
+
+    Parameters
+    ----------
+    asked : Asked
+    pair : Pair
+    coarse : Level, optional
+        The same patches on coarser cells, near whose ends of contact the search starts.
+    """
     bare, pieces = pair.compliance, _with_skin(asked.first, pair)
     x, held = bare.interface.x, asked.moment is None
     gap = asked.gaps(x) + pair.rise
     gap_range = np.ptp(gap, axis=1)
     turned = np.zeros(asked.load.size) if held else asked.angle
-    # a free piece is counted from no angle, so that its rotation keeps its digits
+    # the rotation of a free piece is measured from zero, so that it keeps its digits
     gap = gap - turned[:, None] * x
     low = gap.min(axis=1)
     normal, tangential = Intervals(pieces.normal, x), Intervals(pieces.tangential, x)
@@ -372,9 +428,9 @@ def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
 
 
 def _about(x, coarse: Level) -> tuple:
-    """Return the nodes at x (m,) [m] between which contacts lie that are known on other cells.
+    """Return the nodes at x (m,) [m] between which contacts known on coarser cells lie.
 
-    (q,) nodes from which on and (q,) nodes before which they lie.
+    They are the first node (q,) and the node (q,) after the last one.
     """
     known, solved = coarse.contacts, coarse.is_solved
     before, after = (

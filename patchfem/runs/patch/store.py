@@ -1,27 +1,31 @@
-"""Results that the runs of one process share: condensed pieces, pressed patches and what follows from them.
+"""Results that the runs of one process share: condensed pieces, pressed patches, measures.
 
-The levels and frequencies of a sweep press the same patch. So a result is kept under a key of plain values that equal
-patches of different models have in common, until MAX_ENTRIES other results were used after it.
+In: a key of plain values, equal for equal patches of different models, and a function that
+computes the result. Out: the result, computed once. For example, all levels and frequencies of
+a sweep use the same patch. A result is discarded after MAX_ENTRIES other results were used.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 
-# a patch with its measures and elements is about seven entries, its meshes are four to nine
+# A patch with its measures and elements has about seven entries, and its meshes have four to nine.
 MAX_ENTRIES = 64
 
-_RESULTS: dict = {}  # from the least to the most recently used
+_RESULTS: dict = {}  # ordered from the least to the most recently used
 
 
 def reuse(key: tuple, make: Callable):
-    """Return the result kept under a key, or make it and keep it."""
+    """Return the result of a key; compute and keep it on the first call."""
     result = _RESULTS[key] if key in _RESULTS else make()
     keep(key, result)
     return result
 
 
 def keep(key: tuple, result) -> None:
-    """Keep a result under a key as the most recently used one, in place of the least recently used beyond the limit."""
+    """Keep a result under a key as the most recently used one.
+
+    Beyond MAX_ENTRIES, the least recently used result is discarded.
+    """
     _RESULTS.pop(key, None)
     _RESULTS[key] = result
     if len(_RESULTS) > MAX_ENTRIES:
@@ -29,12 +33,12 @@ def keep(key: tuple, result) -> None:
 
 
 def clear() -> None:
-    """Forget all results."""
+    """Discard all results."""
     _RESULTS.clear()
 
 
 def content_key(asked) -> tuple:
-    """Key of a `PatchModel` that is equal for all with the same content."""
+    """Return a key that is equal for all `PatchModel`s with the same content."""
     gap = asked.gap
     mesh = asked.mesh
     interface = asked.interface
@@ -54,5 +58,5 @@ def content_key(asked) -> tuple:
 
 
 def is_shared(asked) -> bool:
-    """Whether a `PatchModel` may be one of several: it has meshes that it shares, and no file that may change."""
+    """Return whether several `PatchModel`s may be equal: with shared meshes and without files."""
     return asked.mesh.shared is not None and asked.mesh.file is None and asked.gap.profile is None

@@ -1,4 +1,7 @@
-"""Yield strength of the pieces, and a lower bound of the von Mises stress that follows from the pressure alone."""
+"""Yield strength of the pieces, and a lower bound of the von Mises stress from the pressure.
+
+In: a `PatchModel` and a pressure. Out: notes on the faces that yield.
+"""
 
 from math import sqrt
 from typing import NamedTuple
@@ -11,7 +14,9 @@ NEGLECTED = "the run is elastic and neglects yielding"
 class Strength(NamedTuple):
     """Yield strength of a material.
 
-    material: its name, "material" without one; pressure: strength [Pa]; source: where the number comes from.
+    - material: its name; "material" without a name.
+    - pressure: strength [Pa].
+    - source: source of the number.
     """
 
     material: str
@@ -20,12 +25,15 @@ class Strength(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The strength with its source, as a clause."""
+        """Strength with its source, as a clause."""
         return f"the yield strength is {self.pressure / 1e6:.4g} MPa ({self.source})"
 
 
 def strength_of(material) -> Strength | None:
-    """Find the yield strength of a Material: that of the scene before that of the table; None without one."""
+    """Return the yield strength of a Material, from the scene or else from the table.
+
+    None if neither has it.
+    """
     if material is None:
         return None
     if material.yield_ is not None:
@@ -34,7 +42,7 @@ def strength_of(material) -> Strength | None:
         material.name not in YIELD
         or (material.young, material.poisson) != MATERIALS[material.name][:2]
     ):
-        return None  # a name with constants of its own is another material
+        return None  # a known name with other elastic constants is a different material
     known = YIELD[material.name]
     return Strength(material.name, known.strength, known.source[:-1])
 
@@ -51,13 +59,18 @@ def min_stress_ratio(poisson: float, plane: str) -> float:
 
 
 def yielding_faces(asked, peak: float) -> dict:
-    """Find the faces that a pressure makes yield: Strength -> note.
+    """Return a note for each material of a face that yields under a pressure.
 
     Parameters
     ----------
     asked : PatchModel
     peak : float
-        Pressure [Pa] that the interface bears at least somewhere.
+        Pressure [Pa] that acts at least somewhere on the interface.
+
+    Returns
+    -------
+    dict
+        Notes by Strength.
     """
     notes = {}
     for side, piece in (("lower", asked.pieces.lower), ("upper", asked.pieces.upper)):

@@ -1,4 +1,8 @@
-"""A patch in strips over its width: one holder presses them all, and may roll."""
+"""Patch in strips over its width, pressed by a holder that may roll.
+
+In: a `PatchModel` with strips and its condensed pieces. Out: the contact of all strips, and the
+measures that depend on them.
+"""
 
 import numpy as np
 
@@ -11,12 +15,27 @@ from .skin import MIN_RELATIVE_PRESSURE, borne, skin_law
 
 
 def in_strips(asked, pieces: Compliance, gap, held: tuple, added=None, warm_start=None) -> tuple:
-    """Press a pair in strips: (Compliance of all strips, Pressure of their means over the width, skin or None,
-    StripsState).
+    """Solve the contact of a pair in strips.
 
-    gap: (m,) or (s, m) [m]; held: rotation [rad], moment or None, spring of the holder; added, warm_start: as in
-    `StripCompliance`.
-    The Compliance is what the pieces would have in full contact over the width; stiffnesses are those of the strips.
+    The Compliance is that of the pieces in full contact over the width; measures of stiffness are
+    computed from the strips.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    pieces : Compliance
+    gap : (m,) or (s, m)
+        Unloaded gap [m].
+    held : tuple
+        Rotation [rad], moment [N m] or None, and rotational stiffness of the holder [N m/rad].
+    added, warm_start
+        Parameters of `StripCompliance`.
+
+    Returns
+    -------
+    tuple
+        Compliance of all strips, ContactState of the means over the width, smooth skin or None, and
+        StripsState.
     """
     (count, roll, offset), interface, (angle, moment, spring) = (
         asked.interface.strips,
@@ -57,7 +76,7 @@ def in_strips(asked, pieces: Compliance, gap, held: tuple, added=None, warm_star
 
 
 def skin_of(asked):
-    """The skin between the strips, None where they are bare."""
+    """Return the skin between the strips; None if they are bare."""
     if asked.interface.skin is None:
         return None
     if asked.interface.skin.law == "linear":
@@ -67,9 +86,19 @@ def skin_of(asked):
 
 
 def rotational_stiffness(state, c, x, weight) -> float:
-    """Rotational stiffness -dM/d(rotation) [N m/rad] of all strips behind a smooth skin, at fixed approach.
+    """Return the rotational stiffness -dM/d(rotation) [N m/rad] of strips with a smooth skin.
 
-    c: (m, m) [m/N] and weight: (m,) [m2] of one strip.
+    The approach is fixed.
+
+    Parameters
+    ----------
+    state : StripsState
+    c : (m, m)
+        Compliance of one strip [m/N].
+    x : (m,)
+        Positions [m].
+    weight : (m,)
+        Areas of one strip [m2].
     """
     out = 0.0
     for rate in state.stiffness:
@@ -83,9 +112,10 @@ def rotational_stiffness(state, c, x, weight) -> float:
 
 
 def strip_values(patch) -> dict:
-    """Return the values of the measures that strips change, by name.
+    """Return the values of the measures that depend on strips, by name.
 
-    These are the extent of the contact, the stiffnesses, and the lateral place of the pressure with its roll moment.
+    These are the extent of the contact, the stiffnesses, the lateral centre of pressure and the
+    roll moment.
     """
     state = patch.strips
     weight = patch.pair.compliance.interface.weight / len(state.offsets)
@@ -102,6 +132,7 @@ def strip_values(patch) -> dict:
 
 
 def _behind_skin(patch, weight) -> dict:
+    """Return the extent of contact and the stiffnesses of strips with a smooth skin, by name."""
     state, pieces, count = patch.strips, patch.pair.compliance, len(patch.strips.offsets)
     ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
     x, bears = patch.x, state.pressure > MIN_RELATIVE_PRESSURE * state.pressure.max()
@@ -129,7 +160,10 @@ def _behind_skin(patch, weight) -> dict:
 
 
 def _between_nodes(patch, weight) -> dict:
-    """Share of the area, extent and stiffnesses of strips whose contact ends between nodes (`contact.edges`)."""
+    """Return the extent of contact and the stiffnesses of strips with sharp edges, by name.
+
+    The contact ends between nodes (`contact.edges`).
+    """
     state, pieces, x, count = (
         patch.strips,
         patch.pair.compliance,

@@ -1,5 +1,8 @@
-"""Values read off a pressed patch: peak, edges, half-width, stiffnesses, and the peak beside rounded ends that the
-cells are too long to show."""
+"""Values of the static measures of a pressed patch, without errors.
+
+In: a `Patch`. Out: values by name: peak pressure, edges, half-width, stiffnesses; and the peak
+pressure at rounded ends that the cells do not resolve.
+"""
 
 from typing import NamedTuple
 
@@ -12,26 +15,28 @@ from ...elasticity.lapack import one_thread
 from . import strips
 from .press import Patch
 
-LIKE = 2.0  # a parabola that is so many times less bent than its neighbour is still one smooth curve with it
-# so many cells within the reach of the contact onto a rounding show how its peak converges
+# a parabola may have at most this many times the curvature of its neighbour on a smooth curve
+LIKE = 2.0
+# cells within the contact on a rounding with which its peak converges
 ROUNDING_CELLS = 4
 
 
 def peak_pressures(x, sigma, skin=None) -> np.ndarray:
-    """Return the largest pressures (q,) [Pa] of patches by their nodal pressures.
+    """Return the largest pressures (q,) [Pa] of patches from their nodal pressures.
 
-    Inside the interface it is the vertex of the parabola through the largest node and its neighbours (`vertex`). At a
-    border of the interface the nodal forces of bare pieces are means over half a cell, so it is the end of the curve
-    that has these means; a skin holds the pressure at the node.
+    Inside the interface it is the vertex of the parabola through the largest node and its
+    neighbours (`vertex`). At an end of the interface the nodal forces of bare pieces are means over
+    half a cell, so that it is the end of the curve that has these means; with a skin it is the
+    pressure of the node.
 
     Parameters
     ----------
     x : (m,) ndarray
-        Places of the nodes [m].
+        Positions of the nodes [m].
     sigma : (q, m) ndarray
         Nodal pressures [Pa].
     skin : (m,) ndarray or None
-        Fraction [1] of the compliance of a node that the skin contributes, None without a skin.
+        Fraction [1] of the skin in the compliance of a node; None without a skin.
     """
     top = np.argmax(sigma, axis=1)
     peaks = sigma.max(axis=1)
@@ -46,13 +51,22 @@ def peak_pressures(x, sigma, skin=None) -> np.ndarray:
 
 
 def vertex(x, sigma, top) -> np.ndarray:
-    """Largest pressures (q,) [Pa] of nodal ones sigma (q, m) [Pa] at x (m,) [m] that are largest at the inner nodes top
-    (q,).
+    """Return the vertices (q,) [Pa] of parabolas through the largest nodal pressures.
 
-    Each is the vertex of the parabola through a largest node and its neighbours as long as the parabolas one node on
-    are bent like it. Beside a jump they are not: the less the flatter one is bent, the nearer it is to the node itself.
+    A parabola passes through the largest node and its neighbours, if the parabolas of the next
+    nodes have a similar curvature. Next to a jump they differ: the smaller the lower curvature, the
+    closer the value is to that of the node.
+
+    Parameters
+    ----------
+    x : (m,)
+        Positions of the nodes [m].
+    sigma : (q, m)
+        Nodal pressures [Pa].
+    top : (q,)
+        Inner nodes with the largest pressure.
     """
-    # at a border its own once more
+    # at an end of the interface, the parabola itself replaces its missing neighbour
     rows, at = (
         np.arange(top.size),
         np.clip(top[:, None] + [-1, 0, 1], 1, x.size - 2),
@@ -72,12 +86,12 @@ def vertex(x, sigma, top) -> np.ndarray:
 
 
 def _border_pressures(x, sigma) -> np.ndarray:
-    """Return the pressures (q,) [Pa] at the first node, where a curve begins whose means are the nodal pressures.
+    """Return the pressures (q,) [Pa] at the end of curves whose means are nodal pressures.
 
-    The curve is a parabola through three loaded nodes, a line through two.
+    The curve is a parabola through three loaded nodes, or a line through two.
     """
     peaks = sigma[:, 0].copy()
-    # nodes from the border to the first open one
+    # number of loaded nodes from the border to the first open one
     loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)
     counts = np.minimum(loaded, min(3, x.size - 1))
     for count in (2, 3):
@@ -91,10 +105,12 @@ def _border_pressures(x, sigma) -> np.ndarray:
 
 
 class EdgeValues(NamedTuple):
-    """Quantities of contacts that depend on where they end, numbers or (q,).
+    """Quantities that depend on where a contact ends, numbers or (q,).
 
-    length [m] in contact; width [m] from the first to the last end; normal, tangential [N/m] and rotational [N m/rad]
-    stiffness.
+    - length: length in contact [m].
+    - width: distance between the first and the last end [m].
+    - normal, tangential: stiffness [N/m].
+    - rotational: stiffness [N m/rad].
     """
 
     length: float
@@ -110,7 +126,7 @@ def static_values(interface, pressed: ContactState, peak, edge_values: EdgeValue
     Parameters
     ----------
     interface : Interface
-    pressed : Pressure
+    pressed : ContactState
         Its load, moment, rotation and approach are numbers or (q,).
     peak : float or (q,) ndarray
         Largest pressure [Pa].
@@ -137,10 +153,10 @@ def static_values(interface, pressed: ContactState, peak, edge_values: EdgeValue
 
 
 def values(patch: Patch) -> dict:
-    """Value of every static measure of a pressed patch by name, in SI; `rows` has their meanings.
+    """Return the value of every static measure of a pressed patch by name, in SI units.
 
-    The node at the edge of a step stands for half a cell on either side of it: the weighted mean of the patch where all
-    of it bears and where none does.
+    A node at the edge of a step represents half a cell on either side: the value is the weighted
+    mean of the patches with and without contact of this node. `patch_rows` has the definitions.
     """
     parts = [(weight, _values(part)) for weight, part in patch.either or ((1.0, patch),)]
     return {
@@ -149,6 +165,7 @@ def values(patch: Patch) -> dict:
 
 
 def _values(patch: Patch) -> dict:
+    """Return the values of a patch without a node at a step."""
     pressure, interface = patch.pressure, patch.pieces.interface
     if patch.strips is not None:
         peak = peak_pressures(patch.x, patch.strips.pressure, patch.skin_share).max()
@@ -176,14 +193,20 @@ def _edge_values(patch: Patch) -> EdgeValues:
 
 
 def stretches_of(patch: Patch, found: list) -> np.ndarray:
-    """Stretches of the interface in contact, (k, 2) [m] by rising x, from the ends `found` of `contact_ends`."""
+    """Return the parts of the interface in contact (k, 2) [m], by increasing x.
+
+    found: ends of the contact from `contact_ends`.
+    """
     return edges.contact_intervals(
         patch.x, patch.pressure.sigma_n * patch.pieces.interface.weight, found
     )
 
 
 def contact_ends(patch: Patch) -> list:
-    """Ends of the contact set between the nodes, as a list of `contact.edges.ContactEdge`; of the means over strips none."""
+    """Return the ends of the contact between the nodes, as a list of `ContactEdge`.
+
+    The list is empty for means over strips.
+    """
     if patch.strips is not None:
         return []
     found = _between(patch)
@@ -191,7 +214,7 @@ def contact_ends(patch: Patch) -> list:
 
 
 def _between(patch: Patch) -> list:
-    """The ends of `contact_ends` as if the gap were smooth."""
+    """Return the ends of `contact_ends` without regard to steps of the gap."""
     if patch.skin is not None:
         return edges.find_pressure_edges(
             patch.x, patch.skin.pressure[0], edges.MIN_RELATIVE_PRESSURE
@@ -203,9 +226,10 @@ def _between(patch: Patch) -> list:
 
 
 def shear_stiffness(patch: Patch, found: list) -> float:
-    """Tangential stiffness dT/d(slide) [N/m] in stick at held approach and rotation, edges at the ends `found`.
+    """Return the tangential stiffness dT/d(slide) [N/m] in stick.
 
-    That of unlike pieces includes the closing that shear causes.
+    Approach and rotation are fixed. For unlike pieces it contains the closing that shear causes.
+    found: ends of the contact.
     """
     if not patch.pair.closing.any():
         return edges.set_stiffness(
@@ -213,6 +237,7 @@ def shear_stiffness(patch: Patch, found: list) -> float:
         )
 
     def of(active) -> float:
+        """Return the coupled stiffness [N/m] of a contact set (m,)."""
         return stiffness.coupled_stiffness(patch.pieces, patch.pair.closing, active)
 
     whole = out = of(patch.active)
@@ -224,20 +249,20 @@ def shear_stiffness(patch: Patch, found: list) -> float:
 
 
 def edge_cells(x, active) -> np.ndarray:
-    """Lengths (e,) [m] of the cells in which the contact set ends; empty for full contact."""
+    """Return the lengths (e,) [m] of the cells in which the contact ends; empty in full contact."""
     return np.diff(x)[active[1:] != active[:-1]]
 
 
 def unresolved_rounding(patch: Patch) -> float:
-    """Largest pressure [Pa] that rounded ends may carry between the nodes; 0 where the mesh resolves them.
+    """Return the largest pressure [Pa] of rounded ends that the mesh does not resolve; else 0.
 
-    The cells where the contact ends carry what a sharp end would, K = sigma_n sqrt(cell); a rounding that these cells
-    pass over has its peak by `rounded_corner`.
+    The cells where the contact ends carry the pressure of a sharp end, K = sigma_n sqrt(cell); a
+    rounding smaller than these cells has the peak of `rounded_corner`.
     """
     pair, x, sigma = patch.pair, patch.x, patch.pressure.sigma_n
     rounded = _rounded(pair)
     loaded = np.flatnonzero(patch.active)
-    # a skin evens the pressure out
+    # a skin smooths the pressure
     if not rounded or not loaded.size or patch.pieces is not pair.compliance:
         return 0.0
     flat, radius = (
@@ -251,7 +276,7 @@ def unresolved_rounding(patch: Patch) -> float:
     found = 0.0
     for at in (loaded[0], loaded[-1]):
         cell = np.diff(x)[max(at - 1, 0) : at + 1].max()
-        if abs(abs(x[at]) - flat) > 2 * cell:  # the contact ends elsewhere
+        if abs(abs(x[at]) - flat) > 2 * cell:  # the contact does not end at the rounding
             continue
         reach, peak = contact.rounded_corner(
             sigma[max(at - 2, 0) : at + 3].max() * np.sqrt(cell), radius, modulus
@@ -261,8 +286,10 @@ def unresolved_rounding(patch: Patch) -> float:
 
 
 def open_ends(patch: Patch) -> float:
-    """Length [m] of rounded face, both ends together, within which the contact may end though its last node is in
-    contact."""
+    """Return the length [m] of rounded face, both ends together, in which the contact may end.
+
+    It counts an end whose last node is in contact.
+    """
     rounded = _rounded(patch.pair)
     return (
         patch.active[[0, -1]].sum() * (patch.x[-1] - min(body.half_flat_length for body in rounded))
@@ -272,16 +299,16 @@ def open_ends(patch: Patch) -> float:
 
 
 def beyond_gentle(patch: Patch) -> bool:
-    """Whether the contact goes on where a rounded end is steeper than its face may touch.
+    """Return whether the contact continues where a rounded end is too steep for the model.
 
-    A single loaded node whose cell passes over the whole rounding does not tell.
+    A single loaded node whose cell is longer than the whole rounding does not count.
     """
     cells = np.diff(patch.x)[[0, -1]]
     return bool((patch.active[[0, -1]] & (cells < open_ends(patch))).any())
 
 
 def _rounded(pair) -> list:
-    """The bodies on which a rounding ends the interface."""
+    """Return the bodies with a rounding at the end of the interface."""
     return [
         body
         for body in (pair.grid, pair.upper_grid)
