@@ -110,8 +110,6 @@ class DecayCurve(NamedTuple):
     def unsampled(self, other: "DecayCurve") -> "DecayCurve":
         """Return the curve with the error of sampling added.
 
-        it.
-
         The error is the largest difference from the curve of `turns_from_outside` at the points
         around.
         """
@@ -127,8 +125,6 @@ class DecayCurve(NamedTuple):
 
     def widened(self, one: "DecayCurve", other: "DecayCurve") -> "DecayCurve":
         """Return the curve with the difference of two other curves added to its errors.
-
-        errors.
 
         An error is infinite where one of both curves has no value.
         """
@@ -327,8 +323,6 @@ class Slopes(NamedTuple):
 
 def fit_slopes(values, noise) -> Slopes:
     """Fit the slope at each inner point over the longest span that agrees with all shorter ones.
-
-    ones.
 
     Spans grow until the slope differs from that of a shorter span by more than the noise of both
     allows (Lepski, 1991). The error is the sum of two parts: the noise, and the bias of a mean. The

@@ -212,10 +212,7 @@ def slip_start(phases) -> dict:
 
 
 def ledger_measures(ledger) -> dict:
-    """Return friction work and energies [J] by name at the end of a ledger (4, k) [J].
-
-    k).
-    """
+    """Return friction work and energies [J] by name at the end of a ledger (4, k) [J]."""
     names = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
 
@@ -275,8 +272,6 @@ def _smooth_at(size, top: int) -> bool:
 
 def peaks_between(window: Response, climbs: bool = False) -> dict:
     """Return by how much peaks may exceed their samples, by name, as an additional error.
-
-    step.
 
     - Acceleration: if it jumps at its largest sample, its change over a step on the smooth side.
     - Normal load that changes: an eighth of its second difference at its smallest and largest

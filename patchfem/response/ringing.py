@@ -1,7 +1,5 @@
 """Ringing of a rig while an interface sticks: a decaying sinusoid besides the forced motion.
 
-motion.
-
 In: a signal during the sticks of a window. Out: `ring_frequency` and `ring_damping` with their
 errors. The model is a sum of decaying sinusoids, the forced sine and a constant. Frequency and
 decay enter nonlinearly, all else linearly (variable projection, Golub and Pereyra, 1973). Up to

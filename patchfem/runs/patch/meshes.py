@@ -215,8 +215,6 @@ def _halvings(cases: list, tolerance: float) -> dict:
 def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     """Return the layout of the coarsest grids for all cases; None if no case can be solved.
 
-    solved.
-
     Parameters
     ----------
     cases : list of PatchModel

@@ -1,8 +1,10 @@
-"""What the engines of a rig cost, before anything runs, for the choice of an engine, a plan and a refusal.
+"""Predicted cost of the engines of a rig, for the choice of an engine, a plan and a refusal.
 
-A run from event to event counts its pieces, one of high order and a march their steps; `rates` has the seconds of
-each. A spring that an element holds by rings on, which costs pieces only while it holds: all the time where the
-friction limit exceeds the push of the drive, hardly any where it is half of it.
+In: a Model. Out: CPU seconds, steps, memory (`Cost`), and reasons to march instead of solving
+exactly. A run from event to event counts its pieces (intervals of one power series), a run of
+high order and a march count their steps; `cost_model` has the seconds of each. The free
+vibration of a mode on a stuck element costs pieces only during stick: all the time if the
+friction limit exceeds the force of the drive, hardly any if it is half of it.
 """
 
 from dataclasses import replace
@@ -35,32 +37,38 @@ from ..cost import EVENT_CODE, LINEAR_CODE, SMOOTH_CODE, Cost, MemoryPart
 if TYPE_CHECKING:
     from ...friction.protocol import Element
 
-WORTH = 5.0  # that an exact motion may take where steps would take less, and be off by their bars
-PATIENCE = 60.0  # that it may take where the finest march does not resolve the modes
-LONGEST = 600.0  # seconds that an exact motion may take before it is refused
-MOST_STEPS = 6400  # finest automatic march, steps per cycle
-HELD = 6  # power of the limit over the push that gives the share of the time in which an element holds (measured .01)
-# 49 of 769 cells at this tolerance and above: 2e-4 of the motion behind a joint that slips
+WORTH = 5.0  # CPU seconds that an exact solution may take if a march, which has errors, takes less
+PATIENCE = 60.0  # CPU seconds that it may take if the finest march does not resolve the modes
+LONGEST = 600.0  # CPU seconds of an exact solution above which it is refused
+MOST_STEPS = 6400  # steps per cycle of the finest automatic march
+# exponent of (friction limit / force of the drive) in the fraction of the time of stick (measured:
+# .01)
+HELD = 6
+# Cells are merged in pairs at most this many times, at this tolerance and above: 49 of 769 cells
+# remain, with an error of 2e-4 of the motion of a slipping joint.
 MOST_PAIRS, AT = (
     4,
     1e-3,
 )
-REACH = 2.0  # radians of the fastest rate in a piece, of `dynamics.events.series_kernels`
-DYING = 33.0  # times of decay until what rings after an event is round-off, `dynamics.events.slow_kernels`
-PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # knobs of the march
-# times of decay of the slowest mode, after which a motion is seen to repeat to its digits
+REACH = 2.0  # phase of the fastest rate in a piece [rad], as in `dynamics.events.series_kernels`
+# decay times until the ringing after an event is round-off, as in `dynamics.events.slow_kernels`
+DYING = 33.0
+PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # numerical settings of the march
+# decay times of the slowest mode after which a motion repeats to round-off
 REPEATS = 30.0
-MORE = 3.5  # times the steps of a march, of which more are not worth their digits: a step costs less than one of it
-EASES = 9.0  # steps of a stiff law of the speed per cycle, over those of one that holds: .5 at r = 1.07, .1 at 1.26
-STABLE = 3.0  # times the length over which a state of a law relaxes, in a step
-# engines that keep SAMPLES of each of the last cycles, not their steps
+# a smooth run is worth at most this many times the steps of a march, because its steps are cheaper
+MORE = 3.5
+# exponent of the fraction of time at which a law of the speed is stiff: .5 at r = 1.07, .1 at 1.26
+EASES = 9.0
+STABLE = 3.0  # relaxation lengths of a state of the law that a stable step may cover
+# engines that keep SAMPLES samples of each of the last cycles instead of their steps
 RESAMPLED = (
     "exact",
     "piecewise",
     "smooth",
 )
-SAMPLES = 400  # of a kept cycle, of `dynamics.events.histories` and `dynamics.smooth`
-TURNS = 4.0  # turns a cycle that are kept from before the last cycles
+SAMPLES = 400  # samples of a kept cycle, as in `dynamics.events.histories` and `dynamics.smooth`
+TURNS = 4.0  # reversals per cycle that are kept from before the last cycles
 
 
 class HistoryBytes(NamedTuple):
@@ -69,14 +77,14 @@ class HistoryBytes(NamedTuple):
     Attributes
     ----------
     sample : float
-        Bytes per number of a kept sample: the window, the response and what is read off it. Random records of 4e5 to
-        2e6 samples took 0.8 to 1.2 of this.
+        Bytes per number of a kept sample: window, response and derived arrays. Random records of
+        4e5 to 2e6 samples took 0.8 to 1.2 of this.
     cycle : float
-        Bytes per cycle of a run: extremes, phasors and places of all cycles, of the run and of its coarser runs. Single
-        modes over 1e6 to 1e7 cycles took 0.8 to 1.3 of this.
+        Bytes per cycle of a run: extremes, phasors and positions of all cycles, of the run and of
+        its coarse runs. Single modes over 1e6 to 1e7 cycles took 0.8 to 1.3 of this.
     turn : float
-        Bytes per number of a turn that is kept from before the last cycles. Runs of 1e5 to 1e6 cycles took 0.8 to 1.5
-        of this.
+        Bytes per number of a reversal that is kept from before the last cycles. Runs of 1e5 to 1e6
+        cycles took 0.8 to 1.5 of this.
     """
 
     sample: float
@@ -90,7 +98,7 @@ MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 
 
 def steps_wanted(model: Model) -> int:
-    """Steps per cycle that the tolerance asks of a march, however many."""
+    """Return the steps per cycle that the tolerance requires of a march, without upper bound."""
     accuracy, rig = model.accuracy, model.rig
     quickest = max(
         max_frequency_ratio(rig.drive.signal),
@@ -103,13 +111,19 @@ def steps_wanted(model: Model) -> int:
 
 
 def steps_per_cycle(model: Model) -> int:
-    """Steps per cycle of a march: those of the scene, else what the tolerance asks for, within its bounds."""
+    """Return the steps per cycle of a march, from the scene or else from the tolerance.
+
+    Those from the tolerance lie between 100 and MOST_STEPS.
+    """
     return model.accuracy.steps_per_cycle or min(max(steps_wanted(model), 100), MOST_STEPS)
 
 
 def pairs_of(model: Model) -> int:
-    """How often each two cells of a density count as one at first: what cells leave open falls with their square, and
-    where the error of a run shows too much it is made again with more (`Numerics.finer`)."""
+    """Return how often neighbouring cells of a density are merged in pairs in the first run.
+
+    The error of cells falls with the square of their width. If the error of the run is too large,
+    the run is repeated with more cells (`Numerics.finer`).
+    """
     laws = [one.numbers.law for one in model.rig.friction.interfaces]
     if (
         model.partial_slip
@@ -122,8 +136,10 @@ def pairs_of(model: Model) -> int:
 
 @lru_cache(8)
 def expected_elements(model: Model) -> tuple:
-    """(elements, stiffness [N/m] of those of the stiffest interface) that the interfaces of a rig have, estimated; a
-    rigid element has no spring to ring on."""
+    """Return the expected number of elements, and the stiffness [N/m] of the stiffest interface.
+
+    A rigid element has no spring, and counts as stiffness 0.
+    """
     count, stiff = 0, 0.0
     for one in model.rig.friction.interfaces:
         load = model.nominal_load if one.load is None else one.load
@@ -144,12 +160,12 @@ def expected_elements(model: Model) -> tuple:
 
 
 def pieces_per_cycle(model: Model) -> float:
-    """Pieces of the motion per cycle of the drive at most: of its fastest rate while all holds, and of every event."""
+    """Return the largest number of pieces per cycle of the drive, of stick and of events."""
     return sum(ringing_and_events(model))
 
 
 def ringing_and_events(model: Model) -> tuple:
-    """Pieces per cycle of a motion whose elements hold all the time, and those of every event and row."""
+    """Return the pieces per cycle of a motion in permanent stick, and those of events and rows."""
     modes, drive = model.rig.modes, model.rig.drive.signal
     (count, stiff), made = expected_elements(model), modal_system.plant_of(modes)
     faces, damping = len(made.faces), made.damping_most
@@ -164,7 +180,7 @@ def ringing_and_events(model: Model) -> tuple:
     events = 2 * max(count, faces) * quick + 2 + rows
     if 2 * pi * quick <= made.slow * drive.period:
         dying = DYING / min(min_decay_rate(modes), float(modes.omega.min()) ** 2 / damping)
-        # that it rings
+        # events per cycle after which a mode rings
         times = (
             events + _jumps(model) if model.rig.friction.interfaces else 1 / model.rig.drive.cycles
         )
@@ -173,7 +189,10 @@ def ringing_and_events(model: Model) -> tuple:
 
 
 def _jumps(model: Model) -> float:
-    """Slips per cycle of a slow drive that end early as static friction falls to kinetic, at most."""
+    """Return how many slips per cycle of a slow drive end early, at most.
+
+    They end because static friction falls to kinetic friction.
+    """
     falls = [
         (one.numbers.static - one.numbers.kinetic)
         * (model.nominal_load if one.load is None else one.load)
@@ -185,7 +204,10 @@ def _jumps(model: Model) -> float:
 
 
 def seconds_of_pieces(model: Model) -> float:
-    """Seconds of a run from event to event at most, by which its engine is chosen: all holds all the time."""
+    """Return the largest CPU seconds of a run from event to event, for the choice of an engine.
+
+    The elements are assumed to stick all the time.
+    """
     cycles, each = model.rig.drive.cycles, cost_model.MAX_PIECE_SECONDS + _of_size(model)
     return (each * cycles + cost_model.READ_PIECE_SECONDS * min(cycles, 10.0)) * pieces_per_cycle(
         model
@@ -193,7 +215,7 @@ def seconds_of_pieces(model: Model) -> float:
 
 
 def _of_size(model: Model) -> float:
-    """Seconds of a piece of several modes and interfaces besides that of one."""
+    """Return the additional CPU seconds of a piece with several modes and interfaces."""
     modes = model.rig.modes
     return cost_model.PIECE_MODE_SECONDS * (
         modes.omega.size - 1
@@ -201,8 +223,10 @@ def _of_size(model: Model) -> float:
 
 
 def expected_seconds(model: Model) -> float:
-    """Seconds of a run from event to event as a plan counts them: what rings while an element holds is passed in the
-    share of the time in which it does."""
+    """Return the expected CPU seconds of a run from event to event, for a plan.
+
+    The pieces of ringing during stick count for the fraction of the time of stick.
+    """
     rig, (count, stiff) = model.rig, expected_elements(model)
     limit = sum(
         one.numbers.static * (model.nominal_load if one.load is None else one.load)
@@ -219,7 +243,7 @@ def expected_seconds(model: Model) -> float:
 
 
 def seconds_of_steps(model: Model) -> float:
-    """Estimated seconds of a march with the coarser runs of its error, which has none of the exactness."""
+    """Return the expected CPU seconds of a march with the coarse runs of its error estimate."""
     count, many = expected_elements(model)[0], len(model.rig.friction.interfaces)
     step = cost_model.STEP_SECONDS + cost_model.STEP_ELEMENT_SECONDS * count
     return (
@@ -230,8 +254,10 @@ def seconds_of_steps(model: Model) -> float:
 
 
 def dear_events(model: Model) -> str:
-    """Why the march is to run what the engine of events takes: its events cost more than steps and more than an exact
-    motion is worth."""
+    """Return the reason to march instead of solving from event to event; "" if there is none.
+
+    Its events cost more than time steps, and more than an exact solution is worth.
+    """
     worth = PATIENCE if steps_wanted(model) > MOST_STEPS else max(WORTH, seconds_of_steps(model))
     return (
         "time steps are faster than the exact solution" if seconds_of_pieces(model) > worth else ""
@@ -239,7 +265,10 @@ def dear_events(model: Model) -> str:
 
 
 def dear_elements(model: Model) -> str:
-    """Why the march is to run elements that stick or slip: the scene names its steps, or as of `dear_events`."""
+    """Return the reason to march with elements that stick or slip; "" if there is none.
+
+    Either the scene prescribes the steps, or see `dear_events`.
+    """
     return (
         "accuracy.steps_per_cycle is set"
         if model.accuracy.steps_per_cycle is not None
@@ -248,7 +277,7 @@ def dear_elements(model: Model) -> str:
 
 
 def refuse_endless(model: Model, numerics=None) -> None:
-    """Raise Missing when a run from event to event would take longer than LONGEST seconds."""
+    """Raise Missing if a run from event to event would take longer than LONGEST CPU seconds."""
     seconds = seconds_of_pieces(model)
     if seconds > LONGEST:
         march = ', or use accuracy.method = "march"' * (seconds_of_steps(model) < seconds)
@@ -262,7 +291,15 @@ def refuse_endless(model: Model, numerics=None) -> None:
 
 
 def exact_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the cost of a run from event to event."""
+    """Return the cost of a run from event to event.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    points : int
+        Nodes of the interface; not used.
+    """
     steps = int(pieces_per_cycle(model) * numerics.cycles)
     times = {
         "motion": expected_seconds(model),
@@ -270,7 +307,8 @@ def exact_cost(model: Model, numerics, points: int) -> Cost:
     }
     code = EVENT_CODE if model.rig.friction.interfaces else LINEAR_CODE
     if _python_seconds(model) <= compiled.PATIENCE:
-        # without machine code such a run takes 86 MB; with it 152 MB, because it loads the library of LLVM
+        # such a run takes 86 MB without machine code, and 152 MB with it, because it loads the LLVM
+        # library
         loading = replace(
             (code if _is_loop_kept(model) else code._replace(bytes=0.0)).cost(), compile_seconds=0.0
         )
@@ -280,7 +318,10 @@ def exact_cost(model: Model, numerics, points: int) -> Cost:
 
 
 def _python_seconds(model: Model) -> float:
-    """Return the CPU seconds of a run from event to event as Python, with all cells of a density."""
+    """Return the CPU seconds of a run from event to event in Python.
+
+    The elements are those of all cells of a density.
+    """
     count, stiffness = expected_elements(model)
     each = events_cost.python_seconds(
         model.rig.modes, model.rig.drive.signal, stiffness, count if stiffness else 0
@@ -289,9 +330,9 @@ def _python_seconds(model: Model) -> float:
 
 
 def _is_loop_kept(model: Model) -> bool:
-    """Return whether machine code of the loop from event to event is kept for the modes of a rig."""
+    """Return whether machine code of the event loop is cached for the modes of a rig."""
     from ...dynamics.events.histories import (
-        is_loop_kept,  # a plan does not load the engine otherwise
+        is_loop_kept,  # imported here because a plan does not need the engine otherwise
     )
 
     return is_loop_kept(model.rig.modes, model.rig.drive.signal)
@@ -304,7 +345,14 @@ def kept_samples(numerics) -> float:
 
 
 def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
-    """Return the memory of the last cycles and of what is kept of all others."""
+    """Return the memory of the last cycles, and of the data kept from all other cycles.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    history : HistoryBytes
+    """
     rig, samples = model.rig, kept_samples(numerics)
     width = 2.0 * len(rig.structure.frequencies) + 12 + 6 * len(rig.friction.interfaces)
     length_key = "drive.duration" if rig.drive.waveform.is_random else "drive.cycles"
@@ -320,7 +368,7 @@ def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[Memory
 
 
 def exact_words(model: Model, engine: str) -> list:
-    """The sentence of a plan on which engine takes the elements, and why."""
+    """Return the sentence of a plan on the engine of the elements and on its cost, as a list."""
     count, exact, march = (
         expected_elements(model)[0],
         expected_seconds(model),
@@ -333,7 +381,7 @@ def exact_words(model: Model, engine: str) -> list:
 
 
 def not_smooth(model: Model) -> str:
-    """Why a rig that the smooth engine may take is marched rather than integrated at high order; empty where it is not."""
+    """Return the reason to march a rig instead of integrating it at high order, or ""."""
     rig, accuracy = model.rig, model.accuracy
     pinned = next((f"accuracy.{key}" for key in PINNED if getattr(accuracy, key) is not None), "")
     if pinned or accuracy.quadrature not in ("auto", "recursion"):
@@ -353,8 +401,10 @@ def not_smooth(model: Model) -> str:
 
 
 def smooth_element(model: Model) -> "Element | None":
-    """The law of the interface as compiled code takes it, None where its bonds have no state or it asks for the
-    pressure behind each point."""
+    """Return the law of the interface as an Element for compiled code.
+
+    None if its bonds have no state, or if it depends on the pressure of each point.
+    """
     f = model.friction
     load = model.nominal_load
     if law_has_trait(f.law, "averaged"):
@@ -367,8 +417,11 @@ def smooth_element(model: Model) -> "Element | None":
 
 
 def smooth_steps(model: Model, element: "Element") -> float:
-    """Steps per cycle to expect: some per radian of the fastest motion, some at every reversal, and those that keep a
-    state of the law which relaxes over a short path or time stable."""
+    """Return the expected steps per cycle of the smooth engine.
+
+    They are proportional to the phase of the fastest motion, plus some at every reversal, plus
+    those that keep a state of the law with a short relaxation stable.
+    """
     rig, modes = model.rig, model.rig.modes
     omega, period = drive_omega(rig.drive.signal), rig.drive.signal.period
     damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
@@ -392,9 +445,10 @@ def smooth_steps(model: Model, element: "Element") -> float:
 
 
 def clings(model: Model, element: "Element") -> float:
-    """Share [1] of the time that a law of the speed spends at speeds over which it turns, where it is stiff.
+    """Return the fraction [1] of the time that a law of the speed spends in its stiff range.
 
-    One mode is held all the time by a force r of the limit up to 1, and less of the time the more is left to slide.
+    With a single mode it is 1 for a ratio r of the force to the limit up to 1, and less for larger
+    r.
     """
     rig, modes = model.rig, model.rig.modes
     if modes.omega.size > 1 or not modes.slide[0]:
@@ -411,9 +465,17 @@ def clings(model: Model, element: "Element") -> float:
 
 
 def smooth_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the cost of all runs of high order."""
+    """Return the cost of all runs of high order.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    points : int
+        Nodes of the interface; not used.
+    """
     rig, cycles = model.rig, model.rig.drive.cycles
-    # then it repeats
+    # after this many cycles the motion repeats, and the other cycles are not computed
     if (
         is_sinusoidal(rig.drive.signal)
         and (decay := min_decay_rate(rig.modes) * rig.drive.signal.period) > 0

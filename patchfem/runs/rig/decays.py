@@ -1,7 +1,9 @@
-"""Frequency and damping of a released rig over its amplitude, with the errors of its coarser runs and of its mesh.
+"""Frequency and damping ratio of a released rig against its amplitude, with errors.
 
-Where the nodes of a mesh and of a coarser one hold, their decays are alike, and both leave out the loss of micro-slip.
-So the error of the mesh is read off the static loops of its elements at the same amplitudes (`slip.mesh_correction`).
+In: the Solution of a release and its coarse runs. Out: a `DecayCurve` whose errors include
+those of the coarse runs and of the mesh. While the nodes of both meshes stick, their decays
+agree, although both omit the dissipation by micro-slip. Therefore the error of the mesh is
+computed from the static loops of its elements at the same amplitudes (`slip.mesh_correction`).
 """
 
 from dataclasses import replace
@@ -27,16 +29,16 @@ MOVING = (
 )
 NO_LOOP = "the hysteresis loop of this friction law is not known without a computation in time"
 NOT_STATIC = "no static curve of the mode was found at these amplitudes"
-MOST = 0.5  # of a value, the error up to which it is one
-APART = 16  # amplitudes a decade at which the error of the mesh is computed
+MOST = 0.5  # largest relative error of a point of the curve
+APART = 16  # amplitudes per decade at which the error of the mesh is computed
 
 
 def decay_of(raw: Solution) -> DecayCurve | None:
-    """The curve of the output of a release, without the points whose errors are above MOST of their values; None where
-    there is no other.
+    """Return the decay curve of the output of a release, with errors; None if it has no points.
 
-    What coarser runs change at the same amplitudes is added to what the reading leaves open; where a coarser run does
-    not reach, the error is infinite.
+    Points whose error exceeds MOST of their value are left out. The errors are those of the
+    evaluation plus the changes by the coarse runs at the same amplitudes; they are infinite outside
+    the range of a coarse run.
     """
     found = _read(raw)
     if not found.time.size:
@@ -49,7 +51,7 @@ def decay_of(raw: Solution) -> DecayCurve | None:
 
 
 def _compared(found: DecayCurve, raw: Solution) -> DecayCurve:
-    """A curve of a run with what its coarser runs change in its errors."""
+    """Return a curve of a run with the changes by its coarse runs added to the errors."""
     for run, beside in raw.coarser:
         one, other = (
             _read(run).over(found.amplitude),
@@ -60,8 +62,12 @@ def _compared(found: DecayCurve, raw: Solution) -> DecayCurve:
 
 
 def _read(run: Solution) -> DecayCurve:
-    """The curve of the half swings as long as they shrink, and behind the last slip that of the mode that rings on, at
-    each of its half swings: there other modes ring beside it, and the turns of their sum tell of none of them."""
+    """Return the decay curve of a run from its half swings, as long as they decrease.
+
+    After the last slip, the curve is that of the strongest mode that rings, at each of its half
+    swings: other modes ring at the same time, so that the turning points of their sum belong to
+    none of them.
+    """
     motion, held = run.response, run.extra.get("tail")
     found = curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
     if held is None:
@@ -77,8 +83,21 @@ def _read(run: Solution) -> DecayCurve:
 
 
 def laws_on(model, patch, meshed: tuple = ()):
-    """The `harmonic.forces.Group` of a rig on one of its meshes; patch: of its [contact], None without; meshed:
-    interfaces whose own patches are those on a coarser one. PatchfemError where a law has no steady loop of its own."""
+    """Return the `harmonic.forces.Group` of a rig on one of its meshes.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+        Patch of its [contact].
+    meshed : tuple
+        Indices of interfaces whose own patches are those on a coarser mesh.
+
+    Raises
+    ------
+    PatchfemError
+        If a law has no steady loop.
+    """
     rig = model.rig
     if len(rig.friction.interfaces) < 2:
         return balance.BalanceFinder(
@@ -91,8 +110,10 @@ def laws_on(model, patch, meshed: tuple = ()):
 
 
 def rough_laws(model, coarse) -> list:
-    """Groups of the laws with a coarser mesh of one patch after the other; coarse: the Patch of a coarser mesh of its
-    [contact] or None."""
+    """Return the Groups of the laws in which one patch after the other has a coarser mesh.
+
+    coarse: Patch of its [contact] on a coarser mesh, or None.
+    """
     return [
         *([] if coarse is None else [laws_on(model, coarse)]),
         *(laws_on(model, None, numbers) for numbers in faces.meshed(model)),
@@ -100,13 +121,30 @@ def rough_laws(model, coarse) -> list:
 
 
 def steadily(model):
-    """The model with the method left to the program."""
+    """Return the model with the automatic choice of the method."""
     return replace(model, accuracy=model.accuracy.model_copy(update={"method": "auto"}))
 
 
 def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarray:
-    """(amplitude [m], frequency [Hz], damping, loss [J]) (4, k) by a static force along the mode `number` held by laws,
-    a Group, at amplitudes (k,) [m] of the output; samples: of a cycle."""
+    """Return amplitude, frequency, damping and loss (4, k) of a mode by static loading.
+
+    Parameters
+    ----------
+    modes
+        Modal basis.
+    laws : Group
+    number : int
+        Index of the mode, along which the static force acts.
+    amplitudes : (k,)
+        Amplitudes of the output [m].
+    samples : int
+        Samples of a cycle.
+
+    Returns
+    -------
+    (4, k) array
+        Amplitude [m], frequency [Hz], damping ratio [1], and loss per cycle [J].
+    """
     held = modes.stuck_mode(laws.rows, laws.stiffness(), number)
     moved = float(modes.output @ held[1])
     return rows_of(
@@ -118,7 +156,7 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
 
 
 def rows_of(modes, found: list) -> np.ndarray:
-    """(amplitude [m] at the output, frequency [Hz], damping, loss [J]) (4, k) of `quasi_static.Static`s."""
+    """Return output amplitude [m], frequency [Hz], damping and loss [J] (4, k) of `Static`s."""
     return np.array(
         [
             (abs(float(modes.output @ one.z)), one.omega / (2 * np.pi), one.zeta, one.loss)
@@ -128,10 +166,11 @@ def rows_of(modes, found: list) -> np.ndarray:
 
 
 def mesh_error(fine, rough, read) -> np.ndarray:
-    """Return the error by the mesh of what read(Group) gives of a patch that slips part by part.
+    """Return the error by the mesh of the values that read(Group) returns, for partial slip.
 
-    It is the change by a coarser mesh at second order, and no less than what the elements change when they spread over
-    the yield slides between the nodes (`slip.mesh_correction`): a slide in which no node slips shows no change at all.
+    It is the change by a coarser mesh at second order, but not less than the change if the elements
+    are spread over the yield slides between the nodes (`slip.mesh_correction`): at a slide at which
+    no node slips, a coarser mesh changes nothing.
 
     Parameters
     ----------
@@ -149,17 +188,30 @@ def mesh_error(fine, rough, read) -> np.ndarray:
 
 
 def _spread(stiffness, slide) -> tuple:
-    """`slip.mesh_correction.spread` of elements in any order."""
+    """Return `slip.mesh_correction.spread` of elements in any order."""
     order = np.argsort(slide, kind="stable")
     return spread(stiffness[order], slide[order])
 
 
 def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:
-    """(Static errors (2, k) of frequency [Hz] and damping by the mesh at amplitudes (k,) [m] of the output, why). The
-    errors are 0 without a patch that slips part by part, and where they are not known; why: the reason, else "".
+    """Return the errors of frequency [Hz] and damping by the mesh at amplitudes of the output.
 
-    patch, coarse: of the [contact] of the rig, None without; mode(Group) -> number of the mode. amplitudes: rising;
-    between those that have a static motion the errors are interpolated.
+    Parameters
+    ----------
+    model : Model
+    patch, coarse : Patch or None
+        Patch of the [contact] of the rig, and the same on a coarser mesh.
+    amplitudes : (k,)
+        Increasing amplitudes of the output [m]. The errors are interpolated between those that have
+        a static motion.
+    mode : callable
+        Function of a Group that returns the index of the mode.
+
+    Returns
+    -------
+    tuple
+        Errors (2, k), and the reason why they are not known, else "". They are 0 without a patch
+        that slips in part, and if they are not known.
     """
     rig, none = model.rig, np.zeros((2, len(amplitudes)))
     if not (model.partial_slip or rig.friction.has_partial_slip):
@@ -188,8 +240,18 @@ def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:
 
 
 def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
-    """(Errors (2, k), why) of `left_by_mesh` at many amplitudes (k,) [m], of the held mode nearest to a frequency
-    [Hz]."""
+    """Return `left_by_mesh` at many amplitudes for the stuck mode nearest to a frequency.
+
+    Parameters
+    ----------
+    amplitude : (k,)
+        Amplitudes of the output [m].
+    frequency : float
+        [Hz].
+    model : Model
+    patch, coarse : Patch or None
+        See `left_by_mesh`.
+    """
     low, high = np.log10([amplitude.min(), amplitude.max()])
     at = np.logspace(low, high, 2 + int(APART * (high - low)))
     wide, why = left_by_mesh(
@@ -199,9 +261,14 @@ def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
 
 
 def without_slip_between_nodes(whys: dict, ways) -> list:
-    """Sentences on errors that leave out what `left_by_mesh` would add.
+    """Return sentences on errors to which `left_by_mesh` could not be added.
 
-    whys: reason, or "", by what has these errors; ways() -> the `CoarserRuns` runs in space that are part of them.
+    Parameters
+    ----------
+    whys : dict
+        Reason, or "", by the name of what has these errors.
+    ways : callable
+        Returns the `CoarserRuns` in space that contribute to them.
     """
     out = []
     for why in dict.fromkeys(filter(None, whys.values())):
@@ -217,7 +284,7 @@ def without_slip_between_nodes(whys: dict, ways) -> list:
 
 
 def _mode(modes, laws, frequency: float) -> int:
-    """Number of the held mode that moves the output and is nearest to a frequency [Hz]."""
+    """Return the index of the stuck mode that moves the output and is nearest to a frequency."""
     held = [modes.stuck_mode(laws.rows, laws.stiffness(), k) for k in range(modes.omega.size)]
     return int(
         np.argmin(

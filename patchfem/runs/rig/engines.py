@@ -1,8 +1,9 @@
-"""The engines of a rig as records: what each cannot do, how it solves, how a run of it can be coarser, what it costs.
+"""Engines of a rig as records: what each can compute, how it solves, coarse runs and cost.
 
-`engine_of` takes the engine that the scene names, or the first that can. What each takes is one table for the rules of
-the scene and for this choice, `scene.rules.methods.SUPPORT`. The bytes and the
-compile seconds of each stand in `runs.memory`.
+In: a Model. Out: its Engine (`engine_of`): the one that the scene names, or the first one that
+can compute it. `scene.rules.methods.SUPPORT` has one table of what each engine can compute, for
+the rules of the scene and for this choice. The memory and the compile time of each engine are
+in `runs.memory`.
 """
 
 from collections.abc import Callable
@@ -32,44 +33,54 @@ from ..patch import faces
 from .costs import dear_elements, dear_events, not_smooth, pieces_per_cycle
 from .solution import gauged
 
-FINER = 0.5  # merge width of the run that shows what merging does
-LOOSE = 1e-2  # tail over the tolerance from which it is checked by a run with less; unpinned it is a tenth of that
-LESS = 0.1  # tail of that run
-MOST_PIECES = 1e5  # of a period, up to which a steady motion is found by the map of its yields
+FINER = 0.5  # factor of the merge width in the coarse run that shows the error of merging
+# tail over the tolerance, above which a run with a smaller tail checks it; the automatic tail is a
+# tenth of this
+LOOSE = 1e-2
+LESS = 0.1  # factor of the tail in that run
+# most pieces per period with which a steady motion is found by the map of its yields
+MOST_PIECES = 1e5
 
 
 class Variant(NamedTuple):
-    """A coarser run of a rig: its Numerics and the Patch that it takes, None under [normal]."""
+    """Coarse run of a rig: its Numerics, and the Patch that it uses (None under [normal])."""
 
     numerics: object
     patch: object
 
 
-CLOSED = 1e-8  # gap of an energy balance that is kept to round-off: a billion steps leave less
+# largest error of an energy balance that is accurate to round-off: a billion steps have less
+CLOSED = 1e-8
 
 
 def function_of(where: str) -> Callable:
-    """The function that "module function" of this folder names, imported now."""
+    """Import and return the function that "module function" of this folder names."""
     module, function = where.split()
     return getattr(import_module(f"patchfem.runs.rig.{module}"), function)
 
 
 class Engine(NamedTuple):
-    """One engine of a rig; what it takes stands under its name in `scene.rules.methods.SUPPORT`.
+    """Engine of a rig; `scene.rules.methods.SUPPORT` says what it can compute.
 
-    method: the accuracy.method that names it, "" where only "auto" comes to it. dearer(model) ->
-    why a model that names no engine is better served by the next one, "" where not. solve:
-    function(model, numerics, patch, frames, say, progress) -> Solution; chosen: function(model,
-    Numerics) -> Numerics as the engine has them; refuse: function(model, numerics), which raises
-    Missing where a run would not end; cost: function(model, numerics, unknowns) -> (steps,
-    seconds); words: function(model, numerics) -> sentences of a plan; notes: function(model,
-    numerics, patch, Solution) -> notes of a run. All of these are "module function" of this folder,
-    "" where there is none. in_time(model, numerics, patch) and in_space(model, numerics, patch,
-    coarse, solution) -> list of `CoarserRuns`; least: relative error that stays; closes: gap of the
-    energy balance beyond which a run has not converged, None where the engine's own error of the
-    balance says it, infinite of methods that are shown with what they lose. tells: numbers of a run
-    that its summary has; resumes: it keeps its state on the way; steady: it finds motions that
-    repeat.
+    The fields that name a function are "module function" of this folder, or "" for none.
+
+    - method: value of accuracy.method that selects it; "" if only "auto" does.
+    - dearer: function (model) -> reason why the next engine is better for a model that names none,
+      or "".
+    - solve: function (model, numerics, patch, frames, say, progress) -> Solution.
+    - chosen: function (model, Numerics) -> Numerics of this engine.
+    - refuse: function (model, numerics) that raises Missing if a run would take too long.
+    - cost: function (model, numerics, points) -> Cost.
+    - words: function (model, numerics) -> sentences of a plan.
+    - notes: function (model, numerics, patch, Solution) -> notes of a run.
+    - in_time: function (model, numerics, patch) -> list of `CoarserRuns`.
+    - in_space: function (model, numerics, patch, coarse, solution) -> list of `CoarserRuns`.
+    - least: smallest relative error.
+    - closes: error of the energy balance above which a run has not converged; None if the error
+      estimate of the balance decides, inf for methods that state their loss.
+    - tells: numbers of a run that the summary contains.
+    - resumes: whether it saves its state during a run.
+    - steady: whether it finds periodic motions.
     """
 
     name: str
@@ -90,8 +101,10 @@ class Engine(NamedTuple):
     steady: bool = False
 
     def in_modes(self, model: Model, numerics, patch) -> list:
-        """The run with more modes of a reduced structure, [] where it leaves none out; in a march at a quarter of the
-        steps."""
+        """Return the run with more modes of a reduced structure; [] if no mode is left out.
+
+        For a march, it has a quarter of the steps.
+        """
         if model.rig.structure.richer_rig is None:
             return []
         few = _fewer(numerics, 4) if self.in_time is _march_in_time else numerics
@@ -104,29 +117,34 @@ class Engine(NamedTuple):
 
     @property
     def run(self) -> Callable:
-        """The function that solves, imported when it is first wanted."""
+        """Function that solves, imported on first use."""
         solve = function_of(self.solve)
         return lambda model, *given: gauged(model, solve(model, *given))
 
     def lacks(self, model: Model, steady: bool = False) -> str:
-        """The first thing in a model that the engine does not take, as words behind it; "" where it takes all. steady:
-        under the sine of a curve, not the drive's own waveform."""
+        """Return the first property of a model that the engine cannot compute, as text; "" if none.
+
+        steady: whether the drive is the sine of a curve instead of its own waveform.
+        """
         return methods.unsupported_feature(self.name, motion_of(model, steady))
 
     def call(self, hook: str, *given) -> Any:
-        """What the function of one of its fields gives, None where it has none."""
+        """Call the function that a field names; None if it names none."""
         where = getattr(self, hook)
         return function_of(where)(*given) if where else None
 
 
 def inexact(model: Model, steady: bool = False) -> str:
-    """Why no engine of accuracy.method = "exact" takes a model, "" where one does; steady as in `Engine.lacks`."""
+    """Return the reason why no engine of accuracy.method = "exact" can compute a model, or "".
+
+    steady: see `Engine.lacks`.
+    """
     reasons = [one.lacks(model, steady) for one in ENGINES.values() if one.method == EXACT.method]
     return reasons[-1] if all(reasons) else ""
 
 
 def motion_of(model: Model, steady: bool = False) -> methods.Motion:
-    """What a model confronts an engine with."""
+    """Return the properties of a model that decide which engines can compute it."""
     rig = model.rig
     spring = (
         "[structure.stiffening]"
@@ -151,8 +169,12 @@ def motion_of(model: Model, steady: bool = False) -> methods.Motion:
 
 
 class Finder(NamedTuple):
-    """One way to a steady motion: words of a plan; solve: "module class" of this folder; like: the engine whose code it
-    runs and whose knobs act on it."""
+    """Method that finds a steady motion.
+
+    - words: text of a plan.
+    - solve: "module class" of this folder.
+    - like: name of the engine whose code it runs and whose numerical settings apply.
+    """
 
     name: str
     words: str
@@ -184,11 +206,11 @@ FINDERS = {
 
 
 def steady_by(model: Model) -> Finder:
-    """Choose how the steady motion of a model is found.
+    """Choose the method that finds the steady motion of a model.
 
-    Maps of events or of yields are exact. A march whose initial state is corrected until the motion repeats serves
-    grooves. Harmonic balance serves all else, also a scene that names `harmonics`, or whose springs ring without end
-    between yields.
+    Maps of events or of yields are exact. For grooves, the initial state of a march is corrected
+    until the motion repeats. Harmonic balance is used for all other models, and for a scene that
+    sets `harmonics` or whose springs ring without end between yields.
     """
     if not EXACT.lacks(model, steady=True):
         return FINDERS["events"]
@@ -203,11 +225,12 @@ def steady_by(model: Model) -> Finder:
 
 
 def _none(*_) -> list:
+    """Return no coarse runs."""
     return []
 
 
 def sampling_errors(values: dict) -> dict:
-    """Errors by name of the measures that are read off 400 samples a cycle."""
+    """Return errors by name of the measures that are computed from 400 samples per cycle."""
     loops = (
         "loop_area",
         "equivalent_stiffness",
@@ -226,10 +249,11 @@ def sampling_errors(values: dict) -> dict:
 
 
 def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """The coarser runs of the exact engine: the mesh, where the loads of strips or the limit of an averaged law hang on
-    it.
+    """Return the coarse runs of the exact engine in space.
 
-    Strips that slide apart are read off 400 samples a cycle besides, by the trapezoidal rule.
+    They are those on the mesh if the loads of strips or the limit of an averaged law depend on it.
+    The measures of strips that slide independently also have the error of the trapezoidal rule with
+    400 samples per cycle.
     """
     averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
     meshed = coarse is not None and (model.rig.friction.strips_slide_apart or averaged)
@@ -238,8 +262,7 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """The coarser runs of the engine of pieces: the mesh, where its nodes make the elements, and fewer cells of
-    a density."""
+    """Return the coarse runs of the engine of yields: coarser meshes, fewer cells of a density."""
     meshes = [Variant(one, patch) for one in _meshed(model, numerics)]
     if coarse is not None and model.partial_slip:
         meshes = [Variant(numerics, coarse), *meshes]
@@ -252,19 +275,19 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _meshed(model: Model, numerics) -> list:
-    """Numerics with a coarser mesh of one patch of interfaces after the other."""
+    """Return Numerics in which one patch of the interfaces after the other has a coarser mesh."""
     if not model.rig.friction.has_partial_slip:
         return []
     return [replace(numerics, meshed=one) for one in faces.meshed(model)]
 
 
 def _fewer(numerics, share: int):
-    """Numerics with the steps divided by `share`."""
+    """Return Numerics with the steps divided by `share`."""
     return replace(numerics, steps=max(1, numerics.steps // share))
 
 
 def _march_in_time(model: Model, numerics, patch) -> list:
-    """The coarser runs of the march in time: half and a quarter of the steps."""
+    """Return the coarse runs of a march in time: half and a quarter of the steps."""
     return [
         CoarserRuns(
             _halves(numerics, patch), partial(step_errors, steps=numerics.steps), of="steps"
@@ -273,17 +296,20 @@ def _march_in_time(model: Model, numerics, patch) -> list:
 
 
 def _halves(numerics, patch) -> tuple:
+    """Return the Variants with half and a quarter of the steps."""
     return tuple(Variant(_fewer(numerics, share), patch) for share in (2, 4))
 
 
 def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """The coarser runs of the march in space: the mesh, the number of shear modes and the sum over bonds, at a quarter
-    of the steps."""
+    """Return the coarse runs of a march in space, at a quarter of the steps.
+
+    They have a coarser mesh, another number of shear modes, or another sum over bonds.
+    """
     few, varies, out = _fewer(numerics, 4), model.rig.friction.load_varies, []
     quarter = Variant(few, patch)
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.partial_slip):
-        # one change at a time
+        # the number of shear modes is fixed, so that only the mesh changes
         fixed = few if shape is None else replace(few, shear_modes=shape.size)
         out.append(coarser_space(Variant(fixed, coarse), quarter))
     out += [coarser_space(Variant(one, patch), quarter) for one in _meshed(model, few)]
@@ -291,7 +317,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
         model.grooves is not None,
         model.patch is not None and model.patch.mesh.can_gather_points,
     )
-    # few points state themselves what their modes leave out
+    # a reduction to few points states the error of its modes itself
     pointed = coarse is not None and not gathers
     if shape is not None and (
         varies or climbs or (pointed and law_has_trait(model.friction.law, "bonds"))
@@ -302,8 +328,11 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _summed(model: Model, few, patch, solution) -> list:
-    """The coarser runs of a list of bonds: its stated bound on forces and energies, and, where it merges or its tail
-    was set loose, the change of the motion with narrower strips and a smaller tail, at the steps of `few`."""
+    """Return the coarse runs of a list of bonds, at the steps of `few`.
+
+    They are its bound on forces and energies and, if it merges bonds or its tail is large, the
+    change of the motion with narrower strips and a smaller tail.
+    """
     choice = solution.summed
     if choice is None or not choice.error:
         return []
@@ -320,7 +349,7 @@ def _summed(model: Model, few, patch, solution) -> list:
 
 
 def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
-    """Return `friction_errors` of a sum over bonds whose error is a fraction [1] of the friction limit."""
+    """Return `friction_errors` of a sum over bonds with an error relative to the friction limit."""
     friction, load = model.friction, patch.pressure.load if patch is not None else model.point.load
     passed = np.abs(np.diff(solution.window.extra["ledger"][0])).sum()
     span = solution.window.time[-1] - solution.window.time[0]
@@ -336,13 +365,16 @@ def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) ->
 
 
 def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
-    """What a run itself leaves open: the residual of a balance and the change at half the harmonics, or what samples do
-    not resolve."""
+    """Return the errors that a run itself states, as `CoarserRuns` without runs.
+
+    They are the residual of a balance and its change at half the harmonics, or the error of the
+    samples.
+    """
     return [CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
 
 
 def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
-    """The coarser runs of a steady motion: what it leaves open itself, and the mesh where nodes are elements."""
+    """Return the coarse runs of a steady motion: its own errors, and coarser meshes."""
     meshed = (
         _pieces_in_space(model, numerics, patch, coarse, solution)
         if steady_by(model).like == PIECES.name
@@ -351,14 +383,14 @@ def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     return [*_own_errors(model, numerics, patch, coarse, solution), *meshed]
 
 
-COARSER = 30.0  # times the error of a step
+COARSER = 30.0  # factor of the error of a step in the coarse run
 WIDER_TOLERANCE = partial(coarser_errors, ratio=COARSER)
 
 
 def _smooth_in_time(model: Model, numerics, patch) -> list:
-    """The coarser runs of the smooth engine: a run whose steps may make COARSER times the error.
+    """Return the coarse run of the smooth engine, whose steps may have COARSER times the error.
 
-    The error of a run follows that of its steps.
+    The error of a run is proportional to that of its steps.
     """
     wider = Variant(replace(numerics, local=numerics.local * COARSER), patch)
     return [CoarserRuns((wider,), WIDER_TOLERANCE)]
@@ -424,19 +456,19 @@ HARMONIC = Engine(
     steady=True,
 )
 ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC)}
-AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # in the order in which they are tried
+AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # engines in the order in which they are tried
 
 
 def unbalanced(engine: Engine, measures: dict) -> str:
-    """The sentence on an energy balance that does not close as this engine closes it; "" where it does.
+    """Return the sentence on an energy balance with too large an error for the engine, or "".
 
-    measures: by name, with their errors, of a run of the engine.
+    measures: measures of the run by name, with their errors.
     """
     found = measures.get("energy_balance")
     if found is None or found.value is None:
         return ""
     bar = max(CLOSED, found.error or 0.0) if engine.closes is None else engine.closes
-    if not found.value > bar:  # a motion that is not finite has been seen before
+    if not found.value > bar:  # a motion that is not finite was detected before
         return ""
     return (
         f"the energy balance of engine {engine.name} has an error of {found.value:.2g} of the energy exchanged, "
@@ -446,10 +478,13 @@ def unbalanced(engine: Engine, measures: dict) -> str:
 
 @lru_cache(8)
 def engine_of(model: Model, per_point: bool = False) -> Engine:
-    """The engine that a scene names, of several of that name the first that takes the model, or the first of AUTOMATIC
-    that takes it and is not dearer than the next.
+    """Return the engine of a model.
 
-    per_point: bonds are followed at every node, which the smooth engine does not.
+    It is the one that the scene names (of several with this name the first that can compute the
+    model), else the first of AUTOMATIC that can compute it and is not more expensive than the next
+    one.
+
+    per_point: whether bonds are followed at every node, which the smooth engine cannot do.
     """
     named = [one for one in ENGINES.values() if one.method == model.accuracy.method]
     if named:
@@ -462,7 +497,7 @@ def engine_of(model: Model, per_point: bool = False) -> Engine:
 
 
 def knobs_idle(model: Model, engine: str) -> list:
-    """Sentences on the knobs of [accuracy] that a rig names and that the engine it is run by does not take."""
+    """Return sentences on the settings in [accuracy] of a rig that its engine does not use."""
     by = steady_by(model).like if ENGINES[engine].steady else engine
     where = {
         "steps_per_cycle": f"for engine '{engine}', which has no steps,",

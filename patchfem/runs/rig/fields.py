@@ -1,4 +1,8 @@
-"""Frames of the interface in the last cycle of a coupled run: pressure, gap, shear stress and slip at its nodes."""
+"""Frames of the interface in the last cycle of a coupled run.
+
+In: the Solution of a run with its snapshots, and the pressed patch. Out: pressure, gap, shear
+stress and slip at the nodes of the interface by name.
+"""
 
 import numpy as np
 
@@ -12,9 +16,17 @@ from ..results.result import FRAMES, at_rest, frames_of
 
 
 def fields_of(model, numerics, patch, raw) -> dict:
-    """Interface frames of the last cycle by name; patch: the solved Patch, raw: a Solution."""
+    """Return the frames of the interface in the last cycle by name.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch
+    raw : Solution
+    """
     sigma, f = patch.pressure.sigma_n, model.friction
-    # strips have no common field of shear
+    # strips have no common shear stress
     if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
         return at_rest(patch)
     if model.rig.friction.load_varies:
@@ -64,7 +76,10 @@ def fields_of(model, numerics, patch, raw) -> dict:
 
 
 def _under_changing_load(patch, raw) -> dict:
-    """Interface frames (f, x) of a run, the pressed state first; status 0 open, 1 stick, 2 slip."""
+    """Return interface frames (f, x) of a run with a varying load, the pressed state first.
+
+    Its status is 0 for open, 1 for stick and 2 for slip.
+    """
     law, sets, weight = raw.contact.law, raw.contact.sets, patch.pieces.interface.weight
     shots = raw.snapshots
     time, slide = (np.array([0.0] + [shot[key] for shot in shots]) for key in ("time", "slide"))
@@ -79,7 +94,7 @@ def _under_changing_load(patch, raw) -> dict:
         tau[k], stretch = _shear(law, shot, nodal[k])
         local[k] = slide[k] - stretch - shot["bend"]
     moved = np.abs(np.diff(local, axis=0, prepend=local[:1]))
-    moved[:2] = 0.0  # the first moving frame has no frame before it to slip from
+    moved[:2] = 0.0  # the first frame of the motion has no previous frame from which it could slip
     status = np.where(nodal > 0, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0).astype(
         np.int8
     )
@@ -95,7 +110,7 @@ def _under_changing_load(patch, raw) -> dict:
 
 
 def _shear(law, shot, nodal) -> tuple:
-    """(friction forces (m,) [N], stretches (m,) [m]) of the nodes in a snapshot."""
+    """Return friction forces (m,) [N] and stretches (m,) [m] of the nodes in a snapshot."""
     top, bottom, _ = shot["memory"]
     if law.kind == varying_load.PLASTIC:
         return law.static * top, law.length * np.divide(

@@ -1,4 +1,8 @@
-"""Where friction no longer holds a mode that gains energy: `flutter_amplitude`, by `dynamics.limit_cycles`."""
+"""Amplitude above which friction does not limit a mode that gains energy.
+
+In: a `rig.Coupled` with a mode of negative damping. Out: `flutter_amplitude`, the amplitude of
+the largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
+"""
 
 from ...core import Measure, NotConverged, Outcome, PatchfemError
 from ...dynamics import limit_cycles
@@ -31,8 +35,11 @@ SLIDES = (
 
 
 def flutter_of(run) -> tuple:
-    """(measures by name, notes) of a `rig.Coupled` with a mode of damping < 0: the amplitude of the largest limit cycle
-    that does not last, with its error, or the reason why it is not known."""
+    """Return the measures by name and the notes on unstable limit cycles of a `rig.Coupled`.
+
+    The measure is the amplitude of the largest unstable limit cycle with its error, or the reason
+    why it is not known.
+    """
     model, unit, floor = run.model, TABLE[NAME].unit, TABLE[NAME].floor
     found, reason, looked = _cycles(model, run.numerics, run.patch)
     far = (
@@ -50,7 +57,7 @@ def flutter_of(run) -> tuple:
     least = [
         one for one in found if not one.lasts and below and one.amplitude < below[0].amplitude
     ][-1:]
-    # nothing rings in a stick
+    # a rigid interface with a single mode does not vibrate during stick
     alone = law_has_trait(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1
     falls = (
         f"amplitude between {format_length(least[0].amplitude, 3)} and this"
@@ -76,8 +83,10 @@ def flutter_of(run) -> tuple:
 
 
 def _cycles(model, numerics, patch) -> tuple:
-    """(list of `limit_cycles.Cycle`, the sentence where it holds none that does not last, the smallest amplitude [m] at
-    the output that was looked at, 0 where all were)."""
+    """Return limit cycles, the reason if none is unstable, and the smallest amplitude searched.
+
+    The amplitude [m] is that of the output, and 0 if all amplitudes were searched.
+    """
     rig, f = model.rig, model.friction
     if len(rig.friction.interfaces) != 1 or f is None:
         return [], "limit cycles can be computed for one interface only", 0.0

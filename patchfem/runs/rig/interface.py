@@ -1,4 +1,8 @@
-"""From the law, the load and the pressed patch to the contact that a march moves."""
+"""Contact that an engine moves, from the friction law, the load and the pressed patch.
+
+In: a Model, its Numerics and its pressed patch. Out: a contact model of `dynamics` (single
+interface, several joints, grooves, varying load) or the Elements of every interface.
+"""
 
 from weakref import WeakKeyDictionary
 
@@ -21,14 +25,28 @@ from . import strips, varying_load
 from .lists import quadrature_of
 from .numerics import Numerics
 
-FEWER = 1e-3  # of the tolerance, by which few modes, and few points for all, may each miss the backbone of the patch
+# fraction of the tolerance by which a small number of modes, and of points, may each miss the
+# backbone of the patch
+FEWER = 1e-3
 
 
 def contact_of(model: Model, numerics: Numerics, patch):
-    """The contact that a march takes: a ContactModel, a JointsModel where interfaces or springs stand beside it, or one
-    that climbs grooves.
+    """Return the contact that a march moves.
 
-    patch: the solved Patch or None under [normal]. PatchfemError for a law that cannot stand beside others.
+    It is a ContactModel, a JointsModel if there are several interfaces or nonlinear springs, or a
+    model of grooves.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+        None under [normal].
+
+    Raises
+    ------
+    PatchfemError
+        For a law that cannot be combined with other joints.
     """
     rig, second = model.rig, model.rig.modes.lateral_faces
     many = len(rig.modes.interfaces) > 1 or second is not None
@@ -57,7 +75,7 @@ def contact_of(model: Model, numerics: Numerics, patch):
 
 
 def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
-    """The Elements of interfaces, or of the strips of the one patch, each of which slides by itself."""
+    """Return the Elements of interfaces, or of the strips of a patch, that slide independently."""
     if patch is None:
         return own_elements(model, numerics.meshed)
     f = model.friction
@@ -71,7 +89,10 @@ def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
 
 
 def own_elements(model: Model, meshed: tuple) -> list:
-    """The Element of every interface under a load of its own; meshed: interfaces whose patches are the coarser ones."""
+    """Return the Element of every interface under its own load.
+
+    meshed: indices of interfaces whose patches are those on the coarser mesh.
+    """
     return [
         parallel(*faces.elements_of(one, model.accuracy.tolerance, k in meshed)[:2])
         if one.partial_slip
@@ -81,7 +102,7 @@ def own_elements(model: Model, meshed: tuple) -> list:
 
 
 def _climbing(model: Model, patch, count: int | None = None):
-    """The model of a rig whose load climbs grooves."""
+    """Return the model of a rig whose load climbs grooves."""
     f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
     if model.partial_slip or not law_has_trait(f.law, "memoryless"):
         return rigid.climbing(model, load, patch, count)
@@ -92,7 +113,16 @@ def _climbing(model: Model, patch, count: int | None = None):
 
 
 def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:
-    """The law of an interface under a load [N]; speed [m/s] to expect."""
+    """Return the friction law of an interface under a load as an Element.
+
+    Parameters
+    ----------
+    one : InterfaceLaw
+    load : float
+        Normal load [N].
+    speed : float
+        Expected slip speed [m/s].
+    """
     f = one.numbers
     if law_has_trait(f.law, "bonds"):
         return points_element(bond_parameters(f, speed, 1e-12), [1.0], [load])
@@ -100,9 +130,14 @@ def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:
 
 
 def contact_model(model: Model, numerics: Numerics, patch):
-    """The ContactModel of the one interface of a rig, by its law, load and what gives way.
+    """Return the ContactModel of the single interface of a rig.
 
-    patch: the solved Patch or None under [normal].
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+        None under [normal].
     """
     f, soft = model.friction, model.partial_slip
     if f is None:
@@ -124,7 +159,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
     if not soft:
         return models.element_model(one)
 
-    if patch.strips is not None:  # one slide of them all
+    if patch.strips is not None:  # all strips have the same slide
         strips = jenkins_elements.strip_elements(patch, f.static, one.length)
         return models.jenkins_model(*map(np.concatenate, zip(*strips)))
     found = jenkins_elements.elements(patch, f.static, one.length)
@@ -132,7 +167,10 @@ def contact_model(model: Model, numerics: Numerics, patch):
 
 
 def _bonds(model: Model, numerics: Numerics, patch, load: float):
-    """The contact of a sum over bonds: a list of them, points behind shear modes, points of a field, or one point."""
+    """Return the contact of a sum over bonds.
+
+    It is a list of bonds, points with shear modes, points of a field, or a single point.
+    """
     law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
     if model.side == "lower" and (model.partial_slip or found.engine != "recursion"):
         return shear.on_the_lower(
@@ -162,9 +200,9 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
 
 
 def _shear_modes(patch, law, count: int | None, model) -> tuple:
-    """Return the shear modes and the normal forces (k,) [N] of the points that represent all others, else None.
+    """Return the shear modes and, for a reduction to few points, the forces (k,) [N] of these.
 
-    They are computed once for all marches of a pressed patch.
+    The forces are None for all points. They are computed once for all marches of a pressed patch.
     """
     made, tolerance, few = (
         _MADE.setdefault(patch, {}),
@@ -185,9 +223,24 @@ def _shear_modes(patch, law, count: int | None, model) -> tuple:
 
 
 def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple | None:
-    """(ShearModes of so many points, their limits [N], share of the friction limit by which they miss the backbone of
-    the patch) with the fewest modes, `modes` at most, that miss it by less than a tolerance; None where it takes
-    more."""
+    """Return a reduction of a patch to few points with the fewest shear modes, or None.
+
+    Parameters
+    ----------
+    patch : Patch
+    law
+        Bond parameters.
+    tolerance : float
+        Largest error of the backbone of the patch, as a fraction of the friction limit [1].
+    points, modes : int
+        Number of points, and largest number of modes.
+
+    Returns
+    -------
+    tuple or None
+        ShearModes of the points, their limits [N], and the error of the backbone as a fraction of
+        the friction limit; None if more modes are needed.
+    """
     made, key = (
         _MADE.setdefault(patch, {}),
         (law.static, law.length, law.ratio, tolerance, points, modes),
@@ -202,5 +255,5 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
     return made[key]
 
 
-# Patch -> shear modes by what they are made of, for as long as it lives
+# shear modes of each Patch by their parameters, kept as long as the Patch lives
 _MADE = WeakKeyDictionary()

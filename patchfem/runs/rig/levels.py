@@ -1,4 +1,8 @@
-"""Levels: the level of the drive changed in steps with the state carried over, and the onset between two."""
+"""Drive in levels: the amplitude changes in steps with the state carried over.
+
+In: the runs of successive levels. Out: `Level`s with errors, the onset between two levels by
+bisection, and the joined run.
+"""
 
 from dataclasses import replace
 
@@ -10,27 +14,35 @@ from ...response.levels import JUMP, Level, bracket, hysteresis, jump, no_onset,
 from ...response.rows import TABLE
 from ...structure.drive_sizes import drive_omega
 
-EXACT = 1e-9  # relative error of what is read off a motion in closed form
-MOST = 40  # halvings of the bracket of an onset
+EXACT = 1e-9  # relative error of measures of a motion in closed form
+MOST = 40  # most bisections of the bracket of an onset
 
 
 def level_ends(rig) -> tuple:
-    """Cycles (l,) after which the levels of a drive end; () without levels."""
+    """Return the cycles (l,) after which the levels of a drive end; () without levels."""
     return tuple(rig.drive.levels.cycles * (k + 1) for k in range(len(rig.drive.levels.amplitudes)))
 
 
 def levels_with_errors(levels, ways, made: dict) -> tuple:
-    """The levels with what the coarser runs of theirs leave open at each of them, over what is a level's own.
+    """Return the levels with the errors by their coarse runs in addition to their own errors.
 
-    made: variant -> Solution of the runs that the ladder takes. What a coarser run does not reach is as uncertain as it
-    is large.
+    The error of a measure that a coarse run does not have is its absolute value.
+
+    Parameters
+    ----------
+    levels : sequence of Level
+    ways : sequence of CoarserRuns
+    made : dict
+        Solution by variant of the coarse runs.
     """
 
     def seen(variant, number: int) -> dict:
+        """Return the measures of a level in a coarse run; {} if the run ended before it."""
         found = made[variant].levels
         return found[number].values if number < len(found) else {}
 
     def open_at(number: int, level: Level) -> dict:
+        """Return the errors of a level by measure name."""
         parts = [
             way.rule(
                 level.values if way.beside is None else seen(way.beside, number),
@@ -49,13 +61,27 @@ def levels_with_errors(levels, ways, made: dict) -> tuple:
 
 
 def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
-    """Onset [m s-2] and half its bracket, by halving between the last level before it and the first beyond it.
+    """Return the onset [m s-2] and half its bracket, by bisection between two levels.
 
-    probe(number of the level before or -1, level) -> Level runs one more level from the state that it left; past(Level)
-    -> bool, of slip unless given, as `response.levels.past_onset` makes it.
+    They are the last level below the onset and the first one above it. The bisection ends when the
+    bracket is `tolerance` times the level; if all levels down to 0 are above the onset, times the
+    first level above it. A law for which every level is above the onset (bonds that chatter) has no
+    onset.
 
-    The halving goes on until the bracket is `tolerance` of the level, or of the first one beyond where all down to
-    nought are: a law under which every level is past the onset (bonds that chatter) has none to be found.
+    Parameters
+    ----------
+    levels : sequence of Level
+    probe : callable
+        Function (index of the previous level or -1, level) -> Level that runs another level from
+        the end of the previous one.
+    tolerance : float
+    past : callable, optional
+        Function of a Level from `past_onset`; by default that of slip.
+
+    Returns
+    -------
+    tuple or None
+        None if no level is above the onset.
     """
     past = past_onset("slip") if past is None else past
     found = bracket(levels, past)
@@ -76,17 +102,29 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
 
 
 def drive_with(drive, number: int, level: float):
-    """The drive with `level` [m s-2] in place of the level of this number (from 0), and none after it."""
+    """Return the drive that ends with `level` [m s-2] in place of the level of this index."""
     return replace(
         drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level))
     )
 
 
 def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=()) -> dict:
-    """Measures over all levels: onset_level, jump_level, level_hysteresis, with a reason where they have no value.
+    """Return the measures over all levels, with a reason for those without a value.
 
-    rig: model.rig, with the kind of onset; probe as in `onset`; rubs: whether an interface bears a load; coarser: as in
-    Solution; by the distance of the onsets of each pair that of the run may be off.
+    They are onset_level, jump_level and level_hysteresis.
+
+    Parameters
+    ----------
+    rig : Rig
+        Has the kind of onset.
+    levels : sequence of Level
+    probe : callable
+        See `onset`.
+    tolerance : float
+    rubs : bool
+        Whether an interface carries a load.
+    coarser : sequence
+        See `Solution`; the distance between the onsets of each pair is added to the error.
     """
     unit, size, out = _unit(rig), _size(rig), {}
     past = past_onset(*rig.drive.levels.onset)
@@ -105,7 +143,7 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
             None, unit, None, TABLE["onset_level"].floor, reason=no_onset(*rig.drive.levels.onset)
         )
     if (leap := jump(levels)) is not None:
-        width = size * float(leap[2])  # it lies between two levels
+        width = size * float(leap[2])  # the jump lies between two levels
         out["jump_level"] = Measure(size * leap[0], unit, width, width)
     else:
         out["jump_level"] = Measure(
@@ -122,30 +160,45 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
 
 
 def in_scene_units(rig, levels) -> tuple:
-    """The levels as the results show them: of a force drive with the force [N]."""
+    """Return the levels in the units of the scene: of a force drive with the force [N]."""
     return tuple(
         replace(level, drive=_size(rig) * level.drive, unit=_unit(rig)) for level in levels
     )
 
 
 def _unit(rig) -> str:
+    """Return the unit of the levels in the scene."""
     return "N" if rig.drive.kind == "force" else "m s-2"
 
 
 def _size(rig) -> float:
-    """What a level of the drive [m s-2] is in the unit of the scene, over it."""
+    """Return the factor from a level of the drive [m s-2] to its unit in the scene."""
     return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
 
 def by_levels(reader, go, state, end, progress=None) -> tuple:
-    """Runs of all levels of a drive one after the other, each from where the one before it ended: (their run, the
-    fields `levels` and `probe` of its Solution).
+    """Run all levels of a drive, each from the state at the end of the previous one.
 
-    reader: Reader of the runs; go(sine, state, watch, last) -> run; state: to begin from; end(run) -> state.
+    Parameters
+    ----------
+    reader : Reader
+    go : callable
+        Function (sine, state, watch, last) -> run.
+    state
+        Initial state.
+    end : callable
+        Function of a run that returns its final state.
+    progress : callable, optional
+
+    Returns
+    -------
+    tuple
+        The joined run, and the fields `levels` and `probe` of its Solution.
     """
     rig, states, parts, found = reader.model.rig, [state], [], []
 
     def at(level, state, watch=None, last=False) -> tuple:
+        """Run one level from a state, and return the run and its Level."""
         sine = SineDrive(level, drive_omega(rig.drive.signal), rig.drive.signal.moving)
         done = go(sine, state, watch, last)
         return done, reader.level(level, done, sine, EXACT)
@@ -167,7 +220,7 @@ def by_levels(reader, go, state, end, progress=None) -> tuple:
 
 
 def without_part_of_cycle(done):
-    """The run without the extremes and the phasor of a last cycle that is cut short."""
+    """Return the run without the extremes and the phasor of an incomplete last cycle."""
     count = int(done.cycles_done + 1e-9)
     if not count or count >= len(done.amplitudes):
         return done
@@ -175,15 +228,19 @@ def without_part_of_cycle(done):
 
 
 def joined_runs(parts, each: float):
-    """Runs of `each` [s] one after the other as one EventRun or PieceRun; its window and loop are those of the last."""
+    """Join successive runs of `each` [s] to a single EventRun or PieceRun.
+
+    Window and loop are those of the last run.
+    """
     shift = [k * each for k in range(len(parts))]
-    # where one ends the next begins
+    # the last sample of a run is the first one of the next
     last, rows = (
         parts[-1],
         [slice(None, -1)] * (len(parts) - 1) + [slice(None)],
     )
 
     def column(of):
+        """Return the concatenation of a history over all runs."""
         return np.concatenate([of(p)[part] for p, part in zip(parts, rows)])
 
     columns = {
@@ -218,7 +275,7 @@ def joined_runs(parts, each: float):
 
 
 def _later(time, shift: float):
-    """Times moved by `shift` [s], the two sides of an event still apart."""
+    """Return times shifted by `shift` [s], with the two sides of an event still distinct."""
     moved = time + shift
     before = np.flatnonzero(moved[1:] <= moved[:-1])
     moved[before] = np.nextafter(moved[before], -np.inf)

@@ -1,7 +1,9 @@
-"""How the bonds of a rig are summed, and what a list of them costs: of a block that moves, or that its bonds hold.
+"""Sum over the bonds of a rig, and the cost of a list of them.
 
-A law without stiffness, the printed one and that of order 0, holds a block by turning back in almost every step, and
-each turn leaves a strip in the list: its cost grows with the square of the steps.
+In: a Model and its Numerics. Out: the Choice of a method for the sum (`quadrature_of`), and the
+predicted length and CPU seconds of a list. A law without stiffness, the printed one and that of
+order 0, keeps a block from sliding by a reversal in almost every step. Each reversal adds a
+strip to the list, so that its cost grows with the square of the steps.
 """
 
 from functools import lru_cache
@@ -21,32 +23,39 @@ from ...structure.drive_sizes import drive_omega, max_acceleration, max_frequenc
 from ..bench import engine as bench_engine
 from .numerics import Numerics
 
-# share of the first stroke of a motion that is released, by which its bonds are summed
+# fraction of the first stroke of a released motion that the sum over its bonds resolves
 DECAYED_FRACTION = 1e-2
-HELD = 1e-4  # share of the drive's stroke that a block makes which the printed law holds (measured: 1e-2 to 1e-4)
-# s per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
+# stroke of a block that the printed law keeps from sliding, over the stroke of the drive (measured:
+# 1e-2 to 1e-4)
+HELD = 1e-4
+# CPU seconds per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
 GROWING_STEP = 1e-6
-# D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
+# limit over drive force (D) from which a block is stuck: 0.6 and more strips per step, against 0.06
+# at D = 1.06 and 0.28 at D = 1.4
 MIN_STUCK_RATIO = 2.0
-TURNING = 0.1  # strokes per step from which they are those of the steps
-MOST_CROWDED = 500  # strips of its list, about one per step, from which steps are not halved again: four times the cost
-# bond lengths of slip from which a block moves; of the steps that were seen: 0 to 3
+TURNING = 0.1  # strips per step above which the reversals are those of the steps
+# strips of a list, about one per step, above which steps are not halved again, at four times the
+# cost
+MOST_CROWDED = 500
+# bond lengths of slip above which a block moves; most halvings of the steps (0 to 3 were observed)
 MOVES, MOST_HALVINGS = (
     1e-3,
     2,
 )
-SHEARED = 256.0  # lists of a patch behind shear, times the passes that Newton's method makes more than secants
-MOST_SWING = 2.0  # radians of the block on its bonds in a step
+# lists of a patch with shear compliance, times the passes of Newton's method over those of secants
+SHEARED = 256.0
+MOST_SWING = 2.0  # largest phase of the vibration of the block on its bonds in a step [rad]
 
 
 @lru_cache(maxsize=8)
 def quadrature_of(model: Model, numerics: Numerics):
-    """How the bonds of a nonlocal law are summed, as a Choice of `friction.bonds.engines`.
+    """Return the method of the sum over the bonds of a nonlocal law, as a Choice.
 
-    The stroke is taken as four times the amplitude that the drive's speed over its frequency gives, or that the bonds
-    of a block give which they hold. That of a motion which is released, or pushed once, shrinks, and a list of all its
-    bonds would outgrow any room: it is taken as DECAYED_FRACTION times that of its start. That of a
-    block which the printed law holds is HELD times what the drive would give.
+    The stroke is taken as four times the amplitude that follows from speed over frequency of the
+    drive, or from the stiffness of the bonds of a block that they hold. The stroke of a motion that
+    is released, or excited once, decreases, and a list of all its bonds would need too much memory:
+    it is taken as DECAYED_FRACTION of that of the start. That of a block that the printed law keeps
+    from sliding is HELD times that of the drive.
     """
     return numerics.choice or _summed_by(
         model, numerics, _stretch(model), bench_engine.engine_named(model)
@@ -64,7 +73,10 @@ def has_list(model: Model, numerics: Numerics) -> bool:
 
 
 def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
-    """The Choice of `quadrature_of` by an engine, or "auto", for a block that bonds let move by `stretch` lengths."""
+    """Return the Choice of `quadrature_of` for an engine, or "auto".
+
+    stretch: bond lengths by which a block moves on its bonds.
+    """
     law, accuracy = model.bonds, model.accuracy
     once = model.rig.drive.kind == "free" or model.rig.drive.waveform.is_step
     left = HELD if chatters(model) else DECAYED_FRACTION if once else 1.0
@@ -81,8 +93,11 @@ def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
 
 
 def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
-    """Bond lengths by which a drive moves a block that its bonds hold by their stiffness mu_s N/eps_0; inf where they
-    do not hold it, their limit `least` times what that takes, or the printed law gives them no stiffness."""
+    """Return the bond lengths by which a drive moves a block on the stiffness mu_s N/eps_0.
+
+    inf if the bonds do not hold the block, i.e. their limit is below `least` times the required
+    force, or if the printed law gives them no stiffness.
+    """
     f, rig = model.friction, model.rig
     if f.reading == "report" or rig.drive.kind == "free":
         return inf
@@ -91,9 +106,13 @@ def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
 
 
 def halvings(model: Model) -> int:
-    """How often steps that the scene leaves open will be halved for a block that its bonds hold, which then swings on
-    them faster than its modes and its drive do: until that swing has as many steps as those would get, MOST_HALVINGS
-    times at most. A stretch that is elastic but for a share below MOVES, half of its square, is met at once."""
+    """Return how often automatic steps will be halved for a block that its bonds hold.
+
+    Such a block vibrates on its bonds faster than its modes and its drive. The steps are halved
+    until this vibration has as many steps as those would have, MOST_HALVINGS times at most. If the
+    slip, half the square of the stretch, is below MOVES bond lengths, the motion is elastic and no
+    halving is needed.
+    """
     rig, f = model.rig, model.friction
     if f is None or not law_has_trait(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
         return 0
@@ -108,7 +127,7 @@ def halvings(model: Model) -> int:
 
 
 def _bond_swing(model: Model) -> float:
-    """Circular frequency [rad/s] of the block on its bonds, sqrt(k_t/m)."""
+    """Return the angular frequency [rad/s] of the block on its bonds, sqrt(k_t/m)."""
     f, modes = model.friction, model.rig.modes
     return sqrt(
         f.static * model.nominal_load / f.bond_length * float((modes.slide**2).sum()) / modes.mass
@@ -116,12 +135,15 @@ def _bond_swing(model: Model) -> float:
 
 
 def held_by_bonds(model: Model, push: float | None = None) -> float:
-    """Limit of the bonds of a law without stiffness over the force that holds the block; 0 of other laws.
+    """Return the limit of bonds without stiffness over the force that holds the block; else 0.
 
-    The printed law reaches its limit however small the stroke, so that its stiffness mu_s N/stroke has no bound; bonds
-    of order 0 pull alike at any stretch. A block of a list of growing bonds that is released is held by its spring
-    alone: it then swings on its bonds, or turns back in almost every step, which of both the length of the step decides
-    by chance (at 232 steps per cycle the one, at 230 and 234 the other). push [m s-2]: of the drive, None: its largest.
+    The printed law reaches its limit at any stroke, so that its stiffness mu_s N/stroke is
+    unbounded; bonds of order 0 have the same force at any stretch. A released block with a list of
+    growing bonds is loaded by its spring alone: it then either vibrates on its bonds or reverses in
+    almost every step, and the length of the step decides by chance (232 steps per cycle: the
+    former; 230 and 234: the latter).
+
+    push: acceleration of the drive [m s-2]; None: the largest one.
     """
     f, rig = model.friction, model.rig
     if f is None or not law_has_trait(f.law, "bonds"):
@@ -140,15 +162,20 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
 
 
 def least_held(model: Model) -> float:
-    """What `held_by_bonds` is at least where a list grows with every step: MIN_STUCK_RATIO; 1 of a driven
-    block where each step leaves a strip, which no path wears away: bonds that grow, or have no stiffness by their order."""
+    """Return the value of `held_by_bonds` from which a list grows with every step.
+
+    It is 1 for a driven block if each step leaves a strip that no path erases, i.e. for bonds that
+    grow or that have no stiffness by their order; else MIN_STUCK_RATIO.
+    """
     leaves = form_of(model.bonds) == PRINTED_GROWING or model.friction.reading != "report"
     return 1.0 if leaves and model.rig.drive.kind != "free" else MIN_STUCK_RATIO
 
 
 def chatters(model: Model) -> bool:
-    """Whether the printed law holds a driven block fast: it turns back in almost every step, and its list grows by a
-    strip with each."""
+    """Return whether the printed law keeps a driven block from sliding.
+
+    The block then reverses in almost every step, and each reversal adds a strip to its list.
+    """
     return (
         model.rig.drive.kind != "free"
         and model.friction is not None
@@ -158,18 +185,21 @@ def chatters(model: Model) -> bool:
 
 
 def stalls(model: Model) -> bool:
-    """Whether growing bonds of the printed law hold a released block fast from its start on."""
+    """Return whether growing bonds of the printed law hold a released block from its start on."""
     return model.rig.drive.kind == "free" and held_by_bonds(model) >= MIN_STUCK_RATIO
 
 
 def limp(model: Model) -> bool:
-    """Whether bonds of order 0 hold the block."""
+    """Return whether bonds of order 0 hold the block."""
     return lists_grow(model) and model.friction.reading != "report"
 
 
 def lists_grow(model: Model) -> bool:
-    """Whether a law without stiffness holds the block at some time of the run, so that its list grows with every
-    step. Pieces that give way in shear have a stiffness, and the lists of their points are merged."""
+    """Return whether a list grows with every step because a law without stiffness holds a block.
+
+    It is enough that this happens at some time of the run. Pieces with shear compliance have a
+    stiffness, and the lists of their points are merged.
+    """
     if model.partial_slip:
         return False
     most = held_by_bonds(model, gentlest(model.rig))
@@ -177,19 +207,23 @@ def lists_grow(model: Model) -> bool:
 
 
 def gentlest(rig) -> float:
-    """Least push [m s-2] that the drive of a Rig stays at: of levels half the first one, where the search of the onset
-    begins, or the least of them."""
+    """Return the smallest acceleration [m s-2] at which the drive of a Rig stays.
+
+    For levels it is half the first one, where the bisection of the onset starts, or the smallest
+    level.
+    """
     levels = rig.drive.levels.amplitudes
     return min(levels[0] / 2, *levels) if levels else max_acceleration(rig.drive.signal)
 
 
 def force_that_holds(rig, push: float | None = None) -> float:
-    """Peak force [N] on the first interface that keeps all interfaces of a Rig still under a sine of its drive, of its
-    largest push [m s-2] unless one is given.
+    """Return the peak force [N] on the first interface that keeps all interfaces at rest.
 
-    Of one mode it is mass times acceleration times base/slide, whatever the frequency; modes that go on moving behind
-    the interfaces bring their own. inf where nothing holds them: an interface that no mode slides, or an undamped
-    resonance behind it.
+    For a single mode it is mass times acceleration times base/slide at any frequency; several modes
+    continue to vibrate with stuck interfaces and add their inertia. It is inf if no force can do
+    this: for an interface that no mode moves, or at an undamped resonance.
+
+    push: acceleration of the drive [m s-2]; None: the largest one.
     """
     modes = rig.modes
     size = max_acceleration(rig.drive.signal) if push is None else push
@@ -199,8 +233,23 @@ def force_that_holds(rig, push: float | None = None) -> float:
 
 
 def _held_with(rig, omega: float, push, slides) -> float:
-    """Size of the force [N] on the first interface that keeps the slides (i,) [m] of all of them, beside a push (n,)
-    [m s-2] on the modes that goes as exp(i omega t); inf where no forces do."""
+    """Return the magnitude of the force [N] on the first interface that prescribes all slides.
+
+    Parameters
+    ----------
+    rig : Rig
+    omega : float
+        Angular frequency [rad/s] of the harmonic motion exp(i omega t).
+    push : (n,)
+        Modal accelerations [m s-2].
+    slides : (i,)
+        Prescribed slides [m].
+
+    Returns
+    -------
+    float
+        inf if no forces can do it.
+    """
     modes, n = rig.modes, rig.modes.omega.size
     faces = modes.interfaces
     moves = np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.damping_matrix
@@ -212,8 +261,18 @@ def _held_with(rig, omega: float, push, slides) -> float:
 
 
 def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
-    """Whether the list of bonds of the printed law has grown too long for steps half as long: by a strip in every few
-    steps. Where bonds grow each step leaves a strip, however long the strokes: there the block has to be held."""
+    """Return whether the list of bonds of the printed law is too long to halve the time step.
+
+    It is too long if it grows by a strip in every few steps. Bonds that grow leave a strip in each
+    step of any stroke; for these the block has to be held.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    book : dict
+        Counters of the run, with "strips".
+    """
     strips = book.get("strips", 0.0)
     if strips <= MOST_CROWDED or model.bonds.reading != "report":
         return False
@@ -225,18 +284,28 @@ def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
 
 
 def in_vain(book: dict, bars: list) -> bool:
-    """Whether a motion on a list of bonds is known no better after two doublings of its steps than before them; bars
-    [m]: its errors, one doubling after the other. A released block that turns back in almost every step has another
-    list at any step (errors of 71, 509, 139, 39 and 97 times the tolerance): the next doublings cost four and eight
-    times as much."""
+    """Return whether two doublings of the steps have not reduced the error of a list of bonds.
+
+    The list of a released block that reverses in almost every step is different for any step
+    (errors of 71, 509, 139, 39 and 97 times the tolerance were observed), and the next doublings
+    cost four and eight times as much.
+
+    Parameters
+    ----------
+    book : dict
+        Counters of the run, with "strips".
+    bars : list
+        Errors of the displacement [m], one per doubling.
+    """
     return book.get("strips", 0.0) > 0 and len(bars) > 2 and bars[-1] >= bars[-3]
 
 
 def list_cost(model: Model, numerics: Numerics) -> tuple[float, float]:
     """Return the expected strips of a list of bonds and the CPU seconds of a run with it.
 
-    A list that grows with every step is expected to take all strips; its seconds hold within a factor of about 12,
-    because the increments that a step tries depend on the motion. `ListGuard` stops a run that takes too long.
+    A list that grows with every step is expected to contain all strips; its seconds are known
+    within a factor of about 12, because the increments that a step tries depend on the motion.
+    `ListGuard` stops a run that takes too long.
     """
     steps = numerics.cycles * numerics.steps
     if lists_grow(model):
@@ -254,9 +323,10 @@ def list_cost(model: Model, numerics: Numerics) -> tuple[float, float]:
 
 
 class ListGuard:
-    """Progress of a march with a list of bonds, which is stopped if it would take too long.
+    """Progress callback of a march with a list of bonds, which stops a march that is too long.
 
-    A list grows or keeps its length. So all steps take at least as long as those so far over their fraction of all.
+    A list grows or keeps its length. Therefore all steps together take at least the time of the
+    completed steps divided by their fraction.
     """
 
     def __init__(self, progress=None):
@@ -265,7 +335,13 @@ class ListGuard:
         self.start = None
 
     def __call__(self, fraction: float) -> None:
-        """Pass the fraction of the steps on that is done; Missing if all of them would take more than LONGEST."""
+        """Report the completed fraction of the steps.
+
+        Raises
+        ------
+        Missing
+            If all steps would take more than LONGEST CPU seconds.
+        """
         now = thread_time()
         if self.start is None:
             self.start = now, fraction
@@ -287,10 +363,11 @@ def _too_long(seconds: float, entries: float | None = None) -> str:
 
 
 def refuse_unresolved(model: Model, numerics: Numerics) -> None:
-    """Raise Missing when a step is longer than the block's own swing on its bonds, sqrt(k_t/m) dt > MOST_SWING.
+    """Raise Missing if a step does not resolve the vibration of the block on its bonds.
 
-    The motion has nothing to do with the block's then, and every step makes bonds that outlast it: the list grows, and
-    the run with its square.
+    The limit is sqrt(k_t/m) dt > MOST_SWING. Otherwise the computed motion would be meaningless,
+    and every step would leave permanent bonds: the list would grow, and the run time with its
+    square.
     """
     drive, pace = model.rig.drive.signal, _bond_swing(model)
     swing = pace * drive.period / numerics.steps
@@ -308,7 +385,8 @@ def refuse_unresolved(model: Model, numerics: Numerics) -> None:
 def refuse_long_list(model: Model, numerics: Numerics) -> None:
     """Raise Missing if the list of bonds of a coupled run would take too long.
 
-    The seconds of a list that grows are uncertain: its run is stopped when it turns out to be too long.
+    The seconds of a list that grows are uncertain: its run is stopped when it turns out to be too
+    long.
     """
     if not has_list(model, numerics):
         return

@@ -1,4 +1,8 @@
-"""A march of a rig: patch or point, law and modes, as a Solution."""
+"""March of a rig: contact, time integration, and its Solution.
+
+In: a Model, its Numerics and its pressed patch. Out: a Solution whose measures come from
+samples, except the work of the energy balance and the harmonics of the loop.
+"""
 
 from time import perf_counter
 
@@ -21,29 +25,43 @@ from .lists import ListGuard, has_list, quadrature_of
 from .reading import Reader
 from .solution import Solution, borne, sampled_loop
 
-LATE = 1.5  # times what an end beside the asked one changes to first order
+LATE = 1.5  # factor on the first-order change by an end that is not the requested one
 
 
 def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """One march at numerics.steps per cycle; patch: the solved Patch or None."""
+    """March with numerics.steps steps per cycle, and return the Solution.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+    frames : int
+        Number of snapshots of the interface in the last cycle.
+    say, progress : callable, optional
+        Callbacks for a line of text and for the completed fraction.
+    """
     contact, done, seconds, prepare = marched(model, numerics, patch, frames, say, progress)
     return MarchReader(model, numerics, patch, contact).solution(done, seconds, prepare)
 
 
 def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
-    """(contact, MarchResult, seconds of the march, seconds before it by what they were for); arguments as `run_march`."""
+    """Return the contact, the MarchResult, and the CPU seconds of a march and its preparation.
+
+    The seconds of the preparation are a dict by name. The parameters are those of `run_march`.
+    """
     rig, begin = model.rig, perf_counter()
     contact = contact_of(model, numerics, patch)
     reduced = perf_counter() - begin
     engine.warm_up(rig.modes, rig.drive.signal, contact, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
-    # strips have no common field of shear
+    # strips have no common shear stress, so no frames are kept
     frames = 0 if rig.friction.strips_slide_apart else frames
     progress = ListGuard(progress) if has_list(model, numerics) else progress
     folds = (
         model.patch is not None and model.patch.mesh.can_gather_points
-    )  # nobody sees its histories
+    )  # nobody reads the histories of such a run
     done = engine.march(
         rig.modes,
         rig.drive.signal,
@@ -67,7 +85,7 @@ def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) ->
 
 
 class MarchReader(Reader):
-    """What a finished march shows."""
+    """Reader of a finished march."""
 
     def __init__(self, model, numerics, patch, contact):
         held = 0.0
@@ -77,7 +95,18 @@ class MarchReader(Reader):
         super().__init__(model, numerics, patch, contact, held)
 
     def solution(self, run, seconds: float, prepare: dict | None, drive=None, **more) -> Solution:
-        """The Solution of a MarchResult."""
+        """Return the Solution of a MarchResult.
+
+        Parameters
+        ----------
+        run : MarchResult
+        seconds : float
+            CPU seconds of the march.
+        prepare : dict or None
+            CPU seconds of its preparation.
+        drive : optional
+            Drive, if it is not that of the model.
+        """
         levels, probe = self._levels(run) if self.model.rig.drive.levels.amplitudes else ((), None)
         return super().solution(
             run,
@@ -92,22 +121,22 @@ class MarchReader(Reader):
         )
 
     def own(self, run, drive, values: dict) -> dict:
-        """What the peaks and the end of a run leave open, by name."""
+        """Return the errors by peaks between samples and by the end of the run, by measure name."""
         late, between = self.late(run.window), self.between(run.window)
         return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
 
     def between(self, window) -> dict:
-        """What the peaks of a run may lie above its samples, by name."""
+        """Return by how much the peaks of a run may exceed its samples, by measure name."""
         return peaks_between(window, self.model.grooves is not None)
 
     def late(self, window) -> dict:
-        """What the end of a run at a sample leaves open, by name."""
+        """Return the errors by an end at a sample next to the requested end, by measure name."""
         steps = self.numerics.cycles * self.numerics.steps
         found = end_error(window, self.model.rig.drive.signal.period, steps - round(steps))
         return {name: LATE * error for name, error in found.items()}
 
     def summed(self):
-        """How the bonds are summed, a Choice; None of a law that is no sum."""
+        """Return the Choice for the sum over bonds; None for other laws."""
         f = self.model.friction
         return (
             quadrature_of(self.model, self.numerics)
@@ -116,13 +145,13 @@ class MarchReader(Reader):
         )
 
     def integrated(self, run, drive) -> IntegratedMeasures:
-        """The two books of friction work, which a march keeps itself."""
+        """Return the two values of the friction work, both of which a march integrates."""
         return IntegratedMeasures(
             friction_works=tuple(run.ledger[name] for name in ("sampled", "booked", "passed"))
         )
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """Harmonics and work of the loop, and what a law that jumps shows of an interface that holds."""
+        """Return the loop and, for an interface that sticks under a law with a jump, known measures."""
         if not self.rubs:
             return {}
         rig, jumps = self.model.rig, self.contact.set_valued
@@ -134,16 +163,25 @@ class MarchReader(Reader):
         }
         if not (stuck and jumps):
             return out
-        # its energies are round-off of such a one
+        # the energies of a stuck interface are round-off of the kinetic energy
         moving = rig.modes.mass * peak_speed(drive, rig.start) ** 2
-        # what moves in it does not slide
+        # the remaining motion is round-off, not slip
         return out | {
             "book": run.ledger | {"power": run.ledger["power"] + moving},
             "known": {"slip_start_phase": None, "stick_fraction": 1.0},
         }
 
     def inside_steps(self, window, number: int):
-        """Return the window of an interface with samples inside the steps, if the force of its law changes there."""
+        """Return the window of an interface, with samples inside the steps if its force needs them.
+
+        They are added for laws whose force exceeds its limit within a step.
+
+        Parameters
+        ----------
+        window : Response
+        number : int
+            Index of the interface.
+        """
         model, one = self.model, self.model.rig.friction.interfaces[number]
         if (
             not law_has_trait(one.numbers.law, "overshoots")
@@ -155,16 +193,18 @@ class MarchReader(Reader):
         return motion_inside_steps(window, law_from(one.numbers, load), load)
 
     def _loop(self, part, drive) -> tuple | None:
-        """(first harmonics of slide and force, work per cycle) of the first interface, or of all strips.
+        """Return harmonics of slide and force, and work per cycle, of an interface or all strips.
 
-        Where nothing acts beside drive and friction its harmonics are those of the motion (`friction_harmonic`).
+        If no other forces act besides drive and friction, the harmonics of the force come from the
+        motion (`friction_harmonic`).
         """
         w, rig = part.window, self.model.rig
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
-        # the yaw of strips works besides
+        # the yaw of strips contributes work as well
         together = self.contact.set_valued and not rig.friction.strips_slide_apart
-        if len(rig.friction.names) > 1 or together:  # of this interface, without the blows of stops
+        # work of this interface only, without the impacts at stops
+        if len(rig.friction.names) > 1 or together:
             work = float(part.step_force @ np.diff(w.slide)) + lateral_work(w, 0)
         span = w.time[-1] - w.time[0]
         work *= drive.period / span if span > 0 else 0.0
@@ -188,10 +228,11 @@ class MarchReader(Reader):
         )
 
     def _levels(self, done) -> tuple:
-        """Levels of the drive, and probe as `levels.onset` asks."""
+        """Return the levels of the drive, and the probe of `levels.onset`."""
         rig, numerics = self.model.rig, self.numerics
 
         def probe(number, level):
+            """Run another level after the level of this index, and return its Level."""
             other = rig_levels.drive_with(rig.drive.signal, number + 1, level)
             run = (
                 done.marks[number].after.fork(other)

@@ -1,4 +1,7 @@
-"""What has to be said of a coupled run: warnings of its law, load and engine, notes on what they mean."""
+"""Warnings of a coupled run on its law, load and engine, and notes on their meaning.
+
+In: a `rig.Coupled`. Out: lists of sentences.
+"""
 
 import numpy as np
 
@@ -23,8 +26,10 @@ from .costs import dear_elements
 from .engines import ENGINES, PIECES
 from .solution import borne
 
-DECAYS = 1e-3  # of its amplitude, by which a motion was larger earlier in its window
-AT = 1e-9  # of a frequency, within which two are one
+# relative excess of the largest motion in the window over the amplitude, from which the motion
+# decays
+DECAYS = 1e-3
+AT = 1e-9  # relative difference of two equal frequencies
 AS_ONE_POINT = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
@@ -33,7 +38,7 @@ AS_ONE_POINT = (
 
 
 def warnings_of(run) -> list:
-    """Warnings of a `rig.Coupled`."""
+    """Return the warnings of a `rig.Coupled`."""
     model, patch, raw, found = run.model, run.patch, run.raw, run.measures
     book, harmonics = raw.book, raw.extra.get("harmonics")
     steps = (
@@ -91,9 +96,13 @@ def warnings_of(run) -> list:
 
 
 def peak_at_an_end(run, modes) -> list:
-    """The sentence, in a list, on a curve over a sweep whose largest response lies at an end of the sweep.
+    """Return the sentence, in a list, on a sweep whose largest response is at one of its ends.
 
-    run: a `rig.Coupled`; modes() -> them, as `plan.modes_of` does.
+    Parameters
+    ----------
+    run : rig.Coupled
+    modes : callable
+        Returns the modes, as `plan.modes_of` does.
     """
     found, drive = run.measures.get("peak_frequency"), run.model.rig.drive.signal
     at = (
@@ -118,12 +127,22 @@ def peak_at_an_end(run, modes) -> list:
 
 
 def at_an_end(frequency: float, *ends: float) -> float | None:
-    """The end of a sweep that a frequency is, all in Hz; None where it is neither."""
+    """Return the end of a sweep that equals a frequency, all in [Hz]; None if there is none."""
     return next((end for end in ends if abs(frequency - end) <= AT * end), None)
 
 
 def _beside(modes: list, at: float, upper: bool) -> list:
-    """Words, in a list, on the mode that may have its resonance nearest to a frequency [Hz] on one side of it."""
+    """Return words, in a list, on the mode with the nearest resonance beside a frequency.
+
+    Parameters
+    ----------
+    modes : list of dict
+        See `plan.modes_of`.
+    at : float
+        Frequency [Hz].
+    upper : bool
+        Whether the resonance is above the frequency.
+    """
     near = []
     for mode in modes:
         free, stuck = mode["free_frequency"], mode["stuck_frequency"]
@@ -140,7 +159,7 @@ def _beside(modes: list, at: float, upper: bool) -> list:
 
 
 def notes_of(run) -> list:
-    """Notes of a `rig.Coupled`: what its law and its engine mean, what its fields leave out, how its motion ended."""
+    """Return the notes of a `rig.Coupled` on its law, engine, fields and the end of its motion."""
     model, raw, rig = run.model, run.raw, run.model.rig
     ended = [
         *_across(run),
@@ -163,7 +182,7 @@ def notes_of(run) -> list:
 
 
 def _of_release(run) -> list:
-    """The sentence on over what the measures of a release are taken, in which the motion still decays."""
+    """Return the sentence on the time span of the measures of a release that still decays."""
     rig, window, main = (
         run.model.rig,
         run.raw.window,
@@ -186,7 +205,7 @@ def _of_release(run) -> list:
 
 
 def _across(run) -> list:
-    """The sentence on what strips that yaw do across x."""
+    """Return the sentence on the neglected lateral motion of strips that yaw."""
     if (
         not run.model.rig.friction.strips_slide_apart
         or run.patch.strips.offsets.size < 2
@@ -207,7 +226,7 @@ def _across(run) -> list:
 
 
 def creeping_note(friction) -> list:
-    """The sentence on a law that never holds."""
+    """Return the sentence on a law that never sticks."""
     if friction is None or not law_has_trait(friction.law, "creeps"):
         return []
     return [
@@ -218,7 +237,7 @@ def creeping_note(friction) -> list:
 
 
 def _as_one_point(model, patch, numerics) -> list:
-    """The sentence, in a list, on a patch that moves as one point would."""
+    """Return the sentence, in a list, on a patch that moves exactly as one point."""
     f, moves = (
         model.friction,
         model.rig.friction.load_varies or model.rig.friction.strips_slide_apart,
@@ -236,7 +255,7 @@ def _as_one_point(model, patch, numerics) -> list:
 
 
 def _of_bonds(model, patch, raw) -> list:
-    """Notes, as a list, on bonds that grow."""
+    """Return notes, as a list, on bonds that grow."""
     f = model.friction
     if f is None or not law_has_trait(f.law, "bonds"):
         return []
@@ -248,7 +267,10 @@ def _of_bonds(model, patch, raw) -> list:
 
 
 def marched_elements(model, numerics, patch, raw) -> list:
-    """The note of a march on a mesh whose yields are too many for the exact engine."""
+    """Return the note on a march of elements with too many yields for the exact engine.
+
+    The parameters are those of `Engine.notes`.
+    """
     if (
         PIECES.lacks(model)
         or model.accuracy.method != "auto"
@@ -263,7 +285,10 @@ def marched_elements(model, numerics, patch, raw) -> list:
 
 
 def unmoved_elements(model, numerics, patch, raw) -> list:
-    """The note of a steady motion on elements that it never moves."""
+    """Return the note on a steady motion with elements that never slip.
+
+    The parameters are those of `Engine.notes`.
+    """
     if PIECES.lacks(model) or raw.outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []
 
@@ -281,7 +306,17 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
 
 
 def law_warnings(model, outcome, found, peak: float) -> list:
-    """Warnings of the law of a run; found: its measures by name, peak: its largest speed of the slide [m/s]."""
+    """Return the warnings on the friction law of a run.
+
+    Parameters
+    ----------
+    model : Model
+    outcome : Outcome
+    found : dict
+        Measures by name.
+    peak : float
+        Largest speed of the slide [m/s].
+    """
     if not law_has_trait(model.friction.law, "bonds"):
         return []
     return [
@@ -292,7 +327,10 @@ def law_warnings(model, outcome, found, peak: float) -> list:
 
 
 def created_warning(model, book: dict, cycles: float) -> list:
-    """A sentence for the energy that the printed law made in steps where it gave back more than it had stored."""
+    """Return a sentence, in a list, on energy that the printed law created.
+
+    It creates energy in steps in which it returns more than it had stored.
+    """
     if model.friction is None or model.friction.reading != "report":
         return []
     made, work = book.get("created", 0.0), book.get("dissipated", 0.0)
@@ -306,7 +344,7 @@ def created_warning(model, book: dict, cycles: float) -> list:
 
 
 def modes_note(model, kept: int, nodes: int) -> list:
-    """The sentence on the shear modes of points whose normal force changes."""
+    """Return the sentence on the shear modes of a patch whose normal force changes."""
     return [
         f"{model.partial_slip}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
         f"of elements; {kept} tangential modes of the {nodes} nodes are used instead (key accuracy.shear_modes)"

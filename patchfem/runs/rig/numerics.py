@@ -1,4 +1,7 @@
-"""Numerical choices of a coupled run: engine, steps per cycle, shear modes, quadrature, and what they would cost."""
+"""Numerical settings of a coupled run: engine, steps per cycle, window, shear modes.
+
+In: a Model. Out: `Numerics` by its scene, else by its tolerance (`choose`).
+"""
 
 from dataclasses import dataclass, replace
 from math import ceil, sqrt
@@ -11,20 +14,32 @@ from ...structure.drive_sizes import is_sinusoidal, min_decay_rate, repeat_cycle
 from .costs import pairs_of, steps_per_cycle
 from .engines import engine_of
 
-# of a cycle by which a run may miss a whole number of them: a record of 30 periods has 30
+# fraction of a cycle by which a run may differ from whole cycles: a record of 30 periods has 30
 WHOLE = 1e-6
-SETTLED = 3.0  # decay times after which a start has e^-6 of its mean square left
-LEAST_KEPT = 100  # samples of a run that has no cycles
+SETTLED = 3.0  # decay times after which the mean square of the start has fallen to e^-6
+LEAST_KEPT = 100  # smallest number of samples of a run without cycles
 
 
 @dataclass(frozen=True, slots=True)
 class Numerics:
-    """Numerical choices of a run; `pinned` names the ones the scene fixed; shear_modes None: by the tolerance; choice:
-    how bonds are summed, None: by the tolerance and the steps; whole: whether the run keeps its histories from before
-    the last cycles, which a run for an error need not; local: relative error that a step of the smooth engine may
-    make; pairs: how often each two cells of a law's density count as one; joined: (how many of those do so besides in a
-    run for an error, from which on), () for none; richer: whether the run has more modes of a reduced structure;
-    meshed: numbers of the interfaces whose patches are those on a coarser mesh."""
+    """Numerical settings of a run.
+
+    - engine: name of the engine.
+    - steps: time steps per cycle.
+    - cycles, window: cycles of the run, and of the window at its end.
+    - shear_modes: number of shear modes; None: by the tolerance.
+    - per_point: whether bonds are followed at every node.
+    - pinned: settings that the scene fixed.
+    - choice: method of the sum over bonds; None: by the tolerance and the steps.
+    - whole: whether the run keeps its histories from before the window, which a coarse run need not
+      do.
+    - local: relative error that a step of the smooth engine may have.
+    - pairs: how often neighbouring cells of a density are merged in pairs.
+    - joined: (number of cells that a coarse run merges into one, first cell of the merging); () for
+      none.
+    - richer: whether the run has more modes of a reduced structure.
+    - meshed: indices of the interfaces whose patches are those on a coarser mesh.
+    """
 
     engine: str
     steps: int
@@ -42,8 +57,11 @@ class Numerics:
     meshed: tuple = ()
 
     def finer(self):
-        """The choices with four times the cells where some count as one, with twice the steps, or a hundredth of the
-        error of each."""
+        """Return finer settings for the next run.
+
+        They have four times as many cells if cells are merged; else a hundredth of the error of a
+        step of the smooth engine, or twice as many steps.
+        """
         if self.pairs:
             return replace(self, pairs=max(0, self.pairs - 2))
         return (
@@ -54,19 +72,29 @@ class Numerics:
 
 
 def choose(model: Model, per_point: bool = False) -> Numerics:
-    """Engine and numerical choices of a coupled run: those of the scene, else what the tolerance asks for.
+    """Return engine and numerical settings of a coupled run, from the scene or its tolerance.
 
-    per_point: bonds are followed at every node. PatchfemError for a method that cannot do it.
+    Parameters
+    ----------
+    model : Model
+    per_point : bool
+        Whether bonds are followed at every node.
+
+    Raises
+    ------
+    PatchfemError
+        For a method that cannot do it.
     """
     accuracy, rig = model.accuracy, model.rig
     engine = engine_of(model, per_point)
     window = int(max(1, min(10, (rig.drive.cycles + WHOLE) // 10)))
-    if rig.drive.waveform.is_random:  # all of the record but what the start leaves
+    # the window is the whole record except the transient at its start
+    if rig.drive.waveform.is_random:
         rate = min_decay_rate(rig.modes) * rig.drive.signal.period
         start = min(rig.drive.cycles / 4, SETTLED / rate if rate else np.inf)
         window = int(max(1, rig.drive.cycles - start + WHOLE))
     beat = repeat_cycles(rig.drive.signal) or 0.0
-    if 1 < beat <= rig.drive.cycles:  # whole beats
+    if 1 < beat <= rig.drive.cycles:  # the window contains whole beats
         window = int(beat * max(1, min(10, rig.drive.cycles // (10 * beat))) + WHOLE)
     if rig.drive.levels.amplitudes:
         window = min(window, int(rig.drive.levels.cycles + WHOLE))
@@ -91,7 +119,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
 
 
 def by_steps(model: Model, found: Numerics) -> Numerics:
-    """The choices of a march: steps that have one solution each, and end where the run ends."""
+    """Return the settings of a march: steps with a unique solution that end where the run ends."""
     if "steps_per_cycle" in found.pinned:
         return found
     return replace(
@@ -100,25 +128,30 @@ def by_steps(model: Model, found: Numerics) -> Numerics:
 
 
 def by_error(model: Model, found: Numerics) -> Numerics:
-    """The choices of the smooth engine: the error of a step."""
+    """Return the settings of the smooth engine: the error of a step."""
     return replace(found, local=local_of(model.accuracy.tolerance))
 
 
 def by_pieces(model: Model, found: Numerics) -> Numerics:
-    """The choices of the engine of yields: how finely a density is cut."""
+    """Return the settings of the engine of yields: the merging of cells of a density."""
     return replace(found, pairs=pairs_of(model))
 
 
 def local_of(tolerance: float) -> float:
-    """Relative error of a step of the smooth engine: the energy balance asks for 1e-9 where the tolerance does not."""
+    """Return the relative error of a step of the smooth engine.
+
+    The energy balance requires 1e-9 if the tolerance does not require less.
+    """
     return float(np.clip(1e-3 * tolerance, 1e-12, 1e-9))
 
 
 def ending(steps: int, cycles: float) -> int:
-    """Steps per cycle, at least `steps` and four times a whole number, as a half and a quarter of them show the order.
+    """Return the steps per cycle, at least `steps`, with which a run ends closest to its end.
 
-    A run ends at a sample, and the last of `cycles` need not be whole. An end off by half a step is an error of first
-    order in all that is read off the last cycles. So that number ends as near as an eighth more steps allows.
+    They are a multiple of 4, because runs with a half and a quarter of them show the order. A run
+    ends at a sample, and the last of its `cycles` may be incomplete. An end that is wrong by half a
+    step is an error of first order in all measures of the last cycles. Up to an eighth more steps
+    are tried.
     """
     least = ceil(steps / 4)
     if cycles == round(cycles):
@@ -129,9 +162,10 @@ def ending(steps: int, cycles: float) -> int:
 
 
 def unique_steps(model: Model) -> int:
-    """Least even number of steps per cycle at which a step of weakening bonds has one solution alone; 0 for other laws.
+    """Return the smallest even number of steps per cycle with a unique solution.
 
-    dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1 with k_t = mu_s N/eps_0 and M the mass that the interface moves.
+    It is 0 except for bonds that weaken: dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, with k_t = mu_s
+    N/eps_0 and the mass M that the interface moves.
     """
     f, modes = model.friction, model.rig.modes
     if (

@@ -1,5 +1,8 @@
-"""The engines that are exact from event to event (`dynamics.events`): Coulomb friction, or none at all, and
-elastic-plastic elements."""
+"""Engines that are exact between events: Coulomb or no friction, elastic-plastic elements.
+
+In: a Model, its Numerics and its pressed patch. Out: a Solution whose measures come from the
+power series of the pieces (`dynamics.events`).
+"""
 
 from dataclasses import replace
 from time import perf_counter
@@ -32,15 +35,15 @@ from .levels import by_levels, without_part_of_cycle
 from .reading import Reader
 from .solution import Solution, borne, mode_stiffness
 
-# what is known without an interface
+# measures that are known without an interface
 OF_MOTION = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
     "absolute_acceleration_fundamental",
     "acceleration_distortion",
 )
-CHANGES = 1e-2  # share of the tolerance by which a motion that has settled may still change
-# by which it is told; share of a free motion that is lost in these, at least
+CHANGES = 1e-2  # fraction of the tolerance by which a settled motion may still change
+# windows from which the change is estimated; smallest fraction of a free motion that decays in them
 WINDOWS, LEAST_LOST = (
     3,
     1e-6,
@@ -48,15 +51,45 @@ WINDOWS, LEAST_LOST = (
 
 
 def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solution of a Coulomb rig, or of a structure without friction; patch: the solved Patch, or None under [normal] or
-    between masses."""
+    """Solve a rig with Coulomb friction, or a structure without friction.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+        None under [normal] or between masses.
+    frames : int
+        Not used.
+    say, progress : callable, optional
+        Callbacks for a line of text and for the completed fraction.
+
+    Returns
+    -------
+    Solution
+    """
     return _run(
         Pieces(model, numerics, patch, RigidElements(model, numerics, patch)), 0, say, progress
     )
 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solution of a rig behind elastic-plastic elements; patch: the solved Patch, or None."""
+    """Solve a rig with elastic-plastic elements.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+    frames : int
+        Number of snapshots of the interface in the last cycle.
+    say, progress : callable, optional
+        Callbacks for a line of text and for the completed fraction.
+
+    Returns
+    -------
+    Solution
+    """
     return _run(
         Pieces(model, numerics, patch, YieldingElements(model, numerics, patch)),
         frames,
@@ -66,12 +99,14 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
 
 
 def _run(reader, frames: int, say, progress) -> Solution:
+    """Run the drive of a rig, level by level if it has levels, and return the Solution."""
     rig, numerics, begin, more = reader.model.rig, reader.numerics, perf_counter(), {}
     histories.warm_up(say)
     prepare = {"reduce": reader.reduced, "compiled_code": perf_counter() - begin}
     begin = perf_counter()
 
     def go(drive, state, watch, last: bool, cycles: float = rig.drive.levels.cycles):
+        """Integrate a drive from a state, and return the run of the whole patch."""
         done = histories.simulate(
             rig.modes,
             drive,
@@ -97,7 +132,7 @@ def _run(reader, frames: int, say, progress) -> Solution:
 
 
 class Pieces(Reader):
-    """What a finished run from event to event shows, through Interfaces or Limits `found`."""
+    """Reader of a finished run from event to event; found: RigidElements or YieldingElements."""
 
     def __init__(self, model, numerics, patch, found):
         super().__init__(model, numerics, patch, found.contact, found.held, histories.SAMPLES)
@@ -105,7 +140,7 @@ class Pieces(Reader):
         self.apart = found.rigid and model.rig.friction.strips_slide_apart
 
     def over_strips(self, run):
-        """The run as that of the patch, where its strips slide apart."""
+        """Return the run with histories of the whole patch, if its strips slide independently."""
         if not self.apart:
             return run
         loads, offsets = strips.strip_loads(self.patch), self.patch.strips.offsets
@@ -115,7 +150,7 @@ class Pieces(Reader):
         return replace(run, response=response, window=window)
 
     def sticks(self, run) -> bool:
-        """Of strips that slide apart every one has to stick."""
+        """Return whether the interface sticks; of independent strips, all have to stick."""
         return (
             run_events.all_stick(run.window, self.held)
             if self.apart and self.rubs
@@ -123,12 +158,14 @@ class Pieces(Reader):
         )
 
     def integrated(self, run, drive) -> IntegratedMeasures:
-        """The loops of the interfaces, of strips that slide apart the one of their samples; what else the series of the
-        pieces give stands in `more`."""
+        """Return the loops of the interfaces; for independent strips, their loop from samples.
+
+        `more` returns all else that the series of the pieces give.
+        """
         return IntegratedMeasures(loops=(_of_strips(run, drive),) if self.apart else run.loops)
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """What the series of the pieces give, by name; what goes into rigid elements is lost."""
+        """Return measures from the series of the pieces; work on rigid elements is all dissipated."""
         found = read_off(
             run.reading,
             run.ledger,
@@ -152,8 +189,11 @@ class Pieces(Reader):
         }
 
     def rings(self, run, drive) -> tuple:
-        """What rings is known in closed form of a single element and where every interface holds to the end of a run
-        without a sine, and of a motion that repeats by one of its cycles."""
+        """Return the ringing during stick, and its errors.
+
+        It is known in closed form for a single element, and if every interface sticks until the end
+        of a run without a sine. For a periodic motion, the sticks of a single cycle are used.
+        """
         if not self.rubs:
             return {}, {}
         if run.ring is not None:
@@ -168,8 +208,11 @@ class Pieces(Reader):
         )
 
     def held_modes(self, run, motion, drive) -> list:
-        """`ringing.held_modes` of a part of a run; [] unless nothing but a constant drives it there and every interface
-        is one spring that holds to the end."""
+        """Return `ringing.held_modes` of a part of a run, or [].
+
+        It is [] unless only a constant force acts in this part, and every interface is a single
+        spring that sticks until the end.
+        """
         springs = [one.stiffness for one in self.groups]
         held = (
             self.rubs
@@ -183,7 +226,7 @@ class Pieces(Reader):
         return held_modes(self.model.rig.modes, np.concatenate(springs), motion)
 
     def tail(self, run, drive) -> dict:
-        """What rings after the last slip of a release, as the field `extra` of a Solution keeps it; {} without one."""
+        """Return the ringing after the last slip of a release, for `Solution.extra`; else {}."""
         if (
             self.model.rig.drive.kind != "free"
             or run.response is None
@@ -196,13 +239,14 @@ class Pieces(Reader):
         return {"tail": strongest(held, "displacement")} if held else {}
 
     def own(self, run, drive, values: dict) -> dict:
-        """What samples leave open of the measures that no sum over the pieces has, and behind rigid elements the
-        round-off of the two means that the drift is a difference of.
+        """Return the errors of measures that come from samples, and of the drift of rigid elements.
 
-        No means in a window below 1.5 cycles, which has ends alone. Those of strips are of cubics through 400 samples a
-        cycle, which miss h^4/384 of the fourth derivative: seen against 8000 a cycle, 2e-14 of the range, as the cycles
-        miss nearly alike. What jumps excite in a mode r times as fast as the drive falls with 1/r^2, its fourth
-        derivative grows with r^2.
+        The drift of rigid elements has the round-off of the difference of two means; below 1.5
+        cycles there are no means, only the ends of the window. The means of independent strips are
+        those of cubics through 400 samples per cycle, with an error of h^4/384 times the fourth
+        derivative: 2e-14 of the range compared with 8000 samples per cycle, because both cycles
+        have nearly the same error. The vibration that jumps excite in a mode r times as fast as the
+        drive falls with 1/r^2, and its fourth derivative grows with r^2.
         """
         window, modes = run.window, self.model.rig.modes
         left = {} if self.apart else self.sampled(run, drive, values)
@@ -214,7 +258,7 @@ class Pieces(Reader):
         return left | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
-        """The Solution of a PieceRun; where its windows still change, with the motion that it settles to."""
+        """Return the Solution of a PieceRun, with its steady motion if its windows still change."""
         drive, numerics = drive or self.model.rig.drive.signal, self.numerics
         more |= {"extra": more.get("extra", {}) | tail} if (tail := self.tail(run, drive)) else {}
         unsettled = still_changes(
@@ -238,7 +282,8 @@ class Pieces(Reader):
 def _of_strips(run, drive) -> InterfaceLoop:
     """Return the loop of strips averaged to one interface, from the samples of the window.
 
-    The samples are those on both sides of every event; the yaw does work beside the mean slide.
+    The samples are those on both sides of every event; the yaw does work in addition to the mean
+    slide.
     """
     window, omega = run.window, drive_omega(drive)
     gaps = np.diff(window.time)
@@ -260,11 +305,21 @@ def _of_strips(run, drive) -> InterfaceLoop:
 
 
 def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool:
-    """Whether a motion of extremes (c, 2) [m] per cycle may still change by a share of the tolerance, or is too short
-    to say: by what the ends of its cycles moved over the last WINDOWS of `window` cycles, over the share that its
-    slowest free motion loses in these. Where that beats slowly, ends hardly move as long as it is largest.
+    """Return whether a motion may still change by a fraction CHANGES of the tolerance.
 
-    decay: of that free motion over a cycle [1].
+    It may if the run is too short, or if the extremes of its cycles have moved too much in the last
+    WINDOWS windows, divided by the fraction of the slowest free motion that decays in this time.
+    The extremes of a slow beat hardly move while it is largest.
+
+    Parameters
+    ----------
+    extremes : (c, 2)
+        Smallest and largest output of each cycle [m].
+    window : int
+        Cycles of a window.
+    tolerance : float
+    decay : float
+        Decay of the slowest free motion over a cycle [1].
     """
     last = np.asarray(extremes, float)[-WINDOWS * window :]
     lost = max(-np.expm1(-decay * len(last)), LEAST_LOST)
@@ -275,9 +330,24 @@ def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool
 
 
 def settles(modes, drive, groups, done) -> tuple | None:
-    """(amplitude [m], its error) of the stable motion that a run under a sine settles to, by the map of its yields.
+    """Return the amplitude [m] and its error [m] of the stable motion that a run converges to.
 
-    None where the run does not end with a period of a sine, or where no such motion was found.
+    It is found by the map of the yields over a period.
+
+    Parameters
+    ----------
+    modes
+        Modal basis.
+    drive
+        Drive.
+    groups : tuple
+        Elements of every interface.
+    done : PieceRun
+
+    Returns
+    -------
+    tuple or None
+        None if the run does not end with a whole period of a sine, or no stable motion was found.
     """
     last = drive.segments[-1] if drive.segments else None
     if (
@@ -297,10 +367,17 @@ def settles(modes, drive, groups, done) -> tuple | None:
 
 
 def settled_of(amplitude: float, residual: float, multipliers) -> tuple:
-    """Amplitude [m] of a stable motion and its error, NaN of another.
+    """Return the amplitude [m] of a stable periodic motion and its error [m]; NaN if unstable.
 
-    residual: by which it misses to close, over its size; multipliers (m,) over a period. What it leaves in the motion
-    is that over how far they are from 1, and its last digits are rounding.
+    Parameters
+    ----------
+    amplitude : float
+        [m].
+    residual : float
+        Difference of the states after a period, relative to the motion.
+    multipliers : (m,)
+        Floquet multipliers over a period. The error in the motion is the residual over their
+        distance from 1.
     """
     if np.abs(multipliers).max(initial=0.0) >= 1:
         return np.nan, np.nan
@@ -309,8 +386,13 @@ def settled_of(amplitude: float, residual: float, multipliers) -> tuple:
 
 
 class YieldingElements:
-    """The elements of every interface of a model, as `groups`; contact: the ContactModel of a single one; held: slip
-    [m] below which a cycle sticks; seconds: of its reduction."""
+    """Elastic-plastic elements of every interface of a model.
+
+    - groups: elements of each interface.
+    - contact: ContactModel of a single interface.
+    - held: slip in a cycle [m] below which the interface sticks in it.
+    - seconds: CPU seconds of the reduction.
+    """
 
     rigid = False
 
@@ -336,7 +418,7 @@ class YieldingElements:
 
 
 class RigidElements:
-    """The rigid elements of every Coulomb interface of a model, as `groups`: no slip is small beside them."""
+    """Rigid elements `groups` of every Coulomb interface of a model; any slip counts as slip."""
 
     rigid, contact, held, seconds = True, None, 0.0, 0.0
 
@@ -345,7 +427,7 @@ class RigidElements:
 
 
 def coulomb_limits(model, patch) -> list:
-    """(static, kinetic) friction [N] of every interface, 0 where nothing rubs."""
+    """Return the static and kinetic friction limits [N] of every interface; 0 without friction."""
     rig, share = model.rig, 1.0
     if rig.friction.strips_slide_apart:
         return [
@@ -367,7 +449,7 @@ def coulomb_limits(model, patch) -> list:
 
 
 def elements_of_law(element) -> elements.Elements:
-    """Elements of an Element of form "parallel"."""
+    """Return the Elements of an Element of form "parallel"."""
     count = int(element.numbers[1])
     return elements.elements_of(
         element.numbers[2 : 2 + count], element.numbers[2 + count : 2 + 2 * count]
@@ -375,11 +457,26 @@ def elements_of_law(element) -> elements.Elements:
 
 
 def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, size) -> dict:
-    """Measures of the first interface and of the motion by name, numbers or (n,) of n runs, NaN where a run has none.
+    """Return measures of the first interface and the motion by name, of one run or (n,) of many.
 
-    book: energies of the run [J]; sine: the drive ends as one; whole: the cycles that were read are whole ones;
-    stiffness [N/m]: of the first mode as the contact meets it, 0 where no damping ratio refers to it; size [m s-2]: of
-    the drive.
+    Parameters
+    ----------
+    reading : Reading
+    book : dict
+        Energies of the run [J].
+    sine : bool
+        Whether the drive is a sine at the end.
+    whole : bool
+        Whether the evaluated cycles are complete.
+    stiffness : float or (n,)
+        K of the first mode as seen by the contact [N/m]; 0 if no damping ratio refers to it.
+    size : float or (n,)
+        Acceleration of the drive [m s-2].
+
+    Returns
+    -------
+    dict
+        NaN for a measure that a run does not have.
     """
     none, (first, third) = np.full(np.shape(reading.swing), np.nan)[()], reading.waves
     out = {
@@ -401,7 +498,7 @@ def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, s
 
 
 def _loop(reading: Reading, sine: bool, stiffness) -> dict:
-    """Measures of the loop of the first interface."""
+    """Return the measures of the loop of the first interface by name."""
     one = reading.loop()
     moves = (reading.of(at.HIGH) - reading.of(at.LOW) > REST) & sine
     half = np.where(moves, reading.of(at.RANGE) / 2, 0.0)[()]
@@ -413,8 +510,10 @@ def _loop(reading: Reading, sine: bool, stiffness) -> dict:
 
 
 def _work_check(reading: Reading, book: dict):
-    """Gap [1] of the friction work of the cycles that were read: by the trapezoidal rule on the ends of the pieces
-    against the ledger's."""
+    """Return the relative difference [1] of the friction work from samples and from the ledger.
+
+    The samples are the ends of the pieces, with the trapezoidal rule.
+    """
     turned, booked, passed = (
         reading.faces[..., place].sum(axis=-1) for place in (at.TURNED, at.WORK, at.PASSED)
     )

@@ -1,4 +1,8 @@
-"""Sizes, cost and groups of a coupled run, before it runs."""
+"""Predicted sizes, cost and dimensionless groups of a coupled run.
+
+In: a Model. Out: `Cost` of the engine that `engines.engine_of` chooses, the stiffness chain,
+frequencies with free and stuck interface, groups, and sentences for the plan.
+"""
 
 from dataclasses import replace
 from math import inf, pi
@@ -35,8 +39,10 @@ from .costs import (
 from .engines import ENGINES, PIECES, steady_by
 from .numerics import choose
 
-MODE_PAIR = 125.0  # bytes per pair of coordinates: matrices, shapes and what diagonalises them
-HARMONIC_PAIR = 94.0  # bytes per pair of sines and cosines of a balance: its Jacobian and the factors of its error
+# bytes per pair of coordinates: matrices, shapes and workspace of the eigenvalue solver
+MODE_PAIR = 125.0
+# bytes per pair of harmonics of a balance: Jacobian, and the factors for its error
+HARMONIC_PAIR = 94.0
 MODE_NODE = 24.0  # bytes per shear mode and node of the interface
 DRIVE_ROW = 400.0  # bytes per row of a recorded drive
 STEADY_CODES = {
@@ -45,26 +51,36 @@ STEADY_CODES = {
     "harmonic": BALANCE_CODE,
     "march": None,
 }
-# points over a frequency, with those that its bends and its peak ask for: by a map, by a balance
+# points of a curve over frequency, including those at its bends and peak: by a map, by a balance
 CURVE = (
     160,
     250,
 )
-MARCHED = 400.0  # cycles of the marches until a motion repeats, of all steps
-RESONANT = 0.02  # of the frequency of a mode, within which a sine drives it at resonance
-STIFF = 10.0  # times the stiffness of the mode, from which a link holds the block
+MARCHED = 400.0  # cycles of all marches until a motion repeats
+# relative distance from the frequency of a mode within which a sine excites a resonance
+RESONANT = 0.02
+STIFF = 10.0  # stiffness over that of the mode, from which a link holds the block
 
 
 def chain(rig) -> dict:
-    """Links of the stiffness chain of a Rig by name [N/m]."""
+    """Return the stiffness [N/m] of the links of the stiffness chain of a Rig, by name."""
     return {"mode": rig.first_mode.stiffness} | (
         {"bonded": rig.springs.bonded} if rig.springs.bonded is not None else {}
     )
 
 
 def held_stiffness(chain: dict, number: int = 0) -> float:
-    """Tangential stiffness [N/m] of the interface of a number, from 0, while nothing slips: its links of a plan's chain
-    in series; infinite where all are rigid, 0 of a law that creeps."""
+    """Return the tangential stiffness [N/m] of an interface while it sticks.
+
+    It is that of its links in series; inf if all are rigid, 0 for a law that creeps.
+
+    Parameters
+    ----------
+    chain : dict
+        Links of the stiffness chain of a plan.
+    number : int
+        Index of the interface.
+    """
     links = {
         of_first(name): link
         for name, link in chain.items()
@@ -77,7 +93,10 @@ def held_stiffness(chain: dict, number: int = 0) -> float:
 
 
 def held_by(rig, chain: dict) -> np.ndarray:
-    """`held_stiffness` (i,) of every slide of a Rig, infinite without friction; strips have that of their patch."""
+    """Return `held_stiffness` (i,) of every slide of a Rig; inf without friction.
+
+    Strips have that of their patch.
+    """
     faces = len(rig.friction.interfaces)
     return np.array(
         [
@@ -88,8 +107,11 @@ def held_by(rig, chain: dict) -> np.ndarray:
 
 
 def foreseen(rig, links: dict):
-    """A Rig whose modes were measured with a joint that a patch holds, without it by the links of a chain, until the
-    patch is pressed; as it was where these hold more than the modes have."""
+    """Return a Rig without the joint that was present when its modes were measured.
+
+    The patch that forms the joint is not pressed yet, so that its stiffness follows from the links
+    of a chain. If these are stiffer than the modes allow, the Rig is unchanged.
+    """
     try:
         found = rig.structure.without_joint(held_stiffness(links))
         structure = replace(found.structure, without_joint=rig.structure.without_joint)
@@ -99,8 +121,11 @@ def foreseen(rig, links: dict):
 
 
 def modes_of(rig, chain: dict) -> list:
-    """Name, free and stuck frequency [Hz] of each mode: without the contact, and with it held by the links of a chain;
-    None where nothing gives way, and without friction."""
+    """Return name, free and stuck frequency [Hz] of each mode.
+
+    The stuck frequency is that with the contact held by the links of a chain; None if no link is
+    compliant, and without friction.
+    """
     modes, rows, stiffness = rig.modes, rig.modes.interfaces, held_by(rig, chain)
     if modes.lateral_faces is not None:
         rows, stiffness = np.concatenate([rows, modes.lateral_faces]), np.tile(stiffness, 2)
@@ -127,7 +152,7 @@ def cost(model: Model, per_point: bool, points: int) -> Cost:
     per_point : bool
         Whether bonds are followed at every node.
     points : int
-        Nodes of the interface, 1 without a patch.
+        Nodes of the interface; 1 without a patch.
     """
     rig, numerics = model.rig, choose(model, per_point)
     engine = ENGINES[numerics.engine]
@@ -142,7 +167,15 @@ def cost(model: Model, per_point: bool, points: int) -> Cost:
 
 
 def march_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the cost of a march with its coarser runs."""
+    """Return the cost of a march with its coarse runs.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    points : int
+        Nodes of the interface.
+    """
     rig, f, soft = model.rig, model.friction, bool(model.partial_slip)
     steps = int(numerics.cycles * numerics.steps)
     is_bonds = model.grooves is None and f is not None and law_has_trait(f.law, "bonds")
@@ -164,7 +197,7 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
         )
     else:
         each = _step_without_modes(model, numerics, points, is_bonds)
-    # a half and a quarter of the steps, and each halving of them
+    # runs with a half and a quarter of the steps, and with each halving of the step
     passes = 0.75 + 2 ** (lists.halvings(model) + 1) - 1
     times = {
         "motion": steps * passes * each,
@@ -180,7 +213,7 @@ def march_code(model: Model) -> EngineCode:
 
 
 def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> float:
-    """Return the seconds of a step of a march without shear modes and without a list of bonds."""
+    """Return the CPU seconds of a step of a march without shear modes and list of bonds."""
     rig, step = model.rig, _step(model.rig, model.friction)
     if model.grooves is not None:
         return cost_model.GROOVE_STEP_SECONDS
@@ -196,7 +229,10 @@ def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> 
 
 
 def _step(rig, f) -> float:
-    """Seconds of a step of a march: of one mode and interface, more where bonds grow or interfaces move each other."""
+    """Return the CPU seconds of a step of a march.
+
+    Growing bonds and several interfaces take longer than a single mode and interface.
+    """
     faces = len(rig.friction.interfaces)
     grows = f is not None and f.slip_growth is not None and law_has_trait(f.law, "bonds")
     return (
@@ -210,11 +246,12 @@ def _step(rig, f) -> float:
 
 
 def groups(model: Model) -> dict:
-    """Dimensionless groups of the motion by name, those without a meaning left out.
+    """Return dimensionless groups of the motion by name, without those that have no meaning.
 
-    D: static friction limit over the largest force of the drive, which is D of 2.3 at resonance; D_kinetic: that of the
-    kinetic limit, where it is another; knee [m s-2], or knee_force [N] of a drive by force: input beyond which friction
-    alone does not bound a motion at resonance, that of a block that slides.
+    - D: static friction limit over largest force of the drive, D of (2.3) at resonance.
+    - D_kinetic: the same with the kinetic limit, if it differs.
+    - knee [m s-2], or knee_force [N] of a drive by force: drive above which friction alone does not
+      bound a motion at resonance, for a block that slides.
     """
     out, f, rig = {}, model.friction, model.rig
     limits = [
@@ -237,8 +274,11 @@ def groups(model: Model) -> dict:
 
 
 def run_away(model: Model) -> dict:
-    """{`drive`: acceleration of the base, `knee`: that above which friction alone does not limit the amplitude} [m s-2]
-    of one mode that a sine drives at its resonance; {} of another rig."""
+    """Return the drive and the drive above which friction does not limit the amplitude.
+
+    Both are accelerations of the base [m s-2], "drive" and "knee", of a single mode that a sine
+    excites at resonance; {} for another rig.
+    """
     rig = model.rig
     if (
         rig is None
@@ -256,17 +296,29 @@ def run_away(model: Model) -> dict:
 
 
 def _lever(rig) -> float:
-    """slide_1/base_1, by which friction acts on the first mode that is not rigid over what the drive does; 1 where the
-    scene lists no modes, or nothing drives that one."""
+    """Return slide_1/base_1: the effect of friction over that of the drive on the first mode.
+
+    The mode is the first one that is not rigid. It is 1 if the scene lists no modes, or the drive
+    does not excite this mode.
+    """
     first = int(np.flatnonzero(rig.modes.omega > 0)[0]) if rig.first_mode.frequency else 0
     slide, base = abs(float(rig.modes.slide[first])), abs(float(rig.modes.base[first]))
     return slide / base if rig.structure.lists_modes and base > 0 else 1.0
 
 
 def first_words(rig, found: dict, chain: dict) -> list:
-    """The sentence on D of one mode: whether the block sticks, and whether friction bounds its motion.
+    """Return the sentence on D of a single mode, as a list.
 
-    chain: links of the stiffness chain by name; one that is not STIFF beside the mode lets a block move that sticks.
+    It says whether the block sticks, and whether friction bounds its motion.
+
+    Parameters
+    ----------
+    rig : Rig
+    found : dict
+        `groups`.
+    chain : dict
+        Links of the stiffness chain by name; a link that is not STIFF compared with the mode lets a
+        stuck block move.
     """
     d = found.get("D")
     if (
@@ -289,7 +341,7 @@ def first_words(rig, found: dict, chain: dict) -> list:
         ]
     if d >= 1:
         return [f"D = {d:.3g} >= 1: friction should hold the block, so that it sticks"]
-    if "D_kinetic" in found:  # a block that slides is braked by the kinetic limit
+    if "D_kinetic" in found:  # the kinetic limit acts on a block that slides
         sliding = found["D_kinetic"] * _lever(rig)
         return [
             f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_sliding(sliding)}"
@@ -298,19 +350,19 @@ def first_words(rig, found: dict, chain: dict) -> list:
 
 
 def _sliding(d: float) -> str:
-    """The sentence on a block that slips at D < 1."""
+    """Return the sentence on a block that slips at D < 1."""
     if d > pi / 4:
         return f"D = {d:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"
     return f"D = {d:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
 
 
 def steady_words(model: Model, numerics) -> list:
-    """The sentence on how a steady motion is found."""
+    """Return the sentence on how a steady motion is found, as a list."""
     return [f"the steady motion is found by {steady_by(model).words}"]
 
 
 def summed_words(model: Model, numerics) -> list:
-    """Sentences on how the bonds of law 'nonlocal' are summed, or on which engine takes elements that stick or slip."""
+    """Return sentences on the sum over bonds of law 'nonlocal', or on the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
     found = lists.quadrature_of(model, numerics)
@@ -336,7 +388,7 @@ def summed_words(model: Model, numerics) -> list:
 
 
 def _held_words(model: Model) -> str:
-    """Return how bonds hold the block whose list of them grows."""
+    """Return how bonds hold the block whose list of bonds grows."""
     if lists.limp(model):
         held = "bonds of order 0 keep the block from sliding, but they have no stiffness"
     elif lists.stalls(model):
@@ -352,8 +404,15 @@ def _held_words(model: Model) -> str:
 
 
 def steady_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the cost of a curve of steady motions, with its coarser runs and the run with more modes of a reduced
-    structure."""
+    """Return the cost of a curve of steady motions, with its coarse runs.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    points : int
+        Nodes of the interface; not used.
+    """
     rig, finder = model.rig, steady_by(model)
     places = max(1, len(rig.drive.levels.amplitudes))
     if rig.drive.waveform.is_swept:
@@ -361,7 +420,7 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
     soft = []
     if finder.name == "yields":
         soft = [one for one in rig.friction.interfaces if one.partial_slip or model.partial_slip]
-    passes = 1.0 + 0.5 * len(soft)  # a coarser mesh of each has half the elements
+    passes = 1.0 + 0.5 * len(soft)  # the coarser mesh of each interface has half the elements
     seconds = places * passes * _steady_point(model, finder.name)
     if rig.structure.richer_rig is not None:
         seconds += places * _steady_point(replace(model, rig=rig.structure.richer_rig), finder.name)
@@ -373,7 +432,7 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
 
 
 def _steady_point(model: Model, by: str) -> float:
-    """Seconds of a point of a curve of steady motions that is found `by` the finder of that name."""
+    """Return the CPU seconds of a point of a curve of steady motions by the finder of this name."""
     rig = model.rig
     if by == "balance":
         size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.friction.interfaces))
@@ -399,8 +458,11 @@ def _steady_point(model: Model, by: str) -> float:
 
 
 def _smooth_laws(rig) -> float:
-    """Seconds that a balanced point takes besides where a law changes its slope all the cycle long: elements that stick
-    and slip have the same one for most of it."""
+    """Return the additional CPU seconds of a point by harmonic balance for smooth laws.
+
+    Their slope changes during the whole cycle, whereas that of elements that stick and slip is
+    constant for most of it.
+    """
     laws = {one.numbers.law for one in rig.friction.interfaces}
     flowing = any(
         "pieces" not in LAWS[law].supports.split() and not law_has_trait(law, "memoryless")

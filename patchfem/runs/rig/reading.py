@@ -1,4 +1,8 @@
-"""From a run of any engine to its Solution: measures, sticking, ringing, outcome and levels in one text."""
+"""Evaluation of the run of any engine: measures, stick, ringing, outcome and levels.
+
+In: a run of an engine. Out: its Solution. Engines override the methods of `Reader` for values
+that they know better than their samples.
+"""
 
 from dataclasses import replace
 
@@ -19,9 +23,21 @@ from .solution import Solution, decaying, last_cycles
 
 
 class Reader:
-    """What the runs of a model by one engine show; an engine says what it knows better in `integrated` and `more`.
+    """Evaluator of the runs of a model by one engine.
 
-    contact: what it moves; held: slip [m] below which a cycle sticks; steps: samples per cycle.
+    An engine states what it knows itself in `integrated` and `more`.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+    contact : optional
+        Contact that the engine moves.
+    held : float
+        Slip in a cycle [m] below which the interface sticks in it.
+    steps : int, optional
+        Samples per cycle; None: those of `numerics`.
     """
 
     def __init__(
@@ -31,20 +47,31 @@ class Reader:
         self.steps, self.rubs = steps or numerics.steps, model.friction is not None
         self.creeps = self.rubs and law_has_trait(
             model.friction.law, "creeps"
-        )  # it never holds, nor sticks
+        )  # such a law never sticks
         self.held = 0.0 if self.creeps else held
 
     def integrated(self, run, drive) -> IntegratedMeasures:
-        """What the engine integrated over the last cycles of a run."""
+        """Return the measures that the engine integrated over the last cycles of a run."""
         return IntegratedMeasures()
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """Other fields of `response.rows.Seen`."""
+        """Return other fields of `response.rows.Seen`."""
         return {}
 
     def values(self, run, drive=None, stuck: bool = False, ledger=None) -> dict:
-        """Measures of the last cycles of a run, or of a mark of it; drive: where it is not the model's; ledger: as
-        `Seen` has it."""
+        """Return the measures of the last cycles of a run, or of a mark of it, by name.
+
+        Parameters
+        ----------
+        run
+            Run or mark.
+        drive : optional
+            Drive, if it is not that of the model.
+        stuck : bool
+            Whether the interface sticks.
+        ledger : (4, k), optional
+            See `Seen`.
+        """
         drive = drive or self.model.rig.drive.signal
         given = {"own": self.integrated(run, drive), "run": self.whole_run(run, drive)} | self.more(
             run, drive, stuck
@@ -63,7 +90,7 @@ class Reader:
         return found
 
     def sticks(self, run) -> bool:
-        """Whether no interface slips in the last cycles of a run by more than `held`, or the last digit."""
+        """Return whether no interface slips in the last cycles by more than `held` or round-off."""
         loops = self.integrated(run, self.model.rig.drive.signal).loops
         if not self.rubs or self.creeps:
             return False
@@ -74,7 +101,7 @@ class Reader:
         return run_events.all_stick(run.window, self.held)
 
     def rings(self, run, drive) -> tuple:
-        """Measures by name of what rings while the interface sticks, and their errors."""
+        """Return the measures of the ringing during stick by name, and their errors."""
         if not self.rubs or self.creeps:
             return {}, {}
         return run_events.rings(
@@ -82,16 +109,18 @@ class Reader:
         )
 
     def own(self, run, drive, values: dict) -> dict:
-        """What the run itself leaves open of its values by name, beside its rings."""
+        """Return the errors of the values by name that the run itself states, except of its ringing."""
         return {}
 
     def fewer(self, run):
-        """The run with every second of its samples."""
+        """Return the run with every second one of its samples."""
         return replace(run, window=every_second(run.window))
 
     def sampled(self, run, drive, values: dict) -> dict:
-        """What samples leave open of the values by name of a motion that is exact, by every second of them: nothing of
-        those that the engine integrated."""
+        """Return the errors by sampling of the measures of an exact motion, by name.
+
+        They follow from every second sample; measures that the engine integrated have none.
+        """
         fewer = self.values(self.fewer(run), drive, ledger=run.response.extra.get("ledger"))
         own = self.integrated(run, drive)
         apart = {
@@ -108,7 +137,10 @@ class Reader:
         )
 
     def whole_run(self, run, drive):
-        """Return the histories of a run, or of a mark of it, from t = 0 on; None if equal steps of them are not kept."""
+        """Return the histories of a run, or of a mark of it, from t = 0 on.
+
+        None if they are not kept at equal steps.
+        """
         histories = getattr(run, "response", None)
         kept = (
             NEEDS_RUN
@@ -118,9 +150,10 @@ class Reader:
         return histories if kept and histories.time.size and histories.time[0] == 0 else None
 
     def between_samples(self, run, drive, values: dict) -> dict:
-        """Return what the samples leave open of the measures of the whole run, by every second of them.
+        """Return the errors by sampling of the measures of the whole run, from every second sample.
 
-        The changes without the even and without the odd ones add up, as each reversal has neighbours of one kind.
+        The changes without the even and without the odd samples are added, because each reversal
+        has neighbours of one kind.
         """
         rows = [row for row in NEEDS_RUN if row.name in values]
         if not rows:
@@ -137,7 +170,19 @@ class Reader:
         return out
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
-        """The Solution of a run; drive: where it is not the model's; more: other fields of it."""
+        """Return the Solution of a run.
+
+        Parameters
+        ----------
+        run
+            Run of the engine.
+        seconds : float
+            CPU seconds of the run.
+        drive : optional
+            Drive, if it is not that of the model.
+        more
+            Other fields of the Solution.
+        """
         drive, window = drive or self.model.rig.drive.signal, self.numerics.window
         stuck, (rings, own) = self.sticks(run), self.rings(run, drive)
         values = self.values(run, drive, stuck, run.response.extra.get("ledger")) | rings
@@ -163,8 +208,19 @@ class Reader:
         )
 
     def level(self, size: float, run, drive=None, left: float = 0.0) -> Level:
-        """The Level of a run, or of a mark of it, at one size [m s-2] of the drive; left: relative error of its
-        measures."""
+        """Return the Level of a run, or of a mark of it.
+
+        Parameters
+        ----------
+        size : float
+            Level of the drive [m s-2].
+        run
+            Run or mark.
+        drive : optional
+            Drive, if it is not that of the model.
+        left : float
+            Relative error of the measures.
+        """
         found = self.values(run, drive)
         kept = {name: found[name] for name in KEPT if name in found}
         return Level(
@@ -176,7 +232,7 @@ class Reader:
 
 
 def _between_reversals(histories, parity: int):
-    """Return histories with every second sample, of this parity; the ends and the reversals of the slide stay."""
+    """Return histories with every second sample of this parity, and all ends and reversals."""
     step = np.diff(histories.slide)
     kept = np.arange(histories.time.size) % 2 == parity
     kept[1:-1] |= step[1:] * step[:-1] < 0
@@ -185,8 +241,10 @@ def _between_reversals(histories, parity: int):
 
 
 def every_second(window):
-    """A window without every second of its equally spaced samples; its last, and those of events between the others,
-    stay."""
+    """Return a window without every second one of its equally spaced samples.
+
+    The last sample, and those of events between the others, are kept.
+    """
     place = (window.time - window.time[0]) / np.diff(window.time).max()
     number = np.round(place).astype(int)
     kept = (np.abs(place - number) > 1e-6) | (number % 2 == 0)
@@ -195,8 +253,16 @@ def every_second(window):
 
 
 def friction_works(response, work: float, passed: float | None = None) -> tuple:
-    """(friction work [J] by the trapezoidal rule on the samples of all interfaces, that of a ledger, what went to and
-    fro); passed: the last where it is known better."""
+    """Return the friction work [J] from samples and from a ledger, and the exchanged work [J].
+
+    Parameters
+    ----------
+    response : Response
+    work : float
+        Friction work of the ledger [J].
+    passed : float, optional
+        Sum of |work| [J], if it is known better than from samples.
+    """
     extra = response.extra
     slides, forces = (
         extra.get(name, one[:, None])

@@ -1,4 +1,9 @@
-"""A coupled run from its plan to its result: the engine's solution with its errors, then a list of passes over it."""
+"""Coupled run from its plan to its result: the solution of an engine, then several passes.
+
+In: a plan with a rig, and its pressed patch. Out: a Result. `_solved` computes the Solution
+with its errors from coarse runs; the passes add measures over levels, the outcome, reasons for
+missing values, the decay curve, and final floors.
+"""
 
 from dataclasses import dataclass, replace
 from math import ceil
@@ -25,17 +30,22 @@ from .fields import fields_of
 from .numerics import choose
 from .solution import Solution, curve_measures
 
-ENDED = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)  # of a run before its time
-OTHER = 0.1  # of an amplitude, by which that of a coarser run may be another peak's
-FINEST = 1e-12  # error of a step below which round-off rules
+ENDED = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)  # outcomes of a run that ended early
+# relative difference from the amplitude of a coarse run, above which it may belong to another peak
+OTHER = 0.1
+FINEST = 1e-12  # error of a step [1] below which round-off dominates
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Coupled:
-    """A coupled run as far as its passes have come.
+    """Coupled run between two of its passes.
 
-    model, numerics, patch; raw: the Solution of its engine; drive: of the motion that is shown; estimated: whether its
-    errors are known; measures: by name; outcome.
+    - model, numerics, patch: what was solved.
+    - raw: Solution of the engine.
+    - drive: drive of the motion that is shown.
+    - estimated: whether the errors are known.
+    - measures: by name.
+    - outcome: None before the pass that determines it.
     """
 
     model: object
@@ -54,7 +64,10 @@ class Coupled:
 
 
 def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
-    """Run a plan of kind rig or linear; arguments as `run.run` has them, patch and coarse of its [contact]."""
+    """Run a plan of kind rig or linear.
+
+    The parameters are those of `run.run`; patch and coarse belong to its [contact].
+    """
     model, rig = what.model, what.model.rig
     if rig.start is None and rig.drive.kind != "free" and not np.any(rig.modes.base):
         raise PatchfemError(
@@ -109,7 +122,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
 
 
 def _levelled(run: Coupled) -> Coupled:
-    """With the measures over all levels of its drive."""
+    """Return the run with the measures over all levels of its drive."""
     raw, model = run.raw, run.model
     if not raw.levels:
         return run
@@ -123,7 +136,7 @@ def _levelled(run: Coupled) -> Coupled:
 
 
 def _settled(run: Coupled) -> Coupled:
-    """With its outcome, and what the run itself leaves open in the errors."""
+    """Return the run with its outcome, and errors that include those the run itself states."""
     found = without_errors(run_events.with_own(run.measures, run.raw.own), run.estimated)
     rig = run.model.rig
     outcome, found = settle(
@@ -136,13 +149,13 @@ def _settled(run: Coupled) -> Coupled:
     )
     if (
         outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL
-    ):  # no stop, but nothing holds it
+    ):  # the limit is not a stop of the scene: nothing bounds the motion
         outcome, found = Outcome.GROWS, without_bars(found)
     return replace(run, outcome=outcome, measures=found)
 
 
 def _reasoned(run: Coupled) -> Coupled:
-    """With a reason in place of each measure that such a run can have and this one has not."""
+    """Return the run with a reason for each measure that it could have but has not."""
     found, window, rig = run.measures, run.raw.window, run.model.rig
     rigid = (
         run.rubs
@@ -164,9 +177,12 @@ def _reasoned(run: Coupled) -> Coupled:
 
 
 def _decayed(run: Coupled, coarse) -> tuple:
-    """(The run, the curve of its decay, sentences), neither with smaller errors than the mesh leaves; of what rings, at
-    half the swing in the last stick. The curve is None without a release; coarse: the Patch of a coarser mesh or None;
-    the sentences say where what the mesh leaves is not known."""
+    """Return the run, its decay curve and notes, with errors not below those by the mesh.
+
+    The ringing has the error at half the swing in the last stick. The curve is None without a
+    release. coarse: Patch on a coarser mesh or None. The notes say for which errors the mesh is not
+    included.
+    """
     found, raw = (
         decays.decay_of(run.raw) if run.model.rig.drive.kind == "free" and run.estimated else None,
         run.raw,
@@ -211,7 +227,7 @@ def _decayed(run: Coupled, coarse) -> tuple:
 
 
 def _judged(run: Coupled) -> Coupled:
-    """With the final floors of its measures; a steady motion that does not exist has none."""
+    """Return the run with the final floors of its measures, without values if no motion exists."""
     found = judged(run.measures, run.model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].steady and run.outcome is Outcome.GROWS:
         found = reasons.unbounded(found)
@@ -219,7 +235,7 @@ def _judged(run: Coupled) -> Coupled:
 
 
 def _extra(run: Coupled, notes: list) -> dict:
-    """What a Result keeps of a run beside its measures and histories: choices, levels, events, energies, notes."""
+    """Return the other data of a Result: settings, levels, events, energies, notes."""
     raw, numerics, rig = run.raw, run.numerics, run.model.rig
     tells = ENGINES[numerics.engine].tells
     numbers = {"steps_per_cycle": numerics.steps, "iterations": raw.book.get("iterations")}
@@ -251,9 +267,10 @@ def _extra(run: Coupled, notes: list) -> dict:
 
 
 def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -> tuple:
-    """Solution of the chosen engine, its numerics, and its measures with errors on the engine's ladder of coarser runs.
+    """Return the Solution of the engine, its Numerics, and measures with errors by coarse runs.
 
-    Steps a cycle that the scene does not pin are doubled until the error of the displacement is met.
+    Steps per cycle that the scene does not fix are doubled until the error of the displacement is
+    within the tolerance.
     """
     engine, made = ENGINES[numerics.engine], {}
     has_fields = patch is not None and not model.patch.mesh.can_gather_points
@@ -262,6 +279,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
     size = model.rig.displacement_scale
 
     def go(meant, numerics, patch, frames=0, say=None):
+        """Run the engine as one pass, and return the Solution."""
         return passes.told(
             numerics.steps,
             lambda progress: engine.run(meant, numerics, patch, frames, say, progress),
@@ -277,10 +295,11 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         return found, numerics, with_errors(found.values, size=size) | curve_measures(found.extra)
 
     def solve(variant):
+        """Return the Solution of a Variant; for a curve, only around its peak if that suffices."""
         meant = (
             replace(model, rig=model.rig.structure.richer_rig) if variant.numerics.richer else model
         )
-        # the curve of a decay, and some measures, are of the whole run
+        # the decay curve and some measures need the histories of the whole run
         how = replace(variant.numerics, whole=model.rig.drive.kind == "free" or bool(NEEDS_RUN))
         near = _at_the_top(meant, found, lambda narrow: go(narrow, how, variant.patch))
         return near or go(meant, how, variant.patch)
@@ -290,7 +309,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         *engine.in_modes(model, numerics, patch),
     ]
     space, spent = estimate(solve, found.values, meshed, made)
-    bars = []  # errors of the displacement, of one doubling of the steps after the other
+    bars = []  # errors of the displacement [m] after each doubling of the steps
     while True:
         ways = engine.in_time(model, numerics, patch)
         time, more = estimate(solve, found.values, ways, made)
@@ -301,10 +320,10 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
                 model, numerics.finer(), patch, coarse, seconds, say, progress, estimated
             )
         if found.levels or model.rig.drive.kind == "free":
-            # else levels have their own
+            # otherwise the levels have errors of their own
             apart = [one for one in (*ways, *meshed) if one.runs or found.errors is None]
             of_levels = levels.levels_with_errors(found.levels, apart, made) if found.levels else ()
-            # a list has its bound
+            # a list of bonds has a bound of its error instead of a coarse run
             found = replace(
                 found,
                 levels=of_levels,
@@ -335,8 +354,21 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 
 
 def _at_the_top(model, found: Solution, go) -> Solution | None:
-    """The Solution of a coarser or richer run of a curve over frequency, computed in the neighbourhood of the largest
-    amplitude that was found; None where there is no curve, or where its own largest lies elsewhere."""
+    """Return a coarse or richer run of a curve, computed only around its largest amplitude.
+
+    Parameters
+    ----------
+    model : Model
+    found : Solution
+        The whole curve of the fine run.
+    go : callable
+        Function of a Model that returns a Solution.
+
+    Returns
+    -------
+    Solution or None
+        None if there is no curve, or if the run has its largest amplitude elsewhere.
+    """
     if (
         "at_error" not in found.extra
         or model.rig.drive.levels.amplitudes
@@ -352,7 +384,7 @@ def _at_the_top(model, found: Solution, go) -> Solution | None:
         return None
     try:
         near = go(replace(model, rig=model.rig.with_signal(drive)))
-    except NotConverged:  # the whole curve may begin where a motion is found
+    except NotConverged:  # the whole curve may start at a frequency at which a motion is found
         return None
     name = "relative_displacement_amplitude"
     if (
@@ -366,16 +398,24 @@ def _at_the_top(model, found: Solution, go) -> Solution | None:
 
 
 class Passes:
-    """Progress over all passes of a run, each of which weighs as many as its steps: the share done never falls.
+    """Progress over all passes of a run, each weighted by its steps; it never decreases.
 
-    progress: called with the share, or None; foreseen: steps a cycle of all passes together.
+    Parameters
+    ----------
+    progress : callable or None
+        Called with the completed fraction.
+    foreseen : float
+        Expected steps per cycle of all passes together.
     """
 
     def __init__(self, progress, foreseen: float):
         self.progress, self.foreseen, self.done, self.shown = progress, foreseen, 0.0, 0.0
 
     def told(self, steps: float, go):
-        """What go(progress of a pass of so many steps a cycle, or None) returns."""
+        """Return the result of go(progress) for a pass with this number of steps per cycle.
+
+        go gets None without a progress callback.
+        """
         found = go(
             None
             if self.progress is None
@@ -385,12 +425,16 @@ class Passes:
         return found
 
     def _tell(self, done: float, steps: float) -> None:
+        """Report the fraction that `done` steps are of the expected ones."""
         self.shown = max(self.shown, done / max(self.foreseen, self.done + steps))
         self.progress(self.shown)
 
 
 def _foreseen(engine, model, numerics, patch, coarse, estimated: bool) -> float:
-    """Steps a cycle of a run and of the coarser ones behind its errors; that on a coarser mesh takes the fewest."""
+    """Return the steps per cycle of a run and of its coarse runs together.
+
+    A run on a coarser mesh has the smallest number of steps.
+    """
     if not estimated:
         return numerics.steps
     ways = [*engine.in_time(model, numerics, patch), *engine.in_modes(model, numerics, patch)]
@@ -404,19 +448,22 @@ def _foreseen(engine, model, numerics, patch, coarse, estimated: bool) -> float:
 
 
 def _halved(engine, model, numerics, patch) -> tuple:
-    """Variants at half and a quarter of the steps of an engine that has steps, as `left_open` compares them."""
+    """Return the Variants at half and a quarter of the steps, for `left_open`; () without steps."""
     ways = engine.in_time(model, numerics, patch)
     return ways[0].runs if ways and not numerics.local else ()
 
 
 def errors_met(measures, tolerance: float) -> bool:
-    """Whether the errors of all Measures by name are within a tolerance of their values, or their floors."""
+    """Return whether the errors of all measures are within the tolerance, or their floors."""
     return all(one.error_ratio(tolerance) <= 1 for one in measures.values())
 
 
 def _whole_period(model, numerics, found) -> int:
-    """Cycles of a window that holds a whole stick-slip period, where no periodic drive sets the pace of a run (a
-    belt); 0 where the run has none that lasts, or none two windows long."""
+    """Return the cycles of a window that contains a whole stick-slip period of a belt.
+
+    No periodic drive sets the period of such a run. It is 0 if there is no period, or if the run is
+    shorter than two windows.
+    """
     drive = model.rig.drive.signal
     if model.friction is None or not drive.segments or is_periodic(drive):
         return 0
@@ -425,7 +472,7 @@ def _whole_period(model, numerics, found) -> int:
 
 
 def _enough(model, numerics, found, measures, bars) -> bool:
-    """Whether the error of the displacement is met, or the steps a cycle cannot be doubled again."""
+    """Return whether the displacement is accurate enough, or steps cannot be doubled again."""
     main, again = measures["relative_displacement_amplitude"], numerics.steps * 2
     met = main.error_ratio(model.accuracy.tolerance) <= 1
     if numerics.local:

@@ -1,4 +1,8 @@
-"""A rig whose law is smooth between reversals: the high order of `dynamics.smooth` as a Solution."""
+"""Run of a rig whose friction law is smooth between reversals, integrated at high order.
+
+In: a Model, its Numerics and its pressed patch. Out: a Solution (`dynamics.smooth`) whose
+measures come from the polynomials of the steps.
+"""
 
 from dataclasses import replace
 from time import perf_counter
@@ -11,19 +15,35 @@ from .interface import contact_of
 from .reading import Reader, every_second
 from .solution import Solution
 
-CLEAR = 1e3  # times the round-off of the slip, beyond which its share of the slide is known inside a step
-# what a crossing of that share may be off: the extension of a step errs more than its end
+# factor on the round-off of the slip, above which the fraction of slip is known inside a step
+CLEAR = 1e3
+# error of the instant at which this fraction crosses a limit: the extension of a step is less
+# accurate than its end
 LOCATED = 1e-7
 
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """One run with steps that meet numerics.local; patch: the solved Patch or None."""
+    """Run with steps that meet numerics.local, and return the Solution with its errors.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+    frames : int
+        Number of snapshots of the interface in the last cycle.
+    say, progress : callable, optional
+        Callbacks for a line of text and for the completed fraction.
+    """
     found, done, reader = smooth_run(model, numerics, patch, frames, say, progress)
     return replace(found, errors=reader.left_open(done, found.values))
 
 
 def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
-    """(Solution without what it leaves open itself, SmoothResult, Smooth that tells it); arguments as `run_smooth`."""
+    """Return the Solution without its own errors, the SmoothResult, and its SmoothReader.
+
+    The parameters are those of `run_smooth`.
+    """
     rig, begin = model.rig, perf_counter()
     contact = contact_of(model, numerics, patch)
     engine.loops_of(contact.element.kernels, say)
@@ -56,13 +76,13 @@ def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None)
 
 
 class SmoothReader(Reader):
-    """What a finished run of high order shows: what the integrator knows comes before what samples show."""
+    """Reader of a finished run of high order; values of the integrator precede those of samples."""
 
     def __init__(self, model, numerics, patch, contact):
         super().__init__(model, numerics, patch, contact, 1e-3 * contact.length, engine.SAMPLES)
 
     def integrated(self, run, drive) -> IntegratedMeasures:
-        """What the polynomials of the steps give."""
+        """Return the measures from the polynomials of the steps."""
         book, fine = run.ledger, run.fine
         if not _clear(run):
             fine = replace(
@@ -71,16 +91,19 @@ class SmoothReader(Reader):
         return replace(fine, friction_works=(book["sampled"], book["booked"], book["passed"]))
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """The samples with the reversals among them, and the evenly spaced ones where the spacing counts."""
+        """Return the samples including the reversals, and the equally spaced ones."""
         return {"window": run.turned, "even": run.window, "by": "rate"}
 
     def fewer(self, run):
-        """The run with every second of its samples."""
+        """Return the run with every second one of its samples."""
         return replace(super().fewer(run), turned=every_second(run.turned))
 
     def left_open(self, run, values: dict) -> dict:
-        """Errors of the measures `values` by name that a SmoothResult leaves open itself: those of samples, of peaks,
-        and of cycles that were left out."""
+        """Return the errors of measures by name that a SmoothResult states itself.
+
+        They are those of samples, of peaks, and of cycles that were skipped. values: measures by
+        name.
+        """
         found = self.sampled(run, self.model.rig.drive.signal, values)
         size = values.get("relative_displacement_amplitude", 0.0)
         for name in ("stick_fraction", "slip_start_phase"):
@@ -96,5 +119,5 @@ class SmoothReader(Reader):
 
 
 def _clear(run) -> bool:
-    """Whether the slip of a SmoothResult is no round-off."""
+    """Return whether the slip of a SmoothResult exceeds round-off."""
     return run.fine.loops[0].slip_range > CLEAR * slip_noise(run.window)

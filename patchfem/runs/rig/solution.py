@@ -1,4 +1,7 @@
-"""The solution that an engine gives back, and the last cycles as the measures see them."""
+"""Solution that an engine returns, and the last cycles as input of the measures.
+
+In: a run of an engine. Out: `Solution`, and `Seen` for the rows of `response.rows`.
+"""
 
 from dataclasses import dataclass, field, replace
 
@@ -12,22 +15,36 @@ from ...response.rows import Seen
 from ...structure.drive_sizes import drive_omega, has_full_cycle, is_sinusoidal
 
 NO_PEAK = "the output does not move at any of the swept frequencies, so there is no peak"
-OF_OTHERS = 3.0  # times the way that a peak moves by a coarser mesh or fewer modes
+OF_OTHERS = 3.0  # factor on the shift of a peak by a coarser mesh or fewer modes
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
     """One run of an engine before its errors are known.
 
-    values: measure -> value; response: kept histories, window: those of the last cycles; amplitudes: per window;
-    steady: (steady amplitude, error) or (None, None); outcome: None where the amplitudes decide; snapshots of the
-    interface; book: energies; contact: what the march moved; prepare: seconds of its preparation; levels: of a drive in
-    levels, probe: as `levels.onset` asks; log: events of the exact engine; notes: warnings of the method; held: slip
-    [m] below which a cycle sticks; own: what the run itself leaves open of its measures; errors: by measure, where the
-    engine has them itself; summed: how bonds are, a Choice, None without a sum; coarser: runs of levels at half the
-    steps and on coarser meshes, each with the one that it is held against, None for this run; extremes (c, 2) [m]: of
-    the output in every cycle of the run, by which the outcome is judged, None where the engine knows it; bounded: the
-    steady amplitude is that of a motion known to exist; extra: for the report.
+    - values: measures by name.
+    - response, window: histories that are kept, and those of the last cycles.
+    - amplitudes: amplitude of each window [m].
+    - steady: steady amplitude [m] and its error [m], or (None, None).
+    - outcome: None if the amplitudes decide.
+    - snapshots: states of the interface in the last cycle.
+    - book: energies [J] and counters by name.
+    - seconds: CPU seconds of the run.
+    - contact: contact that was moved.
+    - prepare: CPU seconds of the preparation by name.
+    - message: reason of an early end.
+    - levels, probe: levels of the drive, and the function that `levels.onset` calls.
+    - log: events of the exact engine.
+    - notes: warnings of the method.
+    - held: slip in a cycle [m] below which the interface sticks in it.
+    - own: errors by measure that the run itself states.
+    - errors: errors by measure, if the engine knows them itself.
+    - summed: Choice for the sum over bonds; None without a sum.
+    - coarser: coarse runs of levels, each with its reference run (None for this run).
+    - extremes (c, 2): smallest and largest output of every cycle [m], which decide the outcome;
+      None if the engine knows it.
+    - bounded: whether the steady amplitude is that of a motion known to exist.
+    - extra: further data of the result.
     """
 
     values: dict
@@ -57,9 +74,10 @@ class Solution:
 
 
 def gauged(model, raw: Solution) -> Solution:
-    """The Solution as a gauge sees it that does not move as the accelerometer does: its displacement and histories.
+    """Return the Solution as seen by a gauge that is not at the accelerometer.
 
-    How the motion settles is that of the accelerometer; where it would settle the gauge is not known.
+    Displacement and histories are those of the gauge. How the motion settles is judged at the
+    accelerometer; the steady amplitude at the gauge is not known.
     """
     gauge = model.rig.modes.gauge
     if gauge is None:
@@ -92,24 +110,35 @@ def gauged(model, raw: Solution) -> Solution:
 
 
 def decaying(window, period: float, whole: float) -> float:
-    """Amplitude [m] of a release in its last whole cycle, by its window; that of the `whole` window where it holds no
-    whole cycle."""
+    """Return the amplitude [m] of a release in its last whole cycle.
+
+    `whole` is the amplitude of the window, returned if it contains no whole cycle.
+    """
     found = last_swing(window.time, window.output, window.output_rate, period)
     return whole if found is None else found
 
 
 def borne(model, patch) -> float | None:
-    """Normal load [N] on the first interface, of the pressed patch or of the point; None where nothing rubs."""
+    """Return the normal load [N] on the first interface; None without friction."""
     if model.friction is None:
         return None
     return patch.pressure.load if patch is not None else model.point.load
 
 
 def last_cycles(model, patch, window, extremes, book: dict, **more) -> Seen:
-    """The last cycles of a run of a model, as the measures see them (`response.rows.Seen`).
+    """Return the last cycles of a run as input of the measures (`response.rows.Seen`).
 
-    window: Response; extremes: (c, 2) [m] of the output; book: energies; more: the other
-    fields of Seen, with `drive` where it is not the model's own.
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+    window : Response
+    extremes : (c, 2)
+        Smallest and largest output of each cycle [m].
+    book : dict
+        Energies by name [J].
+    more
+        Other fields of Seen, with `drive` if it is not that of the model.
     """
     drive = more.pop("drive", model.rig.drive.signal)
     return Seen(
@@ -125,7 +154,10 @@ def last_cycles(model, patch, window, extremes, book: dict, **more) -> Seen:
 
 
 def mode_stiffness(model, window) -> float:
-    """Stiffness [N/m] of the first mode as the contact meets it, 0 where another mode carries part of the slide."""
+    """Return the stiffness [N/m] of the first mode as seen by the contact.
+
+    It is 0 if other modes carry more than SHARED of the slide.
+    """
     first_mode = model.rig.first_mode
     if first_mode.fraction_of_other_modes(window.modal) > SHARED:
         return 0.0
@@ -133,10 +165,21 @@ def mode_stiffness(model, window) -> float:
 
 
 def sampled_loop(window, drive, work: float, force: complex | None = None) -> tuple | None:
-    """Loop of equally spaced samples by the trapezoidal rule, as `Seen` takes it; None where the window holds no whole
-    cycle.
+    """Return the loop of equally spaced samples by the trapezoidal rule (`Seen.loop`).
 
-    work: per cycle [J]; force: its first harmonic where it is known better.
+    Parameters
+    ----------
+    window : Response
+    drive
+    work : float
+        Friction work per cycle [J].
+    force : complex, optional
+        First harmonic of the force [N], if it is known better.
+
+    Returns
+    -------
+    tuple or None
+        None if the window contains no whole cycle.
     """
     if not has_full_cycle(window.time[-1] - window.time[0], drive):
         return None
@@ -148,9 +191,21 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
 
 
 def curve_measures(extra: dict, coarser=()) -> dict:
-    """Measure of a curve of steady motions: the frequency [Hz] of its largest amplitude, no value where that is 0.
+    """Return the frequency [Hz] of the largest amplitude of a curve of steady motions, by name.
 
-    extra: of a Solution; {} without a curve; coarser: Solutions of coarser runs, which have their peak elsewhere.
+    It has no value if the amplitude is 0.
+
+    Parameters
+    ----------
+    extra : dict
+        `Solution.extra`.
+    coarser : sequence of Solution
+        Coarse runs, whose peak lies elsewhere.
+
+    Returns
+    -------
+    dict
+        {} without a curve.
     """
     if "at_error" not in extra:
         return {}

@@ -1,4 +1,8 @@
-"""Several interfaces of one rig: each with its own law and load, and the springs that stand beside them."""
+"""Histories of strips that slide independently, averaged to those of the patch.
+
+In: a run in which each strip is an interface, and the pressed patch. Out: the run with the
+histories of a single interface.
+"""
 
 from dataclasses import replace
 
@@ -6,12 +10,12 @@ import numpy as np
 
 
 def strip_loads(patch) -> np.ndarray:
-    """Normal load (s,) [N] of every strip of a solved patch."""
+    """Return the normal load (s,) [N] of every strip of a solved patch."""
     return patch.strips.force.sum(axis=1)
 
 
 def run_of_strips(done, patch):
-    """A MarchResult of strips as that of the patch, averaged by `as_one`."""
+    """Return a MarchResult of strips as that of the patch, averaged by `as_one`."""
     loads, offsets = strip_loads(patch), patch.strips.offsets
     window = as_one(done.window, loads, offsets)
     return replace(
@@ -24,14 +28,26 @@ def run_of_strips(done, patch):
 
 
 def mark_as_one(mark, patch):
-    """A Mark of strips as that of the patch, averaged by `as_one`."""
+    """Return a Mark of strips as that of the patch, averaged by `as_one`."""
     window = as_one(mark.window, strip_loads(patch), patch.strips.offsets)
     return replace(mark, window=window, step_force=(window.force[1:] + window.force[:-1]) / 2)
 
 
 def as_one(response, loads, offsets):
-    """Histories of strips as those of the patch: slide, speed and slip averaged with the loads, the resultant force;
-    `extra` keeps the strips and has yaw_moment (k,) [N m], sum y f of the friction about +z on the upper piece."""
+    """Return histories of strips as those of the patch.
+
+    Slide, speed and slip are means weighted by the loads, the force is the resultant. `extra` keeps
+    the strips, and has the yaw moment (k,) [N m], the sum of y f of the friction about +z on the
+    upper piece.
+
+    Parameters
+    ----------
+    response : Response
+    loads : (s,)
+        Normal loads [N].
+    offsets : (s,)
+        Lateral positions y of the strips [m].
+    """
     extra, share = response.extra, np.asarray(loads) / np.sum(loads)
     slides, rates, forces = (extra[name] for name in ("slides", "slide_rates", "forces"))
     slips = extra.get("slips", slides)
@@ -46,10 +62,16 @@ def as_one(response, loads, offsets):
 
 
 def across(patch, window, period: float) -> tuple:
-    """What strips that yaw leave out: (amplitude [m] of the ends of the patch across x, share by which the slide path
-    of the last cycle is longer with it, in the mean under the pressure).
+    """Return the lateral amplitude of the ends of a patch that yaws, and the neglected path.
 
-    The yaw turns the patch about its middle: a point slides by s_j along x and by its rotation times x across.
+    The yaw rotates the patch about its middle: a point slides by s_j along x, and by the rotation
+    times x across it.
+
+    Returns
+    -------
+    tuple
+        Amplitude [m], and fraction by which the lateral motion makes the slide path of the last
+        cycle longer (mean over the patch, weighted by the pressure).
     """
     last = window.time >= window.time[-1] - period * (1 + 1e-9)
     slides, y, x = window.extra["slides"][last], patch.strips.offsets, np.abs(patch.x)

@@ -1,4 +1,8 @@
-"""A scene whose contact pushes and turns the modes as well as it rubs, or whose load is prescribed in time."""
+"""Contact whose normal load changes with the motion, or is prescribed in time.
+
+In: a Model, its Numerics and its pressed patch. Out: a VaryingLoadModel of
+`dynamics.march.varying_load`.
+"""
 
 from ...dynamics.march import varying_load as march
 from ...effects import is_bond_list
@@ -8,7 +12,7 @@ from .numerics import Numerics
 
 
 def rubbing_of(model: Model, numerics: Numerics):
-    """The dynamics.march.varying_load.Rubbing of the law of a model."""
+    """Return the friction law of a model as a `dynamics.march.varying_load.Rubbing`."""
     f = model.friction
     if f.law == "coulomb":
         return march.coulomb(f.static, f.kinetic)
@@ -23,7 +27,15 @@ def rubbing_of(model: Model, numerics: Numerics):
 
 
 def varying_load_model(model: Model, numerics: Numerics, patch):
-    """The VaryingLoadModel of a rig whose load changes; patch: the solved Patch or None under [normal]."""
+    """Return the VaryingLoadModel of a rig whose load changes.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+        None under [normal].
+    """
     load, sets = (
         (model.point.at, None)
         if patch is None

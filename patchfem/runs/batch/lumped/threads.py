@@ -11,10 +11,7 @@ LEAST = 32  # cases of a thread: fewer are done before it has begun
 
 
 def in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> None:
-    """work(part) for parts that make up range(count), at once where there are cores; it must let other threads run.
-
-    least: cases of a part, 0 for LEAST.
-    """
+    """Call work(part) for parts of range(count), in parallel threads if there are cores."""
     parts = max(1, min(cores(), count // (least or LEAST)))
     ends = [count * k // parts for k in range(parts + 1)]
     pieces = [slice(*pair) for pair in pairwise(ends)]

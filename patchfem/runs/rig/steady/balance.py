@@ -1,4 +1,8 @@
-"""The steady motion of laws with memory and of springs that bend, by harmonic balance; its curve through folds."""
+"""Steady motion of laws with memory and of nonlinear springs, by harmonic balance.
+
+In: a Model, its Numerics and its pressed patch. Out: the Solution of a sine, and the curve over
+frequency through its folds (`dynamics.harmonic`).
+"""
 
 from dataclasses import replace
 from time import perf_counter
@@ -25,16 +29,19 @@ from ..reading import Reader, friction_works
 from ..solution import Solution, sampled_loop
 from .curves import LAST, SHOWN, Shown, unlasting
 
-SAMPLES = 4096  # of the cycle that measures are read off
+SAMPLES = 4096  # samples of the cycle from which measures are computed
 
 
 class Balanced(Reader):
-    """What one cycle of a balance shows; turns: `Periodic.turns` of it."""
+    """Reader of one cycle of a harmonic balance; turns: `Periodic.turns` of this cycle."""
 
     turns: tuple = ()
 
     def integrated(self, run, drive) -> IntegratedMeasures:
-        """The two books of friction work and the turns; the middle of a motion that repeats stays."""
+        """Return the two values of the friction work, and the reversals.
+
+        A periodic motion has no drift.
+        """
         return IntegratedMeasures(
             drift=0.0,
             friction_works=friction_works(run.response, run.ledger["friction"]),
@@ -42,7 +49,7 @@ class Balanced(Reader):
         )
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """The loop of a cycle by the trapezoidal rule, force and slip as its samples and turns have them."""
+        """Return the loop by the trapezoidal rule, and the peaks of force and slip."""
         loop = sampled_loop(run.window, drive, run.ledger["friction"])
         if not self.rubs or not self.turns:
             return {"loop": loop}
@@ -60,7 +67,10 @@ class Balanced(Reader):
 
 
 class BalanceFinder:
-    """Laws with memory and springs that bend, by harmonic balance."""
+    """Finder for laws with memory and nonlinear springs, by harmonic balance.
+
+    It starts near the point of a curve that it gets, if there are several motions.
+    """
 
     tries_another, leaves = False, (1e-2, 0.1)
 
@@ -84,8 +94,16 @@ class BalanceFinder:
         self.group, self.tolerance = Group(rig.modes, parts), model.accuracy.tolerance
 
     def point(self, drive, near=None) -> tuple:
-        """The steady motion, from the point `near` of a curve where there are several, its measures read off one cycle,
-        and its Periodic; errors from twice its harmonics, its samples and those it is read at."""
+        """Return the Solution of the steady motion under a sine, and its Periodic.
+
+        The errors come from twice as many harmonics and from twice as many samples.
+
+        Parameters
+        ----------
+        drive : SineDrive
+        near : Periodic, optional
+            Point of a curve from which the solution starts, if there are several motions.
+        """
         begin = perf_counter()
         found = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
@@ -129,9 +147,18 @@ class BalanceFinder:
         ), found
 
     def _errors(self, values: dict, found, drive, read) -> dict:
-        """Errors by name of the measures of a Periodic; where no finer one balances, what the balance leaves open.
+        """Return errors of the measures of a Periodic by name.
 
-        read(Periodic, drive) -> measures by name.
+        If no finer Periodic converges, they are the error of the balance itself.
+
+        Parameters
+        ----------
+        values : dict
+            Measures by name.
+        found : Periodic
+        drive : SineDrive
+        read : callable
+            Function (Periodic, drive) that returns measures by name.
         """
         out = {name: abs(v) * min(found.error, 1.0) for name, v in values.items()}
         try:
@@ -146,8 +173,10 @@ class BalanceFinder:
         }
 
     def _lasting(self, drive, found, stable) -> tuple:
-        """In place of a Periodic that does not last the smallest one under the same drive that does, with its
-        multipliers and a note on it; what is given, where none is found."""
+        """Return the smallest stable Periodic under the same drive, its multipliers, and a note.
+
+        If none is found, the unstable one that was given is returned.
+        """
         every = branches.branches(self.modes, drive, self.group, self.tolerance)
         lasts = [one for one in every if one.stable]
         if not lasts:
@@ -168,14 +197,14 @@ class BalanceFinder:
         return found, with_stability(found, self.modes), (note,)
 
     def shown(self, drive, near=None) -> Shown:
-        """A point of a curve, its errors unknown."""
+        """Return a point of a curve without its errors."""
         found = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
         return self._shown(with_stability(found, self.modes))
 
     def _shown(self, found) -> Shown:
-        """What a Periodic with its multipliers shows."""
+        """Return the point of a curve of a Periodic with its multipliers."""
         kind, stable = balanced_regime(found)[0], bool(found.stable)
         drive = SineDrive(found.level, found.omega, self.model.rig.drive.signal.moving)
         return Shown(
@@ -190,7 +219,7 @@ class BalanceFinder:
         )
 
     def _read(self, found, drive) -> dict:
-        """The measures that a curve shows, by name."""
+        """Return the measures of a curve, by name."""
         response = periodic_response(found, self.modes, drive, SAMPLES)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
@@ -201,6 +230,7 @@ class BalanceFinder:
         return {name: value for name, value in values.items() if value is not None}
 
     def _measured(self, found, drive, samples: int = SAMPLES) -> tuple:
+        """Return the measures by name, the Response of a cycle, and its energies [J]."""
         response = periodic_response(found, self.modes, drive, samples)
         book = cycle_energy(found, self.modes) | {
             "stored": 0.0,
@@ -220,7 +250,7 @@ class BalanceFinder:
         return reader.values(run, drive), response, book
 
     def curve(self, drive) -> tuple:
-        """(points of the curve over the frequency through its folds, the frequencies [Hz] of these)."""
+        """Return the points of the curve over frequency, through its folds, and the folds [Hz]."""
         first = SineDrive(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
         branch = branches.response(
             self.modes,
@@ -234,11 +264,17 @@ class BalanceFinder:
         return [self._of_branch(one, first) for one in branch.points], branch.folds
 
     def apart(self, one: Shown, other: Shown) -> float:
-        """Way along a curve from one of its points to another, in which the whole range counts as the largest."""
+        """Return the arc length along a curve between two of its points.
+
+        The frequency is scaled by the swept range.
+        """
         return branches.way(one.near, other.near, self._range)
 
     def between(self, one: Shown, other: Shown, share: float) -> Shown:
-        """The point of a curve at a share of the way from one of its points to another, across the line to it."""
+        """Return the point of a curve at a fraction of the arc length between two of its points.
+
+        It is solved in the plane normal to the line between them.
+        """
         drive = replace(one.drive, omega=one.near.omega)
         return self._of_branch(
             branches.between(self.modes, drive, one.near, other.near, share, self._range), drive
@@ -246,16 +282,16 @@ class BalanceFinder:
 
     @property
     def _range(self) -> float:
-        """Width [rad/s] of the range that is swept."""
+        """Width of the swept range [rad/s]."""
         drive = self.model.rig.drive.signal
         return 2 * np.pi * abs(drive.high - drive.low)
 
     def _of_branch(self, found, drive) -> Shown:
-        """A Periodic of a branch as a point of a curve with its errors."""
+        """Return a Periodic of a branch as a point of a curve with its errors."""
         found = with_stability(found, self.modes) if found.stable is None else found
         point = self._shown(found)._replace(regime="stable" if found.stable else "unstable")
         errors = self._errors(point.values, point.near, point.drive, self._read)
-        least = {"acceleration_distortion": LAST}  # besides that of the value
+        least = {"acceleration_distortion": LAST}  # error in addition to that relative to the value
         return point._replace(
             errors={
                 name: error + LAST * abs(point.values[name]) + least.get(name, 0.0)

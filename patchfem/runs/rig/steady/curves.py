@@ -1,4 +1,8 @@
-"""Points of a curve of steady motions as columns, and the levels of a drive as the table that a march makes of them."""
+"""Curves of steady motions: points, columns, levels, and refinement over frequency.
+
+In: points from a finder. Out: columns of a curve, and the Solution of a drive in levels with
+the same table as a march.
+"""
 
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -10,29 +14,39 @@ from ....dynamics.curve_points import adapted
 from ....response.levels import KEPT, Level
 from ..solution import gauged
 
-# column of a curve -> measure
+# measure of each column of a curve
 SHOWN = {
     "amplitude": "relative_displacement_amplitude",
     "acceleration_peak": "absolute_acceleration_peak",
     "acceleration_fundamental": "absolute_acceleration_fundamental",
     "acceleration_distortion": "acceleration_distortion",
 }
-READ = 1e-9  # relative error of what an exact engine reads off a motion that it is given
-LAST = 1e-12  # of the first harmonic: round-off of the third
-POINTS = 121  # of a curve over frequency, before its bends ask for more
-# of a peak, down to which its neighbourhood reaches and above which no other is; of
+# relative error of the measures of a motion that an exact engine integrates from a given state
+READ = 1e-9
+LAST = 1e-12  # round-off of the third harmonic relative to the first
+POINTS = 121  # points of a curve over frequency before its refinement
+# The neighbourhood of a peak ends at this fraction of the peak, and no other peak may be higher
+# than this fraction. It is computed alone if it is at most this fraction of the curve. Its curve
+# starts with this many points.
 FALLEN, NARROW, FEW = (
     0.8,
     0.75,
     7,
 )
-# a whole curve, a neighbourhood that is worth it; points with which its curve begins
-SHARE = 0.01  # by which straight lines between points of a curve may miss it
+SHARE = 0.01  # largest relative error of the linear interpolation between the points of a curve
 
 
 class Shown(NamedTuple):
-    """A point of a curve: its sine, values and errors by measure name (none where no bounded motion is), regime,
-    largest |Floquet multiplier|, whether a disturbance dies out, outcome, and a start for a motion nearby."""
+    """Point of a curve.
+
+    - drive: its sine.
+    - values, errors: measures and their errors by name; {} if there is no bounded motion.
+    - regime: kind of the motion.
+    - multiplier: largest |Floquet multiplier|.
+    - stable: whether a disturbance decays.
+    - outcome.
+    - near: initial guess for a motion nearby.
+    """
 
     drive: SineDrive
     values: dict
@@ -45,7 +59,7 @@ class Shown(NamedTuple):
 
     @property
     def level(self) -> Level:
-        """The point as a level of the drive; without a bounded motion its values are NaN."""
+        """The point as a Level of the drive; its amplitude is NaN without a bounded motion."""
         values = (
             {name: self.values.get(name) for name in KEPT}
             if self.values
@@ -63,7 +77,7 @@ class Shown(NamedTuple):
 
 
 def exact_errors(values: dict, left: float) -> dict:
-    """Errors by name of what is read off a motion that closes to the relative error `left`."""
+    """Return the errors by name of a motion that closes to the relative error `left`."""
     return {
         name: abs(v) * (READ + left) + LAST * (name == "acceleration_distortion")
         for name, v in values.items()
@@ -72,7 +86,7 @@ def exact_errors(values: dict, left: float) -> dict:
 
 
 def unlasting(multipliers) -> str:
-    """The sentence on a steady motion that does not last; multipliers: Floquet's (m,)."""
+    """Return the sentence on an unstable steady motion; multipliers: Floquet multipliers (m,)."""
     size = np.abs(multipliers).max()
     return (
         f"the steady motion that was found is unstable: a disturbance grows by the factor {size:.3g} per cycle; "
@@ -81,7 +95,15 @@ def unlasting(multipliers) -> str:
 
 
 def curve_point(drive, raw, near=None) -> Shown:
-    """The Solution of a steady motion as a point of a curve."""
+    """Return the Solution of a steady motion as a point of a curve.
+
+    Parameters
+    ----------
+    drive : SineDrive
+    raw : Solution
+    near : optional
+        Initial guess for a motion nearby.
+    """
     size = float(np.abs(np.asarray(raw.extra["multipliers"])).max(initial=0.0))
     bounded = raw.outcome not in (Outcome.GROWS, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
     return Shown(
@@ -97,33 +119,43 @@ def curve_point(drive, raw, near=None) -> Shown:
 
 
 def lost(drive) -> Shown:
-    """A point at which no steady motion was found."""
+    """Return a point at which no steady motion was found."""
     return Shown(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
 
 
 class Followed:
-    """Curves over frequency whose points `shown` finds at any frequency; leaves: as of `top.highest`."""
+    """Curve over frequency whose points `shown` finds; leaves: see `top.highest`."""
 
     leaves = 1e-2, 0.1
 
     def apart(self, one: Shown, other: Shown) -> float:
-        """Way [rad/s] along the curve from one of its points to another."""
+        """Return the distance [rad/s] of two points along the curve."""
         return abs(other.drive.omega - one.drive.omega)
 
     def between(self, one: Shown, other: Shown, share: float) -> Shown:
-        """The point of the curve at a share of the way from one of its points to another."""
+        """Return the point of the curve at a fraction of the distance between two of its points."""
         omega = one.drive.omega + share * (other.drive.omega - one.drive.omega)
         return self.shown(replace(one.drive, omega=omega), one.near)
 
 
 def traced(modes, drive, find) -> list:
-    """Points of the curve of a sweep. find(sine, near) -> Shown; near: the start that the point before gives, or None.
+    """Return the points of the curve of a sweep, refined where it bends.
 
-    POINTS frequencies and those of the modes are where the curve begins; straight lines between its points miss it by
-    SHARE at most.
+    The curve starts with POINTS frequencies and those of the modes, and is refined until linear
+    interpolation between its points has an error of at most SHARE.
+
+    Parameters
+    ----------
+    modes
+        Modal basis.
+    drive : Sweep
+    find : callable
+        Function (sine, near) that returns a Shown; near: initial guess from the previous point, or
+        None.
     """
 
     def found(frequency, before):
+        """Return the amplitude [m] at a frequency [Hz], and the point."""
         one = find(
             SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving),
             before and before[1].near,
@@ -134,8 +166,11 @@ def traced(modes, drive, find) -> list:
 
 
 def starts_of(modes, drive) -> np.ndarray:
-    """Frequencies [Hz] from end to end of a sweep with which its curve begins: POINTS of them, and those of the modes
-    between, where a peak may be narrower than their spacing."""
+    """Return the frequencies [Hz] with which the curve of a sweep starts.
+
+    They are POINTS frequencies over the range, and the frequencies of the modes in it, where a peak
+    may be narrower than their spacing.
+    """
     space = np.geomspace if drive.logarithmic else np.linspace
     ends, own = sorted((drive.low, drive.high)), modes.omega / (2 * np.pi)
     places = np.union1d(
@@ -146,10 +181,23 @@ def starts_of(modes, drive) -> np.ndarray:
 
 
 def around_the_top(drive, curve: dict, at: float):
-    """A Sweep over the neighbourhood of the largest amplitude of a curve, at a frequency `at` [Hz], for a run that
-    checks it; curve: columns of `curve_columns`. None where another peak is nearly as high, or the curve is short.
+    """Return a Sweep over the neighbourhood of the largest amplitude of a curve.
 
-    It reaches to where the curve has fallen to FALLEN of the largest amplitude, and a quarter of that way beyond.
+    The neighbourhood ends where the curve has fallen to FALLEN of the largest amplitude, plus a
+    quarter of its width on both sides.
+
+    Parameters
+    ----------
+    drive : Sweep
+    curve : dict
+        Columns from `curve_columns`.
+    at : float
+        Frequency of the largest amplitude [Hz].
+
+    Returns
+    -------
+    Sweep or None
+        None if another peak is nearly as high, or the neighbourhood is most of the curve.
     """
     order = np.argsort(curve["frequency"], kind="stable")
     places, heights = curve["frequency"][order], np.nan_to_num(curve["amplitude"][order])
@@ -172,15 +220,21 @@ def around_the_top(drive, curve: dict, at: float):
 
 
 def largest_of(points) -> int:
-    """Number of the point with the largest amplitude, among those that are stable where any is."""
+    """Return the index of the point with the largest amplitude.
+
+    Only stable points count, if there are any.
+    """
     sizes = np.array([one.values.get(SHOWN["amplitude"], -1.0) for one in points])
     lasting = np.array([one.stable for one in points])
     return int(np.argmax(np.where(lasting | ~lasting.any(), sizes, -2.0)))
 
 
 def curve_columns(points, folds=()) -> dict:
-    """Columns (c,) of a curve by name: frequency [Hz], level [m s-2], regime, multiplier, and each of SHOWN with its
-    error; NaN where no bounded motion is. folds: where it turns back."""
+    """Return the columns (c,) of a curve by name; NaN where no bounded motion exists.
+
+    They are frequency [Hz], level [m s-2], regime, multiplier, and each of SHOWN with its error.
+    folds: frequencies [Hz] at which the curve turns back.
+    """
     out = {
         "frequency": np.array([one.drive.omega / (2 * np.pi) for one in points]),
         "level": np.array([one.drive.acceleration for one in points]),
@@ -196,10 +250,16 @@ def curve_columns(points, folds=()) -> dict:
 
 
 def motion_at_levels(finder, drive):
-    """The Solution of the largest of the levels of a drive, each found from the one before it as a rig comes to it,
-    with the curve of them all, the Level of each and a probe as `levels.onset` asks.
+    """Return the Solution of the largest level of a drive in levels.
 
-    A level without a steady motion is kept as not converged and said; NotConverged where all are.
+    Each level starts from the motion at the previous one, as in a test. The Solution has the curve
+    of all levels, the Level of each, and a probe for `levels.onset`. A level without a steady
+    motion is kept as not converged with a note.
+
+    Raises
+    ------
+    NotConverged
+        If no level has a steady motion.
     """
     points, said, best = [], [], None
     for part in drive.segments:
@@ -218,9 +278,10 @@ def motion_at_levels(finder, drive):
             best = raw, sine
         said += [raw.message] if raw.message else []
     if best is None:
-        raise said[0]  # no level has a motion
+        raise said[0]  # no level has a steady motion
 
     def probe(number: int, level: float) -> Level:
+        """Return the Level at another level [m s-2], started from the motion at a known level."""
         sine = SineDrive(level, drive.segments[0].omega, drive.moving)
         return finder.shown(sine, points[number].near if number >= 0 else None).level
 

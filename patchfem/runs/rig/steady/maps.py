@@ -1,9 +1,9 @@
-"""The steady motion of what is linear between events, by the map from event to event over a period: of Coulomb
-interfaces or none at all (`EventFinder`), of elastic-plastic elements (`YieldFinder`); its curve over frequency or
-level.
+"""Steady motion of a rig that is linear between events, by the map of a period.
 
-Nothing is left open but round-off: what the interfaces do is followed from event to event, and the period closes to the
-residual that is stated.
+In: a Model, its Numerics and its pressed patch. Out: the Solution of a sine and the curve over
+frequency or level, for Coulomb interfaces or none (`EventFinder`) and for elastic-plastic
+elements (`YieldFinder`). The only errors are round-off and the stated residual of the period,
+because the interfaces are followed from event to event.
 """
 
 from dataclasses import replace
@@ -26,8 +26,18 @@ from .curves import SHOWN, Followed, Shown, exact_errors, traced, unlasting
 
 
 class Repeating(NamedTuple):
-    """A motion that a map finds: its state and memory at phase 0 of the drive; near: a start for a motion nearby;
-    regime, multipliers (m,), residual; error: relative, that the residual leaves; iterations; bounded, lasting."""
+    """Periodic motion that a map finds.
+
+    - start, memory: state and memory of the elements at phase 0 of the drive.
+    - near: initial guess for a motion nearby.
+    - regime: kind of the motion.
+    - multipliers (m,): Floquet multipliers.
+    - residual: relative change of the state over a period.
+    - error: relative error that follows from the residual.
+    - iterations: number of iterations.
+    - bounded: whether a bounded motion exists.
+    - lasting: whether it is stable.
+    """
 
     start: InitialState
     memory: Any
@@ -42,17 +52,20 @@ class Repeating(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The regime, and whether a disturbance of it grows."""
+        """Regime, and whether the motion is unstable."""
         return self.regime if self.lasting else f"{self.regime}, unstable"
 
     @property
     def size(self) -> float:
-        """The largest |multiplier|."""
+        """Largest |multiplier|."""
         return float(np.abs(self.multipliers).max(initial=0.0))
 
 
 class Maps(Followed):
-    """Steady motions by the map of a period; `repeating` finds one, from `near` where there are several."""
+    """Finder of steady motions by the map of a period.
+
+    `repeating` finds a motion; it starts from `near` if there are several.
+    """
 
     name, elements, tries_another = "", None, False
 
@@ -69,11 +82,11 @@ class Maps(Followed):
         self.groups = self.found.groups
 
     def repeating(self, drive, near) -> Repeating:
-        """The motion that repeats with a sine."""
+        """Return the motion that repeats with a sine, as Repeating."""
         raise NotImplementedError
 
     def point(self, drive, near=None) -> tuple:
-        """The steady motion as a run of two cycles that begins in it, and a start for a motion nearby."""
+        """Return the Solution of two cycles of the steady motion, and a start for a motion nearby."""
         begin, one = perf_counter(), self.repeating(drive, near)
         reader = Pieces(
             self.model, replace(self.numerics, cycles=2.0, window=1), self.patch, self.found
@@ -121,11 +134,11 @@ class Maps(Followed):
         ), one.near
 
     def begun(self, memory):
-        """The memory of elements that a run begins with, whose energies count from there."""
+        """Return the memory of elements with which a run begins, with energies counted from there."""
         return memory
 
     def shown(self, drive, near=None) -> Shown:
-        """A point of a curve."""
+        """Return a point of a curve."""
         one = self.repeating(drive, near)
         if not one.bounded:
             return Shown(drive, {}, {}, one.words, one.size, False, Outcome.GROWS)
@@ -156,18 +169,21 @@ class Maps(Followed):
         )
 
     def curve(self, drive) -> tuple:
-        """(points of the curve over the frequency, each found from the one before it, no folds)."""
+        """Return the points of the curve over frequency and no folds.
+
+        Each point starts from the motion at the previous one.
+        """
         return traced(self.modes, drive, self.shown), ()
 
 
 def _of_curve(amplitude: float, acceleration: float, waves: dict) -> dict:
-    """The measures that a curve shows, by name."""
+    """Return the measures of a curve, by name."""
     values = {SHOWN["amplitude"]: amplitude, SHOWN["acceleration_peak"]: acceleration, **waves}
     return {name: value for name, value in values.items() if value is not None}
 
 
 class YieldFinder(Maps):
-    """Elastic-plastic elements, by the map from yield to yield."""
+    """Finder for elastic-plastic elements, by the map from yield to yield."""
 
     name, elements = "yields", YieldingElements
 
@@ -176,11 +192,11 @@ class YieldFinder(Maps):
         self.tries_another = len(model.rig.friction.interfaces) == 1
 
     def begun(self, memory):
-        """As of `Maps.begun`."""
+        """Return the memory with energies counted from the start (see `Maps.begun`)."""
         return event_elements.books_begin(memory)
 
     def repeating(self, drive, near) -> Repeating:
-        """The motion that repeats, from the Point `near` it or from rest."""
+        """Return the motion that repeats, started from the Point `near` or from rest."""
         one = steady.steady(self.modes, drive, self.groups, near)
         return Repeating(
             one.start,
@@ -197,18 +213,22 @@ class YieldFinder(Maps):
 
 
 class EventFinder(Maps):
-    """Coulomb interfaces, or none at all, by the event map."""
+    """Finder for Coulomb interfaces, or none, by the event map."""
 
     name, elements = "events", RigidElements
 
     @cached_property
     def forces(self) -> np.ndarray:
-        """Static and kinetic limits (2, i) [N]."""
+        """Static and kinetic friction limits (2, i) [N]."""
         return np.array([(one.static, one.kinetic) for one in self.groups]).T
 
     def repeating(self, drive, near) -> Repeating:
-        """The motion that repeats: where friction falls with the first slip there are several, and one starts from the
-        state `near`. Multipliers of two events at once hold for one order of them, so they tell nothing."""
+        """Return the motion that repeats.
+
+        If friction falls with the first slip, several motions exist, and the search starts from the
+        state `near`. Multipliers of two simultaneous events hold for one order of these only, so
+        they are not used.
+        """
         falls = bool(np.any(self.forces[0] > self.forces[1]))
         one = stick_steady.steady(self.modes, drive, self.groups, start=near if falls else None)
         bounded = one.regime != "unbounded"
@@ -226,11 +246,14 @@ class EventFinder(Maps):
         )
 
     def curve(self, drive) -> tuple:
-        """As of `Maps.curve`, without friction in closed form."""
+        """Return the curve as `Maps.curve` does; without friction it is known in closed form."""
         return traced(self.modes, drive, self.shown), ()
 
     def shown(self, drive, near=None) -> Shown:
-        """As of `Maps.shown`, without friction in closed form, but on a resonance that nothing damps."""
+        """Return a point of a curve; without friction it is known in closed form.
+
+        The exception is an undamped resonance.
+        """
         if self.forces.any():
             return super().shown(drive, near)
         modes, gauge = (
@@ -258,7 +281,7 @@ class EventFinder(Maps):
 
     @cached_property
     def decay(self) -> float:
-        """Rate [1/s] at which the slowest free motion of the modes alone dies out, <= 0."""
+        """Rate [1/s] of the slowest free motion of the modes alone, <= 0 for decay."""
         n = self.modes.omega.size
         state = np.block(
             [

@@ -1,4 +1,8 @@
-"""The steady motion over grooves: a march that is brought to repeat, and the curve of such motions."""
+"""Steady motion over grooves: a march whose initial state is corrected until it repeats.
+
+In: a Model with grooves, its Numerics and its pressed patch. Out: the Solution of a sine, and
+the curve of such motions over frequency (`dynamics.harmonic.orbits`).
+"""
 
 from dataclasses import replace
 from time import perf_counter
@@ -16,19 +20,29 @@ from ..march import MarchReader
 from ..solution import Solution
 from .curves import Followed, Shown, curve_point, traced, unlasting
 
-STEPS, MOST = 256, 4096  # of a cycle, at first and at most
-EXACT = 1024  # of a law without memory, whose steps their error chooses: samples
-LEAD = 30  # cycles within which a lifted mass leaves its grooves, or stays in them
-READ = 1e-9  # relative error of a step's end
-LOOSE = 1e-6  # change from cycle to cycle, over the size of a motion, up to which it repeats
-ROUGH = 1e-2  # change of the multipliers beyond 1 that the steps of a march leave open
+STEPS, MOST = 256, 4096  # steps per cycle at the start, and at most
+EXACT = 1024  # samples per cycle for a law without memory, whose steps are chosen by their error
+LEAD = 30  # cycles after which a lifted mass counts as staying in its grooves
+READ = 1e-9  # relative error of the end of a step
+LOOSE = 1e-6  # largest change from cycle to cycle, over the amplitude, of a periodic motion
+# error of the multipliers by the steps of a march; only a larger excess over 1 is unstable
+ROUGH = 1e-2
 
 
 def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
-    """The Solution of a motion under the sine `drive` whose lifted mass leaves the grooves within LEAD cycles of a
-    march from rest; None where it stays in them, or nothing is lifted.
+    """Return the Solution of a motion whose lifted mass leaves its grooves; None if it does not.
 
-    contact: its model of grooves. The errors are what half the steps change.
+    It must leave them within LEAD cycles of a march from rest. The errors are the changes by half
+    the steps.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+    drive : SineDrive
+    contact
+        Contact model of the grooves.
     """
     if not model.grooves.lifted_mass:
         return None
@@ -53,9 +67,9 @@ def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
 
 
 class MarchFinder(Followed):
-    """Finds the steady motion over grooves by a march that is brought to repeat."""
+    """Finder of the steady motion over grooves, by a march whose initial state is corrected."""
 
-    tries_another, leaves = True, (0.3, 30.0)  # its points have errors of a tolerance
+    tries_another, leaves = True, (0.3, 30.0)  # the points have errors of the size of the tolerance
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         self.model, self.patch, self.frames = model, patch, frames
@@ -66,7 +80,7 @@ class MarchFinder(Followed):
         engine.warm_up(model.rig.modes, model.rig.drive.signal, self.contact, say)
 
     def _run(self, drive, near, steps: int):
-        """A Run that repeats, from the Run `near` as it stands or from rest."""
+        """Return a Run that repeats, started from the Run `near` or from rest, and its residual."""
         run = engine.fresh(
             self.model.rig.modes, drive, self.contact, steps, self.model.rig.springs.travel
         )
@@ -86,7 +100,7 @@ class MarchFinder(Followed):
         return run, left
 
     def _read(self, run, steps: int, frames: int = 0) -> tuple:
-        """(measures by name, Mark of a cycle, snapshots, whether it sticks)."""
+        """Return the measures, the Mark of a cycle, snapshots, and whether the interface sticks."""
         mark, snapshots = orbits.shown(run, frames)
         read = MarchReader(
             self.model, replace(self.numerics, steps=steps), self.patch, self.contact
@@ -96,7 +110,7 @@ class MarchFinder(Followed):
         return values | {"drift_per_cycle": 0.0}, mark, snapshots, stuck
 
     def point(self, drive, near=None) -> tuple:
-        """As of `_point`; a motion that leaves its grooves instead, without a Run."""
+        """Return the steady motion (see `_point`), or that of a mass that leaves its grooves."""
         try:
             return self._point(drive, near)
         except NotConverged:
@@ -107,8 +121,11 @@ class MarchFinder(Followed):
         return gone, None
 
     def _point(self, drive, near) -> tuple:
-        """The steady motion as a cycle of it, and the Run that goes on in it; steps are doubled until half of them
-        change its amplitude by less than the tolerance, which is the error of every measure."""
+        """Return the Solution of one cycle of the steady motion, and the Run that continues it.
+
+        The steps are doubled until the change of the amplitude by half of them is within the
+        tolerance. This change is the error of every measure.
+        """
         begin, name = perf_counter(), "relative_displacement_amplitude"
         run, left = self._run(drive, near, self.steps)
         half = self._read(self._run(drive, run, self.steps // 2)[0], self.steps // 2)[0]
@@ -163,10 +180,11 @@ class MarchFinder(Followed):
         ), run
 
     def _rough(self, value: float, half: float) -> bool:
+        """Return whether the amplitude changes by more than the tolerance if the steps are halved."""
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
     def shown(self, drive, near=None) -> Shown:
-        """A point of a curve."""
+        """Return a point of a curve; if the search from `near` fails, from rest."""
         try:
             return curve_point(drive, *self.point(drive, near))
         except NotConverged:
@@ -175,5 +193,8 @@ class MarchFinder(Followed):
         return curve_point(drive, *self.point(drive))
 
     def curve(self, drive) -> tuple:
-        """(points of the curve over the frequency, each found from the one before it, no folds)."""
+        """Return the points of the curve over frequency and no folds.
+
+        Each point starts from the motion at the previous one.
+        """
         return traced(self.model.rig.modes, drive, self.shown), ()

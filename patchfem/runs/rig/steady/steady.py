@@ -1,8 +1,10 @@
-"""The engine `harmonic`: the steady motion of a scene found directly, and its curve over frequency or level.
+"""Engine `harmonic`: steady motion of a scene, found directly, and its curve.
 
-Coulomb interfaces and elastic-plastic elements by shooting on the map of their events and yields (`maps`), other laws
-by harmonic balance (`balance`), those over grooves by a march (`marched`). What is found is a
-motion that repeats with the drive; its regime, multipliers and stability are named.
+In: a Model, its Numerics and its pressed patch. Out: the Solution of a motion that repeats with
+the drive, with its regime, multipliers and stability, under a sine, or the largest one over
+frequency or level. Coulomb interfaces and elastic-plastic elements are solved by shooting with
+the map of their events and yields (`maps`), grooves by a march (`marched`), other laws by
+harmonic balance (`balance`).
 """
 
 from ....core import NotConverged, SineDrive
@@ -13,9 +15,24 @@ from .top import at_the_top
 
 
 def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """The steady motion at a sine, or the largest on a curve over a sweep or over levels, whose sine is extra["at"].
+    """Solve the steady motion under a sine, or the largest one of a sweep or of levels.
 
-    Where the map of yields does not settle, the balance of harmonics is tried.
+    The sine of the largest motion is extra["at"]. If the map of yields does not converge, harmonic
+    balance is tried.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+    frames : int
+        Number of snapshots of the interface in a cycle.
+    say, progress : callable, optional
+        Callbacks for a line of text and for the completed fraction; progress is not used.
+
+    Returns
+    -------
+    Solution
     """
     by = steady_by(model)
     try:
@@ -27,7 +44,7 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
 
 
 def _found(finder, model) -> Solution:
-    """What a finder finds under the drive of a model."""
+    """Return the Solution of a finder under the drive of a model."""
     drive = model.rig.drive.signal
     if isinstance(drive, SineDrive):
         return finder.point(drive)[0]

@@ -1,8 +1,10 @@
-"""The largest amplitude on a curve of steady motions: points are put in until those beside it leave little open.
+"""Largest amplitude of a curve of steady motions, refined until its neighbours bound it.
 
-Between two points a curve that bends downwards lies below the straight lines through the points beyond them on either
-side, so the lines bound what it may reach there. Each new point lies where they reach highest. Where a curve has a kink
-the lines meet in it; a smooth peak is closed in as the square of the spacing.
+In: points of a curve and a finder. Out: the Solution of the largest motion with the errors of
+its amplitude and frequency. Between two points, a curve that is concave lies below the lines
+through the points on either side, so that these lines bound its largest value. Each new point
+is added where this bound is largest. At a kink of a curve the lines meet; a smooth peak
+converges with the square of the spacing.
 """
 
 from dataclasses import replace
@@ -17,18 +19,25 @@ from ..solution import Solution, gauged
 from .curves import SHOWN, curve_columns, largest_of
 
 AMPLITUDE = SHOWN["amplitude"]
-MOST = 40  # points that are put in
-CAP = 0.8  # of the largest amplitude: above it one mode's curve bends downwards (from 0.816 on)
-CLOSE = 3e-4  # of the width of a peak: what round-off leaves to be told of its place
-NEAREST = 1e-9  # of the way along the whole curve: points closer together are one
-TENTH = 0.9  # of a peak, down to which its width counts
-SHIFT = 10.0  # times that width over the relative error of the heights, by which the error moves the place of a peak:
-# errors that tilt a ridge take it a tenth of its height down its flank
+MOST = 40  # most points that are added
+# fraction of the largest amplitude above which the curve of a single mode is concave (from 0.816
+# on)
+CAP = 0.8
+CLOSE = 3e-4  # accuracy of the position of a peak that round-off allows, over its width
+NEAREST = 1e-9  # fraction of the length of the curve; closer points are identical
+TENTH = 0.9  # fraction of a peak at which its width is measured
+SHIFT = 10.0  # shift of a peak over (its width times the relative error of the heights):
+# errors that tilt a flat peak move it a tenth of its height down its flank
 
 
 class Top(NamedTuple):
-    """points: those of the curve and those put in; best: number of the largest that lasts; above: how far the largest
-    amplitude may lie above it [m], infinite where a neighbour has no bounded motion."""
+    """Refined curve and its largest point.
+
+    - points: those of the curve and those added.
+    - best: index of the largest stable point.
+    - above: how far the largest amplitude may exceed it [m]; inf if a neighbour has no bounded
+      motion.
+    """
 
     points: list
     best: int
@@ -36,11 +45,22 @@ class Top(NamedTuple):
 
 
 def highest(points: list, finder, tolerance: float) -> Top:
-    """The largest amplitude of a curve, its neighbourhood refined by motions that `finder` finds between its points.
+    """Find the largest amplitude of a curve by adding points that `finder` computes.
 
-    points: Shown, along the curve; finder: apart(Shown, Shown) -> way between two, between(Shown, Shown, share) ->
-    Shown, and `leaves`: shares of the tolerance that may be left open of the amplitude and of its place, over the
-    width of the peak. It ends there, or after MOST points.
+    Parameters
+    ----------
+    points : list of Shown
+        Points along the curve.
+    finder
+        Has apart(Shown, Shown) -> distance along the curve, between(Shown, Shown, fraction) ->
+        Shown, and `leaves`: fractions of the tolerance that may remain as the error of the
+        amplitude, and of its position over the width of the peak.
+    tolerance : float
+
+    Returns
+    -------
+    Top
+        At the latest after MOST points.
     """
     points = list(points)
     for left in range(MOST, -1, -1):
@@ -51,7 +71,7 @@ def highest(points: list, finder, tolerance: float) -> Top:
             return Top(points, best, 0.0)
         if lasting.any():
             reach[~(lasting[:-1] | lasting[1:])] = 0.0
-            at[lasting[:-1] != lasting[1:]] = 0.5  # where it ceases to last is met by halving
+            at[lasting[:-1] != lasting[1:]] = 0.5  # the limit of stability is found by bisection
         if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
             return Top(points, best, np.inf)
         above = max(float(reach.max()) - y[best], 0.0)
@@ -70,10 +90,13 @@ def highest(points: list, finder, tolerance: float) -> Top:
 
 
 def _closer(s, y, best: int, share: float) -> tuple | None:
-    """(number of the interval, share of it) of a point that brings a neighbour of the largest value closer to it than
-    `share` of the width of the peak; None where both are, or the largest stands at an end.
+    """Return where to add a point that brings a neighbour closer to the largest value, or None.
 
-    It is the vertex of the parabola through the three, or a tenth of the way to the farther neighbour.
+    None if both neighbours are closer than `share` times the width of the peak, or the largest
+    value is at an end. The point is the vertex of the parabola through the three points, or a tenth
+    of the way to the farther neighbour.
+
+    Returns the index of the interval and the fraction of it.
     """
     if not 0 < best < len(s) - 1:
         return None
@@ -93,30 +116,47 @@ def _closer(s, y, best: int, share: float) -> tuple | None:
 
 
 def _width(y, away) -> float:
-    """Distance (k,) `away` of the first value that is below TENTH of the first one, else of the last."""
+    """Return the distance of the first value below TENTH of the first one, else of the last one.
+
+    away: distances (k,) of the values y (k,).
+    """
     low = ~(y >= TENTH * y[0])
     return float(away[: (int(np.argmax(low)) if low.any() else y.size - 1) + 1].max())
 
 
 def _heights(points) -> np.ndarray:
+    """Return the amplitudes [m] of points; NaN without one."""
     return np.array([one.values.get(AMPLITUDE, np.nan) for one in points])
 
 
 def ceilings(s, y) -> tuple:
-    """What a curve that bends downwards may reach in each interval of the places s (n,), and where in it, as its share:
-    (n - 1,) each; y (n,): its values, an interval beside nan reaches 0.
+    """Return the bound of a concave curve in each interval, and where in it the bound lies.
 
-    Of the points beyond an interval those below CAP of its larger end tell nothing, as a curve may bend upwards there;
-    where none tells, a CAP-th more than that end is left open.
+    A line from points below CAP of the larger end is not used, because a curve may be convex there;
+    without any line, the bound is the larger end divided by CAP.
+
+    Parameters
+    ----------
+    s : (n,)
+        Positions along the curve.
+    y : (n,)
+        Values; an interval next to NaN has the bound 0.
+
+    Returns
+    -------
+    tuple
+        Bounds and fractions, (n - 1,) each.
     """
     h, ends = np.diff(s), np.maximum(y[:-1], y[1:])
     with np.errstate(all="ignore"):
         slope = np.diff(y) / h
-        rise, fall = np.full((2, h.size), np.nan)  # of the lines from the left and from the right
+        # slopes of the lines from the left and from the right
+        rise, fall = np.full((2, h.size), np.nan)
         rise[1:] = np.where(y[:-2] >= CAP * ends[1:], slope[:-1], np.nan)
         fall[:-1] = np.where(y[2:] >= CAP * ends[:-1], slope[1:], np.nan)
         left, right = y[:-1] + rise * h, y[1:] - fall * h
-        meet = (right - y[:-1]) / (rise - fall) / h  # as a share of the interval
+        # intersection of both lines as a fraction of the interval
+        meet = (right - y[:-1]) / (rise - fall) / h
         inside = (meet > 0) & (meet < 1)
         reach = np.where(inside, y[:-1] + rise * meet * h, ends)
         alone = np.isnan(rise) != np.isnan(fall)
@@ -130,16 +170,19 @@ def ceilings(s, y) -> tuple:
 
 
 def at_the_top(points: list, folds, finder) -> Solution:
-    """The Solution of the largest motion on a curve, its errors with what its place leaves open, and the curve."""
+    """Return the Solution of the largest motion of a curve, with the curve.
+
+    Its errors include those by the position of the peak.
+    """
     points, best, above = highest(points, finder, finder.model.accuracy.tolerance)
     top = points[best]
     raw = finder.point(top.drive, top.near)[0]
     errors, extra = dict(raw.errors or {}), {"curve": curve_columns(points, folds), "at": top.drive}
     height, y = top.values.get(AMPLITUDE, 0.0), _heights(points)
     if not height > 0 or AMPLITUDE not in raw.values:
-        # None: no peak
+        # None means that there is no peak
         return replace(raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0})
-    # by the curve, whose points are cheaper
+    # difference from the point of the curve, which is computed with fewer samples
     missed = abs(gauged(finder.model, raw).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
     places, off = np.array([one.drive.omega for one in points]) / (2 * np.pi), 0.0
@@ -148,7 +191,8 @@ def at_the_top(points: list, folds, finder) -> Solution:
         heights, away = y[best::way], np.abs(places[best::way] - places[best])
         if heights.size < 2:
             continue
-        low = ~(heights >= height - min(above, height) - 2 * error)  # the largest cannot lie there
+        # points at which the largest amplitude cannot be
+        low = ~(heights >= height - min(above, height) - 2 * error)
         number = int(np.argmax(low)) if low.any() else heights.size - 1
         far = float(away[: number + 1].max())
         near = min(far, float(away[1]) + SHIFT * error / height * _width(heights, away))
@@ -161,7 +205,7 @@ def at_the_top(points: list, folds, finder) -> Solution:
 
 
 def _gaps(finder, beside, raw: Solution) -> dict:
-    """Differences by name of the measures of a motion of a curve to those of a Solution."""
+    """Return differences by name between the measures of a point of a curve and of a Solution."""
     try:
         other = finder.point(beside.drive, beside.near)[0]
     except NotConverged:
