@@ -59,8 +59,8 @@ def picture(rows: list, curves: dict, path: Path = HERE / "failure.svg") -> Path
             upper, lower = axes[0, column], axes[1, column]
             upper.set_title(title, fontsize=10)
             for axis, mine, other in (
-                (upper, found.slide(TWO)[0], truth.slide),
-                (lower, found.force[0], truth.force),
+                (upper, found.z @ TWO.slide, truth.slide),
+                (lower, found.force, truth.force),
             ):
                 axis.plot(truth.time, other, color=GREY, lw=2.2, alpha=0.5, label="exact")
                 axis.plot(

@@ -22,12 +22,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from problems import PLAIN
-from report_methods import duhamel
-from report_methods.point_laws import Coulomb
+from report_methods import coulomb, solve_duhamel
 from told import told
 from vibration_forms import decay
 
@@ -85,18 +83,17 @@ def solve(omega: float, ratio: float) -> Row:
 def stepped(step: float = 0.05) -> tuple:
     """(time, x, share of steps that do not converge) of the first reading by the report's steps."""
     drive = Piecewise((DriveSegment(0.0, 0.0, 0.0, 1.0),), 1000 * step, False)
-    found = duhamel.run(
+    found = solve_duhamel(
         PLAIN,
         drive,
-        (Coulomb(0.125, 0.125),),
-        END,
-        1000,
-        "velocity",
-        1e-4,
-        1.0,
-        InitialState(np.array([1.0]), np.array([0.0])),
+        coulomb(0.125),
+        (END, 1000),
+        criterion="velocity",
+        tolerance=1e-4,
+        relaxation=1.0,
+        start=InitialState(np.array([1.0]), np.array([0.0])),
     )
-    return found.time, found.z[:, 0], found.failures / found.time.size
+    return found.time, found.z[:, 0], found.n_failed / found.time.size
 
 
 def picture(rows: list, steps: tuple, path: Path) -> Path:

@@ -25,8 +25,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
-from report_methods import euler
-from report_methods.scene_run import run_rig
+from report_methods import solve_euler
 from told import told
 
 import patchfem as pf
@@ -85,13 +84,27 @@ def motion(step: float | None = None) -> Motion:
 
 def _by_euler(steps: int, period: float) -> Motion:
     """The last cycle by Euler's method with this number of steps per cycle."""
-    model = build(load_scene(HERE / "figure_5.toml"))
-    response = run_rig(model, euler, steps).response(model.rig.modes, model.rig.drive.signal.moving)
-    last = response.select(slice(-steps - 1, None))
-    block, slide = -last.output, -last.slide
-    low, high = hermite_extremes(last.output, last.output_rate, period / steps)
-    peak = float(high - low) / 2
-    return Motion(last.time - 7 * period, block, block - slide, last.force, peak)
+    rig = build(load_scene(HERE / "figure_5.toml")).rig
+    numbers = rig.friction.interfaces[0].numbers
+    motion = solve_euler(
+        rig.modes,
+        rig.drive.signal,
+        numbers.static,
+        numbers.reference_speed,
+        (rig.drive.cycles * rig.drive.signal.period, steps),
+        rig.start,
+    )
+    last = slice(-steps - 1, None)
+    displacement = motion.z[last] @ rig.modes.output
+    low, high = hermite_extremes(displacement, motion.v[last] @ rig.modes.output, period / steps)
+    frame = motion.z[last] @ rig.modes.slide - displacement
+    return Motion(
+        motion.time[last] - 7 * period,
+        -displacement,
+        frame,
+        motion.force[last],
+        float(high - low) / 2,
+    )
 
 
 def turns(one: Motion) -> np.ndarray:

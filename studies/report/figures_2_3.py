@@ -25,12 +25,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from problems import SDOF, SDOF_DRIVE, sampled
-from report_methods import newmark
-from report_methods.point_laws import Coulomb
+from report_methods import coulomb, solve_newmark
 from told import told
 
 import patchfem as pf
@@ -98,23 +96,21 @@ def newmark_run(
     stick_speed: float, onset: float = 4.0, level: float = 5.0, cycles: int = 60
 ) -> Cycle:
     """The last cycle of Newmark's method that stops the block below `stick_speed`."""
-    limit = onset / level
-    found = newmark.run(
+    found = solve_newmark(
         SDOF,
         SDOF_DRIVE,
-        (Coulomb(limit, limit),),
-        (cycles + 0.5) * SDOF_DRIVE.period,
-        CURVE - 1,
-        stick_speed,
-        by_force=True,
+        coulomb(onset / level, stick_speed),
+        ((cycles + 0.5) * SDOF_DRIVE.period, CURVE - 1),
+        needs_force=True,
     )
-    r, last = found.response(SDOF), slice(-CURVE, None)
+    last = slice(-CURVE, None)
+    relative = found.accelerations(SDOF)[last, 0]
     return Cycle(
-        r.output[last],
-        r.output_rate[last],
-        r.force[last],
-        (r.acceleration - r.base_acceleration)[last],
-        r.acceleration[last],
+        found.z[last, 0],
+        found.v[last, 0],
+        found.force[last],
+        relative,
+        relative + found.drive[last],
     )
 
 

@@ -90,7 +90,7 @@ ITEMS = (
         "Newmark's method with a threshold of speed for sticking, and the spikes that this method causes",
         BLOCK,
         "studies/report/conclusions.py",
-        "tests/studies/report_methods/test_methods.py",
+        "tests/studies/test_report_methods.py",
         "works",
     ),
     Item(
@@ -235,7 +235,7 @@ ITEMS = (
         "the solution by Duhamel's integral, with implicit friction",
         BLOCK,
         "studies/integrators/failure.py",
-        "tests/studies/report_methods/test_methods.py",
+        "tests/studies/test_report_methods.py",
         "works",
     ),
     Item(
