@@ -15,6 +15,6 @@ S = K_ss - K_si K_ii^-1 K_is.
 - A piece on an unstructured mesh (from a file, or with round ends) is assembled cell by cell in
   `substructure` and factorised by `fronts`, in the order of `dissect`.
 - `mortar` joins pieces whose interface nodes do not match.
-- `recovery` computes stresses and their errors, `coating_bond` the traction below a coating.
+- `recovery` computes stresses and their errors, `coating_traction` the traction below a coating.
 - `cache` stores compliances on disk; `lapack` loads BLAS and LAPACK quickly.
 """

@@ -24,8 +24,8 @@ GRID_SOURCE_FILES = (*COMMON_SOURCE_FILES, "tensor_stiffness.py", "condense.py",
 MESH_SOURCE_FILES = (*COMMON_SOURCE_FILES, "dissect.py", "fronts.py", "substructure.py")
 
 
-def folder() -> Path:
-    """Return the folder of the cache.
+def cache_folder() -> Path:
+    """Return the folder of the files, which need not exist.
 
     It is patchfem/operators below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache.
     """
@@ -49,7 +49,7 @@ def grid_key(x, depth, coating_rows: int, layers) -> str:
         32 hexadecimal digits.
     """
     arrays = (np.asarray(x, np.float64), np.asarray(depth, np.float64))
-    return _hash(arrays, (int(coating_rows),), layers, GRID_SOURCE_FILES)
+    return _hash_piece(arrays, (int(coating_rows),), layers, GRID_SOURCE_FILES)
 
 
 def mesh_key(mesh, layers) -> str:
@@ -60,7 +60,7 @@ def mesh_key(mesh, layers) -> str:
     numbers = (mesh.triangles, mesh.quads, mesh.is_coating, mesh.interface, mesh.far)
     arrays = [np.asarray(mesh.points, np.float64)]
     arrays += [np.asarray(part, np.int64) for part in numbers]
-    return _hash(arrays, ("mesh",), layers, MESH_SOURCE_FILES)
+    return _hash_piece(arrays, ("mesh",), layers, MESH_SOURCE_FILES)
 
 
 def reference_cell_key() -> str:
@@ -68,7 +68,7 @@ def reference_cell_key() -> str:
     return _hash_source(hashlib.sha256(), REFERENCE_SOURCE_FILES)
 
 
-def _hash(arrays, words: tuple, layers, source: tuple) -> str:
+def _hash_piece(arrays, words: tuple, layers, source: tuple) -> str:
     digest = hashlib.sha256()
     for array in arrays:
         digest.update(repr(array.shape).encode())
@@ -84,8 +84,8 @@ def _hash_source(digest, source: tuple) -> str:
     return digest.hexdigest()[:32]
 
 
-def fetch(key: str, shapes: dict) -> dict | None:
-    """Read the arrays that `keep` has stored under a key.
+def load_arrays(key: str, shapes: dict) -> dict | None:
+    """Read the arrays that `store_arrays` has stored under a key.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def fetch(key: str, shapes: dict) -> dict | None:
         Read-only arrays by their names. None if the folder cannot be trusted, or if an array is
         missing, has another shape or is not finite.
     """
-    path = folder() / f"{key}.npz"
+    path = cache_folder() / f"{key}.npz"
     if not path.is_file() or user_cache.prepare_folder(path.parent):
         return None
     try:
@@ -114,23 +114,23 @@ def fetch(key: str, shapes: dict) -> dict | None:
     return arrays
 
 
-def keep(key: str, arrays: dict) -> None:
+def store_arrays(key: str, arrays: dict) -> None:
     """Store named arrays under a key; do nothing if the folder cannot be written."""
-    if user_cache.prepare_folder(folder()):
+    if user_cache.prepare_folder(cache_folder()):
         return
     content = BytesIO()
     np.savez(content, **arrays)
-    user_cache.write_file(folder() / f"{key}.npz", content.getvalue())
-    _trim()
+    user_cache.write_file(cache_folder() / f"{key}.npz", content.getvalue())
+    _delete_oldest_files()
 
 
-def _trim() -> None:
+def _delete_oldest_files() -> None:
     """Delete the least recently used files until the folder is within `MAX_FOLDER_BYTES`.
 
     Temporary files that killed processes have left behind are deleted in the same way.
     """
     try:
-        files = [path for path in folder().iterdir() if path.is_file()]
+        files = [path for path in cache_folder().iterdir() if path.is_file()]
         files.sort(key=lambda path: path.stat().st_mtime)
         total = sum(path.stat().st_size for path in files)
         for path in files[:-1]:

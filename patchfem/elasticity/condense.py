@@ -16,60 +16,60 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core import NotConverged
-from .grid_fronts import GridFactor, eliminate
+from .grid_fronts import GridFactor, eliminate_inner_nodes
 from .lapack import cho_inverse, dpotrf, dtrsm, one_thread
 from .tensor_stiffness import apply_stencil
 
 # Residual over the largest load above which a solution is refined once.
 RESIDUAL_TOL = 1e-8
-# Factors are refused if one step of refinement changes the displacements by a larger fraction.
-MAX_REFINEMENT = 1e-2
+# Relative change of the displacements by one step of refinement above which factors are refused.
+MAX_REFINEMENT_CHANGE = 1e-2
 # In even motion the displacement along x changes sign at the mirror plane, the inward one does not.
 MIRROR_SIGNS = np.array([-1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class KeptFactor:
+class KeptNodeFactor:
     """Cholesky factor of the stiffness of the kept nodes, for one kind of motion.
 
     - ``unknowns``: (k,) kept unknowns that can move, those of the interface last
-    - ``low``: (k, k) lower Cholesky factor
+    - ``lower_factor``: (k, k) lower Cholesky factor
     - ``n_interface``: number of unknowns of the interface
     """
 
     unknowns: np.ndarray
-    low: np.ndarray
+    lower_factor: np.ndarray
     n_interface: int
 
     def compliance(self) -> np.ndarray:
         """Return the last diagonal block (n_interface, n_interface) of the inverse."""
-        return cho_inverse(self.low[-self.n_interface :, -self.n_interface :])
+        return cho_inverse(self.lower_factor[-self.n_interface :, -self.n_interface :])
 
     def solve(self, load) -> np.ndarray:
         """Return the displacements (n, 2, r) of the kept nodes under loads of the same shape."""
         out = np.zeros_like(load).reshape(-1, load.shape[-1])
-        half_solved = dtrsm(1.0, self.low, load.reshape(out.shape)[self.unknowns], lower=1)
-        out[self.unknowns] = dtrsm(1.0, self.low, half_solved, lower=1, trans_a=1)
+        half_solved = dtrsm(1.0, self.lower_factor, load.reshape(out.shape)[self.unknowns], lower=1)
+        out[self.unknowns] = dtrsm(1.0, self.lower_factor, half_solved, lower=1, trans_a=1)
         return out.reshape(load.shape)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Condensed:
+class CondensedGrid:
     """A grid condensed to its first row.
 
     - ``stencil``: stiffness of the whole grid (`tensor_stiffness`)
-    - ``inside``: factors of the inner nodes of the grid, or of its right half if `is_mirrored`
-    - ``kept``: factors of the kept nodes: one, or one for even and one for odd motion
+    - ``inner_factor``: factors of the inner nodes of the grid, or of its right half if `is_mirrored`
+    - ``kept_factors``: factors of the kept nodes: one, or one for even and one for odd motion
     - ``is_mirrored``: whether the grid is mirror-symmetric in x
     - ``rounding``: relative error of the compliance by round-off. If it is not 0, solutions take
       one step of iterative refinement.
     """
 
     stencil: np.ndarray
-    inside: GridFactor
-    kept: tuple[KeptFactor, ...]
+    inner_factor: GridFactor
+    kept_factors: tuple[KeptNodeFactor, ...]
     is_mirrored: bool
-    rounding: float = 0.0
+    round_off_error: float = 0.0
 
     def compliance(self) -> np.ndarray:
         """Return the displacements of the interface per force on it.
@@ -80,7 +80,7 @@ class Condensed:
             Symmetric; node by node along x and inward.
         """
         with one_thread():
-            parts = [factor.compliance() for factor in self.kept]
+            parts = [factor.compliance() for factor in self.kept_factors]
         return self._join_halves(*parts) if self.is_mirrored else parts[0]
 
     def _join_halves(self, even, odd) -> np.ndarray:
@@ -93,7 +93,7 @@ class Condensed:
         columns, rows = self.stencil.shape[:2]
         right = np.arange(2 * (columns // 2), 2 * columns)
         halves = np.zeros((2, right.size, right.size))
-        for half, factor, compliance in zip(halves, self.kept, (even, odd)):
+        for half, factor, compliance in zip(halves, self.kept_factors, (even, odd)):
             # the first interface node and the other ones are numbered before and after the kept
             # column, whose unknowns are skipped to number the interface alone
             unknowns = factor.unknowns[-factor.n_interface :]
@@ -126,7 +126,7 @@ class Condensed:
         whole = np.zeros((*self.stencil.shape[:2], *load.shape[1:]))
         whole[:, 0] = load
         u = self.solve(whole, has_inner_loads=False)
-        if self.rounding:
+        if self.round_off_error:
             u += self.solve(whole - apply_stencil(self.stencil, u))
         return u
 
@@ -154,19 +154,19 @@ class Condensed:
             return np.concatenate([left[: columns - half], even + odd])
 
     def _solve_part(self, load, has_inner_loads: bool) -> np.ndarray:
-        """Solve for the nodes of `inside`; the loads of even motion precede those of odd motion."""
+        """Solve one part of the grid; the loads of even motion precede those of odd motion."""
         nodes = load.reshape(-1, *load.shape[2:])
-        nodes = self.inside.forward(nodes) if has_inner_loads else nodes.copy()
-        ring = self.inside.ring
-        frames = load.shape[-1] // len(self.kept)
-        for k, factor in enumerate(self.kept):
+        nodes = self.inner_factor.forward(nodes) if has_inner_loads else nodes.copy()
+        ring = self.inner_factor.ring
+        frames = load.shape[-1] // len(self.kept_factors)
+        for k, factor in enumerate(self.kept_factors):
             columns = slice(k * frames, (k + 1) * frames)
             nodes[ring, :, columns] = factor.solve(nodes[ring, :, columns])
-        u = self.inside.backward(nodes, has_inner_loads=has_inner_loads)
+        u = self.inner_factor.backward(nodes, has_inner_loads=has_inner_loads)
         return u.reshape(load.shape)
 
 
-def condense(stencil, is_mirrored: bool) -> Condensed:
+def condense(stencil, is_mirrored: bool) -> CondensedGrid:
     """Condense a grid to its first row and check the factors.
 
     Parameters
@@ -184,7 +184,7 @@ def condense(stencil, is_mirrored: bool) -> Condensed:
     ------
     NotConverged
         If the stiffness is not positive definite, or if one step of refinement changes a solution
-        by more than `MAX_REFINEMENT`.
+        by more than `MAX_REFINEMENT_CHANGE`.
     """
     columns = stencil.shape[0]
     is_mirrored = is_mirrored and columns > 3
@@ -194,20 +194,22 @@ def condense(stencil, is_mirrored: bool) -> Condensed:
             if columns % 2:
                 half = half.copy()
                 half[0, :, 1] /= 2  # the middle column belongs to both halves
-            inside = eliminate(half, keep_left=True)
+            inside = eliminate_inner_nodes(half, keep_left=True)
             kept = tuple(_factorise_motion(stencil, inside, is_odd=odd) for odd in (False, True))
         else:
-            inside = eliminate(stencil)
+            inside = eliminate_inner_nodes(stencil)
             kept = (_factorise(inside.schur, np.arange(2 * columns), 2 * columns),)
-    condensed = Condensed(stencil, inside, kept, is_mirrored)
+    condensed = CondensedGrid(stencil, inside, kept, is_mirrored)
     load = irregular_load(2 * columns).reshape(columns, 2, 1)
     u = condensed.displacement(load)
     residual = -apply_stencil(stencil, u)
     residual[:, 0] += load
-    return replace(condensed, rounding=rounding_error(load, u, residual, condensed.solve))
+    return replace(
+        condensed, round_off_error=estimate_round_off(load, u, residual, condensed.solve)
+    )
 
 
-def _factorise_motion(stencil, inside: GridFactor, *, is_odd: bool) -> KeptFactor:
+def _factorise_motion(stencil, inside: GridFactor, *, is_odd: bool) -> KeptNodeFactor:
     """Factorise the stiffness of the kept nodes of the right half in even or in odd motion.
 
     If a column of nodes lies in the middle, it does not move along x in even motion, nor inward in
@@ -235,12 +237,12 @@ def _factorise_motion(stencil, inside: GridFactor, *, is_odd: bool) -> KeptFacto
     return _factorise(schur, unknowns, interface.size)
 
 
-def _factorise(matrix, unknowns, n_interface: int) -> KeptFactor:
+def _factorise(matrix, unknowns, n_interface: int) -> KeptNodeFactor:
     kept = np.asfortranarray(matrix[np.ix_(unknowns, unknowns)])
     low, fault = dpotrf(kept, lower=1, clean=1, overwrite_a=1)
     if fault:
         raise NotConverged("the stiffness of the piece is not positive definite")
-    return KeptFactor(unknowns, low, n_interface)
+    return KeptNodeFactor(unknowns, low, n_interface)
 
 
 def irregular_load(size: int) -> np.ndarray:
@@ -252,7 +254,7 @@ def irregular_load(size: int) -> np.ndarray:
     return np.arange(1, size + 1) ** 2 * ((np.sqrt(5) - 1) / 2) % 1 - 0.5
 
 
-def rounding_error(load, u, residual, solve: Callable) -> float:
+def estimate_round_off(load, u, residual, solve: Callable) -> float:
     """Estimate the relative error of a solution by round-off from one step of refinement.
 
     The change by this step is the error of the compliance, too: a compliance refined in double
@@ -273,14 +275,14 @@ def rounding_error(load, u, residual, solve: Callable) -> float:
     Raises
     ------
     NotConverged
-        If the change is larger than `MAX_REFINEMENT`.
+        If the change is larger than `MAX_REFINEMENT_CHANGE`.
     """
     if np.abs(residual).max() <= RESIDUAL_TOL * np.abs(load).max():
         return 0.0
     change = float(np.abs(solve(residual)).max() / np.abs(u).max())
-    if not change <= MAX_REFINEMENT:
+    if not change <= MAX_REFINEMENT_CHANGE:
         raise NotConverged(
             f"the equations of the piece are solved only to a relative accuracy of {change:.1e}, but "
-            f"{MAX_REFINEMENT:.0e} is needed"
+            f"{MAX_REFINEMENT_CHANGE:.0e} is needed"
         )
     return change

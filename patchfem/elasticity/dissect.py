@@ -17,8 +17,8 @@ N_LANDMARKS = 4  # nodes whose distances serve as coordinates; four separate a g
 def graph_coordinates(graph) -> np.ndarray:
     """Return coordinates of the nodes of a graph: numbers of steps from nodes far apart.
 
-    Each of these landmarks is farthest from those before it. Components of the graph lie behind
-    one another.
+    Each of these landmarks is the node farthest from the earlier ones. The components of the graph
+    have separate ranges of coordinates.
 
     Parameters
     ----------
@@ -32,6 +32,7 @@ def graph_coordinates(graph) -> np.ndarray:
     component = connected_components(graph, directed=False)[1]
 
     def count_steps(node: int) -> np.ndarray:
+        """Return the numbers of steps (n,) from a node to all others."""
         steps = dijkstra(graph, directed=False, indices=node, unweighted=True)
         is_unreachable = np.isinf(steps)
         return np.where(is_unreachable, steps[~is_unreachable].max() + 1 + component, steps)
@@ -100,7 +101,7 @@ def _split_parts(sorted_nodes, pairs, part_of_node) -> np.ndarray:
     sizes = np.bincount(part_of_node[part_of_node >= 0])
     sides = np.zeros((len(sorted_nodes), part_of_node.size), np.int64)
     n_severed = np.empty((len(sorted_nodes), sizes.size), np.int64)
-    # NumPy sorts short integers by their digits, which is faster
+    # NumPy sorts 16-bit integers by radix sort, which is faster than its sort of longer integers
     short_int = np.uint16 if sizes.size < 2**16 else np.int64
     for side, severed, nodes in zip(sides, n_severed, sorted_nodes):
         nodes = nodes[part_of_node[nodes] >= 0]

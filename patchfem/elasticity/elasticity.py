@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core import NotConverged, frozen_array
 from ..formatting import format_length
-from .condense import Condensed, condense
+from .condense import CondensedGrid, condense
 from .lapack import one_thread
 from .tensor_stiffness import tensor_stencil
 
@@ -97,12 +97,12 @@ class Piece:
         return self.computed["stencil"]
 
     @property
-    def rounding(self) -> float:
+    def round_off_error(self) -> float:
         """Relative error of the compliance by round-off [1]; 0 before the piece is factorised."""
-        return self.computed["factor"].rounding if "factor" in self.computed else 0.0
+        return self.computed["factor"].round_off_error if "factor" in self.computed else 0.0
 
     @property
-    def factor(self) -> Condensed:
+    def factor(self) -> CondensedGrid:
         """The piece condensed to its interface, which gives compliance and displacements.
 
         NotConverged, with a remedy, if the stiffness cannot be factorised.
@@ -113,30 +113,33 @@ class Piece:
             except NotConverged as error:
                 min_length = min(np.diff(self.x).min(), np.diff(self.depth).min())
                 size = (np.ptp(self.x), self.depth[-1])
-                remedy = suggest_remedy(self.layers, self.is_coating.any(), min_length, size)
+                remedy = describe_remedy(
+                    self.layers, min_length, size, has_coating=self.is_coating.any()
+                )
                 raise NotConverged(f"{error}; {remedy}") from None
         return self.computed["factor"]
 
     def solve(self, load) -> np.ndarray:
         """Return displacements (frames, nx * ny, 2) [m] under loads (nx, 2, frames) [N/m]."""
-        nx, frames = self.x.size, load.shape[-1]
+        nx = self.x.size
+        frames = load.shape[-1]
         out = np.zeros((frames, nx, self.depth.size, 2))
         out[:, :, :-1] = np.moveaxis(self.factor.displacement(load), 3, 0)
         return out.reshape(frames, -1, 2)
 
 
-def suggest_remedy(layers: Layers, has_coating: bool, min_length: float, size) -> str:
+def describe_remedy(layers: Layers, min_length: float, size, *, has_coating: bool) -> str:
     """Return a sentence on what to change if the stiffness of a piece cannot be factorised.
 
     Parameters
     ----------
     layers : Layers
-    has_coating : bool
-        Whether the piece has cells of a coating.
     min_length : float
         Length of the shortest side of a cell [m].
     size : (2,) sequence
         Length and height of the piece [m].
+    has_coating : bool
+        Whether the piece has cells of a coating.
 
     Returns
     -------
@@ -155,7 +158,7 @@ def suggest_remedy(layers: Layers, has_coating: bool, min_length: float, size) -
     )
 
 
-def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:
+def make_piece(x, depth, coating_rows: int, layers: Layers) -> Piece:
     """Make a piece on a tensor grid of bilinear quadrilaterals; no stiffness is computed yet.
 
     Parameters
@@ -199,7 +202,7 @@ def grid_cells(columns: int, rows: int, coating_rows: int) -> tuple[np.ndarray, 
     return cells, first % rows < coating_rows
 
 
-def displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
+def compute_displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Compute the displacements of a piece under forces on its interface.
 
     The factors of the stiffness are computed once and reused.
@@ -288,6 +291,7 @@ def interface_compliance(piece) -> InterfaceCompliance:
     """
     with one_thread():
         both = piece.factor.compliance()
-    along, inward = slice(0, None, 2), slice(1, None, 2)
+    along = slice(0, None, 2)
+    inward = slice(1, None, 2)
     blocks = (both[inward, inward], both[along, along], both[inward, along])
     return InterfaceCompliance(*(frozen_array(block) for block in blocks))

@@ -20,7 +20,7 @@ from ..core import NotConverged
 from .dissect import dissect_nodes, graph_coordinates
 from .lapack import cho_inverse
 
-PER_NODE = 2  # unknowns of a node, which follow one another
+UNKNOWNS_PER_NODE = 2  # unknowns of a node, which follow one another
 MIN_SLICED_NODES = 40  # updates of fewer nodes are added by one indexed assignment
 # An update whose nodes form shorter runs of successive numbers, on average, is added by columns.
 MIN_MEAN_RUN = 24
@@ -31,36 +31,39 @@ class Fronts:
     """Factors L L^T of a matrix (n, n) in f fronts.
 
     - ``triangles``: triangle of L for the own unknowns of each front, in LAPACK's rectangular format
-    - ``sides``: (later, own) columns of L below each triangle
-    - ``firsts``: (f + 1,) first own unknown of each front, and n
-    - ``later``: later unknowns that are coupled with the own unknowns of each front
+    - ``lower_blocks``: (later, own) columns of L below each triangle
+    - ``first_unknowns``: (f + 1,) first own unknown of each front, and n
+    - ``later_unknowns``: later unknowns that are coupled with the own unknowns of each front
     """
 
     triangles: list
-    sides: list
-    firsts: np.ndarray
-    later: list
+    lower_blocks: list
+    first_unknowns: np.ndarray
+    later_unknowns: list
 
     @property
-    def entries(self) -> int:
+    def n_entries(self) -> int:
         """Number of stored numbers, 8 bytes each."""
-        return sum(part.size for part in (*self.triangles, *self.sides))
+        return sum(part.size for part in (*self.triangles, *self.lower_blocks))
 
     def compliance(self) -> np.ndarray:
         """Return the last diagonal block (k, k) of the inverse, that of the last front."""
-        size = self.firsts[-1] - self.firsts[-2]
+        size = self.first_unknowns[-1] - self.first_unknowns[-2]
         low, _ = dtfttr(size, self.triangles[-1], uplo="L")
         return cho_inverse(low)
 
     def solve(self, load) -> np.ndarray:
         """Solve the equations for loads (n, r) by forward and back substitution."""
         x = np.array(load, dtype=float, order="C")
-        fronts = list(zip(self.triangles, self.sides, self.firsts, self.firsts[1:], self.later))
-        for triangle, side, start, stop, later in fronts:
+        starts = self.first_unknowns
+        fronts = list(
+            zip(self.triangles, self.lower_blocks, starts, starts[1:], self.later_unknowns)
+        )
+        for triangle, lower_block, start, stop, later in fronts:
             x[start:stop] = dtfsm(1.0, triangle, x[start:stop], uplo="L")
-            x[later] -= side @ x[start:stop]
-        for triangle, side, start, stop, later in reversed(fronts):
-            right = x[start:stop] - side.T @ x[later]
+            x[later] -= lower_block @ x[start:stop]
+        for triangle, lower_block, start, stop, later in reversed(fronts):
+            right = x[start:stop] - lower_block.T @ x[later]
             x[start:stop] = dtfsm(1.0, triangle, right, uplo="L", trans="T")
         return x
 
@@ -69,7 +72,7 @@ class ZeroEnergyMotion(NotConverged):
     """The stiffness is singular to round-off: it has a zero-energy (rigid-body) mode."""
 
 
-class Factor:
+class SparseFactor:
     """Cholesky factors of a sparse matrix that is given without a mesh.
 
     The order of elimination follows from the graph of the matrix (`dissect.graph_coordinates`).
@@ -102,7 +105,7 @@ class Factor:
 
 
 def factorise(
-    matrix: csc_matrix, firsts, per_node: int = PER_NODE, min_pivot: float = 0.0
+    matrix: csc_matrix, firsts, per_node: int = UNKNOWNS_PER_NODE, min_pivot: float = 0.0
 ) -> Fronts:
     """Factorise a symmetric positive definite matrix without reordering its unknowns.
 
@@ -129,39 +132,39 @@ def factorise(
     """
     lower = tril(matrix, format="csc")
     diagonal = matrix.diagonal()
-    later_nodes = _later_nodes(lower, firsts, per_node)
+    later_nodes = _find_later_nodes(lower, firsts, per_node)
     n_fronts = len(later_nodes)
     front_of_node = np.repeat(np.arange(n_fronts), np.diff(firsts))
     position = np.empty(firsts[-1], np.int64)  # of a node within the present front
     updates = [[] for _ in range(n_fronts)]
     triangles = []
-    sides = []
+    lower_blocks = []
     for number, (start, stop) in enumerate(pairwise(firsts)):
         later = later_nodes[number]
         nodes = np.concatenate([np.arange(start, stop), later])
         position[nodes] = np.arange(nodes.size)
         own = per_node * (stop - start)
-        front = _own_columns(lower, start, stop, per_node * nodes.size, position, per_node)
+        front = _make_front(lower, start, stop, per_node * nodes.size, position, per_node)
         for rows, update in updates[number]:
             _add_update(front, update, position[rows], per_node)
         updates[number] = None  # frees the memory
         triangle, fault = dpotrf(front[:own, :own], lower=1)
         size = diagonal[per_node * start : per_node * stop]
         if fault or (np.diag(triangle) ** 2 <= min_pivot * size).any():
-            raise _explain_fault(front[:own, :own], size, min_pivot)
-        side = np.empty((0, own), order="F")
+            raise _describe_fault(front[:own, :own], size, min_pivot)
+        lower_block = np.empty((0, own), order="F")
         if later.size:
-            side = dtrsm(1.0, triangle, front[own:, :own], side=1, lower=1, trans_a=1)
+            lower_block = dtrsm(1.0, triangle, front[own:, :own], side=1, lower=1, trans_a=1)
             remainder = np.asfortranarray(front[own:, own:])
-            update = dsyrk(-1.0, side, beta=1.0, c=remainder, lower=1, overwrite_c=1)
+            update = dsyrk(-1.0, lower_block, beta=1.0, c=remainder, lower=1, overwrite_c=1)
             updates[front_of_node[later[0]]].append((later, update))
         triangles.append(dtrttf(triangle, uplo="L")[0])
-        sides.append(side)
-    later_unknowns = [_unknowns(nodes, per_node) for nodes in later_nodes]
-    return Fronts(triangles, sides, per_node * np.asarray(firsts), later_unknowns)
+        lower_blocks.append(lower_block)
+    later_unknowns = [_list_unknowns(nodes, per_node) for nodes in later_nodes]
+    return Fronts(triangles, lower_blocks, per_node * np.asarray(firsts), later_unknowns)
 
 
-def _explain_fault(block, diagonal, min_pivot: float) -> NotConverged:
+def _describe_fault(block, diagonal, min_pivot: float) -> NotConverged:
     """Return the exception for a front whose diagonal block cannot be factorised.
 
     block: (k, k), of which the lower half is read; diagonal: (k,) entries of the matrix there.
@@ -179,7 +182,7 @@ def _add_update(front, update, nodes, per_node: int) -> None:
     assignment, a large one in rectangles of successive nodes, or by columns if few nodes are
     successive.
     """
-    unknowns = _unknowns(nodes, per_node)
+    unknowns = _list_unknowns(nodes, per_node)
     if nodes.size < MIN_SLICED_NODES:
         front.T[unknowns[:, None], unknowns] += update.T  # the transposes lie in rows
         return
@@ -199,11 +202,11 @@ def _add_update(front, update, nodes, per_node: int) -> None:
             front[target_rows, target_columns] += update[rows, columns]
 
 
-def _unknowns(nodes, per_node: int) -> np.ndarray:
+def _list_unknowns(nodes, per_node: int) -> np.ndarray:
     return (per_node * nodes[:, None] + np.arange(per_node)).ravel()
 
 
-def _later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
+def _find_later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
     """Find the later nodes that each front is coupled with (symbolic factorisation).
 
     A later node may be coupled with a front only once earlier nodes are eliminated. Each list is in
@@ -226,7 +229,7 @@ def _later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
     return later_nodes
 
 
-def _own_columns(
+def _make_front(
     lower: csc_matrix, start: int, stop: int, size: int, position, per_node: int
 ) -> np.ndarray:
     """Return a front (size, size) that contains the matrix columns of the nodes it eliminates."""

@@ -52,7 +52,7 @@ class Shape(NamedTuple):
     bottom: bool
 
     @property
-    def lines(self) -> int:
+    def n_free_rows(self) -> int:
         """Number of rows of nodes that are not fixed."""
         return self.rows + self.bottom
 
@@ -89,7 +89,9 @@ class Numbering:
 @lru_cache(maxsize=4096)
 def number_nodes(shape: Shape) -> Numbering:
     """Number the nodes of a part: first those eliminated with it, then those on its ring."""
-    grid = np.arange((shape.columns + 1) * shape.lines).reshape(shape.columns + 1, shape.lines)
+    grid = np.arange((shape.columns + 1) * shape.n_free_rows).reshape(
+        shape.columns + 1, shape.n_free_rows
+    )
     between = grid[int(shape.left) : shape.columns + 1 - shape.right]
     sides = []
     if shape.left:
@@ -97,7 +99,7 @@ def number_nodes(shape: Shape) -> Numbering:
     if shape.right:
         sides.append(grid[-1])
     sides.append(between[:, 0])
-    if shape.bottom and shape.lines > 1:
+    if shape.bottom and shape.n_free_rows > 1:
         sides.append(between[:, -1])
     ring = np.concatenate(sides)
     halves = shape.halves()
@@ -113,7 +115,7 @@ def number_nodes(shape: Shape) -> Numbering:
     own = np.flatnonzero(is_own)
     number = np.full(grid.size, -1)
     number[np.concatenate([own, ring])] = np.arange(own.size + ring.size)
-    own, ring = (np.stack(np.divmod(nodes, shape.lines), axis=1) for nodes in (own, ring))
+    own, ring = (np.stack(np.divmod(nodes, shape.n_free_rows), axis=1) for nodes in (own, ring))
     return Numbering(own, ring, number.reshape(grid.shape))
 
 
@@ -187,12 +189,12 @@ def _leaf_couplings(shape: Shape) -> tuple[Couplings, ...]:
     At a free right side no other leaf follows, and the leaf takes the couplings there, too.
     """
     numbering = number_nodes(shape)
-    axes = np.indices((shape.columns + 1, shape.lines, 3, 3, 2, 2)).reshape(6, -1)
+    axes = np.indices((shape.columns + 1, shape.n_free_rows, 3, 3, 2, 2)).reshape(6, -1)
     column, row, column_step, row_step, _, _ = axes
     other_column = column + column_step - 1
     other_row = row + row_step - 1
     has_neighbour = (other_column >= 0) & (other_column <= shape.columns)
-    has_neighbour &= (other_row >= 0) & (other_row < shape.lines)
+    has_neighbour &= (other_row >= 0) & (other_row < shape.n_free_rows)
     is_in_leaf = np.minimum(row, other_row) < shape.rows
     if shape.right:
         is_in_leaf &= np.minimum(column, other_column) < shape.columns
@@ -257,7 +259,7 @@ class Runs(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def _split_ring(shape: Shape, half: Half) -> Runs:
-    """Split the ring of a half into runs, by the numbers of its nodes in the whole part."""
+    """Split the ring of nodes around a half into runs of successive numbers in the whole part."""
     numbering = number_nodes(shape)
     n_own = len(numbering.own)
     ring = number_nodes(half.shape).ring
@@ -331,7 +333,7 @@ def _eliminate_inner_unknowns(blocks: Blocks) -> None:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Stack:
+class FactorStack:
     """Factors of g eliminated parts of one shape.
 
     - ``own``, ``ring``: (g, o) and (g, b) eliminated and ring nodes in the grid, column * rows + row
@@ -359,7 +361,7 @@ class GridFactor:
     schur: np.ndarray
 
     @property
-    def entries(self) -> int:
+    def n_entries(self) -> int:
         """Number of stored numbers, 8 bytes each."""
         factors = sum(stack.own_factor.size + stack.ring_factor.size for stack in self.stacks)
         return self.schur.size + factors
@@ -429,7 +431,7 @@ class Parts(NamedTuple):
     halves: list
 
 
-def _levels(root: Shape) -> list[dict[Shape, Parts]]:
+def _dissect_levels(root: Shape) -> list[dict[Shape, Parts]]:
     """Halve a grid until only leaves remain, and return the parts of every level."""
     corners_by_shape = {root: np.zeros((1, 2), np.int64)}
     levels = []
@@ -449,7 +451,7 @@ def _levels(root: Shape) -> list[dict[Shape, Parts]]:
     return levels
 
 
-def eliminate(stencil, *, keep_left: bool = False) -> GridFactor:
+def eliminate_inner_nodes(stencil, *, keep_left: bool = False) -> GridFactor:
     """Eliminate all nodes of a grid but its first row and, on request, its first column.
 
     Parameters
@@ -472,7 +474,7 @@ def eliminate(stencil, *, keep_left: bool = False) -> GridFactor:
     columns, rows = stencil.shape[:2]
     stacks = []
     updates_below = {}
-    for level in reversed(_levels(Shape(columns - 1, rows, keep_left, False, False))):
+    for level in reversed(_dissect_levels(Shape(columns - 1, rows, keep_left, False, False))):
         updates = {}
         for shape, (corners, halves) in level.items():
             if halves:
@@ -487,13 +489,13 @@ def eliminate(stencil, *, keep_left: bool = False) -> GridFactor:
             )
             if own.size:
                 _eliminate_inner_unknowns(blocks)
-                stacks.append(Stack(own, ring, blocks.own_own, blocks.own_ring))
+                stacks.append(FactorStack(own, ring, blocks.own_own, blocks.own_ring))
             updates[shape] = blocks.ring_ring
         updates_below = updates
     return GridFactor(stacks, ring[0], blocks.ring_ring[0])
 
 
-class Work(NamedTuple):
+class WorkEstimate(NamedTuple):
     """Operation count and storage of assembling and condensing one piece.
 
     - ``shapes``: number of stacks
@@ -510,7 +512,7 @@ class Work(NamedTuple):
     other_entries: int
 
 
-def predict_seconds(nx: int, ny: int, mirrored: bool) -> float:
+def predict_seconds(nx: int, ny: int, is_mirrored: bool) -> float:
     """Predict the CPU seconds of assembling and condensing one piece.
 
     Memory that a process touches for the first time takes up to as long again.
@@ -527,7 +529,7 @@ def predict_seconds(nx: int, ny: int, mirrored: bool) -> float:
     float
         Seconds [s] on the machine of `cost_model`.
     """
-    work = predict_work(nx, ny, mirrored)
+    work = predict_work(nx, ny, is_mirrored)
     return (
         cost_model.CONDENSE_CALL_SECONDS
         + cost_model.CONDENSE_SHAPE_SECONDS * work.shapes
@@ -537,24 +539,24 @@ def predict_seconds(nx: int, ny: int, mirrored: bool) -> float:
     )
 
 
-def predict_bytes(nx: int, ny: int, mirrored: bool) -> float:
+def predict_bytes(nx: int, ny: int, is_mirrored: bool) -> float:
     """Predict the peak memory [bytes] of assembling and condensing one piece.
 
     This includes the stencil, the factors, the updates and the compliance. The parameters are those
     of `predict_seconds`.
     """
-    work = predict_work(nx, ny, mirrored)
+    work = predict_work(nx, ny, is_mirrored)
     return BYTES_PER_NUMBER * (work.factor_entries + work.other_entries)
 
 
 @lru_cache(maxsize=1024)
-def predict_work(nx: int, ny: int, mirrored: bool) -> Work:
+def predict_work(nx: int, ny: int, is_mirrored: bool) -> WorkEstimate:
     """Estimate the operation count and the storage of condensing one piece.
 
     Nodes are counted but not numbered, so the estimate is cheap. The parameters are those of
     `predict_seconds`.
     """
-    is_halved = mirrored and nx > 3
+    is_halved = is_mirrored and nx > 3
     columns = (nx + 1) // 2 if is_halved else nx
     level = Counter({Shape(columns - 1, ny - 1, is_halved, False, False): 1})
     shapes = fronts = factor_entries = max_updates = 0
@@ -581,19 +583,19 @@ def predict_work(nx: int, ny: int, mirrored: bool) -> Work:
     stencil_entries = kinds * NODE_ENTRIES * nx * (ny - 1)
     compliance_entries = 5 * (2 * nx) ** 2
     other_entries = 2 * max_updates + stencil_entries + compliance_entries
-    return Work(shapes, fronts, factor_entries, operations, other_entries)
+    return WorkEstimate(shapes, fronts, factor_entries, operations, other_entries)
 
 
 def _count_unknowns(shape: Shape) -> tuple[int, int]:
     """Count the unknowns that are eliminated with a part, and the unknowns of its ring."""
     kept_sides = shape.left + shape.right
-    kept_lines = 1 + (shape.bottom and shape.lines > 1)
-    ring = kept_sides * shape.lines + (shape.columns + 1 - kept_sides) * kept_lines
+    kept_lines = 1 + (shape.bottom and shape.n_free_rows > 1)
+    ring = kept_sides * shape.n_free_rows + (shape.columns + 1 - kept_sides) * kept_lines
     halves = shape.halves()
     if not halves:
-        own = (shape.columns + 1) * shape.lines - ring
+        own = (shape.columns + 1) * shape.n_free_rows - ring
     elif halves[1].column:
-        own = shape.lines - 1 - shape.bottom
+        own = shape.n_free_rows - 1 - shape.bottom
     else:
         own = shape.columns + 1 - kept_sides
     return 2 * own, 2 * ring

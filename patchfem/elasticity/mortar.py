@@ -17,7 +17,7 @@ than the softer body has nodes, a stiff body follows the kinks of the other one,
 ripples. Where the coarser piece changes along the interface, the grid changes, too.
 
 The caller condenses each piece, calls `join_pieces`, solves contact and shear on `Mortar.x` with
-the weights `tributary_lengths` and the joint compliances, and asks `forces` for the nodal forces of each
+the weights `tributary_lengths` and the joint compliances, and asks `distribute_forces` for the nodal forces of each
 piece before it computes the fields inside.
 """
 
@@ -32,15 +32,16 @@ from ..formatting import format_length
 from ..mesh.grading import LENGTH_TOL, tributary_lengths
 from .elasticity import InterfaceCompliance
 
-# Ratio of compliances above which the nodes of the softer piece carry the pressure, even if finer.
-SOFTNESS_RATIO = 20.0
-# Half width of the contact to which `expected_ripples` refers, in cells of the coarser piece.
-REFERENCE_CELLS = 16
+# Ratio of compliances above which the pressure is defined on the nodes of the softer piece, even if
+# these are finer.
+MAX_SOFTNESS_RATIO = 20.0
+# Half width of the contact to which `estimate_ripples` refers, in cells of the coarser piece.
+N_REFERENCE_CELLS = 16
 MAX_RIPPLE = 1e-2  # expected ripple over peak pressure above which other grids are tried
-REFUSED_RIPPLE = 0.1  # expected ripple of the best grid above which the pair is refused
+MIN_REFUSED_RIPPLE = 0.1  # expected ripple of the best grid above which the pair is refused
 
 
-class Body(NamedTuple):
+class PieceInterface(NamedTuple):
     """Ascending interface nodes (n,) [m] of a piece, and its compliances (n, n) [m2/N]."""
 
     x: np.ndarray
@@ -58,8 +59,8 @@ class Grids(NamedTuple):
     upper: np.ndarray
     both: np.ndarray
 
-    def name_of_common(self) -> str:
-        """Return the name of the piece whose nodes equal the grid `both`, or "both"."""
+    def name_common_grid(self) -> str:
+        """Return "lower" or "upper" if the common grid has just the nodes of that piece, else "both"."""
         for side in ("lower", "upper"):
             x = getattr(self, side)
             if x.size == self.both.size and np.abs(x - self.both).max() <= LENGTH_TOL * np.ptp(x):
@@ -90,12 +91,12 @@ class Mortar:
     ripple: float
     reason: str
 
-    def forces(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return forces (..., m) at `x` as forces on the nodes of the lower and the upper piece."""
+    def distribute_forces(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Convert forces (..., m) at `x` into forces on the nodes of the lower and the upper piece."""
         return nodal @ self.to_lower, nodal @ self.to_upper
 
 
-def join_pieces(lower: Body, upper: Body) -> Mortar:
+def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
     """Join two pieces on the grid along the interface that suits their meshes.
 
     If one piece overhangs the other, only the common part of their interfaces carries pressure, and
@@ -103,7 +104,7 @@ def join_pieces(lower: Body, upper: Body) -> Mortar:
 
     Parameters
     ----------
-    lower, upper : Body
+    lower, upper : PieceInterface
 
     Returns
     -------
@@ -113,19 +114,19 @@ def join_pieces(lower: Body, upper: Body) -> Mortar:
     ------
     PatchfemError
         If nodes are not in ascending order, if the pieces do not face one another, or if the
-        expected ripples are larger than `REFUSED_RIPPLE` on every grid.
+        expected ripples are larger than `MIN_REFUSED_RIPPLE` on every grid.
     """
-    _check_body(lower, "lower")
-    _check_body(upper, "upper")
+    _check_interface(lower, "lower")
+    _check_interface(upper, "upper")
     grids = candidate_grids(lower, upper)
-    best = join_on_grid(grids, grids.name_of_common(), lower, upper)
+    best = join_on_grid(grids, grids.name_common_grid(), lower, upper)
     if best.ripple > MAX_RIPPLE:
         others = [side for side in ("lower", "upper") if side != best.side]
         candidates = [best, *(join_on_grid(grids, side, lower, upper) for side in others)]
         # pressure ripples are compared to three digits, because round-off must not decide: the same
         # grid has to follow if lower and upper piece are exchanged
         best = min(candidates, key=lambda joined: (float(f"{joined.ripple:.2e}"), tuple(joined.x)))
-    if best.ripple > REFUSED_RIPPLE:
+    if best.ripple > MIN_REFUSED_RIPPLE:
         raise PatchfemError(
             f"contact.mesh: {best.reason}, and no other choice of nodes is better; give both pieces "
             "interface cells of similar size that grow gradually"
@@ -133,7 +134,7 @@ def join_pieces(lower: Body, upper: Body) -> Mortar:
     return best
 
 
-def candidate_grids(lower: Body, upper: Body) -> Grids:
+def candidate_grids(lower: PieceInterface, upper: PieceInterface) -> Grids:
     """Return the grids to choose from, on the interface that both pieces cover.
 
     Raises
@@ -149,12 +150,12 @@ def candidate_grids(lower: Body, upper: Body) -> Grids:
             f"contact.mesh: the pieces share {end - begin:.6g} m of the interface, which is less than "
             "two cells; shift or refine the pieces"
         )
-    soft_lower = softness(lower.x, lower.compliance.nn, x_lower)
-    soft_upper = softness(upper.x, upper.compliance.nn, x_upper)
-    return Grids(x_lower, x_upper, common_grid(x_lower, x_upper, soft_lower, soft_upper))
+    softness_lower = interpolate_zigzag_compliance(lower.x, lower.compliance.nn, x_lower)
+    softness_upper = interpolate_zigzag_compliance(upper.x, upper.compliance.nn, x_upper)
+    return Grids(x_lower, x_upper, common_grid(x_lower, x_upper, softness_lower, softness_upper))
 
 
-def transfer_matrix(x, own) -> csr_array:
+def transfer_matrix(x, piece_x) -> csr_array:
     """Integrate the matrix T that transfers displacements from the nodes of a body to a grid.
 
     The integrals are exact, segment by segment between the nodes of both.
@@ -162,8 +163,8 @@ def transfer_matrix(x, own) -> csr_array:
     Parameters
     ----------
     x : (m,) ndarray
-        Ascending nodes of the grid [m], within the ends of `own`.
-    own : (n,) ndarray
+        Ascending nodes of the grid [m], within the ends of `piece_x`.
+    piece_x : (n,) ndarray
         Ascending nodes of the body [m].
 
     Returns
@@ -171,41 +172,41 @@ def transfer_matrix(x, own) -> csr_array:
     (m, n) csr_array
         The identity if the nodes are the same.
     """
-    if np.array_equal(x, own):
+    if np.array_equal(x, piece_x):
         return csr_array(eye_array(x.size))
-    cuts = np.unique(np.concatenate([x, own[(own > x[0]) & (own < x[-1])]]))
+    cuts = np.unique(np.concatenate([x, piece_x[(piece_x > x[0]) & (piece_x < x[-1])]]))
     left = cuts[:-1]
     right = cuts[1:]
     middle = (left + right) / 2
     cell = np.clip(np.searchsorted(x, middle) - 1, 0, x.size - 2)
-    own_cell = np.clip(np.searchsorted(own, middle) - 1, 0, own.size - 2)
-    hats_left = _hats(x, cell, left)
-    hats_right = _hats(x, cell, right)
+    piece_cell = np.clip(np.searchsorted(piece_x, middle) - 1, 0, piece_x.size - 2)
+    hats_left = _hat_functions(x, cell, left)
+    hats_right = _hat_functions(x, cell, right)
     dual_left = 2 * hats_left - hats_left[::-1]
     dual_right = 2 * hats_right - hats_right[::-1]
-    own_left = _hats(own, own_cell, left)
-    own_right = _hats(own, own_cell, right)
+    piece_left = _hat_functions(piece_x, piece_cell, left)
+    piece_right = _hat_functions(piece_x, piece_cell, right)
     sixth = (right - left) / 6
     rows = []
     columns = []
     integrals = []
     for i, j in np.ndindex(2, 2):
         # integral of the product of two linear functions, from their values at both ends
-        by_left = dual_left[i] * (2 * own_left[j] + own_right[j])
-        by_right = dual_right[i] * (own_left[j] + 2 * own_right[j])
+        by_left = dual_left[i] * (2 * piece_left[j] + piece_right[j])
+        by_right = dual_right[i] * (piece_left[j] + 2 * piece_right[j])
         rows.append(cell + i)
-        columns.append(own_cell + j)
+        columns.append(piece_cell + j)
         integrals.append(sixth * (by_left + by_right))
     row = np.concatenate(rows)
     values = np.concatenate(integrals) / tributary_lengths(x)[row]
-    shape = (x.size, own.size)
+    shape = (x.size, piece_x.size)
     return csr_array(coo_array((values, (row, np.concatenate(columns))), shape=shape))
 
 
-def _hats(x, cell, places) -> np.ndarray:
+def _hat_functions(x, cell, positions) -> np.ndarray:
     """Return the values (2, k) of both hat functions of cells (k,) at positions (k,) in them."""
     width = x[cell + 1] - x[cell]
-    return np.stack([(x[cell + 1] - places) / width, (places - x[cell]) / width])
+    return np.stack([(x[cell + 1] - positions) / width, (positions - x[cell]) / width])
 
 
 def common_interval(x_lower, x_upper) -> tuple[float, float]:
@@ -254,19 +255,19 @@ def clip_nodes(x, begin: float, end: float) -> np.ndarray:
     return np.concatenate([[begin], inner, [end]])
 
 
-def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
+def common_grid(x_lower, x_upper, softness_lower, softness_upper) -> np.ndarray:
     """Choose the pressure nodes from those of two pieces with the same ends.
 
     From left to right, each step goes to the next node of the piece that has it farther away. If
     one piece is coarser everywhere, these are its nodes. Where one piece is softer than the other
-    by `SOFTNESS_RATIO`, only nodes of the softer piece are chosen.
+    by `MAX_SOFTNESS_RATIO`, only nodes of the softer piece are chosen.
 
     Parameters
     ----------
     x_lower, x_upper : (n,) ndarray
         Ascending nodes [m].
-    soft_lower, soft_upper : (n,) ndarray
-        `softness` of each piece at its nodes [m2/N].
+    softness_lower, softness_upper : (n,) ndarray
+        zigzag compliance of each piece at its nodes [m2/N].
 
     Returns
     -------
@@ -281,10 +282,10 @@ def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
             x[min(int(np.searchsorted(x, node + close, "right")), x.size - 1)]
             for x in (x_lower, x_upper)
         )
-        ratio = np.interp(node, x_upper, soft_upper) / np.interp(node, x_lower, soft_lower)
-        if ratio < 1 / SOFTNESS_RATIO:
+        ratio = np.interp(node, x_upper, softness_upper) / np.interp(node, x_lower, softness_lower)
+        if ratio < 1 / MAX_SOFTNESS_RATIO:
             node = next_lower
-        elif ratio > SOFTNESS_RATIO:
+        elif ratio > MAX_SOFTNESS_RATIO:
             node = next_upper
         else:
             node = max(next_lower, next_upper)
@@ -295,7 +296,9 @@ def common_grid(x_lower, x_upper, soft_lower, soft_upper) -> np.ndarray:
 
 def _zigzag_forces(x) -> tuple[np.ndarray, np.ndarray]:
     """Return the outer forces (m - 2,) that balance a force of 1 at each inner node."""
-    left, right = np.diff(x)[:-1], np.diff(x)[1:]
+    cells = np.diff(x)
+    left = cells[:-1]
+    right = cells[1:]
     return -right / (left + right), -left / (left + right)
 
 
@@ -319,23 +322,35 @@ def zigzag_compliance(x, compliance) -> np.ndarray:
     """
     left, right = _zigzag_forces(x)
     i = np.arange(1, x.size - 1)
-    own = compliance[i, i]
-    own_outer = left**2 * compliance[i - 1, i - 1] + right**2 * compliance[i + 1, i + 1]
+    middle = compliance[i, i]
+    outer = left**2 * compliance[i - 1, i - 1] + right**2 * compliance[i + 1, i + 1]
     mutual = left * compliance[i, i - 1] + right * compliance[i, i + 1]
     mutual += left * right * compliance[i - 1, i + 1]
-    return own + own_outer + 2 * mutual
+    return middle + outer + 2 * mutual
 
 
-def softness(x, compliance, places) -> np.ndarray:
-    """Interpolate the `zigzag_compliance` [m2/N] of a body to given positions (k,) [m]."""
-    return np.interp(places, x[1:-1], zigzag_compliance(x, compliance))
+def interpolate_zigzag_compliance(x, compliance, positions) -> np.ndarray:
+    """Interpolate the `zigzag_compliance` of a piece linearly along its interface.
+
+    Parameters
+    ----------
+    x : (n,) ndarray
+        Ascending nodes of the piece [m].
+    compliance : (n, n) ndarray [m2/N]
+    positions : (k,) ndarray [m]
+
+    Returns
+    -------
+    (k,) ndarray [m2/N]
+    """
+    return np.interp(positions, x[1:-1], zigzag_compliance(x, compliance))
 
 
-def expected_ripples(x, nn, bodies) -> np.ndarray:
+def estimate_ripples(x, nn, pieces) -> np.ndarray:
     """Estimate the ripple of the pressure at the inner nodes of a grid, over the peak pressure.
 
-    It holds for a smooth contact whose half width is `REFERENCE_CELLS` cells of the coarser side,
-    and falls with the square of this width. A body that is deformed to a parabola reaches the grid
+    It holds for a smooth contact whose half width is `N_REFERENCE_CELLS` cells of the coarser side,
+    and falls with the square of this width. A piece that is deformed to a parabola reaches the grid
     with the kinks of its own nodes, d = T (x_s)^2 - x^2. Zigzag forces against the joint compliance
     balance the non-smooth component of d. For Hertz contact the measured ripple was 0.4 to 1.3
     times this one, for cells of 1:1.5 to 1:10 and moduli of 1:1 to 1:100.
@@ -346,7 +361,7 @@ def expected_ripples(x, nn, bodies) -> np.ndarray:
         Nodes of the grid [m].
     nn : (m, m) ndarray
         Joint normal compliance [m2/N].
-    bodies : sequence of (Body, csr_array)
+    pieces : sequence of (PieceInterface, csr_array)
         Each piece with its matrix T.
 
     Returns
@@ -357,20 +372,20 @@ def expected_ripples(x, nn, bodies) -> np.ndarray:
     inner = x[1:-1]
     forced = np.zeros(inner.size)
     coarser_cell = np.zeros(inner.size)
-    for body, transfer in bodies:
-        own = body.x
+    for piece, transfer in pieces:
+        piece_x = piece.x
         entries = transfer.tocoo()
-        offset = (own[entries.col] - x[entries.row]) ** 2
+        offset = (piece_x[entries.col] - x[entries.row]) ** 2
         kink = np.bincount(entries.row, entries.data * offset, x.size)
         roughness = np.abs(kink[1:-1] + left * kink[:-2] + right * kink[2:])
-        forced += roughness * softness(own, body.compliance.nn, inner)
-        cell = np.interp(inner, (own[1:] + own[:-1]) / 2, np.diff(own))
+        forced += roughness * interpolate_zigzag_compliance(piece_x, piece.compliance.nn, inner)
+        cell = np.interp(inner, (piece_x[1:] + piece_x[:-1]) / 2, np.diff(piece_x))
         coarser_cell = np.maximum(coarser_cell, cell)
-    half_width = REFERENCE_CELLS * coarser_cell
+    half_width = N_REFERENCE_CELLS * coarser_cell
     return forced / (zigzag_compliance(x, nn) * tributary_lengths(x)[1:-1] * half_width)
 
 
-def join_on_grid(grids: Grids, side: str, lower: Body, upper: Body) -> Mortar:
+def join_on_grid(grids: Grids, side: str, lower: PieceInterface, upper: PieceInterface) -> Mortar:
     """Join two pieces on one of the candidate grids and estimate the ripple of the pressure.
 
     Parameters
@@ -378,7 +393,7 @@ def join_on_grid(grids: Grids, side: str, lower: Body, upper: Body) -> Mortar:
     grids : Grids
     side : {"lower", "upper", "both"}
         Name of the grid.
-    lower, upper : Body
+    lower, upper : PieceInterface
 
     Returns
     -------
@@ -393,7 +408,7 @@ def join_on_grid(grids: Grids, side: str, lower: Body, upper: Body) -> Mortar:
     )
     nn = (nn + nn.T) / 2
     tt = (tt + tt.T) / 2
-    ripples = expected_ripples(x, nn, ((lower, to_lower), (upper, to_upper)))
+    ripples = estimate_ripples(x, nn, ((lower, to_lower), (upper, to_upper)))
     worst = int(np.argmax(ripples))
     ripple = float(ripples[worst])
     for matrix in (to_lower, to_upper):
@@ -418,11 +433,11 @@ def join_on_grid(grids: Grids, side: str, lower: Body, upper: Body) -> Mortar:
     )
 
 
-def _check_body(body: Body, side: str) -> None:
-    """Raise PatchfemError unless a body has ascending nodes and compliances of this size."""
-    size = body.x.size
-    has_shape = all(part.shape == (size, size) for part in body.compliance)
-    if size < 3 or not np.all(np.diff(body.x) > 0) or not has_shape:
+def _check_interface(interface: PieceInterface, side: str) -> None:
+    """Raise PatchfemError unless the nodes of a piece ascend and each has its compliances."""
+    size = interface.x.size
+    has_shape = all(part.shape == (size, size) for part in interface.compliance)
+    if size < 3 or not np.all(np.diff(interface.x) > 0) or not has_shape:
         raise PatchfemError(
             f"contact.mesh: the {side} interface needs at least three nodes with rising x, each with "
             "a compliance"

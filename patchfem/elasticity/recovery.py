@@ -18,8 +18,8 @@ from .elasticity import Layers, Piece, hooke
 
 # A patch whose correlations of (1, x, y) have a smaller determinant takes in the cells around it.
 MIN_PLANE_DETERMINANT = 0.1
-GAUSS_POINT = 1 / np.sqrt(3)  # local coordinate of the points of 2 x 2 Gauss quadrature
-CORNERS = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+GAUSS_COORDINATE = 1 / np.sqrt(3)  # local coordinate of the points of 2 x 2 Gauss quadrature
+CORNER_COORDINATES = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -215,7 +215,7 @@ class Quadrature:
         return np.stack([slope[0, 0], slope[1, 1], (slope[0, 1] + slope[1, 0]) / 2])
 
 
-def quadratures(cells: Cells) -> list[Quadrature]:
+def make_quadratures(cells: Cells) -> list[Quadrature]:
     """Return the Gauss points of each block with which the stiffness is integrated.
 
     These are 2 x 2 points in quadrilaterals and 3 points in triangles.
@@ -228,10 +228,10 @@ def quadratures(cells: Cells) -> list[Quadrature]:
             local_gradient = np.broadcast_to(np.array([[-1, -1], [1, 0], [0, 1]]), (3, 3, 2))
             local_weight = 1 / 6
         else:
-            at = GAUSS_POINT * CORNERS
-            factors = 1 + at[:, None] * CORNERS
+            at = GAUSS_COORDINATE * CORNER_COORDINATES
+            factors = 1 + at[:, None] * CORNER_COORDINATES
             shape = factors.prod(axis=2) / 4
-            local_gradient = CORNERS * factors[..., ::-1] / 4
+            local_gradient = CORNER_COORDINATES * factors[..., ::-1] / 4
             local_weight = 1.0
         jacobian = np.einsum("gni,cnj->cgij", local_gradient, cells.points[block], optimize=True)
         inverse = np.linalg.inv(jacobian)
@@ -300,7 +300,7 @@ class StressError:
         return np.sqrt(self.error / norm[:, None]), np.sqrt(total / norm)
 
 
-class Norms(NamedTuple):
+class EnergyNorms(NamedTuple):
     """Squared energy norms of the error of each cell (t,) and of the whole stress [J/m]."""
 
     error: np.ndarray
@@ -330,7 +330,7 @@ def estimate_error(recovery: Recovery, u, stress, rules: list) -> StressError:
     lam, mu = cells.layers.lame(cells.is_coating)
     sides = _rectangle_sides(cells)
     if sides is None:
-        frame_norms = partial(_quadrature_norms, recovery, rules)
+        frame_norms = partial(_compute_quadrature_norms, recovery, rules)
     else:
         rectangles = Rectangles(
             recovery.fit.group_by_size(),
@@ -338,7 +338,7 @@ def estimate_error(recovery: Recovery, u, stress, rules: list) -> StressError:
             np.ascontiguousarray(cells.blocks[0].T),
             sides,
         )
-        frame_norms = partial(_rectangle_norms, rectangles)
+        frame_norms = partial(_compute_rectangle_norms, rectangles)
     norms = [
         frame_norms(motion, centre[:, [0, 1, 3]], lam, mu) for motion, centre in zip(u, stress)
     ]
@@ -375,8 +375,8 @@ class Rectangles(NamedTuple):
     sides: np.ndarray
 
 
-def _rectangle_norms(rectangles: Rectangles, u, stress, lam, mu) -> Norms:
-    """Compute the `Norms` of the stress at one instant on rectangles, in closed form.
+def _compute_rectangle_norms(rectangles: Rectangles, u, stress, lam, mu) -> EnergyNorms:
+    """Compute the `EnergyNorms` of the stress at one instant on rectangles, in closed form.
 
     Both fields are split into 1, xi, eta and xi eta, which are orthogonal with the mean squares 1,
     1/3, 1/3 and 1/9, and into (xx + yy) / (2 sqrt(lam + mu)), (xx - yy) / (2 sqrt(mu)) and
@@ -416,11 +416,11 @@ def _rectangle_norms(rectangles: Rectangles, u, stress, lam, mu) -> Norms:
         for part, mean_square in ((constant, 1), (by_xi, 1 / 3), (by_eta, 1 / 3))
     )
     area = width * height
-    return Norms(area * error, float(area @ energy))
+    return EnergyNorms(area * error, float(area @ energy))
 
 
-def _quadrature_norms(recovery: Recovery, rules: list, u, stress, lam, mu) -> Norms:
-    """Compute the `Norms` of the stress at one instant by quadrature, on cells of any shape."""
+def _compute_quadrature_norms(recovery: Recovery, rules: list, u, stress, lam, mu) -> EnergyNorms:
+    """Compute the `EnergyNorms` of the stress at one instant by quadrature, on cells of any shape."""
     at_corners = recovery(stress)[recovery.recovery_point]
     errors = []
     energy = 0.0
@@ -437,7 +437,7 @@ def _quadrature_norms(recovery: Recovery, rules: list, u, stress, lam, mu) -> No
         energy += (rule.weight * _complementary_energy(computed, lam[cells], mu[cells])).sum()
         first_corner = corners.stop
         first_cell = cells.stop
-    return Norms(np.concatenate(errors), energy)
+    return EnergyNorms(np.concatenate(errors), energy)
 
 
 def _complementary_energy(stress, lam, mu) -> np.ndarray:
@@ -448,8 +448,8 @@ def _complementary_energy(stress, lam, mu) -> np.ndarray:
     return (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy) ** 2) / (2 * mu)
 
 
-def harmless_rounding(recovery: Recovery, error: StressError, rules: list, fraction: float):
-    """Compute a rounding step for stresses that is small against their estimated error.
+def choose_rounding_step(recovery: Recovery, error: StressError, rules: list, fraction: float):
+    """Choose a rounding step for stresses that is small compared with their estimated error.
 
     Rounding to multiples of q changes xx, yy and xy by q / sqrt(12) in the root mean square, whose
     complementary energy is at most q^2 / (6 mu) per volume.

@@ -14,9 +14,9 @@ from skfem import Basis, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, Me
 
 from ..core import NotConverged
 from ..mesh.anymesh import PieceMesh, cell_edges
-from .condense import irregular_load, rounding_error
+from .condense import estimate_round_off, irregular_load
 from .dissect import dissect_nodes
-from .elasticity import Layers, suggest_remedy
+from .elasticity import Layers, describe_remedy
 from .fronts import Fronts, factorise
 from .lapack import one_thread
 from .plane_form import plane_elasticity
@@ -39,7 +39,7 @@ class Substructure:
     @property
     def order(self) -> np.ndarray:
         """Free nodes (n,) in the order of elimination, those of the interface last by x."""
-        return self._compute("order")
+        return self._cached_value("order")
 
     @property
     def factor(self) -> Fronts:
@@ -47,10 +47,10 @@ class Substructure:
 
         NotConverged, with a remedy, if the stiffness cannot be factorised.
         """
-        return self._compute("factor")
+        return self._cached_value("factor")
 
     @property
-    def rounding(self) -> float:
+    def round_off_error(self) -> float:
         """Relative error of the compliance by round-off [1]; 0 before the piece is factorised."""
         return self.computed.get("rounding", 0.0)
 
@@ -65,7 +65,8 @@ class Substructure:
         out[:, self.order] = np.moveaxis(u, 2, 0)
         return out
 
-    def _compute(self, name: str):
+    def _cached_value(self, name: str):
+        """Return a cached result by its name; the first call computes all results."""
         if not self.computed:
             order, firsts = elimination_order(self.mesh)
             stiffness = assemble_stiffness(self.mesh, self.layers, order)
@@ -74,15 +75,19 @@ class Substructure:
                     factor = factorise(stiffness, firsts)
                     load = irregular_load(stiffness.shape[0])[:, None]
                     u = factor.solve(load)
-                    rounding = rounding_error(load, u, load - stiffness @ u, factor.solve)
+                    round_off_error = estimate_round_off(
+                        load, u, load - stiffness @ u, factor.solve
+                    )
             except NotConverged as error:
                 mesh = self.mesh
                 ends = mesh.points[cell_edges(mesh)[0]]
                 min_length = np.hypot(*(ends[:, 1] - ends[:, 0]).T).min()
                 size = np.ptp(mesh.points, axis=0)
-                remedy = suggest_remedy(self.layers, mesh.is_coating.any(), min_length, size)
+                remedy = describe_remedy(
+                    self.layers, min_length, size, has_coating=mesh.is_coating.any()
+                )
                 raise NotConverged(f"{error}; {remedy}") from None
-            self.computed.update(order=order, factor=factor, rounding=rounding)
+            self.computed.update(order=order, factor=factor, round_off_error=round_off_error)
         return self.computed[name]
 
 

@@ -18,7 +18,7 @@ from . import cache as disk_cache
 from .lapack import one_thread
 
 # Corners (column, row) of a cell.
-CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
+CORNER_POSITIONS = ((0, 0), (1, 0), (1, 1), (0, 1))
 # Shape of `plane_form.rectangle_terms`: Lame constant, term A, B or C, two corners, two directions.
 RECTANGLE_TERMS_SHAPE = (2, 3, 4, 4, 2, 2)
 
@@ -30,13 +30,13 @@ def _rectangle_terms() -> np.ndarray:
     Only the first run on a machine imports scikit-fem, which takes as long as a small patch.
     """
     key = disk_cache.reference_cell_key()
-    kept = disk_cache.fetch(key, {"terms": RECTANGLE_TERMS_SHAPE})
+    kept = disk_cache.load_arrays(key, {"terms": RECTANGLE_TERMS_SHAPE})
     if kept is not None:
         return kept["terms"]
     from .plane_form import rectangle_terms
 
-    terms = rectangle_terms(CORNERS)
-    disk_cache.keep(key, {"terms": terms})
+    terms = rectangle_terms(CORNER_POSITIONS)
+    disk_cache.store_arrays(key, {"terms": terms})
     return terms
 
 
@@ -68,8 +68,8 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
     # products of three terms are too small for several threads, which wait for each other
     with one_thread():
         for a, b in np.ndindex(4, 4):
-            column, row = CORNERS[a]
-            other_column, other_row = CORNERS[b]
+            column, row = CORNER_POSITIONS[a]
+            other_column, other_row = CORNER_POSITIONS[b]
             neighbour = 3 * (1 + other_column - column) + 1 + other_row - row
             n_free = n_rows - row  # the lower corners of the last cells are fixed
             terms = np.ascontiguousarray(row_terms[:, :n_free, a, b]).reshape(3, -1)

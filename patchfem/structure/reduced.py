@@ -20,7 +20,7 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..core import ModalBasis, NotConverged, PatchfemError, frozen_array
 from ..effects import MAX_COORDINATES
-from ..elasticity.fronts import Factor, ZeroEnergyMotion
+from ..elasticity.fronts import SparseFactor, ZeroEnergyMotion
 from ..elasticity.lapack import one_thread
 from . import masses, matrices
 
@@ -194,10 +194,10 @@ def _refuse_indefinite(matrix, name: str) -> None:
         )
 
 
-def _factorize(K) -> Factor | None:
+def _factorize(K) -> SparseFactor | None:
     """Factorize a stiffness matrix K; return None if it has rigid motions."""
     try:
-        return Factor(K, MIN_PIVOT)
+        return SparseFactor(K, MIN_PIVOT)
     except ZeroEnergyMotion:
         return None
     except NotConverged:
@@ -208,7 +208,7 @@ def _factorize(K) -> Factor | None:
         ) from None
 
 
-def _lowest_modes(K, M, count: int, factor: Factor, shift: float = 0.0) -> tuple:
+def _lowest_modes(K, M, count: int, factor: SparseFactor, shift: float = 0.0) -> tuple:
     """Compute the lowest modes of unit modal mass, at most `count`.
 
     `factor` is that of K + shift M, with the shift in 1/s^2. Returns circular frequencies (m,) [rad/s]

@@ -31,7 +31,7 @@ def factorise(matrix: csc_matrix, firsts, name: str):
         raise Missing(f"{name} cannot be used ({error}); {REMEDY.get(name, '')}") from None
 
 
-def assemble(mesh, layers, name: str) -> Substructure:
+def make_piece(mesh, layers, name: str) -> Substructure:
     """The piece of any mesh as a `Substructure`, with the factors of this name."""
     order, firsts = elimination_order(mesh)
     piece = Substructure(mesh, layers, {"order": order, "rounding": 0.0})

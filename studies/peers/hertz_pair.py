@@ -13,7 +13,7 @@ from patchfem.closed_forms import contact as exact
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, frozen_array
-from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance
+from patchfem.elasticity.elasticity import Layers, interface_compliance, make_piece
 from patchfem.mesh.tensor import TensorGrid, graded_rows
 
 HALF = 0.1e-3  # half width a of the contact [m]
@@ -86,7 +86,7 @@ def errors_of(x, p) -> tuple:
 def condensed(grid: TensorGrid, bodies: int) -> Compliance:
     """The pair from its meshes on: one piece doubled, or both pieces assembled and condensed."""
     layers = Layers(MATERIAL, MATERIAL, "strain")
-    parts = [interface_compliance(assemble(grid.x, grid.depth, 0, layers)) for _ in range(bodies)]
+    parts = [interface_compliance(make_piece(grid.x, grid.depth, 0, layers)) for _ in range(bodies)]
     low, high = parts[0], parts[-1]
     return Compliance(
         Interface(grid.x, frozen_array(grid.tributary_lengths()), 1.0),

@@ -68,7 +68,7 @@ def once(name: str, columns: int = COLUMNS, rows: int = ROWS) -> dict:
     from time import perf_counter, process_time
 
     sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-    from factors import assemble
+    from factors import make_piece
 
     from patchfem.contact.unilateral import press
     from patchfem.core import Compliance, Interface
@@ -80,7 +80,7 @@ def once(name: str, columns: int = COLUMNS, rows: int = ROWS) -> dict:
         [(perf_counter(), process_time())],
     )
     # both factors are kept, as for the fields of a run
-    pieces = [assemble(body, layers, name) for body in bodies]
+    pieces = [make_piece(body, layers, name) for body in bodies]
     clock.append((perf_counter(), process_time()))
     nn, tt, _ = map(sum, zip(*(interface_compliance(one) for one in pieces)))
     clock.append((perf_counter(), process_time()))

@@ -10,7 +10,7 @@ from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact import edges
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, frozen_array
-from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.elasticity.elasticity import interface_compliance, make_piece
 
 WIDTH = 12.7e-3
 A = 0.1e-3
@@ -50,7 +50,7 @@ def block():
 
 def block_of(grid) -> tuple:
     """(compliance of two pieces of titanium on a grid, height [m] of its first row)."""
-    nn, tt, _ = interface_compliance(assemble(grid.x, grid.depth, 0, bare(TITANIUM)))
+    nn, tt, _ = interface_compliance(make_piece(grid.x, grid.depth, 0, bare(TITANIUM)))
     interface = Interface(grid.x, frozen_array(grid.tributary_lengths() * WIDTH), WIDTH)
     return Compliance(interface, frozen_array(2 * nn / WIDTH), frozen_array(2 * tt / WIDTH)), float(
         grid.depth[1]

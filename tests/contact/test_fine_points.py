@@ -16,7 +16,7 @@ from patchfem.contact.half_space.point_compliance import (
     smooth_modes,
 )
 from patchfem.elasticity.condense import condense
-from patchfem.elasticity.elasticity import Layers, assemble
+from patchfem.elasticity.elasticity import Layers, make_piece
 
 LENGTH, HEIGHT, THICK = 12.7e-3, 6.35e-3, 0.1524e-3
 COATED = Layers((250e9, 0.24), (120e9, 0.32), "strain")
@@ -53,7 +53,7 @@ def test_order_waves_of_a_strip_are_those_of_cells_between_lines_without_frictio
                 THICK + (HEIGHT - THICK) * np.linspace(0, 1, cells // 2) ** 1.8,
             ]
         )
-        piece = assemble(x, depth, cells // 10, layers)
+        piece = make_piece(x, depth, cells // 10, layers)
         stencil = hold_ends(piece.stencil, held)
         face = condense(stencil, False).compliance()[1 - held :: 2, 1 - held :: 2]
         weight = np.full(x.size, x[1])
@@ -118,7 +118,7 @@ def test_exact_what_free_ends_change_is_added_back():
     """Functions between the columns of a piece give its own compliance at them, to the part that is left out."""
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 41)
     depth = HEIGHT * np.linspace(0, 1, 21) ** 1.5
-    piece = assemble(x, depth, 0, COATED)
+    piece = make_piece(x, depth, 0, COATED)
     change = end_compliance(piece)[0]
     modes, sizes = smooth_modes(x, change, x)
     assert modes * sizes @ modes.T == pytest.approx(change, abs=1e-7 * np.abs(change).max())

@@ -25,7 +25,7 @@ from pieces import (
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press, press_to_approach
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.elasticity.elasticity import interface_compliance, make_piece
 from patchfem.mesh.tensor import graded_grid
 
 CELLS = 60
@@ -112,7 +112,7 @@ def pieces() -> tuple:
         graded_grid(LENGTH, HEIGHT, LENGTH / CELLS),
     )
     both = [
-        interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, layers))
+        interface_compliance(make_piece(grid.x, grid.depth, grid.coating_rows, layers))
         for grid, layers in ((coated, COATED), (plain, bare(TITANIUM)))
     ]
     return coated.x, coated.tributary_lengths() * WIDTH, both

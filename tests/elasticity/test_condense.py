@@ -12,13 +12,13 @@ from pieces import CARBIDE, COATED, TITANIUM
 from stiffness import stiffness_of
 
 from patchfem.core import NotConverged
-from patchfem.elasticity.condense import MAX_REFINEMENT, condense
-from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance
+from patchfem.elasticity.condense import MAX_REFINEMENT_CHANGE, condense
+from patchfem.elasticity.elasticity import Layers, interface_compliance, make_piece
 from patchfem.mesh.tensor import TensorGrid, graded_grid
 
 
 def piece_of(grid, layers=COATED):
-    return assemble(grid.x, grid.depth, grid.coating_rows, layers)
+    return make_piece(grid.x, grid.depth, grid.coating_rows, layers)
 
 
 def of_size(columns, rows, seed=None):
@@ -57,7 +57,7 @@ def test_exact_compliance_and_solution_of_a_grid_are_those_of_the_dense_inverse(
         <= 1e-9 * np.abs(found).max()
     )
     # one step of refinement goes through loads inside
-    again = replace(piece.factor, rounding=1.0).displacement(load)
+    again = replace(piece.factor, round_off_error=1.0).displacement(load)
     assert np.abs(again - found).max() <= 1e-9 * np.abs(found).max()
 
 
@@ -69,15 +69,15 @@ def test_exact_halves_of_a_mirrored_piece_give_the_whole(columns):
     one, two = whole.compliance(), halves.compliance()
     assert np.abs(one - two).max() <= 1e-11 * np.abs(one).max()
     assert np.array_equal(two, two.T)
-    assert halves.inside.entries <= 0.7 * whole.inside.entries
+    assert halves.inner_factor.n_entries <= 0.7 * whole.inner_factor.n_entries
 
 
 def test_order_fronts_of_a_square_grid_grow_as_n_log_n():
     kept = []
     for n in (33, 65, 129):
         even = np.arange(n) * 1e-4
-        inside = piece_of(TensorGrid(even, even, 2)).factor.inside
-        kept.append(inside.entries / (4 * n * n * np.log2(n)))
+        inside = piece_of(TensorGrid(even, even, 2)).factor.inner_factor
+        kept.append(inside.n_entries / (4 * n * n * np.log2(n)))
     # George 1973: 31/4 n^2 log2 n; here squares stand for triangles
     assert max(kept) <= 1.7 * 31 / 4
 
@@ -106,8 +106,8 @@ def test_exact_what_the_check_lets_pass_is_known_to_its_bound(ratio, coating):
     layers = Layers((TITANIUM[0] * ratio, CARBIDE[1]), TITANIUM, "strain")
     piece = piece_of(graded_grid(12.7e-3, 6.35e-3, 2e-4, coating), layers)
     one, two = (condense(piece.stencil, mirrored) for mirrored in (False, True))
-    assert 0 < two.rounding <= MAX_REFINEMENT
+    assert 0 < two.round_off_error <= MAX_REFINEMENT_CHANGE
     assert (
         np.abs(one.compliance() - two.compliance()).max()
-        <= 3 * two.rounding * np.abs(one.compliance()).max()
+        <= 3 * two.round_off_error * np.abs(one.compliance()).max()
     )

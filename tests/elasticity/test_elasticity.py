@@ -13,10 +13,10 @@ from stiffness import stiffness_of
 from patchfem.closed_forms.contact import layered_compliance
 from patchfem.elasticity.elasticity import (
     Layers,
-    assemble,
-    displacement,
+    compute_displacement,
     interface_compliance,
     lame,
+    make_piece,
     von_mises,
 )
 from patchfem.elasticity.recovery import centre_stress, get_cells
@@ -32,7 +32,7 @@ UNEVEN = TensorGrid(
 
 
 def piece_of(grid, layers):
-    return assemble(grid.x, grid.depth, grid.coating_rows, layers)
+    return make_piece(grid.x, grid.depth, grid.coating_rows, layers)
 
 
 def shares(points):
@@ -69,7 +69,7 @@ def test_exact_slim_column_shortens_with_the_modulus_of_its_plane(plane, modulus
     grid = TensorGrid(np.linspace(-5e-4, 5e-4, 11), np.linspace(0, 6e-3, 61), 0)
     piece = piece_of(grid, bare(TITANIUM, plane))
     pressure = 1e8
-    u = displacement(piece, np.zeros((1, 11)), pressure * grid.tributary_lengths()[None])[
+    u = compute_displacement(piece, np.zeros((1, 11)), pressure * grid.tributary_lengths()[None])[
         0
     ].reshape(11, 61, 2)
     shortening = u[:, 0, 1] - u[:, 20, 1]
@@ -92,7 +92,7 @@ def test_exact_displacement_at_the_interface_is_the_compliance_times_the_load(pl
     piece = piece_of(grid, Layers(CARBIDE, TITANIUM, plane))
     nn, tt, nt = interface_compliance(piece)
     shear, normal = np.random.default_rng(1).normal(size=(2, 3, grid.x.size))
-    u = displacement(piece, shear, normal).reshape(3, grid.x.size, -1, 2)
+    u = compute_displacement(piece, shear, normal).reshape(3, grid.x.size, -1, 2)
     assert np.abs(u[:, :, 0, 1] - (normal @ nn.T + shear @ nt.T)).max() <= 1e-9 * np.abs(u).max()
     assert np.abs(u[:, :, 0, 0] - (normal @ nt + shear @ tt.T)).max() <= 1e-9 * np.abs(u).max()
     assert np.all(u[:, :, -1] == 0)
@@ -103,7 +103,7 @@ def test_exact_every_row_of_cells_carries_the_load(plane):
     grid = graded_grid(4e-3, 2e-3, 2e-4, COATING)
     piece = piece_of(grid, Layers(CARBIDE, TITANIUM, plane))
     shear, normal = np.random.default_rng(2).normal(size=(2, 4, grid.x.size))
-    stress = centre_stress(get_cells(piece), displacement(piece, shear, normal))
+    stress = centre_stress(get_cells(piece), compute_displacement(piece, shear, normal))
     mises = von_mises(stress)
     corner = piece.cells
     ny = grid.depth.size
@@ -158,7 +158,7 @@ def half_wave_compliance(cells, wave):
         depth = np.sort(np.concatenate([depth, (depth[1:] + depth[:-1]) / 2]))
         rows *= 2
     x = np.linspace(0, wave / 2, cells + 1)
-    piece = assemble(x, depth, rows, COATED)
+    piece = make_piece(x, depth, rows, COATED)
     k = 2 * np.pi / wave
     # consistent nodal forces of cos(kx) on straight shape functions
     h = x[1]

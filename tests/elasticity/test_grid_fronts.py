@@ -5,21 +5,21 @@ import pytest
 from pieces import COATED
 
 from patchfem.elasticity.condense import condense
-from patchfem.elasticity.elasticity import assemble
+from patchfem.elasticity.elasticity import make_piece
 from patchfem.elasticity.grid_fronts import predict_bytes, predict_seconds, predict_work
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("nx, ny", [(2, 2), (5, 3), (16, 70), (41, 20), (90, 33)])
 def test_exact_predicted_work_is_that_of_the_factors(nx, ny, mirrored):
-    piece = assemble(np.linspace(-1, 1, nx), np.linspace(0, 1, ny), 1, COATED)
+    piece = make_piece(np.linspace(-1, 1, nx), np.linspace(0, 1, ny), 1, COATED)
     found = condense(piece.stencil, mirrored)
-    stacks = found.inside.stacks
+    stacks = found.inner_factor.stacks
     work = predict_work(nx, ny, mirrored)
     # some own nothing
     assert work.fronts >= sum(len(stack.own) for stack in stacks)
     assert work.shapes >= len(stacks)
-    kept = sum(factor.low.shape[0] ** 2 for factor in found.kept)
+    kept = sum(factor.lower_factor.shape[0] ** 2 for factor in found.kept_factors)
     whole = sum(stack.own_factor.size + stack.ring_factor.size for stack in stacks)
     assert (
         whole + kept <= work.factor_entries <= whole + 4 * kept

@@ -14,7 +14,13 @@ from patchfem.contact.gaps import crown
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, PatchfemError
 from patchfem.elasticity import elasticity, mortar, recovery, substructure
-from patchfem.elasticity.mortar import Body, clip_nodes, common_grid, softness, transfer_matrix
+from patchfem.elasticity.mortar import (
+    PieceInterface,
+    clip_nodes,
+    common_grid,
+    interpolate_zigzag_compliance,
+    transfer_matrix,
+)
 from patchfem.mesh.anymesh import PieceMesh
 from patchfem.mesh.grading import tributary_lengths
 from patchfem.mesh.tensor import graded_rows
@@ -60,7 +66,7 @@ def column(x, height, young, poisson=TITANIUM[1], plane="strain", growth=1.4):
     """(nn, tt, nt) of a block of uniform material on these columns, its rows growing downwards."""
     depth = np.concatenate([[0.0], np.cumsum(graded_rows(np.diff(x).min(), height, growth))])
     return elasticity.interface_compliance(
-        elasticity.assemble(x, depth, 0, bare((young, poisson), plane))
+        elasticity.make_piece(x, depth, 0, bare((young, poisson), plane))
     )
 
 
@@ -119,7 +125,10 @@ def test_exact_patch_test_on_held_blocks_without_poisson_effect(one, other, stif
         column(x_low, HEIGHT, YOUNG, 0.0, plane),
         column(x_high, 0.7 * HEIGHT, stiff * YOUNG, 0.0, plane),
     )
-    soft = softness(x_low, low[0], x_low), softness(x_high, high[0], x_high)
+    soft = (
+        interpolate_zigzag_compliance(x_low, low[0], x_low),
+        interpolate_zigzag_compliance(x_high, high[0], x_high),
+    )
     for x, limit in ((common_grid(x_low, x_high, *soft), 1e-12), (x_low, None), (x_high, None)):
         nn = forced(low, x_low, high, x_high, x)
         state = pressed(x, nn, np.zeros(x.size))
@@ -167,11 +176,15 @@ def two_crooked(poisson=0.0, stiff=100.0):
 @pytest.mark.parametrize("stiff", [0.01, 1.0, 100.0])
 def test_exact_patch_test_reaches_the_inside_of_both_bodies(stiff):
     pair, (low, high) = two_crooked(0.0, stiff)
-    joined = mortar.join_pieces(Body(pair[0].mesh.x, low), Body(pair[1].mesh.x, high))
+    joined = mortar.join_pieces(
+        PieceInterface(pair[0].mesh.x, low), PieceInterface(pair[1].mesh.x, high)
+    )
     state = pressed(joined.x, joined.compliance.nn, np.zeros(joined.x.size))
-    for piece, force in zip(pair, joined.forces(state.sigma_n * joined.tributary_lengths)):
+    for piece, force in zip(
+        pair, joined.distribute_forces(state.sigma_n * joined.tributary_lengths)
+    ):
         assert force == pytest.approx(piece.mesh.tributary_lengths() * LOAD / LENGTH, rel=1e-12)
-        u = elasticity.displacement(piece, 0 * force, force)
+        u = elasticity.compute_displacement(piece, 0 * force, force)
         stress = recovery.centre_stress(recovery.get_cells(piece), u)
         assert np.abs(stress - [0, -LOAD / LENGTH, 0, 0]).max() <= 1e-11 * LOAD / LENGTH
 
@@ -179,7 +192,7 @@ def test_exact_patch_test_reaches_the_inside_of_both_bodies(stiff):
 @pytest.mark.parametrize("side", ["both", "lower", "upper"])
 def test_exact_compliance_is_the_weighted_motion_of_both_bodies(side):
     pair, (low, high) = two_crooked(0.3, 2.0)
-    bodies = Body(pair[0].mesh.x, low), Body(pair[1].mesh.x, high)
+    bodies = PieceInterface(pair[0].mesh.x, low), PieceInterface(pair[1].mesh.x, high)
     joined = mortar.join_on_grid(mortar.candidate_grids(*bodies), side, *bodies)
     x, rng = joined.x, np.random.default_rng(8)
     normal, shear = rng.normal(size=(2, x.size))
@@ -192,7 +205,7 @@ def test_exact_compliance_is_the_weighted_motion_of_both_bodies(side):
             / tributary_lengths(x)[:, None]
         )
         load = psi @ np.array([hat(own, j, place) for j in range(own.size)]).T
-        u = elasticity.displacement(piece, sign * shear @ load, normal @ load)[
+        u = elasticity.compute_displacement(piece, sign * shear @ load, normal @ load)[
             0, piece.mesh.interface
         ]
         closing += load @ u[:, 1]
@@ -214,7 +227,7 @@ def test_always_symmetric_positive_and_balanced_and_the_same_with_the_bodies_swa
     x_low, x_high = nodes(one), nodes(other)
     low, high = column(x_low, HEIGHT, YOUNG), column(x_high, 0.5 * HEIGHT, stiff * YOUNG, 0.2)
     try:
-        joined = mortar.join_pieces(Body(x_low, low), Body(x_high, high))
+        joined = mortar.join_pieces(PieceInterface(x_low, low), PieceInterface(x_high, high))
     except PatchfemError as error:
         assert "pressure ripples of" in str(error)
         return
@@ -230,10 +243,10 @@ def test_always_symmetric_positive_and_balanced_and_the_same_with_the_bodies_swa
     assert np.linalg.eigvalsh(both).min() > 0
     assert joined.tributary_lengths.sum() == pytest.approx(LENGTH, rel=1e-13)
     force = np.random.default_rng(seed).uniform(0, 1, (3, joined.x.size))
-    for passed, own in zip(joined.forces(force), (x_low, x_high)):
+    for passed, own in zip(joined.distribute_forces(force), (x_low, x_high)):
         assert passed.sum(axis=1) == pytest.approx(force.sum(axis=1), rel=1e-13)
         assert np.abs(passed @ own - force @ joined.x).max() <= 1e-13 * force.sum() * LENGTH
-    turned = mortar.join_pieces(Body(x_high, high), Body(x_low, low))
+    turned = mortar.join_pieces(PieceInterface(x_high, high), PieceInterface(x_low, low))
     alike = x_low.size == x_high.size and np.abs(x_low - x_high).max() <= 1e-12 * LENGTH
     assert alike or {joined.side, turned.side} in ({"both"}, {"lower", "upper"})
     assert turned.x == pytest.approx(joined.x, abs=1e-15)
@@ -253,7 +266,7 @@ def test_always_symmetric_positive_and_balanced_and_the_same_with_the_bodies_swa
 def test_exact_matching_nodes_give_the_joined_operator():
     x = nodes(np.random.default_rng(1).uniform(0.1, 1, 40))
     low, high = column(x, HEIGHT, YOUNG), column(x, 0.5 * HEIGHT, 0.01 * YOUNG)
-    found = mortar.join_pieces(Body(x, low), Body(x, high))
+    found = mortar.join_pieces(PieceInterface(x, low), PieceInterface(x, high))
     joined = low[0] + high[0], low[1] + high[1], low[2] - high[2]
     for mine, theirs in zip(
         (found.compliance.nn, found.compliance.tt, found.compliance.nt), joined
@@ -262,7 +275,7 @@ def test_exact_matching_nodes_give_the_joined_operator():
         assert not mine.flags.writeable
     assert np.array_equal(found.x, x) and found.ripple == 0 and found.side == "lower"
     # a text file rounds the nodes
-    near = mortar.join_pieces(Body(x, low), Body(x * (1 + 1e-12), high))
+    near = mortar.join_pieces(PieceInterface(x, low), PieceInterface(x * (1 + 1e-12), high))
     assert (
         np.abs(near.compliance.nn - found.compliance.nn).max() <= 1e-8 * found.compliance.nn.max()
     )
@@ -272,7 +285,7 @@ def test_exact_matching_nodes_give_the_joined_operator():
 def _block(per_half_width):
     grid = refined_middle(1.5 * A, A / per_half_width, LENGTH, 6e-3, 1.1)
     return grid.x, elasticity.interface_compliance(
-        elasticity.assemble(grid.x, grid.depth, 0, bare(TITANIUM))
+        elasticity.make_piece(grid.x, grid.depth, 0, bare(TITANIUM))
     )
 
 
@@ -295,7 +308,7 @@ def hertz(x, nn, young_low, young_high):
 @pytest.mark.parametrize("fine", [17, 24, 40])
 def test_exact_hertz_on_unlike_meshes_within_four_in_a_thousand(fine, young_low, young_high):
     (x_low, low), (x_high, high) = block(16, young_low * YOUNG), block(fine, young_high * YOUNG)
-    joined = mortar.join_pieces(Body(x_low, low), Body(x_high, high))
+    joined = mortar.join_pieces(PieceInterface(x_low, low), PieceInterface(x_high, high))
     ripple, peak, _ = hertz(joined.x, joined.compliance.nn, young_low * YOUNG, young_high * YOUNG)
     assert ripple <= 4e-3 and peak <= 1e-3
     assert joined.ripple <= 5e-3
@@ -315,7 +328,7 @@ def test_exact_a_wrong_side_ripples_as_expected_and_is_not_chosen(fine, stiff, l
     (x_low, soft), (x_high, hard) = block(16), block(fine, stiff * YOUNG)
     measured = hertz(x_high, forced(soft, x_low, hard, x_high, x_high), YOUNG, stiff * YOUNG)[0]
     assert low <= measured <= high
-    pair = Body(x_low, soft), Body(x_high, hard)
+    pair = PieceInterface(x_low, soft), PieceInterface(x_high, hard)
     refused = mortar.join_on_grid(mortar.candidate_grids(*pair), "upper", *pair)
     assert refused.reason.startswith("with the pressure defined on the nodes of the upper piece")
     assert 0.3 <= measured / refused.ripple <= 1.3
@@ -326,12 +339,12 @@ def test_exact_a_wrong_side_ripples_as_expected_and_is_not_chosen(fine, stiff, l
 
 def test_exact_a_fine_side_that_is_much_softer_keeps_its_nodes():
     (x_low, hard), (x_high, soft) = block(8, 100 * YOUNG), block(64)
-    joined = mortar.join_pieces(Body(x_low, hard), Body(x_high, soft))
+    joined = mortar.join_pieces(PieceInterface(x_low, hard), PieceInterface(x_high, soft))
     assert joined.side == "upper" and joined.reason.startswith(
         "with the pressure defined on the nodes of the upper"
     )
     assert hertz(joined.x, joined.compliance.nn, 100 * YOUNG, YOUNG)[0] <= 1e-3
-    pair = Body(x_low, hard), Body(x_high, soft)
+    pair = PieceInterface(x_low, hard), PieceInterface(x_high, soft)
     named = mortar.join_on_grid(mortar.candidate_grids(*pair), "lower", *pair)
     assert (
         named.side == "lower"
@@ -347,7 +360,7 @@ def test_exact_where_the_coarser_side_changes_the_grid_changes_over(stiff):
     x_high = -x_low[::-1]
     low = column(x_low, 6e-3, YOUNG, growth=1.1)
     high = column(x_high, 6e-3, stiff * YOUNG, growth=1.1)
-    joined = mortar.join_pieces(Body(x_low, low), Body(x_high, high))
+    joined = mortar.join_pieces(PieceInterface(x_low, low), PieceInterface(x_high, high))
     assert joined.side == ("both" if stiff > 0.05 else "upper")
     assert hertz(joined.x, joined.compliance.nn, YOUNG, stiff * YOUNG)[0] <= 4e-3
     assert hertz(x_low, forced(low, x_low, high, x_high, x_low), YOUNG, stiff * YOUNG)[0] >= 2e-2
@@ -377,11 +390,12 @@ def test_always_pieces_that_overhang_touch_where_both_are(one, other, left, righ
 def test_exact_patch_test_of_a_short_block_on_a_long_one():
     x_low, x_high = nodes([1.0] * 23), nodes([1.0] * 10, 0.6 * LENGTH) + 0.1 * LENGTH
     joined = mortar.join_pieces(
-        Body(x_low, column(x_low, HEIGHT, YOUNG)), Body(x_high, column(x_high, HEIGHT, YOUNG))
+        PieceInterface(x_low, column(x_low, HEIGHT, YOUNG)),
+        PieceInterface(x_high, column(x_high, HEIGHT, YOUNG)),
     )
     assert (joined.x[0], joined.x[-1]) == pytest.approx((x_high[0], x_high[-1]))
     assert joined.tributary_lengths.sum() == pytest.approx(0.6 * LENGTH, rel=1e-13)
-    low, high = joined.forces(joined.tributary_lengths)
+    low, high = joined.distribute_forces(joined.tributary_lengths)
     assert high == pytest.approx(tributary_lengths(x_high), rel=1e-12)
     assert np.all(low[x_low < x_high[0] - LENGTH / 23] == 0) and low.sum() == pytest.approx(
         0.6 * LENGTH
@@ -394,13 +408,22 @@ def test_refuses_by_name_what_cannot_be_joined():
     x, other = nodes([1.0] * 8), nodes([1.0] * 5)
     low, high = column(x, HEIGHT, YOUNG), column(other, HEIGHT, YOUNG)
     for bodies, message in (
-        ((Body(x[::-1], low), Body(other, high)), "the lower interface needs at least three nodes"),
-        ((Body(x, low), Body(other, low)), "the upper interface needs .* compliance"),
         (
-            (Body(x, low), Body(other + LENGTH, high)),
+            (PieceInterface(x[::-1], low), PieceInterface(other, high)),
+            "the lower interface needs at least three nodes",
+        ),
+        (
+            (PieceInterface(x, low), PieceInterface(other, low)),
+            "the upper interface needs .* compliance",
+        ),
+        (
+            (PieceInterface(x, low), PieceInterface(other + LENGTH, high)),
             "do not face one another: the lower interface",
         ),
-        ((Body(x, low), Body(other + 0.99 * LENGTH, high)), "share 0.000127 m of the interface"),
+        (
+            (PieceInterface(x, low), PieceInterface(other + 0.99 * LENGTH, high)),
+            "share 0.000127 m of the interface",
+        ),
     ):
         with pytest.raises(PatchfemError, match=r"contact\.mesh: .*" + message):
             mortar.join_pieces(*bodies)
@@ -413,5 +436,6 @@ def test_refuses_meshes_on_which_every_choice_ripples():
         PatchfemError, match=r"pressure ripples of \d+ % are .* cells of similar size that grow"
     ):
         mortar.join_pieces(
-            Body(x, column(x, HEIGHT, YOUNG)), Body(other, column(other, HEIGHT, YOUNG))
+            PieceInterface(x, column(x, HEIGHT, YOUNG)),
+            PieceInterface(other, column(other, HEIGHT, YOUNG)),
         )

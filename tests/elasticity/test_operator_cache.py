@@ -25,9 +25,9 @@ def place(tmp_path, monkeypatch):
 
 def test_exact_the_same_bits_come_back():
     key = cache.grid_key(X, DEPTH, 1, LAYERS)
-    assert cache.fetch(key, SHAPES) is None
-    cache.keep(key, PARTS)
-    for name, kept in cache.fetch(key, SHAPES).items():
+    assert cache.load_arrays(key, SHAPES) is None
+    cache.store_arrays(key, PARTS)
+    for name, kept in cache.load_arrays(key, SHAPES).items():
         assert PARTS[name].tobytes() == kept.tobytes() and not kept.flags.writeable
 
 
@@ -80,22 +80,22 @@ def test_always_a_changed_source_text_has_another_key(tmp_path, monkeypatch):
 
 def test_refuses_damaged_and_foreign_files(place):
     key = cache.grid_key(X, DEPTH, 1, LAYERS)
-    cache.keep(key, PARTS)
+    cache.store_arrays(key, PARTS)
     path = place / f"{key}.npz"
-    assert cache.fetch(key, dict.fromkeys(PARTS, (8, 8))) is None
+    assert cache.load_arrays(key, dict.fromkeys(PARTS, (8, 8))) is None
     content = path.read_bytes()
     for damaged in (b"", content[: len(content) // 2], b"x" * 100, content[:-300] + b"\0" * 300):
         path.write_bytes(damaged)
-        assert cache.fetch(key, SHAPES) is None
-    cache.keep(key, PARTS | {"a": np.full((7, 7), np.nan)})
-    assert cache.fetch(key, SHAPES) is None
+        assert cache.load_arrays(key, SHAPES) is None
+    cache.store_arrays(key, PARTS | {"a": np.full((7, 7), np.nan)})
+    assert cache.load_arrays(key, SHAPES) is None
 
 
 def test_always_the_folder_stays_below_its_size(place, monkeypatch):
     one = 3 * 49 * 8
     monkeypatch.setattr(cache, "MAX_FOLDER_BYTES", 4 * one)
     for k in range(8):
-        cache.keep(f"{k:032d}", PARTS)
+        cache.store_arrays(f"{k:032d}", PARTS)
         os.utime(place / f"{k:032d}.npz", (k, k))
     left = sorted(path.name for path in place.iterdir())
     assert 1 <= len(left) <= 4 and left[-1] == f"{7:032d}.npz"
@@ -105,19 +105,19 @@ def test_exact_an_unwritable_folder_is_no_error(tmp_path, monkeypatch):
     blocked = tmp_path / "file"
     blocked.write_text("no folder", "utf-8")
     monkeypatch.setenv("PATCHFEM_CACHE", str(blocked))
-    cache.keep("k", PARTS)
-    assert cache.fetch("k", SHAPES) is None
+    cache.store_arrays("k", PARTS)
+    assert cache.load_arrays("k", SHAPES) is None
 
 
 def test_always_a_folder_without_room_or_of_others_is_done_without(place):
     key = cache.grid_key(X, DEPTH, 1, LAYERS)
     with limited(500):
-        cache.keep(key, PARTS)
+        cache.store_arrays(key, PARTS)
     # a cut file would stay for ever
-    assert cache.fetch(key, SHAPES) is None and list(place.iterdir()) == []
-    cache.keep(key, PARTS)
-    assert cache.fetch(key, SHAPES) is not None
+    assert cache.load_arrays(key, SHAPES) is None and list(place.iterdir()) == []
+    cache.store_arrays(key, PARTS)
+    assert cache.load_arrays(key, SHAPES) is not None
     place.chmod(0o777)  # anybody could have put numbers there
-    assert cache.fetch(key, SHAPES) is None
-    cache.keep(cache.grid_key(X, DEPTH, 2, LAYERS), PARTS)
+    assert cache.load_arrays(key, SHAPES) is None
+    cache.store_arrays(cache.grid_key(X, DEPTH, 2, LAYERS), PARTS)
     assert len(list(place.iterdir())) == 1

@@ -12,16 +12,16 @@ from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM, bare, refined_middle
 
 from patchfem.elasticity import elasticity, substructure
-from patchfem.elasticity.coating_bond import bond_forces
+from patchfem.elasticity.coating_traction import compute_coating_traction
 from patchfem.elasticity.elasticity import Layers, hooke, lame
 from patchfem.elasticity.recovery import (
     Cells,
     centre_stress,
+    choose_rounding_step,
     estimate_error,
     fit_recovery,
     get_cells,
-    harmless_rounding,
-    quadratures,
+    make_quadratures,
 )
 from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
 
@@ -41,7 +41,7 @@ def any_cells(mesh, layers=COATED) -> Cells:
 
 
 def tensor(grid, layers=COATED):
-    return elasticity.assemble(grid.x, grid.depth, grid.coating_rows, layers)
+    return elasticity.make_piece(grid.x, grid.depth, grid.coating_rows, layers)
 
 
 @cache
@@ -124,7 +124,7 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
             + tall**2 * ((lam + 2 * mu) * b[2] ** 2 + mu * a[2] ** 2)
         )
     )
-    error = estimate_error(found, u, stress, quadratures(cells)).error[0]
+    error = estimate_error(found, u, stress, make_quadratures(cells)).error[0]
     assert np.abs(error / missed - 1).max() <= 1e-9
 
 
@@ -136,15 +136,16 @@ def test_always_rounding_to_the_harmless_step_adds_the_wanted_share_of_the_error
     piece = tensor(graded_grid(4e-3, 1e-3, 4e-5, COATING), layers)
     found = fit_recovery(get_cells(piece))
     u = np.random.default_rng(seed).normal(size=(1, len(piece.nodes), 2)) * 1e-6
-    stress, rules = centre_stress(get_cells(piece), u), quadratures(found.cells)
+    stress, rules = centre_stress(get_cells(piece), u), make_quadratures(found.cells)
     error = estimate_error(found, u, stress, rules)
-    step = harmless_rounding(found, error, rules, 1e-3)
+    step = choose_rounding_step(found, error, rules, 1e-3)
     change = np.round(stress[0] / step) * step - stress[0]
     area = np.concatenate([rule.weight.sum(axis=1) for rule in rules])
     energy = area @ (change[:, 0] ** 2 + change[:, 1] ** 2 + 2 * change[:, 3] ** 2) / 200e9
     assert energy == pytest.approx(1e-6 * error.error.sum(), rel=0.05)
     assert (
-        harmless_rounding(found, estimate_error(found, 0 * u, 0 * stress, rules), rules, 1e-3) == 0
+        choose_rounding_step(found, estimate_error(found, 0 * u, 0 * stress, rules), rules, 1e-3)
+        == 0
     )
 
 
@@ -157,9 +158,9 @@ def test_exact_energy_is_the_work_of_the_load_and_shares_add_up(split):
     else:
         mesh = of_grid(SMALL, split, seed=2)
         piece, face = substructure.Substructure(mesh, COATED), mesh.interface
-    u = elasticity.displacement(piece, *force)
+    u = elasticity.compute_displacement(piece, *force)
     cells = get_cells(piece)
-    rules = quadratures(cells)
+    rules = make_quadratures(cells)
     found = estimate_error(fit_recovery(cells), u, centre_stress(cells, u), rules)
     work = (force.transpose(1, 2, 0) * u[:, face]).sum(axis=(1, 2))
     area = sum(rule.weight.sum() for rule in rules)
@@ -209,7 +210,7 @@ def under_hertz(per_half_width, coating=0.0):
     force = np.bincount(cell, p * (1 - along), grid.x.size) + np.bincount(
         cell + 1, p * along, grid.x.size
     )
-    u = elasticity.displacement(piece, 0 * force[None], force[None])
+    u = elasticity.compute_displacement(piece, 0 * force[None], force[None])
     return piece, force, u, centre_stress(get_cells(piece), u)
 
 
@@ -245,7 +246,7 @@ def test_order_recovered_stress_under_hertz_is_two():
 def test_exact_bond_line_is_the_stress_at_its_depth():
     piece, _, u, _ = under_hertz(16, 0.5 * A)
     cells = get_cells(piece)
-    bond = bond_forces(cells, quadratures(cells), u)
+    bond = compute_coating_traction(cells, make_quadratures(cells), u)
     depth = cells.points[bond.node, 1]
     assert np.ptp(depth) == 0 and depth[0] == pytest.approx(0.5 * A, rel=1e-12)
     x = cells.points[bond.node, 0]
@@ -271,7 +272,9 @@ def test_exact_bond_line_carries_the_load_and_its_moment(kind, seed, plane):
         piece, x = substructure.Substructure(mesh, layers), mesh.x
     shear, normal = np.random.default_rng(seed).normal(size=(2, 2, x.size))
     cells = get_cells(piece)
-    bond = bond_forces(cells, quadratures(cells), elasticity.displacement(piece, shear, normal))
+    bond = compute_coating_traction(
+        cells, make_quadratures(cells), elasticity.compute_displacement(piece, shear, normal)
+    )
     size = np.abs(shear).sum() + np.abs(normal).sum()
     assert (
         np.abs(
@@ -300,7 +303,7 @@ def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
     points = mesh.points + np.outer(slope * mesh.points[:, 0], [0.0, 1.0])
     cells = Cells(points, (mesh.triangles, mesh.quads), mesh.is_coating, bare(TITANIUM))
     strain = np.random.default_rng(seed).normal(size=(2, 2))
-    bond = bond_forces(cells, quadratures(cells), (points @ strain.T)[None])
+    bond = compute_coating_traction(cells, make_quadratures(cells), (points @ strain.T)[None])
     (exx, exy), (eyx, eyy) = strain
     xx, yy, _, xy = hooke((exx, eyy, (exy + eyx) / 2), np.array(0), bare(TITANIUM))
     into, along = np.array([[-slope, 1.0], [1.0, slope]]) / np.hypot(1, slope)
@@ -314,7 +317,12 @@ def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
 def test_exact_no_coating_no_bond_line():
     piece = tensor(graded_grid(2e-3, 1e-3, 2e-4), bare(TITANIUM))
     cells = get_cells(piece)
-    assert bond_forces(cells, quadratures(cells), np.zeros((1, len(cells.points), 2))) is None
+    assert (
+        compute_coating_traction(
+            cells, make_quadratures(cells), np.zeros((1, len(cells.points), 2))
+        )
+        is None
+    )
 
 
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0, None])
@@ -333,11 +341,11 @@ def test_exact_indicator_of_any_mesh_is_the_energy_a_finer_mesh_adds(split):
     force[1:] += step * (2 * pressure[1:] + pressure[:-1]) / 6
     hats = np.array([np.interp(finest.x, mesh.x, unit) for unit in np.eye(mesh.x.size)])
     fine = substructure.Substructure(finest, COATED)
-    energy = force @ elasticity.displacement(fine, 0 * force, force)[0, finest.interface, 1]
+    energy = force @ elasticity.compute_displacement(fine, 0 * force, force)[0, finest.interface, 1]
     piece, load = substructure.Substructure(mesh, COATED), hats @ force
-    u = elasticity.displacement(piece, 0 * load, load)
+    u = elasticity.compute_displacement(piece, 0 * load, load)
     true = (energy - load @ u[0, mesh.interface, 1]) * 16 / 15
     cells = get_cells(piece)
-    rules = quadratures(cells)
+    rules = make_quadratures(cells)
     found = estimate_error(fit_recovery(cells), u, centre_stress(cells, u), rules)
     assert 0.8 <= np.sqrt(found.error.sum() / true) <= 1.3

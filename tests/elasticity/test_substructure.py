@@ -18,7 +18,7 @@ from patchfem.contact.gaps import crown
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, NotConverged
 from patchfem.elasticity import elasticity
-from patchfem.elasticity.elasticity import Layers, displacement
+from patchfem.elasticity.elasticity import Layers, compute_displacement
 from patchfem.elasticity.elasticity import interface_compliance as condense
 from patchfem.elasticity.recovery import centre_stress, get_cells
 from patchfem.elasticity.substructure import Substructure
@@ -35,7 +35,7 @@ def test_exact_a_tensor_grid_read_as_any_mesh_is_the_sweep(cells, plane):
     grid = graded_grid(LENGTH, HEIGHT, LENGTH / cells, COATING)
     layers = Layers(CARBIDE, TITANIUM, plane)
     wanted = elasticity.interface_compliance(
-        elasticity.assemble(grid.x, grid.depth, grid.coating_rows, layers)
+        elasticity.make_piece(grid.x, grid.depth, grid.coating_rows, layers)
     )
     found = condense(Substructure(of_grid(grid, seed=cells), layers))
     for mine, theirs in zip(found, wanted):
@@ -82,7 +82,7 @@ def test_exact_fields_are_those_of_the_compliance_and_of_the_tensor_grid(split):
     piece = Substructure(mesh, COATED)
     nn, tt, nt = condense(piece)
     shear, normal = np.random.default_rng(1).normal(size=(2, 3, grid.x.size))
-    u = displacement(piece, shear, normal)
+    u = compute_displacement(piece, shear, normal)
     assert (
         np.abs(u[:, mesh.interface, 1] - (normal @ nn.T + shear @ nt.T)).max()
         <= 1e-10 * np.abs(u).max()
@@ -102,9 +102,9 @@ def test_exact_fields_are_those_of_the_compliance_and_of_the_tensor_grid(split):
         )
     assert lift[mesh.interface] == pytest.approx(1)
     if split == 0:
-        own = elasticity.assemble(grid.x, grid.depth, grid.coating_rows, COATED)
+        own = elasticity.make_piece(grid.x, grid.depth, grid.coating_rows, COATED)
         theirs = elasticity.von_mises(
-            centre_stress(get_cells(own), displacement(own, shear, normal))
+            centre_stress(get_cells(own), compute_displacement(own, shear, normal))
         )
         mine = elasticity.von_mises(centre_stress(get_cells(piece), u))
         assert np.abs(mine - theirs).max() <= 1e-9 * theirs.max()

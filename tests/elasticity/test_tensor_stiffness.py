@@ -19,9 +19,9 @@ from stiffness import matrix_of, stencil_of, stiffness_of
 from patchfem.elasticity.elasticity import (
     Layers,
     Piece,
-    assemble,
     grid_cells,
     lame,
+    make_piece,
 )
 from patchfem.elasticity.substructure import Substructure
 from patchfem.elasticity.tensor_stiffness import apply_stencil
@@ -72,7 +72,7 @@ def test_exact_a_tensor_grid_has_the_stiffness_of_scikit_fem_s_own_form(
     x, depth = (np.append(0, np.cumsum(part)) * 1e-4 for part in (across, down))
     layers, coating = Layers(CARBIDE, TITANIUM, plane), min(coating, len(down))
     mine, theirs = (
-        assemble(x, depth, coating, layers),
+        make_piece(x, depth, coating, layers),
         assemble_nodes(grid_nodes(x, depth), coating, layers),
     )
     scale = np.abs(theirs.stencil).max()

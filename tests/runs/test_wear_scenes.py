@@ -19,7 +19,7 @@ from patchfem import build
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.elasticity.elasticity import interface_compliance, make_piece
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve
 from patchfem.scene.scene import loads
@@ -199,7 +199,7 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
     peak, stick = hertz_peak(line, radius, young / (1 - 0.32**2) / 2), half * np.sqrt(0.4)
     grid = refined_middle(1.5 * half, half / cells, 40 * half, 20 * half, 1.15)
     nn, _, _ = interface_compliance(
-        assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
+        make_piece(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
     )
     x, area, gap, load = (
         grid.x,

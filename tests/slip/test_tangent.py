@@ -8,7 +8,7 @@ from pieces import COATED, COATING, HEIGHT, LENGTH, WIDTH, bare, coated_pair
 
 from patchfem.contact.stiffness import coupled_stiffness, tangential_stiffness
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.elasticity.elasticity import interface_compliance, make_piece
 from patchfem.mesh.tensor import graded_grid
 
 
@@ -19,7 +19,7 @@ def unlike_pieces() -> tuple:
         graded_grid(LENGTH, 4e-3, LENGTH / 60),
     )
     low, high = (
-        interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, layers))
+        interface_compliance(make_piece(grid.x, grid.depth, grid.coating_rows, layers))
         for grid, layers in zip(grids, (COATED, bare((70e9, 0.3))))
     )
     x = grids[0].x

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance
+from patchfem.elasticity.elasticity import Layers, interface_compliance, make_piece
 from patchfem.mesh.tensor import TensorGrid, graded_grid, graded_rows
 
 TITANIUM = (121e9, 0.32)
@@ -27,7 +27,7 @@ def bare(material, plane="strain") -> Layers:
 
 def pair_of(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Compliance:
     """Two mirrored pieces: normal and tangential compliance double, their coupling cancels."""
-    piece = assemble(grid.x, grid.depth, grid.coating_rows, layers)
+    piece = make_piece(grid.x, grid.depth, grid.coating_rows, layers)
     nn, tt, _ = interface_compliance(piece)
     return Compliance(
         Interface(grid.x, grid.tributary_lengths() * width, width), 2 * nn / width, 2 * tt / width

@@ -25,7 +25,7 @@ FIRST = (1.0, 1 / 60, 0.6, 16)
 
 
 @dataclass(frozen=True)
-class Body:
+class PieceInterface:
     """One piece, lengths [m]; layers: (Young's modulus [Pa], Poisson's ratio) of coating and substrate."""
 
     length: float
@@ -42,8 +42,8 @@ class Scene:
     length: float
     width: float
     plane: str
-    lower: Body
-    upper: Body
+    lower: PieceInterface
+    upper: PieceInterface
     load: float
     tilt: float = 0.0
     curvature: float = 0.0
@@ -70,7 +70,7 @@ def spread(points, sizes, begin: float, end: float, growth: float, most: float) 
     return np.array(out)
 
 
-def face(body: Body, plane: str, inner, growth: float, corner: float) -> tuple:
+def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) -> tuple:
     """(nn, tt, nt) (m, m) [m2/N] of the shared stretch of the face, per unit width, at the nodes of `inner`'s cells;
     nt: normal motion by shear."""
     x, extra = inner, 0

@@ -13,7 +13,7 @@ import time
 from itertools import pairwise
 
 import numpy as np
-from static_reference import Body, Scene, answer
+from static_reference import PieceInterface, Scene, answer
 
 KINDS = ("plain", "crown", "h1", "step", "ends", "skin")
 MATERIALS = ((121e9, 0.32), (210e9, 0.3), (70e9, 0.34), (250e9, 0.24))
@@ -43,16 +43,16 @@ def drawn(seed: int) -> Scene:
     kinds = r.choice(len(MATERIALS), 3)
     thick = float(f"{height * r.uniform(0.01, 0.2):.5g}") if r.random() < 0.5 else 0.0
     base = tuple(MATERIALS[k] for k in kinds[:2]) if thick else (MATERIALS[kinds[1]],) * 2
-    lower = upper = Body(length, height, thick, base)
+    lower = upper = PieceInterface(length, height, thick, base)
     if r.random() < 0.3:
-        upper = Body(length, height, 0.0, (MATERIALS[kinds[2]],) * 2)
+        upper = PieceInterface(length, height, 0.0, (MATERIALS[kinds[2]],) * 2)
     tilt = float(f"{10 ** r.uniform(-6.5, -3.5) * r.choice([-1, 1]):.5g}")
     curvature = step = skin = None
     if kind in ("crown", "h1") or (kind in ("step", "skin") and r.random() < 0.5):
         curvature = float(f"{10 ** r.uniform(-1.5, 1):.5g}")
     if kind == "h1":  # a narrow contact of long pieces, aside of their middle
         length = wide(2e-2, 6e-2)
-        lower = upper = Body(length, length / 2, 0.0, (MATERIALS[kinds[0]],) * 2)
+        lower = upper = PieceInterface(length, length / 2, 0.0, (MATERIALS[kinds[0]],) * 2)
         tilt = float(f"{length * curvature * r.uniform(-0.2, 0.2):.5g}")
         load = wide(1, 100)
     if kind == "step" or (kind == "skin" and r.random() < 0.5):
@@ -64,7 +64,7 @@ def drawn(seed: int) -> Scene:
     if kind == "skin":
         skin = wide(1e12, 1e15)
     if kind == "ends":
-        lower = Body(
+        lower = PieceInterface(
             float(f"{length * r.uniform(1.2, 2):.5g}"), height, lower.thickness, lower.layers
         )
     return Scene(

@@ -10,7 +10,7 @@ from wear_forms import even_wear_pressure, worn_crown_half_width, worn_pad_fract
 
 from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact.unilateral import solve_forces
-from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.elasticity.elasticity import interface_compliance, make_piece
 from patchfem.wear.depth import solve_jump, wear_rates
 from patchfem.wear.jumps import WearProblem, start_wear, take_jump
 
@@ -195,7 +195,7 @@ def test_exact_worn_hertz_contact_at_two_paths():
     half = hertz_half_width(line, radius, young / (1 - 0.32**2) / 2)
     grid = refined_middle(5 * half, half / 10, 40 * half, 20 * half, 1.2)
     nn, _, _ = interface_compliance(
-        assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
+        make_piece(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
     )
     x, area = grid.x, grid.tributary_lengths() * width
     press, even = pressing(2 * nn / width, x, x**2 / 2 / radius, line * width), np.ones(x.size)

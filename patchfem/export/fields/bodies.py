@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ...elasticity import coating_bond
-from ...elasticity.elasticity import Piece, displacement, von_mises
+from ...elasticity import coating_traction
+from ...elasticity.elasticity import Piece, compute_displacement, von_mises
 from ...elasticity.recovery import (
     Cells,
     Recovery,
     StressError,
     centre_stress,
+    choose_rounding_step,
     estimate_error,
     fit_recovery,
     get_cells,
-    harmless_rounding,
-    quadratures,
+    make_quadratures,
 )
 from ...runs.results.result import surface_of
 from .blocks import blocks_of
@@ -114,9 +114,10 @@ def _motions(patch, loads: list) -> list:
     """Displacements (1 + f, nodes, 2) of both pieces; alike ones share one factorisation."""
     pair = patch.pair
     if pair.upper is pair.piece:
-        both = displacement(pair.piece, *(np.concatenate(parts) for parts in zip(*loads)))
+        both = compute_displacement(pair.piece, *(np.concatenate(parts) for parts in zip(*loads)))
         return np.split(both, 2)
-    return [displacement(piece, *load) for piece, load in zip((pair.piece, pair.upper), loads)]
+    pieces = (pair.piece, pair.upper)
+    return [compute_displacement(piece, *load) for piece, load in zip(pieces, loads)]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -151,7 +152,7 @@ def _inside(piece, grid) -> _Inside:
         interface,
         partial(centre_stress, cells),
         cells,
-        quadratures(cells),
+        make_quadratures(cells),
         fit_recovery(cells),
     )
 
@@ -184,13 +185,15 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
     error = StressError(
         *(np.concatenate([getattr(one, name) for one in errors]) for name in ("error", "energy"))
     )
-    bond = coating_bond.interpolate_bond(cells, coating_bond.bond_forces(cells, inside.rules, u), x)
+    bond = coating_traction.interpolate_coating_traction(
+        cells, coating_traction.compute_coating_traction(cells, inside.rules, u), x
+    )
     bond = {name: rows[:1] + rows[1:] for name, rows in bond.items()}
     if bond:
         bond["shear_bond"] *= -sign  # on the lower piece along +x, as the interface shear
     blocks = [block if not lower else block[:, ::-1] for block in inside.blocks]
     finest = min(
-        harmless_rounding(inside.found, error, inside.rules, SHARE),
+        choose_rounding_step(inside.found, error, inside.rules, SHARE),
         FINEST * float(out["mises"].max(initial=0.0)),
     )
     return out | {

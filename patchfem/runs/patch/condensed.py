@@ -16,8 +16,8 @@ from ...elasticity.elasticity import (
     InterfaceCompliance,
     Layers,
     Piece,
-    assemble,
     interface_compliance,
+    make_piece,
 )
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import elastic_layers
@@ -63,19 +63,19 @@ class Pair:
     @property
     def rounding(self) -> float:
         """Relative error of the compliance by round-off [1]; 0 if it is negligible."""
-        return max(self.piece.rounding, self.upper.rounding)
+        return max(self.piece.round_off_error, self.upper.round_off_error)
 
     def forces(self, nodal) -> tuple:
         """Return nodal forces (..., m) of the interface on the nodes of the lower and upper piece."""
         if self.joint is None:
             return nodal, nodal
-        return self.joint.forces(nodal)
+        return self.joint.distribute_forces(nodal)
 
 
 def finite_elements(body, layers: Layers):
     """Return the piece of a tensor grid (Piece) or of any mesh (Substructure)."""
     if isinstance(body, TensorGrid):
-        return assemble(body.x, body.depth, body.coating_rows, layers)
+        return make_piece(body.x, body.depth, body.coating_rows, layers)
     return substructure.Substructure(body, layers)
 
 
@@ -97,12 +97,12 @@ def compliance_of(body, piece, fresh: bool) -> InterfaceCompliance:
     else:
         key = cache.mesh_key(body, piece.layers)
     shapes = dict.fromkeys(InterfaceCompliance._fields, 2 * (body.x.size,))
-    kept = None if fresh else cache.fetch(key, shapes)
+    kept = None if fresh else cache.load_arrays(key, shapes)
     if kept is not None:
         return InterfaceCompliance(**kept)
     compliance = interface_compliance(piece)
-    if not piece.rounding:
-        cache.keep(key, compliance._asdict())
+    if not piece.round_off_error:
+        cache.store_arrays(key, compliance._asdict())
     return compliance
 
 
@@ -131,7 +131,9 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
     joint, x, share = None, grid.x, grid.tributary_lengths()
     if upper_grid is not None and not _match(x, upper_grid.x):
-        joint = mortar.join_pieces(mortar.Body(x, low), mortar.Body(upper_grid.x, high))
+        joint = mortar.join_pieces(
+            mortar.PieceInterface(x, low), mortar.PieceInterface(upper_grid.x, high)
+        )
         x, share, parts = joint.x, joint.tributary_lengths, joint.compliance
     # Shear of the upper piece lifts the interface where that of a like lower piece lowers it: nt
     # cancels.
@@ -189,7 +191,7 @@ def without_factors(pair: Pair) -> Pair:
     They need far more memory than the compliance, and are recomputed for fields.
     """
     for piece in (pair.piece, pair.upper):
-        if isinstance(piece, Piece) and not piece.rounding:
+        if isinstance(piece, Piece) and not piece.round_off_error:
             piece.computed.clear()
     return pair
 

@@ -21,7 +21,7 @@ from ...contact.half_space.point_compliance import (
     smooth_modes,
 )
 from ...core import NotConverged
-from ...elasticity.elasticity import assemble
+from ...elasticity.elasticity import make_piece
 from ...elasticity.lapack import one_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...model import profile
@@ -173,12 +173,12 @@ def _ends(asked, level: int) -> list:
         MIDDLE_CELL * length,
         MIDDLE_CELL * length,
         GROWTH,
-    ).times(0.5**level)
+    ).scale_cells(0.5**level)
     places, changes = divide_into_columns(layout), 0.0
     for piece, share in _bodies(asked):
         depth, coated = _rows(piece, layout)
         changes = changes + share * np.array(
-            end_compliance(assemble(places, depth, coated, elastic_layers(asked, piece)))
+            end_compliance(make_piece(places, depth, coated, elastic_layers(asked, piece)))
         )
     return places, changes
 

@@ -279,7 +279,7 @@ def _merged(layouts: list, between: bool) -> Layout:
     places = np.linspace(low, high, 5, axis=1)
     # only the bands that shorten some cell are kept, because most are redundant
     size, kept = (
-        out.size(places),
+        out.cell_lengths(places),
         [],
     )
     for k, band in enumerate(bands):

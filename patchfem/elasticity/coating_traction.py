@@ -9,8 +9,8 @@ from .recovery import Cells, quadrature_stress
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Bond:
-    """Forces of a coating on its substrate along their common line.
+class CoatingTraction:
+    """Forces and tractions of a coating on its substrate along their common line.
 
     - ``node``: (b,) nodes by increasing x
     - ``length``: (b,) tributary length of each node along the line [m]
@@ -26,7 +26,7 @@ class Bond:
     normal: np.ndarray
 
 
-def bond_forces(cells: Cells, rules: list, u) -> Bond | None:
+def compute_coating_traction(cells: Cells, rules: list, u) -> CoatingTraction | None:
     """Compute the forces of the coating on its substrate.
 
     They are the nodal forces of the stress in the coating, so they balance the load on its face.
@@ -43,7 +43,7 @@ def bond_forces(cells: Cells, rules: list, u) -> Bond | None:
     Bond or None
         None without a coating.
     """
-    edges = _bond_edges(cells)
+    edges = _find_bonded_edges(cells)
     if not len(edges):
         return None
     nodes = np.unique(edges)
@@ -65,10 +65,10 @@ def bond_forces(cells: Cells, rules: list, u) -> Bond | None:
     force = np.stack([-_nodal_forces(coating, coating_rules, motion)[nodes] for motion in u])
     shear = (force * along).sum(axis=2) / length
     normal = (force * across).sum(axis=2) / length
-    return Bond(nodes, length, force, shear, normal)
+    return CoatingTraction(nodes, length, force, shear, normal)
 
 
-def _bond_edges(cells: Cells) -> np.ndarray:
+def _find_bonded_edges(cells: Cells) -> np.ndarray:
     """Return the edges (e, 2) that a coating cell shares with a substrate cell."""
     edges = np.concatenate(
         [
@@ -89,7 +89,7 @@ def _bond_edges(cells: Cells) -> np.ndarray:
 
 
 def _select_coating(cells: Cells, rules: list, nodes) -> tuple[Cells, list]:
-    """Return the coating cells that touch given nodes, and the quadratures of these cells.
+    """Return the coating cells that touch given nodes, and the Gauss points of these cells.
 
     No other cell exerts a force of the coating on these nodes.
     """
@@ -124,13 +124,13 @@ def _nodal_forces(cells: Cells, rules: list, u) -> np.ndarray:
     return out
 
 
-def interpolate_bond(cells: Cells, bond: Bond | None, x) -> dict:
-    """Interpolate the tractions of a bond line at positions along the interface.
+def interpolate_coating_traction(cells: Cells, traction: CoatingTraction | None, x) -> dict:
+    """Interpolate the tractions below a coating at positions along the interface.
 
     Parameters
     ----------
     cells : Cells
-    bond : Bond or None
+    traction : CoatingTraction or None
     x : (m,) ndarray [m]
 
     Returns
@@ -139,13 +139,13 @@ def interpolate_bond(cells: Cells, bond: Bond | None, x) -> dict:
         "normal_bond" and "shear_bond" (frames, m) [Pa], NaN beyond the ends of the coating; empty
         without a coating.
     """
-    if bond is None:
+    if traction is None:
         return {}
-    own = cells.points[bond.node, 0]
-    close = LENGTH_TOL * np.ptp(own)
-    is_outside = (x < own[0] - close) | (x > own[-1] + close)
+    line_x = cells.points[traction.node, 0]
+    close = LENGTH_TOL * np.ptp(line_x)
+    is_outside = (x < line_x[0] - close) | (x > line_x[-1] + close)
     out = {}
-    for name, values in (("normal_bond", bond.normal), ("shear_bond", bond.shear)):
-        rows = np.stack([np.interp(x, own, row) for row in values])
+    for name, values in (("normal_bond", traction.normal), ("shear_bond", traction.shear)):
+        rows = np.stack([np.interp(x, line_x, row) for row in values])
         out[name] = np.where(is_outside, np.nan, rows)
     return out
