@@ -1,19 +1,24 @@
-"""The averaged law on a patch: along a prescribed slide, and as the constant limit of a rigid block on a rig."""
+"""Averaged friction law on a patch: along a prescribed slide, or as limit of a rigid block.
+
+In: a model with law 'convolution' and its pressed patch. Out: the law object, the limit force
+over mu_s N, and tractions.
+"""
 
 import numpy as np
 
 from ...core import PatchfemError
 from ...effects import import_effect, law_has_trait, not_supported_message
 
-ALIKE = 1e-9  # relative difference of the limits forward and backward that counts as none
+ALIKE = 1e-9  # relative difference of the limits in both directions that counts as zero
 
 
 def _law():
+    """Return the module of the averaged law."""
     return import_effect("friction.law=convolution")
 
 
 def law_on(model, patch):
-    """The law of a bench scene; patch None for [normal]."""
+    """Return the law of a bench; patch: None for [normal]."""
     f, law = model.friction, _law()
     if patch is None:
         return law.Convolution(f.static, f.bond_length, f.order)
@@ -23,9 +28,12 @@ def law_on(model, patch):
 
 
 def limit_share(model, patch) -> float:
-    """Limit force of a rigid block over mu_s N [1]: below 1 for the averaged law on a patch, else 1.
+    """Return the limit force of a rigid block over mu_s N [1]: below 1 for the averaged law.
 
-    PatchfemError where it differs between the two ways of the slide.
+    Raises
+    ------
+    PatchfemError
+        If the limit differs between the two directions of the slide.
     """
     f = model.friction
     if patch is None or not law_has_trait(f.law, "averaged"):
@@ -45,7 +53,10 @@ def limit_share(model, patch) -> float:
 
 
 def limit_tractions(model, patch, force) -> np.ndarray:
-    """Tractions (f, m) [Pa] of resultants force (f,) [N] of a rigid block: the averaged pressure of their way."""
+    """Return the tractions (f, m) [Pa] of a rigid block under resultants force (f,) [N].
+
+    They are proportional to the averaged pressure in the direction of the force.
+    """
     f, x = model.friction, patch.x
     sigma, weight = patch.pressure.sigma_n, patch.pieces.interface.weight
     average = _law().average

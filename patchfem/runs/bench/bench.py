@@ -1,4 +1,8 @@
-"""The law bench: a prescribed slide in, the loop out; over one point or over a patch, with or without its shear."""
+"""Law bench: slide an interface along a prescribed path; compute the loop and its measures.
+
+In: a model with [slide] and its pressed patch, or none for a single point. Out: a `BenchRun`,
+with or without the shear compliance of the pieces.
+"""
 
 from dataclasses import dataclass
 from time import perf_counter
@@ -17,10 +21,20 @@ from .stepped import stepped
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BenchRun:
-    """One pass over the path. time, slide, rate, force, load, slip: (k,); ledger: work, stored, dissipated and created
-    energy (4, k) [J], all but the stored one running sums; tau, local: frames (f, m) of traction [Pa] and local slip
-    [m] at samples `frames`; values by measure name; first: sample at which the last cycle begins; engine: what ran.
-    lateral, lateral_force, yaw_moment: (k,) of a slide in two directions, else None."""
+    """One pass along the path, at k samples.
+
+    - time, slide, rate, force, load, slip (k,): [s], [m], [m/s], [N], [N], [m].
+    - ledger (4, k): work, stored, dissipated and created energy [J]; all but the stored energy are
+      cumulative.
+    - frames (f,): samples at which fields are kept.
+    - tau, local (f, m): traction [Pa] and slip [m] of the nodes in the frames.
+    - values: measures by name.
+    - seconds: CPU seconds.
+    - first: sample at which the last cycle starts.
+    - engine: how the slide was computed.
+    - lateral, lateral_force, yaw_moment (k,): of a slide in two directions [m], [N], [N m]; else
+      None.
+    """
 
     time: np.ndarray
     slide: np.ndarray
@@ -42,8 +56,26 @@ class BenchRun:
 
 
 def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNWATCHED) -> BenchRun:
-    """Slide the interface of a model along its path with `steps` per cycle, or along `path` in the form of
-    `SlidePath.samples`; patch None for [normal]; frames: fields kept on the way."""
+    """Slide the interface of a model along its path.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+        None for [normal].
+    steps : int
+        Steps per cycle.
+    frames : int
+        Number of frames of the fields.
+    path : tuple, optional
+        Path in the form of `SlidePath.samples` that replaces that of the model.
+    watch : Watch
+        Options and callbacks of the pass.
+
+    Returns
+    -------
+    BenchRun
+    """
     begin = perf_counter()
     time, slide, first, omega = model.slide.samples(steps) if path is None else path
     if model.load_varies:
@@ -57,13 +89,13 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
             out.ledger[0], [(slide, out.force), *more.pop("pairs", ())], at_turns(model) == "jumps"
         )
     }
-    span = time[-1]  # endless where a slide is endlessly slow
+    span = time[-1]  # the division by the span avoids overflow for an extremely slow slide
     rate = np.gradient(slide, time / span) / span if time.size > 2 else np.zeros(time.size)
     return BenchRun(time, slide, rate, *out, values, perf_counter() - begin, first, engine, **more)
 
 
 def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Watch) -> tuple:
-    """(Slid, histories of the other direction by name) of a pass along path = (time, slide)."""
+    """Return the Slid of a pass along (time, slide), and histories of the lateral direction."""
     if model.slide.across is not None:
         return stepping.run_plane(model, patch, *path, frames, watch)
     if model.partial_slip:
@@ -77,7 +109,8 @@ def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Wa
 
 
 def _values(model, time, slide, out, first, omega) -> dict:
-    # over the load that is applied: what slides off the pressure is friction lost
+    """Return the measures of a pass by name."""
+    # the ratio refers to the applied load: friction is lost where the piece slides off the pressure
     applied = out.load if model.load_varies else np.full_like(out.load, out.load[0])
     ratio = np.divide(
         out.force,

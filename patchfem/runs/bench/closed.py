@@ -1,6 +1,8 @@
-"""A rigid slide of a law without memory, in closed form: a pressure that rides on the upper piece, a constant load.
+"""Rigid slide of a law without memory in closed form, under a constant load.
 
-In every step such a law carries a share of its limit, and the limit is that of the way it slides.
+In: a model whose pressure moves with the upper piece, and a path. Out: `Slid`. In every step,
+the force of such a law is a fraction of its limit, and the limit depends only on the direction
+of the slide.
 """
 
 import numpy as np
@@ -8,13 +10,25 @@ import numpy as np
 from .law import ends_of_rest, law_for, pressure_of
 from .ledger import Slid, Watch, elastic_slip, frame_numbers, ledger_of, local_slip
 
-GAUSS = 8  # points in a step over a flank
+GAUSS = 8  # Gauss points in a step over a flank
 
 
 def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
-    """Slide the interface of a law without memory along path = (time (k,) [s], slide (k,) [m]), in closed form.
+    """Slide the interface of a law without memory along a path, in closed form.
 
-    patch: the solved Patch or None; frames: how many frames of tractions are kept.
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+    path : tuple
+        time (k,) [s] and slide (k,) [m].
+    frames : int
+        Number of frames of the tractions.
+    watch : Watch
+
+    Returns
+    -------
+    Slid
     """
     if model.grooves is not None:
         return climbed_form(model, patch, path, frames, watch)
@@ -22,7 +36,7 @@ def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
     move = np.diff(slide)
     share = law.share(move, np.diff(time))
-    if law.holds:  # the last traction stays at rest
+    if law.holds:  # the last traction persists during rest
         last = np.maximum.accumulate(np.where(move != 0, np.arange(move.size), -1))
         share = np.where(last < 0, 0.0, share[last])
     share = np.concatenate([[0.0], share])
@@ -50,10 +64,11 @@ def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
 
 
 def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
-    """Slide a law without memory slowly over grooves: the force is N (t + phi)/(1 - phi t), phi = f/R along the flank.
+    """Slide a law without memory slowly over grooves, in closed form.
 
-    The height of the load is stored, friction's own work along the flank is dissipated; no mass is lifted. Arguments as
-    of `closed_form`.
+    The force is N (t + phi)/(1 - phi t), with the slope t and phi = f/R along the flank. The lift
+    of the load is stored energy, the friction work along the flank is dissipated; no mass is
+    lifted. The parameters are those of `closed_form`.
     """
     (time, slide), (sigma, weight), law, grooves = (
         path,
@@ -70,7 +85,7 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
         lowest, highest = (
             grooves.ratio(slide[0], side, model.friction.static) for side in (-1.0, 1.0)
         )
-        # at rest before the motion the flank holds what it must
+        # at rest before the motion, friction on the flank takes the value that balances the load
         ratio[way == 0] = np.clip(0.0, lowest, highest)
         own = load * grooves.lost(slide[:-1], slide[1:], law.kinetic)
     else:
@@ -80,6 +95,7 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
         ratio = (t + phi) / (1 - phi * t)
 
         def own_force(q):
+            """Return the dissipated work per slide [N] at slides (k - 1,) [m]."""
             t, phi = _along_flank(grooves, law, q, speed)
             return load * phi * (1 + t**2) / (1 - phi * t)
 
@@ -103,9 +119,14 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
 
 
 def integrate_steps(slide, integrand) -> np.ndarray:
-    """Integrate integrand(q) over q in every step of a slide (k,) [m], by Gauss's rule; returns (k - 1,).
+    """Integrate integrand(q) over q in every step of a slide by Gauss quadrature, (k - 1,).
 
-    integrand: function of slides (k - 1,) [m].
+    Parameters
+    ----------
+    slide : (k,)
+        [m].
+    integrand : callable
+        Function of slides (k - 1,) [m].
     """
     move = np.diff(slide)
     out = np.zeros_like(move)
@@ -115,6 +136,9 @@ def integrate_steps(slide, integrand) -> np.ndarray:
 
 
 def _along_flank(grooves, law, slide, speed) -> tuple:
-    """Return (slope t, f/R along the flank) [1] of a law of the speed, at slides [m] with speeds of the slide [m/s]."""
+    """Return slope t and friction ratio f/R along the flank [1] of a law of the speed.
+
+    At slides [m] with speeds [m/s].
+    """
     t = grooves.slope(slide)
     return t, law.static * law.share(np.sqrt(1 + t**2) * speed, 1.0)

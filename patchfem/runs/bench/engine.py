@@ -1,7 +1,8 @@
-"""Which engine slides the interface of a bench, what it loses and what it costs.
+"""Engine of a bench: which method slides its interface, its error and its cost.
 
-The recursion, the list of bonds and the elements are the compiled ones that rigs march with. A law without memory needs
-no loop. Where the pressure of a point changes on the way, a law is stepped sample by sample.
+In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `Cost`. Recursion, list of
+bonds and elements are the compiled ones that rigs use. A law without memory needs no loop. If
+the pressure of a point changes during the slide, the law is evaluated sample by sample.
 """
 
 from dataclasses import dataclass, replace
@@ -27,8 +28,8 @@ NAMES = {
     STEPPED: "law step by step",
     PLANE: "two directions",
 }
-MOST_STEPS = 200_000  # per cycle over grooves
-FLANK = 20  # samples over a radian of grooves
+MOST_STEPS = 200_000  # most steps per cycle over grooves
+FLANK = 20  # samples per radian of grooves
 CODES = {
     CLOSED: NO_CODE,
     STEPPED: NO_CODE,
@@ -39,16 +40,19 @@ CODES = {
     LIST: MARCH_CODE,
     LISTS: MARCH_CODE,
 }
-SAMPLE_BYTES = 250.0  # bytes of a sample of the slide
-# of the passes over the list that a rig makes: a given slide needs no search for the increment
+SAMPLE_BYTES = 250.0  # memory of a sample of the slide [bytes]
+# passes over the list relative to those in a rig: a prescribed slide needs no search for the
+# increment
 PASSES = 1 / 3
 
 
 @dataclass(frozen=True, slots=True)
 class BenchEngine:
-    """How a bench slides its interface.
+    """Method with which a bench slides its interface.
 
-    kind: one of the numbers above; seconds: per sample; choice: how bonds are summed, None without a sum.
+    - kind: one of the constants above.
+    - seconds: CPU seconds per sample.
+    - choice: method of the sum over bonds; None without a sum.
     """
 
     kind: int
@@ -57,7 +61,7 @@ class BenchEngine:
 
     @property
     def name(self) -> str:
-        """The name of the engine as summaries and plans have it."""
+        """Name of the engine in summaries and plans."""
         several = {LIST: "bond list", LISTS: "bond lists"}.get(self.kind)
         return "bench, " + (f"{self.choice.engine} {several}" if several else NAMES[self.kind])
 
@@ -65,10 +69,22 @@ class BenchEngine:
 def bench_engine(
     model, slide, points: int = 1, choice: "bond_engines.Choice | None" = None
 ) -> BenchEngine:
-    """The engine of a bench along the samples slide (k,) [m]; points: nodes of the interface; choice: how bonds are
-    summed where that is known already.
+    """Return the engine of a bench.
 
-    Missing where the sum would take too long.
+    Parameters
+    ----------
+    model : Model
+    slide : (k,)
+        Samples of the slide [m].
+    points : int
+        Nodes of the interface.
+    choice : Choice, optional
+        Method of the sum over bonds, if it is known.
+
+    Raises
+    ------
+    Missing
+        If the sum over bonds would take too long.
     """
     f, soft = model.friction, bool(model.partial_slip)
     if model.slide.across is not None:
@@ -97,7 +113,7 @@ def bench_engine(
 
 
 def steps_of(model) -> int:
-    """Steps per cycle of a bench: those of the scene, else what the tolerance asks for, and what grooves ask for."""
+    """Return the steps per cycle of a bench: from the scene, else from tolerance and grooves."""
     slide, accuracy = model.slide, model.accuracy
     steps = slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
     if model.grooves is None or accuracy.steps_per_cycle is not None:
@@ -111,13 +127,19 @@ def steps_of(model) -> int:
 
 
 def pressure_changes(model) -> bool:
-    """Whether the pressure of a point changes during the slide: with the load, or as it slides over the other piece."""
+    """Return whether the pressure of a point changes during the slide.
+
+    It changes with the load, or if the point slides over the pressure of the other piece.
+    """
     return model.load_varies or model.side == "lower"
 
 
 def sum_of(model, slide) -> "bond_engines.Choice":
-    """How the bonds of a rigid slide along the samples slide (k,) [m] are summed: as in a rig, but the error is held
-    against the force that is reached, which is small where the stroke is short against the bond length."""
+    """Return the method of the sum over bonds of a rigid slide along samples slide (k,) [m].
+
+    It is chosen as in a rig, except that its error is relative to the force that is reached, which
+    is small if the stroke is short compared with the bond length.
+    """
     law, accuracy = model.bonds, model.accuracy
     stroke, steps = strokes(slide)
     stroke = max(stroke / law.length, 1e-9)
@@ -127,8 +149,11 @@ def sum_of(model, slide) -> "bond_engines.Choice":
 
 
 def engine_named(model) -> str:
-    """The engine of a sum that the scene names, or "auto". Where every point has a list of its own, and bonds keep the
-    pressure that they formed under while it changes, each step leaves a strip: they are merged."""
+    """Return the engine of a sum over bonds that the scene names, or "auto".
+
+    "merged" replaces it if every point has its own list and bonds keep the pressure at which they
+    formed while it changes, because each step then leaves a strip.
+    """
     named, f = model.accuracy.quadrature, model.friction
     rig = model.rig is not None
     apart = (model.side == "lower" and (model.partial_slip or (rig and is_bond_list(f)))) or (
@@ -138,8 +163,10 @@ def engine_named(model) -> str:
 
 
 def smooth_sum_of(model, slide) -> "bond_engines.Choice | None":
-    """`sum_of` without merging, which makes a force jump by the error of the sum as a value of the scene changes: for a
-    fit. None of a law that is no sum, or where the scene names the engine."""
+    """Return `sum_of` without merging, for a fit; None for other laws or a prescribed engine.
+
+    With merging, the force would jump by the error of the sum when a value of the scene changes.
+    """
     if (
         not law_has_trait(model.friction.law, "bonds")
         or model.accuracy.quadrature != "auto"
@@ -155,7 +182,7 @@ def smooth_sum_of(model, slide) -> "bond_engines.Choice | None":
 
 
 def strokes(slide) -> tuple:
-    """(mean path [m], mean number of moving steps) between two reversals of the samples slide (k,) [m]."""
+    """Return mean path [m] and mean number of moving steps between two reversals of a slide."""
     move = np.diff(slide)
     way = np.sign(move[move != 0])
     count = 1 + np.count_nonzero(way[1:] != way[:-1])
@@ -163,11 +190,14 @@ def strokes(slide) -> tuple:
 
 
 def _summed(model, slide, points: int, found: "bond_engines.Choice", lists: int = 1) -> BenchEngine:
-    """The engine of a sum over bonds; lists: of them, one a point behind shear modes."""
+    """Return the engine of a sum over bonds.
+
+    lists: number of lists, one per point with shear modes, else 1.
+    """
     law = model.bonds
     if found.engine == "recursion":
         return BenchEngine(RECURSION, cost_model.RECURSION_STEP_SECONDS, found)
-    if law.breakaway and lists == 1:  # a list has no elastic range
+    if law.breakaway and lists == 1:  # a list cannot represent an elastic range
         return _stepped(model, slide, points)
     size = slide.size
     strips = min(
@@ -189,11 +219,15 @@ def _summed(model, slide, points: int, found: "bond_engines.Choice", lists: int 
 
 
 def _stepped(model, slide, points: int) -> BenchEngine:
+    """Return the engine that evaluates a law sample by sample."""
     return BenchEngine(STEPPED, _stepped_seconds(model, slide, points))
 
 
 def _stepped_seconds(model, slide, points: int) -> float:
-    """Seconds of a step in NumPy: laws of the last increment, or a sum over the strips of the path."""
+    """Return the CPU seconds of a step in NumPy.
+
+    The law depends on the last increment, or is a sum over the strips of the path.
+    """
     f = model.friction
     if not is_bond_list(f):
         return cost_model.LAW_STEP_SECONDS
@@ -207,7 +241,7 @@ def _stepped_seconds(model, slide, points: int) -> float:
 
 
 def slips_by_elements(model) -> bool:
-    """Whether the slide of a model moves parallel elements, one for each node that slips."""
+    """Return whether the slide of a model moves parallel elements, one per node that slips."""
     simple = model.grooves is None and model.slide.across is None
     return model.partial_slip and simple and not law_has_trait(model.friction.law, "bonds")
 
@@ -219,15 +253,15 @@ def cost(model, points: int) -> Cost:
     ----------
     model : Model
     points : int
-        Nodes of the interface, 1 without a patch.
+        Nodes of the interface; 1 without a patch.
     """
     per_cycle = steps_of(model)
     time, slide = model.slide.samples(per_cycle)[:2]
     if model.load_varies:
         time, slide = model.point.refine_samples(model.slide, time, slide, per_cycle)
     engine = bench_engine(model, slide, points)
-    # each sample is passed in the run and in its runs at half and at a quarter of the steps, which take about as much
-    # as a second one; a sum over bonds or cells is checked by a further run
+    # The run and its passes with half and a quarter of the steps take about as long as two runs; a
+    # sum over bonds or cells needs a further pass.
     passes = 3 if law_has_trait(model.friction.law, "cells") and engine.kind == ELEMENTS else 2
     steps = passes * time.size
     samples = MemoryPart(
@@ -252,6 +286,6 @@ def _samples_key(model) -> str:
 
 
 def groups(model) -> dict:
-    """Dimensionless groups of the slide by name: its amplitude over the bond length, where the law has one."""
+    """Return the amplitude of the slide over the bond length by name; {} without a bond length."""
     length = model.friction.bond_length
     return {"amplitude_over_bond_length": model.slide.amplitude / length} if length else {}

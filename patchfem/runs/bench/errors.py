@@ -1,4 +1,7 @@
-"""What a bench leaves open: its steps, its mesh and its sum over bonds."""
+"""Errors of a bench by its steps, its mesh and its sum over bonds, from coarse passes.
+
+In: the fine pass and patches on nested meshes. Out: errors by measure name for each kind.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,13 +25,19 @@ from .engine import ELEMENTS, LIST, LISTS, PLANE, STEPPED, slips_by_elements
 from .law import tail_of
 from .ledger import Watch
 
-MESH_TOL = 1e-2  # tolerance whose steps show what a mesh changes; elements follow any path exactly
-FINER = 0.5  # merge width of the run that shows what merging does
+# tolerance that sets the steps of passes on coarser meshes; elements follow any path exactly
+MESH_TOL = 1e-2
+FINER = 0.5  # factor of the merge width in the pass that shows the error of merging
 
 
 class Pass(NamedTuple):
-    """A pass beside: steps per cycle, number of the coarser mesh, 0 of that of the run, how bonds are summed, springs
-    and modes of a `Watch`."""
+    """Coarse pass.
+
+    - steps: steps per cycle.
+    - level: index of the coarser mesh; 0 is that of the run.
+    - choice: method of the sum over bonds.
+    - springs, modes: see `Watch`.
+    """
 
     steps: int
     level: int
@@ -38,10 +47,28 @@ class Pass(NamedTuple):
 
 
 def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
-    """([error by measure name, ...], seconds, `left_open`) of the pass `fine` at `steps` per cycle on the ladder of
-    `ladder_of`; patches: the patch on nested meshes, fine to coarse, [None] without a patch."""
+    """Return the errors of a pass on its ladder of coarse passes.
+
+    Parameters
+    ----------
+    model : Model
+    patches : list of Patch
+        The patch on nested meshes, fine to coarse; [None] without a patch.
+    fine : BenchRun
+        The pass itself.
+    steps : int
+        Its steps per cycle.
+    say : callable, optional
+        Callback for a line of text.
+
+    Returns
+    -------
+    tuple
+        Errors by measure name, one dict per kind; CPU seconds; and `coarser.left_open`.
+    """
 
     def solve(variant: Pass):
+        """Return the BenchRun of a Pass."""
         on = patches[variant.level]
         watch = Watch(variant.choice, say, springs=variant.springs, modes=variant.modes)
         return bench.run(model, on, variant.steps, watch=watch)
@@ -56,12 +83,24 @@ def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
 
 
 def ladder_of(model, patches: list, fine, steps: int) -> list:
-    """The coarser runs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there
-    is one, other shear modes behind which bonds slide, fewer cells of a density of sliders, and for a merged list of
-    bonds narrower strips. Parallel elements run on all coarser meshes, at steps that no tolerance changes."""
+    """Return the coarse passes of a bench.
+
+    They are half and a quarter of the steps; at a quarter of them the coarser mesh, another number
+    of shear modes, merged cells of a density of sliders, and narrower strips of a merged list of
+    bonds. Parallel elements are run on all coarser meshes, with steps that do not depend on the
+    tolerance.
+
+    Parameters
+    ----------
+    model : Model
+    patches : list of Patch
+    fine : BenchRun
+    steps : int
+        Steps per cycle of the fine pass.
+    """
     choice = fine.engine.choice
     half, few = Pass(max(4, steps // 8 * 4), 0, choice), Pass(max(4, steps // 16 * 4), 0, choice)
-    # elements follow any path exactly, so samples of it change harmonics alone
+    # elements follow any path exactly, so that the sampling affects the harmonics only
     rule = convergence_errors if slips_by_elements(model) else partial(step_errors, steps=steps)
     out, meshed, patch = [CoarserRuns((half, few), rule, of="steps")], len(patches) > 1, patches[0]
     if meshed and slips_by_elements(model):
@@ -69,7 +108,8 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
         same = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
         out.append(shear.coarser_elements(len(patches) - 1, few._replace(steps=same)))
     elif meshed:
-        count = shear.modes_of(model, patch) if model.partial_slip else None  # one change at a time
+        # the number of modes is fixed, so that only the mesh changes
+        count = shear.modes_of(model, patch) if model.partial_slip else None
         out.append(coarser_space(few._replace(level=1, modes=count), few))
         if count:
             out.append(
@@ -84,7 +124,7 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
 
 
 def sum_error(model, engine) -> float:
-    """Bound of the error of the sum over bonds, as a share of the friction limit [1]; 0 without such a sum."""
+    """Return a bound of the error of the sum over bonds over the friction limit [1]; else 0."""
     if engine.kind in (LIST, LISTS):
         return engine.choice.error
     return (

@@ -1,4 +1,7 @@
-"""A contact of the compiled loops slid along a given path, block by block."""
+"""Contact of the compiled loops that follows a prescribed slide, in blocks of samples.
+
+In: a ContactModel and samples of time and slide. Out: `Followed`.
+"""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -13,9 +16,18 @@ from .ledger import BLOCK, Watch, frame_numbers, ledger_of
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Followed:
-    """force, mean, stored: (k,) force at the samples [N], mean over the step that follows [N], energy stored [J];
-    lost: (k - 1,) energy that a step does not store [J], below zero where it is created; at: (f,) numbers of the
-    frames, states: the contact there; missed: steps that missed their residual."""
+    """Histories of a contact along a slide, at k samples.
+
+    - slide (k,): [m].
+    - force (k,): force at the samples [N].
+    - mean (k,): mean force over the following step [N].
+    - stored (k,): stored energy [J].
+    - slip (k,): [m].
+    - lost (k - 1,): energy that a step dissipates [J]; negative if it creates energy.
+    - at (f,): samples of the frames.
+    - states: contact state in each frame.
+    - missed: number of steps with too large a residual.
+    """
 
     slide: np.ndarray
     force: np.ndarray
@@ -29,7 +41,7 @@ class Followed:
 
     @property
     def ledger(self) -> np.ndarray:
-        """The energy book of the pass."""
+        """Energy balance of the pass (4, k) [J], as of `ledger_of`."""
         work = np.concatenate([[0.0], np.cumsum(self.mean[:-1] * np.diff(self.slide))])
         losses = np.zeros((self.slide.size, 2))
         losses[1:, 0], losses[1:, 1] = -np.minimum(self.lost, 0.0), np.maximum(self.lost, 0.0)
@@ -37,9 +49,27 @@ class Followed:
 
 
 def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = False) -> Followed:
-    """Slide a ContactModel along the samples time [s], slide [m] (k,), with `frames` copies of its state on the way.
+    """Slide a ContactModel along samples of time and slide.
 
-    paced: whether the law feels how fast it slides. Missing where a list of bonds outgrows its room.
+    Parameters
+    ----------
+    model : ContactModel
+    time, slide : (k,)
+        [s], [m].
+    frames : int
+        Number of copies of its state that are kept.
+    watch : Watch
+    paced : bool
+        Whether the law depends on the speed.
+
+    Returns
+    -------
+    Followed
+
+    Raises
+    ------
+    Missing
+        If a list of bonds exceeds its memory.
     """
     loops = load_kernels(watch.say)
     contact = model.build()
@@ -53,6 +83,7 @@ def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = Fal
         kept = keep(contact)
 
         def slid(contact, a=a, b=b):
+            """Follow the samples a to b; return the number of steps with too large a residual."""
             dt = float(time[b] - time[a]) / float(b - a)
             return loops.follow_path(
                 slide[a : b + 1].copy(),
@@ -88,6 +119,6 @@ def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = Fal
 
 
 def _new_pace(time) -> np.ndarray:
-    """Samples where the length of the time step changes."""
+    """Return the samples at which the length of the time step changes."""
     step = np.diff(time)
     return 1 + np.flatnonzero(np.abs(np.diff(step)) > 1e-6 * np.minimum(step[1:], step[:-1]))

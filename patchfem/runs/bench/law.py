@@ -1,4 +1,8 @@
-"""The law object that a bench steps, one per value of friction.law, and the pressure it rubs under."""
+"""Friction law object that a bench evaluates, and the pressure under which it slides.
+
+In: a model with friction and its patch. Out: a NumPy law object for any value of friction.law,
+nodal pressures and areas.
+"""
 
 import numpy as np
 
@@ -9,7 +13,7 @@ from . import averaged
 
 
 def law_for(model, patch=None):
-    """The NumPy law object of a bench; only an averaged law looks at the patch."""
+    """Return the NumPy law object of a bench; only an averaged law depends on the patch."""
     f = model.friction
     if law_has_trait(f.law, "averaged"):
         return averaged.law_on(model, patch)
@@ -25,7 +29,7 @@ def law_for(model, patch=None):
 
 
 def tail_of(model) -> float:
-    """What the cut-off of the NumPy sum over bonds may lose, as a share of the friction limit [1]."""
+    """Return the loss by the cut-off of the NumPy sum over bonds, over the friction limit [1]."""
     accuracy = model.accuracy
     if accuracy.quadrature == "direct":
         return 0.0
@@ -33,15 +37,21 @@ def tail_of(model) -> float:
 
 
 def pressure_of(model, patch) -> tuple:
-    """(pressure (m,) [Pa], nodal area (m,) [m2]) of the points; one point that carries the load without a patch."""
+    """Return pressure (m,) [Pa] and area (m,) [m2] of the nodes.
+
+    Without a patch it is a single point that carries the load.
+    """
     if patch is None:
         return np.array([model.point.load]), np.ones(1)
     return patch.pressure.sigma_n, patch.pieces.interface.weight
 
 
 def ends_of_rest(model, slide) -> dict:
-    """Sample -> sign of the motion that starts there, where Coulomb friction holds more at rest than it does in motion:
-    the first sample of a slide and the last of every rest."""
+    """Return the samples at which a slide starts from rest under a higher static friction.
+
+    They are the first sample of a slide and the last one of every rest; the values are the signs of
+    the motion that starts there. The dict is empty unless static exceeds kinetic Coulomb friction.
+    """
     f = model.friction
     if not law_has_trait(f.law, "set-valued") or f.kinetic is None or not f.kinetic < f.static:
         return {}

@@ -1,4 +1,8 @@
-"""One pass of a bench: what it is told from outside, and its histories, its energy book and its frames."""
+"""Options of a pass of a bench, its histories, its energy balance and its frames.
+
+In: forces, losses and samples of a pass. Out: `Slid`, the ledger (4, k), and slip of the
+interface and of its points.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -7,13 +11,21 @@ import numpy as np
 
 from ...effects import law_has_trait
 
-BLOCK = 4096  # samples between two words of progress; what it costs to enter compiled code is lost in it
-ROUND = 1e-13  # of what a law dissipates: created energy below it is round-off
+# samples between two reports of progress; with so many, the cost of a call of compiled code is
+# negligible
+BLOCK = 4096
+ROUND = 1e-13  # relative to the dissipated energy; less created energy is round-off
 
 
 class Slid(NamedTuple):
-    """Histories of a pass over k samples. force, load, slip: (k,) [N], [N], [m]; ledger: of `ledger_of` [J]; frames:
-    (f,) numbers of the samples of the frames; tau, local: (f, m) traction [Pa] and irreversible slip [m] there."""
+    """Histories of a pass over k samples.
+
+    - force, load (k,): [N].
+    - slip (k,): [m].
+    - ledger (4, k): energies of `ledger_of` [J].
+    - frames (f,): samples of the frames.
+    - tau, local (f, m): traction [Pa] and slip [m] of the nodes in the frames.
+    """
 
     force: np.ndarray
     load: np.ndarray
@@ -25,27 +37,45 @@ class Slid(NamedTuple):
 
 
 def ledger_of(work, stored, losses) -> np.ndarray:
-    """(4, k): work, stored, dissipated and created energy [J] of samples, from the (gain, loss) (k, 2) [J] of every
-    step over the points that create energy and those that lose it."""
+    """Return work, stored, dissipated and created energy (4, k) [J] of samples.
+
+    Parameters
+    ----------
+    work, stored : (k,)
+        Cumulative work and stored energy [J].
+    losses : (k, 2)
+        Created and dissipated energy of every step [J], summed over the points.
+    """
     created, dissipated = np.cumsum(losses, axis=0).T
     created = created if created[-1] > ROUND * dissipated[-1] else 0 * created
     return np.stack([work, stored, dissipated, created])
 
 
 def gains_and_losses(losses) -> tuple:
-    """(created, dissipated) of the energy (..., m) that points lose, some of it below zero; summed over the points."""
+    """Return created and dissipated energy, summed over points that lose energy (..., m) each.
+
+    A negative loss is created energy.
+    """
     return -np.minimum(losses, 0.0).sum(axis=-1), np.maximum(losses, 0.0).sum(axis=-1)
 
 
 def frame_numbers(count: int, frames: int) -> np.ndarray:
-    """Numbers of the samples of the frames; the first sample is the pressed state, which is a frame of its own."""
+    """Return the samples of the frames; the first sample, the pressed state, is not among them."""
     at = np.linspace(0, count - 1, frames + 1).round().astype(int)[1:]
     return np.unique(at[at > 0]) if frames else np.zeros(0, int)
 
 
 def elastic_slip(model, slide, force, load) -> np.ndarray:
-    """Irreversible slip (k,) [m] of the whole interface along the slide (k,) [m]: without the stretch of the bonds,
-    which counts up to one bond length."""
+    """Return the slip (k,) [m] of the whole interface: the slide minus the stretch of the bonds.
+
+    The stretch is at most one bond length.
+
+    Parameters
+    ----------
+    model : Model
+    slide, force, load : (k,)
+        [m], [N], [N].
+    """
     length, static = _length(model), model.friction.static
     stretch = length * np.divide(
         force, static * load, out=np.zeros_like(force), where=static * load > 0
@@ -54,8 +84,18 @@ def elastic_slip(model, slide, force, load) -> np.ndarray:
 
 
 def local_slip(model, slide, tau, sigma) -> np.ndarray:
-    """Irreversible slip (f, m) [m] of points under the traction tau (f, m) and the pressure sigma, (m,) or (f, m) [Pa],
-    that share the slide (f,) [m]."""
+    """Return the slip (f, m) [m] of points that share a slide.
+
+    Parameters
+    ----------
+    model : Model
+    slide : (f,)
+        [m].
+    tau : (f, m)
+        Tractions [Pa].
+    sigma : (m,) or (f, m)
+        Pressures [Pa].
+    """
     limit = np.broadcast_to(model.friction.static * sigma, tau.shape)
     return slide[:, None] - _length(model) * np.divide(
         tau, limit, out=np.zeros_like(tau), where=limit > 0
@@ -63,17 +103,22 @@ def local_slip(model, slide, tau, sigma) -> np.ndarray:
 
 
 def _length(model) -> float:
-    """Bond length [m], 0 of a law that does not stretch."""
+    """Return the bond length [m]; 0 for a law that does not stretch."""
     f = model.friction
     return (f.bond_length or 0.0) if not law_has_trait(f.law, "averaged") else 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class Watch:
-    """What a pass is told from outside. choice: how bonds are summed, None to choose; say: called with one line when
-    something compiles; progress: called with the done share; springs: function of the (stiffness, yield slide) of the
-    elements of partial slip -> those that move, None: they do; modes: how many shear modes stand for pieces that give
-    way, None: by the scene."""
+    """Options and callbacks of a pass.
+
+    - choice: method of the sum over bonds; None: chosen by the pass.
+    - say: callback for a line of text when something compiles.
+    - progress: callback for the completed fraction.
+    - springs: function that maps (stiffness, yield slide) of the elements of partial slip to those
+      that are used; None: all of them.
+    - modes: number of shear modes of the pieces; None: by the scene.
+    """
 
     choice: object = None
     say: object = None
@@ -82,7 +127,7 @@ class Watch:
     modes: int | None = None
 
     def tell(self, share: float) -> None:
-        """Pass the done share (0 to 1) on to `progress`, if there is one."""
+        """Report the completed fraction (0 to 1) to `progress`, if there is one."""
         if self.progress is not None:
             self.progress(share)
 

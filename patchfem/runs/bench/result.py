@@ -1,4 +1,7 @@
-"""A bench from its plan to its result: the slide, its errors, and the warnings on law and overhang."""
+"""Bench from its plan to its result: slide, errors, and warnings on law and overhang.
+
+In: a plan of kind bench and its pressed patch. Out: a Result.
+"""
 
 from dataclasses import replace
 
@@ -25,14 +28,14 @@ from .engine import steps_of
 from .errors import errors_of
 from .ledger import Watch
 
-MORE = 4  # cycles by which a steady loop is sought
-MOST_TRIED = 2e6  # forces of points at samples, up to which they are tried
+MORE = 4  # further cycles in which a steady loop is searched for
+MOST_TRIED = 2e6  # most evaluations (points times samples) of this search
 
 
 def prescribed(
     what, patch, coarse, seconds, warnings, say, progress, per_point, estimate
 ) -> Result:
-    """Run a plan of kind bench; arguments as `run.run` has them."""
+    """Run a plan of kind bench; the parameters are those of `run.run`."""
     model, f = what.model, what.model.friction
     if law_has_trait(f.law, "bonds"):
         warnings = [
@@ -111,8 +114,11 @@ def prescribed(
 
 
 def _miss(fine) -> float:
-    """By what the last cycle misses to close [1]: by the force over the largest one, or by the energy stored over the
-    work of the cycle."""
+    """Return by how much the last cycle does not close [1].
+
+    It is the larger of two changes over the cycle: that of the force over its peak, and that of the
+    stored energy over the work.
+    """
     force, (work, stored, *_) = fine.force[fine.first :], fine.ledger[:, fine.first :]
     shares = (
         (force[-1] - force[0], np.abs(force).max()),
@@ -122,8 +128,11 @@ def _miss(fine) -> float:
 
 
 def _still_open(model, patch, fine, steps: int) -> list:
-    """Warning, as a list, of a bench whose last loop does not close and is not the steady one, with the cycles after
-    which it is, found by MORE cycles, where they take fewer than MOST_TRIED forces."""
+    """Return a warning, as a list, if the last loop does not close and is not the steady one.
+
+    It names the number of cycles after which the loop is steady, if MORE cycles with at most
+    MOST_TRIED evaluations show it.
+    """
     period, tolerance, cycles = model.slide.period, model.accuracy.tolerance, model.slide.cycles
     if period is None or cycles < 1 or not fine.values.get("loop_area"):
         return []
@@ -155,7 +164,7 @@ def _still_open(model, patch, fine, steps: int) -> list:
 
 
 def _overhang(asked, patch, fine) -> list:
-    """Warnings of a bench whose slide leaves the patch."""
+    """Return warnings of a bench whose slide leaves the patch."""
     out = []
     if (
         fine.lateral is not None

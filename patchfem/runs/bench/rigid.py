@@ -1,7 +1,8 @@
-"""A rigid slide under a pressure that rides on the upper piece, by the compiled engines.
+"""Rigid slide under a pressure that moves with the upper piece, by the compiled engines.
 
-Every point shares the slide and the laws are linear in the pressure, so all points have the traction of one that
-carries the load, times their own share of it.
+In: a model, its patch and a path. Out: `Slid`. Every point has the same slide, and the laws are
+linear in the pressure, so that the traction of a point is that of a single point with the whole
+load, times the fraction of the load at the point.
 """
 
 from dataclasses import replace
@@ -25,9 +26,22 @@ from .ledger import Slid, Watch, elastic_slip, local_slip
 
 
 def rigid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Watch) -> Slid:
-    """Slide the interface rigidly along path = (time (k,) [s], slide (k,) [m]) by a compiled engine.
+    """Slide the interface rigidly along a path by a compiled engine.
 
-    patch: the solved Patch or None; frames: how many frames of tractions are kept; engine: of `bench_engine`.
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+    path : tuple
+        time (k,) [s] and slide (k,) [m].
+    frames : int
+        Number of frames of the tractions.
+    engine : BenchEngine
+    watch : Watch
+
+    Returns
+    -------
+    Slid
     """
     (time, slide), f = path, model.friction
     sigma, weight = pressure_of(model, patch)
@@ -53,10 +67,19 @@ def rigid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Wa
 
 
 def climbing(model, load: float, patch=None, count: int | None = None):
-    """The model of a law with memory along the flanks of grooves, under a load [N]; in a bench no mass is lifted.
+    """Return the contact model of a law with memory along the flanks of grooves.
 
-    patch: the solved Patch where its pieces give way, count: how many shear modes stand for them, None: by the
-    tolerance.
+    In a bench no mass is lifted.
+
+    Parameters
+    ----------
+    model : Model
+    load : float
+        Normal load [N].
+    patch : Patch, optional
+        Pressed patch whose pieces deform in shear.
+    count : int, optional
+        Number of shear modes of the pieces; None: by the tolerance.
     """
     f = model.friction
     if law_has_trait(f.law, "bonds"):
@@ -75,8 +98,17 @@ def climbing(model, load: float, patch=None, count: int | None = None):
 
 
 def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactModel:
-    """One point that carries the whole load [N], as a contact of the compiled loops; springs: of its elements, as
-    `Watch` has them."""
+    """Return one point with the whole load as a contact of the compiled loops.
+
+    Parameters
+    ----------
+    model : Model
+    load : float
+        Normal load [N].
+    engine : BenchEngine
+    springs : callable, optional
+        See `Watch`.
+    """
     f = model.friction
     if model.grooves is not None:
         return climbing(model, load)
@@ -92,7 +124,9 @@ def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactM
 
 
 def coarser_cells(few) -> CoarserRuns:
-    """The passes of a bench in which each four cells of a density of sliders are one; few: variant of `errors` beside
-    them."""
+    """Return the passes in which four cells each of a density of sliders are merged.
+
+    few: the Pass with which they are compared.
+    """
     runs = tuple(few._replace(springs=partial(cells_joined, *one)) for one in JOINED)
     return CoarserRuns(runs, merged_cell_errors, few, "cells")

@@ -1,5 +1,8 @@
-"""A slide behind the pieces' own shear: the exact set of elements, or bond points behind the shear modes, and the
-error of the mesh of the former."""
+"""Slide of pieces that deform in shear: parallel elements, or bond points with shear modes.
+
+In: a model with [contact.shear], its pressed patch and a path. Out: `Slid`, and the coarse
+passes that show the error of the mesh of elements.
+"""
 
 import numpy as np
 
@@ -15,12 +18,30 @@ from .follow import follow_path
 from .ledger import Slid, Watch
 from .rigid import climbing
 
-OPEN = 1e-3  # of the mean pressure, under which nodes count that the lower piece does not press at first
+# fraction of the mean pressure assumed at nodes that the lower piece does not press at first
+OPEN = 1e-3
 
 
 def with_shear(model, patch, time, slide, frames: int, watch: Watch, engine=None) -> Slid:
-    """Slide the holders along the samples time [s], slide [m] (k,); engine: of `bench_engine`, where bonds slide.
-    NotConverged where a step misses its residual."""
+    """Slide the holders along samples of time and slide.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    time, slide : (k,)
+        [s], [m].
+    frames : int
+        Number of frames of the tractions.
+    watch : Watch
+    engine : BenchEngine, optional
+        Needed for bonds.
+
+    Raises
+    ------
+    NotConverged
+        If the residual of a step is too large.
+    """
     if model.grooves is not None:
         return _climbing(model, patch, time, slide, frames, watch)
     if law_has_trait(model.friction.law, "bonds"):
@@ -29,7 +50,7 @@ def with_shear(model, patch, time, slide, frames: int, watch: Watch, engine=None
 
 
 def _elements(model, patch, time, slide, frames, watch) -> Slid:
-    """Coulomb and elastic-plastic points: parallel elements."""
+    """Slide Coulomb and elastic-plastic points as parallel elements."""
     f = model.friction
     length = law_from(f).element(1.0).length
     found = elements(patch, f.static, length)
@@ -49,7 +70,7 @@ def _elements(model, patch, time, slide, frames, watch) -> Slid:
 
 
 def _climbing(model, patch, time, slide, frames, watch) -> Slid:
-    """Points behind the shear modes of pieces that climb grooves as one."""
+    """Slide pieces over grooves, with points that share the height and have shear modes."""
     load = patch.pressure.load
     contact = climbing(model, load, patch, model.accuracy.shear_modes)
     done = follow_path(
@@ -61,7 +82,7 @@ def _climbing(model, patch, time, slide, frames, watch) -> Slid:
 
 
 def refuse_missed(done) -> None:
-    """NotConverged where a step missed its residual."""
+    """Raise NotConverged if the residual of a step was too large."""
     if done.missed:
         raise NotConverged(
             f"in {done.missed} time steps of the prescribed slide the friction force has an error "
@@ -71,8 +92,18 @@ def refuse_missed(done) -> None:
 
 
 def climbed_fields(patch, contact, states) -> tuple:
-    """Traction (f, m) [Pa], climb included, and irreversible local slip (f, m) [m] of points behind shear modes over
-    grooves; states: f of (slide [m], `ClimbingModel.shown`)."""
+    """Return traction (f, m) [Pa] with climbing, and slip (f, m) [m], of points over grooves.
+
+    The points have shear modes.
+
+    Parameters
+    ----------
+    patch : Patch
+    contact
+        Contact model of the grooves.
+    states : sequence
+        f states (slide [m], `ClimbingModel.shown`).
+    """
     index, m = contact.shear.points, patch.x.size
     tau, local = np.zeros((len(states), m)), np.zeros((len(states), m))
     for i, (slide, (along, elastic, vertical)) in enumerate(states):
@@ -86,7 +117,7 @@ def climbed_fields(patch, contact, states) -> tuple:
 
 
 def _points(model, patch, time, slide, frames, watch, engine) -> Slid:
-    """Bond points behind the shear modes, or lists of bonds."""
+    """Slide bond points, or lists of bonds, with shear modes."""
     law, shear, found = model.bonds, reduced(model, patch, watch.modes), engine.choice
     if model.side == "lower":
         contact = on_the_lower(model, patch, found, shear)
@@ -112,28 +143,36 @@ def _points(model, patch, time, slide, frames, watch, engine) -> Slid:
 
 
 def reduced(model, patch, count: int | None = None):
-    """ShearModes of the points of a sum over bonds: `count` of them, or as many as scene and tolerance ask for.
+    """Return the ShearModes of the points of a sum over bonds.
 
-    Under the pressure of the lower piece they are those of all nodes; one that nothing presses at first counts as under
-    OPEN of the mean pressure of the others.
+    If the pressure belongs to the lower piece, the points are all nodes; a node without pressure at
+    first counts as if under OPEN times the mean pressure of the others.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    count : int, optional
+        Number of modes; None: by scene and tolerance.
     """
     law, sigma, tolerance = model.bonds, patch.pressure.sigma_n, 0.1 * model.accuracy.tolerance
     count = count or model.accuracy.shear_modes
     if model.side != "lower":
         return bond_shear_modes(patch, law, count, tolerance)
-    bond_shear_modes(patch, law, 1, 1.0)  # refuses a patch that could jump by itself
+    # this call refuses a patch that could jump without a slide
+    bond_shear_modes(patch, law, 1, 1.0)
     return bond_shear_modes(
         patch, law, count, tolerance, sigma=np.maximum(sigma, OPEN * mean_pressure(patch))
     )
 
 
 def mean_pressure(patch) -> float:
-    """Load over the nodal areas that carry it [Pa]."""
+    """Return the load over the nodal areas that carry it [Pa]."""
     return patch.pressure.load / float(patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0))
 
 
 def modes_of(model, patch) -> int | None:
-    """How many shear modes stand behind the bonds of a bench; None where there are none."""
+    """Return the number of shear modes of a bench with bonds; None if there are none."""
     behind = (
         model.partial_slip and law_has_trait(model.friction.law, "bonds") and model.grooves is None
     )
@@ -141,8 +180,17 @@ def modes_of(model, patch) -> int | None:
 
 
 def on_the_lower(model, patch, found, shear):
-    """Lists of bonds, one a node, under the pressure of the lower piece, summed as the Choice `found` has it; shear:
-    ShearModes on every node, None of pieces that are rigid in shear."""
+    """Return lists of bonds, one per node, under the pressure of the lower piece.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    found : Choice
+        Method of the sum over bonds.
+    shear : ShearModes or None
+        Modes on every node; None for pieces that are rigid in shear.
+    """
     law, sigma, mean = model.bonds, patch.pressure.sigma_n, mean_pressure(patch)
     return lists_model(
         law,
@@ -156,17 +204,33 @@ def on_the_lower(model, patch, found, shear):
 
 
 def lists_of(patch, law, shear, found, force=None):
-    """Lists of bonds behind the ShearModes of a pressed patch, summed as the Choice `found` has it; force (k,) [N]: the
-    normal forces of the points where few stand for all."""
+    """Return lists of bonds with the ShearModes of a pressed patch.
+
+    Parameters
+    ----------
+    patch : Patch
+    law
+        Bond parameters.
+    shear : ShearModes
+    found : Choice
+        Method of the sum over bonds.
+    force : (k,), optional
+        Normal forces [N] of the points, if few points represent all.
+    """
     sigma = patch.pressure.sigma_n[shear.points] if force is None else np.ones_like(force)
     force = patch.pieces.interface.weight[shear.points] * sigma if force is None else force
     return lists_model(law, law.static * force, sigma, shear, found.reach(law.order), found.merge)
 
 
 def coarser_elements(count: int, few) -> CoarserRuns:
-    """Return the coarser meshes of a bench of elements.
+    """Return the passes of a bench of elements on coarser meshes.
 
-    count: number of coarser meshes; few: the variant of `errors` that they are compared with.
+    Parameters
+    ----------
+    count : int
+        Number of coarser meshes.
+    few : Pass
+        Pass with which they are compared.
     """
     runs = tuple(few._replace(level=level) for level in range(1, count + 1))
     return CoarserRuns(runs, mesh_errors, few, "mesh")
@@ -175,7 +239,7 @@ def coarser_elements(count: int, few) -> CoarserRuns:
 def mesh_errors(*values: dict) -> dict:
     """Return the error of each measure from its values on nested meshes, fine to coarse.
 
-    What a balance misses is an error itself, and has its change.
+    The residual of a balance is an error itself; its change is used.
     """
     missed = change(values[0], values[1])
     return convergence_errors(*values) | {name: missed[name] for name in GAPS if name in missed}

@@ -1,7 +1,7 @@
-"""A rigid slide with the NumPy laws, sample by sample: where the pressure of a point changes on the way, or in two
-directions.
+"""Rigid slide with the NumPy laws, sample by sample, for varying pressure or two directions.
 
-The twin of the compiled engines: it takes every law and every bench with a rigid slide.
+In: a model, its patch and a path. Out: `Slid`. This reference implementation of the compiled
+engines takes every law and every bench with a rigid slide.
 """
 
 from typing import NamedTuple
@@ -21,12 +21,34 @@ from .ledger import (
     local_slip,
 )
 
-MOST_WORK = 2e11  # strip-point products of a direct quadrature beyond which a bench is refused
+MOST_WORK = 2e11  # most strip-point products of a direct quadrature; a bench with more is refused
 
 
 def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
-    """Slide every point along the samples time [s], slide [m] (k,); the pressure rides on the upper piece or stays on
-    the lower one, or the load changes in time. Missing where the sum over bonds would take too long."""
+    """Slide every point along samples of time and slide.
+
+    The pressure moves with the upper piece, belongs to the lower one, or the load changes with
+    time.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+    time, slide : (k,)
+        [s], [m].
+    frames : int
+        Number of frames of the tractions.
+    watch : Watch
+
+    Returns
+    -------
+    Slid
+
+    Raises
+    ------
+    Missing
+        If the sum over bonds would take too long.
+    """
     law, (weight, pressure) = law_for(model, patch), _pressures(model, patch, time, slide)
     refuse_long_sum(model, law, time.size, weight.size, slide)
     peaks, at = ends_of_rest(model, slide), frame_numbers(time.size, frames)
@@ -51,12 +73,28 @@ def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
 
 
 def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
-    """(Slid along x, histories of the other direction by name; `pairs` are the (slide, force) of that direction) of a
-    slide in two directions: the `lateral` column of slide.file beside its displacement.
+    """Slide an interface in two directions, along the displacement and `lateral` of slide.file.
 
-    Pressure that rides on a rigid mover is constant at every point and the law is linear in it, so every point has the
-    traction of one point under unit pressure times its own. yaw_moment [N m]: sum of y f_x - x f_y, about +z of the
-    friction on the upper piece, f positive against its slip; strips have their places y over the width.
+    The pressure of a rigid upper piece is constant at every point, and the law is linear in it, so
+    that the traction of every point is that of a point under unit pressure times its pressure.
+    yaw_moment [N m] is the sum of y f_x - x f_y, the moment about +z of the friction on the upper
+    piece, with f positive against its slip; strips have their positions y over the width.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+    time, slide : (k,)
+        [s], [m].
+    frames : int
+        Number of frames of the tractions.
+    watch : Watch
+
+    Returns
+    -------
+    tuple
+        Slid along x, and histories of the lateral direction by name; `pairs` are (slide, force) in
+        this direction.
     """
     law = law_for(model)
     refuse_long_sum(model, law, time.size, 1, slide)
@@ -94,8 +132,12 @@ def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
 
 
 class _Walked(NamedTuple):
-    """Histories of k samples in d directions: force (k, d) and load (k,) [N], ledger of `ledger_of` [J], tau (f, d, m)
-    [Pa] of the frames."""
+    """Histories of k samples in d directions.
+
+    - force (k, d), load (k,): [N].
+    - ledger (4, k): energies of `ledger_of` [J].
+    - tau (f, d, m): tractions in the frames [Pa].
+    """
 
     force: np.ndarray
     load: np.ndarray
@@ -104,9 +146,22 @@ class _Walked(NamedTuple):
 
 
 def _walked(laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: Watch) -> _Walked:
-    """Step a law along a path. laws: (the law, how it takes a step); path: (time (k,) [s], slide (k, d) [m]); points:
-    (weights (m,) [m2], function from the number of a sample to the pressure (m,) [Pa] there); at: numbers of the
-    frames; peaks: sample -> sign of the motion that a rest ends with."""
+    """Evaluate a law along a path, sample by sample.
+
+    Parameters
+    ----------
+    laws : tuple
+        Law, and function that takes one step of it.
+    path : tuple
+        time (k,) [s] and slide (k, d) [m].
+    points : tuple
+        Weights (m,) [m2], and function from the index of a sample to the pressure (m,) [Pa].
+    at : (f,)
+        Samples of the frames.
+    peaks : dict
+        Sign of the motion that starts, by the sample at the end of a rest.
+    watch : Watch
+    """
     (law, move), (time, slide), (weight, pressure) = laws, path, points
     size, width = slide.shape
     s0, pick = pressure(0), set(at.tolist())
@@ -141,9 +196,18 @@ def _walked(laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: Wat
 
 
 def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
-    """Raise Missing where the NumPy sum over bonds would form more strip-point products than MOST_WORK.
+    """Raise Missing if the NumPy sum over bonds needs more than MOST_WORK strip-point products.
 
-    slide: (k,) [m]; bonds older than 25 lengths are taken as cut off.
+    Bonds older than 25 bond lengths count as cut off.
+
+    Parameters
+    ----------
+    model : Model
+    law
+    samples, points : int
+        Numbers of samples and points.
+    slide : (k,)
+        [m].
     """
     if not hasattr(law, "weights"):
         return
@@ -159,7 +223,7 @@ def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
 
 
 def _pressures(model, patch, time, slide) -> tuple:
-    """(weights (m,) [m2], function from the number of a sample to the pressure (m,) [Pa] there)."""
+    """Return weights (m,) [m2], and a function from a sample index to the pressure (m,) [Pa]."""
     if model.load_varies:
         loads = model.point.at(time)
         return np.ones(1), lambda k: loads[k : k + 1]
@@ -170,12 +234,16 @@ def _pressures(model, patch, time, slide) -> tuple:
 
 
 def _along(law, state, dq: float, s0, s1, dt: float) -> tuple:
+    """Take one step of a law at constant or given pressure."""
     return law.step(state, dq, s0, s1, dt)
 
 
 def _under_load(law, state, dq: float, s0, s1, dt: float) -> tuple:
-    """One step while the load goes from s0 to s1: half of its change before the motion, half after (order 1 where
-    bonds are let go, else 2). A law without stretch takes the change along with the motion."""
+    """Take one step of a law while the load changes from s0 to s1.
+
+    Half of the change is applied before the motion, half after it (order 1 if bonds are released,
+    else 2). A law without stretch takes the change during the motion.
+    """
     if dq != 0 and getattr(law, "at_once", False):
         return law.step(state, dq, s0, s1, dt)
     half = (s0 + s1) / 2
@@ -186,7 +254,7 @@ def _under_load(law, state, dq: float, s0, s1, dt: float) -> tuple:
 
 
 def _moments(model, patch) -> tuple:
-    """(load [N], sum f x, sum f y [N m]) of the pressure; y from the strips, 0 without them."""
+    """Return load [N], sum f x and sum f y [N m] of the pressure; y from the strips, else 0."""
     if patch is None:
         return model.point.load, 0.0, 0.0
     force = patch.pressure.sigma_n * patch.pieces.interface.weight

@@ -1,5 +1,6 @@
-"""What every run hands back.
+"""Result that every run returns.
 
-In: a `Plan` that was run and what its engine found. Out: `Result`, with the meaning of every measure and notes on what
-the law and the heat of friction leave out. Read `result` first.
+In: a `Plan` that was run, and the output of its engine. Out: `Result`, with the meaning of
+every measure, and notes on effects of the law and of frictional heating that are neglected.
+Read `result` first.
 """

@@ -1,4 +1,7 @@
-"""Sentences of a run on its law and its heat: how it warms, ripens and creeps."""
+"""Sentences of a run on its friction law and on frictional heating.
+
+In: a model, its histories and measures. Out: warnings and notes as lists.
+"""
 
 from math import ceil, log2
 
@@ -9,16 +12,21 @@ from ...formatting import format_length
 from ...friction.bonds import parameters, temperature
 from ...scene.keys import materials
 
-BOOKS = 1e-3  # relative gap of the two books of energy beyond which a run says so
-RIPE = 0.3  # of their length, over which bonds may ripen before a run says so
-BOUND = 1e-3  # share of mu_s N that friction may exceed before a run says so
-FARTHEST = 8  # halvings of the steps that are named at once where no engine without steps serves
-MORE, LEAST = 4, 31  # times the harmonics of a balance, and harmonics, that are proposed
-MOST_HARMONICS = 500  # that are proposed at once
+# relative difference of the two values of the friction work, above which a warning is given
+BOOKS = 1e-3
+RIPE = 0.3  # slide during which bonds form over their length, above which a warning is given
+BOUND = 1e-3  # excess over mu_s N relative to it, above which a note is given
+FARTHEST = 8  # most halvings of the steps that a warning proposes
+# proposed harmonics over those of a balance; smallest proposed number of harmonics
+MORE, LEAST = 4, 31
+MOST_HARMONICS = 500  # largest number of harmonics that is proposed for a sharp friction law
 
 
 def climbing_as_one(model, patch) -> list:
-    """The note on pieces that give way over grooves: how far a point is from where its flank is taken."""
+    """Return the note on pieces with shear over grooves, as a list.
+
+    It says how far a point may be from the position at which the slope is taken.
+    """
     if model.grooves is None or not model.partial_slip:
         return []
     limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
@@ -33,7 +41,19 @@ def climbing_as_one(model, patch) -> list:
 
 
 def warming(model, patch, response, work: float | None = None) -> list:
-    """The line on the rise of the surface temperature, where the scene names one."""
+    """Return the line on the rise of the surface temperature, as a list.
+
+    It is empty if the scene does not ask for it.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+    response
+        Histories.
+    work : float, optional
+        Friction work [J]; None: from the samples.
+    """
     if model.heat is None:
         return []
     if work is None:
@@ -44,11 +64,14 @@ def warming(model, patch, response, work: float | None = None) -> list:
 
 
 def unripe(law, speed: float) -> list:
-    """Warning that a printed law's bonds break before they are grown, as a list of sentences."""
+    """Return a warning, as a list, if bonds of the printed law break before they are formed.
+
+    speed: peak speed [m/s].
+    """
     a = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
     if a <= RIPE:
         return []
-    # growth_path_ratio(law, speed) = RIPE with it
+    # with this growth path, growth_path_ratio(law, speed) = RIPE
     least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)
     return [
         f"at the peak speed of {speed:.3g} m/s a bond slides by {a:.2g} of its length while it forms (limit "
@@ -59,7 +82,10 @@ def unripe(law, speed: float) -> list:
 
 
 def creeping(law, outcome, found) -> list:
-    """Warning of a bounded motion whose middle moves on, as a list: Dahl's creep, not a property of the joint."""
+    """Return a warning, as a list, of a bounded motion whose mean position drifts.
+
+    This is Dahl's creep, not a property of the joint. found: measures by name.
+    """
     drift = found.get("drift_per_cycle")
     if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []
@@ -72,9 +98,10 @@ def creeping(law, outcome, found) -> list:
 
 
 def unbounded_bonds(law) -> list:
-    """Warning, as a list, of initial bonds of negative order: they pull without a bound in the first instant.
+    """Return a warning, as a list, of initial bonds of negative order.
 
-    Bonds that form later never do: grown or not, theirs is at most the share P(p + 1, R/eps_0) of mu_s N.
+    Their traction is infinite at the first instant. Bonds that form later are bounded: theirs is at
+    most the fraction P(p + 1, R/eps_0) of mu_s N, grown or not.
     """
     if law.order >= 0 or law.initial == 0:
         return []
@@ -85,9 +112,9 @@ def unbounded_bonds(law) -> list:
 
 
 def of_growth(law, peak: float | None) -> list:
-    """Notes, as a list, on what growing bonds mean.
+    """Return notes, as a list, on the effects of growing bonds.
 
-    peak: largest friction force of the run over mu_s N [1], None where the load changes.
+    peak: largest friction force of the run over mu_s N [1]; None if the load changes.
     """
     if not law.grows:
         return []
@@ -117,16 +144,24 @@ def of_growth(law, peak: float | None) -> list:
 
 
 def work_check_warning(values: dict, steps: int | None, harmonics: int | None = None) -> list:
-    """Warning, as a list, of friction work that the samples of a run do not show as its ledger books it.
+    """Return a warning, as a list, if the two values of the friction work differ.
 
-    values: measures; steps: per cycle, harmonics: of the run, each None of an engine without. The trapezoidal rule is
-    of second order; a gap that is smaller than its error can be small by chance.
+    They are those from the samples and from the energy balance. The trapezoidal rule is of second
+    order; a difference that is smaller than its error may be small by chance.
+
+    Parameters
+    ----------
+    values : dict
+        Measures by name.
+    steps, harmonics : int or None
+        Steps per cycle, and harmonics, of the run; None for an engine without them.
     """
     found = values.get("work_check")
     if found is None or found.value is None or found.value <= BOOKS:
         return []
     wide = max(found.value, found.error or 0.0) / BOOKS
-    # one more: of a motion with stops the gap falls by second order on the whole
+    # one more halving, because in a motion with stops the difference is of second order only on
+    # average
     halvings = 1 + ceil(log2(wide) / 2)
     if harmonics:
         remedy = more_harmonics(harmonics)
@@ -145,18 +180,29 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
 
 
 def more_harmonics(found: int, sharp: float = 0.0) -> str:
-    """The harmonics that make a balance of so many better; few of them say little of how it converges.
+    """Return the remedy that proposes a larger number of harmonics than `found`.
 
-    sharp: how many the friction itself asks for.
+    A balance with few harmonics says little about its convergence. sharp: number of harmonics that
+    the friction law itself needs.
     """
     return f"set accuracy.harmonics = {max(MORE * found, LEAST, min(ceil(sharp), MOST_HARMONICS))}"
 
 
 def heating(model, patch, work: float, duration: float) -> list:
-    """One line on the rise of the surface temperature; none where nothing is loaded or nothing moves.
+    """Return a line, as a list, on the rise of the surface temperature.
 
-    work [J] of the friction over `duration` [s]. All of the heat goes into one half-space of the substrate through the
-    loaded area: two alike pieces share it and warm by half as much.
+    It is empty if nothing is loaded or nothing moves. All heat is assumed to flow into one
+    half-space of the substrate through the loaded area: two alike pieces share it, and warm by half
+    as much.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+    work : float
+        Friction work [J].
+    duration : float
+        Time in which it is done [s].
     """
     if patch is None:
         return [
@@ -186,7 +232,7 @@ def heating(model, patch, work: float, duration: float) -> list:
 
 
 def _cycle(model) -> float | None:
-    """Period of the motion [s], None where it does not repeat."""
+    """Return the period of the motion [s]; None if it does not repeat."""
     if model.rig is not None:
         return 1 / model.rig.drive.frequency if model.rig.drive.frequency else None
     return model.slide.period

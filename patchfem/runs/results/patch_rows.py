@@ -1,4 +1,7 @@
-"""Static measures of a pressed patch: unit, least floor and meaning of each."""
+"""Table of the static measures of a pressed patch and of wear.
+
+In: a name. Out: its unit, floor and meaning; and the text that names what computed it.
+"""
 
 from math import inf
 from re import sub
@@ -161,12 +164,13 @@ ROWS = (
         group="patch",
     ),
 )
-# what computes a static measure, as `numerics.measures` of summary.json names it
+# what computes a static measure, as `numerics.measures` in summary.json says
 ON_FINEST_MESH = "finite elements, finest mesh"
-EXTRAPOLATED = "finite elements, extrapolated over nested meshes"  # or of a coarser one of them, whose error is smaller
+# or the value of a coarser mesh, whose error is smaller
+EXTRAPOLATED = "finite elements, extrapolated over nested meshes"
 ON_POINTS = "points on layered half-spaces"
 WORN = "wear in jumps of cycles"
-# what a mesh is chosen for
+# measures whose errors choose the mesh
 DECISIVE = (
     "pressure_peak",
     "contact_fraction",
@@ -180,13 +184,16 @@ POSITIVE = tuple(name for name in DECISIVE if TABLE[name].minimum == 0.0)
 
 
 def minimum_of(name: str) -> float:
-    """Smallest value [SI] that a static measure, also of a numbered interface, can have; -inf without a bound."""
+    """Return the smallest value [SI] that a static measure can have; -inf without a bound.
+
+    The name may have the number of an interface.
+    """
     row = TABLE.get(sub(r"_\d+$", "", name))
     return -inf if row is None else row.minimum
 
 
 def unknown_measures(measures: dict) -> list:
-    """Names of the decisive measures, above 0 by nature, whose error is as large as their value."""
+    """Return names of the decisive positive measures whose error is as large as their value."""
     found = {name: measures[name] for name in POSITIVE if name in measures}
     return [
         name

@@ -1,4 +1,8 @@
-"""The result of a run, with the parts that every kind of run shares."""
+"""Result of a run, with the parts that every kind of run has.
+
+In: the output of an engine. Out: `Result`, frames of the interface, meanings of measures, and
+the numerical settings of the run as a dict.
+"""
 
 import re
 from collections.abc import Callable, Iterable
@@ -12,17 +16,24 @@ from ...formatting import rewrite_powers_of_ten
 from ...response import rows
 from . import patch_rows
 
-FRAMES = 16  # of the interface, in the last cycle
+FRAMES = 16  # number of frames of the interface in the last cycle
 COUNTS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
-_BEFORE = re.compile(r"/[^:]*/(?=[^/:]+: )")  # of an absolute path at the start of a remark
+_BEFORE = re.compile(r"/[^:]*/(?=[^/:]+: )")  # folder of an absolute path at the start of a remark
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Result:
-    """Everything that a run found.
+    """Everything that a run computed.
 
-    plan: the Plan that was run; measures: name -> Measure; response: kept histories or None; patch: the solved patch or
-    None; fields: (frame, x) arrays by name with `time`; seconds by part; extra: engine, steps, notes for the report.
+    - plan: Plan that was run.
+    - outcome: how the run ended.
+    - measures: Measure by name.
+    - response, window: kept histories, and those of the last cycles; None without motion.
+    - patch: solved patch, or None.
+    - fields: arrays (frame, x) by name, with `time`.
+    - seconds: CPU seconds by part.
+    - warnings: sentences.
+    - extra: engine, steps, notes and other data of the report.
     """
 
     plan: object
@@ -48,17 +59,17 @@ class Result:
 
 
 def with_meanings(measures: dict, apart: str) -> dict:
-    """The measures by name, with their meanings.
+    """Return the measures by name, with their meanings.
 
-    apart: what a number behind a name counts, "interface" or "strip".
+    apart: what a number after a name counts, "interface" or "strip".
     """
     return {name: replace(m, text=meaning(name, apart)) for name, m in measures.items()}
 
 
 def meaning(name: str, apart: str = "interface") -> str:
-    """Meaning of a measure by its name in a summary, in one sentence without a stop.
+    """Return the meaning of a measure by its name in a summary, one sentence without full stop.
 
-    slip_amplitude_2 is that of the second interface, or of what `apart` names.
+    slip_amplitude_2 is the measure of the second interface, or of what `apart` names.
     """
     if name in patch_rows.TABLE:
         return patch_rows.TABLE[name].text
@@ -69,15 +80,16 @@ def meaning(name: str, apart: str = "interface") -> str:
 
 
 def at_rest(patch) -> dict:
-    """Fields of the pressed patch without motion: normal_stress [Pa], gap [m] and status, (1, n) each.
+    """Return the fields of the pressed patch without motion, (1, n) each.
 
-    They are those of its finest solution, on the points of a trace where it has these.
+    They are normal_stress [Pa], gap [m] and status of its finest solution, on the points of a
+    profile if it has these.
     """
     return _pressed_frame(patch.fine or patch.on_mesh)
 
 
 def _pressed_frame(surface) -> dict:
-    """Fields of a pressed Surface, (1, n) each."""
+    """Return the fields of a pressed Surface, (1, n) each."""
     return {
         "time": np.zeros(1),
         "normal_stress": surface.sigma_n[None],
@@ -87,9 +99,10 @@ def _pressed_frame(surface) -> dict:
 
 
 def surface_of(patch, fields: dict):
-    """The Surface of a pressed patch on whose points its fields are given; None without a patch.
+    """Return the Surface on whose points the fields of a pressed patch are given.
 
-    A motion moves the nodes of the mesh. Without one the fields are those of `at_rest`.
+    A motion moves the nodes of the mesh; without one the fields are those of `at_rest`. None
+    without a patch.
     """
     if patch is None or patch.fine is None or "shear_stress" in fields:
         return patch and patch.on_mesh
@@ -97,16 +110,29 @@ def surface_of(patch, fields: dict):
 
 
 def frames_of(patch, time, tau, local, slide) -> dict:
-    """Frames of the interface: the pressed state first, then the given ones; status 0 open, 1 stick, 2 slip.
+    """Return the frames of the interface by name: the pressed state, then the given ones.
 
-    slide (f,): motion of the upper holder [m] in the given frames.
+    Parameters
+    ----------
+    patch : Patch
+    time : (f,)
+        [s].
+    tau, local : (f, m)
+        Traction [Pa] and slip [m] of the nodes.
+    slide : (f,)
+        Displacement of the upper holder [m].
+
+    Returns
+    -------
+    dict
+        Arrays (f + 1, m); status is 0 for open, 1 for stick and 2 for slip.
     """
     first = _pressed_frame(patch.on_mesh)
     count = len(time) + 1
     tau = np.concatenate([np.zeros((1, tau.shape[1])), tau])
     slip = np.concatenate([np.zeros((1, tau.shape[1])), local])
     moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
-    moved[:2] = 0.0  # the first moving frame has no frame before it to slip from
+    moved[:2] = 0.0  # the first frame of the motion has no previous frame from which it could slip
     status = np.where(
         patch.active, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0
     ).astype(np.int8)
@@ -122,8 +148,11 @@ def frames_of(patch, time, tau, local, slide) -> dict:
 
 
 def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
-    """Whether there is a coarser patch to tell the error of a motion that hangs on the mesh of its own; coarse: patches
-    on coarser meshes, None where there is none. True of a motion that hangs on none."""
+    """Return whether the error of a motion by the mesh of its patch can be estimated.
+
+    This needs a coarser patch, unless the motion does not depend on the mesh. coarse: patches on
+    coarser meshes; None for a missing one.
+    """
     if patch is None or coarse[0] is not None:
         return True
     return not (
@@ -134,16 +163,17 @@ def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
 
 
 def without_errors(found: dict, estimate: bool) -> dict:
-    """The measures as they are, or without their errors where none were estimated."""
+    """Return the measures, without their errors if none were estimated."""
     return found if estimate else {k: replace(m, error=None) for k, m in found.items()}
 
 
 def choices(result) -> dict:
-    """Engine, steps per cycle or those that a tolerance chose, cycles and window of a run, shear modes or elements
-    behind the pieces' shear, how bonds are summed, and interface nodes and strips of its patch,
-    and the length [m] that its profile is averaged over.
+    """Return the numerical settings that a run used, by name; those it did not use are left out.
 
-    map: "events" or "yields" that a steady motion was found by. A choice that the run did not make is left out.
+    They are engine, steps per cycle or those that a tolerance chose, cycles and window, shear modes
+    or elements of the pieces, the method of the sum over bonds, nodes and strips of the patch, and
+    the length [m] over which its profile is averaged. map: "events" or "yields", the map that found
+    a steady motion.
     """
     extra, patch, out = result.extra, result.patch, {}
     if (engine := extra.get("engine")) is not None:
@@ -172,10 +202,10 @@ def choices(result) -> dict:
 
 
 def measure_engines(result) -> dict:
-    """Return by name of each measure that has a value what computed it, in words.
+    """Return what computed each measure that has a value, by name.
 
-    A static measure of a patch names how it was found on the meshes of the patch (`patch_rows`); another measure has
-    the engine of the run.
+    A static measure of a patch names how it was computed on the meshes of the patch (`patch_rows`);
+    another measure has the engine of the run.
     """
     engines = {
         name: measure.engine or result.extra.get("engine", "")
@@ -186,18 +216,21 @@ def measure_engines(result) -> dict:
 
 
 def without_folders(texts, path: Path) -> list:
-    """Remarks in which a file is named without its folder where that is absolute, and numbers are written for people;
-    path: of the scene, beside which files lie."""
+    """Return remarks with absolute file names shortened to the file, and readable numbers.
+
+    path: of the scene, in whose folder the files are.
+    """
     return without_folders_of(path)(texts)
 
 
 def without_folders_of(path: Path) -> Callable[[Iterable[str]], list]:
-    """`without_folders` of many remarks on scenes at one path."""
+    """Return `without_folders` for many remarks on scenes at one path."""
     folders = [
         f"{folder}/" for folder in (path.parent, path.parent.absolute()) if folder.is_absolute()
     ]
 
     def told(texts) -> list:
+        """Return the remarks with short file names and readable numbers."""
         out = []
         for text in texts:
             for folder in folders:

@@ -1,21 +1,25 @@
-"""How far the pieces slide on one another, against the length in contact and the length of the piece."""
+"""Slide of the pieces compared with the length in contact and the length of the piece.
+
+In: kept samples of the slide and the pressed patch. Out: a warning, or the outcome of a run
+that leaves the contact.
+"""
 
 import numpy as np
 
 from ...formatting import format_length
 from ...response.outcome import off_the_piece
 
-FAR = 0.1  # of the contact length; from there on the fixed pressure is doubtful
+FAR = 0.1  # fraction of the contact length above which an unchanged pressure is inaccurate
 
 
 def largest_slide(slide) -> float:
-    """Largest |slide| [m] of kept samples (k,) [m]; infinite where the motion left the numbers."""
+    """Return the largest |slide| [m] of kept samples (k,) [m]; inf if the motion overflowed."""
     largest = float(np.abs(slide).max(initial=0.0))
     return largest if np.isfinite(largest) else np.inf
 
 
 def contact_length(patch) -> float:
-    """Length [m] from one end of the contact to the other, each end half way between its nodes."""
+    """Return the distance [m] between the ends of the contact, halfway between nodes."""
     touching = np.flatnonzero(patch.active)
     if not touching.size:
         return 0.0
@@ -25,7 +29,7 @@ def contact_length(patch) -> float:
 
 
 def travelled(patch, slide) -> list:
-    """A warning, as a list, where the slide (k,) [m] is a tenth of the contact length or more."""
+    """Return a warning, as a list, if the slide (k,) [m] exceeds FAR of the contact length."""
     largest, contact = largest_slide(slide), contact_length(patch)
     if not contact > 0 or largest < FAR * contact:
         return []
@@ -38,9 +42,20 @@ def travelled(patch, slide) -> list:
 
 
 def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
-    """The outcome of a run, or that the slide passed the end of the piece (`response.outcome.off_the_piece`).
+    """Return the outcome of a run, or LEAVES_CONTACT if the slide exceeded the piece.
 
-    patch: None for [normal], which has no length; lateral (k,) [m]: slide across, or None.
+    See `response.outcome.off_the_piece`.
+
+    Parameters
+    ----------
+    outcome : Outcome or None
+    asked : PatchModel
+    patch : Patch or None
+        None for [normal], which has no length.
+    slide : (k,)
+        [m].
+    lateral : (k,), optional
+        Slide in the lateral direction [m].
     """
     if patch is None:
         return outcome

@@ -1,6 +1,7 @@
-"""Wear of a bench or a rig: the patch, the motion and the worn depth advance together over many cycles.
+"""Wear of a bench or a rig: patch, motion and worn depth advance together over many cycles.
 
-In: a model with [wear] and its pressed patch. Out: the worn patch, on which the run is done as on any other, and the
-history on the way. `slip` reads the slip path of a cycle off a run, `evolve` jumps over the cycles, `measures` says
-what was worn. Read `evolve` first.
+In: a model with [wear] and its pressed patch. Out: the worn patch, on which the run continues
+as on any other, and the history of the wear. `slip` computes the slip path of a cycle from a
+run, `evolve` jumps over the cycles, `measures` has the measures of wear, and `plan` predicts
+their cost. Read `evolve` first.
 """

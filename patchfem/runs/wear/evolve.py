@@ -1,5 +1,9 @@
-"""The patch over many cycles of wear: contact, motion and worn depth advance together, jump by jump; the state on disk,
-from which an interrupted run goes on to the same bits."""
+"""Patch over many cycles of wear: contact, motion and worn depth advance in jumps.
+
+In: a model with [wear], its pressed patch and the same on coarser meshes. Out: `Evolved`. The
+state is saved after every jump, and an interrupted run that continues from it gives the same
+bits.
+"""
 
 import json
 import os
@@ -24,18 +28,23 @@ from ..rig import numerics
 from .slip import Rubbed, apart, even, frames_for, rubbed
 
 STATE = tuple(WearState.__slots__)
-THIN = 1e-6  # share of a coating that may be left where it counts as worn through
-MOST_TRIES = 60  # jumps that look for the cycle at which it is
+# fraction of the thickness of a coating that may remain where it counts as worn through
+THIN = 1e-6
+MOST_TRIES = 60  # most jumps of the search for the cycle at which a coating is worn through
 MOMENT = ("cycle", "depth", "used", "pressure", "gap", "miss")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Moment:
-    """The interface after `cycle` cycles.
+    """Interface after a number of cycles.
 
-    depth [m] worn so far; used [m]: slip path per cycle of the last jump; both (m,), of strips (s, m); pressure [Pa];
-    gap [m] that remains; both (m,), of strips the mean pressure and the least gap over the width; miss: relative error
-    of the slip path by its frames; values: measures of patch and motion by name.
+    - cycle: number of cycles.
+    - depth: worn depth (m,), of strips (s, m) [m].
+    - used: slip path per cycle in the last jump (m,), of strips (s, m) [m].
+    - pressure, gap (m,): pressure [Pa] and remaining gap [m]; for strips the mean pressure and the
+      smallest gap over the width.
+    - miss: relative error of the slip path by the number of frames.
+    - values: measures of patch and motion by name.
     """
 
     cycle: float
@@ -49,12 +58,17 @@ class Moment:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Evolved:
-    """A wear run: the worn patch with those on coarser meshes (None where there are none), and the way there.
+    """Worn patch with those on coarser meshes, and the history of the wear.
 
-    state: at the end; moments: after every jump, the first before any wear; depths: worn depth (k,) [m], of strips
-    (s, k), on the coarser meshes, each on its own nodes; stripped: (patch, depth (t, m) [m]) of other strips by the
-    same jumps (`measures.other_strips`), None without; miss: relative error of the slip path by its frames; stopped:
-    why the cycles ended early, else "".
+    - patch, coarse: worn patch, and those on coarser meshes (None for a missing one).
+    - state: at the end; None if nothing was worn.
+    - moments: after every jump; the first one is before any wear.
+    - depths: worn depths (k,), of strips (s, k) [m], on the nodes of each coarser mesh.
+    - stripped: (patch, depth (t, m) [m]) in another number of strips, by the same jumps
+      (`measures.other_strips`); None without strips.
+    - miss: relative error of the slip path by the number of frames.
+    - seconds: CPU seconds.
+    - stopped: reason of an early end, else "".
     """
 
     patch: object
@@ -69,12 +83,15 @@ class Evolved:
 
 
 class _Unbounded(Exception):
-    """The motion has no cycle to repeat."""
+    """The motion has no periodic cycle."""
 
 
 class _Motion:
-    """Slip paths of a model on its worn patch, each found once; a motion that wear cannot change is found once, on the
-    patch before any wear, so that a run that goes on from a kept state has its bits too."""
+    """Slip path of a model on its worn patch.
+
+    A motion that does not depend on wear is computed once, on the unworn patch, so that a run that
+    continues from a saved state gives the same bits.
+    """
 
     def __init__(self, model, patch):
         self.model, self.pair = model, patch.pair
@@ -88,6 +105,7 @@ class _Motion:
         self.last: Rubbed | None = None
 
     def __call__(self, worn) -> np.ndarray:
+        """Return the slip path (m,), of strips (s, m) [m], per cycle at a worn depth [m]."""
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
             patch = pressed(self.model.patch, self.pair, worn)
@@ -99,14 +117,23 @@ class _Motion:
 
 
 def mean_depth(patch, depth) -> float:
-    """WearState volume over the area of the patch [m], of a depth (m,) [m], of strips (s, m)."""
+    """Return the worn volume over the area of the patch [m]; depth: (m,), of strips (s, m) [m]."""
     area = patch.pieces.interface.weight
     return float(np.atleast_2d(depth).mean(axis=0) @ area / area.sum())
 
 
 def worn_model(model, patch, depth):
-    """The model with grooves and friction as the mean of a worn depth (m,) or (s, m) [m] on its patch leaves them;
-    itself where it changes neither."""
+    """Return the model with grooves and friction law at the mean worn depth of its patch.
+
+    It is unchanged if neither depends on wear.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    depth : (m,) or (s, m)
+        Worn depth [m].
+    """
     wear, new = model.wear, {}
     if model.grooves is not None:
         new["grooves"] = model.grooves.worn(mean_depth(patch, depth), wear.upper_share)
@@ -120,11 +147,30 @@ def worn_model(model, patch, depth):
 
 
 def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep=None) -> Evolved:
-    """The patch of a model with [wear] after all its cycles.
+    """Wear the patch of a model with [wear] over all its cycles.
 
-    patch, coarse: the pressed patch and those on coarser meshes, new. progress: called with the share of the cycles
-    that is done. begin: (state, moments) of an interrupted run; keep(state, moments): called after every jump.
-    PatchfemError for a slide in two directions.
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+        Unworn pressed patch.
+    coarse : sequence of Patch or None
+        The same on coarser meshes.
+    progress : callable, optional
+        Called with the completed fraction of the cycles.
+    begin : tuple, optional
+        (state, moments) of an interrupted run.
+    keep : callable, optional
+        Called with state and moments after every jump.
+
+    Returns
+    -------
+    Evolved
+
+    Raises
+    ------
+    PatchfemError
+        For a slide in two directions.
     """
     if model.slide is not None and model.slide.across is not None:
         text = not_supported_message(
@@ -200,14 +246,19 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
 
 
 def worn_through(model, depth) -> tuple | None:
-    """(name, thickness [m]) of the piece whose coating is gone where the depth (m,) or (s, m) [m] of both is largest,
-    else None."""
+    """Return (name, thickness [m]) of a piece whose coating is worn through, else None.
+
+    depth: depth worn off both pieces, (m,) or (s, m) [m].
+    """
     share, name, thickness = max(_taken(model, depth), default=(0.0, "", 0.0))
     return (name, thickness) if share >= 1 - THIN else None
 
 
 def _taken(model, depth) -> list:
-    """(share of its coating that is gone at the deepest place, name, thickness [m]) of each coated piece."""
+    """Return (worn fraction of the coating at the deepest point, name, thickness [m]) per piece.
+
+    Only coated pieces are listed.
+    """
     deepest, upper, asked = float(depth.max(initial=0.0)), model.wear.upper_share, model.patch
     return [
         (part * deepest / piece.thickness, name, piece.thickness)
@@ -220,9 +271,13 @@ def _taken(model, depth) -> list:
 
 
 def _jumped(model, asked: WearProblem, state: WearState) -> WearState:
-    """The state one jump later, or earlier where a coating is gone, by the Illinois form of regula falsi."""
+    """Return the state after the next jump, or where a coating is worn through.
+
+    The latter is found by the Illinois variant of regula falsi.
+    """
 
     def ahead(one: WearState) -> float:
+        """Return the largest worn fraction of a coating minus 1."""
         return max(_taken(model, one.depth), default=(0.0,))[0] - 1
 
     if model.patch.interface.strips is not None:
@@ -251,10 +306,23 @@ def _jumped(model, asked: WearProblem, state: WearState) -> WearState:
 
 
 def next_row(wear, asked: WearProblem, state: WearState) -> float:
-    """Cycle up to which an automatic jump may go, so that it follows the friction from row to row of its table.
+    """Return the cycle up to which an automatic jump may go, to use each row of friction.
 
-    That is where the wear per cycle as it is now reaches the next row, or the one after it where the next is nearer
-    than a tenth of the way between them; a jump past a row would not see what lies between.
+    It is the cycle at which the current wear rate reaches the next row of the table, or the row
+    after it if the next one is nearer than a tenth of their distance. A jump past a row would miss
+    its values.
+
+    Parameters
+    ----------
+    wear
+        Wear of the model.
+    asked : WearProblem
+    state : WearState
+
+    Returns
+    -------
+    float
+        inf if there is no further row.
     """
     change, weight = wear.friction, asked.area / asked.area.sum()
     mean = float(np.vdot(state.depth, weight))
@@ -269,8 +337,15 @@ def next_row(wear, asked: WearProblem, state: WearState) -> float:
 
 
 def _before(model, patch, area):
-    """The pressed patch with what was worn before the first cycle; itself where that is nothing. PatchfemError where it
-    was worn on other surfaces, or through a coating."""
+    """Return the patch with the depth that was worn before the first cycle.
+
+    It is unchanged if there is none.
+
+    Raises
+    ------
+    PatchfemError
+        If this depth was worn on other surfaces, or through a coating.
+    """
     begun = model.wear.start
     if begun is None:
         return patch
@@ -286,12 +361,13 @@ def _before(model, patch, area):
 
 
 def _first(model, patch, asked: WearProblem, motion: _Motion) -> tuple:
-    """(state, moments) before any wear but that of `_before`."""
+    """Return (state, moments) before any wear except that of `_before`."""
     state = start_wear(asked, model.wear.depth_before(patch.x, asked.area))
     return state, (_moment(patch, state, motion),)
 
 
 def _moment(patch, state: WearState, motion: _Motion) -> Moment:
+    """Return the Moment of a worn patch."""
     area = areas(motion.model.patch, patch.pieces.interface)
     worn = {
         "worn_volume": float(np.vdot(state.depth, area)),
@@ -318,10 +394,14 @@ def _moment(patch, state: WearState, motion: _Motion) -> Moment:
 
 
 def _on(asked, model, patch, other, moments) -> tuple:
-    """(patch, worn depth) of a `PatchModel` on another mesh, or in other strips, by the same jumps and slip paths."""
+    """Return (patch, worn depth) on another mesh, or in other strips, by the same slip paths.
+
+    The jumps are the same, too.
+    """
     area = areas(asked, other.pieces.interface)
 
     def path(used) -> np.ndarray:
+        """Return a slip path on the nodes and strips of the other patch."""
         if asked.interface.strips is None:
             return np.interp(other.x, patch.x, used)
         rows = np.array([np.interp(other.x, patch.x, row) for row in used])
@@ -340,8 +420,17 @@ def _on(asked, model, patch, other, moments) -> tuple:
 
 
 def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved:
-    """`evolve` with its state kept after every jump; kept: where, None keeps nothing; key: what the
-    state belongs to."""
+    """Wear the patch of a model as `evolve` does, and save the state after every jump.
+
+    Parameters
+    ----------
+    kept
+        Where the state is saved; None: nowhere.
+    key : str
+        Identifies what the state belongs to.
+    model, patch, coarse, progress
+        See `evolve`.
+    """
     if kept is None:
         return evolve(model, patch, coarse, progress)
     begin = load_state(kept.path, key) if kept.resume else None
@@ -349,7 +438,16 @@ def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved
 
 
 def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
-    """Write a state and the moments so far; an earlier file is replaced only when the new one is whole."""
+    """Save a state and the moments so far; an earlier file is replaced atomically.
+
+    Parameters
+    ----------
+    path : Path
+    key : str
+        Identifies what the state belongs to.
+    state : WearState
+    moments : tuple of Moment
+    """
     arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE}
     arrays |= {
         f"moment_{name}": np.array([getattr(one, name) for one in moments]) for name in MOMENT
@@ -362,7 +460,7 @@ def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
 
 
 def nothing_kept(path: Path) -> PatchfemError:
-    """That there is no state to go on from; path: of the state, in the folder that a run works in."""
+    """Return the error that there is no saved state; path: of the state, in the folder of a run."""
     return PatchfemError(
         f"{path.parent.name.removesuffix('.partial')}: this folder contains no interrupted run; run "
         "without --resume"
@@ -370,7 +468,13 @@ def nothing_kept(path: Path) -> PatchfemError:
 
 
 def load_state(path: Path, key: str) -> tuple:
-    """(state, moments) of a kept file. PatchfemError where it belongs to another scene or cannot be read."""
+    """Return (state, moments) from a saved file.
+
+    Raises
+    ------
+    PatchfemError
+        If it belongs to another scene or cannot be read.
+    """
     try:
         with np.load(path, allow_pickle=False) as file:
             found = {name: file[name] for name in file.files}
@@ -392,7 +496,7 @@ def load_state(path: Path, key: str) -> tuple:
         raise nothing_kept(path) from None
     except PatchfemError:
         raise
-    except Exception as error:  # a damaged archive has many ways to fail
+    except Exception as error:  # a damaged archive can fail in many ways
         raise PatchfemError(
             f"{path.parent.name}: the state saved there cannot be read ({error}); run without "
             "--resume"

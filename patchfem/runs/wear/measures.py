@@ -1,4 +1,8 @@
-"""What was worn, as measures with their errors, and its way there as arrays over the cycles."""
+"""Measures of wear with their errors, and the history of wear as arrays over the cycles.
+
+In: the Result of a run on the worn patch, and its `Evolved`. Out: the Result with the measures,
+fields, warnings and notes of wear.
+"""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -15,8 +19,9 @@ from ..results.patch_rows import TABLE, WORN
 from .evolve import THIN, mean_depth, worn_through
 from .slip import UNBOUNDED, of_point
 
-FRAMES = 24  # of the interface on the way
-# and nodes beside an edge of the contact that the peak may stand on
+FRAMES = 24  # frames of the interface during the wear
+# name of the peak at an edge of the contact in the history; nodes next to an edge that count as the
+# edge
 EDGE_PEAK, BESIDE = (
     "pressure_peak_at_edge",
     2,
@@ -25,7 +30,16 @@ HOLDER = {"closing": "approach", "rotation": "rotation"}
 
 
 def worn(result, found, estimate: bool = True):
-    """The Result of a run on the worn patch with what was worn; found: the `Evolved`, None for one point."""
+    """Return the Result of a run on the worn patch with the measures of wear.
+
+    Parameters
+    ----------
+    result : Result
+    found : Evolved or None
+        None for a single point.
+    estimate : bool
+        Whether errors are computed.
+    """
     model = result.plan.model
     if found is None and result.outcome in UNBOUNDED:
         return replace(
@@ -63,7 +77,10 @@ def worn(result, found, estimate: bool = True):
 
 
 def _gone(model, found, error: float | None) -> dict:
-    """worn_through_cycle where a coating is gone; error [m]: of the largest depth."""
+    """Return worn_through_cycle by name if a coating is worn through.
+
+    error: of the largest depth [m].
+    """
     if worn_through(model, found.state.depth) is None:
         return {}
     before, last = found.moments[-2:]
@@ -77,12 +94,12 @@ def _gone(model, found, error: float | None) -> dict:
 
 
 def _begun(model) -> list:
-    """A note on the run from which this one goes on."""
+    """Return a note on the earlier run from which this one continues."""
     return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
 def _ended(model, found, gone: dict) -> list:
-    """A note on the coating that is gone."""
+    """Return a note on the coating that is worn through."""
     if not gone:
         return []
     (name, thickness), depth = worn_through(model, found.state.depth), found.state.depth
@@ -101,10 +118,18 @@ def _ended(model, found, gone: dict) -> list:
 
 
 def jumped(model, found, measures: dict) -> dict:
-    """Measures of the worn patch with what the length of the jumps adds to their errors.
+    """Return measures of the worn patch whose errors include those by the length of the jumps.
 
-    That is the change to the depth by the same jumps undivided, and to another number of strips, at first order: a
-    contact edge that moves during a jump leaves the nodes that it has just taken too high.
+    They are the change if the depth is computed by the same jumps without subdivision, and the
+    change to another number of strips, at first order: an edge of contact that moves during a jump
+    leaves nodes that just came into contact too high.
+
+    Parameters
+    ----------
+    model : Model
+    found : Evolved
+    measures : dict
+        Measures by name.
     """
     rough = values(pressed(model.patch, found.patch.pair, frozen_array(found.state.rough)))
     here = values(found.patch)
@@ -125,14 +150,17 @@ def jumped(model, found, measures: dict) -> dict:
 
 
 def period_of(model, result) -> float:
-    """Length of one cycle of wear [s]: of the drive, of the slide, of the whole path where it does not repeat."""
+    """Return the duration of one cycle of wear [s].
+
+    It is the period of the drive or of the slide, or the duration of a path that does not repeat.
+    """
     if model.rig is not None:
         return model.rig.drive.signal.period
     return model.slide.period or float(result.response.time[-1])
 
 
 def _deep(model, found) -> list:
-    """Warnings of a worn depth that the pieces as meshed no longer stand for."""
+    """Return warnings of a worn depth that invalidates the stiffness of the unworn pieces."""
     depth, asked, out = float(found.state.depth.max(initial=0.0)), model.patch, []
     for share, piece, name in (
         (model.wear.upper_share, asked.pieces.upper, "upper"),
@@ -148,7 +176,10 @@ def _deep(model, found) -> list:
 
 
 def slip_miss(measures: dict) -> float:
-    """Relative error of the slip of a run: that of its slip amplitude, of its displacement where it has none."""
+    """Return the relative error of the slip of a run.
+
+    It is that of the slip amplitude, or else of the displacement.
+    """
     for name in ("slip_amplitude", "relative_displacement_amplitude"):
         found = measures.get(name)
         if found is not None and found.value and found.error is not None:
@@ -157,8 +188,17 @@ def slip_miss(measures: dict) -> float:
 
 
 def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
-    """worn_volume and worn_depth_max of an `Evolved`, with the errors of both before its first cycle; motion: measures
-    of the run on the worn patch."""
+    """Return worn_volume and worn_depth_max with errors that include earlier runs.
+
+    Parameters
+    ----------
+    model : Model
+    found : Evolved
+    motion : dict
+        Measures of the run on the worn patch by name.
+    estimate : bool
+        Whether errors are computed.
+    """
     state, area = found.state, areas(model.patch, found.patch.pieces.interface)
     share = found.miss + slip_miss(motion) + _coarser(found, motion)
     mine, *others = [
@@ -200,9 +240,19 @@ def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
 
 
 def friction_of(model, found, motion: dict, error: float | None) -> dict:
-    """Numbers of the law after wear, and measures of the motion with what the error of the mean depth adds to theirs.
+    """Return the parameters of the friction law after wear, and measures with wider errors.
 
-    error [m3]: of the worn volume, or None. A measure changes with the depth as it did in the last two jumps.
+    The error of the mean depth changes the measures of the motion, at the rate of the last two
+    jumps.
+
+    Parameters
+    ----------
+    model : Model
+    found : Evolved
+    motion : dict
+        Measures of the run on the worn patch by name.
+    error : float or None
+        Error of the worn volume [m3].
     """
     change, area = model.wear.friction, float(found.patch.pieces.interface.weight.sum())
     deep = [mean_depth(found.patch, one.depth) for one in found.moments[-3:]]
@@ -235,7 +285,7 @@ def friction_of(model, found, motion: dict, error: float | None) -> dict:
 
 
 def _beyond_table(model, found) -> list:
-    """Warnings of wear beyond the last row of the table of friction, and of jumps past its rows."""
+    """Return warnings of wear beyond the table of friction, and of jumps past its rows."""
     change = model.wear.friction
     if change is None:
         return []
@@ -260,7 +310,7 @@ def _beyond_table(model, found) -> list:
 
 
 def _lost(asked, patch, depth) -> dict:
-    """Worn volume [m3] and largest depth [m] of a `PatchModel` by name."""
+    """Return worn volume [m3] and largest depth [m] of a `PatchModel` by name."""
     return {
         "worn_volume": float(np.vdot(depth, areas(asked, patch.pieces.interface))),
         "worn_depth_max": float(depth.max(initial=0.0)),
@@ -268,8 +318,10 @@ def _lost(asked, patch, depth) -> dict:
 
 
 def _coarser(found, motion: dict) -> float:
-    """Relative difference between the slip of the last cycle that wore the patch and that of the run on the worn patch,
-    whose steps may have been halved for its tolerance."""
+    """Return the relative difference of the slip in the last cycle of wear from that of the run.
+
+    The run on the worn patch may have used smaller steps for its tolerance.
+    """
     used, last = found.moments[-1].values.get("slip_amplitude"), motion.get("slip_amplitude")
     return (
         abs(used / last.value - 1) if used is not None and last is not None and last.value else 0.0
@@ -277,7 +329,17 @@ def _coarser(found, motion: dict) -> float:
 
 
 def volume_of_point(model, result, estimate: bool = True) -> dict:
-    """worn_volume of one point under [normal]: coefficient times load times slip path, over all cycles of wear."""
+    """Return worn_volume of a single point under [normal] by name.
+
+    It is coefficient times load times slip path, over all cycles of wear.
+
+    Parameters
+    ----------
+    model : Model
+    result : Result
+    estimate : bool
+        Whether the error is computed.
+    """
     path, miss = of_point(
         model, result.window, {name: m.value for name, m in result.measures.items()}
     )
@@ -291,10 +353,18 @@ def volume_of_point(model, result, estimate: bool = True) -> dict:
 
 
 def frames(found, fields: dict, period: float) -> dict:
-    """Fields (frame, x), of strips their worn depth as (frame, strip, x), of the way and of the last cycle: states
-    after some of the jumps first, then the motion.
+    """Return the fields (frame, x) of the wear and of the last cycle by name.
 
-    The time of a state is its cycle times the period [s], the last cycle follows on.
+    The states after some of the jumps come first, then the motion. The time of a state is its cycle
+    times the period, and the last cycle follows. The worn depth of strips is (frame, strip, x).
+
+    Parameters
+    ----------
+    found : Evolved
+    fields : dict
+        Fields of the last cycle.
+    period : float
+        Period [s].
     """
     pick = np.unique(np.linspace(0, len(found.moments) - 1, FRAMES).round().astype(int))
     shown = [found.moments[k] for k in pick[:-1]] if len(pick) > 1 else []
@@ -324,7 +394,10 @@ def frames(found, fields: dict, period: float) -> dict:
 
 
 def history(found) -> dict:
-    """Measures over the cycles: name -> (j,), with `cycle`, of every name that all moments have, and `EDGE_PEAK`."""
+    """Return measures over the cycles (j,) by name, with `cycle` and `EDGE_PEAK`.
+
+    They are those that all moments have.
+    """
     moments = found.moments
     names = [name for name in moments[-1].values if all(name in one.values for one in moments)]
     return (
@@ -335,11 +408,11 @@ def history(found) -> dict:
 
 
 def edge_peak(pressure) -> float:
-    """How far [Pa] the pressure (m,) at an edge of the contact stands above all that is farther inside; 0 where the
-    largest pressure is inside, or the contact ends with the piece.
+    """Return by how much [Pa] the pressure at an edge of the contact exceeds that inside.
 
-    A contact edge between two nodes moves as the pieces wear, and the element at the edge takes what its neighbours
-    should: such a peak errs by as much as it stands out.
+    It is 0 if the largest pressure is inside, or if the contact ends with the piece. A contact edge
+    between two nodes moves as the pieces wear, and the element at the edge carries part of the load
+    of its neighbours: the error of such a peak is this excess. pressure: (m,) [Pa].
     """
     bears, top = np.asarray(pressure) > 0, int(np.argmax(pressure))
     inside = (

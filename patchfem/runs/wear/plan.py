@@ -1,4 +1,8 @@
-"""What the cycles of wear cost, before anything runs."""
+"""Predicted number of jumps and cost of the cycles of wear.
+
+In: a model with [wear] and the cost of its motion. Out: `Cost`. Automatic jumps are counted on
+a row of independent springs that wears like the patch.
+"""
 
 import numpy as np
 
@@ -8,26 +12,32 @@ from ...wear.jumps import WearProblem, start_wear, take_jump
 from ..cost import Cost
 from .evolve import next_row
 
-PRESSED = 20  # contact solves in a jump with its corrections
-FEWER = 7  # of those of a strip, each begun from the one before it
-AGAIN = 0.7  # of a motion with its coarser runs is the finest, with more of the patch at work as it wears
-SOLVE = 1.2e-8  # s per squared interface point of one of them, and of the measures after it
-ROW, FINE = 192, 1000  # springs of the row whose jumps are counted, of a pinned mesh at most
-# thickness of the springs within a patch, over the length in contact, and at an end of it
+PRESSED = 20  # contact solutions per jump, with its corrections
+FEWER = 7  # contact solutions per jump and strip, because each starts from the previous one
+# fraction of the cost of a motion with its coarse runs that the fine run has; includes more active
+# nodes by wear
+AGAIN = 0.7
+# CPU seconds per squared number of interface points of a contact solution, including its measures
+SOLVE = 1.2e-8
+# springs of the row whose jumps are counted; most of them for a prescribed mesh
+ROW, FINE = 192, 1000
+# thickness of the springs over the length in contact, inside a patch; factor of the same at an end
+# of it
 NJIT_INTERNAL, END = (
     0.3,
     0.44,
 )
 SMOOTH = 8  # jumps of a patch whose asperities touch everywhere
-MOST = 1500  # jumps that are counted
+MOST = 1500  # most jumps that are counted
 
 
 def jumps_about(model) -> int:
-    """Number of jumps, within a factor of 1.5 in 54 of 56 cases that were tried, of 2 in all.
+    """Return the approximate number of jumps, of a prescribed number or of automatic ones.
 
-    Automatic ones are those of a row of springs as stiff as the pieces, under the path of the slide, or of a mass that
-    moves freely with the drive; times 0.6 tolerance^-0.18, by which the edges of a contact of pieces want more (193
-    nodes, tilts and crowns, 1e4 to 1e8 cycles, tolerances of 1e-2 and 1e-3).
+    It was within a factor of 1.5 in 54 of 56 cases, and of 2 in all. Automatic jumps are those of a
+    row of springs as stiff as the pieces, with the path of the slide, or of a mass that moves
+    freely with the drive; multiplied by 0.6 tolerance^-0.18, because the edges of a contact of
+    pieces need more (193 nodes, tilts and crowns, 1e4 to 1e8 cycles, tolerances of 1e-2 and 1e-3).
     """
     asked, wear = model.patch, model.wear
     if wear.jumps:
@@ -45,6 +55,7 @@ def jumps_about(model) -> int:
     path = path * (law.static if wear.uses_friction_work else 1.0)
 
     def changing(worn):
+        """Return the slip path with the friction coefficient at the mean worn depth."""
         mean = float(worn @ area / area.sum())
         return (
             path * (wear.friction.worn_law(law, mean).static / law.static) if law.static else path
@@ -65,24 +76,27 @@ def jumps_about(model) -> int:
 
 
 def _path_about(model) -> float:
-    """Slip path [m] of a cycle, as if nothing held the mass of a rig."""
+    """Return the slip path [m] of a cycle, without friction on the mass of a rig."""
     if model.rig is None:
         return (4.0 if model.slide.period else 1.0) * model.slide.amplitude
     return 4 * max_acceleration(model.rig.drive.signal) / drive_omega(model.rig.drive.signal) ** 2
 
 
 def _springs(asked, x, area):
-    """Forces (m,) [N] of a row of springs at x (m,) [m] under the load of a `PatchModel`, as `WearProblem` wants them."""
+    """Return the forces of a row of springs under the load of a `PatchModel`.
+
+    They are a function of worn depth and softening; x: positions (m,) [m], area: (m,) [m2].
+    """
     try:
         gap = asked.gap.at(x).heights
-    except PatchfemError:  # a trace too fine for the row
+    except PatchfemError:  # the profile is too fine for the row
         gap = np.zeros_like(x)
     gap = gap - np.polyval(np.polyfit(x, gap, 1), x) if asked.loading.can_rotate else gap
     compliance = asked.pieces.series_compliance(
         lambda m: (1 + m.poisson) * (1 - 2 * m.poisson) / (1 - m.poisson) / m.young
     )
     solid = compliance * area.sum()
-    # the depth that gives way goes with the length in contact
+    # the depth that deforms is proportional to the length in contact
     share, height = 1.0, max(asked.pieces.lower.height, asked.pieces.upper.height)
     for _ in range(12):
         soft = solid * min(share, 1.0) + (
@@ -90,6 +104,7 @@ def _springs(asked, x, area):
         )
 
         def press(worn, softening, soft=soft):
+            """Return the forces (m,) [N] of the springs."""
             stiff, level = 1 / (soft / area + softening), gap + worn
             order = np.argsort(level)
             rising, carried = level[order], np.cumsum(stiff[order])
@@ -111,7 +126,7 @@ def _springs(asked, x, area):
 
 
 def _anew(model) -> bool:
-    """Whether wear changes the motion."""
+    """Return whether wear changes the motion."""
     return (
         bool(model.partial_slip)
         or model.side == "lower"
@@ -129,7 +144,8 @@ def cost(model, points: int, motion: float) -> Cost:
     points : int
         Nodes of the interface.
     motion : float
-        CPU seconds of the march or of the bench with its coarser runs, of which a jump takes one.
+        CPU seconds of the march or of the bench with its coarse runs, of which a jump needs one
+        run.
     """
     jumps, strips = jumps_about(model), model.patch.interface.strips
     again = AGAIN * motion if _anew(model) else 0.0

@@ -1,4 +1,7 @@
-"""Slip path of every interface point in one cycle of a converged bench or rig."""
+"""Slip path of every interface node in one cycle of a converged bench or rig.
+
+In: a model and its worn patch. Out: `Rubbed` with the path, its error and the outcome.
+"""
 
 from math import ceil, sqrt
 from typing import NamedTuple
@@ -19,12 +22,14 @@ LEAST_FRAMES, MOST_FRAMES = 64, 800
 
 
 class Rubbed(NamedTuple):
-    """What one cycle of a motion does to the interface.
+    """Slip of the interface in one cycle of a motion.
 
-    path (m,), of strips (s, m) [m]: slip path of each node, or with form 'energy' its friction work per area over its
-    pressure, along the flanks of grooves where there are any; miss: its relative error by the frames it is read from,
-    and by what the cycles of the window still differ; values: measures of the motion; outcome: why no cycle repeats,
-    else None.
+    - path: slip path of each node (m,), of strips (s, m) [m]. With form 'energy' it is friction
+      work per area over pressure, and over grooves it is along their flanks.
+    - miss: relative error by the number of frames, and by differences between the cycles of the
+      window.
+    - values: measures of the motion by name.
+    - outcome: reason why no cycle is periodic, else None.
     """
 
     path: np.ndarray
@@ -34,7 +39,7 @@ class Rubbed(NamedTuple):
 
 
 def frames_for(tolerance: float) -> int:
-    """Frames of a cycle from which its slip path has an error of a hundredth of the tolerance.
+    """Return the frames per cycle with which the slip path has an error of tolerance/100.
 
     A reversal between two of k frames of a sine hides up to (pi/k)^2/2 of the amplitude.
     """
@@ -42,7 +47,7 @@ def frames_for(tolerance: float) -> int:
 
 
 def even(model, per_point: bool = False) -> bool:
-    """Whether every point of the patch, or of each of its strips, slides alike."""
+    """Return whether all points of the patch, or of each of its strips, have the same slip."""
     return (
         not model.partial_slip
         and model.side == "upper"
@@ -51,16 +56,20 @@ def even(model, per_point: bool = False) -> bool:
 
 
 def apart(model) -> bool:
-    """Whether strips slide each by themselves, as wear then changes."""
+    """Return whether strips slide independently, which changes with wear."""
     return model.rig is not None and model.rig.friction.strips_slide_apart
 
 
 def rubbed(model, patch, frames: int) -> Rubbed:
-    """One converged cycle of a model on a patch; frames: how many of the interface it is read from."""
+    """Return the slip of one converged cycle of a model on a patch.
+
+    frames: number of frames of the interface from which it is computed.
+    """
     return _bench(model, patch, frames) if model.rig is None else _rig(model, patch, frames)
 
 
 def _bench(model, patch, frames: int) -> Rubbed:
+    """Return the slip of the last cycle of a bench."""
     cycles = max(1, round(model.slide.cycles or 1))
     steps = steps_of(model)
     shaped = not even(model)
@@ -74,7 +83,7 @@ def _bench(model, patch, frames: int) -> Rubbed:
                 np.concatenate([np.zeros((1, part.shape[1])), part]) for part in (local, tau)
             )
             slide = np.append(0.0, slide)
-            if model.grooves is not None:  # it stands on its flank
+            if model.grooves is not None:  # at the start the load rests on the flank of a groove
                 tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
         if model.grooves is not None:
             local, tau = slip_path_of(
@@ -86,6 +95,7 @@ def _bench(model, patch, frames: int) -> Rubbed:
 
 
 def _rig(model, patch, frames: int) -> Rubbed:
+    """Return the slip of the last cycle of a rig."""
     chosen = numerics.choose(model)
     shaped = not even(model, chosen.per_point and model.grooves is None)
     found = engines.ENGINES[chosen.engine].run(
@@ -123,16 +133,27 @@ def _rig(model, patch, frames: int) -> Rubbed:
 
 
 def _beat(values: dict, slip) -> float:
-    """By how much the slip of the last cycle (k,) [m] differs from the amplitude of the whole window, relative: what a
-    mode that still beats leaves open."""
+    """Return the relative difference of the last slip amplitude from that of the window.
+
+    It is due to a mode that still beats. slip: (k,) [m] of the last cycle.
+    """
     own, whole = float(np.ptp(slip)) / 2, values.get("slip_amplitude")
     return abs(whole / own - 1) if whole is not None and own > 0 else 0.0
 
 
 def of_point(model, window, values: dict) -> tuple:
-    """(slip path [m] of one cycle of one point under [normal], its relative error by what the cycles still differ).
+    """Return the slip path [m] of one cycle of a point under [normal], and its relative error.
 
-    It is weighted with the load where that changes. window: histories of a bench or a rig; values: measures by name.
+    It is weighted with the load if that changes. The error is that by differences between the
+    cycles.
+
+    Parameters
+    ----------
+    model : Model
+    window
+        Histories of a bench or a rig.
+    values : dict
+        Measures by name.
     """
     beat = 0.0
     if model.rig is not None:
@@ -147,16 +168,20 @@ def of_point(model, window, values: dict) -> tuple:
 
 
 def _last_cycle(model, window, load: float) -> list:
-    """Slide [m], slip [m], force [N] and load [N] (k,) of the last cycle of a rig; over grooves the vertical force."""
+    """Return slide [m], slip [m], force [N] and load [N] (k,) of the last cycle of a rig.
+
+    Over grooves the load is the vertical force.
+    """
     last = window.time >= window.time[-1] - model.rig.drive.signal.period * (1 + 1e-9)
     loads = window.extra.get("normal_load", np.full(window.time.size, load))
     return [part[last] for part in (window.slide, window.slip, window.force, loads)]
 
 
 def _in_strips(model, patch, found, outcome) -> Rubbed:
-    """The path of every strip of a rig whose modes yaw, along x; an open strip slides as the nearest that bears.
+    """Return the slip of every strip of a rig with yaw, along x.
 
-    Every third sample tells what turns between samples hide, as in `_read`.
+    An open strip has the slip of the nearest strip in contact. Every third sample shows the error
+    by reversals between samples, as in `_read`.
     """
     window, loads = found.window, patch.strips.force.sum(axis=1)
     last = window.time >= window.time[-1] - model.rig.drive.signal.period * (1 + 1e-9)
@@ -171,6 +196,7 @@ def _in_strips(model, patch, found, outcome) -> Rubbed:
     )
 
     def path(some) -> np.ndarray:
+        """Return the slip path (s,) [m] of the strips from some samples."""
         return np.array(
             [_summed(slip, heavy) for slip, heavy in zip(slips[some].T, weight[some].T)]
         )
@@ -190,10 +216,12 @@ def _in_strips(model, patch, found, outcome) -> Rubbed:
 
 
 def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rubbed:
-    """The path of a slide that is the same at every point: its length under `scale` [N], from slide, slip, force and
-    load (k,) of the last cycle."""
+    """Return the slip that is the same at every point, over `scale` [N].
+
+    last: slide, slip, force and load (k,) of the last cycle.
+    """
     slide, slip, force, load = last
-    # friction opposes the slip, also where a step reverses it
+    # friction opposes the slip, also in a step with a reversal
     weight = np.abs(force) if model.wear.uses_friction_work else load
     miss = 0.0
     if model.grooves is not None:
@@ -210,14 +238,23 @@ def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rub
 
 
 def _summed(slip, weight) -> float:
+    """Return the integral of the weight over |slip| by the trapezoidal rule."""
     return float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2))
 
 
 def along_flanks(model, slide, force, load) -> np.ndarray:
-    """What wears per slide on the flanks of grooves (k,) [N]: R ds/dq = V + F t of the normal force R, with form
-    'energy' |f| ds/dq = |F - V t| of the friction f along them.
+    """Return the force per slide (k,) [N] that wears the flanks of grooves.
 
-    slide [m], force F against the slide [N] and vertical force V [N] (k,).
+    It is R ds/dq = V + F t of the normal force R, or with form 'energy' |f| ds/dq = |F - V t| of
+    the friction force f along the flank, with the slope t.
+
+    Parameters
+    ----------
+    model : Model
+    slide : (k,)
+        [m].
+    force, load : (k,)
+        Force F against the slide and vertical force V [N].
     """
     t = model.grooves.slope(slide)
     if model.wear.uses_friction_work:
@@ -226,12 +263,23 @@ def along_flanks(model, slide, force, load) -> np.ndarray:
 
 
 def slip_path_of(model, patch, slide, vertical, local, tau) -> tuple:
-    """(slip along the flank (f, m) [m], what wears there (f, m) [Pa]) of points of pieces that give way, from frames of
-    the holder's slide (f,) [m], the vertical force V (f,) [N], irreversible slip and resultant traction (f, m).
+    """Return slip along the flank [m] and wearing stress [Pa] (f, m) of points over grooves.
 
-    The slip is s - e, s the path along the flank and e what is elastic of it. A point of pressure sigma carries V
-    sigma/N, so its normal stress on the flank is R = (V sigma/N + tau t)/sqrt(1 + t^2) and its friction along it, with
-    form 'energy', |tau - t V sigma/N|/sqrt(1 + t^2).
+    The slip is s - e, with the path s along the flank and its elastic part e. A point of pressure
+    sigma carries V sigma/N, so that its normal stress on the flank is R = (V sigma/N + tau
+    t)/sqrt(1 + t^2), and its friction along the flank, used with form 'energy', is |tau - t V
+    sigma/N|/sqrt(1 + t^2).
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    slide : (f,)
+        Slide of the holder in each frame [m].
+    vertical : (f,)
+        Vertical force V [N].
+    local, tau : (f, m)
+        Slip [m] and resultant traction [Pa].
     """
     g, sigma = model.grooves, patch.pressure.sigma_n
     t = g.slope(slide)[:, None]
@@ -246,12 +294,24 @@ def slip_path_of(model, patch, slide, vertical, local, tau) -> tuple:
 
 
 def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubbed:
-    """The path of every node from frames (f, m) of local slip [m] and shear stress [Pa], over grooves those of
-    `slip_path_of`; closed: the last frame is followed by the first.
+    """Return the slip path of every node from frames of local slip and shear stress.
 
-    A reversal between two frames hides f(d) of the path, d <= 1/2 of their distance. Every third frame hides f(d),
-    f(1 - d) or f(1 + d), from the first, the second or the third: in the mean so much more that 3/2 of it hold f(d)
-    wherever d lies, of a corner f = c d as of a smooth turn f = c d^2.
+    Over grooves, the frames are those of `slip_path_of`. A reversal between two frames hides f(d)
+    of the path, d <= 1/2 of their distance. Every third frame hides f(d), f(1 - d) or f(1 + d), for
+    the first, second or third choice: 3/2 of the mean excess contains f(d) for any d, for a corner
+    f = c d as well as for a smooth reversal f = c d^2.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    local, tau : (f, m)
+        Local slip [m] and shear stress [Pa].
+    closed : bool
+        Whether the last frame is followed by the first one.
+    values : dict
+        Measures by name.
+    outcome : Outcome or None
     """
     path = _path(model, patch, local, tau, closed)
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
@@ -266,6 +326,7 @@ def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubb
 
 
 def _path(model, patch, local, tau, closed: bool) -> np.ndarray:
+    """Return the slip path (m,) [m] of the nodes from frames."""
     if closed:
         local, tau = (np.concatenate([part[-1:], part]) for part in (local, tau))
     steps = np.abs(np.diff(local, axis=0))
@@ -278,7 +339,10 @@ def _path(model, patch, local, tau, closed: bool) -> np.ndarray:
 
 
 def _nearest(x, active) -> np.ndarray:
-    """Number (m,) of the nearest node in contact; one that comes into contact during a jump slides as its neighbour."""
+    """Return the index (m,) of the nearest node in contact.
+
+    A node that comes into contact during a jump has the slip of this neighbour.
+    """
     touching = np.flatnonzero(active)
     if not touching.size:
         return np.arange(x.size)
