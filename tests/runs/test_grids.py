@@ -5,6 +5,7 @@ import pytest
 from scene_texts import SMALL_PATCH
 
 from patchfem import build
+from patchfem.runs.patch import grids, store
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.plan import expected_grids
 from patchfem.scene.scene import loads
@@ -71,3 +72,20 @@ def test_always_a_plan_expects_the_grids_of_a_contact_that_only_its_pressure_end
     patch = asked(text)
     (found,), ((wanted,), _) = expected_grids(patch, 1e-2).finest, grids_of_run(patch, 1e-2)
     assert np.array_equal(found, wanted)
+
+
+ECCENTRIC_LOAD = 'offset = "3 mm"'
+SMALL_CROWN = 'radius = "0.3 m"'
+
+
+@pytest.mark.parametrize(
+    "ending", [ENDING.format("load_line", ECCENTRIC_LOAD), ENDING.format("crown", SMALL_CROWN)]
+)
+def test_always_further_searches_for_the_contact_give_the_same_columns(ending, monkeypatch):
+    columns = []
+    for fraction in (grids.SETTLED_FRACTION, -1.0):  # a search is never settled with -1
+        store.clear()
+        monkeypatch.setattr(grids, "SETTLED_FRACTION", fraction)
+        columns.append(grids.base_grids(asked(PIECES + ending)).bodies[0].x)
+    settled, searched = columns
+    assert np.abs(settled - searched).max() < 0.1 * np.diff(searched).min()

@@ -47,6 +47,9 @@ SLIP_CELLS = 4
 MAX_SEARCH_CELL = 4.0
 # most searches; each one has columns that are graded to the result of the previous one
 MAX_SEARCHES = 8
+# The search ends when no band of the layout moves or changes by more than this fraction of its
+# cell, because the next search would have the same columns.
+SETTLED_FRACTION = 0.1
 MIN_LEVELS = 3  # fewer nested meshes do not show an order of convergence
 # predicted CPU seconds of condensing, above which a finer mesh is not tried
 MAX_SECONDS = {
@@ -114,27 +117,50 @@ class BaseGrids(NamedTuple):
 def base_grids(asked) -> BaseGrids:
     """Return the coarsest grids of a `PatchModel`, graded to the contact that is found on them.
 
+    The result is kept, because the plan of a run and the run itself need the same grids.
+    """
+    has_files = asked.mesh.file is not None or asked.gap.profile is not None
+    key = ("base grids", asked if has_files else store.content_key(asked))
+    return store.reuse(key, lambda: _search_grids(asked))
+
+
+def _search_grids(asked) -> BaseGrids:
+    """Search for the contact of a `PatchModel` on columns graded to the result of the last search.
+
     If a varying load moves the edges of the contact, the columns are fine wherever the edges lie
     between SWING times the load; if wear moves them, no column is longer than WEAR_CELL of the
     interface.
     """
-    sweep = [
-        asked.with_loading(load=share * asked.loading.load)
-        for share in SWING
-        if asked.mesh.edge_motion == "load" and asked.loading.load is not None
-    ]
-    layout, contact = search_layout(asked), None
+    sweep = []
+    if asked.mesh.edge_motion == "load" and asked.loading.load is not None:
+        sweep = [asked.with_loading(load=share * asked.loading.load) for share in SWING]
+    layout = search_layout(asked)
+    contact = None
     # without a load there is no contact to search for
     for search in range(MAX_SEARCHES if asked.nominal_load > 0 else 0):
         pair = condensed(asked, *grids_of(asked, layout)) if search else search_pair(asked)
         x = pair.grid.x
         seen = [contact_extent(pressed(each, pair), asked.mesh.slip) for each in (asked, *sweep)]
-        layout, contact = layout_of(asked, seen), seen[0]
+        contact = seen[0]
+        last = layout
+        layout = layout_of(asked, seen)
         cells = max(one.cell / one.wide for one in seen)
         shows = _shows_crests(asked, x, layout) and _shows_slip(contact.slip_zones, x, layout)
         if cells <= 1 / (EDGE_CELLS[asked.mesh.is_static] - 1) and shows:
             break
+        if _is_settled(layout, last):
+            break
     return BaseGrids(grids_of(asked, layout), contact)
+
+
+def _is_settled(layout: Layout, last: Layout) -> bool:
+    """Return whether the bands of two layouts differ by at most SETTLED_FRACTION of their cells."""
+    if len(layout.bands) != len(last.bands):
+        return False
+    bands = np.reshape(layout.bands, (-1, 3))
+    last_bands = np.reshape(last.bands, (-1, 3))
+    cells = np.minimum(bands[:, 2:], last_bands[:, 2:])
+    return bool((np.abs(bands - last_bands) <= SETTLED_FRACTION * cells).all())
 
 
 def _shows_slip(zones: tuple, x, layout: Layout) -> bool:

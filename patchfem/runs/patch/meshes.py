@@ -278,10 +278,8 @@ def _merged(layouts: list, between: bool) -> Layout:
     low, high, _ = np.array(bands).T
     places = np.linspace(low, high, 5, axis=1)
     # only the bands that shorten some cell are kept, because most are redundant
-    size, kept = (
-        out.cell_lengths(places),
-        [],
-    )
+    size = out.cell_lengths(places)
+    kept = []
     for k, band in enumerate(bands):
         if (size[k] > band[2] * (1 + 1e-9)).any():
             kept.append(band)
