@@ -1,8 +1,9 @@
-"""Warnings about measures whose error exceeds the tolerance, each with the setting that makes them more accurate.
+"""Warnings about measures whose error exceeds the tolerance, with the setting that helps.
 
-The error of a measure is `safety * change / (ratio**order - 1)` (`response.errors`). So an error that exceeds what is
-allowed `excess` times needs a resolution that is `excess ** (1 / order)` times as fine. Read `tolerance_warnings`
-first, then `_motion_remedy`.
+In: a `Finding`, i.e. the measures of a run with their errors. Out: sentences. The error of a
+measure is `safety * change / (ratio**order - 1)` (`response.errors`). An error that is `excess`
+times the allowed one therefore needs a resolution that is `excess ** (1 / order)` times as
+fine. Read `tolerance_warnings` first, then `_motion_remedy`.
 """
 
 from collections.abc import Mapping
@@ -19,9 +20,12 @@ from .results import notes, patch_rows
 from .rig import costs, engines
 
 MAX_EXCESS = 1e9  # error over what is allowed; a larger one belongs to a value that is zero
-TIGHTER = 0.1  # ratio of a proposed tolerance to that of the scene, which gives a mesh of one halving more at least
-MAX_HALVINGS = 4  # halvings of the steps for which an order that was seen at two of them is trusted
-# fraction of an allowed error that is left to the steps where other causes take all of it
+# ratio of a proposed tolerance to that of the scene, which gives at least one more halving of the
+# mesh
+TIGHTER = 0.1
+# halvings of the steps up to which an order that was observed over two halvings is used
+MAX_HALVINGS = 4
+# fraction of the allowed error that is left for the steps if other causes use up all of it
 MIN_STEP_SHARE = 0.2
 MAX_STRIPS = 64  # number of strips proposed; four times the strips take about twenty times as long
 # measures that converge with the first power of the strips
@@ -29,17 +33,17 @@ FIRST_ORDER = (
     "pressure_peak",
     "loaded_fraction",
 )
-# measures read off samples, however many harmonics there are
+# measures that come from samples, for any number of harmonics
 SAMPLED = (
     "stick_fraction",
     "slip_start_phase",
 )
-RING = "ring_"  # prefix of the measures of a ring, which an engine without steps need not have
+RING = "ring_"  # prefix of the measures of ringing, which an engine without steps need not have
 STEADY = "relative_displacement_amplitude_steady"
 USE_ERROR = "use the value with its stated error"
 NO_REMEDY = f"no known setting makes this value more accurate; {USE_ERROR}"
 ELEMENT_SIZE = "contact.element_size"
-# measures that a run answers first: those among them that exceed the tolerance are named before all others
+# main measures of a run: those that exceed the tolerance are named first
 MAIN = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
@@ -51,7 +55,7 @@ MAIN = (
 
 
 class Finding(NamedTuple):
-    """Part of a result that the warnings depend on.
+    """Part of a result on which the warnings depend.
 
     Attributes
     ----------
@@ -62,7 +66,8 @@ class Finding(NamedTuple):
     extra : Mapping
         As in a `Result`.
     climbed : tuple
-        The patch before wear on the meshes of its ladder, fine to coarse, if it chose the mesh of a worn patch.
+        The patch before wear on the meshes of its ladder, fine to coarse, if it chose the mesh of a
+        worn patch.
     """
 
     model: object
@@ -73,7 +78,7 @@ class Finding(NamedTuple):
 
 
 def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
-    """Return a warning about the static measures and one about those of the motion that exceed the tolerance.
+    """Return warnings about measures, static and of the motion, that miss the tolerance.
 
     Parameters
     ----------
@@ -116,7 +121,7 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
 
 
 def _finding_of(found: Finding, face) -> Finding:
-    """Return the static measures of the patch of an interface, without the number behind their names."""
+    """Return the static measures of the patch of an interface, without numbers in their names."""
     numbered = {
         name: found.measures.get(rows.of_number(name, face.number)) for name in patch_rows.TABLE
     }
@@ -125,7 +130,11 @@ def _finding_of(found: Finding, face) -> Finding:
 
 
 def _named_measures(found: Finding, excess: dict) -> list[str]:
-    """Return the main measures with an excess that are not zero within their error, else the one with the largest."""
+    """Return the names of the measures that a warning mentions.
+
+    They are the main measures with an excess that are not zero within their error, else the measure
+    with the largest excess.
+    """
     known = found.measures
     main = [name for name in MAIN if name in excess and known[name].error < abs(known[name].value)]
     others = {name: times for name, times in excess.items() if not name.startswith(RING)} or excess
@@ -146,13 +155,14 @@ def _warning(found: Finding, excess: dict, remedy: str) -> str:
 
 
 def _error_words(measure) -> str:
+    """Return the relative error of a measure as text."""
     if abs(measure.error) < abs(measure.value):
         return f"{abs(measure.error / measure.value):.2g} of its value"
     return f"at least its value ({measure})"
 
 
 def _static_remedy(found: Finding, excess: dict, coarse) -> str:
-    """Return what makes static measures more accurate: strips, or a mesh."""
+    """Return the remedy for static measures: more strips, or a finer mesh."""
     asked, peak = found.model.patch, found.measures.get("pressure_peak")
     is_wear_unbounded = (
         "worn_depth_max" in _named_measures(found, excess)
@@ -176,8 +186,9 @@ def _static_remedy(found: Finding, excess: dict, coarse) -> str:
 def _strip_remedy(asked, excess: dict) -> str:
     """Return the number of strips that meets the tolerance.
 
-    The peak of the outermost strip is taken in its middle, so its error is of first order in the width of a strip. The
-    errors of all other measures are of second order, as those of the mesh.
+    The peak of the outermost strip is computed at its centre, so that its error is of first order
+    in the width of a strip. The errors of all other measures are of second order, like those of the
+    mesh.
     """
     ratio = max(times if name in FIRST_ORDER else times**0.5 for name, times in excess.items())
     count = ceil(asked.interface.strips.count * ratio)
@@ -189,7 +200,11 @@ def _strip_remedy(asked, excess: dict) -> str:
 
 
 def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
-    """Return what refines the mesh of each place, a pair of a Finding and its coarser patches."""
+    """Return the remedy that refines meshes.
+
+    places: pairs of a Finding and its coarser patches; is_at_limit: whether the ladder of meshes
+    has ended.
+    """
     asked = [found.model.patch for found, _ in places]
     cause = f"the mesh ({max(found.patch.x.size for found, _ in places)} interface nodes) causes this error"
     if any(patch.mesh.file is not None for patch in asked):
@@ -218,9 +233,9 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
 
 
 def _refining_tolerance(found: Finding, coarse) -> float | None:
-    """Return the tolerance for which a patch takes a finer mesh; None if the ladder of its meshes has ended.
+    """Return the tolerance for which a patch gets a finer mesh; None if its ladder has ended.
 
-    If the coarser meshes are not at hand, it is the tolerance of one halving more.
+    If the coarser meshes are not at hand, it is the tolerance for one more halving.
     """
     asked, tolerance = found.model.patch, found.model.accuracy.tolerance
     if asked.mesh.shared is not None and isinstance(found.patch, press.Patch):
@@ -234,7 +249,7 @@ def _refining_tolerance(found: Finding, coarse) -> float | None:
 
 
 def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
-    """Return what makes the main measure of a motion more accurate, by the largest part of its error.
+    """Return the remedy for the main measure of a motion, by the largest part of its error.
 
     A looser tolerance is no remedy: it chooses coarser steps and meshes.
     """
@@ -266,7 +281,7 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
         if pinned:
             return f"leave out {' and leave out '.join(pinned)}"
         return f"set accuracy.tolerance = {TIGHTER * model.accuracy.tolerance:.3g} to refine the sum over bonds"
-    if name == STEADY:  # the transient dies out in a longer run
+    if name == STEADY:  # the transient decays in a longer run
         return "more drive cycles make this value more accurate; raise drive.cycles"
     if extra.get("harmonics") is None or name.startswith(SAMPLED):
         return NO_REMEDY
@@ -274,20 +289,20 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
 
 
 def _main_cause(found: Finding, name: str) -> str:
-    """Return the largest part of the error of a measure: one of the kinds of `response.coarser.left_open`."""
+    """Return the largest part of the error of a measure, a kind of `response.coarser.left_open`."""
     parts = found.extra.get("left_open")
     if parts is not None:
         return max(
             parts["parts"], key=lambda kind: parts["parts"][kind].get(name, 0.0), default="own"
         )
-    # a batch, which has no steps, or a run without an estimate
+    # results of a batch, or of a run without an estimate, have no parts
     if found.extra.get("steps_per_cycle") or found.extra.get("steps"):
         return "steps"
     return "own" if found.patch is None else "mesh"
 
 
 def _step_remedy(found: Finding, name: str, excess: dict, steps: int) -> str:
-    """Return the steps per cycle that the order of convergence of a measure asks for, or what helps without one."""
+    """Return the steps per cycle that the order of convergence requires, or another remedy."""
     model = found.model
     parts = found.extra.get("left_open") or {"parts": {"steps": {name: 1.0}}, "orders": {name: 2.0}}
     order = parts["orders"].get(name)
@@ -312,6 +327,7 @@ def _step_remedy(found: Finding, name: str, excess: dict, steps: int) -> str:
 
 
 def _no_order(name: str, steps: int) -> str:
+    """Return the sentence that a measure does not converge with the steps."""
     return (
         f"the steps per cycle were doubled twice, up to {steps}, and the second doubling changed "
         f"{name} at least as much as the first"
@@ -319,9 +335,9 @@ def _no_order(name: str, steps: int) -> str:
 
 
 def _remedy_without_order(model, steps: int, excess: dict, exact: str) -> str:
-    """Return what helps a run whose measures do not converge with its steps.
+    """Return the remedy for a run whose measures do not converge with its steps.
 
-    Steps that are left out are doubled until the displacement meets the tolerance.
+    Steps that the scene does not fix are doubled until the displacement meets the tolerance.
     """
     if exact:
         return f", so more steps may not help; {exact}"
@@ -336,9 +352,11 @@ def _remedy_without_order(model, steps: int, excess: dict, exact: str) -> str:
 
 
 def _end_remedy(cycles: float, steps: int) -> str:
-    """Return the steps per cycle, up to twice as many, that end a run closest to the end that was asked for.
+    """Return the remedy for a run that ends between two samples.
 
-    They are a multiple of four, so that there are runs at half and at a quarter of them.
+    It proposes the steps per cycle, up to twice as many, with which a run ends closest to the
+    requested end. They are a multiple of four, so that there are runs with half and a quarter of
+    them.
     """
     counts = range(4 * ceil(steps / 4), 2 * steps + 4, 4)
     best = min(counts, key=lambda count: abs(cycles * count - round(cycles * count)))
@@ -349,7 +367,10 @@ def _end_remedy(cycles: float, steps: int) -> str:
 
 
 def _harmonics_of_friction(found: Finding) -> float:
-    """Return the harmonics of a friction force that follows the speed: the largest speed over that of the law."""
+    """Return the harmonics of a friction force that depends on the speed.
+
+    They are the largest speed over the reference speed of the law; 0 for other laws.
+    """
     law, slip = found.model.friction, found.measures.get("slip_amplitude")
     if law is None or slip is None or not law_has_trait(law.law, "creeps"):
         return 0.0

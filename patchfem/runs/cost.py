@@ -1,4 +1,8 @@
-"""Predicted cost of a run: the record that each engine and each step of a run returns, and that a plan adds up."""
+"""Predicted cost of a run: the record that engines return and that a plan adds up.
+
+In: seconds, bytes and sentences of each step of a run. Out: `Cost`, with the memory as a list
+of parts.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +10,15 @@ from dataclasses import dataclass, field
 from operator import add
 from typing import NamedTuple
 
-# address space of the compiler is counted for a run with a part of this name (`memory.free_bytes`)
+# Name of the memory part of code to compile. A run with such a part also needs address space for
+# the compiler (`memory.free_bytes`).
 CODE_TO_COMPILE = "compiled code"
 
 
 class MemoryPart(NamedTuple):
     """Part of the memory of a run at its peak.
 
-    key: the key of the scene that sets its size, "" if there is none.
+    key: the key of the scene that sets its size; "" if there is none.
     """
 
     bytes: float
@@ -28,16 +33,16 @@ class Cost:
     Attributes
     ----------
     times : dict
-        CPU seconds on one core, by what takes them.
+        CPU seconds on one core by activity.
     parts : tuple of MemoryPart
     words : tuple of str
         Sentences of the plan.
     steps : int
-        Steps of the time loop, those of the coarser runs included.
+        Steps of the time loop, including those of the coarse runs.
     sizes : dict
         Number of unknowns by name.
     engine : str
-        Name of the engine, "" for a step without one.
+        Name of the engine; "" for a step without one.
     compile_seconds : float
         CPU seconds of compiling in the first run of this kind.
     """
@@ -52,16 +57,17 @@ class Cost:
 
     @property
     def seconds(self) -> float:
-        """CPU seconds in all, without compiling."""
+        """Total CPU seconds without compiling."""
         return sum(self.times.values())
 
     @property
     def bytes(self) -> int:
-        """Memory of all parts."""
+        """Memory of all parts [bytes]."""
         return int(sum(part.bytes for part in self.parts))
 
     def __add__(self, other: Cost) -> Cost:
         def merge(mine: dict, others: dict) -> dict:
+            """Return the sum of two dicts of numbers by name."""
             return mine | {name: mine.get(name, 0) + value for name, value in others.items()}
 
         summed = map(
@@ -77,7 +83,12 @@ class Cost:
 
 
 class EngineCode(NamedTuple):
-    """Cost of the compiled code of an engine: bytes, CPU seconds until it runs, CPU seconds of compiling."""
+    """Cost of the compiled code of an engine.
+
+    - bytes: memory of the code.
+    - seconds: CPU seconds of loading it.
+    - compile: CPU seconds of compiling it.
+    """
 
     bytes: float
     seconds: float
@@ -90,11 +101,11 @@ class EngineCode(NamedTuple):
 
 
 NO_CODE = EngineCode(0.0, 0.0)
-# of a linear motion in closed form: the library of LLVM is loaded
+# linear motion in closed form: the LLVM library is loaded
 LINEAR_CODE = EngineCode(58e6, 0.0)
-SHORT_CODE = EngineCode(58e6, 0.15, 2.0)  # of the slide of a bench, which has few kernels
+SHORT_CODE = EngineCode(58e6, 0.15, 2.0)  # slide of a bench, which has few kernels
 MARCH_CODE = EngineCode(58e6, 0.15, 3.5)
-SHEAR_MARCH_CODE = EngineCode(58e6, 0.15, 7.0)  # of a march with shear modes of a patch
+SHEAR_MARCH_CODE = EngineCode(58e6, 0.15, 7.0)  # march with shear modes of a patch
 SMOOTH_CODE = EngineCode(74e6, 0.15, 9.0)
-EVENT_CODE = EngineCode(82e6, 0.15, 12.0)  # of the engines that go from event to event
+EVENT_CODE = EngineCode(82e6, 0.15, 12.0)  # engines that solve from event to event
 BALANCE_CODE = EngineCode(1e8, 0.3, 3.0)

@@ -1,4 +1,8 @@
-"""The stiffness of a pressed patch taken off the modes of a rig that were measured with it."""
+"""Stiffness of a pressed patch that is removed from the modes of a rig measured with it.
+
+In: a model whose modes were measured with the joint, and its pressed patch. Out: the model with
+the modes without the joint.
+"""
 
 from dataclasses import replace
 
@@ -14,9 +18,18 @@ from .patch.jenkins_elements import elements, strip_elements
 
 
 def freed(model: Model, patch=None) -> Model:
-    """The model whose modes are those without the joint; of any other the model as it stands.
+    """Return the model with the modes without the joint; any other model unchanged.
 
-    patch: the pressed Patch, pressed here unless given. PatchfemError where the patch holds more than the modes have.
+    Parameters
+    ----------
+    model : Model
+    patch : Patch, optional
+        Pressed patch; None: it is pressed here.
+
+    Raises
+    ------
+    PatchfemError
+        If the patch is stiffer than the modes allow.
     """
     if model.rig is None or model.rig.structure.without_joint is None:
         return model
@@ -28,22 +41,36 @@ def freed(model: Model, patch=None) -> Model:
 
 
 def patch_stiffness(model: Model, patch) -> float:
-    """Tangential stiffness [N/m] of a pressed patch and its law while nothing slips."""
+    """Return the tangential stiffness [N/m] of a pressed patch with its law while nothing slips."""
     f, load = model.friction, patch.pressure.load
     held = record.held_stiffness(f, load)
     if not model.partial_slip or (np.isfinite(held) and not law_has_trait(f.law, "set-valued")):
         held = sticking_stiffness(model.rig.friction.interfaces[0], load)
     if not model.partial_slip:
         return held
-    length = f.static * load / held  # 0 of a law that holds rigidly
+    length = f.static * load / held  # 0 for a law that is rigid in stick
     if patch.strips is not None:
         return float(sum(one[0].sum() for one in strip_elements(patch, f.static, length)))
     return float(elements(patch, f.static, length).stiffness.sum())
 
 
 def held_patch(model: Model, patch, apart: tuple):
-    """The Measure of the stiffness [N/m] of a pressed Patch while nothing slips, extrapolated over its meshes, as its
-    run prints it, where the pieces alone give way; None of any other. apart: the coarser Patches or Nones."""
+    """Return the Measure of the stiffness [N/m] of a pressed Patch that sticks, or None.
+
+    It is the value that its run prints, extrapolated over the meshes, and exists only if the pieces
+    alone are compliant.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+    apart : tuple
+        The patch on coarser meshes; None for a missing one.
+
+    Returns
+    -------
+    Measure or None
+    """
     if (
         patch is None
         or not model.partial_slip

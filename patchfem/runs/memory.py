@@ -1,4 +1,8 @@
-"""Memory that this process may still take, and the refusal of a run that needs more."""
+"""Memory that this process may still use, and the refusal of a run that needs more.
+
+In: the memory parts of a plan. Out: the available memory, and the reason of a refusal with the
+key that helps.
+"""
 
 import os
 from pathlib import Path
@@ -6,9 +10,9 @@ from pathlib import Path
 from ..core import Missing
 from .cost import CODE_TO_COMPILE
 
-MAPPED = 60e6  # bytes of address space of the packages beside the memory in use
-CODE = 150e6  # bytes of address space of the compiler's library
-NAMED = 0.3  # fraction of the memory from which a plan names the part that takes most
+MAPPED = 60e6  # bytes of address space of the packages in addition to the memory in use
+CODE = 150e6  # bytes of address space of the compiler library
+NAMED = 0.3  # fraction of the memory from which a plan names the largest part
 CURES = {
     "contact.element_size": "make contact.element_size larger",
     "contact.mesh": "give contact.mesh fewer nodes on the interface",
@@ -20,7 +24,10 @@ CURES = {
 
 
 def largest(parts: tuple) -> str:
-    """What takes most of the memory that a key of the scene sets, with this key, in words; "" where that is little."""
+    """Return a sentence on the largest memory part that a key of the scene sets, with this key.
+
+    It is "" if this part is small.
+    """
     most = next((part for part in parts if part.key), None)
     if most is None or most.bytes < NAMED * sum(part.bytes for part in parts):
         return ""
@@ -30,8 +37,11 @@ def largest(parts: tuple) -> str:
 
 
 def free_bytes(compiled: bool = False) -> float:
-    """Memory [bytes] that this process may take in all, by the system, its group and its own limits; infinite where
-    none of them tells. compiled: a compiler's library is mapped besides, which only the last counts."""
+    """Return the total memory [bytes] that this process may use.
+
+    The system, its control group and its own limits are considered; inf if none is known. compiled:
+    whether the compiler library is needed as well, which counts for address space only.
+    """
     used, mapped = own_bytes()
     beside = mapped - used + MAPPED + (CODE if compiled else 0.0)
     return min(
@@ -40,7 +50,7 @@ def free_bytes(compiled: bool = False) -> float:
 
 
 def own_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
-    """(memory in use, address space) of this process [bytes]; zeros where the system does not tell."""
+    """Return memory in use and address space of this process [bytes]; zeros if not known."""
     try:
         size, resident = map(int, status.read_text("ascii").split()[:2])
     except (OSError, ValueError):
@@ -50,6 +60,7 @@ def own_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
 
 
 def _available() -> float:
+    """Return the available memory of the system [bytes]; inf if not known."""
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
             known = dict(line.split(":", 1) for line in file)
@@ -59,7 +70,7 @@ def _available() -> float:
 
 
 def _limits() -> list:
-    """Limits of the address space and of the data of this process [bytes], infinite where none is set."""
+    """Return the limits of address space and data of this process [bytes]; inf without a limit."""
     try:
         import resource
     except ImportError:
@@ -71,7 +82,9 @@ def _limits() -> list:
 def free_in_control_group(
     used: float, groups: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")
 ) -> float:
-    """Return the memory [bytes] that the control groups of this process leave it, its own use included.
+    """Return the memory [bytes] that the control groups leave to this process.
+
+    It contains the memory that the process already uses.
 
     Parameters
     ----------
@@ -111,7 +124,10 @@ def free_in_control_group(
 
 
 def _left(folder: Path, limit: str, usage: str) -> float:
-    """Limit less usage of one group, whose files that were read long ago count as free; infinite without a limit."""
+    """Return limit minus usage of one group [bytes]; inf without a limit.
+
+    Inactive cached files count as free.
+    """
     try:
         most, taken = (
             int((folder / limit).read_text("ascii")),
@@ -120,7 +136,7 @@ def _left(folder: Path, limit: str, usage: str) -> float:
         known = dict(
             line.split() for line in (folder / "memory.stat").read_text("ascii").splitlines()
         )
-    except (OSError, ValueError):  # "max"
+    except (OSError, ValueError):  # the limit is "max", or a file is missing
         return float("inf")
     return float(
         most - taken + int(known.get("total_inactive_file", known.get("inactive_file", 0)))
@@ -128,7 +144,10 @@ def _left(folder: Path, limit: str, usage: str) -> float:
 
 
 def refusal(parts: tuple, free: float | None = None) -> str:
-    """Why a run of these parts cannot be: what it needs, what there is, what takes most and its key; or nothing."""
+    """Return why a run with these memory parts is impossible; "" if it is possible.
+
+    The sentence names the required and the free memory, and the largest part with its key.
+    """
     free = free_bytes(any(part.what == CODE_TO_COMPILE for part in parts)) if free is None else free
     total = sum(part.bytes for part in parts)
     if total <= free:
@@ -141,6 +160,6 @@ def refusal(parts: tuple, free: float | None = None) -> str:
 
 
 def refuse(parts: tuple) -> None:
-    """Raise Missing where a run would need more memory than there is."""
+    """Raise Missing if a run would need more memory than there is."""
     if text := refusal(parts):
         raise Missing(text, "")

@@ -1,4 +1,7 @@
-"""What a scene would run, before anything runs: engine, sizes, cost, stiffness chain and dimensionless groups."""
+"""Plan of a scene, before anything runs: engine, sizes, cost, stiffness chain and groups.
+
+In: a Scene or a Model. Out: a `Plan`; no mesh is assembled and nothing is solved.
+"""
 
 from dataclasses import dataclass, replace
 from math import inf
@@ -24,8 +27,8 @@ from .tolerance_forecast import NOTHING_FORESEEN, Forecast, foresee_tolerance
 from .wear import plan as of_wear
 
 PACKAGES = 80e6  # bytes of the packages that every run imports
-LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
-# engines that compute no cycle of a motion that repeats, and cycles
+LONGEST = 1e6  # CPU seconds (twelve days) above which no run is started
+# engines that skip the cycles of a periodic motion, and number of cycles from which a plan says so
 SKIPS, MANY = (
     ("march", "exact", "piecewise"),
     100,
@@ -34,7 +37,7 @@ UP_TO = (
     "the computing time is an upper limit: as soon as the motion repeats itself, the remaining cycles are not "
     "computed one by one"
 )
-GROUPS = {  # group -> (what it is, SI unit of its value)
+GROUPS = {  # meaning and SI unit of each group
     "D": (
         "D: friction limit (static, if there are two) divided by the largest force of the drive",
         "1",
@@ -64,11 +67,18 @@ GROUPS = {  # group -> (what it is, SI unit of its value)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
-    """A model with the engine that will run it, its sizes and its cost.
+    """Model with the engine that will run it, its sizes and its cost.
 
-    effects: names in the scene; cost: of the run, its memory the largest part first; chain: link -> stiffness [N/m] or
-    "rigid"; groups: name -> value; verdict: sentences; compile_seconds: besides `seconds`, where no run of this kind
-    has left its compiled code; tolerance: whether it will be missed.
+    - model, kind: model and kind of its run.
+    - effects: names of the effects in the scene.
+    - not_in_scene: effects that the scene does not contain.
+    - cost: cost of the run, its memory with the largest part first.
+    - chain: stiffness [N/m] or "rigid" of each link of the stiffness chain.
+    - groups: dimensionless groups by name.
+    - verdict: sentences.
+    - compile_seconds: CPU seconds of compiling in addition to `seconds`, if no run of this kind has
+      left compiled code.
+    - tolerance: whether the tolerance will be missed.
     """
 
     model: Model
@@ -84,7 +94,7 @@ class Plan:
 
     @property
     def engine(self) -> str:
-        """Name of the engine, "static" for a patch without motion."""
+        """Name of the engine; "static" for a patch without motion."""
         return self.cost.engine or "static"
 
     @property
@@ -94,7 +104,7 @@ class Plan:
 
     @property
     def steps(self) -> int:
-        """Steps of the time loop, those of the coarser runs included."""
+        """Steps of the time loop, including those of the coarse runs."""
         return self.cost.steps
 
     @property
@@ -120,11 +130,11 @@ class Plan:
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
     def modes(self, chain: dict) -> list:
-        """Each mode's name, free and stuck frequency [Hz] with the links of a chain; [] without a rig."""
+        """Return name, free and stuck frequency [Hz] of each mode for a chain; [] without a rig."""
         return of_rig.modes_of(self.model.rig, chain) if self.model.rig is not None else []
 
     def as_json(self) -> dict:
-        """The plan as the object that `patchfem plan --json` prints."""
+        """Return the plan as the object that `patchfem plan --json` prints."""
         return {
             "kind": self.kind,
             "effects": [{"effect": e, "equations": EFFECTS[e].equations} for e in self.effects],
@@ -145,15 +155,23 @@ class Plan:
 
 
 def compile_words(seconds: float) -> str:
-    """The words on what compiles, "" where nothing does."""
+    """Return the words on the time of compiling; "" if nothing is compiled."""
     return f" (and {seconds:.0f} s once for compiling)" if seconds else ""
 
 
 def plan(asked, per_point: bool = False) -> Plan:
-    """Plan of a Scene or a Model from its numbers alone: no mesh, no solve.
+    """Return the Plan of a Scene or a Model from its numbers, without a mesh or a solution.
 
-    per_point: bonds are followed at every node though one point would do. PatchfemError, with its place, where nothing
-    can run it.
+    Parameters
+    ----------
+    asked : Scene or Model
+    per_point : bool
+        Whether bonds are followed at every node although a single point would do.
+
+    Raises
+    ------
+    PatchfemError
+        With its position in the scene, if nothing can run it.
     """
     model = asked if isinstance(asked, Model) else build(asked)
     with locate_errors(model.source):
@@ -161,9 +179,11 @@ def plan(asked, per_point: bool = False) -> Plan:
 
 
 def _planned(model: Model, per_point: bool) -> Plan:
+    """Return the Plan of a Model."""
     if model.measured is not None:
         try:
-            measured.read_table(model.measured.path)  # a broken table is named before anything runs
+            # an invalid table is reported before anything runs
+            measured.read_table(model.measured.path)
         except PatchfemError as error:
             error.key = error.key or "measured.file"
             raise
@@ -250,7 +270,18 @@ def _cost(model: Model, per_point: bool) -> Cost:
 
 
 def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
-    """Return what the compiled code of a run depends on, in words: two runs of one kind run the same code."""
+    """Return the properties on which the compiled code of a run depends, as text.
+
+    Two runs of one kind run the same code.
+
+    Parameters
+    ----------
+    model : Model
+    engine : str
+        Name of the engine.
+    unknowns : dict
+        Number of unknowns by name.
+    """
     rig, f = model.rig, model.friction
     laws = [] if f is None else [f]
     if rig is not None:
@@ -274,7 +305,7 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
 
 
 def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
-    """Sentences on what the groups say; said: those on the motion, the patch and the friction law."""
+    """Return the sentences of a plan; said: those on the motion, the patch and the friction law."""
     out = list(said[0])
     if text := memory.refusal(parts):
         out.append(f"`run` will refuse this scene: {text}")
@@ -298,7 +329,7 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
 
 
 def refuse_size(what: Plan) -> None:
-    """Raise Missing where a run would need more memory than there is, or longer than LONGEST seconds."""
+    """Raise Missing if a run needs too much memory, or more than LONGEST CPU seconds."""
     memory.refuse(what.cost.parts)
     if what.seconds > LONGEST:
         pinned = what.model.accuracy.steps_per_cycle is not None
@@ -318,7 +349,7 @@ def refuse_size(what: Plan) -> None:
 
 
 def _link(model: Model) -> dict:
-    """Last links of the stiffness chain: grooves, and of every interface bonds, or slip."""
+    """Return the last links of the stiffness chain: grooves, and the bonds of every interface."""
     load = model.nominal_load
     if not load > 0:
         return {}
@@ -335,14 +366,14 @@ def _link(model: Model) -> dict:
 
 
 def _of_law(f, load: float) -> dict:
-    """The link of a law under a load [N]."""
+    """Return the link of a law under a load [N]."""
     rigid = "none: it creeps" if law_has_trait(f.law, "creeps") else "rigid until it slips"
     held = record.held_stiffness(f, load)
     return {"bonds": rigid if held == inf or law_has_trait(f.law, "creeps") else held}
 
 
 def _law_groups(model: Model) -> dict:
-    """Dimensionless groups of the law by name."""
+    """Return dimensionless groups of the friction law by name."""
     if model.spread is None:
         return {}
 
@@ -350,7 +381,7 @@ def _law_groups(model: Model) -> dict:
 
 
 def _groove_words(model: Model) -> list:
-    """The sentence on the grooves that the load climbs; none without them."""
+    """Return the sentence on the grooves that the load climbs, as a list; [] without grooves."""
     load = model.nominal_load
     if model.grooves is None or not load > 0:
         return []

@@ -1,4 +1,7 @@
-"""A run from its plan to its result: plan(scene) says what would run, run(plan) runs it."""
+"""Run of a plan: from the pressed patch and the motion to the result with its warnings.
+
+In: a `Plan`, or a Scene or Model that is planned first. Out: a `Result`.
+"""
 
 import hashlib
 from contextlib import nullcontext
@@ -27,7 +30,7 @@ from .self_checks.checks import with_self_checks
 from .wear import evolve, measures
 
 __all__ = ["KeptState", "Plan", "Result", "plan", "run"]
-# kind of a scene -> "module function" of this folder that runs it: imported and called by `_run`, and nowhere by name
+# "module function" of this folder that runs each kind of scene; imported and called only in `_run`
 KINDS = {
     "patch": "patch.result static",
     "bench": "bench.result prescribed",
@@ -39,7 +42,12 @@ AT_REST = "no motion was found; the measures are those of the pressed patch at r
 
 
 class KeptState(NamedTuple):
-    """Where the state of a long run is kept, by which version of the program, and whether to go on from it."""
+    """File with the state of a long run.
+
+    - path: the file.
+    - version: version of the program that the state must have.
+    - resume: whether to continue from the state.
+    """
 
     path: Path
     version: str
@@ -57,11 +65,32 @@ def run(
 ) -> Result:
     """Run a Plan, or plan and run a Scene or a Model.
 
-    say: called with one line when compiled code has to be made; progress: called with the share that is done, of all
-    passes of a rig, of the main one of a bench. per_point forces the path of every interface point where one lumped
-    point would do; estimate=False skips the coarser runs and leaves the errors None; fresh condenses the pieces anew;
-    kept: where the state of a run with [wear] or of a long march is kept on the way. NotConverged and Missing as named
-    by the stages; the first carries the pressed patch where the motion alone is missed.
+    Parameters
+    ----------
+    what : Plan, Scene or Model
+    say : callable, optional
+        Callback for a line of text when code has to be compiled.
+    progress : callable, optional
+        Callback for the completed fraction: of all passes of a rig, of the main pass of a bench.
+    per_point : bool
+        Whether every interface point is followed although a single point would do.
+    estimate : bool
+        If False, there are no coarse runs and the errors are None.
+    fresh : bool
+        Whether the pieces are condensed again.
+    kept : KeptState, optional
+        File in which the state of a run with [wear] or of a long march is saved.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    NotConverged
+        With the pressed patch as partial result if only the motion was not found.
+    Missing
+        If the scene cannot be run.
     """
     what = what if isinstance(what, Plan) else plan(what, per_point)
     with locate_errors(what.model.source):
@@ -72,6 +101,7 @@ def run(
 def _run(
     what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: KeptState | None
 ) -> Result:
+    """Run a plan whose size was accepted; the parameters are those of `run`."""
     begin, model = perf_counter(), what.model
     seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
     patch, coarse, climbed, still = None, (None, None), (), ()
@@ -129,7 +159,7 @@ def _run(
         if model.wear is not None and patch is not None:
             key, climbed = kept and state_key(model, patch, kept.version), (patch, *coarse)
             evolved = evolve.evolved_with(kept, key, model, patch, coarse[:2], progress)
-            progress = None  # it has told of all cycles
+            progress = None  # the progress of the wear has covered all cycles
             patch, coarse = evolved.patch, evolved.coarse
             if evolved.state is not None:
                 here = replace(what, model=evolve.worn_model(model, patch, evolved.state.depth))
@@ -168,9 +198,23 @@ def _run(
 
 
 def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=(), still=()) -> Result:
-    """The result with its time since `begin`, its notes, and words that name no folder; climbed: the patch before wear
-    on the meshes of its ladder, fine to coarse, where the result is that of a worn one; still: those of its static
-    measures, where these are others."""
+    """Return the result with its total time, notes, tolerance warnings and meanings.
+
+    Parameters
+    ----------
+    result : Result
+    notes : list
+        Notes on the scene and the patch.
+    begin : float
+        Time at the start [s].
+    coarse : sequence of Patch or None
+        The patch on coarser meshes.
+    climbed : sequence of Patch
+        The patch before wear on the meshes of its ladder, fine to coarse, if the result is that of
+        a worn one.
+    still : sequence of Patch
+        The patch on the meshes of its static measures, if these differ.
+    """
     result.seconds["total"], model = perf_counter() - begin, result.plan.model
     apart = "strip" if model.patch is not None else "interface"
     wide = tolerance_warnings(
@@ -193,7 +237,7 @@ def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=(), sti
 
 
 def _yielding_faces(result: Result) -> dict:
-    """Notes by Strength on faces that yield under the smallest pressure peak within its error."""
+    """Return notes by Strength on faces that yield even at the smallest peak within its error."""
     peak, asked = result.measures.get("pressure_peak"), result.plan.model.patch
     if asked is None or result.patch is None or peak is None or peak.value is None:
         return {}
@@ -201,13 +245,19 @@ def _yielding_faces(result: Result) -> dict:
 
 
 def _keeping(kept: KeptState | None, what: Plan, patch):
-    """A context in which marches keep their states, or nothing where none is to be kept. PatchfemError where there is
-    none to go on from."""
+    """Return a context in which marches save their states, or an empty one.
+
+    Raises
+    ------
+    PatchfemError
+        If there is no state from which to continue.
+    """
     model = what.model
     if kept is None or not marches(what):
         return nullcontext()
 
     def path(number: int) -> Path:
+        """Return the file of the state of a march."""
         return kept.path.parent / f"march_{number}.npz"
 
     if kept.resume and model.wear is None and not path(1).is_file():
@@ -218,7 +268,11 @@ def _keeping(kept: KeptState | None, what: Plan, patch):
 
 
 def state_key(model, patch, version: str) -> str:
-    """What a kept state belongs to: the scene in SI, the unworn gap on its nodes, a slide from a file, the version."""
+    """Return the key of what a saved state belongs to.
+
+    It depends on the scene in SI units, the unworn gap on the nodes, a slide from a file, and the
+    version.
+    """
     corners = () if model.slide is None or model.slide.corners is None else model.slide.corners
     of_patch = () if patch is None else (patch.x, patch.gap)
     if model.wear is not None and model.wear.start is not None:
@@ -230,7 +284,7 @@ def state_key(model, patch, version: str) -> str:
 
 
 def marches(what: Plan) -> bool:
-    """Whether a run is a march in time, which keeps its state on the way."""
+    """Return whether a run is a march in time, which saves its state."""
     if what.model.rig is None:
         return False
 
@@ -238,7 +292,7 @@ def marches(what: Plan) -> bool:
 
 
 def _unloaded(model: Model) -> bool:
-    """Whether no interface of a model without a patch bears a load."""
+    """Return whether no interface of a model without a patch carries a load."""
     if model.rig is not None and len(model.rig.friction.names):
         return not any(one.load for one in model.rig.friction.interfaces)
     return model.point is not None and model.point.load == 0

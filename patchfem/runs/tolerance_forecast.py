@@ -1,9 +1,10 @@
-"""Whether a scene will miss its tolerance, and by which key it would meet it, before anything is computed.
+"""Forecast whether a scene will miss its tolerance, and by which key it would meet it.
 
-A scene that leaves its numerical settings to the tolerance mostly meets it. A key that fixes a setting can prevent
-this: steps per cycle, the element size, a method, the neglected part of a sum over bonds. The rules below compare such
-a key with what the tolerance asks for. They speak only where measured runs nearly always missed the tolerance
-(`FEWER_STEPS`, `OF_ELEMENT`); in between they are silent, and the run itself warns.
+In: a Model, before anything is computed. Out: a `Forecast`. A scene that leaves its numerical
+settings to the tolerance mostly meets it. A key that fixes a setting can prevent this: steps
+per cycle, the element size, a method, the neglected part of a sum over bonds. The rules below
+compare such a key with what the tolerance requires. They apply only where measured runs nearly
+always missed the tolerance (`FEWER_STEPS`, `OF_ELEMENT`); otherwise the run itself warns.
 """
 
 from dataclasses import replace
@@ -18,24 +19,31 @@ from .bench import engine as bench_engine
 from .patch import grids as patch_grids
 from .rig import costs, engines, lists, numerics
 
-# steps per cycle over those that the tolerance asks for, below which runs missed it: of 60 random rigs and 30 benches
-# with 50 to 6400 steps and tolerances of 0.1 to 1e-4, one in twenty met it below these
+# Steps per cycle over those that the tolerance requires, below which runs missed it: of 60 random
+# rigs and 30 benches with 50 to 6400 steps and tolerances of 0.1 to 1e-4, one in twenty met it
+# below these.
 FEWER_STEPS = 2 / 3
 FEWER_STEPS_OF_BENCH = {True: 1 / 3, False: 1 / 8}  # with a law of bonds, with any other law
-ENOUGH_STEPS = 4.0  # times the steps that the tolerance asks for: then all measures met it, not only the displacement
-ENOUGH_STEPS_OF_BENCH = 2.0  # same of a bench: a triangle needs 1.1 times, a sine at most 1
-OF_ELEMENT = 0.2  # error over element size / length of the contact; even meshes had 0.2 to 7 (crowns, tilts, flat ends)
-FINEST_PATCH = 1e-6  # error that the finest mesh of a static patch leaves, which costs some CPU s
-FINEST_MOTION = 3e-5  # same of pieces that slip part by part in a rig, whose mesh is kept coarse for the time steps
+# steps over those that the tolerance requires with which all measures met it, not only the
+# displacement
+ENOUGH_STEPS = 4.0
+ENOUGH_STEPS_OF_BENCH = 2.0  # same for a bench: a triangle needs 1.1 times, a sine at most 1
+# relative error over (element size / length of the contact); equal elements had 0.2 to 7 (crowns,
+# tilts, flat ends)
+OF_ELEMENT = 0.2
+FINEST_PATCH = 1e-6  # relative error of the finest mesh of a static patch, which costs some CPU s
+# same for pieces that slip in part in a rig, whose mesh is coarser because of the time steps
+FINEST_MOTION = 3e-5
 SAFE_TOLERANCE = 1e-3  # tolerance that the meshes of patches meet
 STEPLESS = ("exact", "piecewise", "smooth")  # engines that need no steps per cycle
-MAX_CYCLES = 1e5  # cycles of a drive that are proposed at most
+MAX_CYCLES = 1e5  # largest number of drive cycles that is proposed
 
 
 class Cause(NamedTuple):
-    """What prevents a tolerance, and its cure.
+    """Cause for which a tolerance will be missed, and its remedy.
 
-    words: the cause as the end of a sentence; cure: {key: value to set, None to leave the key out}.
+    - words: the cause as the end of a sentence.
+    - cure: {key: value to set, or None to leave the key out}.
     """
 
     words: str
@@ -43,20 +51,20 @@ class Cause(NamedTuple):
 
 
 class Forecast(NamedTuple):
-    """What is foreseen of a tolerance: that asked for, and the causes for which it will be missed."""
+    """Requested tolerance, and the causes for which it will be missed."""
 
     asked: float
     causes: tuple
 
     def sentence(self) -> str:
-        """Say that the tolerance will be missed and what to do; "" if nothing prevents it."""
+        """Return the sentence that the tolerance will be missed and what to do; "" without a cause."""
         if not self.causes:
             return ""
         words = " and ".join(cause.words for cause in self.causes)
         return f"the tolerance {self.asked:g} will not be met {words}; {_cure_words(self.cure())}"
 
     def cure(self) -> dict:
-        """Return {key: value to set, None to leave the key out} of all causes."""
+        """Return {key: value to set, or None to leave the key out} for all causes."""
         return {key: value for cause in self.causes for key, value in cause.cure.items()}
 
     def as_json(self) -> dict:
@@ -73,7 +81,7 @@ NOTHING_FORESEEN = Forecast(0.0, ())
 
 
 def _cure_words(cure: dict) -> str:
-    """Say which keys to set and which to leave out."""
+    """Return which keys to set and which to leave out, as text."""
     dropped = [key for key, value in cure.items() if value is None]
     given = [f"{key} = {value:.15g}" for key, value in cure.items() if value is not None]
     parts = [f"leave out {' and '.join(dropped)}"] * bool(dropped) + [
@@ -83,7 +91,7 @@ def _cure_words(cure: dict) -> str:
 
 
 def foresee_tolerance(model: Model) -> Forecast:
-    """Foresee whether a model will miss its tolerance, from its numbers alone."""
+    """Return the Forecast of a model from its numbers alone."""
     tolerance = model.accuracy.tolerance
     if cause := _mesh_cause(model, tolerance):
         return Forecast(tolerance, (cause,))
@@ -96,12 +104,12 @@ def foresee_tolerance(model: Model) -> Forecast:
 
 
 def _without(model: Model, **keys) -> Model:
-    """Return a model with other values of [accuracy]."""
+    """Return a model with other values of keys in [accuracy]."""
     return replace(model, accuracy=model.accuracy.model_copy(update=keys))
 
 
 def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
-    """A tolerance that no mesh of pieces meets in a bearable time."""
+    """Return the Cause if no mesh of the pieces meets a tolerance in acceptable time."""
     if model.kind == "patch" and model.patch.mesh.file is None and tolerance < FINEST_PATCH / 2:
         finest = FINEST_PATCH
     elif (
@@ -125,7 +133,7 @@ def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
 
 
 def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
-    """Elements of a fixed size that are too long for the contact."""
+    """Return the Cause if elements of a fixed size are too long for the contact."""
     patch = model.patch
     if patch is None or patch.mesh.is_automatic:
         return None
@@ -142,7 +150,7 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
 
 
 def _rig_steps_cause(model: Model) -> Cause | None:
-    """Time steps of a rig that are too few."""
+    """Return the Cause if a rig has too few time steps."""
     engine = engines.engine_of(model)
     if not engine.in_time(model, numerics.choose(model), None) or engine is engines.SMOOTH:
         return None
@@ -159,8 +167,10 @@ def _rig_steps_cause(model: Model) -> Cause | None:
 
 
 def _steps_cure(model: Model) -> dict:
-    """Keys by which time steps no longer prevent the tolerance: an engine without steps if there is one, else more
-    steps; {} if there are enough."""
+    """Return keys with which time steps no longer prevent the tolerance.
+
+    They select an engine without steps if there is one, else more steps; {} if there are enough.
+    """
     accuracy = model.accuracy
     free = engines.engine_of(_without(model, method="auto", steps_per_cycle=None))
     if free.name in STEPLESS:
@@ -173,13 +183,19 @@ def _steps_cure(model: Model) -> dict:
 
 
 def _rounded_steps(steps: float) -> int:
-    """Round steps per cycle up to two digits and to a multiple of four, of which a half and a quarter are whole."""
+    """Return steps per cycle rounded up to two digits and to a multiple of four.
+
+    Half and a quarter of them are then whole numbers.
+    """
     unit = 10 ** (floor(log10(steps)) - 1)
     return 4 * ceil(ceil(steps / unit) * unit / 4)
 
 
 def _more_cycles(model: Model) -> dict:
-    """Cycles in which the transient of the slowest mode decays below the tolerance, {} if the scene has them."""
+    """Return the cycles in which the transient decays below the tolerance, as a dict by key.
+
+    The slowest mode counts; {} if the scene has enough cycles.
+    """
     rig, tolerance = model.rig, model.accuracy.tolerance
     if not rig.drive.waveform.is_sine or not drive_sizes.is_sinusoidal(rig.drive.signal):
         return {}
@@ -191,7 +207,7 @@ def _more_cycles(model: Model) -> dict:
 
 
 def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
-    """A part of the sum over bonds that is neglected by keys of the scene."""
+    """Return the Cause if keys of the scene neglect too much of the sum over bonds."""
     pinned = [
         f"accuracy.{key}" for key in ("tail", "merge") if getattr(model.accuracy, key) is not None
     ]
@@ -208,11 +224,11 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
 
 
 def _bench_steps_cause(model: Model) -> Cause | None:
-    """Steps of a bench that are too few."""
+    """Return the Cause if a bench has too few steps."""
     if model.accuracy.steps_per_cycle is None or (
         law_has_trait(model.friction.law, "memoryless") and not model.partial_slip
     ):
-        return None  # without a memory there is a closed form
+        return None  # a law without memory has a closed form
     steps, wanted = (
         bench_engine.steps_of(model),
         bench_engine.steps_of(_without(model, steps_per_cycle=None)),

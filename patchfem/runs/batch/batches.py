@@ -1,4 +1,8 @@
-"""Answers of many models: each goes, with those that share its work, to the first batch that does not refuse it."""
+"""Case results of many models, each computed by the first batch that does not refuse it.
+
+In: a sequence of models. Out: `CaseResults`. Models that can share work are computed together,
+in groups.
+"""
 
 from __future__ import annotations
 
@@ -19,14 +23,20 @@ from .case_results import CaseResults
 
 
 class Batch(NamedTuple):
-    """A way to answer many models together.
+    """Method that computes many models together.
 
-    refuses(model) -> "" or the sentence why not; group(model): equal for models that can share work; solve(models,
-    say) -> Answers of a group, equal to single runs to 1e-12, bars too, whatever else is in the group; share: seconds
-    of a case over those of its own run, 0 where they are next to nothing; compile: CPU seconds of the first group;
-    least: fewest cases of a study that it serves: such a batch gives answers with bars of their own, each the same
-    whatever else is in the group; parts(models) -> {group: places} of those that it takes, where it reads columns;
-    together: fewest cases of a chunk of a sweep, where what they share is worth so many.
+    - name: name of its module.
+    - refuses: function (model) -> "" or a sentence that says why it cannot compute the model.
+    - group: function (model) -> key that is equal for models that can share work.
+    - solve: function (models, say) -> CaseResults of a group, equal to those of single runs to
+      1e-12, errors included, whatever else is in the group.
+    - share: seconds of a case over those of a single run; 0 if negligible.
+    - compile: CPU seconds of compiling for the first group.
+    - least: smallest number of cases of a study that it takes; such a batch has its own error
+      estimates, which do not depend on what else is in the group.
+    - parts: function (models) -> {group: indices} of those that it takes, if it reads columns; else
+      None.
+    - together: smallest number of cases in a chunk of a sweep for which the shared work pays.
     """
 
     name: str
@@ -49,22 +59,29 @@ def _batch(
     columns: bool = False,
     together: int = 1,
 ) -> Batch:
-    """The batch of the module of this name, which takes models of this kind and is imported for the first of them."""
+    """Return the batch of the module of this name, which is imported for its first model.
+
+    kind: kind of the models that it takes; the other parameters are fields of `Batch`.
+    """
 
     @cache
     def module():
+        """Import and return the module of the batch."""
         return import_module(f"patchfem.runs.batch.{name}")
 
     def of(function: str) -> Callable:
+        """Return a function that calls the function of this name in the module."""
         return lambda *given: getattr(module(), function)(*given)
 
     def parts(models: Sequence) -> dict:
+        """Return {group: indices} of the models that the batch takes as columns."""
         some_of = [models.first] if isinstance(models, SimilarModels) else models
         if not any(getattr(one, "kind", "") == kind for one in some_of) or _of_single_runs(kind):
             return {}
         return module().parts(models)
 
     def refuses(model: Model) -> str:
+        """Return why the batch does not take a model; "" if it does."""
         return (
             _of_single_runs(kind) or asked(model) if model.kind == kind else f"it is a {model.kind}"
         )
@@ -85,12 +102,15 @@ def _batch(
 
 @cache
 def _of_single_runs(kind: str) -> str:
-    """Return why no batch takes cases of a kind: it lacks a measure of single runs; "" if there is no such measure."""
+    """Return why no batch takes cases of a kind, or "".
+
+    A measure that only single runs compute excludes all batches.
+    """
     rows = import_module("patchfem.response.rows").SINGLE_RUN_ROWS if kind == "rig" else ()
     return f"the measure {rows[0].name} is computed only by single runs" if rows else ""
 
 
-# the first that does not refuse a model takes it
+# the first batch that does not refuse a model takes it
 BATCHES: tuple[Batch, ...] = (
     _batch("patches", "patch", compile=6.0, columns=True, together=2048),
     _batch("benches", "bench", 0.4, together=64),
@@ -103,14 +123,14 @@ BATCHES: tuple[Batch, ...] = (
 
 
 def batch_compile_seconds(batch: Batch, model: Model) -> float:
-    """CPU seconds in which a batch compiles for a model like this; 0 where one like it has been answered."""
+    """Return the CPU seconds of compiling for a model; 0 if one of its kind has been computed."""
     if batch.compile:
         return 0.0 if compiled.has_run(_kind(batch, model)) else batch.compile
     return 0.0
 
 
 def _kind(batch: Batch, model: Model) -> str:
-    """What the compiled code of a batch hangs on, in words."""
+    """Return the properties on which the compiled code of a batch depends, as text."""
     rig = model.rig
     if rig is None:
         return batch.name
@@ -119,7 +139,7 @@ def _kind(batch: Batch, model: Model) -> str:
 
 
 def batch_of(model: Model, study: int = 1) -> Batch | None:
-    """The batch that takes a model of a study of so many cases; None where it is run by itself."""
+    """Return the batch of a model in a study of so many cases; None if it is run by itself."""
     return next((one for one in BATCHES if study >= one.least and not one.refuses(model)), None)
 
 
@@ -130,12 +150,22 @@ def answers(
     estimate: bool = True,
     study: int = 0,
 ) -> CaseResults:
-    """Answers of the models in their order; an error in place of a model is the message of its failed case.
+    """Return the case results of models in their order.
 
-    keep(case, Result): called after each run; a batch has no Result, so all cases then run one by one. say: called with
-    one line when compiled code has to be made; estimate: False leaves out the coarser runs of all models, and their
-    errors, where they run one by one (a batch has its errors from the same work); study: cases of the whole that these
-    are a part of, 0 where they are all of it.
+    Parameters
+    ----------
+    models : sequence of Model or PatchfemError
+        An error in place of a model is the message of its failed case.
+    keep : callable, optional
+        Called with case and Result after each run. A batch has no Result, so that all cases are
+        then run one by one.
+    say : callable, optional
+        Callback for a line of text when code has to be compiled.
+    estimate : bool
+        If False, the models that are run one by one have no coarse runs and no errors (a batch has
+        its errors from the same work).
+    study : int
+        Number of cases of which these are a part; 0 if they are all.
     """
     models = models if isinstance(models, SimilarModels) else [_freed(one) for one in models]
     found, groups = CaseResults.blank(len(models)), {}
@@ -162,7 +192,7 @@ def answers(
 
 
 def _freed(model: Model | PatchfemError) -> Model | PatchfemError:
-    """A model whose modes are those without the joint, or why there is none."""
+    """Return a model with the modes without the joint, or the error that there are none."""
     if (
         isinstance(model, PatchfemError)
         or model.rig is None
@@ -176,14 +206,17 @@ def _freed(model: Model | PatchfemError) -> Model | PatchfemError:
 
 
 def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
-    """(places of the models that no batch takes as columns, {(batch, group): places} of those that one does)."""
+    """Return the indices of models that no batch takes as columns, and those that one takes.
+
+    The latter are a dict by batch and group.
+    """
     out, left = {}, np.arange(len(models))
     for batch in BATCHES:
         if batch.parts is None or study < batch.least or not left.size:
             continue
         try:
             parts = batch.parts(select_models(models, left))
-        except Exception:  # what is odd about a model is told by its own run
+        except Exception:  # the model is run again by itself, which reports its error
             continue
         out |= {(batch, group): left[np.asarray(cases)].tolist() for group, cases in parts.items()}
         left = np.setdiff1d(
@@ -193,29 +226,30 @@ def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
 
 
 def _place(model: Model, study: int) -> tuple:
-    """(batch, group) of a model; (None, None) where it is run by itself."""
+    """Return the batch and the group of a model; (None, None) if it is run by itself."""
     try:
         batch = batch_of(model, study)
         return (batch, batch.group(model)) if batch is not None else (None, None)
-    except Exception:  # what is odd about the model is told by its own run
+    except Exception:  # the model is run again by itself, which reports its error
         return None, None
 
 
 def _of(keep: Callable | None, cases: list) -> Callable | None:
-    """`keep` of a part of the cases, by their places in it."""
+    """Return `keep` for a part of the cases, called with indices in this part."""
     return keep and (lambda case, result: keep(cases[case], result))
 
 
 def _solved(
     batch: Batch | None, models: list, alone: Callable, say: Callable | None
 ) -> CaseResults:
+    """Return the results of a group by its batch, or one by one if the batch fails."""
     if batch is not None:
         try:
             out = batch.solve(models, say)
             if batch.compile and batch_compile_seconds(batch, models[0]):
                 compiled.ran(_kind(batch, models[0]))
             return out
-        except Exception as error:  # the case at fault is named by its own run
+        except Exception as error:  # each case is run again by itself, which names the one at fault
             if say is not None:
                 say(
                     f"{len(models)} cases are run one by one, because running them together failed: {batch.name}: "

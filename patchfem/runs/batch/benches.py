@@ -1,4 +1,7 @@
-"""Benches on patches, of a study of many: pressed together, each slides by itself."""
+"""Batch of benches with patches, which are pressed together; each bench slides by itself.
+
+In: models of a group. Out: `CaseResults`.
+"""
 
 from collections.abc import Hashable, Sequence
 
@@ -7,11 +10,11 @@ from ..patch import static
 from . import one_by_one, patches
 from .case_results import CaseResults
 
-TOGETHER = 256  # cases that are pressed at once
+TOGETHER = 256  # cases whose patches are pressed in one call
 
 
 def refuses(model: Model) -> str:
-    """Why a bench does not share its pressing; "" where it does."""
+    """Return why the patch of a bench is not pressed with others; "" if it is."""
     if (
         model.patch is None
         or model.load_varies
@@ -23,10 +26,10 @@ def refuses(model: Model) -> str:
 
 
 def group(model: Model) -> Hashable:
-    """Equal for models whose patches are pressed together."""
+    """Return a key that is equal for models whose patches are pressed together."""
     return patches.group(model)
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Answers of models of a group."""
+    """Return the case results of models of a group."""
     return patches.pressed_first(models, TOGETHER, lambda part: one_by_one.solve(part, say))

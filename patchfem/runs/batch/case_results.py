@@ -1,4 +1,7 @@
-"""What many runs found: a column per measure, over the cases in the order they were asked in."""
+"""Results of many runs: a column per measure over the cases, in the order of the models.
+
+In: measures, outcomes and messages of cases. Out: `CaseResults`, whose columns may be on disk.
+"""
 
 from __future__ import annotations
 
@@ -14,16 +17,21 @@ import numpy as np
 from ...inputs import measured
 from ...model.model import Model
 
-MANY = 50_000  # cases from which on columns may lie on disk: those of a rig are 25 kB a thousand cases and measure
-FAILED = "failed"  # outcome of a case that was refused or that did not come to an end
+# number of cases from which columns may be on disk: those of a rig have 25 kB per 1000 cases and
+# measure
+MANY = 50_000
+FAILED = "failed"  # outcome of a case that was refused or did not finish
 
 
 class OnDisk:
-    """An array of floats in a file, which fills memory only while it is looked at: what is taken of it is mapped, and
-    let go of with it."""
+    """Array of floats in a file.
+
+    It needs memory only while it is used: an access maps the file, and releases the map with the
+    result.
+    """
 
     def __init__(self, file, shape: tuple, whole: OnDisk | None = None):
-        # the file is closed with the array that it was made for
+        # the file is closed together with the array for which it was opened
         self.file, self.shape, self.whole = (
             file,
             shape,
@@ -52,20 +60,25 @@ class OnDisk:
         np.asarray(self)[at] = values
 
     def reshape(self, shape: tuple) -> OnDisk:
-        """The same numbers in another shape."""
+        """Return the same numbers in another shape."""
         return OnDisk(self.file, tuple(shape), self)
 
 
 @dataclass(eq=False, slots=True)
 class CaseResults:
-    """The answers of n cases, in SI.
+    """Results of n cases, in SI units.
 
-    outcome: (n,) names of `Outcome`, or FAILED. values, errors, floors: measure -> (n,) floats; NaN stands for a
-    measure that a case has not, and in `errors` for one that is not estimated. units: measure -> unit. reasons:
-    measure -> {case: why it has no value there}, "" where none was given: the measure is in the case, without a value.
-    messages: {case: text} of the failed ones. warnings, notes: {case: [sentence]}; numerics: {case: dict}, what was
-    chosen, a dict may be shared by cases. seconds: (n,) of work, that of a batch in equal shares. room: as `blank` has
-    it.
+    - outcome (n,): names of `Outcome`, or FAILED.
+    - values, errors, floors: columns (n,) by measure. NaN means that a case does not have the
+      measure, and in `errors` that the error is not estimated.
+    - units: unit by measure.
+    - reasons: {case: reason} by measure for cases with the measure but without a value; "" for an
+      unknown reason.
+    - messages: {case: text} of the failed cases.
+    - warnings, notes: {case: [sentence]}.
+    - numerics: {case: dict} with the numerical settings; cases may share a dict.
+    - seconds (n,): CPU seconds; those of a batch are divided equally.
+    - room: folder for columns on disk, or None (see `blank`).
     """
 
     outcome: np.ndarray
@@ -90,12 +103,14 @@ class CaseResults:
 
     @classmethod
     def blank(cls, count: int, room: Path | None = None) -> CaseResults:
-        """Answers of `count` cases without an outcome and without measures; room: a folder on whose disk the columns of
-        many cases lie, so that they fill no memory."""
+        """Return results of `count` cases without outcomes and measures.
+
+        room: folder on whose disk the columns of many cases are kept instead of in memory.
+        """
         return cls(np.full(count, "", object), room=room if count > MANY else None)
 
     def measure(self, name: str, unit: str) -> None:
-        """Give the measure its columns, NaN in every case, where it has none yet."""
+        """Add the columns of a measure, with NaN in every case, if it has none yet."""
         if name not in self.values:
             self.units[name] = unit
             for columns in (self.values, self.errors, self.floors):
@@ -103,6 +118,7 @@ class CaseResults:
                 columns[name][:] = np.nan
 
     def _column(self) -> np.ndarray | OnDisk:
+        """Return an empty column (n,), in memory or on disk."""
         return (
             np.empty(len(self))
             if self.room is None
@@ -114,12 +130,22 @@ class CaseResults:
         self.outcome[case], self.messages[case] = FAILED, message
 
     def put(self, case: int, outcome: str, measures: dict, seconds: float) -> None:
-        """Fill in one case. measures: name -> core.Measure."""
+        """Set the results of one case.
+
+        Parameters
+        ----------
+        case : int
+        outcome : str
+        measures : dict
+            core.Measure by name.
+        seconds : float
+            CPU seconds.
+        """
         self.outcome[case], self.seconds[case] = str(outcome), seconds
         self.fill(case, measures)
 
     def fill(self, case: int, measures: dict) -> None:
-        """Fill in measures of a case, name -> core.Measure, over what it has of them."""
+        """Set measures of a case, replacing those it has; measures: core.Measure by name."""
         for name, one in measures.items():
             self.measure(name, one.unit)
             if one.value is None:
@@ -129,7 +155,7 @@ class CaseResults:
             self.floors[name][case] = one.floor
 
     def place(self, cases: Sequence[int], part: CaseResults) -> None:
-        """Put the answers of `part` in for these cases, in their order."""
+        """Insert the results `part` of these cases, in their order."""
         at = np.asarray(cases, int)
         self.outcome[at], self.seconds[at] = part.outcome, part.seconds
         for name, unit in part.units.items():
@@ -153,7 +179,7 @@ class CaseResults:
             mine.update({int(at[case]): found for case, found in given.items()})
 
     def some(self, cases: np.ndarray) -> CaseResults:
-        """The answers of some cases, in their order, as `place` takes them."""
+        """Return the results of some cases, in their order, as `place` takes them."""
         out, at = (
             CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases]),
             {case: place for place, case in enumerate(np.asarray(cases).tolist())},
@@ -170,12 +196,12 @@ class CaseResults:
         return out
 
     def has(self, name: str, case: int) -> bool:
-        """Whether a case has a measure, with a value or with the reason why it has none."""
+        """Return whether a case has a measure, with a value or with a reason for none."""
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
 
 
 def joined_answers(count: int, parts: Iterable[tuple[Sequence[int], CaseResults]]) -> CaseResults:
-    """Answers of `count` cases put together from parts, each with the places of its cases."""
+    """Return the results of `count` cases from parts, each with the indices of its cases."""
     out = CaseResults.blank(count)
     for cases, part in parts:
         out.place(cases, part)
@@ -183,6 +209,8 @@ def joined_answers(count: int, parts: Iterable[tuple[Sequence[int], CaseResults]
 
 
 def unread(model: Model) -> bool:
-    """Whether a model names a table of measured responses that cannot be read, which its own run then tells; one that
-    can be changes no answer."""
+    """Return whether a model names a table of measured responses that cannot be read.
+
+    Its single run reports the error; a readable table does not change the results.
+    """
     return model.measured is not None and not measured.is_readable(model.measured.path)

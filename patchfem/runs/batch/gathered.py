@@ -1,12 +1,15 @@
-"""Patches with bonds behind shear, of a study of many: pressed together, each runs by itself, a few points in place of
-all its nodes.
+"""Batch of patches with bonds and shear: pressed together, each reduced to a few points.
 
-Nobody sees the fields of such a run, nor its histories. Cases on one or two modes under one sine march side by side
-(`dynamics.march.lanes`), on POINTS points behind MODES modes, which leave less than SHARE of the tolerance out of the
-backbone: that stands in the bars. Their coarser runs are those of a run by itself, by a half and a quarter of the steps
-and on the coarser mesh. A case that sticks, or may ring in its sticks, or asks for more modes runs by itself, its
-cycles before the last folded as they pass (`dynamics.march.passing_kernels`); what its points and modes each leave out
-is a thousandth of the tolerance (`rig.interface.FEWER`), so no further run tells the error of the modes.
+In: models of a group, whose fields and histories nobody reads. Out: `CaseResults`.
+
+Cases with one or two modes under a sine march side by side (`dynamics.march.lanes`), with
+POINTS points and MODES modes whose error in the backbone is below SHARE of the tolerance; this
+error is part of the stated errors. Their coarse runs are those of a single run: half and a
+quarter of the steps, and the coarser mesh. A case that sticks, may ring during stick, or needs
+more modes runs by itself, and its earlier cycles are evaluated during the run
+(`dynamics.march.passing_kernels`); there, points and modes each have an error of a thousandth
+of the tolerance (`rig.interface.FEWER`), so that no further run estimates the error of the
+modes.
 """
 
 from collections.abc import Hashable, Sequence
@@ -44,17 +47,25 @@ from .lumped.columns import MAIN, Runs, batch_answers, known_of
 from .lumped.lumped import take_out
 from .samples import Samples, peaks
 
-TOGETHER = 256  # cases that are pressed at once
-SAMPLES = 1_200_000  # of all cases that march at once, which are held together: 200 MB with what is read off them
-SHARE = 3e-2  # of the tolerance, by which few modes, and few points, may each miss the backbone of the patch
-TWICE = 2.0  # times that share, by which a loop may miss what its backbone does once
-HELD = 1e-3  # bond lengths of slip up to which a case sticks
+TOGETHER = 256  # cases whose patches are pressed in one call
+# samples of all cases that march in one call and are kept: 200 MB with the evaluation
+SAMPLES = 1_200_000
+# fraction of the tolerance by which modes, and points, may each miss the backbone of the patch
+SHARE = 3e-2
+TWICE = 2.0  # factor from the error of the backbone to that of a loop, which passes it twice
+HELD = 1e-3  # slip in bond lengths up to which a case sticks
 RINGS = "ring_frequency", "ring_damping"
 
 
 class _Pressed(NamedTuple):
-    """A case in lanes: its points, and those of the coarser mesh; error: share of the friction limit that both leave
-    out; measures, warnings and notes of its pressed patch; numerics as of a run."""
+    """Case that marches in a lane.
+
+    - fine, coarse: points of its patch, and of the coarser mesh.
+    - error: error of both reductions as a fraction of the friction limit.
+    - measures, warnings, notes: of its pressed patch.
+    - patch: the pressed Patch.
+    - numerics: as of a single run.
+    """
 
     fine: lanes.Points
     coarse: lanes.Points
@@ -67,7 +78,7 @@ class _Pressed(NamedTuple):
 
 
 def refuses(model: Model) -> str:
-    """Why all points of a model move; "" where a few may stand for them."""
+    """Return why the batch does not take a model; "" if a few points may represent its patch."""
     if (
         model.patch is None
         or not model.partial_slip
@@ -87,7 +98,7 @@ def refuses(model: Model) -> str:
 
 
 def group(model: Model) -> Hashable:
-    """Equal for models that march side by side; None for those that run by themselves."""
+    """Return a key that is equal for models that march side by side; None for single runs."""
     if no_lanes(model):
         return None
     modes = model.rig.modes
@@ -102,7 +113,7 @@ def group(model: Model) -> Hashable:
 
 
 def no_lanes(model: Model) -> str:
-    """Why a model that is not refused does not march in lanes; "" where it may."""
+    """Return why a model that is not refused does not march in a lane; "" if it may."""
     rig, law = model.rig, model.bonds
     if (
         not rig.drive.waveform.is_sine
@@ -141,13 +152,13 @@ def no_lanes(model: Model) -> str:
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Answers of models of a group."""
+    """Return the case results of models of a group."""
     few = [replace(model, patch=model.patch.with_mesh(can_gather_points=True)) for model in models]
     return patches.pressed_first(few, TOGETHER, lambda part: _solved(part, say))
 
 
 def _solved(models: list, say) -> CaseResults:
-    """Answers of models whose patches are pressed."""
+    """Return the case results of models whose patches are pressed."""
     begin, out, alone = perf_counter(), CaseResults.blank(len(models)), set(range(len(models)))
     held = (
         {}
@@ -172,9 +183,11 @@ def _solved(models: list, say) -> CaseResults:
 
 
 def _side_by_side(models: list, held: list, steps: int) -> tuple:
-    """(Answers of pressed cases at so many steps a cycle, or twice as many where the displacement asks for them and the
-    scene does not pin them; (n,) whether a case must be run by itself). Those that slide alike stand beside each
-    other."""
+    """Return the results of pressed cases, and which (n,) must be run by themselves.
+
+    They march with `steps` per cycle, or with twice as many if the displacement needs them and the
+    scene does not fix them. Cases with similar slides are neighbours.
+    """
     found, lost, many = (
         CaseResults.blank(len(models)),
         np.zeros(len(models), bool),
@@ -198,7 +211,7 @@ def _side_by_side(models: list, held: list, steps: int) -> tuple:
 
 
 def _pressed(model: Model) -> _Pressed | None:
-    """A case with its patch pressed, on few points; None of one that runs by itself."""
+    """Return a case with its pressed patch on few points; None if it runs by itself."""
     try:
         with locate_errors(model.source):
             patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
@@ -241,16 +254,19 @@ def _pressed(model: Model) -> _Pressed | None:
                 patch,
                 numerics,
             )
-    except Exception:  # what is wrong is told by its own run
+    except Exception:  # the case is run by itself, which reports the error
         return None
 
 
 def _marched(models: list, held: list, steps: int) -> tuple:
-    """(Answers of pressed cases at so many steps a cycle, (n,) whether a case must be run by itself, and whether it
-    marches by twice the steps)."""
+    """March pressed cases with `steps` per cycle.
+
+    Returns their results, which (n,) must be run by themselves, and which need twice the steps.
+    """
     rig, window, cycles = models[0].rig, held[0].numerics.window, int(models[0].rig.drive.cycles)
 
     def read(share: int, coarse: bool = False, asked=None) -> _Read:
+        """Return the evaluation of a march with a fraction of the steps, or on the coarser mesh."""
         cases = [one.coarse if coarse else one.fine for one in held]
         done = lanes.march(rig.modes, rig.drive.signal, cases, cycles, steps // share, window)
         return _read(models, held, done, steps // share, asked)
@@ -279,8 +295,15 @@ def _marched(models: list, held: list, steps: int) -> tuple:
 
 
 class _Read(NamedTuple):
-    """What a march shows: measures by name (n,), energies, extremes and phasors of its cycles, largest slide (n,) [m];
-    own: what each leaves open itself, by name; lost (n,): whether it must be run otherwise."""
+    """Evaluation of a march of n cases.
+
+    - values: measures (n,) by name.
+    - book: energies (n,) by name [J].
+    - extremes, phasors: of the cycles.
+    - reach (n,): largest slide [m].
+    - own: errors by name that each case states itself.
+    - lost (n,): whether it must be run otherwise.
+    """
 
     values: dict
     book: dict
@@ -292,7 +315,10 @@ class _Read(NamedTuple):
 
 
 def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None) -> _Read:
-    """What a march of so many steps a cycle shows; asked (n,): of which rings are told, None for all."""
+    """Evaluate a march with `steps` per cycle.
+
+    asked: which cases (n,) are searched for ringing; None: all.
+    """
     modes, omega, window = (
         models[0].rig.modes,
         models[0].rig.drive.signal.omega,
@@ -311,7 +337,7 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
     with np.errstate(all="ignore"):
         stiffness = np.array([model.rig.first_mode.stiffness for model in models])
         values = seen.values(book, stiffness * ~_beside(models[0], done), load)
-        # the pieces give way, so that nothing swings faster than the rig on its bonds
+        # the pieces are compliant, so that nothing vibrates faster than the rig on its bonds
         fastest = np.sqrt(
             (modes.omega**2).max()
             + (modes.slide**2).sum()
@@ -344,7 +370,7 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
 
 
 def _beside(model: Model, done: lanes.Marched) -> np.ndarray:
-    """(n,) whether another mode than the first carries part of the slide."""
+    """Return whether modes other than the first carry part of the slide (n,)."""
     return np.array(
         [
             model.rig.first_mode.fraction_of_other_modes(done.z[:, :, k]) > SHARED
@@ -354,7 +380,7 @@ def _beside(model: Model, done: lanes.Marched) -> np.ndarray:
 
 
 def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple:
-    """(Runs with their errors, and of each case its parts of them as `left_open` takes them)."""
+    """Return the Runs with their errors, and the parts of these for each case (see `left_open`)."""
     fine, (steps, window, cycles), n = reads[0], counts, len(models)
     whole = []
     for one in reads:
@@ -402,9 +428,19 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
 def _left_out(
     values: dict, fraction: float, static: float, points: lanes.Points, work: float
 ) -> dict:
-    """Return `friction_errors` of a fraction [1] of the friction limit that modes and points leave out.
+    """Return `friction_errors` of the error by few modes and points.
 
-    static [1]: coefficient of friction; work [J]: what friction exchanged to and fro.
+    Parameters
+    ----------
+    values : dict
+        Measures by name.
+    fraction : float
+        Error over the friction limit [1].
+    static : float
+        Coefficient of friction [1].
+    points : lanes.Points
+    work : float
+        Work that friction exchanged [J].
     """
     limit = points.limit.sum()
     cycle_work = 4 * limit * (values["slip_amplitude"] + points.length)
@@ -422,8 +458,7 @@ def _tell(
     parts: tuple,
     steps: int,
 ) -> None:
-    """Put the measures of the pressed patch in, and the outcome, numerics, warnings and notes as a run of its own has
-    them."""
+    """Add measures of the patch, outcome, settings, warnings and notes, as in a single run."""
     reach, known = reads[0].reach[case : case + 1], known_of(found, case)
     outcome = outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, reach)
     found.outcome[case] = str(outcome)

@@ -1,4 +1,7 @@
-"""One mesh for all cases of a sweep whose patches have one geometry, chosen by the hardest of them."""
+"""Common mesh of all cases of a sweep whose patches have one geometry.
+
+In: the models of the cases. Out: models with shared meshes, chosen by the hardest case.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,10 @@ from ..patch import meshes as patch_meshes
 
 
 class Shared:
-    """The meshes of a sweep: by geometry and tolerance those that its cases share.
+    """Shared meshes of a sweep by geometry and tolerance.
 
-    They depend on all the models that they are chosen by, not on their order. So a sweep makes them once of its cases,
-    before these are handed out in chunks. `all_`: there are no other cases beside these models.
+    They depend on all models that choose them, but not on their order. Therefore a sweep makes them
+    once from its cases, before these are divided into chunks. `all_`: there are no other cases.
     """
 
     def __init__(self, models: Iterable[Model | PatchfemError], all_: bool = True):
@@ -28,11 +31,11 @@ class Shared:
 
             try:
                 self.meshes[key] = patch_meshes.shared_meshes(patches, key[1], all_)
-            except PatchfemError:  # each case is told by its own run what is wrong
+            except PatchfemError:  # each case is run by itself, which reports its error
                 continue
 
     def given(self, model: Model | PatchfemError) -> Model | PatchfemError:
-        """The model with the meshes that it shares; as it is where it shares none."""
+        """Return the model with its shared meshes; unchanged if it shares none."""
         meshes = self.meshes.get(_key(model)) if self.meshes and _wants(model) else None
         if meshes is None:
             return model
@@ -40,15 +43,19 @@ class Shared:
 
 
 def meshed(models: Sequence[Model | PatchfemError]) -> list:
-    """The models in their order, those of one geometry with meshes that they share; a patch that stands alone keeps the
-    mesh that its own run chooses."""
+    """Return the models in their order, with shared meshes for those of one geometry.
+
+    A single patch of a geometry keeps the mesh that its own run chooses.
+    """
     shared = Shared(models)
     return [shared.given(model) for model in models]
 
 
 def _wants(model: Model | PatchfemError) -> bool:
+    """Return whether a model may share its meshes."""
     return isinstance(model, Model) and model.patch is not None and model.patch.mesh.shared is None
 
 
 def _key(model: Model) -> tuple:
+    """Return the key of geometry and tolerance."""
     return patch_meshes.geometry_of(model.patch), model.accuracy.tolerance

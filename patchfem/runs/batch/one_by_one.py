@@ -1,4 +1,7 @@
-"""Cases run one after the other, as single runs: what every kind of model has, and what batches are held against."""
+"""Cases run one after the other, as single runs: the reference of all batches.
+
+In: models. Out: `CaseResults`.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +22,19 @@ def solve(
     keep: Callable | None = None,
     estimate: bool = True,
 ) -> CaseResults:
-    """Answers of single runs of the models.
+    """Return the results of single runs of the models.
 
-    keep(case, Result): called after each run; estimate: False leaves out the coarser runs and the errors. A
-    PatchfemError of one case is its message, and so is any other fault: none stops the rest.
+    An error of one case becomes its message and does not stop the others.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    say : callable, optional
+        Callback for a line of text.
+    keep : callable, optional
+        Called with case and Result after each run.
+    estimate : bool
+        If False, coarse runs and errors are omitted.
     """
     found = CaseResults.blank(len(models))
     for case, model in enumerate(models):
@@ -39,7 +51,7 @@ def solve(
             )
         except (
             Exception
-        ) as error:  # a defect of one case must not cost the answers of a thousand others
+        ) as error:  # a defect of one case must not lose the results of a thousand others
             found.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
         else:
             found.put(case, result.outcome, result.measures, 0.0)

@@ -1,4 +1,7 @@
-"""Static patches that share their pieces: pressed together, a pass per mesh for all of them."""
+"""Batch of static patches that share their pieces, pressed together on each mesh.
+
+In: models of a group. Out: `CaseResults`, or models whose patches are solved.
+"""
 
 from __future__ import annotations
 
@@ -23,28 +26,30 @@ from ..results.result import without_folders, without_folders_of
 from . import one_by_one
 from .case_results import CaseResults
 
-AT_ONCE = 2048  # cases whose forces are held at once
-TINY = 1e-300  # an error that is always allowed
+AT_ONCE = 2048  # cases whose forces are in memory at the same time
+TINY = 1e-300  # absolute error that is always allowed
 
 
 class _Nodes(NamedTuple):
+    """Positions of the interface nodes [m], in place of a Patch."""
+
     x: np.ndarray
 
 
 def refuses(model: Model) -> str:
-    """Why a model is not pressed together with others; "" where it may be."""
+    """Return why a model is not pressed with others; "" if it may be."""
     return (
         static.not_together(model.patch) if model.kind == "patch" else "the case is no static patch"
     )
 
 
 def group(model: Model) -> Hashable:
-    """Equal for models whose patches are pressed together."""
+    """Return a key that is equal for models whose patches are pressed together."""
     return geometry_of(model.patch), static.pressing_kind(model.patch), model.accuracy.tolerance
 
 
 def parts(models: Sequence[Model]) -> dict:
-    """{group: places} of models that differ in plain numbers alone; of others none."""
+    """Return {group: indices} of models that differ in plain numbers only; {} for others."""
     alike = (
         isinstance(models, SimilarModels)
         and models.first.kind == "patch"
@@ -54,9 +59,10 @@ def parts(models: Sequence[Model]) -> dict:
 
 
 def solved_together(models: Sequence[Model]) -> list[Model]:
-    """The models in their order, those whose patches press together with how they do, for what moves them then.
+    """Return the models in their order, with the solution of patches that are pressed together.
 
-    Of patches that are alike, as those of levels or frictions, one is pressed for all, so that they share its shear.
+    Of patches that are equal, e.g. for several drive levels or friction laws, one is pressed for
+    all, so that they share its shear modes.
     """
     out, groups = list(models), {}
     for case, model in enumerate(models):
@@ -73,17 +79,27 @@ def solved_together(models: Sequence[Model]) -> list[Model]:
 
 
 def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> CaseResults:
-    """Answers of models, so many at once, whose patches are pressed before `solve` gives those of a part."""
+    """Return the results of models whose patches are pressed before `solve` computes the rest.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    together : int
+        Number of cases per call.
+    solve : callable
+        Function of a part of the models that returns its CaseResults.
+    """
     out = CaseResults.blank(len(models))
     for first in range(0, len(models), together):
-        with one_thread():  # more wait for each other longer than such small systems take
+        # several threads wait for each other longer than such small systems take
+        with one_thread():
             part = solved_together(models[first : first + together])
             out.place(range(first, first + len(part)), solve(part))
     return out
 
 
 def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
-    """Answers of a group; cases that do not press together with the others are run by themselves."""
+    """Return the case results of a group; cases not pressed together are run by themselves."""
     out = CaseResults.blank(len(models))
     for start in range(0, len(models), AT_ONCE):
         cases = range(start, min(start + AT_ONCE, len(models)))
@@ -92,6 +108,7 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
 
 
 def _solved(models: Sequence[Model], say: Callable | None) -> CaseResults:
+    """Return the case results of at most AT_ONCE models."""
     begin, first, alike = perf_counter(), models[0], isinstance(models, SimilarModels)
     asked = (
         static.asked_by_columns(models.columns().patch, len(models))

@@ -1,7 +1,7 @@
-"""Measures of many marches under one sine from the samples of their last cycles, side by side: those of `response.rows`
-on the samples of one run, as columns.
+"""Measures of many marches under a sine from the samples of their last cycles, as columns.
 
-Samples (s, n) of n runs are equally spaced over whole cycles.
+In: samples (s, n) of n runs, equally spaced over whole cycles. Out: the measures that
+`response.rows` computes from the samples of a single run, (n,) each.
 """
 
 from types import SimpleNamespace
@@ -16,9 +16,24 @@ from ...response.spectrum import PLACES, WEIGHTS, distorted
 
 
 class Samples:
-    """The last `window` cycles of runs at `steps` steps each: motion z, rate (s, m, n) of the modes of a rig, force [N]
-    and slip [m] (s, n); amplitude (n,) [m s-2] of the sine of the base, omega [rad/s]; worked (n,) [J]: friction work
-    of these cycles."""
+    """Samples of the last `window` cycles of n runs.
+
+    Parameters
+    ----------
+    found
+        Motion z and rate (s, m, n) of the modes of a rig, force [N] and slip [m] (s, n), and
+        friction work of these cycles `worked` (n,) [J].
+    modes
+        Modal basis of the rig.
+    omega : float
+        Angular frequency of the drive [rad/s].
+    amplitude : (n,)
+        Acceleration of the base [m s-2].
+    steps : int
+        Steps per cycle.
+    window : int
+        Number of cycles.
+    """
 
     def __init__(self, found, modes, omega: float, amplitude, steps: int, window: int):
         self.found, self.modes, self.omega, self.amplitude = found, modes, omega, amplitude
@@ -28,7 +43,7 @@ class Samples:
         self.span = window * self.period
 
     def acceleration(self) -> np.ndarray:
-        """Absolute acceleration of the output (s, n) [m s-2]."""
+        """Return the absolute acceleration of the output (s, n) [m s-2]."""
         modes, found = self.modes, self.found
         out = np.multiply.outer(
             (1 - modes.base @ modes.output) * np.sin(self.angle), self.amplitude
@@ -38,9 +53,18 @@ class Samples:
         return out - modes.output @ modes.slide / modes.mass * found.force
 
     def values(self, book: dict, stiffness, load) -> dict:
-        """Measures by name, (n,) each, NaN where a run has none; book: energies of the runs as `energy_balance` takes
-        them, with what `sampled`, `booked` and `passed` say of the friction work; stiffness (n,) [N/m]: of the first
-        mode as the contact meets it, 0 where no damping ratio refers to it; load (n,) [N]."""
+        """Return the measures (n,) by name; NaN for a run without the measure.
+
+        Parameters
+        ----------
+        book : dict
+            Energies of the runs as in `energy_balance`, and `sampled`, `booked` and `passed`
+            friction work [J].
+        stiffness : (n,)
+            K of the first mode as seen by the contact [N/m]; 0 if no damping ratio refers to it.
+        load : (n,)
+            Normal load [N].
+        """
         first, third = (self.harmonic(number) for number in (1, 3))
         out = {
             "absolute_acceleration_peak": peaks(np.abs(self.acceleration()))[0],
@@ -71,8 +95,10 @@ class Samples:
         return out | self.slips() | self.loops(first, stiffness)
 
     def harmonic(self, number: int) -> np.ndarray:
-        """First Fourier coefficients (m, n) [m] of the modes at so many times the frequency of the drive, as
-        `spectrum.motion_harmonic` has them of cubics."""
+        """Return the Fourier coefficients (m, n) [m] of the modes at a multiple of the frequency.
+
+        They are those of cubics, as in `spectrum.motion_harmonic`.
+        """
         h, n, s, found = self.dt, number, PLACES, self.found
         wave, part = (
             np.exp(-1j * n * self.angle[:-1]),
@@ -96,16 +122,34 @@ class Samples:
         )
 
     def ends(self) -> tuple:
-        """What motion and rate of the modes (m, n) gain over the cycles."""
+        """Return the changes of motion and rate of the modes (m, n) over the window."""
         return self.found.z[-1] - self.found.z[0], self.found.rate[-1] - self.found.rate[0]
 
     def gain(self, row, first, number: int) -> np.ndarray:
-        """Fourier coefficient (n,) of the second derivative of row . modes from that (m, n) of the modes, by parts."""
+        """Return the Fourier coefficient (n,) of the second derivative of row . modes, by parts.
+
+        Parameters
+        ----------
+        row : (m,)
+            Participations.
+        first : (m, n)
+            Fourier coefficients of the modes.
+        number : int
+            Multiple of the drive frequency.
+        """
         omega, (moved, faster) = number * self.omega, self.ends()
         return row @ (2 / self.span * (faster + 1j * omega * moved) - omega**2 * first)
 
     def loops(self, first, stiffness) -> dict:
-        """Measures of the loop; first (m, n) [m]: coefficients of the modes."""
+        """Return the measures of the loop (n,) by name.
+
+        Parameters
+        ----------
+        first : (m, n)
+            Fourier coefficients of the modes [m].
+        stiffness : (n,)
+            See `values`.
+        """
         modes, omega, (moved, _) = self.modes, self.omega, self.ends()
         rates = 2 / self.span * moved + 1j * omega * first
         rest = np.array(
@@ -125,7 +169,7 @@ class Samples:
         ) | {"secant_stiffness": secant}
 
     def turns(self) -> list:
-        """What `loops.turns_of` gives of each run."""
+        """Return the result of `loops.turns_of` for each run."""
         steps, size = self.steps, self.slide.shape[1]
         rows, out = np.arange(size), np.empty((2, 2, self.window, size))
         for number in range(self.window):
@@ -148,7 +192,7 @@ class Samples:
         ]
         for run in np.flatnonzero(
             np.isnan(out[:, 1]).any(axis=(0, 1))
-        ):  # it turns at an end of a cycle
+        ):  # these runs have a reversal at an end of a cycle
             turn[run] = turns_of(
                 time,
                 self.slide[:, run],
@@ -160,7 +204,7 @@ class Samples:
         return turn
 
     def drift(self) -> np.ndarray:
-        """Motion per cycle (n,) [m] as `loops.drift` has it, of two cycles or more."""
+        """Return the motion per cycle (n,) [m] as `loops.drift` does, for two cycles or more."""
         means, h = [], self.dt
         for first in (0, (self.window - 1) * self.steps):
             y, v = (one[first : first + self.steps + 1] for one in (self.slide, self.speed))
@@ -169,7 +213,7 @@ class Samples:
         return (means[1] - means[0]) / max(self.window - 1, 1)
 
     def slips(self) -> dict:
-        """Measures of the slip as `measures.slip_measures` has them of runs that slide."""
+        """Return the measures of the slip as `measures.slip_measures` does for runs that slide."""
         slip, steps = self.found.slip, np.abs(np.diff(self.slide, axis=0))
         still = steps <= ROUND * np.abs(self.slide).max(axis=0)
         above = (
@@ -198,7 +242,10 @@ class Samples:
         }
 
     def window_of(self, run: int, acceleration) -> Response:
-        """The samples of one run with its acceleration (s,) [m s-2], as far as what rings in them is asked for."""
+        """Return the samples of one run for the search for ringing.
+
+        acceleration: (s,) [m s-2].
+        """
         z, rate = self.found.z[:, :, run], self.found.rate[:, :, run]
         return Response(
             self.angle / self.omega,
@@ -215,7 +262,10 @@ class Samples:
         )
 
     def longest_stick(self, share: float) -> np.ndarray:
-        """Longest time (n,) [s] in which the slip is slower than this share of its fastest in the same cycle."""
+        """Return the longest time (n,) [s] in which the slip is slow.
+
+        Slow means below the fraction `share` of the largest slip rate in the same cycle.
+        """
         rate = np.abs(np.diff(self.found.slip, axis=0)).reshape(self.window, self.steps, -1)
         slow = (rate < share * rate.max(axis=1, keepdims=True)).reshape(
             self.window * self.steps, -1
@@ -226,7 +276,7 @@ class Samples:
 
 
 def _along(row, motion) -> np.ndarray:
-    """row . modes (s, n) of a motion (s, m, n)."""
+    """Return row . modes (s, n) of a motion (s, m, n)."""
     out = row[0] * motion[:, 0]
     for k in range(1, len(row)):
         out += row[k] * motion[:, k]
@@ -234,8 +284,11 @@ def _along(row, motion) -> np.ndarray:
 
 
 def _turned(slide, speed, force, rows, h: float) -> np.ndarray:
-    """(largest slide, force there) (2, n) of a cycle of samples, as `loops.turns_of` reads it by the slide; the force
-    is NaN where it is largest at an end of the cycle."""
+    """Return the largest slide [m] and the force there [N] (2, n) of a cycle.
+
+    As in `loops.turns_of` with "slide"; the force is NaN if the slide is largest at an end of the
+    cycle.
+    """
     top = slide.argmax(axis=0)
     best, at, share = slide[top, rows], top.copy(), np.zeros(len(rows))
     for k in (top - 1, top):
@@ -264,8 +317,10 @@ def _turned(slide, speed, force, rows, h: float) -> np.ndarray:
 
 
 def peaks(size) -> tuple:
-    """((n,) largest of samples (s, n) as `measures.acceleration_peak` reads it; what it may lie above them, as
-    `measures.peaks_between` says)."""
+    """Return the largest values (n,) of samples (s, n), and by how much they may be too small.
+
+    As in `measures.acceleration_peak` and `measures.peaks_between`.
+    """
     rows, top = np.arange(size.shape[1]), size.argmax(axis=0)
     inside = (top > 0) & (top < len(size) - 1)
     near = np.clip(top + np.arange(-2, 3)[:, None], 0, len(size) - 1)

@@ -1,7 +1,9 @@
-"""What instruments see of a rig at many drives: its motion alone, without errors, multipliers or events.
+"""Motion of a rig at many drives as instruments see it, without errors and events.
 
-For searches, which ask a model thousands of times. A steady engine goes straight to its motion and may start from one
-nearby; any other engine makes its run. Pieces and elements are made once for all drives.
+In: a model and its patch, then one drive after the other. Out: `Watched`. It serves searches,
+which evaluate a model thousands of times. A steady engine finds the motion directly, and may
+start from a motion nearby; any other engine makes its run. Pieces and elements are computed
+once for all drives.
 """
 
 from __future__ import annotations
@@ -23,15 +25,20 @@ from ..rig.numerics import choose
 from ..rig.steady import balance as rig_balance
 from ..rig.steady import maps
 
-SAMPLES = 400  # of a cycle without friction
+SAMPLES = 400  # samples of a cycle without friction
 UNBOUNDED = Outcome.GROWS, Outcome.NOT_CONVERGED, Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES
 
 
 class Watched(NamedTuple):
-    """The last cycle or cycles of a rig: window with its histories, None where a Watcher is not asked for it; largest
-    absolute acceleration [m s-2] and displacement amplitude [m] as a run measures them; near: a start for a motion
-    nearby, None where there is none; fundamental: first harmonic [m s-2] of the absolute acceleration, None where only
-    the window has it."""
+    """Last cycles of a rig.
+
+    - window: histories; None if the Watcher does not need them.
+    - acceleration: largest absolute acceleration as a run measures it [m s-2].
+    - displacement: displacement amplitude as a run measures it [m].
+    - near: initial guess for a motion nearby, or None.
+    - fundamental: first harmonic of the absolute acceleration [m s-2]; None if only the window
+      contains it.
+    """
 
     window: Response | None
     acceleration: float
@@ -41,12 +48,23 @@ class Watched(NamedTuple):
 
 
 class Watcher:
-    """A model of kind rig or linear, asked at one drive after another.
+    """Model of kind rig or linear that is evaluated at one drive after the other.
 
-    patch: the solved Patch, or None under [normal]. A call with a drive (core.SineDrive) and the `near` of another
-    answer gives Watched, or None where no bounded motion is found; the answer is that of `runs.run.run` to round-off
-    where no start is given. windowed: whether histories are wanted where the engine can do without them; before: a
-    Watcher of another model that is no longer asked, whose room serves this one where it fits.
+    A call with a drive (core.SineDrive), and with the `near` of another result, returns Watched;
+    None if no bounded motion is found. Without a start, the result is that of `runs.run.run` to
+    round-off.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch or None
+        None under [normal].
+    say : callable, optional
+        Callback for a line of text.
+    windowed : bool
+        Whether histories are needed if the engine can do without them.
+    before : Watcher, optional
+        Watcher of another model that is no longer used, whose workspace is reused if it fits.
     """
 
     def __init__(
@@ -75,7 +93,7 @@ class Watcher:
         return self(drive)
 
     def _gauged(self, seen: Watched | None) -> Watched | None:
-        """The displacement at the gauge, where it moves otherwise than the accelerometer."""
+        """Return the result with the displacement of the gauge, if the rig has one."""
         gauge = self.model.rig.modes.gauge
         if seen is None or gauge is None or seen.window is None:
             return seen
@@ -85,12 +103,13 @@ class Watcher:
         )
 
     def _once(self, name: str, make):
+        """Return the object of this name, made on the first call."""
         if name not in self.made:
             self.made[name] = make()
         return self.made[name]
 
     def _line(self, drive, near) -> Watched | None:
-        """Without friction: z = (Omega^2 - omega^2 + i omega D)^-1 (i a base)."""
+        """Return the motion without friction: z = (Omega^2 - omega^2 + i omega D)^-1 (i a base)."""
         modes, omega = self.model.rig.modes, drive.omega
         found = harmonic.linear_part(modes, omega, 1)
         if any(k == 1 for k, *_ in found.free):
@@ -120,18 +139,20 @@ class Watcher:
         )
 
     def _yields(self, drive, near) -> Watched:
+        """Return the motion of elastic-plastic elements, by the map of yields or else by balance."""
         orbits = self._once("yields", self._orbits)
         try:
             seen = orbits(drive, near)
         except NotConverged:
             if near is not None or len(self.model.rig.friction.interfaces) > 1:
                 raise
-            # a start for a balance is none for a map of yields
+            # an initial guess for harmonic balance does not serve the map of yields
             return self._balance(drive, None)._replace(near=None)
         window = orbits.window(drive, seen.point) if self.windowed else None
         return Watched(window, seen.acceleration, seen.displacement, seen.point, seen.fundamental)
 
     def _orbits(self):
+        """Return the map of yields, in the workspace of an earlier Watcher if it fits."""
         modes, groups = (
             self.model.rig.modes,
             pieces.YieldingElements(self.model, self.numerics, self.patch).groups,
@@ -144,6 +165,7 @@ class Watcher:
         )
 
     def _balance(self, drive, near) -> Watched:
+        """Return the motion by harmonic balance."""
         one = self._once(
             "balance",
             lambda: rig_balance.BalanceFinder(self.model, self.numerics, self.patch, 0, self.say),
@@ -155,14 +177,16 @@ class Watcher:
         )
 
     def _events(self, drive, near) -> Watched | None:
+        """Return the motion of Coulomb interfaces by the event map."""
         one = self._once(
             "events", lambda: maps.EventFinder(self.model, self.numerics, self.patch, 0, self.say)
         )
         return _seen(one.point(drive)[0])
 
     def _run(self, drive, near) -> Watched | None:
+        """Return the last cycles of a run."""
         model = replace(self.model, rig=self.model.rig.with_signal(drive))
-        # what is before the window is neither kept nor measured
+        # histories from before the window are not kept
         few = replace(self.numerics, whole=False)
         if ENGINES[self.numerics.engine] is not MARCH:
             return _seen(
@@ -177,11 +201,12 @@ class Watcher:
 
 
 def _seen(raw) -> Watched | None:
-    """What a Solution shows; None where the motion grows, leaves its travel or was not found."""
+    """Return the last cycles of a Solution; None if the motion is unbounded or was not found."""
     return None if raw.outcome in UNBOUNDED else _measured(raw.window, raw.values)
 
 
 def _measured(window: Response, values: dict) -> Watched:
+    """Return the Watched of a window and its measures."""
     return Watched(
         window, values["absolute_acceleration_peak"], values["relative_displacement_amplitude"]
     )

@@ -216,7 +216,7 @@ def measure_engines(result) -> dict:
 
 
 def without_folders(texts, path: Path) -> list:
-    """Return remarks with absolute file names shortened to the file, and readable numbers.
+    """Return remarks with absolute file names reduced to the file, and readable numbers.
 
     path: of the scene, in whose folder the files are.
     """

@@ -1,4 +1,7 @@
-"""The table of all checks, and the result of a run whose checks failed."""
+"""Table of all checks, and the result of a run whose checks failed.
+
+In: a Result. Out: its failed Findings, and the Result as `not_converged` if there are any.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -24,7 +27,7 @@ CHECKS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
 
 
 def failed_findings(result: Result) -> list:
-    """All Findings of a Result that exceed their thresholds."""
+    """Return all Findings of a Result that exceed their thresholds."""
     run = Evidence(result)
     return [finding for check in CHECKS for finding in check(run) if finding.is_failed]
 
@@ -32,7 +35,7 @@ def failed_findings(result: Result) -> list:
 def with_self_checks(result: Result) -> Result:
     """Return the result, as `not_converged` with a sentence for each of CHECKS that failed.
 
-    A model that was changed after it was built from its scene is not checked against the scene.
+    A model that was changed after it was built from its scene is not compared with the scene.
     """
     model = result.plan.model
     if result.outcome is Outcome.NOT_CONVERGED or not model.source.describes(model):

@@ -1,4 +1,7 @@
-"""What the checks read of a result: numbers of the scene, its modes, its last cycles, its friction by two routes."""
+"""Data of a result that the checks use: scene, modes, last cycles, friction by two methods.
+
+In: a Result. Out: `Evidence`.
+"""
 
 import tomllib
 from functools import cached_property
@@ -11,11 +14,11 @@ from ..results.result import Result
 from ..rig import engines
 from .finding import CUBIC_QUADRATURE
 
-MIN_CYCLE_SAMPLES = 40  # samples of a cycle; a coarser window is not read
+MIN_CYCLE_SAMPLES = 40  # samples per cycle; a window with fewer is not used
 
 
 class Evidence:
-    """What the checks read: a Result, and the scene as a table of numbers in SI."""
+    """Result, and its scene as a table of numbers in SI units."""
 
     def __init__(self, result: Result):
         self.result = result
@@ -23,7 +26,7 @@ class Evidence:
         self.scene = tomllib.loads(self.model.source.resolved)
 
     def number(self, *keys) -> float | None:
-        """Value of a key of the scene in SI, None if the scene does not have it."""
+        """Return the value of a key of the scene in SI units; None if the scene does not have it."""
         value = self.scene
         for key in keys:
             if not isinstance(value, dict) or key not in value:
@@ -32,12 +35,12 @@ class Evidence:
         return quantity(value)
 
     def value(self, name: str) -> float | None:
-        """Value of a measure, None if the run does not have it."""
+        """Return the value of a measure; None if the run does not have it."""
         measure = self.result.measures.get(name)
         return None if measure is None else measure.value
 
     def error(self, name: str) -> float:
-        """Stated error of a measure with its floor, 0 where none is known."""
+        """Return the stated error of a measure plus its floor; 0 if the run does not have it."""
         measure = self.result.measures.get(name)
         return 0.0 if measure is None else (measure.error or 0.0) + measure.floor
 
@@ -53,13 +56,12 @@ class Evidence:
 
     @cached_property
     def load(self) -> float | None:
-        """Normal load [N] of the scene, None where an approach is given instead."""
+        """Normal load [N] of the scene; None if it gives an approach instead."""
         return self.number("normal", "load") or self.number("contact", "load")
 
     @cached_property
     def has_plain_friction(self) -> bool:
-        """Whether one interface rubs under a load that does not change, with coefficients that do
-        not change."""
+        """Whether a single interface slides under a constant load with constant coefficients."""
         friction, model = self.scene.get("friction"), self.model
         if (
             friction is None
@@ -80,7 +82,10 @@ class Evidence:
 
     @cached_property
     def modes(self) -> "SceneModes | None":
-        """Modes of [[structure.mode]], None where others or a bonded spring replace them."""
+        """Modes of [[structure.mode]]; None if the engine moves others.
+
+        Reduction, or a bonded spring, replaces them.
+        """
         structure = self.scene.get("structure", {})
         if (
             "mode" not in structure
@@ -105,8 +110,10 @@ class Evidence:
 
     @cached_property
     def window(self):
-        """Last cycles of a run under a sine, as a Response or BenchRun; None of other drives and of
-        few samples."""
+        """Last cycles of a run under a sine, as a Response or LastCycle; else None.
+
+        None also for too few samples.
+        """
         window, frequency = self.result.window, self.frequency
         if window is None or frequency is None or window.time.size < 3:
             return None
@@ -122,7 +129,7 @@ class Evidence:
 
     @cached_property
     def frequency(self) -> float | None:
-        """Frequency [Hz] of a drive or a slide that is a sine to the end, None of any other."""
+        """Frequency [Hz] of a drive or a slide that is a sine to the end; None for any other."""
         drive, slide = self.scene.get("drive"), self.scene.get("slide", {})
         if drive is None:
             return self.number("slide", "frequency") if slide.get("kind") == "sine" else None
@@ -131,8 +138,7 @@ class Evidence:
 
     @cached_property
     def balance(self) -> "ForceBalance | None":
-        """Friction by the equation of motion and by its samples, None where something else acts as
-        well."""
+        """Friction by the equation of motion and by its samples; None if other forces act as well."""
         rig, modes, window = self.model.rig, self.modes, self.window
         if (
             rig is None
@@ -149,7 +155,8 @@ class Evidence:
             return None
         size = self.number("drive", "acceleration")
         force = self.number("drive", "force")
-        if size is None and force is None:  # of another kind, such as a displacement of the base
+        # the drive is of another kind, such as a displacement of the base
+        if size is None and force is None:
             return None
         drive = force / modes.mass if size is None else size
         return balance_of(modes, window, drive, 2 * np.pi * self.frequency)
@@ -164,8 +171,10 @@ class LastCycle(NamedTuple):
 
 
 class SceneModes(NamedTuple):
-    """Modes as the scene writes them: omega [rad/s], zeta, slide, base, output [1], (n,) each, and
-    the mass [kg]."""
+    """Modes as in the scene.
+
+    omega [rad/s], zeta, slide, base and output [1], (n,) each, and the mass [kg].
+    """
 
     omega: np.ndarray
     zeta: np.ndarray
@@ -176,9 +185,13 @@ class SceneModes(NamedTuple):
 
 
 class ForceBalance(NamedTuple):
-    """First harmonics [N] of the friction force by the equation of motion and by its samples, of
-    the slide [m]; what the samples leave open of the second [N], and the size [N] of the terms that
-    the first is a difference of.
+    """First harmonics of the friction force by two methods, and of the slide.
+
+    - from_motion: harmonic of the force by the equation of motion [N].
+    - from_samples: harmonic of the force by its samples [N].
+    - slide: harmonic of the slide [m].
+    - sampling: error of `from_samples` by the sampling [N].
+    - terms: magnitude of the terms of which `from_motion` is a difference [N].
     """
 
     from_motion: complex
@@ -189,12 +202,12 @@ class ForceBalance(NamedTuple):
 
     @property
     def threshold(self) -> float:
-        """Largest difference [N] of the two first harmonics on a right run."""
+        """Largest difference [N] of the two first harmonics in a correct run."""
         return self.sampling + CUBIC_QUADRATURE * self.terms
 
 
 def quantity(value) -> float | None:
-    """Number of a value in a resolved scene, such as 0.3 or "700.0 N"; None of other texts."""
+    """Return the number of a value in a resolved scene, such as 0.3 or "700.0 N", else None."""
     if isinstance(value, str):
         head = value.split()[0] if value else ""
         try:
@@ -205,8 +218,15 @@ def quantity(value) -> float | None:
 
 
 def cubic_harmonic(time, value, rate, omega: float) -> complex:
-    """Compute 2/T int y exp(-i omega t) dt of the cubics through samples (k,) and their rates, by
-    Simpson's rule."""
+    """Compute 2/T int y exp(-i omega t) dt of cubics through samples (k,), by Simpson's rule.
+
+    Parameters
+    ----------
+    time, value, rate : (k,)
+        Times [s], samples of y and their rates.
+    omega : float
+        Angular frequency [rad/s].
+    """
     step = np.diff(time)
     middle = (value[1:] + value[:-1]) / 2 + step * (rate[:-1] - rate[1:]) / 8
     wave = np.exp(-1j * omega * time)
@@ -217,13 +237,22 @@ def cubic_harmonic(time, value, rate, omega: float) -> complex:
 
 
 def balance_of(modes: SceneModes, window, acceleration: float, omega: float) -> ForceBalance:
-    """Compute the first harmonic of the friction force by its two routes.
+    """Compute the first harmonic of the friction force by two methods.
 
-    The equation of motion times exp(-i omega t), integrated by parts over the window: the harmonic
-    of z'' is [v e + i omega z e] 2/T - omega^2 z1, that of v is [z e] 2/T + i omega z1. By the
-    samples it is the trapezoidal rule; where the force is monotonic between two samples, that rule
-    misses at most h |change of F|/2 per step. Twice as much is allowed, for a force that turns
-    within a step.
+    The equation of motion times exp(-i omega t) is integrated by parts over the window: the
+    harmonic of z'' is [v e + i omega z e] 2/T - omega^2 z1, that of v is [z e] 2/T + i omega z1.
+    From the samples it is computed by the trapezoidal rule; if the force is monotonic between two
+    samples, the error of this rule is at most h |change of F|/2 per step. Twice as much is allowed,
+    for a force that reverses within a step.
+
+    Parameters
+    ----------
+    modes : SceneModes
+    window : Response
+    acceleration : float
+        Acceleration of the drive, or its force over the mass [m s-2].
+    omega : float
+        Angular frequency of the drive [rad/s].
     """
     time, span = window.time, window.time[-1] - window.time[0]
     wave = np.exp(-1j * omega * time)

@@ -1,4 +1,7 @@
-"""Checks of a motion: friction force, loop, amplitudes, energies."""
+"""Checks of a motion: friction force, loop, amplitudes, energies.
+
+In: `Evidence`. Out: Findings.
+"""
 
 from collections.abc import Iterator
 
@@ -17,17 +20,18 @@ from .finding import (
     Finding,
 )
 
-SAMPLED_PEAK = 0.05  # relative; a peak between two of 40 samples a cycle of the fastest motion
+# relative; error of a peak between two of 40 samples per cycle of the fastest motion
+SAMPLED_PEAK = 0.05
 LIMITED_LAWS = ("coulomb", "tanh", "elastic-plastic", "iwan", "bouc-wen", "convolution")
-MAX_SLIP_CORRECTION = 0.05  # relative; equivalent damping of a window whose cycles differ a little
+# relative; error of the equivalent damping of a window whose cycles differ slightly
+MAX_SLIP_CORRECTION = 0.05
 
 
 def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
-    """Compare the first harmonic of the friction force from the equation of motion with that from
-    its samples.
+    """Compare the first harmonic of the friction force by two methods.
 
-    See `balance_of` for both routes and the threshold. `equivalent_stiffness` is Re(F1/q1) by
-    definition.
+    They are the equation of motion and the samples; see `balance_of` for both and for the
+    threshold. `equivalent_stiffness` is Re(F1/q1) by definition.
     """
     balance = run.balance
     if balance is None:
@@ -45,7 +49,7 @@ def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
     stiffness = run.value("equivalent_stiffness")
     if stiffness is not None and abs(balance.slide) > 0:
         expected = (balance.from_samples / balance.slide).real
-        # the slide enters as a divisor, so its quadrature counts in proportion
+        # the slide is a divisor, so that the error of its quadrature counts in proportion
         slack = (balance.threshold + CUBIC_QUADRATURE * size) / abs(balance.slide)
         yield Finding(
             "equivalent_stiffness",
@@ -57,17 +61,17 @@ def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
 
 
 def check_friction_limit(run: Evidence) -> Iterator[Finding]:
-    """Compare `friction_force_peak` with static × load, which no friction of a limited law exceeds.
+    """Compare `friction_force_peak` with static × load, the limit of the friction force.
 
-    Laws that overshoot (lugre, growing bonds) are left out. A Coulomb contact of rigid pieces that
-    slips bears at least kinetic × load; an elastic-plastic one that slides 4 bond lengths on a
-    bench bears static × load.
+    Laws that exceed it (lugre, growing bonds) are left out. A Coulomb contact of rigid pieces that
+    slips carries at least kinetic × load; an elastic-plastic one that slides 4 bond lengths in a
+    bench carries static × load.
     """
     peak = run.value("friction_force_peak")
     if (
         peak is None
         or run.result.outcome
-        is Outcome.GROWS  # without bound, so that no error of the peak is known
+        is Outcome.GROWS  # the motion is unbounded, so that the error of the peak is not known
         or not run.has_plain_friction
         or run.scene["friction"]["law"] not in LIMITED_LAWS
     ):
@@ -102,12 +106,11 @@ def check_friction_limit(run: Evidence) -> Iterator[Finding]:
 
 
 def check_loop_area(run: Evidence) -> Iterator[Finding]:
-    """Compare `loop_area` with the trapezoidal rule over slide and force, and with the damping
-    ratio.
+    """Compare `loop_area` with the trapezoidal rule over slide and force, and with the damping.
 
-    Between two samples force and slide stay within their ranges where they are monotonic, so a step
-    is missed by at most |change of F| |change of q|/2; twice as much is allowed.
-    `equivalent_damping` is loop_area/(2 pi K A^2) with K and A of the first mode of the scene.
+    Between two samples force and slide are assumed to be monotonic, so that the error of a step is
+    at most |change of F| |change of q|/2; twice as much is allowed. `equivalent_damping` is
+    loop_area/(2 pi K A^2) with K and A of the first mode of the scene.
     """
     window, area = run.window, run.value("loop_area")
     if window is None or area is None or not run.has_plain_friction:
@@ -149,13 +152,12 @@ def check_loop_area(run: Evidence) -> Iterator[Finding]:
 
 
 def check_motion_measures(run: Evidence) -> Iterator[Finding]:
-    """Compare the amplitude and the acceleration with those of the modal coordinates and the
-    participations.
+    """Compare amplitude and acceleration with those from modal coordinates and participations.
 
-    Half the range of sum output_i z_i over the samples is at most the amplitude, and a few percent
-    less at most; so is the largest absolute acceleration over samples. The acceleration of a sample
-    is that of the equation of motion, output . z'' + a(t); friction that jumps at a sample is taken
-    on either side of it, so single samples are left out by the median.
+    Half the range of sum output_i z_i over the samples is at most the amplitude, and at most a few
+    percent less; the same holds for the largest absolute acceleration. The acceleration of a sample
+    follows from the equation of motion, output . z'' + a(t); since friction that jumps at a sample
+    may be on either side of the jump, the median over the samples is used.
     """
     modes, window, rig = run.modes, run.window, run.model.rig
     if (
@@ -218,9 +220,9 @@ def check_motion_measures(run: Evidence) -> Iterator[Finding]:
 def check_energy_balance(run: Evidence) -> Iterator[Finding]:
     """Compare the energy balance of a bench with zero.
 
-    Work = change of the stored energy + dissipated - created. A bench keeps each of them by the
-    same rule, so what is missing falls with the steps; a hundredth of the energy exchanged is more
-    than its first run leaves.
+    Work = change of the stored energy + dissipated - created. A bench integrates each of them by
+    the same rule, so that the error falls with the steps; a hundredth of the exchanged energy is
+    more than the error of its first run.
     """
     missing = run.value("energy_balance")
     if missing is not None and run.model.rig is None:

@@ -1,4 +1,7 @@
-"""Checks of a pressed patch: area, load, stiffness, pressure."""
+"""Checks of a pressed patch: area, load, stiffness, pressure.
+
+In: `Evidence`. Out: Findings.
+"""
 
 from collections.abc import Iterator
 
@@ -11,8 +14,8 @@ from .finding import AT_LEAST, AT_MOST, CONTACT_RESIDUAL, READING, ROUND_OFF, ST
 def check_interface_area(run: Evidence) -> Iterator[Finding]:
     """Compare the sum of the nodal areas with length × width × pairs.
 
-    The nodal areas integrate a constant exactly, so the two differ by round-off; coordinates of a
-    mesh file have some seven printed digits.
+    The nodal areas integrate a constant exactly, so that both differ by round-off; coordinates of a
+    mesh file have about seven digits.
     """
     if run.result.patch is None:
         return
@@ -22,10 +25,9 @@ def check_interface_area(run: Evidence) -> Iterator[Finding]:
 
 
 def check_normal_load(run: Evidence) -> Iterator[Finding]:
-    """Compare the sum of pressure × nodal area, and the measure `normal_load`, with the load of the
-    scene.
+    """Compare the integral of the pressure, and the measure `normal_load`, with the load.
 
-    Equilibrium of the upper piece. The contact solve meets it to its residual.
+    This is the equilibrium of the upper piece, which the contact solver satisfies to its residual.
     """
     if (
         run.result.patch is None
@@ -46,16 +48,16 @@ def check_normal_load(run: Evidence) -> Iterator[Finding]:
 
 
 def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
-    """Compare `normal_stiffness` and `tangential_stiffness` with the bounds of a layered column.
+    """Compare normal and tangential stiffness with the bounds of a layered column.
 
-    Two alike-long pieces that are held over their whole far faces. A uniform strain is admissible
-    (potential energy): the stiffness is at most that of columns M A/H in series, M = E (1 - nu)/((1
-    + nu)(1 - 2 nu)) in plane strain and E/(1 - nu^2) in plane stress; in shear G A/H. Where the
-    whole interface bears and nothing lies between the pieces, a uniform stress is admissible
-    (complementary energy): at least E' A/H, E' = E/(1 - nu^2) or E. Contact over a part of the
-    interface and asperities only soften. Elements on bilinear cells contain the uniform strain and
-    are stiffer than the continuum, so they lie between the same bounds. The stated errors of the
-    measures are added.
+    Two pieces of equal length are clamped over their whole far faces. A uniform strain is
+    admissible (potential energy): the stiffness is at most that of columns M A/H in series, M = E
+    (1 - nu)/((1 + nu)(1 - 2 nu)) in plane strain and E/(1 - nu^2) in plane stress; in shear G A/H.
+    If the whole interface is in contact and nothing lies between the pieces, a uniform stress is
+    admissible (complementary energy): the stiffness is at least E' A/H, E' = E/(1 - nu^2) or E.
+    Partial contact and asperities only reduce it. Elements on bilinear cells contain the uniform
+    strain and are stiffer than the continuum, so that they lie between the same bounds. The stated
+    errors of the measures are added.
     """
     patch, found = run.result.patch, run.model.patch
     if (
@@ -119,12 +121,11 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
 
 
 def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
-    """Compare the measures of the pressure with the nodal pressures and with load/(length × width).
+    """Compare the measures of the pressure with the nodal pressures and the mean pressure.
 
-    mean = loaded_fraction × pressure_peak is the definition of the first; the peak is at least the
-    mean; the moment is the sum of force × x; each edge of the contact lies within one cell beside
-    its last node. Measures may come from another mesh than the nodal pressures, hence their stated
-    errors.
+    By definition loaded_fraction × pressure_peak is the mean, load/(length × width); the moment is
+    the sum of force × x; each edge of the contact lies within one cell of its last node. Measures
+    may come from another mesh than the nodal pressures, therefore their stated errors are added.
     """
     patch = run.result.patch
     names = ("loaded_fraction", "pressure_peak", "moment", "contact_fraction", "normal_load")

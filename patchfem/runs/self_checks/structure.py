@@ -1,4 +1,7 @@
-"""Check of the modes that an engine moves."""
+"""Check of the modes that an engine moves.
+
+In: `Evidence`. Out: Findings on modes, or on masses and springs, of the scene.
+"""
 
 from collections.abc import Iterator
 

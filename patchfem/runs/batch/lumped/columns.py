@@ -1,4 +1,8 @@
-"""Measures of many runs as columns, with errors, outcome and reasons: what `runs.rig.rig` makes of one Solution."""
+"""Measures of many runs as columns, with errors, outcomes and reasons.
+
+In: `Runs` of a batch. Out: `CaseResults` equal to what `runs.rig.rig` makes of a single
+Solution, and which cases must be run by themselves.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,13 +36,19 @@ from ...rig.engines import knobs_idle
 from ...rig.motion_warnings import law_warnings
 from ..case_results import CaseResults
 
-ENDS = 5  # last windows whose phasors tell a steady motion (response.settling)
+ENDS = 5  # last windows whose phasors determine a steady motion (response.settling)
 MAIN, PHASE = "relative_displacement_amplitude", "slip_start_phase"
 
 
 class Sizes(NamedTuple):
-    """What a scene says of each of n models, (n,): tolerance; scale of the displacements to expect [m]; largest
-    acceleration of the drive [m s-2], its period [s]; least rate of a decay [1/s]."""
+    """Sizes in the scenes of n models, (n,) each.
+
+    - tolerance: [1].
+    - moved: expected displacement [m].
+    - largest: largest acceleration of the drive [m s-2].
+    - period: of the drive [s].
+    - decay: smallest decay rate of a mode [1/s].
+    """
 
     tolerance: np.ndarray
     moved: np.ndarray
@@ -48,7 +58,7 @@ class Sizes(NamedTuple):
 
 
 def sizes_of(models) -> Sizes:
-    """The Sizes of models."""
+    """Return the Sizes of models."""
     return Sizes(
         *collect_columns(
             models,
@@ -65,16 +75,25 @@ def sizes_of(models) -> Sizes:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Runs:
-    """What an engine found of n runs of `cycles` cycles each, the last `window` of which are read.
+    """Output of an engine for n runs of `cycles` cycles; the last `window` are evaluated.
 
-    values: measure -> (n,), NaN where a run has none; book: energies of the run [J], (n,) each; extremes: (n, c, 2) [m]
-    of the output per cycle; phasors: (n, w) [m] of the output in the last cycle of the last ENDS windows, or of all;
-    stuck, lost: (n,) whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside
-    `least` of its value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck
-    run, whether what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is
-    known to settle to, NaN where none is; chosen: what each run chose besides; again: whether a run by itself is
-    made again with finer steps where its amplitude misses the tolerance. Extremes and phasors are those of a run by
-    itself to the last bit: what is extrapolated far shows it.
+    - values: measures (n,) by name; NaN for a run without the measure.
+    - book: energies of the run (n,) by name [J].
+    - extremes (n, c, 2): smallest and largest output of each cycle [m].
+    - phasors (n, w): of the output in the last cycle of the last ENDS windows, or of all [m].
+    - stuck (n,): whether nothing slipped.
+    - lost (n,): whether the case must be run by itself.
+    - errors: (n,) by name, in addition to `least` times the value.
+    - closes: error of the energy balance above which a run has not converged.
+    - loads (n,): whether the friction force of a stuck run still increases.
+    - steady: amplitude and error (n,) [m] of the motion to which a run is known to settle; NaN if
+      unknown.
+    - chosen: further settings of each run.
+    - again: whether a single run would be repeated with finer steps if its amplitude misses the
+      tolerance.
+
+    Extremes and phasors are bitwise those of a single run, because far extrapolation amplifies
+    differences.
     """
 
     cycles: int
@@ -101,11 +120,23 @@ class Runs:
 
 
 def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = None) -> tuple:
-    """(Answers of the models, (n,) whether a case must be run by itself, (n,) whether all its errors but that of the
-    steady estimate are within its tolerance).
+    """Return the case results of models from their Runs.
 
-    numerics: as `results.result.choices` has it; again(Answers) -> (n,) which are answered another time, and are not
-    warned of what is wide.
+    Parameters
+    ----------
+    models : sequence of Model
+    runs : Runs
+    numerics : dict
+        Settings as in `results.result.choices`.
+    again : callable, optional
+        Function of the results that returns which cases (n,) are computed again; these have no
+        warnings of large errors.
+
+    Returns
+    -------
+    tuple
+        CaseResults; which cases (n,) must be run by themselves; which (n,) have all errors, except
+        that of the steady estimate, within the tolerance.
     """
     n, values = len(models), dict(runs.values)
     values[MAIN] = runs.values.get(MAIN, runs.amplitudes)
@@ -194,13 +225,15 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
 
 
 def _remarks(model, engine: str) -> list:
-    """What is said of a model, whatever its run finds."""
+    """Return the warnings on a model that do not depend on its run."""
     return [*model.source.remarks, *knobs_idle(model, engine), *model.rig.structure.notes]
 
 
 def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
-    """Outcomes (n), and the steady amplitudes and their errors, (n,) [m] each; moves: (n,), whose middle moves on, so
-    that none is steady."""
+    """Return the outcomes (n), and the steady amplitudes and their errors (n,) [m].
+
+    moves: which motions (n,) have a midpoint that drifts, so that they are not steady.
+    """
     pick = np.arange(runs.cycles - 1, -1, -runs.window)[::-1]
     ends = (runs.extremes[:, pick, 1] - runs.extremes[:, pick, 0]) / 2
     floor = SMALL * (sizes.largest / (2 * np.pi / sizes.period) ** 2)
@@ -227,7 +260,7 @@ def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
 
 
 def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
-    """What `rings_on` says of the cases that stick and ring on, by case."""
+    """Return the warnings of `rings_on` for the cases that stick but still vibrate, by case."""
     n, cases = (
         len(amplitude),
         np.flatnonzero([one is Outcome.STUCK for one in outcome] & (amplitude != 0)),
@@ -253,7 +286,10 @@ def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
 
 
 def _stops(found: CaseResults) -> None:
-    """No secant stiffness where rigid friction holds at the ends of its slide, as of `response.reasons.stopping`."""
+    """Remove the secant stiffness of rigid friction that sticks at the largest slide.
+
+    See `response.reasons.stopping`.
+    """
     stuck, secant = (found.values.get(name) for name in ("stick_fraction", "secant_stiffness"))
     if stuck is None or secant is None:
         return
@@ -271,7 +307,7 @@ def _stops(found: CaseResults) -> None:
 
 
 def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
-    """Why cases have no value of a measure that such runs can have."""
+    """Add the reasons why cases have no value of measures that they could have."""
     names = [*CYCLIC, PHASE]
     for name in names:
         found.measure(name, TABLE[name].unit)
@@ -286,7 +322,7 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
         if "stick_fraction" in found.values
         else lacking[0] & False
     )
-    # all that a reason hangs on, of a sine
+    # all properties on which a reason depends under a sine
     signs = np.array([*lacking, holds, sticks, sizes.largest != 0])
     patterns, which = np.unique(signs, axis=1, return_inverse=True)
     for place in np.flatnonzero(patterns[: len(names)].any(axis=0)).tolist():
@@ -304,8 +340,21 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
 
 
 def warned(model, outcome, found: CaseResults, case: int, wide: bool, rings=()) -> list:
-    """Warnings of a case, those that its own run would give: of its law and, where `wide` says that some is, of what is
-    known less well than the tolerance asks."""
+    """Return the warnings of a case that a single run would give.
+
+    They concern its friction law and, if `wide`, the errors that exceed the tolerance.
+
+    Parameters
+    ----------
+    model : Model
+    outcome : Outcome
+    found : CaseResults
+    case : int
+    wide : bool
+        Whether an error exceeds the tolerance.
+    rings : sequence of str
+        Warnings of `rings_on`.
+    """
     if not wide and not law_has_trait(model.friction.law, "bonds"):
         return list(rings)
     known = known_of(found, case)
@@ -318,21 +367,23 @@ def warned(model, outcome, found: CaseResults, case: int, wide: bool, rings=()) 
 
 
 def _by_law(models: SimilarModels, found: CaseResults) -> np.ndarray:
-    """(n,) whether the law of a case may have to be warned of, as `law_warnings` does: bonds that grow, are unbounded
-    or creep."""
+    """Return which cases (n,) may need a warning of `law_warnings`.
+
+    These have bonds that grow, are unbounded or creep.
+    """
     first = models.first
     if not law_has_trait(first.friction.law, "bonds"):
         return np.zeros(len(models), bool)
     if first.bonds.grows or first.bonds.order < 0 or first.bonds.reading != "stretch":
         return np.ones(len(models), bool)
-    if "drift_per_cycle" not in found.values:  # what moves no cycle long has none
+    if "drift_per_cycle" not in found.values:  # runs of less than a cycle have no drift
         return np.zeros(len(models), bool)
     drift, error = found.values["drift_per_cycle"], found.errors["drift_per_cycle"]
     return (np.abs(drift) > np.nan_to_num(error)) & (found.outcome != str(Outcome.TRANSIENT))
 
 
 def known_of(found: CaseResults, case: int) -> dict:
-    """The measures of a case whose errors are known, by name."""
+    """Return the measures of a case whose errors are known, by name."""
     return {
         name: Measure(
             float(column[case]),

@@ -1,13 +1,18 @@
-"""The batch of lanes: lumped cases of one law side by side, with bars from half the steps.
+"""Batch of lanes: lumped cases of one friction law marched side by side.
 
-Where the bars of a case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) miss the tolerance,
-it marches by a quarter of the steps too, which shows how its errors fall. A case marches by twice the steps where its
-bars still miss it: what it said before tells the errors then. A case of Iwan or of the elastic-plastic law that has not
-settled marches on. What rings in a stick that lasts all the time is told in closed form behind one spring, else by a
-fit. A case goes to the exact batch `lumped`, or under a law of a stretch to a run of its own, where a bar still misses
-its tolerance, rings in shorter sticks are to be told, or a motion grows. Where these contradict one of a few (under a
-law of a stretch twice: by its steps and by as many again), more are checked; where more than 3 in 100 are contradicted,
-every case of the batch is exact, else those are.
+In: models of a group. Out: `CaseResults`. The errors come from a march with half the steps.
+
+- Refinement: if an error of a case with a stretch law (tanh, Bouc-Wen, LuGre, bonds of constant
+  length) misses the tolerance, a quarter of the steps is marched too, which shows how its
+  errors fall. If errors still miss it, the case is marched with twice the steps, and its
+  previous march serves the error.
+- Settling: a case of the Iwan or the elastic-plastic law that has not settled marches on.
+- Ringing in a permanent stick is computed in closed form for a single spring, else by a fit.
+- Exact engine: a case goes to the exact batch `lumped`, or with a stretch law to a single run,
+  if an error still misses its tolerance, if shorter sticks may ring, or if its motion grows.
+- Check: a few cases are compared with the exact engine (with a stretch law twice, with its
+  steps and with twice as many). If one differs, more are checked; if more than 3 in 100 differ,
+  all cases of the batch are computed exactly, else those that differ.
 """
 
 from collections.abc import Callable, Sequence
@@ -41,10 +46,10 @@ from .columns import ENDS, Runs, batch_answers
 from .pieces import LONGEST, SHORTEST
 
 AMPLITUDE = "relative_displacement_amplitude"
-LEAST = 64  # cases of a study that lanes serve
-TIGHTEST = 1e-4  # tolerance that lanes serve
+LEAST = 64  # smallest number of cases of a study that lanes take
+TIGHTEST = 1e-4  # smallest tolerance that lanes can meet
 TOGETHER = 4096  # cases of one compiled call
-# law -> that of `dynamics.lanes`
+# friction law in `dynamics.lanes` by the law of the scene
 KINDS = {
     "coulomb": "rigid",
     "elastic-plastic": "yielding",
@@ -54,70 +59,82 @@ KINDS = {
     "lugre": "friction.laws.lugre_kernels",
     "nonlocal": "friction.laws.stretch_kernels",
 }
-MARCH_ON = "yielding", *march.MASING  # whose motions march on until they settle
-# steps of a cycle under a law of a stretch, its rate in a step then
+MARCH_ON = "yielding", *march.MASING  # laws whose motions march on until they settle
+# steps per cycle under a stretch law, and largest phase of its fastest rate in a step
 SMOOTH, CALM = (
     (128, 256, 512, 1024, 2048),
     0.5,
 )
-LAYER = 0.5  # of the rate at which a speed settles in the layer of tanh, from which on bars ask for more steps
-PASSES = 0.75  # of the time in which a slide that turns passes the speed of Stribeck, over that of a rate
-# steps of a cycle under a law of a stretch from which a ring that is not found is none
+# fraction of the relaxation rate of the speed in the layer of tanh, from which the errors need more
+# steps
+LAYER = 0.5
+# rate of the force peak of LuGre over (acceleration / Stribeck speed), the inverse time of a
+# reversal to pass this speed
+PASSES = 0.75
+# steps per cycle under a stretch law with which a ringing that is not found does not exist
 RINGING = 512
-# fastest motion over the drive, and the steps of a cycle it asks for
+# fastest rate over that of the drive, and the steps per cycle that it needs
 RATES = (
     (5.0, 96),
     (10.0, 192),
     (20.0, 384),
 )
-# the same behind sliders that are a patch
+# the same for a patch, represented by sliders
 OF_TABLE = (
     (10.0, 96),
     (20.0, 192),
     (40.0, 384),
     (80.0, 768),
 )
-OF_FIT = 5.0  # of the error of the fit of a ring, whose samples err alike by the steps of the march
-# relative error that stays, a hundredth of TIGHTEST: both marches can miss the same event
+# factor on the error of the fit of a ringing, because the march causes similar errors in all of its
+# samples
+OF_FIT = 5.0
+# smallest relative error, a hundredth of TIGHTEST: both marches may miss the same event
 LEAST_ERROR = 1e-6
-NO_LOOP = 1e-6  # of the largest force times slide: a case with less of a loop sticks
-# times its cycles marches what has not settled; change over a tenth of these that is left
+NO_LOOP = 1e-6  # relative to largest force times slide; a case with a smaller loop area sticks
+# a case that has not settled marches for at most MORE times its cycles; largest remaining change
+# over a tenth of these
 MORE, SETTLED = (
     10,
     1e-5,
 )
-LATE = 100  # times that change may be left at last
-# of its cycles, after which it is asked whether it has
+LATE = 100  # factor on SETTLED at the end of this march
+# fractions of its cycles after which it is tested whether a case has settled
 PACES = (
     0.25,
     0.25,
     0.5,
     *(MORE - 1) * (1.0,),
 )
-# error of an extrapolated range over what the extrapolation says, and over the range at least: 1 of 571 erred more
+# Error of an extrapolated range over the error that the extrapolation states, and its minimum over
+# the range: 1 of 571 was larger.
 OF_STATED, OF_TAIL = 2.5, 7e-6
-# times twice as many cells as a run by itself has in a check of Iwan, and of its bars: 1 of 590 random cases erred more
-# than one, by 1.9
+# In a check of the Iwan law: how often the cells of a single run are doubled, and the factor on its
+# errors. 1 of 590 random cases differed by more than one error, by 1.9.
 FINER_CELLS, SHORT = 2, 2.0
 RING = "ring_frequency", "ring_damping"
-# of a measure, by which a coarser mesh that marches changes it at most: the loop of little slip may be all unknown
+# Largest relative change by a coarser mesh that is fine enough to march; the loop of little slip
+# may be completely uncertain.
 WILD = ("relative_displacement_amplitude", 0.1), ("friction_force_peak", 0.1), ("loop_area", 10.0)
-DROPPED = 1e-2  # share of a loop by which another may be larger that is forgotten for want of room
-# one of so many cases is held against the exact engine, so many of a batch at least
+# fraction of a loop by which a loop that is forgotten for lack of memory may be larger
+DROPPED = 1e-2
+# One of this many cases is checked with the exact engine, and at least this many of a batch.
 CHECKED, FEWEST = (
     200,
     2,
 )
-# so many more where one contradicts; from this share of them on all cases are exact
+# If one differs, this many more are checked; from this fraction of differing cases, all are
+# computed exactly.
 IN_DOUBT, WRONG = (
     70,
     0.03,
 )
-RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a ring is looked for
+# phase of the free vibration in a stick [rad] from which a ringing is searched for
+RINGS = 0.9 * 3 * np.pi
 
 
 def refuses(model: Model) -> str:
-    """Why lanes do not take a model; "" where they do."""
+    """Return why lanes do not take a model; "" if they do."""
     return no_lanes(model) or (
         ""
         if steps_of([model])[0]
@@ -126,7 +143,7 @@ def refuses(model: Model) -> str:
 
 
 def no_lanes(model: Model) -> str:
-    """Why lanes do not take a model, nor any that differs from it in plain numbers; "" where they may."""
+    """Return why lanes take no model that differs from this one in plain numbers only, or ""."""
     if why := lumped.not_one_point(model):
         return why
     if not SHORTEST <= model.rig.drive.cycles <= LONGEST or not model.friction.static > 0:
@@ -137,7 +154,7 @@ def no_lanes(model: Model) -> str:
 
 
 def asks_more(model: Model) -> str:
-    """Why the accuracy that a model asks for is not that of lanes; "" where it is."""
+    """Return why the requested accuracy of a model exceeds that of lanes; "" if it does not."""
     if (
         model.accuracy.method != "auto"
         or fixed_settings(model.accuracy)
@@ -148,7 +165,7 @@ def asks_more(model: Model) -> str:
 
 
 def _manifold(friction) -> str:
-    """Why a law of a stretch has more than that to follow; "" where it has not."""
+    """Return why a stretch law has more states than its stretch; "" if it has not."""
     grows = law_has_trait(friction.law, "bonds") and (
         is_bond_list(friction) or friction.slip_growth is not None
     )
@@ -156,18 +173,20 @@ def _manifold(friction) -> str:
 
 
 def _creates(model: Model):
-    """Whether a law of a stretch may create energy, or its bonds have more than one stretch."""
+    """Return whether a stretch law may create energy, or its bonds have several stretches."""
     f = model.friction
     if law_has_trait(f.law, "bonds"):
         return np.not_equal(f.breakaway or 0.0, 0.0) | np.not_equal(f.initial_bonds, 1.0)
-    if f.law == "lugre":  # the power of its damping is below zero from there on
+    if f.law == "lugre":  # from this damping on, its power may be negative
         return np.greater(f.micro_damping * model.rig.speed_scale, 4 * of_law(model)[1])
     return np.less(f.shape, 0.5) if f.law == "bouc-wen" else False
 
 
 def of_law(model: Model) -> tuple:
-    """Numbers of a law of a stretch, as its `rate_equation` takes them, and the length [m] over which it gives way, 0 for
-    none."""
+    """Return the numbers of a stretch law for its `rate_equation`, and its length [m].
+
+    The length is 0 for a law without one.
+    """
     f, load, limit = model.friction, model.point.load, model.friction_limits(model.point.load)[0]
     if f.law == "tanh":
         return limit, 1 / f.reference_speed, 0.0
@@ -188,21 +207,24 @@ def of_law(model: Model) -> tuple:
 
 
 def steps_of(models: Sequence[Model]) -> np.ndarray:
-    """Steps per cycle (n,) of models of one law, 0 where they would be too many."""
+    """Return the steps per cycle (n,) of models of one law; 0 if there would be too many."""
     smooth = march.flows(KINDS[models[0].friction.law])
     ends = [(CALM * steps / (2 * np.pi), steps) for steps in SMOOTH] if smooth else RATES
     return steps_at(collect_columns(models, _rate)[0], ends)
 
 
 def steps_at(rate, ends) -> np.ndarray:
-    """Steps per cycle (n,) at fastest rates (n,) over that of the drive; ends: up to which rate how many."""
+    """Return the steps per cycle (n,) at fastest rates (n,) over that of the drive.
+
+    ends: sequence of (largest rate, steps).
+    """
     return np.append([steps for _, steps in ends], 0)[
         np.searchsorted([end for end, _ in ends], rate)
     ]
 
 
 def rate_of(model: Model, stiffness):
-    """Fastest rate of a model behind a spring of this stiffness [N/m] over that of its drive."""
+    """Return the fastest rate of a model with a contact stiffness [N/m], over that of its drive."""
     modes = model.rig.modes
     return (
         np.sqrt(modes.omega[0] ** 2 + stiffness * modes.slide[0] ** 2 / modes.mass)
@@ -211,7 +233,7 @@ def rate_of(model: Model, stiffness):
 
 
 def _rate(model: Model) -> tuple:
-    """Fastest rate of a model over that of its drive; infinite where lanes do not follow it."""
+    """Return the fastest rate of a model over that of its drive; inf if lanes cannot follow it."""
     modes, omega, damper = (
         model.rig.modes,
         model.rig.drive.signal.omega,
@@ -228,7 +250,7 @@ def _rate(model: Model) -> tuple:
             + damper
         )
         rate = np.where(rate > CALM * SMOOTH[-1] / (2 * np.pi) * omega, np.inf, LAYER * rate)
-    # its peak of force lasts while the slide turns, as long as its speed is that low
+    # its force peak during a reversal lasts as long as the speed is below the Stribeck speed
     if model.friction.law == "lugre":
         turns = np.abs(modes.slide[0] * modes.base[0]) * max_acceleration(model.rig.drive.signal)
         rate = np.maximum(damper, PASSES * turns / model.friction.stribeck_speed)
@@ -240,11 +262,11 @@ def _rate(model: Model) -> tuple:
 
 
 def _contact(model: Model) -> tuple:
-    """(stiffness before it slips [N/m], length [m], what else there is) of a contact, as `Cases` has them."""
+    """Return stiffness in stick [N/m], length [m] and other numbers of a contact (see `Cases`)."""
     friction, static = model.friction, model.friction_limits(model.point.load)[0]
     if friction.law == "iwan":
         chi, share = friction.chi, 1 / (1 + friction.beta)
-        # of the friction, before the last slider does
+        # fraction of the friction that slips before the last slider does
         slips = share * (chi + 1) / (chi + 2 - share)
         half = np.minimum(1.0, (0.5 / slips) ** (1 / (chi + 2)))
         return (
@@ -265,12 +287,12 @@ def _contact(model: Model) -> tuple:
 
 
 def group(model: Model) -> tuple:
-    """Equal for models of one compiled call."""
+    """Return a key that is equal for models of one compiled call."""
     return int(model.rig.drive.cycles), model.friction.law
 
 
 def parts(models: Sequence) -> dict[tuple, list]:
-    """Places of the models that lanes take, by group."""
+    """Return the indices of the models that lanes take, by group."""
     places: dict = {}
     if isinstance(models, SimilarModels):
         places |= {} if no_lanes(models.first) else {group(models.first): range(len(models))}
@@ -287,7 +309,7 @@ def parts(models: Sequence) -> dict[tuple, list]:
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Answers of models of one group."""
+    """Return the case results of models of one group."""
     found = CaseResults.blank(len(models))
     for first in range(0, len(models), TOGETHER):
         part = select_models(models, range(first, min(first + TOGETHER, len(models))))
@@ -296,10 +318,11 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
 
 
 def _solved(models: Sequence[Model], say) -> CaseResults:
-    """Answers of models, as `answered` gives them."""
+    """Return the case results of models by `answered`, with the notes of law 'tanh'."""
     law = models[0].friction.law
 
     def exact(places, check: bool) -> CaseResults:
+        """Return the results of some cases by the exact engine."""
         return exactly(
             select_models(models, places), say, FINER_CELLS if law == "iwan" and check else 0
         )
@@ -319,12 +342,25 @@ def _solved(models: Sequence[Model], say) -> CaseResults:
 
 
 def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) -> tuple:
-    """(Answers of models, (n,) which are not of lanes, (n,) furthest the output was [m]); a few of them are held
-    against the exact engine. Where these contradict the others, a law of a stretch marches by twice the steps, and more
-    are checked; where more than a few still do, all are exact.
+    """Return the results of models by lanes, of which a few are checked with the exact engine.
 
-    cases: as of `cases_of`, and what a coarser mesh makes of them, None without one; steps (n,); exactly(places, check)
-    -> exact Answers of some, for a check or for themselves.
+    If these differ, cases of a stretch law are marched with twice the steps, and more cases are
+    checked; if more than a few still differ, all cases are computed exactly.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    cases : tuple
+        From `cases_of`, and the same on a coarser mesh or None.
+    steps : (n,)
+        Steps per cycle.
+    exactly : callable
+        Function (indices, is_check) that returns the exact results of some cases.
+
+    Returns
+    -------
+    tuple
+        CaseResults; which (n,) were not computed by lanes; largest output (n,) [m].
     """
     begin, law = perf_counter(), kind_of(models[0])
     found, exact, steps, reach = _side_by_side(models, cases, steps)
@@ -370,12 +406,28 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
 
 
 def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
-    """(Answers of models, (n,) which must be run otherwise, steps a cycle (n,) of each, furthest (n,) [m] their output
-    was) from steps (n,) on that many more are made of where bars miss the tolerance; all that march by the same steps
-    do so together, those for whose errors it is too. Where the change at half the steps is too large under a law of a
-    stretch, a quarter of them tells how it falls. What a coarser mesh changes is told by the fewest steps, and by more
-    where that is so much that steps are too long for its start, or where the case sticks, as what then is left of the
-    third harmonic hangs on both."""
+    """March models side by side, and refine the steps until their errors meet the tolerance.
+
+    All cases with the same steps march together, including those whose errors need these steps. If
+    the change by half the steps is too large with a stretch law, a quarter of them shows how the
+    errors fall. The change by a coarser mesh is computed with the fewest steps; with more if it is
+    so large that the steps are too long for the start, or if the case sticks, because what then
+    remains of the third harmonic depends on both.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    cases : tuple
+        See `answered`.
+    steps : (n,)
+        First number of steps per cycle.
+
+    Returns
+    -------
+    tuple
+        CaseResults; which (n,) must be run otherwise; steps per cycle (n,); largest output (n,)
+        [m].
+    """
     found, exact, steps = CaseResults.blank(len(models)), np.zeros(len(models), bool), steps.copy()
     reach = np.zeros(len(models))
     law, cycles, meshed = kind_of(models[0]), group(models[0])[0], {}
@@ -384,11 +436,13 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     finest = (SMOOTH if smooth else RATES[-1])[-1]
 
     def tell_mesh(places, fine: dict) -> None:
+        """Store the errors by the mesh of some cases."""
         rough = _measured(law, *_of(cases[2], places), cycles, now)[0]
         for name, error in _of_mesh(fine, rough).items():
             meshed.setdefault(name, np.zeros(len(models)))[places] = error
 
     def measured(places, count: int) -> tuple:
+        """March some cases, and store their measures by the number of steps."""
         seen = _measured(law, *_of(cases[:2], places), cycles, count)
         for name, column in seen[0].items():
             known.setdefault(count, {}).setdefault(name, np.full(len(models), np.nan))[places] = (
@@ -397,12 +451,13 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
         return seen
 
     def tell(places, seen: tuple, *shares: int) -> np.ndarray:
+        """Store the results of some cases; return which have too large errors."""
         fewer = [_of(known[now // share], places) for share in shares]
         some_cases = *_of(cases[:2], places), _of(meshed, places)
         answers, exact[places], wide = _marched(
             select_models(models, places), some_cases, now, seen, fewer
         )
-        lumped.take_out(found, places)  # what fewer steps said
+        lumped.take_out(found, places)  # the results with fewer steps are replaced
         found.place(places, answers)
         return wide
 
@@ -432,8 +487,10 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
 
 
 def _wild(values: dict, meshed: dict) -> np.ndarray:
-    """(n,) whether a coarser mesh changes a motion or its loop by more than a mesh does that is fine enough to march;
-    values, errors by name (n,)."""
+    """Return which cases (n,) a coarser mesh changes more than a mesh that is fine enough.
+
+    values, meshed: measures and errors by the mesh, (n,) by name.
+    """
     return np.any(
         [~(meshed[name] <= share * np.abs(values[name])) for name, share in WILD if name in meshed],
         axis=0,
@@ -441,7 +498,7 @@ def _wild(values: dict, meshed: dict) -> np.ndarray:
 
 
 def _of(found, places):
-    """The rows of some places of arrays in a dictionary or a tuple; what is no array is of all."""
+    """Return the rows of some cases from arrays in a dict or a tuple; other entries are common."""
     if isinstance(found, dict):
         return {name: _of(one, places) for name, one in found.items()}
     if isinstance(found, tuple):
@@ -453,8 +510,11 @@ def _of(found, places):
 def _marched(
     models: Sequence[Model], cases: tuple, steps: int, seen: tuple, coarser: list
 ) -> tuple:
-    """(Answers of models that marched by so many steps a cycle; (n,) which must be run otherwise, and for which so many
-    steps are too few); arguments as of `runs_of`."""
+    """Return the results of models from a march with `steps` per cycle.
+
+    Also returns which cases (n,) must be run otherwise, and which need more steps. The parameters
+    are those of `runs_of`.
+    """
     window, wide_of = window_of(group(models[0])[0]), partial(too_wide, models, meshed=cases[2])
     runs, exact, lost = runs_of(models, cases, steps, seen, coarser)
     found, alone, _ = batch_answers(
@@ -466,8 +526,16 @@ def _marched(
 
 
 def exactly(models: Sequence[Model], say, finer: int = 0) -> CaseResults:
-    """Answers of models of a group by the exact batch; by runs of their own where that refuses them. finer: how often
-    twice the cells of a density are taken."""
+    """Return the case results of models of a group by the exact batch, or else by single runs.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    say : callable or None
+        Callback for a line of text.
+    finer : int
+        How often the cells of a density are doubled.
+    """
     models = list(models)
     found, fit = (
         CaseResults.blank(len(models)),
@@ -483,20 +551,31 @@ def exactly(models: Sequence[Model], say, finer: int = 0) -> CaseResults:
 
 
 def too_wide(models, found: CaseResults, meshed: dict | None = None) -> np.ndarray:
-    """(n,) whether a bar misses the tolerance of a case: of a measure or of the larger term that it is left of, beside
-    what a coarser mesh changes, (n,) by name, which no other engine knows better."""
+    """Return whether an error of a case exceeds its tolerance, (n,).
+
+    The tolerance applies to a measure or to the larger terms of which it is the difference. The
+    errors by the mesh are not counted, because no other engine reduces them.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    found : CaseResults
+    meshed : dict, optional
+        Errors by the mesh, (n,) by name.
+    """
     tolerance, out = (
         collect_columns(models, lambda model: (model.accuracy.tolerance,))[0],
         np.zeros(len(models), bool),
     )
     for name, values in found.values.items():
-        if name in RING:  # the fit of a single run knows it no better
+        if name in RING:  # the fit of a single run is no more accurate
             continue
         if name.endswith("_steady") and kind_of(models[0]) not in MARCH_ON:
-            continue  # an extrapolation errs alike at finer steps, and in the exact engine
+            # an extrapolation has the same error with finer steps, and with the exact engine
+            continue
         of_mesh = (meshed or {}).get(name.removesuffix("_steady"), 0.0)
         floors = np.fmax(found.floors[name], tolerance * larger_term(name, found.values))
-        # the loop over an energy, known no better
+        # it is the loop area over an energy, and not more accurate than this area
         if name == "equivalent_damping" and "loop_area" in found.values:
             floors = np.fmax(floors, found.floors["loop_area"] * _of_loop(found.values))
         out |= found.errors[name] - of_mesh > tolerance * np.abs(values) + floors
@@ -504,8 +583,19 @@ def too_wide(models, found: CaseResults, meshed: dict | None = None) -> np.ndarr
 
 
 def checked(marks, free, least: int = FEWEST) -> list:
-    """Numbers of the cases that the exact engine checks: by a hash of what each is, whatever stands beside it; marks
-    (n, k): numbers that tell each from any other; free: (n,) which may be; least: so many at least, if there are."""
+    """Return the indices of the cases that the exact engine checks.
+
+    They are chosen by a hash of each case, so that the choice does not depend on other cases.
+
+    Parameters
+    ----------
+    marks : (n, k)
+        Numbers that identify each case.
+    free : (n,) of bool
+        Cases that may be checked.
+    least : int
+        Smallest number of cases, if there are so many.
+    """
     hashes = np.array([crc32(row.tobytes()) for row in marks])
     order = [case for case in np.argsort(hashes, kind="stable").tolist() if free[case]]
     few = sum(hashes[case] < 2**32 // CHECKED for case in order)
@@ -515,8 +605,22 @@ def checked(marks, free, least: int = FEWEST) -> list:
 def contradicted(
     found: CaseResults, ones: CaseResults | None, looked: list, exact, times: float = 1.0
 ) -> dict[int, str]:
-    """Measures, by case, that exact answers of some cases contradict first, beyond the sum of both bars and the floor;
-    exact: (n,) which are not answered by lanes; times: their bars are taken."""
+    """Return the first measure of each case that differs from its exact result, by case.
+
+    It differs by more than the sum of both errors and the floor.
+
+    Parameters
+    ----------
+    found : CaseResults
+    ones : CaseResults or None
+        Exact results of some cases.
+    looked : list
+        Indices of these cases.
+    exact : (n,) of bool
+        Cases that lanes did not compute.
+    times : float
+        Factor on the exact errors.
+    """
     wrong: dict[int, str] = {}
     for place, case in enumerate(looked):
         for name, column in found.values.items() if not exact[case] else ():
@@ -534,8 +638,25 @@ def contradicted(
 
 
 def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
-    """(Runs of models of a group, (n,) which must be run otherwise, (n,) which need finer steps at least); cases: as of
-    `cases_of`; seen: as of `_measured`, by so many steps a cycle; coarser: values by half of them, and by a quarter."""
+    """Return the Runs of models of a group from their march.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    cases : tuple
+        From `cases_of`, and the errors by the mesh.
+    steps : int
+        Steps per cycle.
+    seen : tuple
+        From `_measured` with these steps.
+    coarser : list of dict
+        Measures with half, and perhaps a quarter, of the steps.
+
+    Returns
+    -------
+    tuple
+        Runs; which cases (n,) must be run otherwise; which (n,) need more steps.
+    """
     law, cycles, (cases, c, meshed), (values, book, found, extremes, rise) = (
         kind_of(models[0]),
         group(models[0])[0],
@@ -566,7 +687,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
         exact |= march.own_of(law, found.motion, "DROPPED") > DROPPED
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
-    nowhere = np.zeros(len(models), bool)  # what is lost goes elsewhere
+    nowhere = np.zeros(len(models), bool)  # lost cases are returned separately
     (tolerance,) = collect_columns(models, lambda model: (model.accuracy.tolerance,))
     runs = Runs(
         cycles,
@@ -589,14 +710,16 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
 
 
 def may_ring(cases, found) -> np.ndarray:
-    """(n,) whether a stick of the last cycles is long enough that what rings in it could be told."""
+    """Return whether a stick of the last cycles is long enough for a ringing, (n,)."""
     own = np.sqrt(np.maximum(cases.square + cases.spring - cases.damp**2 / 4, 0.0))
     return found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
 
 
 def stays(cases, found) -> np.ndarray:
-    """(n,) whether a start or a ring may be left at the end: cycles change by what it decays in one, by its damper at
-    least."""
+    """Return whether the start or a ringing may remain at the end, (n,).
+
+    The last two cycles differ by its decay in one cycle, at least by that of the damper.
+    """
     last = found.history[:, -2:, :2]
     change = np.abs(last[:, 1] - last[:, 0]).max(axis=1) / np.maximum(
         -np.expm1(-np.pi * cases.damp), 1e-300
@@ -606,22 +729,37 @@ def stays(cases, found) -> np.ndarray:
 
 
 def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
-    """(ring_frequency [Hz] and ring_damping by name, their errors, (n,) whether a run has to tell what rings, and
-    whether finer steps have to); read: (n,) which are stuck, the cycles that are read of what does not repeat, steps of
-    a cycle.
+    """Return the ringing by name, its errors, and which cases need another run.
 
-    Told is what rings in a stick that lasts all the time: in closed form behind a spring, else by the fit of a run.
+    A ringing is computed in a stick that lasts all the time: in closed form for a spring, else by
+    the fit of a single run.
+
+    Parameters
+    ----------
+    law : str
+    cases : Cases
+    c : dict
+        Other numbers from `cases_of`.
+    found : Marched
+    read : tuple
+        Which cases (n,) stick, evaluated cycles of a motion that is not periodic, steps per cycle.
+
+    Returns
+    -------
+    tuple
+        ring_frequency [Hz] and ring_damping [1] by name, their errors, which cases (n,) need a
+        single run, and which need more steps.
     """
     (stuck, window, steps), n, faint = read, len(found.ended), np.zeros(len(found.ended), bool)
     out = tuple({name: np.full(n, np.nan) for name in RING} for _ in range(2))
-    if law == "rigid":  # nothing moves in its sticks
+    if law == "rigid":  # a rigid interface with one mode does not move in a stick
         return *out, faint, faint
     rings, marched = may_ring(cases, found), found.ended >= found.history.shape[1] - window
     held = found.shown[:, at.STUCK - at.SHOW] > 2 * np.pi * (found.cycles - 1e-6)
     if law == "yielding":
         _of_springs(cases, c, found, held & rings & marched, out)
         return *out, rings & ~held, faint
-    # nothing rings in what repeats, but a start may be left in a stick of all cycles
+    # a periodic motion does not ring, but the start may remain in a stick of all cycles
     may = (
         (rings & marched & (march.own_of(law, found.motion, "EVER") > 0))
         | (stays(cases, found) & stuck)
@@ -630,7 +768,7 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     )
     untold, told = may & ~held, may & held
     strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.square + cases.spring, 1.0)))
-    # each case by its own, whatever stands beside it
+    # the stride of a case does not depend on other cases
     strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(int)
     where = np.flatnonzero(told)
     every = (
@@ -642,7 +780,7 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         omega, signal = float(c["omega"][case]), signal[:: strides[case]]
         time = np.linspace(0, 2 * np.pi * window / omega, len(signal))
         values, apart = ringing(time, signal, [(0.0, time[-1])], omega)
-        # for so few steps, perhaps
+        # with so few steps, a ringing may be missed
         faint[case] = not values and march.flows(law) and steps < RINGING
         for name, value in values.items():
             out[0][name][case], out[1][name][case] = value, OF_FIT * apart[name]
@@ -650,15 +788,18 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
 
 
 def _of_springs(cases, c: dict, found, held, out: tuple) -> None:
-    """Write what rings in cases that a spring holds through all cycles that were read, (n,) `held`, in closed form, by
-    the rule of `response.ringing`; out: values and errors by name."""
+    """Compute the ringing of cases (n,) `held` that a spring holds in all evaluated cycles.
+
+    It is known in closed form, with the criteria of `response.ringing`; `out` is filled: values and
+    errors by name.
+    """
     beta, half, angle = cases.square + cases.spring, cases.damp / 2, 2 * np.pi * found.cycles
     own, far = np.sqrt(np.maximum(beta - half**2, 0.0)), beta - 1
     whole = far**2 + cases.damp**2
     begun, place = found.begun, found.begun[:, at.PLACE]
     with np.errstate(
         all="ignore"
-    ):  # the motion less that of the sine and of the stretch of the spring
+    ):  # the motion without that of the sine and without the stretch of the spring
         z = begun[:, at.X] - cases.spring * place / beta + cases.push * cases.damp / whole
         other = (begun[:, at.V] - cases.push * far / whole + half * z) / own
         damping = half / np.sqrt(beta)
@@ -677,11 +818,29 @@ def _of_springs(cases, c: dict, found, held, out: tuple) -> None:
 
 
 def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
-    """((half the range of the slide that motions settle to [m], its error), (n,) each, NaN of those that need none;
-    (n,) which of them do not show it after MORE times their cycles, nor by how they come near).
+    """March cases on until they settle, and return their amplitudes.
 
-    amplitudes (n, w) [m] of the output by windows; free: (n,) which may. They march on by a part of as many cycles as
-    they did, later by all of these, each until it settles, so that what settles soon costs little.
+    They march on by a fraction of their cycles at first, later by all of these, each until it
+    settles, so that those that settle soon cost little.
+
+    Parameters
+    ----------
+    law : str
+    cases : Cases
+    found : Marched
+    steps : int
+        Steps per cycle.
+    amplitudes : (n, w)
+        Output per window [m].
+    free : (n,) of bool
+        Cases that may march on.
+
+    Returns
+    -------
+    tuple
+        Half the range of the slide of the steady motion and its error, (n,) each [m], NaN if not
+        needed; which cases (n,) do not settle within MORE times their cycles, even by
+        extrapolation.
     """
     out, part = np.full((2, len(free)), np.nan), found.history.shape[1]
     if amplitudes.shape[1] > 2:
@@ -708,9 +867,19 @@ def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
 
 
 def _goes_on(ranges, length, value, error) -> np.ndarray:
-    """(n,) whether motions behind one spring slip in all of their last cycles and in the one that they settle to, or in
-    none: their free motion decays otherwise once no cycle slips. ranges (n, c): half those of the slide; length (n,):
-    the stretch beyond which it slips; value, error (n,): half the range that they settle to; all [m]."""
+    """Return whether a motion slips in all cycles up to its steady state, or in none, (n,).
+
+    If slip ceases in between, its free motion decays differently from then on.
+
+    Parameters
+    ----------
+    ranges : (n, c)
+        Half the range of the slide in the last cycles [m].
+    length : (n,)
+        Stretch above which it slips [m].
+    value, error : (n,)
+        Half the range in the steady state and its error [m].
+    """
     least, most = (
         np.minimum(ranges.min(axis=1), value - error),
         np.maximum(ranges.max(axis=1), value + error),
@@ -719,8 +888,11 @@ def _goes_on(ranges, length, value, error) -> np.ndarray:
 
 
 def _left(cases, before, motion, cycles: int) -> np.ndarray:
-    """(n,) [m] the most that is left of a free motion, by what so many cycles changed of a motion `before` and by what
-    its damper takes of it in them at least: where it beats slowly, extremes hardly change as long as it is largest."""
+    """Return an upper bound of the remaining free motion (n,) [m].
+
+    It follows from the change in `cycles` cycles, and from the smallest decay by the damper in
+    them: with a slow beat, the extremes hardly change while it is largest.
+    """
     own, half = np.sqrt(cases.square + cases.spring), cases.damp / 2
     step = np.hypot(motion[:, at.X] - before[:, at.X], (motion[:, at.V] - before[:, at.V]) / own)
     goes = -np.expm1(
@@ -730,10 +902,28 @@ def _left(cases, before, motion, cycles: int) -> np.ndarray:
 
 
 def _known(history, part: int, least, near: float) -> tuple:
-    """(half the range of the slide that motions settle to [m], its error, NaN where nothing tells it, (n,) each), of
-    their history (n, c, 4) beyond `part` cycles: the last where so many cycles hardly change it, and no more than those
-    before them, and no more free motion is left, (n,) `least` [m] at most, than a share `near` of it, else an
-    extrapolation of windows, in the end of windows of `part` cycles."""
+    """Return half the range of the slide in the steady state and its error, (n,) each [m].
+
+    It is the last range if it hardly changes in `part` cycles, not more than in those before, and
+    if the remaining free motion is below the fraction `near` of it; else an extrapolation of
+    windows, at last of windows of `part` cycles.
+
+    Parameters
+    ----------
+    history : (n, c, 4)
+        Cycles of the cases.
+    part : int
+        Cycles of the first march.
+    least : (n,)
+        Upper bound of the remaining free motion [m].
+    near : float
+        Largest relative change.
+
+    Returns
+    -------
+    tuple
+        NaN if it is not known.
+    """
     ranges, count = np.ptp(history[:, :, :2], axis=2) / 2, history.shape[1]
     last, left = ranges[:, -1], 2 * np.ptp(ranges[:, -part:], axis=1)
     before = 2 * np.ptp(ranges[:, -2 * part : -part], axis=1) if count >= 2 * part else np.inf
@@ -748,8 +938,10 @@ def _known(history, part: int, least, near: float) -> tuple:
 
 
 def cases_of(models, contacts=None) -> tuple:
-    """(Cases of models, what else is told of them by name, (n,) each: SI); contacts (m, n): what `_of_contact` gives of
-    points, of others."""
+    """Return the Cases of models, and further numbers (n,) by name in SI units.
+
+    contacts: numbers (m, n) of the contacts as from `_of_contact`; None: those of single points.
+    """
     own, damping, slide, share, output, mass, drive, w, moving, z, v, stiffness, size = (
         collect_columns(models, _of_rig)
     )
@@ -786,7 +978,7 @@ def cases_of(models, contacts=None) -> tuple:
 
 
 def _of_rig(model: Model) -> tuple:
-    """The numbers of a model but for its contact that `cases_of` takes."""
+    """Return the numbers of a model, except its contact, for `cases_of`."""
     modes, drive, start = model.rig.modes, model.rig.drive.signal, model.rig.start
     return (
         modes.omega[0],
@@ -805,8 +997,10 @@ def _of_rig(model: Model) -> tuple:
 
 
 def _of_contact(model: Model) -> tuple:
-    """The numbers of the contact of a model that `cases_of` takes: static and kinetic friction [N], load [N], and
-    `_contact`."""
+    """Return the numbers of the contact of a model for `cases_of`.
+
+    They are static and kinetic friction [N], load [N], and those of `_contact`.
+    """
     static, kinetic = model.friction_limits(model.point.load)
     kinetic = (
         kinetic if kind_of(model) == "rigid" and model.friction.kinetic is not None else static
@@ -815,13 +1009,15 @@ def _of_contact(model: Model) -> tuple:
 
 
 def kind_of(model: Model) -> str:
-    """The law of `dynamics.lanes` of a model; that of a patch is the table of its elements."""
+    """Return the law of a model in `dynamics.lanes`; for a patch, the table of its elements."""
     return KINDS[model.friction.law] if model.patch is None else "table"
 
 
 def _of_mesh(fine: dict, rough: dict) -> dict:
-    """Errors by name, (n,) each, of a mesh, from values on it and on a coarser one; one that this lacks is as uncertain
-    as it is large."""
+    """Return the errors (n,) by name of a mesh from a coarser one.
+
+    The error of a measure that the coarser mesh does not have is its absolute value.
+    """
     with np.errstate(all="ignore"):
         return {
             name: np.where(np.isnan(error), np.abs(fine[name]), error)
@@ -830,12 +1026,16 @@ def _of_mesh(fine: dict, rough: dict) -> dict:
 
 
 def window_of(cycles: int) -> int:
-    """Last cycles that are read."""
+    """Return the number of last cycles that are evaluated."""
     return min(10, cycles // 10)
 
 
 def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
-    """(values, books, Marched, extremes of the output (n, c, 2) [m], rise of the force [N]) of a march."""
+    """March cases, and evaluate the last cycles.
+
+    Returns the measures by name, energies [J], Marched, extremes of the output (n, c, 2) [m], and
+    the increase of the friction force [N].
+    """
     found, window = march.march(law, cases, cycles, window_of(cycles), steps), window_of(cycles)
     extremes = found.history[:, :, :2] * c["ratio"][:, None, None]
     extremes[c["ratio"] < 0] = extremes[c["ratio"] < 0, :, ::-1]
@@ -854,7 +1054,7 @@ def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
 
 
 def bars(values: dict, coarser: list) -> dict:
-    """Return the error of each measure (n,) of cases from their values at half and a quarter of the steps.
+    """Return the error (n,) of each measure from its values at half and a quarter of the steps.
 
     Parameters
     ----------
@@ -863,7 +1063,7 @@ def bars(values: dict, coarser: list) -> dict:
     coarser : list of dict
         The same at half the steps and, if it is known, at a quarter of them.
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # of a march that ran away by half the steps
+    with np.errstate(over="ignore", invalid="ignore"):  # a march with half the steps may diverge
         changes = [signed(fine, coarse) for fine, coarse in pairwise([values, *coarser])]
         return {
             name: np.nan_to_num(convergence_error(*(gaps[name] for gaps in changes)), posinf=np.inf)
@@ -872,14 +1072,14 @@ def bars(values: dict, coarser: list) -> dict:
 
 
 def _loops(values: dict) -> np.ndarray:
-    """(n,) whether a case has a loop, and not a small difference of what goes to and fro as it sticks."""
+    """Return whether a case has a loop (n,), not only the round-off of a stick."""
     return np.abs(values["loop_area"]) > NO_LOOP * values["friction_force_peak"] * np.abs(
         values[AMPLITUDE]
     )
 
 
 def _of_loop(values: dict) -> np.ndarray:
-    """equivalent_damping over loop_area (n,) [1/J]; 0 without a loop."""
+    """Return equivalent_damping over loop_area (n,) [1/J]; 0 without a loop."""
     loop = values["loop_area"]
     return np.divide(
         np.abs(values["equivalent_damping"]), np.abs(loop), out=0 * loop, where=loop != 0

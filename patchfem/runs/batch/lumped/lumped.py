@@ -1,4 +1,7 @@
-"""The batch of lumped cases: which models it takes, which stand together, and their answers."""
+"""Batch of lumped cases: which models it takes, its groups, and their results.
+
+In: models of a group with a single mode and a single point. Out: `CaseResults`.
+"""
 
 from collections.abc import Sequence
 from time import perf_counter
@@ -13,16 +16,16 @@ from ..case_results import CaseResults, unread
 from . import pieces
 from .columns import batch_answers
 
-TOGETHER = 1024  # cases of one compiled call, so that their histories of cycles stay small
+TOGETHER = 1024  # cases of one compiled call, which limits the memory of their histories
 
 
 def refuses(model: Model) -> str:
-    """Why the batch does not take a model; "" where it does."""
+    """Return why the batch does not take a model; "" if it does."""
     return not_one_point(model) or pieces.refuses(model)
 
 
 def not_one_point(model: Model) -> str:
-    """Why a model is not one mode under one sine behind a point under a constant load; "" where it is."""
+    """Return why a model is not one mode under a sine with one constantly loaded point, or ""."""
     rig = model.rig
     if model.kind != "rig" or model.patch is not None or model.wear is not None or unread(model):
         return "the contact of the case is not a single point, or its table of measured responses cannot be read"
@@ -39,7 +42,7 @@ def not_one_point(model: Model) -> str:
 
 
 def not_one_sine(rig) -> str:
-    """Why a rig is not one mode under one sine, seen by one accelerometer; "" where it is."""
+    """Return why a rig is not one mode under a sine with one accelerometer; "" if it is."""
     if rig.modes.gauge is not None:
         return "the gauge and the accelerometer of the case move differently"
     if rig.structure.richer_rig is not None:
@@ -63,13 +66,22 @@ def not_one_sine(rig) -> str:
 
 
 def group(model: Model) -> tuple:
-    """Equal for models of one compiled call."""
+    """Return a key that is equal for models of one compiled call."""
     return int(model.rig.drive.cycles), model.friction.law, pieces.coarsened(model)
 
 
 def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
-    """Answers of models of one group; a case that needs it is run by itself. finer: how often twice the cells of a
-    density are taken, in a check, for which a ring need not be told, and which takes no more where bars are wide."""
+    """Return the case results of models of one group; cases that need it are run by themselves.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    say : callable, optional
+        Callback for a line of text.
+    finer : int
+        How often the cells of a density are doubled, in a check. A check does not need the ringing,
+        and does not use more cells if errors are too large.
+    """
     found = CaseResults.blank(len(models))
     for first in range(0, len(models), TOGETHER):
         part = models[first : first + TOGETHER]
@@ -79,6 +91,7 @@ def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
 
 
 def _solved(models, say, pairs: int, check: bool = False) -> CaseResults:
+    """Return the case results of at most TOGETHER models."""
     begin, cycles = perf_counter(), int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)
     runs = pieces.runs_of(models, cycles, window, say, pairs)
@@ -102,7 +115,7 @@ def _solved(models, say, pairs: int, check: bool = False) -> CaseResults:
 
 
 def take_out(found: CaseResults, cases: Sequence[int]) -> None:
-    """Take out what was found of cases."""
+    """Remove the results of cases."""
     for columns in (found.values, found.errors, found.floors):
         for column in columns.values():
             column[cases] = np.nan
@@ -120,5 +133,5 @@ def take_out(found: CaseResults, cases: Sequence[int]) -> None:
             found.errors,
             found.floors,
             found.units,
-        ):  # it was of these cases alone
+        ):  # only these cases had the measure
             columns.pop(name)

@@ -1,5 +1,8 @@
-"""Coulomb friction and elastic-plastic elements, one or many, on one mode under a sine: runs from event to event
-without histories, their numbers read off as one array."""
+"""Runs from event to event of Coulomb friction and elastic-plastic elements, many at once.
+
+In: models with one mode under a sine. Out: `Runs` with the measures of all cases as arrays,
+without histories.
+"""
 
 from typing import NamedTuple
 
@@ -22,12 +25,19 @@ from ...rig.pieces import RigidElements, elements_of_law, read_off, settles, sti
 from .columns import ENDS, MAIN, Runs
 from .threads import in_threads
 
-CYCLES = 3  # that hold every stick of a cycle whole
-SHORTEST, LONGEST = 20, 4000  # cycles of a run whose extremes are all held
+CYCLES = 3  # cycles that contain every stick of a cycle completely
+# smallest and largest number of cycles of a run, whose extremes are all kept
+SHORTEST, LONGEST = 20, 4000
 
 
 class Case(NamedTuple):
-    """A run: the model it is of, the Elements of its interface, the slip [m] below which it sticks, its load [N]."""
+    """Run of the batch.
+
+    - model: its Model.
+    - groups: Elements of its interface.
+    - held: slip in a cycle [m] below which it sticks.
+    - load: normal load [N].
+    """
 
     model: object
     groups: tuple
@@ -36,7 +46,7 @@ class Case(NamedTuple):
 
 
 def refuses(model) -> str:
-    """Why the law, the cycles or the engine of a model are not of this batch; "" where they are."""
+    """Return why law, cycles or engine of a model do not belong to this batch; "" if they do."""
     f = model.friction
     if not _holds(model) and not law_has_trait(f.law, "cells") and f.law != "elastic-plastic":
         return "the friction law of the case is not a set of friction elements"
@@ -52,19 +62,19 @@ def refuses(model) -> str:
 
 
 def _holds(model) -> bool:
-    """Whether the law of a model is Coulomb's: a rigid element."""
+    """Return whether the law of a model is Coulomb's, i.e. a rigid element."""
     return law_has_trait(model.friction.law, "set-valued") and not law_has_trait(
         model.friction.law, "averaged"
     )
 
 
 def coarsened(model) -> int:
-    """How often each two elements count as one in a first run."""
+    """Return how often neighbouring cells are merged in pairs in a first run."""
     return 0 if _holds(model) else pairs_of(model)
 
 
 def case_of(model, pairs: int = 0) -> Case:
-    """The Case of a model of one point; pairs: as `Numerics` has it."""
+    """Return the Case of a model with a single point; pairs: see `Numerics`."""
     if _holds(model):
         return Case(model, RigidElements(model, None, None).groups, 0.0, model.point.load)
     element = law_from(model.friction, model.point.load).element(model.point.load)
@@ -75,7 +85,22 @@ def case_of(model, pairs: int = 0) -> Case:
 
 
 def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
-    """Runs of models of this kind, all of `cycles` cycles from their starts; pairs: as `Numerics` has it."""
+    """Run models of this kind, each for `cycles` cycles from its initial state.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    cycles, window : int
+        Cycles of the run, and at its end those that are evaluated.
+    say : callable, optional
+        Callback for a line of text.
+    pairs : int
+        See `Numerics`.
+
+    Returns
+    -------
+    Runs
+    """
     cases = [case_of(model, pairs) for model in models]
     out = runs_of_cases(cases, cycles, window, say)
     if law_has_trait(models[0].friction.law, "cells"):
@@ -97,14 +122,31 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
 def runs_of_cases(
     cases: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True
 ) -> Runs:
-    """Runs of cases; least: cases of a thread, as `in_threads` has it; steady: whether the motion is sought that a case
-    settles to, and what rings in it, as a run for an error does not."""
+    """Run cases without histories.
+
+    Parameters
+    ----------
+    cases : list of Case
+    cycles, window : int
+        Cycles of the run, and at its end those that are evaluated.
+    say : callable, optional
+        Callback for a line of text.
+    least : int
+        Cases of a thread (see `in_threads`).
+    steady : bool
+        Whether the steady motion and the ringing are computed; a coarse run does not need them.
+
+    Returns
+    -------
+    Runs
+    """
     histories.warm_up(say)
     rig = cases[0].model.rig
     histories.expect(rig.modes, rig.drive.signal, cases[0].groups, cycles, window, len(cases))
     done = [None] * len(cases)
 
     def go(part: slice) -> None:
+        """Run a part of the cases."""
         rigs = [(one.model.rig, one.groups) for one in cases[part]]
         done[part] = histories.briefly(
             ((rig.modes, rig.drive.signal, groups, rig.start) for rig, groups in rigs),
@@ -117,8 +159,11 @@ def runs_of_cases(
 
 
 def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Runs:
-    """Measures of runs that came to their end. All are of rigid elements, or none is: what goes into these is lost,
-    they hold one mode whole, so that nothing rings, and their drift is known to the round-off of its two means."""
+    """Return the Runs of finished runs, either all of rigid elements or none.
+
+    Work on rigid elements is all dissipated. They keep a single mode at rest during stick, so that
+    nothing rings, and their drift has the round-off of two means.
+    """
     reading, models = joined([one.reading for one in done]), [case.model for case in cases]
     book = {name: np.array([one.ledger[name] for one in done]) for name in done[0].ledger}
     stiffness, size, held, load, tolerance = (
@@ -202,11 +247,10 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
 
 
 def _rings(case: Case, one) -> dict | None:
-    """What rings in the sticks of a run whose samples have to tell: {} where nothing does, None where a run by itself
-    has to say it."""
+    """Return the ringing of a run from its samples: {} for none, None if a single run is needed."""
     modes, drive = case.model.rig.modes, case.model.rig.drive.signal
     stuck = one.reading.loop().stuck_time >= one.reading.span * (1 - 1e-12)
-    # it never stopped, or what decays has gone from cycles all the same
+    # without stick nothing rings, and in a periodic motion that sticks the ringing has decayed
     if not one.slips or (one.repeats and stuck):
         return {}
     if not one.repeats:
@@ -221,7 +265,10 @@ def _rings(case: Case, one) -> dict | None:
 
 
 def with_coarser_errors(fine: Runs, coarser: list, told_by) -> Runs:
-    """Runs with the errors that coarser Runs tell; told_by(fine, *coarser): errors by name from values of all."""
+    """Return Runs with the errors that follow from coarse Runs.
+
+    told_by: function (fine, *coarse) of values by name that returns errors by name.
+    """
     whole = [
         one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)}
         for one in (fine, *coarser)

@@ -1,8 +1,9 @@
-"""Patches that slip part by part, on one mode under a sine, many together.
+"""Batch of patches that slip in part, with one mode under a sine.
 
-Patches that share their pieces are pressed together (`runs.patch.static`), others as their own runs do it. Their
-elements, and those of the coarser mesh for the error, then move without histories, as `pieces` has it, or in lanes
-(`tabled`). A case that sticks, or rings in its sticks, is run by itself.
+In: models of a group. Out: `CaseResults`. Patches that share their pieces are pressed together
+(`runs.patch.static`), others as in single runs. Their elements, and those of the coarser mesh
+for the error, then move without histories (`pieces`), or in lanes (`tabled`). A case that
+sticks, or rings during stick, is run by itself.
 """
 
 from collections.abc import Callable, Sequence
@@ -30,13 +31,18 @@ from . import pieces
 from .columns import batch_answers, known_of
 from .lumped import not_one_sine, take_out
 
-# cases of one compiled call: their elements and histories of cycles are held at once
+# cases of one compiled call, whose elements and histories of cycles are in memory together
 TOGETHER = 128
-LEAST = 2  # cases of a thread: one takes as long as hundreds of a point
+LEAST = 2  # cases of a thread: a single one takes as long as hundreds of single points
 
 
 class Pressed(NamedTuple):
-    """A case whose patch is pressed: what its motion and its words want of it; patch: for lengths and places alone."""
+    """Case whose patch is pressed.
+
+    - fine, coarse: elements on its mesh and on the coarser one.
+    - measures, warnings, notes: of its patch.
+    - patch: the pressed Patch, for lengths and positions only.
+    """
 
     fine: YieldingElements
     coarse: YieldingElements
@@ -47,7 +53,7 @@ class Pressed(NamedTuple):
 
 
 def refuses(model: Model) -> str:
-    """Why the batch does not take a model; "" where it does."""
+    """Return why the batch does not take a model; "" if it does."""
     if (
         model.patch is None
         or not model.partial_slip
@@ -74,26 +80,38 @@ def refuses(model: Model) -> str:
 
 
 def group(model: Model) -> tuple:
-    """Equal for models of one compiled call."""
+    """Return a key that is equal for models of one compiled call."""
     return int(model.rig.drive.cycles), model.friction.law
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Answers of models of one group; a case that needs it is run by itself."""
+    """Return the case results of models of one group; cases that need it are run by themselves."""
     return solved(models, say, moved, TOGETHER)
 
 
 def solved(models: Sequence[Model], say, move: Callable, together: int) -> CaseResults:
-    """Answers of models of one group, by so many; move: as `moved`."""
+    """Return the case results of models of one group.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    say : callable, optional
+        Callback for a line of text.
+    move : callable
+        Function like `moved`.
+    together : int
+        Number of cases per call.
+    """
     return patches.pressed_first(models, together, lambda part: _solved(part, say, move))
 
 
 def _solved(models, say, move: Callable) -> CaseResults:
+    """Return the case results of models whose patches are pressed."""
     begin, out = perf_counter(), CaseResults.blank(len(models))
     held = dict.fromkeys(range(len(models)))
     for case in sorted(
         held, key=lambda case: id(models[case].patch.solved)
-    ):  # those of one patch share its elements
+    ):  # cases of one patch are neighbours, because they share its elements
         held[case] = _pressed(models[case])
     moves = [case for case, one in held.items() if one is not None]
     alone = set(range(len(models))) - set(moves)
@@ -111,7 +129,7 @@ def _solved(models, say, move: Callable) -> CaseResults:
 
 
 def _pressed(model: Model) -> Pressed | None:
-    """A case with its patch pressed; None of one that is run by itself."""
+    """Return a case with its pressed patch; None if it is run by itself."""
     try:
         with locate_errors(model.source):
             patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
@@ -127,12 +145,20 @@ def _pressed(model: Model) -> Pressed | None:
                 of_patch.left_out(model, patch, coarse),
                 patch,
             )
-    except Exception:  # what is wrong is told by its own run
+    except Exception:  # the case is run by itself, which reports the error
         return None
 
 
 def moved(models, held: list, say) -> tuple:
-    """(Answers of pressed cases, (n,) whether a case must be run by itself)."""
+    """Return the results of pressed cases, and which (n,) must be run by themselves.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    held : list of Pressed
+    say : callable or None
+        Callback for a line of text.
+    """
     cycles = int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)
     cases = [
@@ -160,8 +186,17 @@ def moved(models, held: list, say) -> tuple:
 
 
 def tell(found: CaseResults, case: int, model: Model, one: Pressed, reach: float) -> None:
-    """Put the measures of the pressed patch in, and the outcome, warnings and notes as a run of its own has them; reach
-    [m]: furthest its output was."""
+    """Add the measures of the patch, outcome, warnings and notes, as in a single run.
+
+    Parameters
+    ----------
+    found : CaseResults
+    case : int
+    model : Model
+    one : Pressed
+    reach : float
+        Largest output [m].
+    """
     modes = model.rig.modes
     slide = np.array([reach * abs(float(modes.interfaces[0, 0]) / float(modes.output[0]))])
     found.outcome[case] = str(

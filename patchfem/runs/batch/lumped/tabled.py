@@ -1,8 +1,9 @@
-"""Patches that slip part by part, on one mode under a sine, in lanes.
+"""Batch of patches that slip in part, with one mode under a sine, marched in lanes.
 
-Under a load that stays, such a patch is a set of Jenkins elements, whose force follows Masing's rule from one curve.
-That of each case and that of its coarser mesh, for the error, march side by side as tables (`lanes.answered`). What
-lanes do not tell goes to `sheared`.
+In: models of a group. Out: `CaseResults`. Under a constant load such a patch is a set of
+Jenkins elements, whose force follows from one curve by Masing's rule. The curves of each case
+and of its coarser mesh are marched as tables (`lanes.answered`). Cases that lanes cannot finish
+go to `sheared`.
 """
 
 from collections.abc import Sequence
@@ -16,26 +17,34 @@ from .. import one_by_one
 from ..case_results import CaseResults
 from . import lanes, sheared
 
-TOGETHER = 512  # cases of one compiled call, whose tables are held at once
+TOGETHER = 512  # cases of one compiled call, whose tables are in memory together
 
 
 def refuses(model: Model) -> str:
-    """Why lanes do not take a model; "" where they do."""
+    """Return why lanes do not take a model; "" if they do."""
     return sheared.refuses(model) or lanes.asks_more(model)
 
 
 def group(model: Model) -> tuple:
-    """Equal for models of one compiled call."""
+    """Return a key that is equal for models of one compiled call."""
     return sheared.group(model)
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Answers of models of one group."""
+    """Return the case results of models of one group."""
     return sheared.solved(models, say, moved, TOGETHER)
 
 
 def moved(models, held: list, say) -> tuple:
-    """(Answers of pressed cases, (n,) whether a case must be run by itself)."""
+    """Return the results of pressed cases, and which (n,) must be run by themselves.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    held : list of Pressed
+    say : callable or None
+        Callback for a line of text.
+    """
     sets = [[one.groups[0] for one in (pressed.fine, pressed.coarse)] for pressed in held]
     rates = [lanes.rate_of(model, fine.stiffness.sum()) for model, (fine, _) in zip(models, sets)]
     steps = lanes.steps_at(rates, lanes.OF_TABLE)
@@ -44,6 +53,7 @@ def moved(models, held: list, say) -> tuple:
     found, lost = CaseResults.blank(len(models)), np.zeros(len(models), bool)
 
     def exactly(places) -> CaseResults:
+        """Return the results of some cases by the exact batch or by single runs."""
         answers, alone = sheared.moved([models[k] for k in places], [held[k] for k in places], say)
         answers.place(
             np.flatnonzero(alone),
@@ -77,7 +87,7 @@ def moved(models, held: list, say) -> tuple:
 
 
 def _contacts(sets: list, held: list) -> np.ndarray:
-    """(m, n) numbers of the contacts of patches, as `lanes.cases_of` takes them, from their Elements."""
+    """Return the numbers (m, n) of the contacts of patches, as `lanes.cases_of` takes them."""
     rows = [
         (
             one.limit,

@@ -1,4 +1,8 @@
-"""Cases of one compiled call shared over the cores of this machine, where no other process does so already."""
+"""Cases of one compiled call, divided among the cores of this machine.
+
+In: a function of a part of the cases. Out: nothing; the function writes its results. Threads
+are not used if another process already uses the cores.
+"""
 
 import multiprocessing
 import os
@@ -7,11 +11,21 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
 
-LEAST = 32  # cases of a thread: fewer are done before it has begun
+LEAST = 32  # cases of a thread: fewer are finished before a thread has started
 
 
 def in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> None:
-    """Call work(part) for parts of range(count), in parallel threads if there are cores."""
+    """Call work(part) for parts of range(count), in parallel threads if there are cores.
+
+    Parameters
+    ----------
+    work : callable
+        Function of a slice; it must release the interpreter lock to run in parallel.
+    count : int
+        Number of cases.
+    least : int
+        Smallest number of cases of a thread; 0 for LEAST.
+    """
     parts = max(1, min(cores(), count // (least or LEAST)))
     ends = [count * k // parts for k in range(parts + 1)]
     pieces = [slice(*pair) for pair in pairwise(ends)]
@@ -19,7 +33,10 @@ def in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> Non
 
 
 def cores() -> int:
-    """Cores that this process may use for itself: one where it is a worker of others, or where OMP_NUM_THREADS says."""
+    """Return how many cores this process may use for itself.
+
+    It is 1 in a worker of another process, and at most OMP_NUM_THREADS.
+    """
     if multiprocessing.parent_process() is not None:
         return 1
     mine = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -29,4 +46,5 @@ def cores() -> int:
 
 @cache
 def _pool() -> ThreadPoolExecutor:
+    """Return the pool of threads, made on the first call."""
     return ThreadPoolExecutor(cores(), "lumped")
