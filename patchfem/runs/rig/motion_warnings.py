@@ -330,6 +330,14 @@ def created_warning(model, book: dict, cycles: float) -> list:
     """Return a sentence, in a list, on energy that the printed law created.
 
     It creates energy in steps in which it returns more than it had stored.
+
+    Parameters
+    ----------
+    model : Model
+    book : dict
+        Energies by name [J].
+    cycles : float
+        Cycles of the run.
     """
     if model.friction is None or model.friction.reading != "report":
         return []
@@ -344,7 +352,14 @@ def created_warning(model, book: dict, cycles: float) -> list:
 
 
 def modes_note(model, kept: int, nodes: int) -> list:
-    """Return the sentence on the shear modes of a patch whose normal force changes."""
+    """Return the sentence on the shear modes of a patch whose normal force changes.
+
+    Parameters
+    ----------
+    model : Model
+    kept, nodes : int
+        Numbers of shear modes and of nodes.
+    """
     return [
         f"{model.partial_slip}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
         f"of elements; {kept} tangential modes of the {nodes} nodes are used instead (key accuracy.shear_modes)"

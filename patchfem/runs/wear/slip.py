@@ -63,7 +63,16 @@ def apart(model) -> bool:
 def rubbed(model, patch, frames: int) -> Rubbed:
     """Return the slip of one converged cycle of a model on a patch.
 
-    frames: number of frames of the interface from which it is computed.
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    frames : int
+        Number of frames of the interface from which it is computed.
+
+    Returns
+    -------
+    Rubbed
     """
     return _bench(model, patch, frames) if model.rig is None else _rig(model, patch, frames)
 
