@@ -345,7 +345,7 @@ def fit_slopes(values, noise) -> Slopes:
     slope = np.empty(count)
     spread = np.zeros(count)
     bias = np.full(count, np.nan)
-    shorter_change = np.full(count, np.nan)  # Change over the next shorter span, less its noise.
+    shorter_change = np.full(count, np.nan)  # change over the next shorter span, minus its noise
     span = np.zeros(count, int)
     grows = np.ones(count, bool)
     tried: list = []

@@ -149,9 +149,15 @@ def coarser_errors(fine: dict, *coarse: dict, ratio: float = 2.0, order: float =
 
 
 def finer_errors(values: dict, finer: dict) -> dict:
-    """Return the error of each measure from a run with twice as many harmonics, modes or strips of bonds.
+    """Return the error of each measure from a run with more harmonics, modes or strips of bonds.
 
-    What a truncated series leaves out of a friction force, which has corners, is of second order.
+    The finer run has twice as many. The truncation error of the series of a friction force with
+    corners is of second order.
+
+    Parameters
+    ----------
+    values, finer : dict
+        Measures by name of the run and of the finer one.
     """
     return coarser_errors(values, finer, ratio=0.5, order=2.0)
 
@@ -159,10 +165,17 @@ def finer_errors(values: dict, finer: dict) -> dict:
 def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     """Return the error of each measure from runs in which four cells of a density are merged.
 
-    The force of a density in cells is exact at the ends of a cell and errs most in its middle, by
-    the square of its width. A measure that is read off the instants at which the interface begins
-    or ends to slip errs by the width itself, because the stiffness jumps from cell to cell.
-    `dynamics.events.elements.JOINED` states where the merging begins.
+    The force of a density in cells is exact at the ends of a cell and has its largest error, of
+    second order in the width, in the middle. A measure that depends on the instants at which the
+    interface starts or stops slipping has an error of first order, because the stiffness jumps from
+    cell to cell. `dynamics.events.elements.JOINED` states where the merging starts.
+
+    Parameters
+    ----------
+    fine : dict
+        Measures by name.
+    coarse : dict
+        Measures of each coarse run.
     """
     errors = coarser_errors(fine, *coarse, ratio=4.0, order=2.0)
     at_instants = coarser_errors(fine, *coarse, ratio=4.0, order=1.0)
@@ -284,7 +297,7 @@ def total_error(name: str, value, parts, least: float, size):
         Amplitude of the output [m].
     """
     error = sum(parts) + np.abs(value) * least
-    if name == "slip_start_phase":  # a phase modulo pi cannot be farther off
+    if name == "slip_start_phase":  # the error of a phase modulo pi is at most pi/2
         return np.minimum(error, np.pi / 2)
     if name in GAPS:  # the value itself is an error
         return np.maximum(error, np.abs(value))

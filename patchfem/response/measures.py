@@ -57,7 +57,7 @@ def relative_gap(sampled, balanced, passed, energy=0.0):
 
 
 def ratio_or_zero(part, whole):
-    """Return part / whole, and 0 where the whole is not positive; numbers or (n,) arrays."""
+    """Return part / whole, or 0 if the whole is not positive; numbers or (n,) arrays."""
     is_positive = np.asarray(whole) > 0
     return (part / np.where(is_positive, whole, 1.0) * is_positive)[()]
 
@@ -322,7 +322,8 @@ def turn_shares(time, place, rate) -> tuple:
     k = np.flatnonzero(rate[:-1] * rate[1:] < 0)
     p, q, rise = rate[k] * step[k], rate[k + 1] * step[k], place[k + 1] - place[k]
     two, three = 3 * rise - 2 * p - q, p + q - 2 * rise
-    # p + 2 two s + 3 three s^2 = 0, by the root that keeps its digits where the cubic is nearly a parabola
+    # p + 2 two s + 3 three s^2 = 0; this form of the root avoids cancellation if the cubic is
+    # nearly a parabola
     root = np.sqrt(np.maximum(two**2 - 3 * three * p, 0.0))
     return k, np.clip(-p / (two - np.sign(p) * root), 0.0, 1.0)
 

@@ -209,7 +209,10 @@ def strongest(held: list, kind: str) -> HeldMode:
     """
 
     def energy(one: HeldMode) -> float:
-        """Return the mean square of the decaying sinusoid over the stick."""
+        """Return the mean square of the decaying sinusoid over the stick.
+
+        Its amplitude is the field of this `kind`.
+        """
         fall = 4 * np.pi * one.damping * one.frequency * (one.end - one.begin)
         return getattr(one, kind) ** 2 * (-np.expm1(-fall) / fall if fall else 1.0)
 

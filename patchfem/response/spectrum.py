@@ -104,7 +104,8 @@ def odd_harmonics(window, drive) -> tuple:
         acceleration_harmonic(window.time, window.output, window.output_rate, n * last.omega)
         for n in (1, 3)
     )
-    # the base: a sin(omega (t - start) + phase) has -i a exp(i (phase - omega start))
+    # the Fourier coefficient of the base, a sin(omega (t - start) + phase), is -i a exp(i (phase -
+    # omega start))
     if drive.moving:
         first += -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
     return float(abs(first)), float(abs(third))

@@ -98,7 +98,11 @@ def measures(window, drive) -> dict:
 def short(found: dict, window) -> list:
     """Return a warning, as a list, if a record is short compared with the decay of its mode.
 
-    found: Measure by name; window: Response.
+    Parameters
+    ----------
+    found : dict
+        Measure by name.
+    window : Response
     """
     names = "response_frequency", "response_damping"
     if any(name not in found or not found[name].value for name in names):
@@ -259,6 +263,7 @@ def _fitted(f, gain, span: float, theta) -> np.ndarray:
     size = np.abs(gain).max()
 
     def left(theta):
+        """Return the residual of H1 after a linear fit of the columns, over its largest value."""
         column = blurred(f, *np.exp(theta), span)
         design = np.stack(
             [

@@ -1,4 +1,8 @@
-"""Spectral densities of records, averaged over transforms of overlapping segments (Welch 1967)."""
+"""Spectral densities of records from transforms of overlapping segments (Welch, 1967).
+
+In: records at equal time steps. Out: `Segments` of their transforms, and `CrossDensities` of
+two of them.
+"""
 
 from typing import NamedTuple
 
@@ -8,8 +12,9 @@ import numpy as np
 class Segments(NamedTuple):
     """Transforms of the segments of records.
 
-    frequency: (q,) [Hz]; transforms: (r, m, q) of r records over m segments, scaled so that 2 |X|^2 is a
-    one-sided density.
+    - frequency (q,): [Hz].
+    - transforms (r, m, q): of r records over m segments, scaled so that 2 |X|^2 is a one-sided
+      density.
     """
 
     frequency: np.ndarray

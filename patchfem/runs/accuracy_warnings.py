@@ -19,7 +19,7 @@ from .patch import faces, ladder, press
 from .results import notes, patch_rows
 from .rig import costs, engines
 
-MAX_EXCESS = 1e9  # error over what is allowed; a larger one belongs to a value that is zero
+MAX_EXCESS = 1e9  # error over the allowed error; a larger ratio belongs to a value that is zero
 # ratio of a proposed tolerance to that of the scene, which gives at least one more halving of the
 # mesh
 TIGHTER = 0.1
@@ -27,7 +27,8 @@ TIGHTER = 0.1
 MAX_HALVINGS = 4
 # fraction of the allowed error that is left for the steps if other causes use up all of it
 MIN_STEP_SHARE = 0.2
-MAX_STRIPS = 64  # number of strips proposed; four times the strips take about twenty times as long
+# largest number of strips that is proposed; four times the strips take about twenty times as long
+MAX_STRIPS = 64
 # measures that converge with the first power of the strips
 FIRST_ORDER = (
     "pressure_peak",
@@ -142,7 +143,7 @@ def _named_measures(found: Finding, excess: dict) -> list[str]:
 
 
 def _warning(found: Finding, excess: dict, remedy: str) -> str:
-    """Return the warning that names the errors of the main measures, the tolerance and the remedy."""
+    """Return the warning with the errors of the main measures, the tolerance and the remedy."""
     names = _named_measures(found, excess)
     first, *more = (f"of {_error_words(found.measures[name])}" for name in names)
     listed = "".join(f", {name} {words}" for name, words in zip(names[1:], more, strict=True))
@@ -202,8 +203,13 @@ def _strip_remedy(asked, excess: dict) -> str:
 def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
     """Return the remedy that refines meshes.
 
-    places: pairs of a Finding and its coarser patches; is_at_limit: whether the ladder of meshes
-    has ended.
+    Parameters
+    ----------
+    model : Model
+    places : list
+        Pairs of a Finding and its coarser patches.
+    is_at_limit : bool
+        Whether the ladder of meshes has ended.
     """
     asked = [found.model.patch for found, _ in places]
     cause = f"the mesh ({max(found.patch.x.size for found, _ in places)} interface nodes) causes this error"

@@ -23,7 +23,8 @@ from .rig import costs, engines, lists, numerics
 # rigs and 30 benches with 50 to 6400 steps and tolerances of 0.1 to 1e-4, one in twenty met it
 # below these.
 FEWER_STEPS = 2 / 3
-FEWER_STEPS_OF_BENCH = {True: 1 / 3, False: 1 / 8}  # with a law of bonds, with any other law
+# True: with a law of bonds, False: with any other law
+FEWER_STEPS_OF_BENCH = {True: 1 / 3, False: 1 / 8}
 # steps over those that the tolerance requires with which all measures met it, not only the
 # displacement
 ENOUGH_STEPS = 4.0

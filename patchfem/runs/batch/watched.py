@@ -78,6 +78,7 @@ class Watcher:
         self.made, self.before = {}, before.made if before is not None else {}
 
     def __call__(self, drive, near=None) -> Watched | None:
+        """Return the motion at a drive, started from `near` if it is given; None if not found."""
         try:
             return self._gauged(
                 {

@@ -31,7 +31,7 @@ from .press import Surface
 from .values import vertex
 
 MIN_LEVELS = 3  # fewer levels do not show an order of convergence
-MAX_POINTS = 60_000  # points of a level; more would not fit the time of a patch
+MAX_POINTS = 60_000  # points of a level; more would exceed the time of a patch
 MAX_WORK = 2.5e7  # iterations times points of a level, for the same reason
 MIN_POINTS = 500  # points of the first level
 END_CELL = 1e-4  # cell at the ends over the length, on level 0

@@ -25,7 +25,8 @@ from .values import contact_ends
 SEARCH_CELLS = 96  # columns of the first search for the contact
 # most columns of the coarsest grid; a layout with more is made coarser everywhere
 MAX_COLUMNS = 120
-# The tables with two entries are for a patch that stays (True) and for one whose motion takes longer with more nodes.
+# The dicts have one value for a static patch (True) and one for a patch with motion, which takes
+# longer with more nodes.
 SLOPE = {True: 0.5, False: 0.9}  # growth of the cells of the coarsest grid per distance [1]
 EDGE_CELLS = {True: 20, False: 10}  # length of a contact over the coarsest cells at its edges
 # shortest cell of the coarsest grid over the length: some tens of picometres, near round-off
@@ -209,7 +210,7 @@ def layout_of(asked, seen: list) -> Layout:
     half = length / 2
     span = (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
     wide, thick = min(one.wide for one in seen), _coating(asked)
-    # the third mesh has cells a quarter as long
+    # the third mesh, whose cells are a quarter as long, has to resolve the waves
     most = min(length / 12, 4 * _longest(asked))
     if max(len(one.places) for one in seen) > MAX_PLACES:
         return Layout(-half, half, (), span, *(2 * [min(length / 64, most)]), 0.0)

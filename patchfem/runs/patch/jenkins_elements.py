@@ -14,7 +14,11 @@ from .press import Patch
 
 
 class StripElements(NamedTuple):
-    """Parallel elements of one strip: stiffness (t,) [N/m] and the slide (t,) [m] at which each yields."""
+    """Parallel elements of one strip.
+
+    - stiffness (t,): [N/m].
+    - yield_slide (t,): slide at which each element yields [m].
+    """
 
     stiffness: np.ndarray
     yield_slide: np.ndarray

@@ -201,7 +201,7 @@ def _cornered(found: dict, fine: Patch, coarse: Patch) -> dict:
 
 
 class Converged(NamedTuple):
-    """Static measures from nested meshes: values and errors by name, numbers or (q,) of q patches."""
+    """Static measures from nested meshes: values and errors by name, numbers or (q,)."""
 
     values: dict
     errors: dict
@@ -233,7 +233,7 @@ def converge(
     for row, name in enumerate(names):
         hidden[row], floors[row] = least.get(name, 0.0), TABLE[name].floor
     enough = np.inf if wanted is None else allowed_error(wanted, known[-1], floors)
-    with np.errstate(invalid="ignore", divide="ignore"):  # of patches that were not solved
+    with np.errstate(invalid="ignore", divide="ignore"):  # patches that were not solved have NaN
         seen = limit(known, nested)
         plain = np.maximum(rough * seen.error, hidden)
         is_extrapolated = (seen.extrapolated != seen.value) & (plain > enough)
@@ -358,6 +358,7 @@ def of_peak(fraction, error, share):
 
 
 def _of_peak(fraction: Measure, peak: Measure) -> Measure:
+    """Return a loaded fraction whose error contains that of the peak."""
     return replace(
         fraction, error=float(of_peak(fraction.value, fraction.error, peak.error / peak.value))
     )
@@ -425,7 +426,7 @@ def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
     longest = cells.max(axis=1)
     spread = gap_range + np.abs(force @ pieces.normal).max(axis=1)
     corner = 0.0
-    if pieces is pair.compliance:  # a skin evens the pressure out
+    if pieces is pair.compliance:  # a skin smooths the pressure
         corner = corner_layer(
             pair, (force / interface.weight)[:, [0, -1]], np.diff(interface.x)[[0, -1]]
         )

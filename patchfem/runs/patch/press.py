@@ -323,6 +323,7 @@ class PressedStrips:
         self.warm_start.contact_set = np.asarray(force) > 0
 
     def __call__(self, worn, softening) -> np.ndarray:
+        """Return the contact forces (s, m) [N] for worn depth [m] and softening [m/N], (s, m) each."""
         how = _how(
             self.asked,
             partial(

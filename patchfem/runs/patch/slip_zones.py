@@ -70,7 +70,7 @@ def _crossing(x, slides, amplitude: float) -> float:
 
 
 def cycle_work(found: JenkinsSet, amplitude: float) -> float:
-    """Return the work [J] of a cycle between -amplitude and amplitude [m] of parallel elements."""
+    """Return the work [J] of parallel elements in a cycle between -amplitude and amplitude [m]."""
     beyond = np.maximum(amplitude - found.yield_slide, 0.0)
     return float(4 * (found.stiffness * found.yield_slide) @ beyond)
 

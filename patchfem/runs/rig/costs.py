@@ -41,8 +41,8 @@ WORTH = 5.0  # CPU seconds that an exact solution may take if a march, which has
 PATIENCE = 60.0  # CPU seconds that it may take if the finest march does not resolve the modes
 LONGEST = 600.0  # CPU seconds of an exact solution above which it is refused
 MOST_STEPS = 6400  # steps per cycle of the finest automatic march
-# exponent of (friction limit / force of the drive) in the fraction of the time of stick (measured:
-# .01)
+# an element sticks for the fraction (friction limit / force of the drive)**HELD of the time
+# (measured: .01)
 HELD = 6
 # Cells are merged in pairs at most this many times, at this tolerance and above: 49 of 769 cells
 # remain, with an error of 2e-4 of the motion of a slipping joint.
@@ -56,9 +56,11 @@ DYING = 33.0
 PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # numerical settings of the march
 # decay times of the slowest mode after which a motion repeats to round-off
 REPEATS = 30.0
-# a smooth run is worth at most this many times the steps of a march, because its steps are cheaper
+# largest number of smooth steps over those of a march; with more, the march is preferred although
+# its steps cost more
 MORE = 3.5
-# exponent of the fraction of time at which a law of the speed is stiff: .5 at r = 1.07, .1 at 1.26
+# a law of the speed is stiff for the fraction exp(EASES (1 - r)) of the time: .5 at r = 1.07, .1 at
+# 1.26
 EASES = 9.0
 STABLE = 3.0  # relaxation lengths of a state of the law that a stable step may cover
 # engines that keep SAMPLES samples of each of the last cycles instead of their steps

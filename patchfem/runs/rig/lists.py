@@ -33,7 +33,9 @@ GROWING_STEP = 1e-6
 # limit over drive force (D) from which a block is stuck: 0.6 and more strips per step, against 0.06
 # at D = 1.06 and 0.28 at D = 1.4
 MIN_STUCK_RATIO = 2.0
-TURNING = 0.1  # strips per step above which the reversals are those of the steps
+# strips per step; a list with more has reversals in every few steps, so that shorter steps would
+# only make it longer
+TURNING = 0.1
 # strips of a list, about one per step, above which steps are not halved again, at four times the
 # cost
 MOST_CROWDED = 500

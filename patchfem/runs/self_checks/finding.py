@@ -5,11 +5,12 @@ from typing import NamedTuple
 import numpy as np
 
 ROUND_OFF = 1e-9  # relative; sums of some hundred terms of double precision stay below 1e-12
-CONTACT_RESIDUAL = 1e-6  # relative; the contact solve balances the load to 1e-9 or better
+CONTACT_RESIDUAL = 1e-6  # relative; the contact solver balances the load to 1e-9 or better
 # factor on the stated error of a measure; a stated error that is too small is no fault
 STATED_ERRORS = 10.0
 READING = 0.01  # relative; two evaluations of one smooth curve on a mesh or on samples
-CUBIC_QUADRATURE = 2e-3  # relative; cubics through samples, for motions of up to a radian a step
+# relative; error of cubics through samples, for motions of up to a radian per step
+CUBIC_QUADRATURE = 2e-3
 AT_MOST = "from the values of the scene at most"
 AT_LEAST = "from the values of the scene at least"
 

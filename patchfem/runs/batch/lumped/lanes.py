@@ -48,7 +48,7 @@ from .pieces import LONGEST, SHORTEST
 AMPLITUDE = "relative_displacement_amplitude"
 LEAST = 64  # smallest number of cases of a study that lanes take
 TIGHTEST = 1e-4  # smallest tolerance that lanes can meet
-TOGETHER = 4096  # cases of one compiled call
+TOGETHER = 4096  # number of cases in one compiled call
 # friction law in `dynamics.lanes` by the law of the scene
 KINDS = {
     "coulomb": "rigid",
@@ -380,7 +380,7 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
         lumped.take_out(found, again)
         found.place(again, finer)
         wrong = contradicted(found, ones, looked, exact, times)
-    if wrong:  # by chance, or is it the rule?
+    if wrong:  # more checks show whether these differences are exceptions
         free = ~exact
         free[looked] = False
         more = checked(marks, free, IN_DOUBT)
