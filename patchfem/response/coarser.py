@@ -89,13 +89,6 @@ def left_open(kinds, errors, runs) -> dict:
 def coarser_space(coarser, beside=None, of: str = "mesh") -> CoarserRuns:
     """Return a `CoarserRuns` of second order with one run that has wider cells or fewer modes.
 
-    Parameters
-    ----------
-    coarser : hashable
-        Variant of the coarse run.
-    beside : hashable, optional
-        Variant of the reference run; None: the run itself.
-    of : str
-        What is coarser (see `CoarserRuns`).
+    The parameters are fields of `CoarserRuns`.
     """
     return CoarserRuns((coarser,), partial(coarser_errors, order=2.0), beside, of)

@@ -1,14 +1,12 @@
-"""Errors of measures from coarse runs of one scene: the grid convergence index.
+"""Errors of measures from coarser runs of the same scene: the grid convergence index for every engine.
 
-In: measures by name of a run and of coarse runs. Out: errors by name.
-
-A run that is coarser by a factor `ratio` in one respect (steps, elements, cells of a density,
-harmonics, modes, tolerance of a step) changes a measure by ratio**p - 1 times its error, where
-p is the order of the error. So the error is SAFETY times the change over ratio**p - 1 (Roache,
-J. Fluids Eng. 116, 405, 1994; ASME V&V 20). Three runs, each twice as coarse as the one before,
-show p where a measure changes monotonically. For two runs, the order is the one that is known
-for this kind of coarsening. No factor belongs to a single measure, law or scene.
-tests/README.md states which fraction of the intervals of random scenes contain the true value.
+A run that is `ratio` times as coarse in one way (steps, elements, cells of a density, harmonics,
+modes, tolerance of a step) changes a measure by ratio**p - 1 times its error, where p is the order
+of the error. So the error is SAFETY times the change over ratio**p - 1 (Roache, J. Fluids Eng. 116,
+405, 1994; ASME V&V 20). Three runs, each twice as coarse as the one before, show p where a measure
+changes monotonically. The error from two runs takes the order that this way of being coarser
+declares. No factor belongs to a single measure, law or scene. tests/README.md states which share of
+the errors of random scenes holds.
 """
 
 from itertools import pairwise
@@ -20,10 +18,9 @@ from ..core import Measure
 from .rows import floor_of, row_of
 
 SAFETY = 3.0  # Roache's factor for two runs; it covers runs that are too coarse to show the order
-MIN_ORDER = 1.0  # lowest order that is assumed
-MAX_ORDER = 2.0  # highest order that is assumed, that of the methods
-# largest ratio of two changes (order 4); above it the last change is small by chance
-MAX_FALL = 16.0
+MIN_ORDER = 1.0  # lowest order that is believed
+MAX_ORDER = 2.0  # highest order that is believed, that of the methods
+MAX_FALL = 16.0  # ratio of two changes, of order 4; above it the last is small by chance
 MIN_FALL = 0.5  # lowest observed order at which an error counts as decreasing with the step
 ROUND = 1e-12  # relative round-off of a long sum
 MEAN_ROUND = 1e-13  # round-off of a mean over the motion, relative to the amplitude
@@ -31,7 +28,7 @@ GAPS = ("energy_balance", "work_check")  # measures that are errors themselves
 
 
 def signed(fine: dict, coarse: dict) -> dict:
-    """Return fine - coarse by name of the measures of both runs; a phase is reduced to +-pi/2."""
+    """Return fine - coarse by name of the measures of both runs; that of a phase lies in +-pi/2."""
     out = {name: fine[name] - coarse[name] for name in fine.keys() & coarse.keys()}
     if "slip_start_phase" in out:
         out["slip_start_phase"] = (out["slip_start_phase"] + np.pi / 2) % np.pi - np.pi / 2
@@ -46,14 +43,7 @@ def change(fine: dict, coarse: dict) -> dict:
 def error_of_change(difference, ratio: float = 2.0, order: float = MIN_ORDER):
     """Return the error of a value that a run `ratio` times as coarse changes by `difference`.
 
-    Parameters
-    ----------
-    difference : float or (n,)
-        Change of the value.
-    ratio : float
-        Factor by which the other run is coarser; below 1 for a finer run.
-    order : float
-        Order at which the error falls.
+    A ratio below 1 is that of a finer run: of 1/2, a run that is twice as fine.
     """
     return SAFETY * np.abs(difference) / abs(ratio**order - 1)
 

@@ -241,15 +241,8 @@ def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=Fa
 def goes_on(steady, error, amplitude, tolerance) -> np.ndarray:
     """Return whether a motion that is steady to the tolerance will still change noticeably.
 
-    The limit is the fraction TELLS of the tolerance.
-
-    Parameters
-    ----------
-    steady, error : float or (n,)
-        Steady estimate and its error [m].
-    amplitude : float or (n,)
-        Amplitude of the last cycles [m].
-    tolerance : float or (n,)
+    The limit is the fraction TELLS of the tolerance, against the steady estimate [m] and its error
+    [m]; numbers or (n,).
     """
     return np.abs(steady - amplitude) + error > TELLS * tolerance * np.abs(amplitude)
 
@@ -428,12 +421,6 @@ def steady_of(drive, amplitudes, phasors) -> tuple:
     A released or struck rig comes to rest, so its amplitudes are not extrapolated. Under a drive
     that is not a sine the motion may have no first harmonic, so the amplitudes are extrapolated
     instead of the phasors.
-
-    Parameters
-    ----------
-    drive
-    amplitudes, phasors : (w,)
-        Amplitudes and phasors of the last cycle of successive windows [m].
     """
     if not drive_sizes.is_periodic(drive):
         return None, None

@@ -54,17 +54,8 @@ def less(a, share, b):
 def orthonormal(columns, count, basis, corner):
     """Compute the QR factorization of the columns by Gram-Schmidt, twice for each column.
 
-    Column j is the sum of corner[i, j] basis[i]; a dependent column has zeros as its basis vector.
-
-    Parameters
-    ----------
-    columns : (c, k)
-        The first `count` rows are factorized.
-    count : int
-    basis : (c, k)
-        Filled with orthonormal rows.
-    corner : (c, c)
-        Filled with the upper triangle.
+    Fills the rows of `basis` and the upper triangle `corner` (count, count) with column j = sum
+    corner[i, j] basis[i]. A dependent column has zeros as its basis vector.
     """
     for j in range(count):
         own = basis[j]
@@ -88,16 +79,7 @@ def orthonormal(columns, count, basis, corner):
 def projected(value, count, basis, inside, left):
     """Project a value (k,) onto a basis of `count` rows.
 
-    Parameters
-    ----------
-    value : (k,)
-    count : int
-    basis : (c, k)
-        Orthonormal rows.
-    inside : (c,)
-        Filled with the coefficients.
-    left : (k,)
-        Filled with the residual.
+    Fills `left` (k,) with the residual and `inside` (count,) with the coefficients.
     """
     for at in range(value.size):
         left[at] = value[at]
@@ -122,23 +104,9 @@ def numbers_of(count, corner, inside, numbers):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def left_over(time, value, poles, columns, few):
-    """Compute the residual of the sinusoids of poles for a signal.
+    """Compute the residual of the sinusoids of poles for value (k,) at times (k,) [s].
 
-    The workspace is filled as `fitted` describes.
-
-    Parameters
-    ----------
-    time, value : (k,)
-        Times [s] and signal.
-    poles : (2 r,)
-        Angular frequencies [rad/s] and decay rates [1/s].
-    columns : (3, c, k)
-    few : (c + 2, c)
-
-    Returns
-    -------
-    float
-        Sum of squares of the residual.
+    Fills the workspace and returns the sum of squares of the residual.
     """
     count = few.shape[1]
     waves(time, poles, columns[0], count - poles.size)
@@ -152,18 +120,8 @@ def left_over(time, value, poles, columns, few):
 def derived(time, poles, scale, columns, few, slopes, normal):
     """Compute the Jacobian of the residual with respect to poles over scale (Kaufman, 1975).
 
-    Parameters
-    ----------
-    time : (k,)
-        [s].
-    poles, scale : (2 r,)
-    columns : (3, c, k)
-    few : (c + 2, c)
-        Filled by `left_over`.
-    slopes : (2 r, k)
-        Filled with the Jacobian.
-    normal : (2 r, 2 r + 1)
-        Filled with the normal matrix and, in the last column, the gradient.
+    Fills `slopes` (2 r, k) with the Jacobian, and `normal` (2 r, 2 r + 1) with the normal matrix
+    and, in the last column, the gradient.
     """
     many, count = poles.size, few.shape[1]
     first, numbers = count - many, few[count + 1]
@@ -187,24 +145,10 @@ def derived(time, poles, scale, columns, few, slopes, normal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stepped(normal, damping, step, lower):
-    """Compute the Levenberg-Marquardt step -(N + damping diag N)^-1 g by Cholesky factorization.
+    """Fill step (m,) with the Levenberg-Marquardt step of normal (m, m + 1).
 
-    A dependent direction is left out.
-
-    Parameters
-    ----------
-    normal : (m, m + 1)
-        Normal matrix N, and gradient g in the last column.
-    damping : float
-    step : (m,)
-        Filled with the step.
-    lower : (m, m)
-        Workspace.
-
-    Returns
-    -------
-    float
-        Product of gradient and step.
+    The step is -(N + damping diag N)^-1 g, by Cholesky factorization; a dependent direction is left
+    out. lower: workspace (m, m). Returns the product of gradient g and step.
     """
     many = step.size
     for i in range(many):

@@ -95,7 +95,7 @@ def events_of(window, drive, log=None, held: float = 0.0) -> Events:
 def moving(window, drive, log=None, held: float = 0.0) -> list:
     """Return whether each interface slips at some time in the window, as a list of bool (i).
 
-    The parameters are those of `events_of`.
+    Parameters as in `events_of`.
     """
     slips, held = slips_of(window)[0], max(held, slip_noise(window))
     if log is not None:
@@ -104,10 +104,7 @@ def moving(window, drive, log=None, held: float = 0.0) -> list:
 
 
 def spans_of(window, drive, log=None, held: float = 0.0) -> list:
-    """Return the stick intervals [(start, end)] [s] of a window.
-
-    The parameters are those of `events_of`.
-    """
+    """Return the stick intervals [(start, end)] [s] of a window; parameters as in `events_of`."""
     return sticks(
         events_of(window, drive, log, held),
         window.time[0],
@@ -120,15 +117,6 @@ def of_a_cycle(spans, end: float, period: float) -> list:
     """Return the sticks that begin in the last cycle but one before `end` and end before it.
 
     These are all sticks of a periodic motion; there are none if the interface sticks forever.
-
-    Parameters
-    ----------
-    spans : list
-        Stick intervals (start, end) [s].
-    end : float
-        End of the window [s].
-    period : float
-        Period of the motion [s].
     """
     return [(a, b) for a, b in spans if end - 2 * period <= a < end - period and b < end]
 

@@ -71,16 +71,7 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
     """Return the Fourier coefficient of y'' [m s-2] from y and y', by integration by parts.
 
     The acceleration of a rig with friction jumps, but its motion does not, so that a jump causes no
-    error.
-
-    Parameters
-    ----------
-    time : (k,)
-        Times over whole cycles [s].
-    value, rate : (k,)
-        Samples of y and its rate.
-    omega : float
-        Angular frequency [rad/s].
+    error. Parameters as in `motion_harmonic`, over whole cycles.
     """
     return _by_parts(time, value, rate, omega, motion_harmonic(time, value, rate, omega))
 

@@ -272,13 +272,6 @@ def state_key(model, patch, version: str) -> str:
 
     It depends on the scene in SI units, the unworn gap on the nodes, a slide from a file, and the
     version.
-
-    Parameters
-    ----------
-    model : Model
-    patch : Patch or None
-    version : str
-        Version of the program.
     """
     corners = () if model.slide is None or model.slide.corners is None else model.slide.corners
     of_patch = () if patch is None else (patch.x, patch.gap)

@@ -1,7 +1,7 @@
-"""Factors of a piece's stiffness by other libraries, which check the package's own fronts and are timed beside them.
+"""Factors of a piece's stiffness by other libraries, which check the package's own fronts.
 
 Every kind of factors has `solve(load (n, r)) -> (n, r)` and `compliance() -> (k, k)`, the last diagonal block of the
-inverse. The fronts need nothing but LAPACK and are as fast as the quickest of the others (`speed/large_pair.py`).
+inverse. The fronts need nothing but LAPACK.
 """
 
 import ctypes

@@ -22,16 +22,16 @@ def basis(omega, zeta, slide, base) -> ModalBasis:
 
 
 HALF = np.sqrt(0.5)
-# a block on its spring, m = k = 1, damping ratio .003, base acceleration sin t, friction .8
-SDOF, SDOF_DRIVE, SDOF_LIMIT = basis([1.0], [0.003], [1.0], [1.0]), SineDrive(1.0, 1.0), 0.8
+# a block on its spring, m = k = 1, damping ratio 0.003, base acceleration sin t
+SDOF = basis([1.0], [0.003], [1.0], [1.0])
+SDOF_DRIVE = SineDrive(1.0, 1.0)
+SDOF_LIMIT = 0.8  # friction [N]
 PLAIN = basis([1.0], [0.0], [1.0], [1.0])  # the same without damping
-# two free masses and a spring, m = k = 1, sin 1.14 t on the first, friction 3 under the second; coordinates: together
-# and against each other
-TWO, TWO_DRIVE, TWO_LIMIT = (
-    basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF], [-HALF, -HALF]),
-    SineDrive(1.0, 1.14, False),
-    3.0,
-)
+# two free masses and a spring, m = k = 1, the force sin 1.14 t on the first, friction under the second; the coordinates
+# are those of the motion together and of the relative motion
+TWO = basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF], [-HALF, -HALF])
+TWO_DRIVE = SineDrive(1.0, 1.14, False)
+TWO_LIMIT = 3.0  # friction [N]
 
 
 def sampled(modes, drive, limit, cycles: float, times, start=None):

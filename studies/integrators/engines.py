@@ -44,8 +44,21 @@ def duhamel_cured(one: Problem, steps: int) -> np.ndarray:
     return duhamel_motion(one, steps, 0.1 * one.drive.period / steps, tolerance=1e-9 * one.limit)
 
 
-def newmark_motion(one: Problem, steps: int, stick_speed: float, needs_force: bool) -> np.ndarray:
-    """Return the slide by Newmark's method."""
+def newmark_motion(
+    one: Problem, steps: int, stick_speed: float, *, needs_force: bool
+) -> np.ndarray:
+    """Return the slide by Newmark's method.
+
+    Parameters
+    ----------
+    one : Problem
+    steps : int
+        Steps per cycle.
+    stick_speed : float
+        Speed below which the interface stops [m/s].
+    needs_force : bool
+        The interface stops only where its friction suffices to hold it.
+    """
     motion = solve_newmark(
         one.modes,
         one.drive,
@@ -59,12 +72,13 @@ def newmark_motion(one: Problem, steps: int, stick_speed: float, needs_force: bo
 
 def newmark_report(one: Problem, steps: int) -> np.ndarray:
     """Newmark with a stick speed of 1e-3, stopped by the speed alone."""
-    return newmark_motion(one, steps, 1e-3, False)
+    return newmark_motion(one, steps, 1e-3, needs_force=False)
 
 
 def newmark_cured(one: Problem, steps: int) -> np.ndarray:
     """Newmark, stopped where the static friction suffices below what friction takes off the speed in a step."""
-    return newmark_motion(one, steps, one.limit * one.drive.period / steps, True)
+    stick_speed = one.limit * one.drive.period / steps
+    return newmark_motion(one, steps, stick_speed, needs_force=True)
 
 
 def euler_tanh(one: Problem, steps: int) -> np.ndarray:

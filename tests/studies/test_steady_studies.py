@@ -58,21 +58,6 @@ def test_exact_forty_frequencies_of_five_contacts(march, tmp_path, capsys):
     assert "largest" in capsys.readouterr().out
 
 
-# ---- multipliers
-
-
-@pytest.mark.slow
-def test_exact_every_case_of_the_multipliers(pushed):
-    rows = pushed.main()
-    for r in rows:
-        assert r.miss < 4e-3, r.case
-    stiff = [r for r in rows if r.case.startswith("stiffened")]
-    assert [r.regime for r in stiff] == ["stable", "unstable", "stable"]
-    assert stiff[1].march[0].real > 1.02 and max(np.abs(stiff[k].march[0]) for k in (0, 2)) < 1
-    (finer,) = pushed.main(("elastic-plastic, 5 g",), steps=6400)
-    assert finer.miss < 1e-3
-
-
 # ---- the fold
 
 

@@ -53,16 +53,9 @@ def limit_share(model, patch) -> float:
 
 
 def limit_tractions(model, patch, force) -> np.ndarray:
-    """Return the tractions (f, m) [Pa] of a rigid block under a resultant force.
+    """Return the tractions (f, m) [Pa] of a rigid block under resultants force (f,) [N].
 
     They are proportional to the averaged pressure in the direction of the force.
-
-    Parameters
-    ----------
-    model : Model
-    patch : Patch
-    force : (f,)
-        Resultants [N].
     """
     f, x = model.friction, patch.x
     sigma, weight = patch.pressure.sigma_n, patch.pieces.interface.weight

@@ -1,8 +1,8 @@
 """Rigid slide of a law without memory in closed form, under a constant load.
 
 In: a model whose pressure moves with the upper piece, and a path. Out: `Slid`. In every step,
-the force of such a law is a fraction of its limit, and the limit depends on the direction of
-the slide only.
+the force of such a law is a fraction of its limit, and the limit depends only on the direction
+of the slide.
 """
 
 import numpy as np

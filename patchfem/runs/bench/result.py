@@ -35,29 +35,7 @@ MOST_TRIED = 2e6  # most evaluations (points times samples) of this search
 def prescribed(
     what, patch, coarse, seconds, warnings, say, progress, per_point, estimate
 ) -> Result:
-    """Run a plan of kind bench.
-
-    Parameters
-    ----------
-    what : Plan
-    patch : Patch or None
-    coarse : sequence of Patch or None
-        The patch on coarser meshes, fine to coarse.
-    seconds : dict
-        CPU seconds by part; those of the bench are added.
-    warnings : list
-        Warnings so far.
-    say, progress : callable or None
-        Callbacks for a line of text and for the completed fraction.
-    per_point : bool
-        Not used.
-    estimate : bool
-        Whether errors are computed.
-
-    Returns
-    -------
-    Result
-    """
+    """Run a plan of kind bench; the parameters are those of `run.run`."""
     model, f = what.model, what.model.friction
     if law_has_trait(f.law, "bonds"):
         warnings = [

@@ -164,15 +164,9 @@ def shared_pair(asked, level: int) -> Pair:
 
 
 def keep_pairs(asked, meshes, pairs) -> None:
-    """Keep condensed pieces of new shared meshes for `shared_pair`.
+    """Keep condensed pieces (Pair, level by level) of new shared meshes for `shared_pair`.
 
-    Parameters
-    ----------
-    asked : PatchModel
-        One of the patches that share the meshes.
-    meshes : SharedMeshes
-    pairs : sequence of Pair
-        Condensed pieces, level by level.
+    asked: one of the patches that share the meshes.
     """
     for level, pair in enumerate(pairs):
         store.keep(_pair_key(asked, meshes.name, level), without_factors(pair))

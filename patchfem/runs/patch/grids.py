@@ -354,18 +354,10 @@ def columns_of(asked, layout: Layout) -> np.ndarray:
 
 
 def grid_on(asked, x, piece) -> TensorGrid:
-    """Return the grid of one piece on given columns.
+    """Return the grid of one piece on columns x (k,) [m].
 
     Its rows are as fine as the columns at the interface, at the inner face of the coating and at
     the holder.
-
-    Parameters
-    ----------
-    asked : PatchModel
-    x : (k,)
-        Columns [m].
-    piece
-        Piece of the model.
     """
     thick, height = piece.thickness, piece.height
     top = float(np.diff(x).min())

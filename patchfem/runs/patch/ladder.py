@@ -25,17 +25,7 @@ MAX_DECADES = 6  # decades of the tolerance that are searched for one that needs
 def solve_split(asked, level: int, estimate: bool) -> tuple:
     """Solve a patch on the mesh of its file with every edge halved `level` times.
 
-    Parameters
-    ----------
-    asked : PatchModel
-    level : int
-    estimate : bool
-        Whether coarser meshes are solved as well.
-
-    Returns
-    -------
-    tuple
-        Patches, as from `solve_all`.
+    The coarser patches are those of `solve_all`.
     """
     low, high = piece_meshes(asked)
     for _ in range(level):
@@ -96,21 +86,7 @@ def _misses_trace(asked, patches: tuple, tolerance: float) -> bool:
 
 
 def on_pairs(asked, pairs, estimate: bool = True) -> tuple:
-    """Solve a patch on condensed pieces.
-
-    Parameters
-    ----------
-    asked : PatchModel
-    pairs : sequence of Pair
-        Fine to coarse.
-    estimate : bool
-        If False, only the first one is solved.
-
-    Returns
-    -------
-    tuple
-        Patches, as from `solve_all`.
-    """
+    """Solve a patch on condensed pieces, from fine to coarse (see `solve_all`)."""
     return _filled(pressed(asked, pair) for pair in pairs[: None if estimate else 1])
 
 
@@ -223,20 +199,10 @@ def most_seconds(asked, tolerance: float | None = None) -> float:
 
 
 def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
-    """Solve the patch of a bench that slips in part as a static run does.
+    """Solve the patch of a bench that slips in part as a static run does, fine to coarse.
 
-    Parameters
-    ----------
-    asked : PatchModel
-    tolerance : float
-    estimate, fresh : bool
-        See `solve_all`.
-
-    Returns
-    -------
-    tuple
-        Patches, fine to coarse; () if there is no such ladder: the mesh is prescribed, shared with
-        other cases, or solved already.
+    () if there is no such ladder: the mesh is prescribed, shared with other cases, or solved
+    already.
     """
     if (
         not asked.interface.partial_slip

@@ -343,16 +343,9 @@ def _unbounded(patch: Patch) -> str:
 
 
 def of_peak(fraction, error, share):
-    """Return errors of loaded fractions that contain the relative error of the peak.
+    """Return errors of loaded fractions that contain the relative error `share` of the peak.
 
     The peak is the divisor of the fraction.
-
-    Parameters
-    ----------
-    fraction, error : float or (q,)
-        Loaded fraction and its error without that of the peak [1].
-    share : float or (q,)
-        Relative error of the peak [1].
     """
     return np.maximum(error, fraction * share / (1 - np.minimum(share, 0.5)))
 

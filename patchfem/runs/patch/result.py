@@ -119,16 +119,7 @@ def floors(asked, tolerance: float, values: dict) -> dict:
 def static(what, patch, coarse, seconds, warnings, *_) -> Result:
     """Return the Result of a plan whose patch does not move, or of a patch without contact.
 
-    Parameters
-    ----------
-    what : Plan
-    patch : Patch
-    coarse : sequence of Patch or None
-        The same on coarser meshes, fine to coarse.
-    seconds : dict
-        CPU seconds by part.
-    warnings : list
-        Warnings so far.
+    The parameters are those of `run.run`.
     """
     p, extra = (
         patch.pressure,
@@ -200,16 +191,7 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
 
 
 def beyond_small_strains(asked, top, approach):
-    """Return whether `strained_by` may have a warning, for one patch or arrays of many.
-
-    Parameters
-    ----------
-    asked : PatchModel
-    top : float or (q,)
-        Largest nodal pressure [Pa].
-    approach : float or (q,)
-        Approach [m].
-    """
+    """Return whether `strained_by` may have a warning, for one patch or arrays of many."""
     return (
         np.maximum(*_strains(asked, top, approach)) > SMALL
         if asked.mesh.is_automatic

@@ -84,15 +84,7 @@ def unripe(law, speed: float) -> list:
 def creeping(law, outcome, found) -> list:
     """Return a warning, as a list, of a bounded motion whose mean position drifts.
 
-    This is Dahl's creep, not a property of the joint.
-
-    Parameters
-    ----------
-    law
-        Bond parameters.
-    outcome : Outcome
-    found : dict
-        Measures by name.
+    This is Dahl's creep, not a property of the joint. found: measures by name.
     """
     drift = found.get("drift_per_cycle")
     if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK):

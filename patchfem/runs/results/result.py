@@ -150,14 +150,8 @@ def frames_of(patch, time, tau, local, slide) -> dict:
 def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
     """Return whether the error of a motion by the mesh of its patch can be estimated.
 
-    This needs a coarser patch, unless the motion does not depend on the mesh.
-
-    Parameters
-    ----------
-    model : Model
-    patch : Patch or None
-    coarse : sequence of Patch or None
-        The same on coarser meshes; None for a missing one.
+    This needs a coarser patch, unless the motion does not depend on the mesh. coarse: patches on
+    coarser meshes; None for a missing one.
     """
     if patch is None or coarse[0] is not None:
         return True

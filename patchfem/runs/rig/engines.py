@@ -104,16 +104,6 @@ class Engine(NamedTuple):
         """Return the run with more modes of a reduced structure; [] if no mode is left out.
 
         For a march, it has a quarter of the steps.
-
-        Parameters
-        ----------
-        model : Model
-        numerics : Numerics
-        patch : Patch or None
-
-        Returns
-        -------
-        list of CoarserRuns
         """
         if model.rig.structure.richer_rig is None:
             return []

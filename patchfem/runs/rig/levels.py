@@ -102,17 +102,7 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
 
 
 def drive_with(drive, number: int, level: float):
-    """Return the drive without its later levels, and with another value of one level.
-
-    Parameters
-    ----------
-    drive
-        Drive in levels.
-    number : int
-        Index of the level that is replaced; it becomes the last one.
-    level : float
-        New level [m s-2].
-    """
+    """Return the drive that ends with `level` [m s-2] in place of the level of this index."""
     return replace(
         drive, segments=(*drive.segments[:number], replace(drive.segments[number], amplitude=level))
     )

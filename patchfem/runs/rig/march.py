@@ -46,14 +46,9 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
 
 
 def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
-    """March a rig, without computing its measures.
+    """Return the contact, the MarchResult, and the CPU seconds of a march and its preparation.
 
-    The parameters are those of `run_march`.
-
-    Returns
-    -------
-    tuple
-        Contact, MarchResult, CPU seconds of the march, and CPU seconds of its preparation by name.
+    The seconds of the preparation are a dict by name. The parameters are those of `run_march`.
     """
     rig, begin = model.rig, perf_counter()
     contact = contact_of(model, numerics, patch)
@@ -177,7 +172,7 @@ class MarchReader(Reader):
         }
 
     def inside_steps(self, window, number: int):
-        """Return the window of an interface, with samples inside the steps if its law needs them.
+        """Return the window of an interface, with samples inside the steps if its force needs them.
 
         They are added for laws whose force exceeds its limit within a step.
 

@@ -330,14 +330,6 @@ def created_warning(model, book: dict, cycles: float) -> list:
     """Return a sentence, in a list, on energy that the printed law created.
 
     It creates energy in steps in which it returns more than it had stored.
-
-    Parameters
-    ----------
-    model : Model
-    book : dict
-        Energies by name [J].
-    cycles : float
-        Cycles of the run.
     """
     if model.friction is None or model.friction.reading != "report":
         return []
@@ -352,14 +344,7 @@ def created_warning(model, book: dict, cycles: float) -> list:
 
 
 def modes_note(model, kept: int, nodes: int) -> list:
-    """Return the sentence on the shear modes of a patch whose normal force changes.
-
-    Parameters
-    ----------
-    model : Model
-    kept, nodes : int
-        Numbers of shear modes and of nodes.
-    """
+    """Return the sentence on the shear modes of a patch whose normal force changes."""
     return [
         f"{model.partial_slip}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
         f"of elements; {kept} tangential modes of the {nodes} nodes are used instead (key accuracy.shear_modes)"

@@ -208,20 +208,10 @@ class Pieces(Reader):
         )
 
     def held_modes(self, run, motion, drive) -> list:
-        """Return `ringing.held_modes` of a part of a run.
+        """Return `ringing.held_modes` of a part of a run, or [].
 
-        Parameters
-        ----------
-        run : PieceRun
-        motion : Response
-            The part.
-        drive
-
-        Returns
-        -------
-        list
-            [] unless only a constant force acts in this part, and every interface is a single
-            spring that sticks until the end.
+        It is [] unless only a constant force acts in this part, and every interface is a single
+        spring that sticks until the end.
         """
         springs = [one.stiffness for one in self.groups]
         held = (

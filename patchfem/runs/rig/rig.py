@@ -66,27 +66,7 @@ class Coupled:
 def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
     """Run a plan of kind rig or linear.
 
-    Parameters
-    ----------
-    what : Plan
-    patch : Patch or None
-        Pressed patch of its [contact].
-    coarse : sequence of Patch or None
-        The same on coarser meshes, fine to coarse.
-    seconds : dict
-        CPU seconds by part; those of the rig are added.
-    warnings : list
-        Warnings so far.
-    say, progress : callable or None
-        Callbacks for a line of text and for the completed fraction.
-    per_point : bool
-        Whether bonds are followed at every node.
-    estimate : bool
-        Whether errors are computed.
-
-    Returns
-    -------
-    Result
+    The parameters are those of `run.run`; patch and coarse belong to its [contact].
     """
     model, rig = what.model, what.model.rig
     if rig.start is None and rig.drive.kind != "free" and not np.any(rig.modes.base):

@@ -40,14 +40,9 @@ def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None)
 
 
 def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
-    """Run with steps that meet numerics.local.
+    """Return the Solution without its own errors, the SmoothResult, and its SmoothReader.
 
     The parameters are those of `run_smooth`.
-
-    Returns
-    -------
-    tuple
-        Solution without the errors that it states itself, SmoothResult, and its SmoothReader.
     """
     rig, begin = model.rig, perf_counter()
     contact = contact_of(model, numerics, patch)

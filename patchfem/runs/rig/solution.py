@@ -112,13 +112,7 @@ def gauged(model, raw: Solution) -> Solution:
 def decaying(window, period: float, whole: float) -> float:
     """Return the amplitude [m] of a release in its last whole cycle.
 
-    Parameters
-    ----------
-    window : Response
-    period : float
-        Period [s].
-    whole : float
-        Amplitude of the window [m], returned if it contains no whole cycle.
+    `whole` is the amplitude of the window, returned if it contains no whole cycle.
     """
     found = last_swing(window.time, window.output, window.output_rate, period)
     return whole if found is None else found

@@ -63,16 +63,7 @@ def apart(model) -> bool:
 def rubbed(model, patch, frames: int) -> Rubbed:
     """Return the slip of one converged cycle of a model on a patch.
 
-    Parameters
-    ----------
-    model : Model
-    patch : Patch
-    frames : int
-        Number of frames of the interface from which it is computed.
-
-    Returns
-    -------
-    Rubbed
+    frames: number of frames of the interface from which it is computed.
     """
     return _bench(model, patch, frames) if model.rig is None else _rig(model, patch, frames)
 

@@ -65,8 +65,8 @@ SMOOTH, CALM = (
     (128, 256, 512, 1024, 2048),
     0.5,
 )
-# fraction of the relaxation rate of the speed in the layer of tanh that the steps have to resolve;
-# larger errors lead to more steps
+# fraction of the relaxation rate of the speed in the layer of tanh, from which the errors need more
+# steps
 LAYER = 0.5
 # rate of the force peak of LuGre over (acceleration / Stribeck speed), the inverse time of a
 # reversal to pass this speed

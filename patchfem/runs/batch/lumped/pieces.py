@@ -267,12 +267,7 @@ def _rings(case: Case, one) -> dict | None:
 def with_coarser_errors(fine: Runs, coarser: list, told_by) -> Runs:
     """Return Runs with the errors that follow from coarse Runs.
 
-    Parameters
-    ----------
-    fine : Runs
-    coarser : list of Runs
-    told_by : callable
-        Function (fine, *coarse) of values by name that returns errors by name.
+    told_by: function (fine, *coarse) of values by name that returns errors by name.
     """
     whole = [
         one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)}

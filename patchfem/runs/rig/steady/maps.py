@@ -134,10 +134,7 @@ class Maps(Followed):
         ), one.near
 
     def begun(self, memory):
-        """Return the memory of elements with which a run begins.
-
-        Their energies are measured from this state.
-        """
+        """Return the memory of elements with which a run begins, with energies counted from there."""
         return memory
 
     def shown(self, drive, near=None) -> Shown:
@@ -195,7 +192,7 @@ class YieldFinder(Maps):
         self.tries_another = len(model.rig.friction.interfaces) == 1
 
     def begun(self, memory):
-        """Return the memory with energies measured from the start (see `Maps.begun`)."""
+        """Return the memory with energies counted from the start (see `Maps.begun`)."""
         return event_elements.books_begin(memory)
 
     def repeating(self, drive, near) -> Repeating:

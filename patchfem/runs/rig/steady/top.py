@@ -173,15 +173,6 @@ def at_the_top(points: list, folds, finder) -> Solution:
     """Return the Solution of the largest motion of a curve, with the curve.
 
     Its errors include those by the position of the peak.
-
-    Parameters
-    ----------
-    points : list of Shown
-        Points of the curve.
-    folds : sequence of float
-        Frequencies at which the curve turns back [Hz].
-    finder
-        See `highest`; its `point` returns a Solution.
     """
     points, best, above = highest(points, finder, finder.model.accuracy.tolerance)
     top = points[best]
