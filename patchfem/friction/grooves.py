@@ -19,8 +19,8 @@ from math import pi
 
 import numpy as np
 
-SMALL = 0.1  # mu t below which the friction work is a series, because the closed form suffers from cancellation
-TERMS = 18  # number of terms of this series; 0.1^18 is round-off
+MAX_SERIES_SLOPE = 0.1  # mu t below which the friction work is a series, because the closed form suffers from cancellation
+N_SERIES_TERMS = 18  # number of terms of this series; 0.1^18 is round-off
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,11 +114,11 @@ class Grooves:
         way = np.sign(q1 - q0)
         turn, start, end = self.wave, self.wave * q0 - self.phase, self.wave * q1 - self.phase
         span, c = end - start, way * friction
-        if friction * self.steepest < SMALL:
-            parts = _powers(start, end, TERMS + 2)
+        if friction * self.steepest < MAX_SERIES_SLOPE:
+            parts = _integrate_sine_powers(start, end, N_SERIES_TERMS + 2)
             total = sum(
                 (c * self.steepest) ** j * (parts[j] + self.steepest**2 * parts[j + 2])
-                for j in range(TERMS)
+                for j in range(N_SERIES_TERMS)
             )
             return c * total / turn
         b = c * self.steepest
@@ -147,7 +147,7 @@ class Grooves:
         return flank * (flank - friction) / (1 + friction * flank)
 
 
-def _powers(start, end, count: int) -> list:
+def _integrate_sine_powers(start, end, count: int) -> list:
     """Integrals of sin^j over the angles from start to end (k,) [rad], j = 0 .. count - 1."""
     out = [end - start, 2 * np.sin(0.5 * (end - start)) * np.sin(0.5 * (end + start))]
     for j in range(2, count):

@@ -6,7 +6,7 @@ from math import inf
 from ..effects import LAWS, law_has_trait
 
 
-def law_from(friction, load: float = 1.0):
+def make_law(friction, load: float = 1.0):
     """Return the law object of a [friction] table, for laws that the keys define completely.
 
     Parameters
@@ -24,7 +24,7 @@ def law_from(friction, load: float = 1.0):
     return import_module(LAWS[friction.law].module).from_keys(friction, load)
 
 
-def held_stiffness(friction, load: float) -> float:
+def stick_stiffness(friction, load: float) -> float:
     """Return the tangential stiffness [N/m] of a law under a load [N] before slip.
 
     It is infinite for a law that sticks rigidly, and 0 for a law that creeps.
@@ -35,11 +35,11 @@ def held_stiffness(friction, load: float) -> float:
         return friction.static * load / friction.bond_length
     if law_has_trait(friction.law, "averaged"):
         return inf
-    element = law_from(friction, load).element(load)
+    element = make_law(friction, load).element(load)
     return element.limit / element.length if element.length else inf
 
 
-def loop_from(friction, load: float, amplitude: float) -> tuple | None:
+def steady_loop(friction, load: float, amplitude: float) -> tuple | None:
     """Return the steady loop of a law in closed form, None if the law has no closed form.
 
     Parameters

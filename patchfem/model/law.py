@@ -109,7 +109,7 @@ def _growth_at_temperature(law: Friction, where: Callable) -> tuple:
     """Return the rates of growth at rest and in slip at the surface temperature."""
     heat = law.temperature
     try:
-        return import_effect("friction.temperature").growth_at(
+        return import_effect("friction.temperature").growth_at_temperature(
             law.rest_growth,
             law.slip_growth,
             heat.surface,

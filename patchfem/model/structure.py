@@ -123,7 +123,7 @@ def sticking_stiffness(interface: InterfaceLaw, load: float) -> float:
         If the law has no single finite stiffness.
     """
     law = interface.numbers
-    stiffness = record.held_stiffness(law, load)
+    stiffness = record.stick_stiffness(law, load)
     is_curved = law_has_trait(law.law, "bonds") and (law.order, law.reading) != (1, "stretch")
     if 0 < stiffness < inf and not is_curved:
         return stiffness

@@ -43,7 +43,7 @@ def freed(model: Model, patch=None) -> Model:
 def patch_stiffness(model: Model, patch) -> float:
     """Return the tangential stiffness [N/m] of a pressed patch with its law while nothing slips."""
     f, load = model.friction, patch.pressure.load
-    held = record.held_stiffness(f, load)
+    held = record.stick_stiffness(f, load)
     if not model.partial_slip or (np.isfinite(held) and not law_has_trait(f.law, "set-valued")):
         held = sticking_stiffness(model.rig.friction.interfaces[0], load)
     if not model.partial_slip:

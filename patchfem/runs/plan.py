@@ -368,7 +368,7 @@ def _link(model: Model) -> dict:
 def _of_law(f, load: float) -> dict:
     """Return the link of a law under a load [N]."""
     rigid = "none: it creeps" if law_has_trait(f.law, "creeps") else "rigid until it slips"
-    held = record.held_stiffness(f, load)
+    held = record.stick_stiffness(f, load)
     return {"bonds": rigid if held == inf or law_has_trait(f.law, "creeps") else held}
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..friction.bonds.parameters import Bonds
-from .shear_modes import SHEAR_MODES, enough_modes, fewest_modes, shear_modes
+from .shear_modes import N_SHEAR_MODES, enough_modes, fewest_modes, shear_modes
 
 
 class ShearFields(NamedTuple):
@@ -90,4 +90,4 @@ def bond_shear_modes(
         return shear_modes(patch.giving, limit, law.length, count, weakening)
     if fewest:
         return fewest_modes(patch.giving, limit, law.length, tolerance, weakening)
-    return enough_modes(patch.giving, limit, law.length, SHEAR_MODES, tolerance, weakening)
+    return enough_modes(patch.giving, limit, law.length, N_SHEAR_MODES, tolerance, weakening)

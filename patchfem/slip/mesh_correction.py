@@ -12,7 +12,7 @@ import numpy as np
 
 # error of a measure / its change when the elements are spread (tests/README.md)
 SPREAD_FACTOR = 1.5
-N_PARTS = 4  # number of parts into which an element is split; the first element has as many per halving of its range
+N_ELEMENT_PARTS = 4  # number of parts into which an element is split; the first element has as many per halving of its range
 N_HALVINGS = 8  # number of these halvings; even displacements down to a 256th of the first element then show slip
 # relative difference of yield displacements below which nodes at both ends of a contact count as one
 SAME_YIELD_TOL = 1e-6
@@ -25,7 +25,7 @@ class SpreadElements(NamedTuple):
     yield_slide: np.ndarray
 
 
-def spread(stiffness, yield_slide) -> SpreadElements:
+def spread_elements(stiffness, yield_slide) -> SpreadElements:
     """Spread parallel elements evenly over ranges around their yield displacements.
 
     The sum of the stiffnesses and the friction limit stay. A range is as wide as the distance to the farther neighbour,
@@ -48,13 +48,17 @@ def spread(stiffness, yield_slide) -> SpreadElements:
     # the second element may be at the other end of the contact
     width[0] = 2 * min(y[0], y[min(2, y.size - 1)] - y[0])
     width = np.minimum(width, 2 * y)
-    even = (np.arange(N_PARTS) + 0.5) / N_PARTS - 0.5
-    borders = np.append(2.0 ** (-np.arange(N_PARTS * N_HALVINGS + 1) / N_PARTS), 0.0)
+    even = (np.arange(N_ELEMENT_PARTS) + 0.5) / N_ELEMENT_PARTS - 0.5
+    borders = np.append(
+        2.0 ** (-np.arange(N_ELEMENT_PARTS * N_HALVINGS + 1) / N_ELEMENT_PARTS), 0.0
+    )
     fraction = -np.diff(borders)
     position = (borders[1:] + borders[:-1]) / 2 - 0.5
     first = y[0] + width[0] * position
     others = (y[1:, None] + width[1:, None] * even).ravel()
     spread_slides = np.concatenate([first, others])
-    parts = np.concatenate([total[0] * fraction, np.repeat(total[1:] / N_PARTS, N_PARTS)])
+    parts = np.concatenate(
+        [total[0] * fraction, np.repeat(total[1:] / N_ELEMENT_PARTS, N_ELEMENT_PARTS)]
+    )
     order = np.argsort(spread_slides, kind="stable")
     return SpreadElements(parts[order], spread_slides[order])

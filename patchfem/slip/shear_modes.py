@@ -31,11 +31,11 @@ MAX_SORTS = 2
 # exchanges of neighbours per point, after which points are eliminated one by one; patches need at most 1
 MAX_EXCHANGES = 20
 # number of modes with which a reduction starts; without a layer of asperities its error is 1e-6 of the friction limit
-SHEAR_MODES = 4
+N_SHEAR_MODES = 4
 # smallest number of modes of the reference with which fewer modes are compared
 N_REFERENCE_MODES = 16
 # fraction of the tolerance by which few modes may differ from the reference; higher modes account for the rest
-MAX_MODE_ERROR = 0.8
+MODE_ERROR_FRACTION = 0.8
 # number of points from which it is faster to compute the most compliant modes alone
 MIN_LANCZOS_POINTS = 128
 # matrix products of Lanczos' method, with two vectors each; it fails to converge only for a soft layer of asperities
@@ -45,11 +45,11 @@ MODE_TOL = 1e-6
 # numbers of Gauss points that may represent a patch
 GAUSS_COUNTS = (16, 32, 64)
 # bond lengths by which a Newton step may move a point back; the law there is exp(2) times as steep as at rest
-MAX_BACK_STEP = 2.0
+MAX_BACKWARD_LENGTHS = 2.0
 # number of relative displacements at which backbones are compared
 N_DISPLACEMENTS = 24
 # bond lengths in the largest of these displacements, at which the force is within exp(-6) of its limit
-MAX_SLIDE_LENGTHS = 6
+MAX_BACKBONE_LENGTHS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +135,7 @@ class Spectrum:
             displacement = self.shape @ (self.values * (self.shape.T @ self.limit))
         else:
             displacement = _block(self.tangential, self.points) @ self.limit
-        largest = MAX_SLIDE_LENGTHS * self.length + 2 * np.abs(displacement).max()
+        largest = MAX_BACKBONE_LENGTHS * self.length + 2 * np.abs(displacement).max()
         return largest * (np.arange(1, N_DISPLACEMENTS + 1) / N_DISPLACEMENTS) ** 2
 
     def modes(self, count: int) -> "ShearModes":
@@ -611,17 +611,17 @@ def fewest_modes(
         backbone = spectrum.backbone(count)
         reference = spectrum.backbone(max(N_REFERENCE_MODES, 4 * count))
         error = spectrum.relative_difference(reference, backbone)
-        if error <= MAX_MODE_ERROR * tolerance:
+        if error <= MODE_ERROR_FRACTION * tolerance:
             return spectrum.modes(count)
     return spectrum.modes(max_modes)
 
 
-def comparison_count(count: int) -> int:
+def comparison_mode_count(count: int) -> int:
     """Return how many modes a second run needs to show the error of `count` modes.
 
     It is half as many. Of two or three modes of a symmetric patch only the first acts: there it is four times as many.
     """
-    return count // 2 if count >= SHEAR_MODES else 4 * count
+    return count // 2 if count >= N_SHEAR_MODES else 4 * count
 
 
 class GaussModes(NamedTuple):
@@ -738,7 +738,9 @@ def _solve_backbone(limit, shape, values, length, slides, start) -> _Backbone:
             return _Backbone(np.full(slides.size, np.nan), coordinates)
         change = step @ shape.T
         backward = np.where(change < 0, -change, 1.0)
-        part = np.where(change < 0, (xi + MAX_BACK_STEP * length) / backward, 1.0).min(axis=1)
+        part = np.where(change < 0, (xi + MAX_BACKWARD_LENGTHS * length) / backward, 1.0).min(
+            axis=1
+        )
         part = np.where((part > 0) & (part < 1), part, 1.0)
         coordinates[pending] -= part[:, None] * step
         size = np.abs(coordinates[pending]).max(axis=1) + 1e-300

@@ -7,16 +7,19 @@ import numpy as np
 
 from .depth import solve_jump, wear_rates
 
-MAX_GROWTH = 4.0  # largest ratio of a jump to the jump before it
-MIN_REDUCTION = 0.2  # smallest ratio of a repeated jump to the rejected one
-SAFETY = 0.9  # factor on the length that would just meet the tolerance
-FIRST_JUMP = 1e-3  # length of the first automatic jump as a fraction of all cycles
-MIN_JUMP = 1e-9  # smallest length of a jump as a fraction of all cycles
-ORDER = 2  # order of `depth.solve_jump`
-RICHARDSON = 2**ORDER - 1  # divisor of the difference between one jump and two halves of it
-MIN_ERROR = 1e-9  # error over tolerance below which a jump grows no further
+MAX_JUMP_GROWTH = 4.0  # largest ratio of a jump to the jump before it
+MIN_RETRY_RATIO = 0.2  # smallest ratio of a repeated jump to the rejected jump
+SAFETY_FACTOR = 0.9  # factor on the length that would just meet the tolerance
+FIRST_JUMP_FRACTION = 1e-3  # length of the first automatic jump as a fraction of all cycles
+MIN_JUMP_FRACTION = 1e-9  # smallest length of a jump as a fraction of all cycles
+METHOD_ORDER = 2  # order of `depth.solve_jump`
+# divisor of the difference between a jump and its two halves, which gives the error of the halves
+RICHARDSON_DIVISOR = 2**METHOD_ORDER - 1
+MIN_ERROR_RATIO = 1e-9  # error / tolerance; the next jump does not grow further below it
 MIN_DEPTH = 1e-300  # depth [m] that keeps quotients finite before anything is worn
-SHAKEDOWN_DEPTH = 1e-3  # wear of a jump over the whole depth below which the change of the path is compared with the depth
+# wear of a jump / worn depth; a jump that wears less than this fraction hardly changes the depth, and the error of its
+# slip path is then compared with this fraction of the depth
+SHAKEDOWN_WEAR_RATIO = 1e-3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -90,7 +93,7 @@ def start_wear(problem: WearProblem, depth=None) -> WearState:
         force=problem.press(depth, zero),
         path=problem.path(depth),
         trend=zero,
-        length=FIRST_JUMP * problem.cycles,
+        length=FIRST_JUMP_FRACTION * problem.cycles,
         rough=depth,
         strayed=0.0,
         used=zero,
@@ -135,13 +138,15 @@ def take_jump(
     while True:
         path = np.maximum(state.path + 0.5 * length * state.trend, 0.0)
         after, error = _take_halves(problem, state, path, length, tolerance)
-        is_forced = count or length <= MIN_JUMP * problem.cycles
+        is_forced = count or length <= MIN_JUMP_FRACTION * problem.cycles
         if is_forced or error <= 1:
             after, error = _correct_path(problem, state, after, error, length, tolerance)
             if is_forced or error <= 1:
                 break
-        length *= max(MIN_REDUCTION, SAFETY * error ** (-1 / (ORDER + 1)))
-    growth = min(MAX_GROWTH, SAFETY * max(error, MIN_ERROR) ** (-1 / (ORDER + 1)))
+        length *= max(MIN_RETRY_RATIO, SAFETY_FACTOR * error ** (-1 / (METHOD_ORDER + 1)))
+    growth = min(
+        MAX_JUMP_GROWTH, SAFETY_FACTOR * max(error, MIN_ERROR_RATIO) ** (-1 / (METHOD_ORDER + 1))
+    )
     cycle = end if length == remaining else after.cycle
     return replace(after, cycle=cycle, length=length * growth)
 
@@ -164,7 +169,7 @@ def _correct_path(
     # never more than a third of it.
     path_error = float(np.abs(again.depth - after.depth).max()) / 3
     worn = float((again.depth - state.depth).max())
-    scale = max(worn, SHAKEDOWN_DEPTH * float(again.depth.max()))
+    scale = max(worn, SHAKEDOWN_WEAR_RATIO * float(again.depth.max()))
     corrected = replace(
         again,
         path=path,
@@ -189,11 +194,11 @@ def _take_halves(
         state, cycle=state.cycle + length, depth=depth, force=force, rough=rough, used=path
     )
     depth_limit = tolerance * max(float(depth.max()), MIN_DEPTH)
-    depth_error = float(np.abs(depth - whole).max()) / RICHARDSON / depth_limit
+    depth_error = float(np.abs(depth - whole).max()) / RICHARDSON_DIVISOR / depth_limit
     load = float(force.sum())
     if load <= 0:
         return after, max(depth_error, 0.0)
-    force_error = float(np.abs(force - whole_force).sum()) / RICHARDSON / (tolerance * load)
+    force_error = float(np.abs(force - whole_force).sum()) / RICHARDSON_DIVISOR / (tolerance * load)
     return after, max(depth_error, force_error)
 
 

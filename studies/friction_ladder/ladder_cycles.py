@@ -15,7 +15,7 @@ import today
 from patchfem.dynamics.march.models import jenkins_model, list_model, load_kernels, points_model
 from patchfem.friction.bonds.list_kernels import list_mean, list_step
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import cutoff
+from patchfem.friction.bonds.quadrature import cutoff_age
 
 loop_kernels = load_kernels()
 
@@ -82,7 +82,7 @@ def printed(amplitude: float, order: float, steps: int, **growth) -> Cycle:
     """The law as printed, every bond of its own length, by the compiled list merged to 0.01 bond lengths (1e-4 of
     the limit); the means of the steps are asked for in the last cycle only."""
     law = bonds(order=order, reading="report", **growth)
-    c = list_model(law, 1.0, cutoff(order, 1e-5), 0.01).build()
+    c = list_model(law, 1.0, cutoff_age(order, 1e-5), 0.01).build()
     path, dt, force = LENGTH * harmonic(amplitude, steps), 1 / (HERTZ * steps), []
     for i, dq in enumerate(np.diff(path)):
         if i >= path.size - 1 - steps:

@@ -10,7 +10,7 @@ from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, friction_of
 import patchfem as pf
 from patchfem.campaigns.fits.patch import Curves, fit_law, fit_patch
 from patchfem.formatting import format_number, format_quantity
-from patchfem.friction.record import loop_from
+from patchfem.friction.record import steady_loop
 from patchfem.scene.keys.tables import Friction
 
 SLIDE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'
@@ -50,7 +50,7 @@ tangential_ratio = 0.8
 def test_exact_a_law_finds_itself_in_its_own_loops(law, keys):
     own = Friction.model_construct(law=law, static=0.3, **keys)
     slides = np.geomspace(2e-7, 6e-5, 20)
-    found = fit_law(law, 0.3, 100.0, slides, Curves(*loop_from(own, 100.0, slides)), 5e6)
+    found = fit_law(law, 0.3, 100.0, slides, Curves(*steady_loop(own, 100.0, slides)), 5e6)
     assert found.values == pytest.approx(keys, rel=1e-6)
     assert np.abs(found.deviations).max() < 1e-6
 

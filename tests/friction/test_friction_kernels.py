@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.friction.laws import elastic_plastic_kernels
-from patchfem.friction.laws.elastic_plastic import parallel
+from patchfem.friction.laws.elastic_plastic import parallel_element
 
 # ---- bond points
 
@@ -34,7 +34,7 @@ def jenkins_numpy(dq, stretch, stiffness, limit):
 def test_exact_jenkins_is_a_clip(seed):
     rng = np.random.default_rng(seed)
     stiffness, limit = rng.uniform(0.1, 3, 29), rng.uniform(0.05, 2, 29)
-    element = parallel(stiffness, limit)
+    element = parallel_element(stiffness, limit)
     num, mem = element.numbers[None], element.memory[None].copy()
     stretch, now = mem[0, 3:], mem[0, :3]
     for dq in rng.normal(0, 1, 60) * 10.0 ** rng.uniform(-3, 1, 60):
@@ -65,7 +65,7 @@ def test_exact_jenkins_is_a_clip(seed):
 def test_exact_a_tiny_step_of_stretched_elements_keeps_its_force():
     """No difference of large numbers: a step of 1e-12 of the stretch, elastic, has its force to 1e-15 of itself."""
     num, mem = (
-        parallel(np.full(4, 3.0), np.full(4, 1.0)).numbers[None],
+        parallel_element(np.full(4, 3.0), np.full(4, 1.0)).numbers[None],
         np.array([[0, 0, 0, 0.3, -0.7, 0.9, 0.1]]),
     )
     for dq in (1e-12, -1e-13, 1e-300, 0.0):

@@ -7,8 +7,8 @@ import pytest
 
 from patchfem import SceneError, build, plan
 from patchfem.core import Missing
-from patchfem.friction.bonds.parameters import LONGEST
-from patchfem.friction.record import loop_from
+from patchfem.friction.bonds.parameters import MAX_LIST_SECONDS
+from patchfem.friction.record import steady_loop
 from patchfem.runs.bench import bench
 from patchfem.runs.bench.ledger import BLOCK, UNWATCHED, Watch
 from patchfem.runs.bench.stepped import stepped
@@ -139,7 +139,8 @@ def test_refuses_a_list_that_takes_too_long_and_merging_where_none_is():
         "accuracy.steps_per_cycle=4000",
     )
     with pytest.raises(
-        Missing, match=f"more than the limit of {LONGEST:.0f} s; lower accuracy.steps_per_cycle"
+        Missing,
+        match=f"more than the limit of {MAX_LIST_SECONDS:.0f} s; lower accuracy.steps_per_cycle",
     ):
         plan(model)
     with pytest.raises(SceneError, match=r"'merged' with friction\.breakaway, or with a pressure"):
@@ -229,7 +230,7 @@ def test_exact_the_cells_of_iwans_law_are_in_the_bars(chi, beta, slide):
         f'chi = {chi}\nbeta = {beta}\n[slide]\nkind = "sine"\namplitude = "{slide!r} m"\n'
         'frequency = "1 Hz"\ncycles = 2\n'
     )
-    tip, area = loop_from(scene.friction, 5e3, slide)
+    tip, area = steady_loop(scene.friction, 5e3, slide)
     measures = run(scene).measures
     for name, exact in (
         ("loop_area", area),

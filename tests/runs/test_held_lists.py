@@ -173,7 +173,7 @@ def test_refuses_a_stuck_block_whose_list_of_bonds_grows_too_long(monkeypatch):
     scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
     begin = process_time()
     assert "each reversal makes the list of bonds longer" in str(plan(scene))
-    monkeypatch.setattr(lists, "LONGEST", 3.0)
+    monkeypatch.setattr(lists, "MAX_LIST_SECONDS", 3.0)
     with pytest.raises(
         Missing,
         match=r"the list of bonds would need a computing time of about \d+ s, more than the "

@@ -7,7 +7,7 @@ import patchfem as pf
 from patchfem import build
 from patchfem.runs.bench.engine import slips_by_elements
 from patchfem.scene.scene import loads
-from patchfem.slip.mesh_correction import spread
+from patchfem.slip.mesh_correction import spread_elements
 
 
 def work(k, y, amplitude):
@@ -19,7 +19,7 @@ ELEMENTS = np.array([3e6, 2e6, 2e6, 9e6]), np.array([2e-8, 7e-8, 1.1e-7, 1.3e-7]
 
 
 def test_exact_stiffness_and_limit_stay():
-    k, y = spread(*ELEMENTS)
+    k, y = spread_elements(*ELEMENTS)
     assert k.sum() == pytest.approx(ELEMENTS[0].sum(), rel=1e-14)
     assert k @ y == pytest.approx(ELEMENTS[0] @ ELEMENTS[1], rel=1e-14)
     assert (k > 0).all() and (np.diff(y) >= 0).all() and y[0] > 0
@@ -29,7 +29,7 @@ def test_exact_stiffness_and_limit_stay():
 def test_order_small_slides_lose_by_their_third_power(amplitude):
     """A first element of stiffness k at y, over 0 to 2 y: 4 k/(2 y) A^3/6."""
     assert work(*ELEMENTS, amplitude) == 0
-    assert work(*spread(*ELEMENTS), amplitude) == pytest.approx(
+    assert work(*spread_elements(*ELEMENTS), amplitude) == pytest.approx(
         ELEMENTS[0][0] / ELEMENTS[1][0] * amplitude**3 / 3, rel=0.02
     )
 
@@ -37,7 +37,7 @@ def test_order_small_slides_lose_by_their_third_power(amplitude):
 def test_exact_large_slides_lose_as_before_but_for_the_widths():
     """An element whose range w lies below the slide loses k w^2/3 less."""
     wide = np.array([4e-8, 5e-8, 4e-8, 2e-8])
-    gone = work(*ELEMENTS, 1e-6) - work(*spread(*ELEMENTS), 1e-6)
+    gone = work(*ELEMENTS, 1e-6) - work(*spread_elements(*ELEMENTS), 1e-6)
     # four parts have 15/16 of it
     assert gone == pytest.approx(float(ELEMENTS[0] @ wide**2) / 3, rel=0.07)
 
@@ -47,22 +47,22 @@ def test_exact_mirrored_nodes_that_round_off_parts_have_the_grain_of_one():
     were then half as wide, and the bar a quarter. Parted by a tilt they now keep three fifths of it."""
     k, y = np.array([1e6, 2e6, 3e6, 4e6, 5e6]), np.array([2e-8, 5e-8, 9e-8, 14e-8, 16e-8])
     slides = 1e-8, 6e-8, 2e-7
-    whole = [work(*spread(k, y), at) - work(k, y, at) for at in slides]
+    whole = [work(*spread_elements(k, y), at) - work(k, y, at) for at in slides]
     for apart, within in ((1e-10, 1e-6), (1e-4, 0.4)):  # the middle node stands alone
         two = (
             np.append(np.repeat(k[:-1] / 2, 2), k[-1]),
             np.append((y[:-1, None] * [1.0, 1.0 + apart]).ravel(), y[-1]),
         )
-        assert [work(*spread(*two), at) - work(*two, at) for at in slides] == pytest.approx(
-            whole, rel=within
-        )
+        assert [
+            work(*spread_elements(*two), at) - work(*two, at) for at in slides
+        ] == pytest.approx(whole, rel=within)
 
 
 def test_exact_what_yields_together_stays_together():
     """Flat pieces slip all at once: no slide below the yield slide loses anything."""
-    k, y = spread(np.ones(5), 5e-7 + 1e-10 * np.arange(5))
+    k, y = spread_elements(np.ones(5), 5e-7 + 1e-10 * np.arange(5))
     assert y[0] > 4.9e-7
-    k, y = spread(np.array([3.0]), np.array([2e-7]))
+    k, y = spread_elements(np.array([3.0]), np.array([2e-7]))
     assert k.tolist() == [3.0] and y.tolist() == [2e-7]
 
 

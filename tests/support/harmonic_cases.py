@@ -7,12 +7,12 @@ from patchfem.core import ModalBasis
 from patchfem.dynamics.harmonic.laws import Flow, OfSpeed
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.stretch import points_element
-from patchfem.friction.laws.tanh import Rate
+from patchfem.friction.laws.tanh import TanhLaw
 
 
 def of_speed(limit, speed):
     """limit tanh(v/speed)."""
-    return OfSpeed(Rate(limit, speed).element(1.0))
+    return OfSpeed(TanhLaw(limit, speed).element(1.0))
 
 
 def bonds(limit, length):

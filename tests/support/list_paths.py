@@ -8,9 +8,9 @@ from scipy.special import gamma
 
 from patchfem.dynamics.interfaces.arrays import BondList
 from patchfem.friction.bonds import list_kernels
-from patchfem.friction.bonds.list_numbers import gamma_table, law_numbers, now_of, status_of
+from patchfem.friction.bonds.list_numbers import gamma_table, law_numbers, make_clocks, make_status
 from patchfem.friction.bonds.list_rows_kernels import N_ROWS, STATUS
-from patchfem.friction.bonds.quadrature import cutoff
+from patchfem.friction.bonds.quadrature import cutoff_age
 from patchfem.friction.laws.stretch import growth_numbers
 
 for kernel in (list_kernels.list_mean, list_kernels.list_force, list_kernels.list_step):
@@ -30,13 +30,13 @@ class Listed(NamedTuple):
 
 def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
     """A list before any slide, as the functions of `list_kernels` take it."""
-    numbers = law_numbers(law, cutoff(law.order, tail) if tail else np.inf, merge)
-    now = now_of(law)
+    numbers = law_numbers(law, cutoff_age(law.order, tail) if tail else np.inf, merge)
+    now = make_clocks(law)
     return BondList(
         np.ones(1),
         np.zeros((N_ROWS, capacity)),
         now,
-        status_of(capacity),
+        make_status(capacity),
         numbers,
         gamma_table(law),
         growth_numbers(law),

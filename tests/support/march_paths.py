@@ -6,7 +6,7 @@ from patchfem.core import ModalBasis
 from patchfem.dynamics.march.joints import JointsModel
 from patchfem.dynamics.march.march import GOAL
 from patchfem.dynamics.march.models import element_model, load_kernels
-from patchfem.friction.laws.tanh import Rate
+from patchfem.friction.laws.tanh import TanhLaw
 
 OMEGA = 2 * np.pi * 143
 # laws of the one compiled loop of joints that most tests share
@@ -26,7 +26,7 @@ def share_one_loop(monkeypatch) -> None:
 
 def rate_model(limit: float, speed: float):
     """Return the ContactModel of friction limit tanh(v/speed), limit [N], speed [m/s]."""
-    return element_model(Rate(limit, speed).element(1.0))
+    return element_model(TanhLaw(limit, speed).element(1.0))
 
 
 def one_mode(omega, zeta, mass):

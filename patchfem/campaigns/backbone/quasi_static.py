@@ -4,7 +4,7 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import quasi_static
-from ...friction.record import loop_from
+from ...friction.record import steady_loop
 from ...response.errors import with_errors
 from ...runs.bench.errors import errors_of
 from ...runs.rig import decays
@@ -86,7 +86,7 @@ def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
     load = joint.friction_limit / model.friction.static
     slides = np.abs(modes.interfaces[0] @ joint.shape) * amplitudes / joint.reach
     for _ in range(MAX_STEPS):
-        loops = [loop_from(model.friction, load, float(slide)) for slide in slides]
+        loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
             return None
         best = _read_loops(joint, slides, [quasi_static.Loops(*loop) for loop in loops])

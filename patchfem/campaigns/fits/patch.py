@@ -16,8 +16,8 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...effects import LAWS, law_has_trait
-from ...friction.laws.elastic_plastic import masing
-from ...friction.record import law_from, loop_from
+from ...friction.laws.elastic_plastic import masing_loop
+from ...friction.record import make_law, steady_loop
 from ...identify.least_squares import Fit, fit
 from ...model.model import Model, build
 from ...model.source import locate_errors
@@ -116,7 +116,7 @@ class Elements(NamedTuple):
 
     def curves_at(self, slides) -> Curves:
         """Return the curves at amplitudes (k,) [m] of the slide."""
-        return Curves(*masing(self.stiffness, self.yield_displacement, slides))
+        return Curves(*masing_loop(self.stiffness, self.yield_displacement, slides))
 
 
 class PatchLoops(NamedTuple):
@@ -277,7 +277,7 @@ def fit_law(
         return asked.keys(values[0] * stiffness, static * load, *values[1:])
 
     def curves_at(values) -> Curves:
-        return Curves(*loop_from(_FrictionKeys(law, static, keys_at(values)), load, slides))
+        return Curves(*steady_loop(_FrictionKeys(law, static, keys_at(values)), load, slides))
 
     def residual(values) -> np.ndarray:
         return (weights * curves_at(values).deviate_from(own, slides)).ravel()
@@ -302,7 +302,7 @@ def _elements(model: Model, patch) -> Elements:
     """Return the elements of a pressed patch."""
     friction = model.friction
     load = patch.pressure.load
-    element = law_from(friction, load).element(load)
+    element = make_law(friction, load).element(load)
     if not model.partial_slip:
         return Elements(np.array([element.limit / element.length]), np.array([element.length]))
     if patch.strips is not None:

@@ -7,7 +7,7 @@ import numpy as np
 from ...contact.stiffness import tangential_stiffness
 from ...core import Outcome, PatchfemError, Response
 from ...friction.grooves import Grooves
-from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
+from ...slip.shear_modes import N_SHEAR_MODES, enough_modes, shear_modes
 from ..integrated import accelerations
 from ..interfaces.arrays import Climbing
 from ..march.march import Run
@@ -80,7 +80,7 @@ def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -
     found = (
         shear_modes(patch.giving, limit, length, count, weakening)
         if count is not None
-        else enough_modes(patch.giving, limit, length, SHEAR_MODES, 0.1 * tolerance, weakening)
+        else enough_modes(patch.giving, limit, length, N_SHEAR_MODES, 0.1 * tolerance, weakening)
     )
     return replace(model, law=law, shear=found, share=tuple(force[found.points] / force.sum()))
 

@@ -14,7 +14,7 @@ from scipy.optimize import root
 
 from ...core import ModalBasis, NotConverged, PatchfemError
 from ...formatting import format_length
-from ...friction.laws.elastic_plastic import masing
+from ...friction.laws.elastic_plastic import masing_loop
 from .forces import Group
 from .laws import Jenkins, Track
 
@@ -46,7 +46,7 @@ def loops(laws, u: float, samples: int) -> Loops:
     """Loops of the laws on one row at an amplitude u >= 0 [m] of its slide, those without a closed form on `samples` of
     a cycle."""
     found = [
-        Loops(*map(float, masing(law.stiffness, law.limit_slide, u)))
+        Loops(*map(float, masing_loop(law.stiffness, law.limit_slide, u)))
         if isinstance(law, Jenkins)
         else _sampled(law, u, samples)
         for law in laws

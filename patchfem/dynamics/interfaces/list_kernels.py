@@ -6,7 +6,7 @@ The functions are those that `march.loop_kernels` asks of every contact.
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_forms_kernels import MOMENTS, POWER
+from ...friction.bonds.list_forms_kernels import FORM_MOMENTS, FORM_POWER
 from ...friction.bonds.list_kernels import list_force, list_mean, list_slope, list_step
 from ...friction.bonds.list_rows_kernels import LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
@@ -20,7 +20,7 @@ OWED = 1e-4  # bond lengths at the friction limit: the most that a list of stret
 def answer(dq, c, v0, dt):
     """(path-mean weight [1], its slope over dq [1/m]) of a list over dq [m]; the slope of a law other than that of
     MOMENTS is that of a mean whose force depends on the slide alone, and may be below 0."""
-    if c.law[LAW.form] == MOMENTS:
+    if c.law[LAW.form] == FORM_MOMENTS:
         mean, slope = list_slope(dq, c, v0, dt)
         return mean, slope
     mean = list_mean(dq, c, v0, dt)
@@ -35,7 +35,7 @@ def pulled(dq, c, v0, dt):
     """(path-mean force [N], its slope over dq [N/m]) of a bond list over dq [m]; a slope of 0 stands for an unknown
     one."""
     scale = c.force[0]
-    if c.law[LAW.form] == MOMENTS:
+    if c.law[LAW.form] == FORM_MOMENTS:
         force, slope = list_slope(dq, c, v0, dt)
         return scale * force, scale * slope
     return scale * list_mean(dq, c, v0, dt), 0.0
@@ -93,7 +93,7 @@ def booked(work, before, limit, c):
     `before` is the energy in its status before the step, `limit` the friction limit mu_s N [N].
     """
     net = work - limit * (c.status[STATUS.energy] - before)
-    if c.law[LAW.form] <= POWER and limit > 0:
+    if c.law[LAW.form] <= FORM_POWER and limit > 0:
         owed = c.status[STATUS.owed] - net / limit
         c.status[STATUS.owed] = min(max(owed, 0.0), OWED * c.law[LAW.length])
         net = limit * (c.status[STATUS.owed] - owed)

@@ -9,7 +9,7 @@ the points by their loads. The local slide of a point is that of the holder less
 """
 
 from ...compiled.jit import njit
-from ...friction.bonds.point_kernels import bond_step, elastic_bond_step, grow, short_step
+from ...friction.bonds.point_kernels import bond_step, elastic_bond_step, grow, short_bond_step
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .shear_points_kernels import DENSITY, LOAD, PLAY, POINTS, SLIDE, SQUARE, STRETCH, short
 from .shear_solve_kernels import descend, halfway, went_on
@@ -101,7 +101,7 @@ def moved_short(c, length):
     lost = 0.0
     for j in range(c.weight.size):
         xi = points[SLIDE, j]
-        points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], part = short_step(
+        points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], part = short_bond_step(
             points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], xi, points[LOAD, j], length
         )
         lost += c.weight[j] * part

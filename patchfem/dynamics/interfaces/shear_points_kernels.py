@@ -6,11 +6,11 @@ the load in the row LOAD; at its `ending` they are those after the slide.
 
 from ...compiled.jit import njit
 from ...friction.bonds.point_kernels import (
-    MAX_SHORT,
-    bond_end,
+    MAX_SHORT_PATH,
+    bond_end_stretch,
     bond_mean,
     elastic_bond_mean,
-    short_mean,
+    short_bond_mean,
 )
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
@@ -32,7 +32,7 @@ def short(c, length):
     near = 0.0
     for j in range(int(c.count[0])):
         # a sum, which unlike a maximum is vectorised
-        near += 1.0 if abs(points[SLIDE, j]) <= MAX_SHORT * length else 0.0
+        near += 1.0 if abs(points[SLIDE, j]) <= MAX_SHORT_PATH * length else 0.0
     return near == c.count[0]
 
 
@@ -45,7 +45,7 @@ def respond(kind, ending, c):
     force = 0.0
     if kind == POINTS and not ending and c.growth[5] == 0.0 and short(c, length):
         for j in range(int(c.count[0])):
-            f, s = short_mean(
+            f, s = short_bond_mean(
                 points[DENSITY, j], points[STRETCH, j], points[SLIDE, j], points[LOAD, j], length
             )
             points[FORCE, j] = weight[j] * f
@@ -74,7 +74,7 @@ def answer(kind, ending, c, length):
                 else spring_mean(m, z, load, xi, length)
             )
         elif ending:
-            f, s = bond_end(m, z, xi, load, length)
+            f, s = bond_end_stretch(m, z, xi, load, length)
         elif loose > 0.0:
             f, s = elastic_bond_mean(m, z, points[PLAY, j], loose, xi, load, length)
         else:

@@ -13,7 +13,7 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws import plane_kernels as plane
-from ...friction.laws.coulomb_kernels import stick
+from ...friction.laws.coulomb_kernels import solve_coulomb_step
 from ..interfaces import element_kernels as contact
 from ..interfaces import element_solve_kernels as solver
 from ..modal_kernels import ended, free_rate, free_slide
@@ -164,7 +164,7 @@ def turned(e, turn, j, dt):
     mine = j.port[FREE, p] - elsewhere(e, p, j)
     if STOPS:
         if j.num[e, 0] == HOLDS:
-            dq = stick(mine, beta, j.num[e, 1], j.num[e, 2])[0]
+            dq = solve_coulomb_step(mine, beta, j.num[e, 1], j.num[e, 2])[0]
     if SMOOTH:
         if j.num[e, 0] != HOLDS:
             guess = 2 * j.each[WENT, e] - j.each[WENT_BEFORE, e] if turn == 0 else dq

@@ -10,8 +10,8 @@ from ...compiled import load
 from ...friction.bonds import list_numbers as numbers
 from ...friction.bonds.list_rows_kernels import CLOCK, N_ROWS, STATUS
 from ...friction.laws.coulomb import Coulomb
-from ...friction.laws.elastic_plastic import parallel
-from ...friction.laws.stretch import bonds_of, growth_numbers, points_element
+from ...friction.laws.elastic_plastic import parallel_element
+from ...friction.laws.stretch import growth_numbers, points_element, unpack_bonds
 from ...friction.protocol import Element
 from ..interfaces import arrays
 from ..interfaces.dispatch import COULOMB
@@ -92,7 +92,7 @@ class ContactModel:
         if form == "parallel":
             return {"stretch": contact.mem[0, 3:].copy()}
         if form in ("points", "places"):
-            return {"bonds": bonds_of(self.element, contact.mem[0]).copy()}
+            return {"bonds": unpack_bonds(self.element, contact.mem[0]).copy()}
         if not hasattr(contact, "psi"):
             return {}
         if hasattr(contact, "bondlist"):
@@ -160,7 +160,7 @@ def coulomb_model(static: float, kinetic: float) -> ContactModel:
 
 def jenkins_model(stiffness, yield_slide, reduction=None) -> ContactModel:
     """Parallel Jenkins elements (t,) [N/m], [m]."""
-    return element_model(parallel(stiffness, yield_slide), reduction)
+    return element_model(parallel_element(stiffness, yield_slide), reduction)
 
 
 def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
@@ -206,18 +206,18 @@ def lists_model(
         else (np.asarray(shear.shape), shear.stiffness)
     )
     capacity = min(
-        numbers.capacity(law, reach, merge),
-        MOST_AT_FIRST + numbers.STRIPS_PER_LENGTH * int(min(reach, numbers.MAX_DAMAGE)),
+        numbers.list_capacity(law, reach, merge),
+        MOST_AT_FIRST + numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, numbers.MAX_DAMAGE)),
     )
     fields = arrays.sheared(limit, law.length, growth_numbers(law), shape, stiffness)
     fields["points"][4], fields["drag"][2, 1:] = sigma, shape.T @ limit / limit.sum()
     fields |= {
         "bondlist": np.zeros((N_ROWS, limit.size * capacity)),
-        "status": numbers.status_of(capacity),
+        "status": numbers.make_status(capacity),
         "time": np.ones(1),
-        "statuses": numbers.status_of(capacity, limit.size),
-        "now": numbers.now_of(law),
-        "nows": np.tile(numbers.now_of(law), (limit.size, 1)),
+        "statuses": numbers.make_status(capacity, limit.size),
+        "now": numbers.make_clocks(law),
+        "nows": np.tile(numbers.make_clocks(law), (limit.size, 1)),
         "table": numbers.gamma_table(law),
         "law": numbers.law_numbers(law, reach, merge, WIDE),
         "pressed": np.zeros((2, 0)),
@@ -277,12 +277,12 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
 
     reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
     """
-    capacity = numbers.capacity(law, reach, merge)
+    capacity = numbers.list_capacity(law, reach, merge)
     fields = {
         "force": [limit],
         "bondlist": np.zeros((N_ROWS, capacity)),
-        "now": numbers.now_of(law),
-        "status": numbers.status_of(capacity),
+        "now": numbers.make_clocks(law),
+        "status": numbers.make_status(capacity),
         "law": numbers.law_numbers(law, reach, merge),
         "table": numbers.gamma_table(law),
         "growth": growth_numbers(law),

@@ -168,7 +168,7 @@ def in_plane(e, f, dx, j):
     dy = j.port[FREE, r]
     for k in range(j.of.shape[1]):
         dy -= beta[r, j.of[PORT, k]] * j.each[PULL, k]
-    slide = plane.slide_straight((j.num[e, 2], j.num[e, 3]), (j.mem[e, 3], j.mem[f, 3]), (dx, dy))
+    slide = plane.advance_straight((j.num[e, 2], j.num[e, 3]), (j.mem[e, 3], j.mem[f, 3]), (dx, dy))
     j.each[LACK, e] = slide.mean_x - j.each[PULL, e]
     j.each[LACK, f] = slide.mean_y - j.each[PULL, f]
     for k in range(j.of.shape[1]):

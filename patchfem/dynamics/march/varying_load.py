@@ -17,8 +17,8 @@ from ...effects import not_supported_message
 from ...friction.bonds.list_rows_kernels import STATUS
 from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.stretch import growth_numbers
-from ...friction.laws.tanh import Rate
-from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
+from ...friction.laws.tanh import TanhLaw
+from ...slip.shear_modes import N_SHEAR_MODES, enough_modes, shear_modes
 from ..interfaces import arrays
 from ..interfaces.dispatch import COULOMB as COULOMB_LAW
 from .faces import GOAL
@@ -240,7 +240,7 @@ class VaryingLoadModel:
                 np.full(1 if self.load is not None else self.sets.x.size, self.preload)
             )
         return element_model(
-            Rate(law.static, law.force[1] if law.kind == RATE else 1.0).element(self.preload)
+            TanhLaw(law.static, law.force[1] if law.kind == RATE else 1.0).element(self.preload)
         ).build()
 
     def points(self, force):
@@ -284,7 +284,7 @@ def shear_of(
         )
     if count is not None:
         return shear_modes(giving, limit, law.length, count)
-    return enough_modes(giving, limit, law.length, SHEAR_MODES, 0.1 * tolerance)
+    return enough_modes(giving, limit, law.length, N_SHEAR_MODES, 0.1 * tolerance)
 
 
 def model_of(

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import compiled
 from ...core import IntegratedMeasures, ModalBasis, Outcome, Response
-from ...friction.laws.stretch import bonds_of
+from ...friction.laws.stretch import unpack_bonds
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import stored_samples_per_cycle
 from ..events.modal_system import segments_of
@@ -434,7 +434,7 @@ class Motion:
         slide, rate, force, slip = row[-6:-2]
         out = {"time": self.time, "slide": slide, "rate": rate, "force": force, "slip": slip}
         points = self.element.form == "points"
-        return out | ({"bonds": bonds_of(self.element, memory).copy()} if points else {})
+        return out | ({"bonds": unpack_bonds(self.element, memory).copy()} if points else {})
 
 
 def simulate(

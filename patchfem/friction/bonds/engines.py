@@ -10,16 +10,22 @@ from dataclasses import dataclass
 from math import ceil, inf, sqrt
 
 from ... import cost_model
-from .list_forms_kernels import MAX_STRIP, MOMENTS, POWER, PRINTED, PRINTED_GROWING
-from .list_numbers import MAX_DAMAGE, cutoff, form_of
+from .list_forms_kernels import (
+    FORM_MOMENTS,
+    FORM_POWER,
+    FORM_REPORT,
+    FORM_REPORT_GROWING,
+    MAX_STRIP_LENGTH,
+)
+from .list_numbers import MAX_DAMAGE, cutoff_age, sum_form
 from .parameters import Bonds
 
-LISTS = {  # settings of a list: whether it drops old strips, whether it merges strips
+LIST_SETTINGS = {  # settings of a list: whether it drops old strips, whether it merges strips
     "direct": (False, False),
     "truncated": (True, False),
     "merged": (True, True),
 }
-ENGINES = (*LISTS, "recursion")
+ENGINES = (*LIST_SETTINGS, "recursion")
 # bounds of the error of merging over the square of its width, which test_merge_bounds measures
 MERGE_ERROR_CONSTANT = 0.25  # for a constant bond length
 MERGE_ERROR_GROWING = 1.0  # for reading="stretch" with growing bonds
@@ -28,13 +34,13 @@ MERGE_ERROR_PRINTED_GROWING = 6.0  # for reading="report" with growing bonds
 MERGE_ERROR_PRINTED_FRACTIONAL = 1.0
 NEGATIVE_ORDER_ERROR = 3e-4  # error of merging growing bonds with p < 0 at any width, due to bonds that form at a reversal
 # evaluations of the list per step of a rig: three for each of two or three trial increments
-PASSES_PER_STEP = 9
+N_PASSES_PER_STEP = 9
 MAX_TAIL = 1e-6  # largest fraction of the friction limit by which the cut-off may change the force
 MAX_MERGE_WIDTH = 0.02  # largest width of a merged strip in bond lengths
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class EngineChoice:
     """Engine and its settings.
 
     - engine: name of the engine
@@ -54,7 +60,7 @@ class Choice:
 
     def reach(self, order: float) -> float:
         """Return the age [bond lengths] beyond which bonds are dropped; inf if none are."""
-        return cutoff(order, self.tail) if self.tail > 0 else inf
+        return cutoff_age(order, self.tail) if self.tail > 0 else inf
 
     def describe(self) -> str:
         """Describe engine, list length, cost per step, settings and error bound in a line."""
@@ -71,14 +77,14 @@ class Choice:
         return ", ".join([*parts, f"error of the sum {self.error:.1g} of the friction limit"])
 
 
-def impossible(engine: str, reading: str, order: float) -> str:
+def unsupported_reason(engine: str, reading: str, order: float) -> str:
     """Return why an engine cannot sum a law, and which one can; "" if it can."""
     if engine == "recursion" and (reading != "stretch" or order != 1):
         return 'works only with reading = "stretch" and order = 1; use "auto" or "merged"'
     return ""
 
 
-def choose(
+def choose_engine(
     law: Bonds,
     tolerance: float,
     stroke: float,
@@ -86,7 +92,7 @@ def choose(
     engine: str = "auto",
     tail: float | None = None,
     merge: float | None = None,
-) -> Choice:
+) -> EngineChoice:
     """Choose the cheapest engine whose error bound meets a tenth of the tolerance.
 
     Parameters
@@ -110,11 +116,11 @@ def choose(
     ValueError
         If the engine cannot sum the law.
     """
-    reason = impossible(engine, law.reading, law.order)
+    reason = unsupported_reason(engine, law.reading, law.order)
     if reason:
         raise ValueError(f"{engine} {reason}")
-    if engine == "recursion" or (engine == "auto" and form_of(law) == MOMENTS):
-        return Choice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION_STEP_SECONDS)
+    if engine == "recursion" or (engine == "auto" and sum_form(law) == FORM_MOMENTS):
+        return EngineChoice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION_STEP_SECONDS)
     if tail is None:
         tail = min(1e-3 * tolerance, MAX_TAIL)
     width = merge
@@ -122,7 +128,7 @@ def choose(
         width = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / _merge_error_factor(law)))
     choices = {
         name: _estimate(law, name, tail * drops, width * merges, stroke, steps)
-        for name, (drops, merges) in LISTS.items()
+        for name, (drops, merges) in LIST_SETTINGS.items()
     }
     if engine != "auto":
         return choices[engine]
@@ -136,52 +142,52 @@ def choose(
 
 def _merge_error_factor(law: Bonds) -> float:
     """Return the error bound of merging / square of the merge width."""
-    form = form_of(law)
-    if form == PRINTED_GROWING:
+    form = sum_form(law)
+    if form == FORM_REPORT_GROWING:
         return MERGE_ERROR_PRINTED_GROWING
     if law.grows:
         return MERGE_ERROR_GROWING
-    if form == PRINTED and law.order < 1:
+    if form == FORM_REPORT and law.order < 1:
         return MERGE_ERROR_PRINTED_FRACTIONAL
     return MERGE_ERROR_CONSTANT
 
 
 def _estimate(
     law: Bonds, name: str, tail: float, merge: float, stroke: float, steps: float
-) -> Choice:
+) -> EngineChoice:
     """Estimate length, cost and error of a list with these settings; 0 switches a setting off."""
     increment = stroke / max(steps, 1)
     strips = _expected_strips(law, tail, merge, stroke, increment)
-    seconds_per_strip = cost_model.STRIP_SECONDS[int(form_of(law))]
-    if form_of(law) in (POWER, PRINTED) and law.order not in (0, 1, 2):
+    seconds_per_strip = cost_model.STRIP_SECONDS[int(sum_form(law))]
+    if sum_form(law) in (FORM_POWER, FORM_REPORT) and law.order not in (0, 1, 2):
         seconds_per_strip = cost_model.ANY_ORDER_STRIP_SECONDS
     panels = 1 if increment <= 1 else 2 + ceil(increment).bit_length()
     # a long increment takes five Gauss points per panel instead of the two values of Simpson's rule
     factor = 1 if increment <= 0.1 else 5 / 2 * panels
     pass_seconds = cost_model.PASS_SECONDS + seconds_per_strip * strips
-    seconds = cost_model.LIST_STEP_SECONDS + PASSES_PER_STEP * pass_seconds * factor
+    seconds = cost_model.LIST_STEP_SECONDS + N_PASSES_PER_STEP * pass_seconds * factor
     error = tail
-    if merge > 0 and form_of(law) != MOMENTS:
+    if merge > 0 and sum_form(law) != FORM_MOMENTS:
         error += _merge_error_factor(law) * merge**2
-        if form_of(law) == PRINTED_GROWING and law.order < 0:
+        if sum_form(law) == FORM_REPORT_GROWING and law.order < 0:
             error += NEGATIVE_ORDER_ERROR
-    return Choice(name, tail, merge, error, strips, seconds)
+    return EngineChoice(name, tail, merge, error, strips, seconds)
 
 
 def _expected_strips(
     law: Bonds, tail: float, merge: float, stroke: float, increment: float
 ) -> float:
     """Estimate the number of strips in a list, for strokes and increments in bond lengths."""
-    form = form_of(law)
-    reach = cutoff(law.order, tail) if tail > 0 else MAX_DAMAGE
-    strips = min(reach, MAX_DAMAGE) / max(increment, 1e-12) * max(1.0, increment / MAX_STRIP)
-    if form == PRINTED:
+    form = sum_form(law)
+    reach = cutoff_age(law.order, tail) if tail > 0 else MAX_DAMAGE
+    strips = min(reach, MAX_DAMAGE) / max(increment, 1e-12) * max(1.0, increment / MAX_STRIP_LENGTH)
+    if form == FORM_REPORT:
         strips = reach / stroke + 2
-    elif form == PRINTED_GROWING:
+    elif form == FORM_REPORT_GROWING:
         strips *= 2
     if merge > 0:
         merged = 5 / merge + 20 + 2 * min(reach / stroke, 50)
-        if form == PRINTED_GROWING:
+        if form == FORM_REPORT_GROWING:
             merged += 180
         strips = min(strips, merged)
     return strips

@@ -1,15 +1,19 @@
 """Forms of the sum over a list of strips of bonds (eq. 2.17), and their quadrature rules."""
 
-MOMENTS = 0.0  # reading="stretch" with p = 1: three moments of the strips, exact
-POWER = 1.0  # reading="stretch" with any order p: two Gauss points per strip
-PRINTED = 2.0  # reading="report" with a constant bond length: differences of P(p + 1, R/eps), exact
-PRINTED_GROWING = 3.0  # reading="report" with growing bonds: two Gauss points per strip
+FORM_MOMENTS = 0.0  # reading="stretch" with p = 1: three moments of the strips, exact
+FORM_POWER = 1.0  # reading="stretch" with any order p: two Gauss points per strip
+FORM_REPORT = (
+    2.0  # reading="report" with a constant bond length: differences of P(p + 1, R/eps), exact
+)
+FORM_REPORT_GROWING = 3.0  # reading="report" with growing bonds: two Gauss points per strip
 
-GAUSS_1 = 0.21132486540518713  # first of two Gauss points, as a fraction of the strip from its end
-GAUSS_2 = 0.7886751345948129  # second of two Gauss points
-MAX_STRIP = 0.25  # longest strip in bond lengths
+GAUSS_POINT_1 = (
+    0.21132486540518713  # first of two Gauss points, as a fraction of the strip from its end
+)
+GAUSS_POINT_2 = 0.7886751345948129  # second of two Gauss points
+MAX_STRIP_LENGTH = 0.25  # longest strip in bond lengths
 
-GAUSS_FIVE = (  # five Gauss points in (-1, 1) and their weights
+GAUSS_RULE_5 = (  # five Gauss points in (-1, 1) and their weights
     (-0.906179845938664, 0.23692688505618908),
     (-0.5384693101056831, 0.47862867049936647),
     (0.0, 0.5688888888888889),

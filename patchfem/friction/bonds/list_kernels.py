@@ -19,16 +19,16 @@ import numpy as np
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
 from .list_forms_kernels import (
-    GAUSS_1,
-    GAUSS_2,
-    GAUSS_FIVE,
-    MAX_STRIP,
-    MOMENTS,
-    POWER,
-    PRINTED,
-    PRINTED_GROWING,
+    FORM_MOMENTS,
+    FORM_POWER,
+    FORM_REPORT,
+    FORM_REPORT_GROWING,
+    GAUSS_POINT_1,
+    GAUSS_POINT_2,
+    GAUSS_RULE_5,
+    MAX_STRIP_LENGTH,
 )
-from .list_math_kernels import fexp, flog, share
+from .list_math_kernels import bond_gammainc, fast_exp, fast_log
 from .list_merge_kernels import merge
 from .list_rows_kernels import (
     CLOCK,
@@ -36,48 +36,48 @@ from .list_rows_kernels import (
     LAW,
     MOMENT,
     POWER_ROW,
-    PRINTED_ROW,
+    REPORT_ROW,
     STATUS,
     STRIP,
 )
 from .list_sum_kernels import (
     MIN_LENGTH,
     BondSum,
-    Mature,
-    Range,
+    MatureBonds,
+    StripRange,
     average_initial,
     formed_force,
     sum_growing,
     sum_initial,
     sum_moments,
     sum_powers,
-    sum_printed,
+    sum_report,
 )
 from .point_kernels import bond_mean, grow
 
 # two Gauss points per strip then sum growing bonds to 1e-6 (test_exact_direct_of_growing_bonds_is_the_sum_by_hand)
-MAX_GROWTH = 0.5  # largest growth J in a strip of growing bonds
+MAX_STRIP_GROWTH = 0.5  # largest growth J in a strip of growing bonds
 # largest number of strips into which growth alone divides an increment, as J has no bound after a long rest
 MAX_GROWTH_STRIPS = 16
 # fraction of the friction limit; largest error of the bonds that form on an increment, which falls with the fourth power
 # of the number of strips and vanishes once the bonds are grown
-GROWTH_TOLERANCE = 1e-9
+NEW_BOND_TOL = 1e-9
 # fraction of the increment; if it ends this close to the initial bonds, it touches them
-PLACE_TOLERANCE = 1e-6
-MIN_BALANCED = 1e-3  # increment in bond lengths; below it, a difference of energies has more round-off than the force
+TOUCH_TOL = 1e-6
+MIN_ENERGY_STEP = 1e-3  # increment in bond lengths; below it, a difference of energies has more round-off than the force
 # same limit for spread initial bonds, where a solver needs a force without jumps
-MIN_BALANCED_SPREAD = 1e-6
-MAX_SIMPSON = 0.1  # increment in bond lengths up to which Simpson's rule is exact enough
-MAX_SIMPSON_FRACTIONAL = 0.03  # same limit for an order below 1
-MAX_PANEL = 0.5  # longest first panel of five Gauss points, in bond lengths
+MIN_ENERGY_STEP_SPREAD = 1e-6
+MAX_SIMPSON_STEP = 0.1  # increment in bond lengths up to which Simpson's rule is exact enough
+MAX_SIMPSON_STEP_FRACTIONAL = 0.03  # same limit for an order below 1
+MAX_PANEL_LENGTH = 0.5  # longest first panel of five Gauss points, in bond lengths
 MAX_EXPONENT = 300.0  # exponent beyond which the scaled numbers are rescaled; exp(709) is the largest floating-point number
 # path in bond lengths; below it, the moments of new bonds are computed by power series
-MAX_SERIES = 1e-2
+MAX_SERIES_PATH = 1e-2
 # strips by which a list must grow, besides a fifth of its length, before it is merged again
-N_STRIPS_OF_MERGE = 12
+MIN_STRIPS_BETWEEN_MERGES = 12
 
 
-class Advance(NamedTuple):
+class ClockValues(NamedTuple):
     """Clocks of a list after an increment, and the bond length [m] in its middle."""
 
     displacement: float
@@ -95,13 +95,13 @@ class Formation(NamedTuple):
     """
 
     increment: float
-    before: Advance
-    after: Advance
+    before: ClockValues
+    after: ClockValues
     pressure: float
     reference: float
 
 
-class Pieces(NamedTuple):
+class StripCount(NamedTuple):
     """Number of strips of equal length in an increment, and of those before the cut-off."""
 
     count: float
@@ -133,7 +133,7 @@ def _advance(increment, clocks, growth, v0, v1, dt):
     before = clocks[CLOCK.length]
     length, exponent = grow(before, v0, v1, path, dt, growth)
     middle, _ = grow(before, v0, (v0 + v1) / 2, path / 2, dt / 2, growth)
-    return Advance(
+    return ClockValues(
         clocks[CLOCK.displacement] + increment,
         clocks[CLOCK.path] + path,
         clocks[CLOCK.damage] + path / middle,
@@ -161,19 +161,19 @@ def target_length(before, after, exponent):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _divide(path, eps, growth, law):
+def _count_strips(path, eps, growth, law):
     """Return the number of strips of an increment.
 
     It depends on the path [m] in bond lengths eps [m] and on the growth J.
     """
-    count = max(1.0, path / (MAX_STRIP * eps))
-    if law[LAW.form] == PRINTED_GROWING:
+    count = max(1.0, path / (MAX_STRIP_LENGTH * eps))
+    if law[LAW.form] == FORM_REPORT_GROWING:
         limit = (path / law[LAW.length]) ** (1 + min(law[LAW.order], 0.0))
-        needed = (limit / GROWTH_TOLERANCE) ** 0.25
-        count = max(count, min(growth / MAX_GROWTH, MAX_GROWTH_STRIPS, needed))
+        needed = (limit / NEW_BOND_TOL) ** 0.25
+        count = max(count, min(growth / MAX_STRIP_GROWTH, MAX_GROWTH_STRIPS, needed))
     count = np.ceil(count)
-    clock = path / eps if law[LAW.form] < PRINTED else path
-    return Pieces(count, min(count, 1 + np.ceil(count * (law[LAW.cutoff] / clock))))
+    clock = path / eps if law[LAW.form] < FORM_REPORT else path
+    return StripCount(count, min(count, 1 + np.ceil(count * (law[LAW.cutoff] / clock))))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -184,14 +184,14 @@ def _formed_growing_force(path, before, after, law):
     """
     growth = after.growth - before[CLOCK.growth]
     target = target_length(before[CLOCK.length], after.length, growth)
-    pieces = _divide(path, after.middle_length, growth, law)
+    pieces = _count_strips(path, after.middle_length, growth, law)
     total = 0.0
     for piece in range(int(pieces.kept)):
         for point in range(2):
-            fraction = (piece + (GAUSS_1 if point == 0 else GAUSS_2)) / pieces.count
+            fraction = (piece + (GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2)) / pieces.count
             length = max(-target * expm1(-fraction * growth), MIN_LENGTH * after.length)
             x = fraction * path / length
-            total += fexp(law[LAW.order] * flog(x) - x)
+            total += fast_exp(law[LAW.order] * fast_log(x) - x)
     return total * law[LAW.inverse_gamma] * path / (2 * pieces.count * law[LAW.length])
 
 
@@ -230,27 +230,27 @@ def _sum_strips(increment, bond_list, v0, dt):
     form = law[LAW.form]
     after = _advance(increment, clocks, bond_list.growth, v0, v0, dt)
     head = int(status[STATUS.head])
-    strips = Range(head, head + int(status[STATUS.n_spread]), int(status[STATUS.end]))
+    strips = StripRange(head, head + int(status[STATUS.n_spread]), int(status[STATUS.end]))
     eps0 = law[LAW.length]
     reference = clocks[CLOCK.reference]
     force = 0.0
     energy = 0.0
-    if form == MOMENTS:
+    if form == FORM_MOMENTS:
         scale = exp(reference - after.damage)
         moments = sum_moments(after.displacement, scale, bonds, strips)
         force += moments.z / eps0
         energy += moments.s2 / (2 * eps0)
-    elif form == POWER:
+    elif form == FORM_POWER:
         total = sum_powers(after.displacement, after.damage, bonds, strips, law)
         factor = law[LAW.inverse_gamma] / eps0 * exp(reference - after.damage)
         force += factor * total.force
         energy += factor * total.energy / (law[LAW.order] + 1)
-    elif form == PRINTED:
-        total = sum_printed(after.displacement, after.path, bonds, strips, law, bond_list.table)
+    elif form == FORM_REPORT:
+        total = sum_report(after.displacement, after.path, bonds, strips, law, bond_list.table)
         force += total.force
         energy += total.energy
     else:
-        mature = Mature(after.length, exp(reference - after.growth))
+        mature = MatureBonds(after.length, exp(reference - after.growth))
         total = sum_growing(after.displacement, after.path, mature, bonds, strips, law)
         factor = law[LAW.inverse_gamma] / eps0
         force += factor * total.force
@@ -258,10 +258,10 @@ def _sum_strips(increment, bond_list, v0, dt):
     path = abs(increment)
     formed = 0.0
     if path > 0:
-        if form == PRINTED_GROWING:
+        if form == FORM_REPORT_GROWING:
             formed = _formed_growing_force(path, clocks, after, law)
         else:
-            formed = formed_force(path, after.middle_length if form <= POWER else eps0, law)
+            formed = formed_force(path, after.middle_length if form <= FORM_POWER else eps0, law)
     return BondSum(force + np.copysign(status[STATUS.pressure] * formed, increment), energy)
 
 
@@ -300,7 +300,7 @@ def list_energy(increment, bond_list, v0, dt):
     """
     law = bond_list.law
     eps = _advance(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
-    formed = eps * eps / law[LAW.length] * share(law[LAW.order] + 1, abs(increment) / eps)
+    formed = eps * eps / law[LAW.length] * bond_gammainc(law[LAW.order] + 1, abs(increment) / eps)
     return (
         bond_list.status[STATUS.pressure] * formed + sum_list(increment, bond_list, v0, dt).energy
     )
@@ -314,7 +314,7 @@ def _integrand(is_energy, increment, bond_list, v0, dt):
     """
     if is_energy:
         return list_energy(increment, bond_list, v0, dt)
-    if bond_list.law[LAW.form] >= PRINTED:
+    if bond_list.law[LAW.form] >= FORM_REPORT:
         return _sum_strips(increment, bond_list, v0, dt).force
     return list_force(increment, bond_list, v0, dt)
 
@@ -343,17 +343,17 @@ def list_mean(increment, bond_list, v0, dt):
     form = law[LAW.form]
     if increment == 0:
         return status[STATUS.force]
-    if form == MOMENTS:
+    if form == FORM_MOMENTS:
         return list_slope(increment, bond_list, v0, dt).mean
     is_short = _suits_simpson(increment, bond_list)
-    if form == POWER and _needs_energy_balance(increment, bond_list):
+    if form == FORM_POWER and _needs_energy_balance(increment, bond_list):
         return _mean_from_energy(is_short, increment, bond_list, v0, dt)
     if is_short:
         last = _integrand(False, increment, bond_list, v0, dt)
         mean = _average_by_simpson(False, last, increment, bond_list, v0, dt)
     else:
         mean = _average_by_gauss(False, increment, bond_list, v0, dt)
-    if form == POWER:
+    if form == FORM_POWER:
         return mean
     initial = average_initial(increment, clocks[CLOCK.displacement], clocks[CLOCK.path], law)
     return mean + status[STATUS.initial_pressure] * initial
@@ -375,11 +375,11 @@ def _suits_simpson(increment, bond_list):
     start = clocks[CLOCK.displacement]
     low = min(start, start + increment)
     high = max(start, start + increment)
-    margin = PLACE_TOLERANCE * abs(increment)
+    margin = TOUCH_TOL * abs(increment)
     touches_place = low <= margin and high >= -margin
-    has_jump = law[LAW.form] < PRINTED
+    has_jump = law[LAW.form] < FORM_REPORT
     has_turn = law[LAW.half_width] > 0 and p < 1
-    limit = MAX_SIMPSON if p >= 1 else MAX_SIMPSON_FRACTIONAL
+    limit = MAX_SIMPSON_STEP if p >= 1 else MAX_SIMPSON_STEP_FRACTIONAL
     return (
         status[STATUS.end] > status[STATUS.head]
         and abs(increment) / clocks[CLOCK.length] <= limit
@@ -401,7 +401,7 @@ def _needs_energy_balance(increment, bond_list):
     end = start + increment
     crosses_place = min(start, end) <= 0.0 <= max(start, end)
     has_jump = law[LAW.initial] > 0 and law[LAW.order] < 1
-    smallest = MIN_BALANCED if law[LAW.half_width] == 0 else MIN_BALANCED_SPREAD
+    smallest = MIN_ENERGY_STEP if law[LAW.half_width] == 0 else MIN_ENERGY_STEP_SPREAD
     is_large = abs(increment) / clocks[CLOCK.length] > smallest
     return is_large or (crosses_place and has_jump)
 
@@ -434,10 +434,10 @@ def _average_by_gauss(is_energy, increment, bond_list, v0, dt):
     The panels double in length.
     """
     path = abs(increment) / bond_list.now[CLOCK.length]
-    if path <= MAX_PANEL:
+    if path <= MAX_PANEL_LENGTH:
         return _integrate_panel(is_energy, (0.0, 1.0), increment, bond_list, v0, dt)
     low = 0.0
-    high = MAX_PANEL / path
+    high = MAX_PANEL_LENGTH / path
     total = 0.0
     while low < 1:
         # the last two panels are merged into one
@@ -455,7 +455,7 @@ def _first_integrand(is_energy, bond_list):
     clocks = bond_list.now
     if is_energy:
         return status[STATUS.energy]
-    if bond_list.law[LAW.form] < PRINTED:
+    if bond_list.law[LAW.form] < FORM_REPORT:
         return status[STATUS.force]
     initial = sum_initial(
         clocks[CLOCK.displacement], clocks[CLOCK.path], clocks[CLOCK.damage], bond_list.law
@@ -468,7 +468,7 @@ def _integrate_panel(is_energy, span, increment, bond_list, v0, dt):
     """Integrate by five Gauss points between two fractions of an increment."""
     low, high = span
     total = 0.0
-    for point, weight in GAUSS_FIVE:
+    for point, weight in GAUSS_RULE_5:
         fraction = low + (high - low) * (1 + point) / 2
         value = _integrand(is_energy, fraction * increment, bond_list, v0, fraction * dt)
         total += weight / 2 * value
@@ -494,7 +494,7 @@ def list_slope(increment, bond_list, v0, dt):
     displacement = clocks[CLOCK.displacement]
     damage = clocks[CLOCK.damage]
     head = int(status[STATUS.head])
-    strips = Range(head, head, int(status[STATUS.end]))
+    strips = StripRange(head, head, int(status[STATUS.end]))
     scale = exp(clocks[CLOCK.reference] - damage)
     moments = sum_moments(displacement, scale, bond_list.bondlist, strips)
     initial = status[STATUS.initial_pressure] * law[LAW.initial] * exp(-damage)
@@ -534,7 +534,7 @@ def list_step(increment, bond_list, v0, v1, dt):
     status = bond_list.status
     clocks = bond_list.now
     law = bond_list.law
-    before = Advance(
+    before = ClockValues(
         clocks[CLOCK.displacement],
         clocks[CLOCK.path],
         clocks[CLOCK.damage],
@@ -559,7 +559,7 @@ def list_step(increment, bond_list, v0, v1, dt):
         _drop_old_strips(bonds, status, clocks, law)
         n_strips = status[STATUS.end] - status[STATUS.head]
         # a merge visits the whole list, so it waits until the list has grown by a fifth
-        has_grown = n_strips > 1.2 * status[STATUS.n_after_merge] + N_STRIPS_OF_MERGE
+        has_grown = n_strips > 1.2 * status[STATUS.n_after_merge] + MIN_STRIPS_BETWEEN_MERGES
         if law[LAW.merge_width] > 0 and has_grown:
             merge(bonds, status, clocks, law)
     total = sum_list(0.0, bond_list, 0.0, 0.0)
@@ -574,16 +574,16 @@ def list_step(increment, bond_list, v0, v1, dt):
 def _rescale(bonds, status, clocks, law):
     """Change the reference of the scaled numbers before they overflow."""
     form = law[LAW.form]
-    if form == PRINTED:
+    if form == FORM_REPORT:
         return
-    clock = clocks[CLOCK.growth] if form == PRINTED_GROWING else clocks[CLOCK.damage]
+    clock = clocks[CLOCK.growth] if form == FORM_REPORT_GROWING else clocks[CLOCK.damage]
     if clock - clocks[CLOCK.reference] < MAX_EXPONENT:
         return
     factor = exp(clocks[CLOCK.reference] - clock)
     for k in range(int(status[STATUS.head]), int(status[STATUS.end])):
-        if form == MOMENTS:
+        if form == FORM_MOMENTS:
             bonds[MOMENT.weight, k] *= factor
-        elif form == POWER:
+        elif form == FORM_POWER:
             bonds[POWER_ROW.weight_1, k] *= factor
             bonds[POWER_ROW.weight_2, k] *= factor
         else:
@@ -601,11 +601,11 @@ def _append(formation, bond_list):
     law = bond_list.law
     form = law[LAW.form]
     path = abs(increment)
-    if form == PRINTED and _extend_last_strip(formation, bonds, status):
+    if form == FORM_REPORT and _extend_last_strip(formation, bonds, status):
         return True
-    pieces = Pieces(1.0, 1.0)
-    if form == POWER or form == PRINTED_GROWING:
-        pieces = _divide(path, after.middle_length, after.growth - before.growth, law)
+    pieces = StripCount(1.0, 1.0)
+    if form == FORM_POWER or form == FORM_REPORT_GROWING:
+        pieces = _count_strips(path, after.middle_length, after.growth - before.growth, law)
     count = pieces.count
     status[STATUS.n_extra] += count - 1
     end = int(status[STATUS.end])
@@ -624,12 +624,12 @@ def _append(formation, bond_list):
         bonds[STRIP.clock, end] = bonds[STRIP.path, end]
         bonds[STRIP.clock_width, end] = bonds[STRIP.covered, end]
         bonds[STRIP.weight, end] = pressure * bonds[STRIP.covered, end]
-        if form == MOMENTS:
+        if form == FORM_MOMENTS:
             _write_moments(formation, bonds, end)
-        elif form == POWER:
+        elif form == FORM_POWER:
             _write_powers(near, count, formation, law[LAW.order], bonds, end)
-        elif form == PRINTED:
-            bonds[PRINTED_ROW.pressure, end] = pressure
+        elif form == FORM_REPORT:
+            bonds[REPORT_ROW.pressure, end] = pressure
         else:
             _write_start_lengths(piece, count, formation, bonds, end)
         end += 1
@@ -651,7 +651,7 @@ def _extend_last_strip(formation, bonds, status):
         return False
     has_same_direction = (bonds[STRIP.end, k] - bonds[STRIP.start, k]) * increment > 0
     is_adjacent = bonds[STRIP.path, k] == before.path
-    if not (has_same_direction and is_adjacent and bonds[PRINTED_ROW.pressure, k] == pressure):
+    if not (has_same_direction and is_adjacent and bonds[REPORT_ROW.pressure, k] == pressure):
         return False
     bonds[STRIP.end, k] = after.displacement
     bonds[STRIP.clock, k] = after.path
@@ -676,8 +676,8 @@ def _write_powers(near, count, formation, p, bonds, k):
     bonds[STRIP.clock, k] = clock
     bonds[STRIP.clock_width, k] = width
     bonds[STRIP.weight, k] = weight
-    bonds[POWER_ROW.weight_1, k] = 0.5 * weight * exp(clock - GAUSS_1 * width - reference)
-    bonds[POWER_ROW.weight_2, k] = 0.5 * weight * exp(clock - GAUSS_2 * width - reference)
+    bonds[POWER_ROW.weight_1, k] = 0.5 * weight * exp(clock - GAUSS_POINT_1 * width - reference)
+    bonds[POWER_ROW.weight_2, k] = 0.5 * weight * exp(clock - GAUSS_POINT_2 * width - reference)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -694,7 +694,7 @@ def _write_start_lengths(piece, count, formation, bonds, k):
     target = target_length(before.length, after.length, growth)
     start = (before.length - target) * exp(after.growth - growth - reference)
     for point in range(2):
-        fraction = (piece + (GAUSS_1 if point == 0 else GAUSS_2)) / count
+        fraction = (piece + (GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2)) / count
         length = target * exp(after.growth - fraction * growth - reference) + start
         bonds[GROWING_ROW.length_1 + point, k] = length
 
@@ -717,7 +717,7 @@ def _surviving_moments(x):
 
     They form on this path and decay by exp(-x) over it.
     """
-    if x < MAX_SERIES:
+    if x < MAX_SERIES_PATH:
         return MomentsOfStrip(
             x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5)))),
             x * (1 / 2 - x / 12 * (1 - x * x / 60)),
@@ -738,9 +738,9 @@ def _drop_old_strips(bonds, status, clocks, law):
     end = int(status[STATUS.end])
     while head < end:
         path = clocks[CLOCK.path] - bonds[STRIP.path, head]
-        if form == MOMENTS:
+        if form == FORM_MOMENTS:
             age = path / law[LAW.length]
-        elif form == POWER:
+        elif form == FORM_POWER:
             age = clocks[CLOCK.damage] - bonds[STRIP.clock, head]
         else:
             age = path

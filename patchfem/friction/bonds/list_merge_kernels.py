@@ -8,22 +8,29 @@ from math import exp
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
-from .list_forms_kernels import GAUSS_1, GAUSS_2, MOMENTS, POWER, PRINTED, PRINTED_GROWING
-from .list_math_kernels import fexp, flog
+from .list_forms_kernels import (
+    FORM_MOMENTS,
+    FORM_POWER,
+    FORM_REPORT,
+    FORM_REPORT_GROWING,
+    GAUSS_POINT_1,
+    GAUSS_POINT_2,
+)
+from .list_math_kernels import fast_exp, fast_log
 from .list_rows_kernels import (
     CLOCK,
     GROWING_ROW,
     LAW,
     MOMENT,
     POWER_ROW,
-    PRINTED_ROW,
+    REPORT_ROW,
     STATUS,
     STRIP,
 )
-from .list_sum_kernels import start_length
+from .list_sum_kernels import interpolate_start_length
 
 # starting length / bond length; below it, the starting length no longer matters
-MAX_START_LENGTH = 1e-8
+MAX_START_LENGTH_RATIO = 1e-8
 MAX_GROWTH_SPAN = 0.1  # largest range of the growth J of a merged strip of growing bonds
 # largest fraction by which the last bond of a merged strip is shorter than its first
 MAX_SHORTENING = 0.1
@@ -59,9 +66,9 @@ def merge(bonds, status, clocks, law):
             is_first_unspread = last == head + n_spread
             width = _max_width(k, bonds, clocks, law)
             is_narrow = bonds[STRIP.covered, last] + bonds[STRIP.covered, k] <= width
-            if law[LAW.form] == PRINTED_GROWING:
+            if law[LAW.form] == FORM_REPORT_GROWING:
                 is_narrow = is_narrow and _have_similar_lengths(bonds, last, k, clocks)
-            if is_narrow and law[LAW.form] == MOMENTS:
+            if is_narrow and law[LAW.form] == FORM_MOMENTS:
                 _join_moments(bonds, last, k)
                 continue
             can_join_ends = is_narrow and not was_spread and not is_last_spread
@@ -72,12 +79,16 @@ def merge(bonds, status, clocks, law):
             can_spread = is_narrow and is_even and (is_last_spread or is_first_unspread)
             if can_spread and _have_same_range(bonds, last, k, clocks, law, status):
                 if is_first_unspread:
-                    _spread(bonds, last, law)
+                    _spread_strip(bonds, last, law)
                     n_spread += 1
-                _join_spread(bonds, last, k, was_spread, clocks, law)
+                _join_to_spread_strip(bonds, last, k, was_spread, clocks, law)
                 continue
-            if is_first_unspread and is_even and _ends_a_narrow_pass(bonds, last, k, width, law):
-                _spread(bonds, last, law)
+            if (
+                is_first_unspread
+                and is_even
+                and _is_narrow_before_reversal(bonds, last, k, width, law)
+            ):
+                _spread_strip(bonds, last, law)
                 n_spread += 1
         if out != k:
             for i in range(bonds.shape[0]):
@@ -98,7 +109,7 @@ def _max_width(k, bonds, clocks, law):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _step(bonds, k):
+def _signed_width(bonds, k):
     """Return the signed width [m] of a strip."""
     return bonds[STRIP.end, k] - bonds[STRIP.start, k]
 
@@ -107,31 +118,40 @@ def _step(bonds, k):
 def _are_end_to_end(bonds, i, k, width, law):
     """Return whether two strips lie end to end in one direction and can be joined by density."""
     form = law[LAW.form]
-    if bonds[STRIP.end, i] != bonds[STRIP.start, k] or _step(bonds, i) * _step(bonds, k) <= 0:
+    if (
+        bonds[STRIP.end, i] != bonds[STRIP.start, k]
+        or _signed_width(bonds, i) * _signed_width(bonds, k) <= 0
+    ):
         return False
-    if form == PRINTED and bonds[PRINTED_ROW.pressure, i] == bonds[PRINTED_ROW.pressure, k]:
+    if form == FORM_REPORT and bonds[REPORT_ROW.pressure, i] == bonds[REPORT_ROW.pressure, k]:
         return False
-    if form == PRINTED_GROWING or (form == POWER and law[LAW.order] >= 1.0):
+    if form == FORM_REPORT_GROWING or (form == FORM_POWER and law[LAW.order] >= 1.0):
         return True
     return _have_similar_density(bonds, i, k, width, law[LAW.length])
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _ends_a_narrow_pass(bonds, i, k, width, law):
+def _is_narrow_before_reversal(bonds, i, k, width, law):
     """Return whether strip i is narrow and the direction reverses after it.
 
     A pass over the strip will then follow.
     """
     is_narrow = bonds[STRIP.covered, i] <= 0.5 * width
-    return is_narrow and law[LAW.form] != MOMENTS and _step(bonds, i) * _step(bonds, k) < 0
+    return (
+        is_narrow
+        and law[LAW.form] != FORM_MOMENTS
+        and _signed_width(bonds, i) * _signed_width(bonds, k) < 0
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _is_full_grown(bonds, k, clocks):
     """Return whether the starting lengths of the bonds of a strip no longer matter."""
-    start = start_length(0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k])
+    start = interpolate_start_length(
+        0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k]
+    )
     scale = exp(clocks[CLOCK.reference] - clocks[CLOCK.growth])
-    return scale * start <= MAX_START_LENGTH * clocks[CLOCK.length]
+    return scale * start <= MAX_START_LENGTH_RATIO * clocks[CLOCK.length]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -143,15 +163,17 @@ def _is_evenly_weighted(bonds, i, k, clocks, law):
     """
     p = law[LAW.order]
     form = law[LAW.form]
-    if form == PRINTED_GROWING and not _is_full_grown(bonds, k, clocks):
+    if form == FORM_REPORT_GROWING and not _is_full_grown(bonds, k, clocks):
         return False
-    depends_on_path = form == PRINTED or (form == PRINTED_GROWING and p < 1)
+    depends_on_path = form == FORM_REPORT or (form == FORM_REPORT_GROWING and p < 1)
     if not depends_on_path or p == 0.0:
         return True
     near = (clocks[CLOCK.path] - bonds[STRIP.path, k]) / law[LAW.length]
     joint = (bonds[STRIP.covered, i] + bonds[STRIP.covered, k]) / law[LAW.length]
     far = near + joint
-    part = law[LAW.inverse_gamma] * (fexp((p + 1) * flog(far)) - fexp((p + 1) * flog(near)))
+    part = law[LAW.inverse_gamma] * (
+        fast_exp((p + 1) * fast_log(far)) - fast_exp((p + 1) * fast_log(near))
+    )
     return abs(p) * part * joint <= law[LAW.merge_width] * law[LAW.merge_width] * far
 
 
@@ -173,8 +195,12 @@ def _have_similar_lengths(bonds, i, k, clocks):
     """Return whether the growing bonds of two strips have similar lengths, or are fully grown."""
     if _is_full_grown(bonds, k, clocks):
         return True
-    young = start_length(0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k])
-    old = start_length(1.0, bonds[GROWING_ROW.length_1, i], bonds[GROWING_ROW.length_2, i])
+    young = interpolate_start_length(
+        0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k]
+    )
+    old = interpolate_start_length(
+        1.0, bonds[GROWING_ROW.length_1, i], bonds[GROWING_ROW.length_2, i]
+    )
     scale = exp(clocks[CLOCK.reference] - clocks[CLOCK.growth])
     young_length = clocks[CLOCK.length] - scale * young
     old_length = clocks[CLOCK.length] - scale * old
@@ -236,23 +262,23 @@ def _join_clocks(bonds, i, k):
 def _join_ends(bonds, i, k, clocks, law):
     """Join two strips of one pass that lie end to end; their first moments are kept."""
     form = law[LAW.form]
-    if form == PRINTED_GROWING:
-        length_1 = _joint_start_length(GAUSS_1, bonds, i, k, clocks)
-        length_2 = _joint_start_length(GAUSS_2, bonds, i, k, clocks)
+    if form == FORM_REPORT_GROWING:
+        length_1 = _joint_start_length(GAUSS_POINT_1, bonds, i, k, clocks)
+        length_2 = _joint_start_length(GAUSS_POINT_2, bonds, i, k, clocks)
     bonds[STRIP.end, i] = bonds[STRIP.end, k]
     _join_clocks(bonds, i, k)
-    if form == PRINTED_GROWING:
+    if form == FORM_REPORT_GROWING:
         bonds[GROWING_ROW.length_1, i] = length_1
         bonds[GROWING_ROW.length_2, i] = length_2
-    elif form == PRINTED:
-        bonds[PRINTED_ROW.pressure, i] = bonds[STRIP.weight, i] / bonds[STRIP.clock_width, i]
+    elif form == FORM_REPORT:
+        bonds[REPORT_ROW.pressure, i] = bonds[STRIP.weight, i] / bonds[STRIP.clock_width, i]
     else:
         weight = 0.5 * bonds[STRIP.weight, i]
         clock = bonds[STRIP.clock, i]
         width = bonds[STRIP.clock_width, i]
         reference = clocks[CLOCK.reference]
-        bonds[POWER_ROW.weight_1, i] = weight * exp(clock - GAUSS_1 * width - reference)
-        bonds[POWER_ROW.weight_2, i] = weight * exp(clock - GAUSS_2 * width - reference)
+        bonds[POWER_ROW.weight_1, i] = weight * exp(clock - GAUSS_POINT_1 * width - reference)
+        bonds[POWER_ROW.weight_2, i] = weight * exp(clock - GAUSS_POINT_2 * width - reference)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -265,23 +291,25 @@ def _joint_start_length(gauss, bonds, i, k, clocks):
     place = gauss * (width_i + width_k)
     j = k if place <= width_k else i
     fraction = place / width_k if place <= width_k else (place - width_k) / width_i
-    return start_length(fraction, bonds[GROWING_ROW.length_1, j], bonds[GROWING_ROW.length_2, j])
+    return interpolate_start_length(
+        fraction, bonds[GROWING_ROW.length_1, j], bonds[GROWING_ROW.length_2, j]
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _spread(bonds, k, law):
+def _spread_strip(bonds, k, law):
     """Turn a strip of one pass into one that is spread evenly over its range."""
     low = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
     high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
     bonds[STRIP.start, k] = low
     bonds[STRIP.end, k] = high
-    if law[LAW.form] == POWER:
+    if law[LAW.form] == FORM_POWER:
         bonds[POWER_ROW.weight_1, k] += bonds[POWER_ROW.weight_2, k]
         bonds[POWER_ROW.weight_2, k] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _join_spread(bonds, i, k, was_spread, clocks, law):
+def _join_to_spread_strip(bonds, i, k, was_spread, clocks, law):
     """Add strip k to the spread strip i, over their mean range weighted with the path covered."""
     form = law[LAW.form]
     path_i = bonds[STRIP.covered, i]
@@ -291,14 +319,14 @@ def _join_spread(bonds, i, k, was_spread, clocks, law):
     high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
     bonds[STRIP.start, i] = (path_i * bonds[STRIP.start, i] + path_k * low) / total
     bonds[STRIP.end, i] = (path_i * bonds[STRIP.end, i] + path_k * high) / total
-    if form == POWER:
+    if form == FORM_POWER:
         second = 0.0 if was_spread else bonds[POWER_ROW.weight_2, k]
         bonds[POWER_ROW.weight_1, i] += bonds[POWER_ROW.weight_1, k] + second
-    elif form == PRINTED_GROWING:
-        length_1 = _joint_start_length(GAUSS_1, bonds, i, k, clocks)
-        length_2 = _joint_start_length(GAUSS_2, bonds, i, k, clocks)
+    elif form == FORM_REPORT_GROWING:
+        length_1 = _joint_start_length(GAUSS_POINT_1, bonds, i, k, clocks)
+        length_2 = _joint_start_length(GAUSS_POINT_2, bonds, i, k, clocks)
         bonds[GROWING_ROW.length_1, i] = length_1
         bonds[GROWING_ROW.length_2, i] = length_2
     _join_clocks(bonds, i, k)
-    if form == PRINTED:
-        bonds[PRINTED_ROW.pressure, i] = bonds[STRIP.weight, i] / bonds[STRIP.clock_width, i]
+    if form == FORM_REPORT:
+        bonds[REPORT_ROW.pressure, i] = bonds[STRIP.weight, i] / bonds[STRIP.clock_width, i]

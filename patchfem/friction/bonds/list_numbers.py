@@ -4,27 +4,27 @@ from math import ceil, gamma
 
 import numpy as np
 
-from .list_forms_kernels import MOMENTS, POWER, PRINTED, PRINTED_GROWING
+from .list_forms_kernels import FORM_MOMENTS, FORM_POWER, FORM_REPORT, FORM_REPORT_GROWING
 from .list_rows_kernels import LAW, STATUS, ListStatus
 from .parameters import Bonds
 
 MAX_DAMAGE = 745.0  # damage beyond which exp(-damage) is zero
-STRIPS_PER_LENGTH = 4  # largest number of strips of an increment per bond length
-TABLE_STEPS = 32  # nodes of the table of P(p + 1, x) per unit of x
-N_NODES = 4  # Gauss-Jacobi points of the form POWER
+MAX_STRIPS_PER_LENGTH = 4  # largest number of strips of an increment per bond length
+N_TABLE_STEPS = 32  # nodes of the table of P(p + 1, x) per unit of x
+N_JACOBI_POINTS = 4  # Gauss-Jacobi points of the form POWER
 N_LAW_NUMBERS = 24  # numbers of a law, with the points and weights of two powers
 N_WORK_STRIPS = 64  # additional strips for work space, besides those of an increment
-N_UNMERGED = 20_000  # initial capacity of a list whose strips are not merged
+UNMERGED_CAPACITY = 20_000  # initial capacity of a list whose strips are not merged
 
 
-def form_of(law: Bonds) -> float:
+def sum_form(law: Bonds) -> float:
     """Return the form of the sum over bonds that a law needs, see `list_rows_kernels`."""
     if law.reading == "stretch":
-        return MOMENTS if law.order == 1 else POWER
-    return PRINTED_GROWING if law.grows else PRINTED
+        return FORM_MOMENTS if law.order == 1 else FORM_POWER
+    return FORM_REPORT_GROWING if law.grows else FORM_REPORT
 
 
-def cutoff(order: float, tail: float) -> float:
+def cutoff_age(order: float, tail: float) -> float:
     """Return the path R/eps [1] at which older bonds carry `tail` of the friction limit.
 
     It solves Q(p + 1, R/eps) = tail, with Q the regularised upper incomplete gamma function and p > -1.
@@ -52,7 +52,7 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
     -------
     (24,) array
     """
-    form = form_of(law)
+    form = sum_form(law)
     numbers = np.zeros(N_LAW_NUMBERS)
     numbers[LAW.order] = law.order
     numbers[LAW.form] = form
@@ -60,9 +60,9 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
     numbers[LAW.initial] = law.initial
     numbers[LAW.inverse_gamma] = 1 / gamma(law.order + 1)
     numbers[LAW.merge_width] = merge
-    numbers[LAW.cutoff] = min(reach, MAX_DAMAGE) * (law.length if form >= PRINTED else 1.0)
+    numbers[LAW.cutoff] = min(reach, MAX_DAMAGE) * (law.length if form >= FORM_REPORT else 1.0)
     numbers[LAW.half_width] = half_width * law.length
-    if form == POWER:
+    if form == FORM_POWER:
         rules = _jacobi_rule(law.order), _jacobi_rule(law.order + 1)
         numbers[LAW.nodes :] = np.concatenate(rules)
     return numbers
@@ -72,11 +72,11 @@ def _jacobi_rule(power: float) -> np.ndarray:
     """Return Gauss-Jacobi points in (0, 1), then their weights, for the weight t^power."""
     from scipy.special import roots_jacobi
 
-    x, weights = roots_jacobi(N_NODES, 0.0, power)
+    x, weights = roots_jacobi(N_JACOBI_POINTS, 0.0, power)
     return np.concatenate([(1 + x) / 2, weights / 2 ** (power + 1)])
 
 
-def status_of(capacity: int, count: int | None = None) -> np.ndarray:
+def make_status(capacity: int, count: int | None = None) -> np.ndarray:
     """Return the status of an empty list with room for `capacity` strips.
 
     Parameters
@@ -99,25 +99,25 @@ def status_of(capacity: int, count: int | None = None) -> np.ndarray:
     return status if count else status[0]
 
 
-def now_of(law: Bonds) -> np.ndarray:
+def make_clocks(law: Bonds) -> np.ndarray:
     """Return the clocks (6,) of a list before any motion."""
     return np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0])
 
 
 def gamma_table(law: Bonds) -> np.ndarray:
-    """Return P(p + 1, x) (k,) at multiples x of 1/32 for `list_math_kernels.tabled`.
+    """Return P(p + 1, x) (k,) at multiples x of 1/32 for `list_math_kernels.interpolate_gammainc`.
 
     The table is empty if P has a closed form. It ends at x = 60 + 4 p, where P is 1 to the last digit.
     """
-    if form_of(law) != PRINTED or law.order in (0, 1, 2):
+    if sum_form(law) != FORM_REPORT or law.order in (0, 1, 2):
         return np.zeros(0)
     from scipy.special import gammainc
 
-    n_nodes = TABLE_STEPS * ceil(60 + 4 * law.order)
-    return gammainc(law.order + 1, np.arange(n_nodes) / TABLE_STEPS)
+    n_nodes = N_TABLE_STEPS * ceil(60 + 4 * law.order)
+    return gammainc(law.order + 1, np.arange(n_nodes) / N_TABLE_STEPS)
 
 
-def capacity(law: Bonds, reach: float, merge: float) -> int:
+def list_capacity(law: Bonds, reach: float, merge: float) -> int:
     """Return the number of strips to allocate: after a merge, for a long step, and work space.
 
     Parameters
@@ -130,7 +130,7 @@ def capacity(law: Bonds, reach: float, merge: float) -> int:
     -------
     int
     """
-    step = STRIPS_PER_LENGTH * ceil(min(reach, MAX_DAMAGE)) + N_WORK_STRIPS
+    step = MAX_STRIPS_PER_LENGTH * ceil(min(reach, MAX_DAMAGE)) + N_WORK_STRIPS
     if merge > 0:
         return 4 * step + ceil(16 / merge)
-    return 4 * step + N_UNMERGED
+    return 4 * step + UNMERGED_CAPACITY

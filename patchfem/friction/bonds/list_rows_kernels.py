@@ -2,7 +2,7 @@
 
 A strip holds the bonds that formed on one straight increment, or on several increments that were merged. Some rows of
 the array of strips depend on the form of the sum (`list_forms_kernels`): `MOMENT` names the rows of a strip that is
-known by its moments; `POWER_ROW`, `PRINTED_ROW` and `GROWING_ROW` name what the other forms keep beside the rows of
+known by its moments; `POWER_ROW`, `REPORT_ROW` and `GROWING_ROW` name what the other forms keep beside the rows of
 `STRIP`.
 
 The clock of a form is the quantity that ages a bond: the damage int dR/eps for reading="stretch", and the path R [m]
@@ -50,7 +50,7 @@ class PowerRows(NamedTuple):
     weight_2: int = 6
 
 
-class PrintedRows(NamedTuple):
+class ReportRows(NamedTuple):
     """Row of a strip in the form PRINTED: relative pressure at which its bonds formed."""
 
     pressure: int = 5
@@ -145,7 +145,7 @@ class ListStatus(NamedTuple):
 STRIP = StripRows()
 MOMENT = MomentRows()
 POWER_ROW = PowerRows()
-PRINTED_ROW = PrintedRows()
+REPORT_ROW = ReportRows()
 GROWING_ROW = GrowingRows()
 LAW = LawNumbers()
 CLOCK = Clocks()

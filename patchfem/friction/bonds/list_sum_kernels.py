@@ -1,6 +1,6 @@
 """Compiled sums over a list of strips of bonds (eq. 2.17): force and stored energy.
 
-Each form of the sum has a function: `sum_moments` and `sum_powers` for reading="stretch", `sum_printed` and
+Each form of the sum has a function: `sum_moments` and `sum_powers` for reading="stretch", `sum_report` and
 `sum_growing` for reading="report"; `sum_initial` adds the bonds that were there at the start. The arrays are described
 in `list_rows_kernels`. In a strip u is the relative displacement since a bond formed, R the path since then.
 """
@@ -13,18 +13,24 @@ from numba import uint64
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
-from .list_forms_kernels import GAUSS_1, GAUSS_2, POWER
-from .list_math_kernels import FASTMATH_FLAGS, fexp, flog, share, tabled
-from .list_rows_kernels import GROWING_ROW, LAW, MOMENT, POWER_ROW, PRINTED_ROW, STRIP
+from .list_forms_kernels import FORM_POWER, GAUSS_POINT_1, GAUSS_POINT_2
+from .list_math_kernels import (
+    FASTMATH_FLAGS,
+    bond_gammainc,
+    fast_exp,
+    fast_log,
+    interpolate_gammainc,
+)
+from .list_rows_kernels import GROWING_ROW, LAW, MOMENT, POWER_ROW, REPORT_ROW, STRIP
 
 # last / first bond length of a strip; below it, all bonds of the strip are growing
 MIN_GROWING_RATIO = 0.05
-AT_PLACE = 1e-14  # displacement / path; below it, the initial bonds count as unstressed
+UNSTRESSED_TOL = 1e-14  # displacement / path; below it, the initial bonds count as unstressed
 # smallest length of a growing bond / that of mature bonds, which keeps R/length finite
 MIN_LENGTH = 1e-9
 MIN_PATH = 1e-300  # smallest path [m] since a bond formed, which keeps its logarithm finite
 # width / distance; below it, a spread strip acts as if concentrated at one position
-MIN_SPREAD = 1e-4
+MIN_SPREAD_RATIO = 1e-4
 
 
 class BondSum(NamedTuple):
@@ -42,14 +48,14 @@ class Moments(NamedTuple):
     s2: float
 
 
-class Mature(NamedTuple):
+class MatureBonds(NamedTuple):
     """Length [m] of mature bonds now, and exp(reference - J), which rescales starting lengths."""
 
     length: float
     scale: float
 
 
-class Range(NamedTuple):
+class StripRange(NamedTuple):
     """Strips of a list: spread ones from `head` to `first`, then single passes up to `end`."""
 
     head: int
@@ -98,8 +104,8 @@ def _sum_gauss_powers(displacement, bonds, first, end, p):
         for k in range(uint64(first), uint64(end)):
             place = bonds[STRIP.end, k]
             step = place - bonds[STRIP.start, k]
-            u_1 = displacement - place + GAUSS_1 * step
-            u_2 = displacement - place + GAUSS_2 * step
+            u_1 = displacement - place + GAUSS_POINT_1 * step
+            u_2 = displacement - place + GAUSS_POINT_2 * step
             weight_1 = bonds[POWER_ROW.weight_1, k]
             weight_2 = bonds[POWER_ROW.weight_2, k]
             force += np.copysign(weight_1, u_1) + np.copysign(weight_2, u_2)
@@ -108,8 +114,8 @@ def _sum_gauss_powers(displacement, bonds, first, end, p):
         for k in range(uint64(first), uint64(end)):
             place = bonds[STRIP.end, k]
             step = place - bonds[STRIP.start, k]
-            u_1 = displacement - place + GAUSS_1 * step
-            u_2 = displacement - place + GAUSS_2 * step
+            u_1 = displacement - place + GAUSS_POINT_1 * step
+            u_2 = displacement - place + GAUSS_POINT_2 * step
             force_1 = bonds[POWER_ROW.weight_1, k] * u_1 * u_1
             force_2 = bonds[POWER_ROW.weight_2, k] * u_2 * u_2
             force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
@@ -118,10 +124,10 @@ def _sum_gauss_powers(displacement, bonds, first, end, p):
         for k in range(uint64(first), uint64(end)):
             place = bonds[STRIP.end, k]
             step = place - bonds[STRIP.start, k]
-            u_1 = displacement - place + GAUSS_1 * step
-            u_2 = displacement - place + GAUSS_2 * step
-            force_1 = bonds[POWER_ROW.weight_1, k] * fexp(p * flog(abs(u_1)))
-            force_2 = bonds[POWER_ROW.weight_2, k] * fexp(p * flog(abs(u_2)))
+            u_1 = displacement - place + GAUSS_POINT_1 * step
+            u_2 = displacement - place + GAUSS_POINT_2 * step
+            force_1 = bonds[POWER_ROW.weight_1, k] * fast_exp(p * fast_log(abs(u_1)))
+            force_2 = bonds[POWER_ROW.weight_2, k] * fast_exp(p * fast_log(abs(u_2)))
             force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
             energy += force_1 * abs(u_1) + force_2 * abs(u_2)
     return BondSum(force, energy)
@@ -134,8 +140,8 @@ def _integrate_jacobi(size, slope, nodes, p):
         return 0.0
     total = 0.0
     for i in range(4):
-        total += nodes[4 + i] * fexp(slope * size * nodes[i])
-    return total * fexp((p + 1) * flog(size))
+        total += nodes[4 + i] * fast_exp(slope * size * nodes[i])
+    return total * fast_exp((p + 1) * fast_log(size))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -155,7 +161,7 @@ def _integrate_power_strip(displacement, bonds, k, p, nodes, is_force):
     ahead = _integrate_jacobi(high - displacement, slope, nodes, p)
     ahead -= _integrate_jacobi(low - displacement, slope, nodes, p)
     density = 2 * bonds[POWER_ROW.weight_1, k] / abs(step)
-    density *= exp(slope * (displacement - end + GAUSS_1 * step))
+    density *= exp(slope * (displacement - end + GAUSS_POINT_1 * step))
     return density * (behind - ahead if is_force else behind + ahead)
 
 
@@ -181,13 +187,13 @@ def average_spread(displacement, low, high, p):
         if 2 * distance >= width:
             return BondSum(np.sign(middle), distance)
         return BondSum(2 * middle / width, width / 4 + middle * middle / width)
-    if width < MIN_SPREAD * abs(middle) or width == 0:
-        power = fexp(p * flog(abs(middle)))
+    if width < MIN_SPREAD_RATIO * abs(middle) or width == 0:
+        power = fast_exp(p * fast_log(abs(middle)))
         return BondSum(power * np.sign(middle), power * abs(middle))
     u = displacement - low
     v = displacement - high
-    power_u = fexp((p + 1) * flog(abs(u)))
-    power_v = fexp((p + 1) * flog(abs(v)))
+    power_u = fast_exp((p + 1) * fast_log(abs(u)))
+    power_v = fast_exp((p + 1) * fast_log(abs(v)))
     force = (power_u - power_v) / ((p + 1) * width)
     return BondSum(force, (power_u * u - power_v * v) / ((p + 2) * width))
 
@@ -216,13 +222,13 @@ def sum_linear_density(displacement, start, end, weights, p):
     step = end - start
     u = displacement - end
     v = displacement - start
-    power_u = fexp((p + 1) * flog(abs(u)))
-    power_v = fexp((p + 1) * flog(abs(v)))
+    power_u = fast_exp((p + 1) * fast_log(abs(u)))
+    power_v = fast_exp((p + 1) * fast_log(abs(v)))
     # averages of |u|^p sgn u, of |u|^(p + 1) and of |u|^(p + 1) u
     odd = (power_v - power_u) / ((p + 1) * step)
     even = (power_v * v - power_u * u) / ((p + 2) * step)
     third = (power_v * v * v - power_u * u * u) / ((p + 3) * step)
-    slope = 2 * (weight_2 - weight_1) / ((GAUSS_2 - GAUSS_1) * step)
+    slope = 2 * (weight_2 - weight_1) / ((GAUSS_POINT_2 - GAUSS_POINT_1) * step)
     middle = (weight_1 + weight_2) - slope * 0.5 * (u + v)
     return BondSum(middle * odd + slope * even, middle * even + slope * third)
 
@@ -263,7 +269,7 @@ def sum_powers(displacement, damage, bonds, strips, law):
         width = abs(end - start)
         if abs(2 * displacement - start - end) > reach * width:
             continue
-        is_narrow = width <= merge_width * fexp((damage - bonds[STRIP.clock, k]) / 3)
+        is_narrow = width <= merge_width * fast_exp((damage - bonds[STRIP.clock, k]) / 3)
         if is_narrow and p >= 1:
             continue
         gauss = _sum_gauss_powers(displacement, bonds, k, k + 1, p)
@@ -285,7 +291,7 @@ def sum_powers(displacement, damage, bonds, strips, law):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _sum_closed_printed(displacement, path, bonds, strips, law):
+def _sum_report_closed(displacement, path, bonds, strips, law):
     """Sum strips of reading="report" for p = 0, 1 or 2, where P(p + 1, x) is elementary.
 
     The bond length is constant, and each strip has been passed only once.
@@ -312,14 +318,14 @@ def _sum_closed_printed(displacement, path, bonds, strips, law):
         x = near / eps0
         y = (near + turn) / eps0
         z = (near + abs(step)) / eps0
-        exp_x = fexp(-x)
-        exp_y = fexp(-y)
-        exp_z = fexp(-z)
+        exp_x = fast_exp(-x)
+        exp_y = fast_exp(-y)
+        exp_z = fast_exp(-z)
         s_x = (1 + linear * x * (1 + quadratic * x)) * exp_x
         s_y = (1 + linear * y * (1 + quadratic * y)) * exp_y
         s_z = (1 + linear * z * (1 + quadratic * z)) * exp_z
         signed = 2 * s_y - s_x - s_z
-        pressure = bonds[PRINTED_ROW.pressure, k]
+        pressure = bonds[REPORT_ROW.pressure, k]
         density_x = exp_x * x * (phi_0 + x * (phi_1 + x * phi_2))
         density_y = exp_y * y * (phi_0 + y * (phi_1 + y * phi_2))
         density_z = exp_z * z * (phi_0 + z * (phi_1 + z * phi_2))
@@ -331,7 +337,7 @@ def _sum_closed_printed(displacement, path, bonds, strips, law):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _sum_tabled_printed(displacement, path, bonds, strips, law, table):
+def _sum_report_table(displacement, path, bonds, strips, law, table):
     """Sum strips of reading="report" at constant bond length by the table of P(p + 1, x).
 
     It holds for any order p and strips that have been passed only once.
@@ -353,21 +359,21 @@ def _sum_tabled_printed(displacement, path, bonds, strips, law, table):
         x = near / eps0
         z = (near + abs(step)) / eps0
         if last < 0:
-            last = tabled(p, x, table, inverse_gamma)
+            last = interpolate_gammainc(p, x, table, inverse_gamma)
             last_lever = _integrate_lever(p, x, last, inverse_gamma)
         p_x = last
         lever_x = last_lever
-        last = tabled(p, z, table, inverse_gamma)
+        last = interpolate_gammainc(p, z, table, inverse_gamma)
         last_lever = _integrate_lever(p, z, last, inverse_gamma)
         p_y = p_x if turn == 0 else last
         lever_y = lever_x if turn == 0 else last_lever
         if 0 < turn < abs(step):
             y = (near + turn) / eps0
-            p_y = tabled(p, y, table, inverse_gamma)
+            p_y = interpolate_gammainc(p, y, table, inverse_gamma)
             lever_y = _integrate_lever(p, y, p_y, inverse_gamma)
         signed = last - 2 * p_y + p_x
         lever = last_lever - 2 * lever_y + lever_x
-        pressure = bonds[PRINTED_ROW.pressure, k]
+        pressure = bonds[REPORT_ROW.pressure, k]
         offset = direction * (displacement - place - direction * near)
         force += pressure * (direction * signed)
         energy += pressure * (offset * signed + eps0 * lever)
@@ -375,7 +381,7 @@ def _sum_tabled_printed(displacement, path, bonds, strips, law, table):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def sum_printed(displacement, path, bonds, strips, law, table):
+def sum_report(displacement, path, bonds, strips, law, table):
     """Sum strips of reading="report" at a constant bond length (eq. 2.17), exactly.
 
     A strip of one pass is split where u changes its sign.
@@ -389,7 +395,7 @@ def sum_printed(displacement, path, bonds, strips, law, table):
     law : (24,) array
         Numbers of `LAW`.
     table : (k,) array
-        As `list_math_kernels.tabled` takes it.
+        As `list_math_kernels.interpolate_gammainc` takes it.
 
     Returns
     -------
@@ -400,17 +406,19 @@ def sum_printed(displacement, path, bonds, strips, law, table):
     eps0 = law[LAW.length]
     inverse_gamma = law[LAW.inverse_gamma]
     if p == 0.0 or p == 1.0 or p == 2.0:
-        total = _sum_closed_printed(displacement, path, bonds, strips, law)
+        total = _sum_report_closed(displacement, path, bonds, strips, law)
     else:
-        total = _sum_tabled_printed(displacement, path, bonds, strips, law, table)
+        total = _sum_report_table(displacement, path, bonds, strips, law, table)
     force = total.force
     energy = total.energy
     for k in range(strips.head, strips.first):
         near = path - bonds[STRIP.clock, k]
         average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], 0.0)
-        older = tabled(p, (near + bonds[STRIP.clock_width, k]) / eps0, table, inverse_gamma)
-        younger = tabled(p, near / eps0, table, inverse_gamma)
-        carried = bonds[PRINTED_ROW.pressure, k] * (older - younger)
+        older = interpolate_gammainc(
+            p, (near + bonds[STRIP.clock_width, k]) / eps0, table, inverse_gamma
+        )
+        younger = interpolate_gammainc(p, near / eps0, table, inverse_gamma)
+        carried = bonds[REPORT_ROW.pressure, k] * (older - younger)
         force += average.force * carried
         energy += average.energy * carried
     return BondSum(force, energy)
@@ -424,7 +432,7 @@ def _integrate_lever(p, x, gamma_p, inverse_gamma):
     """
     if x <= 0:
         return 0.0
-    return (p + 1) * gamma_p - inverse_gamma * fexp((p + 1) * flog(x) - x)
+    return (p + 1) * gamma_p - inverse_gamma * fast_exp((p + 1) * fast_log(x) - x)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -442,18 +450,18 @@ def _sum_gauss_growing(displacement, path, mature, bonds, first, end, p):
             width = bonds[STRIP.clock_width, k]
             near = path - bonds[STRIP.clock, k]
             step = place - bonds[STRIP.start, k]
-            u_1 = displacement - place + GAUSS_1 * step
-            u_2 = displacement - place + GAUSS_2 * step
+            u_1 = displacement - place + GAUSS_POINT_1 * step
+            u_2 = displacement - place + GAUSS_POINT_2 * step
             length_1 = max(
                 mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length
             )
             length_2 = max(
                 mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length
             )
-            x_1 = (near + GAUSS_1 * width) / length_1
-            x_2 = (near + GAUSS_2 * width) / length_2
-            force_1 = bonds[STRIP.weight, k] * x_1 * fexp(-x_1)
-            force_2 = bonds[STRIP.weight, k] * x_2 * fexp(-x_2)
+            x_1 = (near + GAUSS_POINT_1 * width) / length_1
+            x_2 = (near + GAUSS_POINT_2 * width) / length_2
+            force_1 = bonds[STRIP.weight, k] * x_1 * fast_exp(-x_1)
+            force_2 = bonds[STRIP.weight, k] * x_2 * fast_exp(-x_2)
             force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
             energy += force_1 * abs(u_1) + force_2 * abs(u_2)
     else:
@@ -462,25 +470,25 @@ def _sum_gauss_growing(displacement, path, mature, bonds, first, end, p):
             width = bonds[STRIP.clock_width, k]
             near = path - bonds[STRIP.clock, k]
             step = place - bonds[STRIP.start, k]
-            u_1 = displacement - place + GAUSS_1 * step
-            u_2 = displacement - place + GAUSS_2 * step
+            u_1 = displacement - place + GAUSS_POINT_1 * step
+            u_2 = displacement - place + GAUSS_POINT_2 * step
             length_1 = max(
                 mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length
             )
             length_2 = max(
                 mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length
             )
-            x_1 = max(near + GAUSS_1 * width, MIN_PATH) / length_1
-            x_2 = max(near + GAUSS_2 * width, MIN_PATH) / length_2
-            force_1 = bonds[STRIP.weight, k] * fexp(p * flog(x_1) - x_1)
-            force_2 = bonds[STRIP.weight, k] * fexp(p * flog(x_2) - x_2)
+            x_1 = max(near + GAUSS_POINT_1 * width, MIN_PATH) / length_1
+            x_2 = max(near + GAUSS_POINT_2 * width, MIN_PATH) / length_2
+            force_1 = bonds[STRIP.weight, k] * fast_exp(p * fast_log(x_1) - x_1)
+            force_2 = bonds[STRIP.weight, k] * fast_exp(p * fast_log(x_2) - x_2)
             force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
             energy += force_1 * abs(u_1) + force_2 * abs(u_2)
     return BondSum(0.5 * force, 0.5 * energy)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def start_length(fraction, length_1, length_2):
+def interpolate_start_length(fraction, length_1, length_2):
     """Interpolate the scaled starting length of bonds log-linearly between the Gauss points.
 
     Parameters
@@ -495,15 +503,17 @@ def start_length(fraction, length_1, length_2):
     float
     """
     if length_1 > MIN_PATH and length_2 > MIN_PATH:
-        rise = (fraction - GAUSS_1) / (GAUSS_2 - GAUSS_1)
-        return length_1 * exp(rise * (flog(length_2) - flog(length_1)))
+        rise = (fraction - GAUSS_POINT_1) / (GAUSS_POINT_2 - GAUSS_POINT_1)
+        return length_1 * exp(rise * (fast_log(length_2) - fast_log(length_1)))
     return max(length_1, length_2)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _bond_length(fraction, mature, bonds, k):
     """Return the bond length [m] at a position of a strip, which tends to that of mature bonds."""
-    start = start_length(fraction, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k])
+    start = interpolate_start_length(
+        fraction, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k]
+    )
     return max(mature.length - mature.scale * start, MIN_LENGTH * mature.length)
 
 
@@ -540,7 +550,7 @@ def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
         if high <= low:
             continue
         for point in range(2):
-            gauss = GAUSS_1 if point == 0 else GAUSS_2
+            gauss = GAUSS_POINT_1 if point == 0 else GAUSS_POINT_2
             fraction = low + gauss * (high - low)
             weight = 0.5 * (high - low) * width
             if is_steep:
@@ -550,7 +560,7 @@ def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
                 fraction = (place - near) / width
                 weight = 0.5 * (power_high - power_low) / (p + 1) * place ** (-p)
             x = max(near + fraction * width, MIN_PATH) / _bond_length(fraction, mature, bonds, k)
-            carried = weight * fexp(p * flog(x) - x)
+            carried = weight * fast_exp(p * fast_log(x) - x)
             u = displacement - end + fraction * step
             force += np.copysign(carried, u)
             energy += carried * abs(u)
@@ -604,7 +614,7 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
         if from_start * from_end >= 0 and not is_young:
             continue
         gauss = _sum_gauss_growing(displacement, path, mature, bonds, k, k + 1, p)
-        is_narrow = width <= merge_width * fexp(near / (3 * mature.length))
+        is_narrow = width <= merge_width * fast_exp(near / (3 * mature.length))
         if not is_young and is_narrow and near > mature.length:
             exact = _spread_growing_strip(displacement, path, mature, bonds, k, p)
         else:
@@ -617,9 +627,9 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
         width = bonds[STRIP.clock_width, k]
         length_1 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length)
         length_2 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length)
-        x_1 = max(near + GAUSS_1 * width, MIN_PATH) / length_1
-        x_2 = max(near + GAUSS_2 * width, MIN_PATH) / length_2
-        carried = fexp(p * flog(x_1) - x_1) + fexp(p * flog(x_2) - x_2)
+        x_1 = max(near + GAUSS_POINT_1 * width, MIN_PATH) / length_1
+        x_2 = max(near + GAUSS_POINT_2 * width, MIN_PATH) / length_2
+        carried = fast_exp(p * fast_log(x_1) - x_1) + fast_exp(p * fast_log(x_2) - x_2)
         carried *= 0.5 * bonds[STRIP.weight, k]
         average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], 0.0)
         force += average.force * carried
@@ -650,19 +660,21 @@ def sum_initial(displacement, path, damage, law):
     eps0 = law[LAW.length]
     initial = law[LAW.initial]
     half_width = law[LAW.half_width]
-    is_at_place = half_width == 0 and abs(displacement) <= AT_PLACE * path
+    is_at_place = half_width == 0 and abs(displacement) <= UNSTRESSED_TOL * path
     if initial == 0 or is_at_place:
         return BondSum(0.0, 0.0)
-    if law[LAW.form] <= POWER:
-        weight = initial * law[LAW.inverse_gamma] * fexp(-damage) * fexp(-p * flog(eps0))
+    if law[LAW.form] <= FORM_POWER:
+        weight = (
+            initial * law[LAW.inverse_gamma] * fast_exp(-damage) * fast_exp(-p * fast_log(eps0))
+        )
         if half_width > 0:
             average = average_spread(displacement, -half_width, half_width, p)
-            at_rest = fexp((p + 1) * flog(half_width)) / (p + 2)
+            at_rest = fast_exp((p + 1) * fast_log(half_width)) / (p + 2)
             energy = weight * (average.energy - at_rest) / (p + 1)
             return BondSum(weight * average.force, energy)
-        force = weight * fexp(p * flog(abs(displacement)))
+        force = weight * fast_exp(p * fast_log(abs(displacement)))
         return BondSum(force * np.sign(displacement), force * abs(displacement) / (p + 1))
-    force = initial * law[LAW.inverse_gamma] * fexp(p * flog(path / eps0) - path / eps0)
+    force = initial * law[LAW.inverse_gamma] * fast_exp(p * fast_log(path / eps0) - path / eps0)
     if half_width > abs(displacement):
         energy = force * displacement * displacement / (2 * half_width)
         return BondSum(force * displacement / half_width, energy)
@@ -697,10 +709,10 @@ def average_initial(increment, displacement, path, law):
     # lengths of the increment before, inside and behind the range of the bonds
     enter = min(max(-direction * displacement - half_width, 0.0), size)
     leave = min(max(-direction * displacement + half_width, 0.0), size)
-    p_start = share(p, path / eps0)
-    p_enter = share(p, (path + enter) / eps0)
-    p_leave = share(p, (path + leave) / eps0)
-    total = share(p, (path + size) / eps0) - p_leave - (p_enter - p_start)
+    p_start = bond_gammainc(p, path / eps0)
+    p_enter = bond_gammainc(p, (path + enter) / eps0)
+    p_leave = bond_gammainc(p, (path + leave) / eps0)
+    total = bond_gammainc(p, (path + size) / eps0) - p_leave - (p_enter - p_start)
     if leave > enter:
         middle = 0.5 * (direction * displacement + enter + (direction * displacement + leave))
         total += (p_leave - p_enter) * middle / half_width
@@ -722,4 +734,4 @@ def formed_force(path, eps, law):
     -------
     float
     """
-    return eps / law[LAW.length] * share(law[LAW.order], path / eps)
+    return eps / law[LAW.length] * bond_gammainc(law[LAW.order], path / eps)

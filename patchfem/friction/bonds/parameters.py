@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 MAX_EXPONENT = 1e100  # exponents of growth beyond which the bond length no longer changes
-LONGEST = 600.0  # largest estimated CPU seconds of a run with a list of bonds
-SAME_SPEED = 1e-6  # relative difference of two speeds; below it their mean is accurate and avoids cancellation
-MIN_GROWTH = 1e-9  # growth J of a step below which the growth along it is linear
+MAX_LIST_SECONDS = 600.0  # largest estimated CPU seconds of a run with a list of bonds
+SAME_SPEED_TOL = 1e-6  # relative difference of two speeds; below it their mean is accurate and avoids cancellation
+MAX_LINEAR_GROWTH = 1e-9  # growth J of a step below which the growth along it is linear
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +72,7 @@ def grown_fraction(growth, back):
     array
     """
     before = np.expm1(-growth * (1 - back))
-    return np.divide(before, np.expm1(-growth), out=1 - back, where=growth > MIN_GROWTH)
+    return np.divide(before, np.expm1(-growth), out=1 - back, where=growth > MAX_LINEAR_GROWTH)
 
 
 def growth_path_ratio(law: Bonds, speed: float) -> float:
@@ -89,7 +89,7 @@ def growth_path_ratio(law: Bonds, speed: float) -> float:
     return 1 / ((healing + weakening) * steady)
 
 
-def elastic_part(law: Bonds, play, increment, eps) -> ElasticSplit:
+def split_elastic(law: Bonds, play, increment, eps) -> ElasticSplit:
     """Split an increment by the play operator.
 
     Source: Visintin, Differential Models of Hysteresis, 1994.
@@ -144,7 +144,7 @@ def growth_exponents(law: Bonds, v0: float, v1: float, increment: float, dt: flo
     floor = law.rest_speed
     if max(abs(v0), abs(v1)) < floor:
         healing = law.rest_growth * dt / floor
-    elif abs(v1 - v0) > SAME_SPEED * (abs(v0) + abs(v1)):
+    elif abs(v1 - v0) > SAME_SPEED_TOL * (abs(v0) + abs(v1)):
         slowness = _integrate_slowness(v1, floor) - _integrate_slowness(v0, floor)
         healing = law.rest_growth * dt * slowness / (v1 - v0)
     else:

@@ -14,8 +14,10 @@ import numpy as np
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
-MAX_SHORT = 0.5  # path in bond lengths; below it, the power series are exact to round-off
-MAX_SERIES = 0.03  # path in bond lengths; below it, half of the terms of the first series suffice
+MAX_SHORT_PATH = 0.5  # path in bond lengths; below it, the power series are exact to round-off
+MAX_SERIES_PATH = (
+    0.03  # path in bond lengths; below it, half of the terms of the first series suffice
+)
 # coefficients of (exp(-x) - 1 + x)/x^2 and of the integral of y^3 exp(-y) over x^4, both as series in -x
 SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(13)])
 MOMENT_SERIES = np.array([1 / (factorial(k) * (k + 4)) for k in range(13)])
@@ -54,7 +56,7 @@ def _sum_series(coefficients, n_terms, x):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def shape_functions(x):
     """Return the shape functions of a path x >= 0 in bond lengths, without cancellation; 6 ns."""
-    if x < MAX_SERIES:
+    if x < MAX_SERIES_PATH:
         f2 = _sum_series(SHAPE_SERIES, N_SHORT_TERMS, x)
         f1 = 1 - x * f2
         return ShapeFunctions(f1, f2, 1 - x * f1)
@@ -73,7 +75,7 @@ def _short_shape_functions(x):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _integrate_powers(x, decay):
     """Return the integrals of y exp(-y) and y^2 exp(-y) from 0 to x, and that of the latter."""
-    if x < MAX_SHORT:
+    if x < MAX_SHORT_PATH:
         return _integrate_short_powers(x, decay)
     return _powers_from_cubic(x, decay, 6 - decay * (x * x * x + 3 * x * x + 6 * x + 6))
 
@@ -110,7 +112,7 @@ def bond_mean(m, z, increment, sigma, eps):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def short_mean(m, z, increment, sigma, eps):
+def short_bond_mean(m, z, increment, sigma, eps):
     """Return `bond_mean` of an increment up to MAX_SHORT eps.
 
     Parameters
@@ -158,7 +160,7 @@ def bond_step(m, z, s2, increment, sigma, eps):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def short_step(m, z, s2, increment, sigma, eps):
+def short_bond_step(m, z, s2, increment, sigma, eps):
     """Return `bond_step` of an increment up to MAX_SHORT eps.
 
     Parameters
@@ -199,7 +201,7 @@ def _step_bonds(bonds, increment, sigma, eps, shapes, powers):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _split_elastic(play, increment, half):
-    """Return the elastic part of an increment and the play after it (`parameters.elastic_part`)."""
+    """Return the elastic part of an increment and the play after it (`parameters.split_elastic`)."""
     start = play * half
     end = start + increment
     if end >= half:
@@ -304,7 +306,7 @@ def _integrate_slowness(v, floor):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bond_end(m, z, increment, sigma, eps):
+def bond_end_stretch(m, z, increment, sigma, eps):
     """Return the stretch of a point at the end of an increment, the z of `bond_step`.
 
     Parameters

@@ -10,7 +10,7 @@ u/|u| of the displacement since the bond formed, every bond growing its own leng
 the power frozen when the bond forms; it agrees with "report" on every path without a reversal and never creates energy
 for p >= 0.
 
-Bonds older than `cutoff` bond lengths of path are left out; what they could carry is at most `tail` of mu_s sigma.
+Bonds older than `cutoff_age` bond lengths of path are left out; what they could carry is at most `tail` of mu_s sigma.
 
 Energy. A bond stores what it gives back when its stretch goes to zero at the current damage: f u/(p + 1) for "stretch",
 f u for "report", whose force does not depend on the stretch. The dissipated energy of a step is its work minus the gain
@@ -25,14 +25,14 @@ from itertools import pairwise
 import numpy as np
 
 from ..protocol import Step
-from .list_numbers import cutoff
-from .parameters import Bonds, elastic_part, grow, growth_exponents
-from .recursion import BondState, direction, move_bonds, press_bonds, refuse_directions
-from .strips import COLUMNS, Strips, surviving, weights
+from .list_numbers import cutoff_age
+from .parameters import Bonds, grow, growth_exponents, split_elastic
+from .recursion import BondState, length_and_direction, move_bonds, press_bonds, refuse_directions
+from .strips import COLUMNS, Strips, strip_weights, surviving_density
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 # ends of the panels of a step in bond lengths, with five Gauss points per panel
-PANELS = (0, 1, 2, 4, 8, 16, 32)
+PANEL_ENDS = (0, 1, 2, 4, 8, 16, 32)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +107,7 @@ class Quadrature:
                     )
                 )
             )
-            path, e = direction(dq)
+            path, e = length_and_direction(dq)
             own = (spent + held - before) / path
             mean = mean + e[:, None] * (own - e @ mean) if len(dq) > 1 else e[:, None] * own
         return Step(_squeezed(mean), dq @ mean - gain, after)
@@ -118,11 +118,11 @@ class Quadrature:
         The energy holds for reading="stretch", where damage dissipates the fraction dR/eps of the stored energy, which is
         never negative.
         """
-        middle, path = self._middle(state, dq, dt), direction(dq)[0]
+        middle, path = self._middle(state, dq, dt), length_and_direction(dq)[0]
         length = self._damaging(state, dq, middle)[0] / middle
         free, edges = (
             1 - length * middle / path,
-            np.unique(np.append(np.minimum(PANELS, length), length)),
+            np.unique(np.append(np.minimum(PANEL_ENDS, length), length)),
         )
         if self.law.reading == "report":
             free, length, edges = 0.0, 1.0, np.array([0.0, 1.0])
@@ -176,7 +176,7 @@ class Quadrature:
         Where the pressure falls, the last-formed bonds are lost first. Bonds re-form unstretched where the pressure
         rises, or where the remaining ones would carry more than mu_s sigma.
         """
-        mass = _young(state) * state.sigma * surviving(state)[:, None]
+        mass = _young(state) * state.sigma * surviving_density(state)[:, None]
         falls, total = s1 < s0, mass.sum(axis=0)
         excess = np.where(falls & (s0 > 0), total * (1 - s1 / np.where(s0 > 0, s0, 1.0)), 0.0)
         younger = np.cumsum(mass[::-1], axis=0)[::-1] - mass
@@ -197,7 +197,7 @@ class Quadrature:
         """Return m, z, s2 of `recursion`, (d + 2, m), for reading="stretch" with p = 1."""
         sums = self._sums(state) * self.law.length
         sums[-1] *= 2
-        return np.vstack([_summed(state, surviving(state)[:, None]), sums])
+        return np.vstack([_summed(state, surviving_density(state)[:, None]), sums])
 
     def carried(self, state: Strips, dq, s0, s1, dt: float, forming=None) -> Strips:
         """Return the bonds after an increment, without the means that `step` computes.
@@ -207,7 +207,7 @@ class Quadrature:
         """
         (q, path, damage, growth, mature), law = state.now, self.law
         dq = np.atleast_1d(np.asarray(dq, float))
-        distance = direction(dq)[0]
+        distance = length_and_direction(dq)[0]
         speed = distance / dt if dt > 0 else 0.0
         middle = self._middle(state, dq, dt)
         length, way, play = self._damaging(state, dq, middle)
@@ -238,20 +238,20 @@ class Quadrature:
         In this part bonds form and break.
         """
         if len(dq) > 1:
-            return *direction(dq), state.play
-        _, damaging, play = elastic_part(self.law, state.play, float(dq[0]), middle)
+            return *length_and_direction(dq), state.play
+        _, damaging, play = split_elastic(self.law, state.play, float(dq[0]), middle)
         return abs(damaging), np.sign([damaging]), play
 
     def _middle(self, state: Strips, dq, dt: float) -> float:
         """Return the bond length [m] in the middle of an increment, which new bonds have."""
-        half = direction(dq)[0] / 2
+        half = length_and_direction(dq)[0] / 2
         speed = 2 * half / dt if dt > 0 else 0.0
         return grow(self.law, state.now[4], speed, speed, half, dt / 2)
 
     def _cut(self, state: Strips) -> Strips:
         if self.tail <= 0:
             return state
-        reach, stretched = cutoff(self.law.order, self.tail), self.law.reading == "stretch"
+        reach, stretched = cutoff_age(self.law.order, self.tail), self.law.reading == "stretch"
         old, now = (
             (state.damage, state.now[2])
             if stretched
@@ -275,7 +275,7 @@ class Quadrature:
 
         The traction is mu_s sum_k weight_k sigma_k, the stored energy mu_s sum_k energy_k sigma_k.
         """
-        return weights(state, self.law)
+        return strip_weights(state, self.law)
 
     def _sums(self, state: Strips) -> np.ndarray:
         """Return traction / mu_s [Pa] and stored energy / mu_s [Pa m], (d + 1, m)."""

@@ -16,7 +16,7 @@ Directions. A line is a plane with one component: u and z are vectors of d = 1 o
 increment steps as on a line and the part across it decays. Bonds are arrays (d + 2, m) of m, the components of z, s2.
 
 Breakaway (on a line). The path counts only where the displacement moves its elastic range along
-(`parameters.elastic_part`); inside it z' = m e and s2' = 2 z.e. With a fraction b of the bond length, an oscillation of
+(`parameters.split_elastic`); inside it z' = m e and s2' = 2 z.e. With a fraction b of the bond length, an oscillation of
 the force by less than 2 b mu_s sigma from end to end drifts in its first cycle only; b = 0 is Dahl's law, and b -> 1
 the elastic-plastic one.
 
@@ -36,13 +36,13 @@ import numpy as np
 from ...core import PatchfemError
 from ...effects import not_supported_message
 from ..protocol import Step
-from .parameters import Bonds, elastic_part, grow
+from .parameters import Bonds, grow, split_elastic
 
 # path in bond lengths; below it, the shape functions are computed by power series
-MAX_SERIES = 0.03
+MAX_SERIES_PATH = 0.03
 # path in bond lengths; below it, the integrals of powers are computed by power series
-MAX_POWER_SERIES = 0.5
-TINY = 1e-300  # divisor that keeps quotients finite where no bonds are left
+MAX_POWER_SERIES_PATH = 0.5
+MIN_DIVISOR = 1e-300  # divisor that keeps quotients finite where no bonds are left
 
 
 class BondState(NamedTuple):
@@ -50,7 +50,7 @@ class BondState(NamedTuple):
 
     - bonds: m [Pa], the components of z [Pa m] and s2 [Pa m2], (d + 2, m)
     - eps: bond length [m], common or per point (m,)
-    - play: place in the elastic range [1], see `parameters.elastic_part`
+    - play: place in the elastic range [1], see `parameters.split_elastic`
     """
 
     bonds: np.ndarray
@@ -103,7 +103,7 @@ class BondIncrement(NamedTuple):
 def shape_functions(x) -> ShapeFunctions:
     """Return the shape functions of paths x >= 0 of any shape, without cancellation."""
     x = np.asarray(x, float)
-    is_small = x < MAX_SERIES
+    is_small = x < MAX_SERIES_PATH
     safe = np.where(is_small, 1.0, x)
     f1 = -np.expm1(-safe) / safe
     f2 = (1 - f1) / safe
@@ -119,12 +119,12 @@ def integrate_powers(x, decay) -> PowerIntegrals:
     """Return the integrals of y exp(-y) and y^2 exp(-y) for x >= 0 and decay = exp(-x)."""
     series = sum((-1) ** k * x**k / (factorial(k) * (k + 4)) for k in range(13))
     closed = 6 - decay * (x**3 + 3 * x * x + 6 * x + 6)
-    cubic = np.where(x < MAX_POWER_SERIES, x**4 * series, closed)
+    cubic = np.where(x < MAX_POWER_SERIES_PATH, x**4 * series, closed)
     second = (cubic + x**3 * decay) / 3
     return PowerIntegrals((second + x * x * decay) / 2, second, x * second - cubic)
 
 
-def direction(increment) -> tuple:
+def length_and_direction(increment) -> tuple:
     """Return the length [m] and the unit vector (d,) of an increment (d,) [m]; 0 if it is zero."""
     path = float(abs(increment[0]) if len(increment) == 1 else np.hypot(*increment))
     if path > 0:
@@ -132,7 +132,7 @@ def direction(increment) -> tuple:
     return path, np.zeros(len(increment))
 
 
-def advance(bonds, increment, sigma, eps) -> LineIncrement:
+def advance_bonds(bonds, increment, sigma, eps) -> LineIncrement:
     """Advance bonds by an increment along a line.
 
     Parameters
@@ -173,7 +173,7 @@ def advance(bonds, increment, sigma, eps) -> LineIncrement:
     return LineIncrement(after, mean, slope, damage)
 
 
-def stretch(bonds, increment):
+def stretch_bonds(bonds, increment):
     """Stretch all bonds (3, m) by an increment [m] along a line; none breaks or forms."""
     m, z, s2 = bonds
     return np.stack([m, z + m * increment, s2 + increment * (2 * z + m * increment)])
@@ -204,19 +204,19 @@ def move_bonds(law: Bonds, state: BondState, increment, sigma, eps) -> BondIncre
     """
     bonds = state.bonds
     if len(bonds) == 3:
-        elastic, damaging, play = elastic_part(law, state.play, increment, eps)
-        stretched = stretch(bonds, elastic)
-        moved = advance(stretched, damaging, sigma, eps)
+        elastic, damaging, play = split_elastic(law, state.play, increment, eps)
+        stretched = stretch_bonds(bonds, elastic)
+        moved = advance_bonds(stretched, damaging, sigma, eps)
         mean = moved.mean
         if np.any(elastic):
             elastic_mean = (bonds[1] + stretched[1]) / 2
             mean = elastic / increment * elastic_mean + damaging / increment * mean
         return BondIncrement(moved.bonds, mean, moved.damage_integral, play)
-    path, unit = direction(increment)
+    path, unit = length_and_direction(increment)
     along = unit @ bonds[1:3]
     across = bonds[1:3] - unit[:, None] * along
     f1, _, decay = shape_functions(path / eps)
-    moved = advance(np.stack([bonds[0], along, bonds[3]]), path, sigma, eps)
+    moved = advance_bonds(np.stack([bonds[0], along, bonds[3]]), path, sigma, eps)
     z = unit[:, None] * moved.bonds[1] + across * decay
     after = np.stack([moved.bonds[0], *z, moved.bonds[2]])
     mean = unit[:, None] * moved.mean + across * f1
@@ -246,10 +246,10 @@ def press_bonds(law: Bonds, bonds, s0, s1):
     density = np.where(falls, remaining, m + law.initial * (s1 - s0))
     needed = np.divide(z * z, s2, out=np.zeros_like(m), where=s2 > 0)
     must_shrink = falls & (needed > remaining)
-    factor = np.where(must_shrink, remaining / np.maximum(needed, TINY), 1.0)
+    factor = np.where(must_shrink, remaining / np.maximum(needed, MIN_DIVISOR), 1.0)
     bound = law.length * s1
     stretched = factor * np.abs(z)
-    factor *= np.where(falls & (stretched > bound), bound / np.maximum(stretched, TINY), 1.0)
+    factor *= np.where(falls & (stretched > bound), bound / np.maximum(stretched, MIN_DIVISOR), 1.0)
     return np.stack([density, z * factor, s2 * factor])
 
 
@@ -299,7 +299,7 @@ class Recursion:
         Step
         """
         law = self.law
-        path = direction(np.atleast_1d(dq))[0]
+        path = length_and_direction(np.atleast_1d(dq))[0]
         speed = path / dt if dt > 0 else 0.0
         middle = grow(law, state.eps, speed, speed, path / 2, dt / 2)
         moved = move_bonds(law, state, dq, (s0 + s1) / 2, middle)

@@ -59,10 +59,10 @@ class Strips:
     now: tuple  # present q (d,), path, damage, growth and mature length
     alive: np.ndarray  # index (m,) of the first strip that still acts at each point
     dropped: int = 0
-    play: float = 0.0  # play of the play operator in `parameters.elastic_part`
+    play: float = 0.0  # play of the play operator in `parameters.split_elastic`
 
 
-def surviving(state: Strips) -> np.ndarray:
+def surviving_density(state: Strips) -> np.ndarray:
     """Return the surviving density (k,) / pressure at formation, for reading="stretch".
 
     A cohort keeps exp(-damage since it formed), a strip that times 1 - exp(-length/eps).
@@ -71,7 +71,7 @@ def surviving(state: Strips) -> np.ndarray:
     return np.where(state.length == 0, left, left * -np.expm1(-state.length / state.eps))
 
 
-def weights(state: Strips, law: Bonds) -> np.ndarray:
+def strip_weights(state: Strips, law: Bonds) -> np.ndarray:
     """Return force and stored energy of each entry per mu_s sigma (eq. 2.17), (k, d + 1).
 
     Columns: signed force [1] along each of the d directions, then stored energy [m]. It chooses the closed forms and

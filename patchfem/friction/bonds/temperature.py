@@ -16,7 +16,7 @@ import numpy as np
 from ...core import PatchfemError
 
 
-def growth_at(
+def growth_at_temperature(
     rest: float,
     slip: float,
     surface,
@@ -38,12 +38,12 @@ def growth_at(
         )
     cold = 1 / reference - 1 / surface
     return (
-        _scaled("rest_growth", rest, (rest_activation or 0.0) * cold, "rest_activation"),
-        _scaled("slip_growth", slip, -(slip_activation or 0.0) * cold, "slip_activation"),
+        _scale_rate("rest_growth", rest, (rest_activation or 0.0) * cold, "rest_activation"),
+        _scale_rate("slip_growth", slip, -(slip_activation or 0.0) * cold, "slip_activation"),
     )
 
 
-def _scaled(name: str, value: float, exponent, key: str):
+def _scale_rate(name: str, value: float, exponent, key: str):
     total = np.log(value) + exponent
     if not ((total < np.log(np.finfo(float).max)) & (total > np.log(np.finfo(float).tiny))).all():
         worst = float(np.asarray(total).flat[np.argmax(np.abs(total))]) / np.log(10)
@@ -56,7 +56,9 @@ def _scaled(name: str, value: float, exponent, key: str):
     return float(out) if np.ndim(out) == 0 else out
 
 
-def surface_rise(flux: float, time: float, conductivity: float, capacity: float) -> float:
+def surface_temperature_rise(
+    flux: float, time: float, conductivity: float, capacity: float
+) -> float:
     """Return the temperature rise [K] of the surface of a half-space under a constant heat flux.
 
     It is 2 q sqrt(t/(pi k rho c)) for a flux q [W/m2] from time 0 on. conductivity k [W m-1 K-1], capacity rho c [J m-3

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..protocol import Element
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
-PIECES = 10  # number of pieces for the integrals over a stroke
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(20)
+N_PIECES = 10  # number of pieces for the integrals over a stroke
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,12 +50,12 @@ class BoucWen:
 
         The area is int v (1/(1 - v^n) - 1/(1 - g v^n)) dv, g = 1 - 2 s: the excess of loading over unloading.
         """
-        edges = np.linspace(0.0, 1.0, PIECES + 1)
+        edges = np.linspace(0.0, 1.0, N_PIECES + 1)
         half = np.diff(edges)[:, None] / 2
         # Gauss rule in the fourth root of v, where powers of v are smooth down to zero
-        root = (edges[:-1, None] + half * (1 + NODES)).ravel()
+        root = (edges[:-1, None] + half * (1 + GAUSS_POINTS)).ravel()
         v = w[..., None] * root**4
-        rule = w[..., None] * (half * WEIGHTS).ravel() * 4 * root**3
+        rule = w[..., None] * (half * GAUSS_WEIGHTS).ravel() * 4 * root**3
         rise, spent = self._rates(v)
         return (rule * rise).sum(axis=-1), self._rates(w)[0], (rule * spent).sum(axis=-1)
 

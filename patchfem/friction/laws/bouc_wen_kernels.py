@@ -23,7 +23,7 @@ NUMBER_UNITS = "N m 1 1"  # units of `numbers`, for batches that scale time and 
 HAS_ZERO_KINK = True  # the slope over the path jumps between loading and unloading
 IS_RATE_INDEPENDENT = True  # z depends on the path alone
 
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 MAX_PIECE = 0.25  # longest interval of the Gauss rule in |y| or w
 FIRST_PIECE = 0.05  # longest interval next to zero, where a fractional power is not smooth
 MAX_W = 36.0  # value of w beyond which y rounds to 1
@@ -64,10 +64,10 @@ def _integrate_piece(low, size, n, give, is_loading):
     """Integrate dx and |y| dx over an interval of the integration variable u by the Gauss rule."""
     path = 0.0
     area = 0.0
-    for k in range(NODES.size):
-        rate, y = _integrand(low + size * 0.5 * (1 + NODES[k]), n, give, is_loading)
-        path += 0.5 * size * WEIGHTS[k] * rate
-        area += 0.5 * size * WEIGHTS[k] * rate * y
+    for k in range(GAUSS_POINTS.size):
+        rate, y = _integrand(low + size * 0.5 * (1 + GAUSS_POINTS[k]), n, give, is_loading)
+        path += 0.5 * size * GAUSS_WEIGHTS[k] * rate
+        area += 0.5 * size * GAUSS_WEIGHTS[k] * rate * y
     return path, area
 
 
@@ -76,9 +76,9 @@ def _integrate_from_zero(size, n, give, is_loading):
     """Integrate dx and |y| dx from u = 0 over sqrt(u), in which fractional powers are smooth."""
     path = 0.0
     area = 0.0
-    for k in range(NODES.size):
-        root = 0.5 * (1 + NODES[k])
-        weight = size * WEIGHTS[k] * root
+    for k in range(GAUSS_POINTS.size):
+        root = 0.5 * (1 + GAUSS_POINTS[k])
+        weight = size * GAUSS_WEIGHTS[k] * root
         rate, y = _integrand(size * root * root, n, give, is_loading)
         path += weight * rate
         area += weight * rate * y
@@ -86,7 +86,7 @@ def _integrate_from_zero(size, n, give, is_loading):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate(low, high, n, give, is_loading):
+def _integrate_path(low, high, n, give, is_loading):
     """Integrate dx and |y| dx between two values of u, low < high."""
     path = 0.0
     area = 0.0
@@ -128,16 +128,16 @@ def _unload(y, x, n, give):
 
     Returns y, the remaining path and the integral of y.
     """
-    whole, area = _integrate(0.0, -y, n, give, False)
+    whole, area = _integrate_path(0.0, -y, n, give, False)
     if whole <= x:
         return 0.0, x - whole, -area
     u = max(-y - x * (1 - give * (-y) ** n), 0.0)
     for _ in range(MAX_NEWTON):
-        residual = _integrate(u, -y, n, give, False)[0] - x
+        residual = _integrate_path(u, -y, n, give, False)[0] - x
         u = min(max(u + residual * (1 - give * u**n), 0.0), -y)
         if abs(residual) <= NEWTON_TOL * x:
             break
-    path, area = _integrate(u, -y, n, give, False)
+    path, area = _integrate_path(u, -y, n, give, False)
     return -u, 0.0, -_scale_area(area, path, x)
 
 
@@ -152,16 +152,16 @@ def _follow_path(y, x, n, s):
     start = -log1p(-y) if y < 1 - 1e-15 else MAX_W  # at the limit w has no bound
     w = start + x * _loading_rate(start, n)
     for _ in range(MAX_NEWTON):
-        residual = _integrate(start, w, n, 0.0, True)[0] - x
+        residual = _integrate_path(start, w, n, 0.0, True)[0] - x
         w = max(w - residual * _loading_rate(w, n), start)
         if abs(residual) <= NEWTON_TOL * x:
             break
-    path, loaded = _integrate(start, w, n, 0.0, True)
+    path, loaded = _integrate_path(start, w, n, 0.0, True)
     return -expm1(-w), area + (_scale_area(loaded, path, x) if path > 0 else x * y)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def _slope(y, n, s):
+def _z_slope(y, n, s):
     """Return dy/dx at y: 1 - y^n on loading, 1 - (1 - 2 s) |y|^n on unloading."""
     return 1 - (1.0 if y >= 0 else 1 - 2 * s) * abs(y) ** n
 
@@ -175,7 +175,7 @@ def rate_equation(numbers, stretch, velocity, direction):
     Rates
     """
     stiffness = numbers[1] / numbers[2]
-    gain = _slope(direction * stretch / numbers[2], numbers[3], numbers[4])
+    gain = _z_slope(direction * stretch / numbers[2], numbers[3], numbers[4])
     return Rates(stiffness * stretch, gain, stiffness, 0.0)
 
 
@@ -185,7 +185,7 @@ def _knee_rate(u, n, s):
 
     A Runge-Kutta step of any length is therefore stable.
     """
-    return n * (1 - 0.5 * (n - 1) * u) if u < 1e-5 else _slope(1 - u, n, s) / u
+    return n * (1 - 0.5 * (n - 1) * u) if u < 1e-5 else _z_slope(1 - u, n, s) / u
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -241,7 +241,7 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
     z = memory[0]
     direction = 1.0 if increment > 0 else -1.0
     x = abs(increment) / length
-    rise = _slope(direction * z, numbers[3], numbers[4])
+    rise = _z_slope(direction * z, numbers[3], numbers[4])
     if x < 1e-7:  # the series replaces a quotient of two numbers close to zero
         return limit * (z + 0.5 * direction * x * rise), 0.5 * limit / length * rise
     end, area = _follow_path(direction * z, x, numbers[3], numbers[4])
@@ -290,8 +290,8 @@ def relax_stretch(numbers, stretch, increment, dt):
     direction = 1.0 if increment > 0 else -1.0
     start = direction * stretch / length
     end = _follow_path(start, abs(increment) / length, n, numbers[4])[0]
-    rise = _slope(end, n, numbers[4])
-    first = _slope(start, n, numbers[4])
+    rise = _z_slope(end, n, numbers[4])
+    first = _z_slope(start, n, numbers[4])
     # both derivatives vanish at the limit
     by_stretch = rise / first if first > 1e-8 else exp(-n * abs(increment) / length)
     return RelaxedStretch(direction * length * end, by_stretch, rise, 0.0)
@@ -309,7 +309,7 @@ def start_motion(numbers, memory, direction, states):
     states[0] = memory[0]
     if direction * states[0] >= 0:
         return inf, 0.0
-    path = _integrate(0.0, abs(states[0]), numbers[3], 1 - 2 * numbers[4], False)[0]
+    path = _integrate_path(0.0, abs(states[0]), numbers[3], 1 - 2 * numbers[4], False)[0]
     return numbers[2] * path, 0.0
 
 

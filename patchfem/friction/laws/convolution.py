@@ -22,10 +22,10 @@ from scipy.special import gammainc, gammainccinv
 from ..protocol import Step
 
 # number of positions averaged at a time, so that nodes out of their reach can be left out
-ROWS = 64
+N_POSITIONS_PER_BLOCK = 64
 
 
-def _share(order: float, x):
+def _bond_gammainc(order: float, x):
     """Return P(order + 1, x), in closed form for the first orders."""
     if order in (0, 1, 2):
         e = np.exp(-x)
@@ -33,14 +33,17 @@ def _share(order: float, x):
     return gammainc(order + 1, x)
 
 
-def _weights(places, nodes, bare, length: float, order: float) -> np.ndarray:
+def _node_weights(places, nodes, bare, length: float, order: float) -> np.ndarray:
     """Return the weights (n, m) of the nodes in averages at positions (n,), for motion to +x.
 
     bare (m - 1,): segments without pressure, beyond which nothing is averaged.
     """
     behind = places[:, None] - nodes
     x = np.maximum(behind, 0.0) / length
-    zero, one = -np.diff(_share(order, x), axis=1), -np.diff(_share(order + 1, x), axis=1)
+    zero, one = (
+        -np.diff(_bond_gammainc(order, x), axis=1),
+        -np.diff(_bond_gammainc(order + 1, x), axis=1),
+    )
     near = (behind[:, :-1] * zero - (order + 1) * length * one) / np.diff(nodes)
     own = np.clip(np.searchsorted(nodes, places) - 1, 0, nodes.size - 2)
     island = np.concatenate([[0], np.cumsum(bare[1:] != bare[:-1])])
@@ -52,7 +55,7 @@ def _weights(places, nodes, bare, length: float, order: float) -> np.ndarray:
     return out
 
 
-def average(places, nodes, sigma, way: float, length: float, order: float) -> np.ndarray:
+def average_pressure(places, nodes, sigma, way: float, length: float, order: float) -> np.ndarray:
     """Average the pressure behind the positions (n,) [m], weighted by phi_p; returns (n,) [Pa].
 
     This is the integral in the docstring of the module.
@@ -63,24 +66,24 @@ def average(places, nodes, sigma, way: float, length: float, order: float) -> np
     """
     places, nodes, sigma = (np.asarray(part, float) for part in (places, nodes, sigma))
     if way < 0:
-        return average(-places, -nodes[::-1], sigma[::-1], 1.0, length, order)
+        return average_pressure(-places, -nodes[::-1], sigma[::-1], 1.0, length, order)
     bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
     # further nodes have weights below round-off
     reach = length * float(gammainccinv(order + 2, 1e-20))
     out = np.zeros(places.size)
-    for first in range(0, places.size, ROWS):
-        here = places[first : first + ROWS]
+    for first in range(0, places.size, N_POSITIONS_PER_BLOCK):
+        here = places[first : first + N_POSITIONS_PER_BLOCK]
         low = max(int(np.searchsorted(nodes, here.min() - reach)) - 1, 0)
         high = max(int(np.searchsorted(nodes, here.max())) + 1, low + 2)
         some = slice(low, high) if nodes[low:high].size > 1 else slice(-2, None)
-        weights = _weights(
+        weights = _node_weights(
             here, nodes[some], bare[some.start :][: nodes[some].size - 1], length, order
         )
-        out[first : first + ROWS] = weights @ sigma[some]
+        out[first : first + N_POSITIONS_PER_BLOCK] = weights @ sigma[some]
     return out
 
 
-def limits(nodes, sigma, weight, length: float, order: float) -> tuple:
+def sliding_limits(nodes, sigma, weight, length: float, order: float) -> tuple:
     """Return friction force / mu_s [N] for rigid sliding towards +x and towards -x, both >= 0.
 
     nodes (m,) [m]; sigma (m,) [Pa]; weight: nodal areas (m,) [m2]; length: eps [m]; order: p. They differ where the
@@ -89,13 +92,14 @@ def limits(nodes, sigma, weight, length: float, order: float) -> tuple:
     on = np.asarray(sigma) > 0
     return tuple(
         float(
-            np.asarray(weight) @ np.where(on, average(nodes, nodes, sigma, way, length, order), 0.0)
+            np.asarray(weight)
+            @ np.where(on, average_pressure(nodes, nodes, sigma, way, length, order), 0.0)
         )
         for way in (1.0, -1.0)
     )
 
 
-class Averaged(NamedTuple):
+class ConvolutionState(NamedTuple):
     """State of the averaged law.
 
     - traction (m,): traction of the last motion [Pa]
@@ -127,9 +131,9 @@ class Convolution:
     at_once: ClassVar[bool] = True
     holds: ClassVar[bool] = True  # the last traction at rest
 
-    def start(self, sigma) -> Averaged:
+    def start(self, sigma) -> ConvolutionState:
         """Return the state before any motion: no traction, under a pressure sigma (m,) [Pa]."""
-        return Averaged(np.zeros_like(sigma), 0.0, 0.0)
+        return ConvolutionState(np.zeros_like(sigma), 0.0, 0.0)
 
     def share(self, dq, dt):
         """Return the fraction of the limit that is carried in increments dq [m]; 0 at rest."""
@@ -142,7 +146,7 @@ class Convolution:
         """
         return self.static * self._averaged(0.0, sigma, way)
 
-    def step(self, state: Averaged, dq: float, s0, s1, dt: float) -> Step:
+    def step(self, state: ConvolutionState, dq: float, s0, s1, dt: float) -> Step:
         """Advance by a straight increment dq [m] while the pressure changes from s0 to s1 (m,) [Pa].
 
         dt is not used.
@@ -158,9 +162,9 @@ class Convolution:
             start = self.static * way * self._averaged(state.slide, s0, way)
         end = self.static * way * self._averaged(slide, s1, way)
         mean = (start + end) / 2
-        return Step(mean, mean * dq, Averaged(end, slide, way))
+        return Step(mean, mean * dq, ConvolutionState(end, slide, way))
 
-    def press(self, state: Averaged, s0, s1) -> Step:
+    def press(self, state: ConvolutionState, s0, s1) -> Step:
         """Change the pressure at rest from s0 to s1 (m,) [Pa]; the traction is cut to its new limit.
 
         The mean of the Step is the traction after it; nothing is dissipated.
@@ -169,26 +173,26 @@ class Convolution:
         held = state.traction
         if way != 0:
             held = way * np.minimum(way * held, self.static * self._averaged(state.slide, s1, way))
-        return Step(held, np.zeros_like(held), Averaged(held, state.slide, 0.0))
+        return Step(held, np.zeros_like(held), ConvolutionState(held, state.slide, 0.0))
 
     def _averaged(self, slide: float, sigma, way: float):
         if self.nodes is None:
             return sigma
         if self.pattern is not None:
-            behind = average(
+            behind = average_pressure(
                 self.nodes + slide, self.nodes, self.pattern, way, self.length, self.order
             )
             return np.where(sigma > 0, behind, 0.0)
         before, behind = self.kept.get(way, (None, None))
         if before is None or not np.array_equal(before, sigma):
-            behind = average(self.nodes, self.nodes, sigma, way, self.length, self.order)
+            behind = average_pressure(self.nodes, self.nodes, sigma, way, self.length, self.order)
             self.kept[way] = np.array(sigma), behind
         return np.where(sigma > 0, behind, 0.0)
 
-    def traction(self, state: Averaged):
+    def traction(self, state: ConvolutionState):
         """Return the traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
         return state.traction
 
-    def stored(self, state: Averaged):
+    def stored(self, state: ConvolutionState):
         """Return the elastic energy per area (m,) [J/m2]: zero, because the law has no stretch."""
         return np.zeros_like(state.traction)

@@ -1,6 +1,6 @@
 """Coulomb friction, compiled.
 
-The engines call `stick` for a step, because a set-valued law has no slope.
+The engines call `solve_coulomb_step` for a step, because a set-valued law has no slope.
 
 numbers: static and kinetic force [N]; memory: force of the last step [N]. NumPy form: `coulomb.Coulomb`.
 """
@@ -13,7 +13,7 @@ from ..protocol_kernels import step_bond_length as step_bond_length
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def stick(free, compliance, static, kinetic):
+def solve_coulomb_step(free, compliance, static, kinetic):
     """Solve a step of Coulomb's law: it sticks if the static force suffices, or else slips.
 
     Parameters

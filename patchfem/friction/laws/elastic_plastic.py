@@ -25,7 +25,7 @@ class ElasticPlastic:
 
     def element(self, load: float) -> Element:
         """Return the Element under a constant load [N]: a spring mu N/eps that slips at mu N."""
-        return parallel([self.static * load / self.length], [self.length])._replace(
+        return parallel_element([self.static * load / self.length], [self.length])._replace(
             length=self.length
         )
 
@@ -84,7 +84,7 @@ class ElasticPlastic:
         )
 
 
-def parallel(stiffness, yield_slide) -> Element:
+def parallel_element(stiffness, yield_slide) -> Element:
     """Return the Element of parallel elastic-plastic elements (eq. 3.12 with reversal).
 
     stiffness (t,) [N/m]; yield_slide (t,) [m], the stretch at which each slips. The Element has the sum of their slip
@@ -103,7 +103,7 @@ def parallel(stiffness, yield_slide) -> Element:
     )
 
 
-def masing(stiffness, yield_slide, slide) -> tuple:
+def masing_loop(stiffness, yield_slide, slide) -> tuple:
     """Return the force at the reversals [N] and the area [J] of the steady loops of elements.
 
     The elements (t,) are in parallel; the displacement amplitudes u [m] have any shape. An element has the force
@@ -114,8 +114,8 @@ def masing(stiffness, yield_slide, slide) -> tuple:
 
 
 def loop_from_keys(friction, load: float, slide) -> tuple:
-    """Return `masing` for the law of a [friction] table under a load [N]."""
-    return masing(
+    """Return `masing_loop` for the law of a [friction] table under a load [N]."""
+    return masing_loop(
         np.array([friction.static * load / friction.bond_length]),
         np.array([friction.bond_length]),
         slide,

@@ -16,11 +16,13 @@ import numpy as np
 
 from ...core import frozen_array
 from ..protocol import Element
-from .elastic_plastic import parallel
+from .elastic_plastic import parallel_element
 
-CELLS = 768  # number of cells of the power law, each a Jenkins element; the forces are exact to 1e-6 of the slip force
-SMALL = 1e-5  # fraction of phi_max of the smallest slider that has a separate cell
-LOW = 0.25  # fraction of the cells that are spread evenly over the decades, for small cycles
+N_CELLS = 768  # number of cells of the power law, each a Jenkins element; the forces are exact to 1e-6 of the slip force
+MIN_CELL_RATIO = 1e-5  # fraction of phi_max of the smallest slider that has a separate cell
+LOG_CELL_FRACTION = (
+    0.25  # fraction of the cells that are spread evenly over the decades, for small cycles
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -38,10 +40,10 @@ class Iwan:
 
     def element(self, load: float) -> Element:
         """Return the Element under a constant load [N]: the parallel elements of `elastic_plastic`."""
-        return parallel(self.stiffness * load, self.yield_slide)
+        return parallel_element(self.stiffness * load, self.yield_slide)
 
 
-def largest(force: float, stiffness: float, chi: float, beta: float) -> float:
+def max_yield_displacement(force: float, stiffness: float, chi: float, beta: float) -> float:
     """Return phi_max [m], the displacement from which on every slider slips.
 
     force: slip force F_S [N]; stiffness: K_T [N/m].
@@ -52,7 +54,7 @@ def largest(force: float, stiffness: float, chi: float, beta: float) -> float:
     return force * (1 + beta) / (stiffness * (beta + (chi + 1) / (chi + 2)))
 
 
-def sliders(force: float, stiffness: float, chi: float, beta: float) -> tuple:
+def slider_cells(force: float, stiffness: float, chi: float, beta: float) -> tuple:
     """Return stiffness [N/m] and yield displacement [m] of the sliders, each (t,).
 
     The cells of the power law come first, then the last slider.
@@ -61,19 +63,19 @@ def sliders(force: float, stiffness: float, chi: float, beta: float) -> tuple:
     force of a first loading at every border of a cell. The cells are as narrow as the root of the density asks for, the
     best for a given number of straight pieces.
     """
-    k, most = _shape(chi, beta)
-    return stiffness * k, largest(force, stiffness, chi, beta) * most
+    k, most = _unit_sliders(chi, beta)
+    return stiffness * k, max_yield_displacement(force, stiffness, chi, beta) * most
 
 
 @lru_cache(32)
-def _shape(chi: float, beta: float) -> tuple:
-    """Return the `sliders` of unit stiffness and unit phi_max, shared by a sweep of both."""
-    low, power = np.log(SMALL), 1 / (1 + beta)  # the power law without the last slider
-    x = np.concatenate([[0.0], np.exp(np.linspace(low, 0.0, 20 * CELLS + 1))])
-    share = (1 - LOW) * x ** (1 + chi / 2) + LOW * np.clip(
-        1 - np.log(np.maximum(x, SMALL)) / low, 0.0, 1.0
+def _unit_sliders(chi: float, beta: float) -> tuple:
+    """Return the `slider_cells` of unit stiffness and unit phi_max, shared by a sweep of both."""
+    low, power = np.log(MIN_CELL_RATIO), 1 / (1 + beta)  # the power law without the last slider
+    x = np.concatenate([[0.0], np.exp(np.linspace(low, 0.0, 20 * N_CELLS + 1))])
+    share = (1 - LOG_CELL_FRACTION) * x ** (1 + chi / 2) + LOG_CELL_FRACTION * np.clip(
+        1 - np.log(np.maximum(x, MIN_CELL_RATIO)) / low, 0.0, 1.0
     )
-    edges = np.interp(np.linspace(0.0, 1.0, CELLS + 1), share, x)
+    edges = np.interp(np.linspace(0.0, 1.0, N_CELLS + 1), share, x)
     k = power * np.diff(edges ** (chi + 1))
     moment = power * (chi + 1) / (chi + 2) * np.diff(edges ** (chi + 2))
     last = [1 - power] if beta > 0 else []
@@ -87,7 +89,7 @@ def from_keys(friction, load: float) -> Iwan:
 
     The stiffness [N/m] of the table refers to this load; a load of 0 counts as 1 N.
     """
-    k, most = sliders(
+    k, most = slider_cells(
         friction.static, friction.stiffness / (load or 1.0), friction.chi, friction.beta
     )
     return Iwan(k, most)
@@ -100,7 +102,7 @@ def loop_from_keys(friction, load: float, slide) -> tuple:
     (Segalman's eq. 22), doubled by Masing's rule.
     """
     chi, force = friction.chi, friction.static * load
-    most = largest(force, friction.stiffness, chi, friction.beta)
+    most = max_yield_displacement(force, friction.stiffness, chi, friction.beta)
     scale, r = force / (friction.beta + (chi + 1) / (chi + 2)), np.minimum(slide / most, 1.0)
     tip = scale * ((friction.beta + 1) * r - r ** (chi + 2) / (chi + 2))
     under = (

@@ -24,8 +24,8 @@ from .exponential_kernels import exp_minus
 # units of `numbers`, for batches that scale time and force
 NUMBER_UNITS = "N/m N N m/s N_s/m N_s/m"
 # velocity over v_s beyond which the limit is the kinetic force, since exp(-36) rounds off
-STRIBECK_END = 6.0
-MIN_LIMIT = 1e-9  # smallest limit over the static force; z relaxes over limit/stiffness, which must not be 0
+MAX_STRIBECK_RATIO = 6.0
+MIN_LIMIT_RATIO = 1e-9  # smallest limit over the static force; z relaxes over limit/stiffness, which must not be 0
 
 
 class _Relaxation(NamedTuple):
@@ -44,7 +44,7 @@ def _relaxation_length(numbers, velocity):
     """Return the length g/stiffness [m] over which z relaxes, and its velocity derivative [s]."""
     ratio = velocity / numbers[4]
     rise = (numbers[3] - numbers[2]) * exp_minus(ratio * ratio)
-    limit = max(numbers[2] + rise, MIN_LIMIT * numbers[3])
+    limit = max(numbers[2] + rise, MIN_LIMIT_RATIO * numbers[3])
     return limit / numbers[1], -2 * ratio / numbers[4] * rise / numbers[1]
 
 
@@ -77,7 +77,7 @@ def _relax(numbers, stretch, increment, dt):
     """
     direction = 1.0 if increment > 0 else -1.0
     path = abs(increment)
-    length = max(numbers[2], MIN_LIMIT * numbers[3]) / numbers[1]
+    length = max(numbers[2], MIN_LIMIT_RATIO * numbers[3]) / numbers[1]
     bend = 0.0  # derivative of the length with respect to the path
     if dt > 0:
         length, bend = _relaxation_length(numbers, path / dt)
@@ -175,7 +175,7 @@ def start_motion(numbers, memory, direction, states):
         Path [m] to the next kink, inf for none, and velocity [m/s] of a kink, 0 for none.
     """
     states[0] = memory[0]
-    return inf, STRIBECK_END * numbers[4] if numbers[3] > numbers[2] else 0.0
+    return inf, MAX_STRIBECK_RATIO * numbers[4] if numbers[3] > numbers[2] else 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

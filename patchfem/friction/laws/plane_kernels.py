@@ -17,11 +17,11 @@ from ..flags_kernels import NJIT_NO_REFCOUNT
 
 MAX_ITERATIONS = 100  # largest number of Newton iterations; a step that needs more has failed
 MIN_PATH = 1e-150  # shorter increments have no direction: their square underflows
-ROUND_OFF = 4e-16  # rounding error of a residual / its largest terms
+ROUND_OFF_RATIO = 4e-16  # rounding error of a residual / its largest terms
 MIN_DAMPING = 1e-3  # factor of a Newton step below which a larger residual is accepted
 
 
-class Slope(NamedTuple):
+class ForceDerivatives(NamedTuple):
     """Derivatives [N/m] of the mean force with respect to the increment.
 
     The first letter of a field is the direction of the force.
@@ -33,12 +33,12 @@ class Slope(NamedTuple):
     yy: float
 
 
-class Slide(NamedTuple):
+class PlaneIncrement(NamedTuple):
     """Straight increment of an element: mean force, derivatives, stretch and dissipated energy."""
 
     mean_x: float
     mean_y: float
-    slope: Slope
+    slope: ForceDerivatives
     stretch_x: float
     stretch_y: float
     dissipated: float
@@ -55,7 +55,7 @@ class PlaneStep(NamedTuple):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def slide_straight(spring, stretch, increment):
+def advance_straight(spring, stretch, increment):
     """Advance an element by a straight increment.
 
     Parameters
@@ -73,13 +73,13 @@ def slide_straight(spring, stretch, increment):
     sx, sy = stretch
     dx, dy = increment
     path = sqrt(dx * dx + dy * dy)
-    elastic_slope = Slope(0.5 * k, 0.0, 0.0, 0.5 * k)
+    elastic_slope = ForceDerivatives(0.5 * k, 0.0, 0.0, 0.5 * k)
     if path < MIN_PATH or w <= 0.0:
         end_x = sx + dx if w > 0.0 else 0.0
         end_y = sy + dy if w > 0.0 else 0.0
         mean_x = 0.5 * k * (sx + end_x)
         mean_y = 0.5 * k * (sy + end_y)
-        return Slide(mean_x, mean_y, elastic_slope, end_x, end_y, 0.0)
+        return PlaneIncrement(mean_x, mean_y, elastic_slope, end_x, end_y, 0.0)
     ux = dx / path
     uy = dy / path
     along = sx * ux + sy * uy
@@ -89,7 +89,7 @@ def slide_straight(spring, stretch, increment):
     if elastic >= path:
         mean_x = k * (sx + 0.5 * dx)
         mean_y = k * (sy + 0.5 * dy)
-        return Slide(mean_x, mean_y, elastic_slope, sx + dx, sy + dy, 0.0)
+        return PlaneIncrement(mean_x, mean_y, elastic_slope, sx + dx, sy + dy, 0.0)
     slip = path - elastic
     decay = exp(-slip / w)
     start = across / (w * (1 + cosine))  # tan(psi/2) where the element yields
@@ -112,13 +112,13 @@ def slide_straight(spring, stretch, increment):
     u_y = uu * uy + uv * ux
     v_x = vu * ux - vv * uy
     v_y = vu * uy + vv * ux
-    slope = Slope(
+    slope = ForceDerivatives(
         k * (ux * u_x - uy * v_x),
         k * (ux * u_y - uy * v_y),
         k * (uy * u_x + ux * v_x),
         k * (uy * u_y + ux * v_y),
     )
-    return Slide(
+    return PlaneIncrement(
         k * (u * ux - v * uy) / path,
         k * (u * uy + v * ux) / path,
         slope,
@@ -139,7 +139,7 @@ def solve_plane_step(free, compliance, spring, stretch, guess, tolerance):
     compliance : (float, float, float)
         xx, xy and yy of the symmetric compliance [m/N].
     spring, stretch : (float, float)
-        As in `slide_straight`.
+        As in `advance_straight`.
     guess : (float, float)
         First guess of the increment [m].
     tolerance : float
@@ -161,13 +161,13 @@ def solve_plane_step(free, compliance, spring, stretch, guess, tolerance):
     fx = 0.0
     fy = 0.0
     for count in range(1, MAX_ITERATIONS):
-        slide = slide_straight(spring, stretch, (dx, dy))
+        slide = advance_straight(spring, stretch, (dx, dy))
         fx = slide.mean_x
         fy = slide.mean_y
         rx = dx - gx + xx * fx + xy * fy
         ry = dy - gy + xy * fx + yy * fy
-        round_x = ROUND_OFF * (abs(gx) + abs(dx) + xx * abs(fx) + abs(xy * fy))
-        round_y = ROUND_OFF * (abs(gy) + abs(dy) + yy * abs(fy) + abs(xy * fx))
+        round_x = ROUND_OFF_RATIO * (abs(gx) + abs(dx) + xx * abs(fx) + abs(xy * fy))
+        round_y = ROUND_OFF_RATIO * (abs(gy) + abs(dy) + yy * abs(fy) + abs(xy * fx))
         if abs(rx) <= tolerance * xx + round_x and abs(ry) <= tolerance * yy + round_y:
             return PlaneStep(gx - xx * fx - xy * fy, gy - xy * fx - yy * fy, fx, fy, count)
         size = rx * rx * yy + ry * ry * xx
@@ -207,7 +207,7 @@ def update_plane_memory(numbers, memory_x, memory_y, increment):
         Dissipated energy [J].
     """
     k = numbers[2]
-    slide = slide_straight((k, numbers[3]), (memory_x[3], memory_y[3]), increment)
+    slide = advance_straight((k, numbers[3]), (memory_x[3], memory_y[3]), increment)
     x = slide.stretch_x
     y = slide.stretch_y
     memory_x[0] = k * x

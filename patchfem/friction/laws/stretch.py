@@ -5,7 +5,7 @@ import numpy as np
 from ..bonds.parameters import Bonds
 from ..protocol import Element
 
-N_HEAD = 9  # number of values of an element before those of its points
+N_HEADER_NUMBERS = 9  # number of values of an element before those of its points
 CONSTANT_LENGTH = -1.0  # value of a_s that marks a constant bond length
 
 
@@ -88,7 +88,7 @@ def _state_sizes(law: Bonds) -> tuple | None:
     return law.length, 1.0, law.length, law.length**2
 
 
-def bonds_of(element: Element, memory) -> np.ndarray:
+def unpack_bonds(element: Element, memory) -> np.ndarray:
     """Return the bonds in the memory of a `points_element`.
 
     Parameters
@@ -104,5 +104,5 @@ def bonds_of(element: Element, memory) -> np.ndarray:
     bonds = np.asarray(memory)[1:].reshape(5, -1)
     if element.form == "places":
         return bonds
-    sigma = element.numbers[N_HEAD:]
+    sigma = element.numbers[N_HEADER_NUMBERS:]
     return bonds * np.stack([sigma, sigma, sigma, np.ones_like(sigma), np.ones_like(sigma)])

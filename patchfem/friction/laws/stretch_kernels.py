@@ -29,9 +29,11 @@ from .exponential_kernels import exp_minus
 
 NUMBER_UNITS = "N/m m"  # units of `numbers`, for batches that scale time and force
 IS_RATE_INDEPENDENT = True  # at a constant bond length the stretch depends on the path alone
-GROWTH = 3  # index in `numbers` where the growth begins: a_s, l_k, v_h, eps_0, eps_k, breakaway
-BREAKAWAY = 8  # index of the fraction of the bond length that stretches without damage
-POINTS = 9  # index where the numbers of the points begin
+GROWTH_INDEX = (
+    3  # index in `numbers` where the growth begins: a_s, l_k, v_h, eps_0, eps_k, breakaway
+)
+BREAKAWAY_INDEX = 8  # index of the fraction of the bond length that stretches without damage
+FIRST_POINT_INDEX = 9  # index where the numbers of the points begin
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -43,7 +45,7 @@ def step_bond_length(numbers, memory, velocity, dt):
     float
     """
     half = dt / 2
-    growth = numbers[GROWTH:POINTS]
+    growth = numbers[GROWTH_INDEX:FIRST_POINT_INDEX]
     return grow(memory[0], velocity, velocity, abs(velocity) * half, half, growth)[0]
 
 
@@ -56,8 +58,8 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
     force, slope : float
         Path-mean force [N] and its derivative over the increment [N/m].
     """
-    if numbers[BREAKAWAY] > 0:
-        half = numbers[BREAKAWAY] * bond_length
+    if numbers[BREAKAWAY_INDEX] > 0:
+        half = numbers[BREAKAWAY_INDEX] * bond_length
         force, slope = elastic_bond_mean(
             memory[1], memory[2], memory[5], half, increment, 1.0, bond_length
         )
@@ -77,15 +79,17 @@ def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
     """
     dissipated = _move_bonds(numbers, memory, increment, bond_length)
     memory[4] += increment
-    memory[0] = grow(memory[0], v0, v1, abs(increment), dt, numbers[GROWTH:POINTS])[0]
+    memory[0] = grow(
+        memory[0], v0, v1, abs(increment), dt, numbers[GROWTH_INDEX:FIRST_POINT_INDEX]
+    )[0]
     return dissipated
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _move_bonds(numbers, memory, increment, bond_length):
     """Advance m, z, s2 and play by an increment; return the dissipated energy [J]."""
-    if numbers[BREAKAWAY] > 0:
-        half = numbers[BREAKAWAY] * bond_length
+    if numbers[BREAKAWAY_INDEX] > 0:
+        half = numbers[BREAKAWAY_INDEX] * bond_length
         moved, memory[5] = elastic_bond_step(
             memory[1], memory[2], memory[3], memory[5], half, increment, 1.0, bond_length
         )
@@ -173,8 +177,8 @@ def start_motion(numbers, memory, direction, states):
     """
     for k in range(states.size):
         states[k] = memory[k]
-    floor = numbers[GROWTH + 2] if numbers[GROWTH] >= 0 else 0.0
-    path = numbers[BREAKAWAY] * memory[0] * (1 - direction * memory[5])
+    floor = numbers[GROWTH_INDEX + 2] if numbers[GROWTH_INDEX] >= 0 else 0.0
+    path = numbers[BREAKAWAY_INDEX] * memory[0] * (1 - direction * memory[5])
     return path if path > 0 else inf, floor
 
 
@@ -205,12 +209,12 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
     m = states[1]
     z = states[2]
     speed = motion[0] * velocity
-    floor = numbers[GROWTH + 2]
+    floor = numbers[GROWTH_INDEX + 2]
     # a Runge-Kutta stage above the kink may overshoot to below the floor
     healing_speed = max(speed, 0.5 * floor) if motion[2] > 0 else floor
-    healing = numbers[GROWTH] / healing_speed * (numbers[GROWTH + 3] - eps)
+    healing = numbers[GROWTH_INDEX] / healing_speed * (numbers[GROWTH_INDEX + 3] - eps)
     breaking = speed / eps
-    rates[0] = healing + speed / numbers[GROWTH + 1] * (numbers[GROWTH + 4] - eps)
+    rates[0] = healing + speed / numbers[GROWTH_INDEX + 1] * (numbers[GROWTH_INDEX + 4] - eps)
     rates[1] = breaking * (1 - m)
     rates[2] = m * velocity - breaking * z
     rates[3] = 2 * z * velocity - breaking * states[3]
@@ -238,13 +242,13 @@ def end_motion(numbers, memory, motion, increment, velocity, states):
         memory[2] = z + m * increment
         memory[3] += increment * (2 * z + m * increment)
         is_at_end = motion[0] * increment >= motion[1] * (1 - 1e-12)
-        play = memory[5] + increment / (numbers[BREAKAWAY] * memory[0])
+        play = memory[5] + increment / (numbers[BREAKAWAY_INDEX] * memory[0])
         memory[5] = motion[0] if is_at_end else min(max(play, -1.0), 1.0)
         return 0.0
     moved = bond_step(memory[1], memory[2], memory[3], increment, 1.0, memory[0])
     memory[1] = moved.m
     memory[2] = moved.z
     memory[3] = moved.s2
-    if numbers[BREAKAWAY] > 0 and increment != 0:
+    if numbers[BREAKAWAY_INDEX] > 0 and increment != 0:
         memory[5] = motion[0]
     return 0.5 * numbers[1] * moved.damage_integral

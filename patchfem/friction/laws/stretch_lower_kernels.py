@@ -22,7 +22,7 @@ from ..bonds.point_kernels import (
 )
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..protocol_kernels import Reading
-from .stretch_kernels import BREAKAWAY, GROWTH, POINTS
+from .stretch_kernels import BREAKAWAY_INDEX, FIRST_POINT_INDEX, GROWTH_INDEX
 from .stretch_kernels import solve_step as solve_step
 from .stretch_kernels import step_bond_length as step_bond_length
 
@@ -52,8 +52,8 @@ class _Pattern(NamedTuple):
 def _view_points(numbers, memory):
     m = int(numbers[1])
     return _Points(
-        numbers[POINTS : POINTS + m],
-        numbers[POINTS + m : POINTS + 2 * m],
+        numbers[FIRST_POINT_INDEX : FIRST_POINT_INDEX + m],
+        numbers[FIRST_POINT_INDEX + m : FIRST_POINT_INDEX + 2 * m],
         memory[1 : 1 + m],
         memory[1 + m : 1 + 2 * m],
         memory[1 + 2 * m : 1 + 3 * m],
@@ -65,8 +65,8 @@ def _view_points(numbers, memory):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _view_pattern(numbers):
     m = int(numbers[1])
-    p = int(numbers[POINTS + 2 * m])
-    first = POINTS + 2 * m + 1
+    p = int(numbers[FIRST_POINT_INDEX + 2 * m])
+    first = FIRST_POINT_INDEX + 2 * m + 1
     nodes = first + 2 * m
     return _Pattern(
         numbers[first : first + m],
@@ -77,7 +77,7 @@ def _view_pattern(numbers):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _pressure(position, x, sigma):
+def _pressure_at(position, x, sigma):
     """Return the pressure [Pa] at a position, linear between the nodes x and 0 outside."""
     if position < x[0] or position > x[-1]:
         return 0.0
@@ -101,13 +101,13 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
     """
     points = _view_points(numbers, memory)
     pattern = _view_pattern(numbers)
-    half = numbers[BREAKAWAY] * bond_length
+    half = numbers[BREAKAWAY_INDEX] * bond_length
     force = 0.0
     slope = 0.0
     for j in range(points.weight.size):
         start = pattern.position[j] + rel_disp
-        pattern.end[j] = _pressure(start + increment, pattern.x, pattern.sigma)
-        source = 0.5 * (_pressure(start, pattern.x, pattern.sigma) + pattern.end[j])
+        pattern.end[j] = _pressure_at(start + increment, pattern.x, pattern.sigma)
+        source = 0.5 * (_pressure_at(start, pattern.x, pattern.sigma) + pattern.end[j])
         points.source[j] = source
         m = points.m[j]
         z = points.z[j]
@@ -135,7 +135,7 @@ def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
     """
     points = _view_points(numbers, memory)
     end = _view_pattern(numbers).end
-    half = numbers[BREAKAWAY] * bond_length
+    half = numbers[BREAKAWAY_INDEX] * bond_length
     dissipated = 0.0
     for j in range(points.weight.size):
         m = points.m[j]
@@ -156,7 +156,9 @@ def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
         points.m[j] = moved.m
         points.z[j] = moved.z
         points.s2[j] = moved.s2
-    memory[0] = grow(memory[0], v0, v1, abs(increment), dt, numbers[GROWTH:POINTS])[0]
+    memory[0] = grow(
+        memory[0], v0, v1, abs(increment), dt, numbers[GROWTH_INDEX:FIRST_POINT_INDEX]
+    )[0]
     return dissipated
 
 

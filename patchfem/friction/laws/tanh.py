@@ -9,7 +9,7 @@ from ..protocol import Element, LastTraction, Step
 
 
 @dataclass(frozen=True, slots=True)
-class Rate(LastTraction):
+class TanhLaw(LastTraction):
     """Rate law tau = mu sigma tanh(v/v_0) (eq. 2.4) per point, at the mean speed of a step.
 
     It never sticks: under a constant fraction f of the limit it creeps at v_0 atanh(f).
@@ -53,6 +53,6 @@ class Rate(LastTraction):
         return Step(mean, mean * dq, self.static * s1 * part)
 
 
-def from_keys(friction, load: float) -> Rate:
+def from_keys(friction, load: float) -> TanhLaw:
     """Return the rate law of a [friction] table; load [N] is not used."""
-    return Rate(friction.static, friction.reference_speed)
+    return TanhLaw(friction.static, friction.reference_speed)

@@ -39,7 +39,7 @@ def limit_share(model, patch) -> float:
     if patch is None or not law_has_trait(f.law, "averaged"):
         return 1.0
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
-    forward, back = _law().limits(patch.x, sigma, weight, f.bond_length, f.order)
+    forward, back = _law().sliding_limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
         raise PatchfemError(
             not_supported_message(
@@ -59,7 +59,7 @@ def limit_tractions(model, patch, force) -> np.ndarray:
     """
     f, x = model.friction, patch.x
     sigma, weight = patch.pressure.sigma_n, patch.pieces.interface.weight
-    average = _law().average
+    average = _law().average_pressure
     shape = [
         np.where(sigma > 0, average(x, x, sigma, way, f.bond_length, f.order), 0.0)
         for way in (1.0, -1.0)

@@ -113,7 +113,9 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
         out.append(coarser_space(few._replace(level=1, modes=count), few))
         if count:
             out.append(
-                coarser_space(few._replace(modes=shear_modes.comparison_count(count)), few, "modes")
+                coarser_space(
+                    few._replace(modes=shear_modes.comparison_mode_count(count)), few, "modes"
+                )
             )
     if law_has_trait(model.friction.law, "cells") and fine.engine.kind == ELEMENTS:
         out.append(rigid.coarser_cells(few))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...effects import law_has_trait
 from ...friction.bonds import quadrature, recursion
-from ...friction.record import law_from
+from ...friction.record import make_law
 from . import averaged
 
 
@@ -18,7 +18,7 @@ def law_for(model, patch=None):
     if law_has_trait(f.law, "averaged"):
         return averaged.law_on(model, patch)
     if not law_has_trait(f.law, "bonds"):
-        return law_from(f, patch.pressure.load if patch is not None else model.point.load)
+        return make_law(f, patch.pressure.load if patch is not None else model.point.load)
 
     law = model.bonds
     engine = model.accuracy.quadrature

@@ -15,8 +15,8 @@ from ...dynamics.grooves import climbing as flank_climbing
 from ...dynamics.march import varying_load
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
 from ...effects import law_has_trait
-from ...friction.laws.elastic_plastic import parallel
-from ...friction.record import law_from
+from ...friction.laws.elastic_plastic import parallel_element
+from ...friction.record import make_law
 from ...response.coarser import CoarserRuns
 from ...response.errors import merged_cell_errors
 from .engine import ELEMENTS, BenchEngine
@@ -113,9 +113,9 @@ def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactM
     if model.grooves is not None:
         return climbing(model, load)
     if engine.kind == ELEMENTS:
-        one = law_from(f, load).element(load)
+        one = make_law(f, load).element(load)
         return element_model(
-            one if springs is None else parallel(*springs(*np.split(one.numbers[2:], 2)))
+            one if springs is None else parallel_element(*springs(*np.split(one.numbers[2:], 2)))
         )
     law, found = model.bonds, engine.choice
     if found.engine == "recursion":

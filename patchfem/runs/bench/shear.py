@@ -9,7 +9,7 @@ import numpy as np
 from ...core import NotConverged
 from ...dynamics.march.models import jenkins_model, lists_model, points_model, under_the_lower
 from ...effects import law_has_trait
-from ...friction.record import law_from
+from ...friction.record import make_law
 from ...response.coarser import CoarserRuns
 from ...response.errors import GAPS, change, convergence_errors
 from ...slip.fields import bond_shear_modes, element_fields, point_fields
@@ -52,7 +52,7 @@ def with_shear(model, patch, time, slide, frames: int, watch: Watch, engine=None
 def _elements(model, patch, time, slide, frames, watch) -> Slid:
     """Slide Coulomb and elastic-plastic points as parallel elements."""
     f = model.friction
-    length = law_from(f).element(1.0).length
+    length = make_law(f).element(1.0).length
     found = elements(patch, f.static, length)
     springs = found.stiffness, found.yield_slide
     model = jenkins_model(*(watch.springs(*springs) if watch.springs else springs))

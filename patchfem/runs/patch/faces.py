@@ -124,7 +124,7 @@ def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
     patch, static = patches_of(one, tolerance)[int(coarser)], one.numbers.static
     if not patch.pressure.load > 0:
         return np.array([1 / patch.giving.mean()]), np.zeros(1), None
-    length = record.law_from(one.numbers, one.load).element(one.load).length
+    length = record.make_law(one.numbers, one.load).element(one.load).length
     if patch.strips is not None:
         return *map(
             np.concatenate, zip(*jenkins_elements.strip_elements(patch, static, length))
@@ -160,7 +160,7 @@ def seen(model, shots) -> tuple:
         found = elements_of(one, model.accuracy.tolerance)[2] if face.partial_slip else None
         if found is not None and shots:
             states = [shot["faces"][face.number] for shot in shots]
-            length = record.law_from(one.numbers, one.load).element(one.load).length
+            length = record.make_law(one.numbers, one.load).element(one.load).length
             tau, local = slip_fields.element_fields(face.patch, found, states, length)
             fields = frames_of(
                 face.patch,

@@ -221,9 +221,13 @@ def heating(model, patch, work: float, duration: float) -> list:
         return []
     period = _cycle(model)
     flux, stuff = work / duration / area, (known.conductivity, known.heat_capacity * kind.density)
-    rises = [f"{temperature.surface_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"]
+    rises = [
+        f"{temperature.surface_temperature_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"
+    ]
     if period is not None:
-        rises.insert(0, f"{temperature.surface_rise(flux, period, *stuff):.2g} K after one cycle")
+        rises.insert(
+            0, f"{temperature.surface_temperature_rise(flux, period, *stuff):.2g} K after one cycle"
+        )
     return [
         f"friction dissipates {work / duration:.2g} W on {1e6 * area:.3g} mm2; if one half-space took all this "
         f"heat, the surface temperature would rise by {', '.join(rises)}; the run does not include this rise and "

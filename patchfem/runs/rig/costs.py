@@ -148,7 +148,7 @@ def expected_elements(model: Model) -> tuple:
         if law_has_trait(one.numbers.law, "set-valued"):
             most, mine = inf, 1
         else:
-            element = record.law_from(one.numbers, load).element(load)
+            element = record.make_law(one.numbers, load).element(load)
             mine = int(element.numbers[1]) >> pairs_of(model)
             most = float(element.numbers[2 : 2 + int(element.numbers[1])].sum())
         if model.partial_slip or one.partial_slip:
@@ -412,8 +412,8 @@ def smooth_element(model: Model) -> "Element | None":
     if law_has_trait(f.law, "averaged"):
         return None
     if not law_has_trait(f.law, "bonds"):
-        return record.law_from(f, load).element(load)
-    if engines.impossible("recursion", f.reading, 1.0 if f.order is None else f.order):
+        return record.make_law(f, load).element(load)
+    if engines.unsupported_reason("recursion", f.reading, 1.0 if f.order is None else f.order):
         return None
     return stretch.points_element(model.bonds, [1.0], [load])
 

@@ -322,7 +322,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     if shape is not None and (
         varies or climbs or (pointed and law_has_trait(model.friction.law, "bonds"))
     ):
-        other = replace(few, shear_modes=shear_modes.comparison_count(shape.size))
+        other = replace(few, shear_modes=shear_modes.comparison_mode_count(shape.size))
         out.append(coarser_space(Variant(other, patch), quarter, "modes"))
     return [*out, *_summed(model, few, patch, solution)]
 

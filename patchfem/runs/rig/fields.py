@@ -66,7 +66,7 @@ def fields_of(model, numerics, patch, raw) -> dict:
         moments = [(s["slide"], s["bonds"]) for s in shots]
         tau, local = fields.point_fields(patch, model.bonds, raw.contact.reduction, moments)
     elif shear:
-        length = 0.0 if raw.contact.reduction is None else record.law_from(f).element(1.0).length
+        length = 0.0 if raw.contact.reduction is None else record.make_law(f).element(1.0).length
         states = [(s["slide"], s["stretch"]) for s in shots]
         tau, local = fields.element_fields(patch, raw.contact.reduction, states, length)
     else:

@@ -11,10 +11,10 @@ import numpy as np
 from ...dynamics.grooves import run
 from ...dynamics.march import joints, models
 from ...effects import law_has_trait
-from ...friction.laws.elastic_plastic import parallel
+from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
-from ...friction.record import law_from
+from ...friction.record import make_law
 from ...model.law import InterfaceLaw, bond_parameters
 from ...model.model import Model
 from ...slip import fields, shear_modes
@@ -80,8 +80,11 @@ def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
         return own_elements(model, numerics.meshed)
     f = model.friction
     if model.partial_slip:
-        length = law_from(f, patch.pressure.load).element(patch.pressure.load).length
-        return [parallel(*one) for one in jenkins_elements.strip_elements(patch, f.static, length)]
+        length = make_law(f, patch.pressure.load).element(patch.pressure.load).length
+        return [
+            parallel_element(*one)
+            for one in jenkins_elements.strip_elements(patch, f.static, length)
+        ]
     return [
         element_of(model.rig.friction.interfaces[0], load, model.rig.speed_scale)
         for load in strips.strip_loads(patch)
@@ -94,7 +97,7 @@ def own_elements(model: Model, meshed: tuple) -> list:
     meshed: indices of interfaces whose patches are those on the coarser mesh.
     """
     return [
-        parallel(*faces.elements_of(one, model.accuracy.tolerance, k in meshed)[:2])
+        parallel_element(*faces.elements_of(one, model.accuracy.tolerance, k in meshed)[:2])
         if one.partial_slip
         else element_of(one, one.load, model.rig.speed_scale)
         for k, one in enumerate(model.rig.friction.interfaces)
@@ -126,7 +129,7 @@ def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:
     f = one.numbers
     if law_has_trait(f.law, "bonds"):
         return points_element(bond_parameters(f, speed, 1e-12), [1.0], [load])
-    return law_from(f, load).element(load)
+    return make_law(f, load).element(load)
 
 
 def contact_model(model: Model, numerics: Numerics, patch):
@@ -155,7 +158,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
         return _bonds(model, numerics, patch, load)
     if law_has_trait(f.law, "averaged"):
         return models.coulomb_model(*(f.static * load * averaged.limit_share(model, patch),) * 2)
-    one = law_from(f, load).element(load)
+    one = make_law(f, load).element(load)
     if not soft:
         return models.element_model(one)
 

@@ -11,7 +11,7 @@ import numpy as np
 from ...core import IntegratedMeasures
 from ...dynamics.march import march as engine
 from ...effects import law_has_trait
-from ...friction.record import law_from
+from ...friction.record import make_law
 from ...response.ends import end_error
 from ...response.inside_steps import motion_inside_steps
 from ...response.measures import peaks_between, step_harmonic
@@ -190,7 +190,7 @@ class MarchReader(Reader):
         ):
             return window
         load = borne(model, self.patch) if one.load is None else one.load
-        return motion_inside_steps(window, law_from(one.numbers, load), load)
+        return motion_inside_steps(window, make_law(one.numbers, load), load)
 
     def _loop(self, part, drive) -> tuple | None:
         """Return harmonics of slide and force, and work per cycle, of an interface or all strips.

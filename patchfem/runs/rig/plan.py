@@ -187,7 +187,7 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
             MemoryPart(capacity.most_bytes(int(entries)), "the list of bonds", "accuracy.tail")
         )
     elif soft and (is_bonds or model.grooves is not None or rig.friction.load_varies):
-        sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.SHEAR_MODES
+        sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.N_SHEAR_MODES
         each = cost_model.shear_mode_step_seconds(
             points, modes, load_varies=rig.friction.load_varies or model.grooves is not None
         )
@@ -379,10 +379,10 @@ def summed_words(model: Model, numerics) -> list:
             f"{_held_words(model)}, so that the computing time is known within a factor of about 12 only; "
             f"{stiff}"
         )
-    elif (seconds := lists.list_cost(model, numerics)[1]) > parameters.LONGEST:
+    elif (seconds := lists.list_cost(model, numerics)[1]) > parameters.MAX_LIST_SECONDS:
         out.append(
             "`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
-            f"{seconds:.0f} s, more than the limit of {parameters.LONGEST:.0f} s"
+            f"{seconds:.0f} s, more than the limit of {parameters.MAX_LIST_SECONDS:.0f} s"
         )
     return out
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.dynamics.events.elements import elements_of, merged
-from patchfem.friction.laws.iwan import sliders
+from patchfem.friction.laws.iwan import slider_cells
 
 
 def test_exact_one_element_is_what_is_left_beside_one_that_carries_nothing():
@@ -40,7 +40,7 @@ def test_exact_pairs_keep_stiffness_and_limit():
 def test_order_two_of_the_cells_of_iwans_law():
     """Force of a first loading to half of the largest stretch: four times nearer the closed form with twice the cells,
     on the mean over such loadings."""
-    k, most = sliders(1.0, 1.0, -0.3, 0.0)
+    k, most = slider_cells(1.0, 1.0, -0.3, 0.0)
     fine = elements_of(k, most)
     coarse, coarser = merged(fine), merged(merged(fine))
     places = np.linspace(0.3, 0.7, 2001) * most.max()
@@ -54,7 +54,7 @@ def test_order_two_of_the_cells_of_iwans_law():
 
 def test_exact_fours_from_another_place_on_and_the_last_slider_alone():
     """48 cells of a power law and the last slider: fours, or two, eleven fours and two."""
-    parts = elements_of(*sliders(1.0, 1.0, -0.3, 0.5))
+    parts = elements_of(*slider_cells(1.0, 1.0, -0.3, 0.5))
     for _ in range(4):
         parts = merged(parts)
     assert parts.stiffness.size == 49

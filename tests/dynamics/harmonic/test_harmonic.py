@@ -14,7 +14,7 @@ from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, Spring, Track, s
 from patchfem.dynamics.harmonic.point import balance_of, group_of, point
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import advance
+from patchfem.friction.bonds.recursion import advance_bonds
 
 DRIVE = SineDrive(1.0, 1.0)
 # DOP853 at 1e-12, D = 0.8, xi = 0.003
@@ -69,7 +69,7 @@ def test_always_bonds_follow_the_recursion(seed, count, size):
     for _ in range(int(10 / np.abs(np.diff(cycle)).sum()) + 3):
         forces = []
         for q in cycle:
-            state = advance(state, np.array([q - last]), np.ones(1), law.length)[0]
+            state = advance_bonds(state, np.array([q - last]), np.ones(1), law.length)[0]
             last = q
             forces.append(law.static / law.length * state[1, 0])
     found = bonds(0.3, 0.4).sample(track)

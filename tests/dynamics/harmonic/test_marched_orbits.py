@@ -10,7 +10,7 @@ from patchfem.dynamics.harmonic import orbits
 from patchfem.dynamics.march.march import fresh
 from patchfem.dynamics.march.models import element_model
 from patchfem.friction.grooves import Grooves
-from patchfem.friction.laws.elastic_plastic import parallel
+from patchfem.friction.laws.elastic_plastic import parallel_element
 from patchfem.response.measures import energy_balance
 
 ONE, OMEGA, ZETA = np.ones(1), 2 * np.pi * 143, 0.003
@@ -20,7 +20,7 @@ BASIS = ModalBasis(("axial",), np.array([OMEGA]), np.array([ZETA]), ONE, ONE, ON
 def test_exact_a_spring_beside_a_mode():
     """An element that never slips: amplitude, multipliers and books of a linear oscillator."""
     spring, drive = 2e5, SineDrive(10.0, 2 * np.pi * 120)
-    run = fresh(BASIS, drive, element_model(parallel([spring], [1.0])), 400)
+    run = fresh(BASIS, drive, element_model(parallel_element([spring], [1.0])), 400)
     left = orbits.settled(run)
     assert left < orbits.CLOSE and run.outcome is None
     own = OMEGA**2 + spring / BASIS.mass

@@ -5,7 +5,7 @@ import pytest
 
 from patchfem.dynamics.lanes import names_kernels as at
 from patchfem.dynamics.lanes import reading, run
-from patchfem.friction.laws.iwan import largest
+from patchfem.friction.laws.iwan import max_yield_displacement
 
 FLOWS = tuple(f"friction.laws.{law}_kernels" for law in ("tanh", "stretch", "bouc_wen", "lugre"))
 LAWS = "rigid", "yielding", "masing", "table", *FLOWS
@@ -21,7 +21,7 @@ def cases(law: str, count: int, seed: int = 1) -> run.Cases:
     length, numbers = slip / np.where(spring > 0, spring, 1) * (spring > 0), np.zeros((count, 0))
     if law == "masing":
         chi, beta = r.uniform(-0.9, 0, count), r.choice([0, 0.3, 3], count)
-        length = largest(slip, spring, chi, beta)
+        length = max_yield_displacement(slip, spring, chi, beta)
         slips = (chi + 1) / ((chi + 2) * (1 + beta) - 1)
         numbers = np.stack(
             [chi + 1, 1 / (1 + beta), np.minimum(1, (0.5 / slips) ** (1 / (chi + 2)))], axis=1

@@ -75,6 +75,6 @@ def test_exact_a_bench_whose_list_grows_is_that_with_room_from_the_start(monkeyp
         '[slide]\nkind = "sine"\namplitude = "40 um"\nfrequency = "10 Hz"\n[accuracy]\nquadrature = "direct"\n'
     )
     one = bench.run(build(text), None, 400)
-    monkeypatch.setattr(list_numbers, "capacity", lambda *_: 50)
+    monkeypatch.setattr(list_numbers, "list_capacity", lambda *_: 50)
     two = bench.run(build(text), None, 400)
     assert np.array_equal(one.force, two.force) and np.array_equal(one.ledger, two.ledger)

@@ -17,7 +17,7 @@ from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.stretch import points_element
-from patchfem.friction.laws.tanh import Rate
+from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.structure.drives import release
 
 OMEGA = 2 * np.pi * 143
@@ -65,7 +65,7 @@ def bonds(port, law, load):
 
 
 def rate(port, limit, speed):
-    return Joint(port, Rate(limit, speed).element(1.0))
+    return Joint(port, TanhLaw(limit, speed).element(1.0))
 
 
 def one(omega=OMEGA, zeta=0.003):

@@ -11,7 +11,7 @@ from patchfem.dynamics.march.march import fresh, march
 from patchfem.dynamics.march.models import jenkins_model, list_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion, advance
+from patchfem.friction.bonds.recursion import Recursion, advance_bonds
 from patchfem.slip.shear_modes import shear_modes
 from patchfem.structure import drives
 
@@ -69,7 +69,7 @@ def dense_steps(law, compliance, area, sigma, path):
     for dq in np.diff(path):
         new = d.copy()
         for _ in range(80):
-            _, mean, slope, _ = advance(bonds, dq - (new - d), sigma, law.length)
+            _, mean, slope, _ = advance_bonds(bonds, dq - (new - d), sigma, law.length)
             miss = (d + new) / 2 - compliance @ (weight * mean)
             if np.abs(miss).max() < 1e-15:
                 break
@@ -77,7 +77,7 @@ def dense_steps(law, compliance, area, sigma, path):
             part = 1.0
             while part > 1e-6:
                 trial = new - part * change
-                other = advance(bonds, dq - (trial - d), sigma, law.length)[1]
+                other = advance_bonds(bonds, dq - (trial - d), sigma, law.length)[1]
                 if (
                     np.abs((d + trial) / 2 - compliance @ (weight * other)).max()
                     < np.abs(miss).max()
@@ -85,7 +85,7 @@ def dense_steps(law, compliance, area, sigma, path):
                     break
                 part /= 2
             new = new - part * change
-        bonds, mean, _, dissipated = advance(bonds, dq - (new - d), sigma, law.length)
+        bonds, mean, _, dissipated = advance_bonds(bonds, dq - (new - d), sigma, law.length)
         d = new
         rows.append((weight @ mean, weight @ bonds[1], weight @ dissipated / 2))
     return np.array(rows), d

@@ -13,7 +13,7 @@ from patchfem.dynamics.march import march as plain
 from patchfem.dynamics.march import models, varying_load
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import Recursion, advance
+from patchfem.friction.bonds.recursion import Recursion, advance_bonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.slip.shear_modes import jenkins_set, shear_modes
 
@@ -56,7 +56,7 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
         if not bonds:
             step = law.step(state, xi, load, load, p.dt)
             return step.mean, step.state
-        out, mean, _, _ = advance(state.bonds, xi, load, 1e-6)
+        out, mean, _, _ = advance_bonds(state.bonds, xi, load, 1e-6)
         kept = np.where(load > 0, out, state.bonds)
         return 0.3 / 1e-6 * np.where(load > 0, mean, 0.0), state._replace(bonds=kept)
 

@@ -14,7 +14,7 @@ from patchfem.dynamics.smooth.reader import Parts
 from patchfem.dynamics.smooth.run import Motion
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.stretch import points_element
-from patchfem.friction.laws.tanh import Rate
+from patchfem.friction.laws.tanh import TanhLaw
 
 PERIOD, CYCLES = 0.7, 3
 
@@ -91,9 +91,9 @@ def within(values) -> tuple:
 
 
 CASES = {  # law, load, damping, drive over resonance, drive, motion of the base
-    "tanh": (Rate(0.3, 0.00523108), 83.6747, 0.0185937, 153.949 / 143, 39.9675, True),
-    "narrow": (Rate(0.3, 1e-3), 83.6747, 0.0185937, 1.08, 40.0, True),
-    "force": (Rate(0.3, 0.00523108), 83.6747, 0.0185937, 1.08, 40.0, False),
+    "tanh": (TanhLaw(0.3, 0.00523108), 83.6747, 0.0185937, 153.949 / 143, 39.9675, True),
+    "narrow": (TanhLaw(0.3, 1e-3), 83.6747, 0.0185937, 1.08, 40.0, True),
+    "force": (TanhLaw(0.3, 0.00523108), 83.6747, 0.0185937, 1.08, 40.0, False),
     "bonds": (Bonds(0.3, 5e-6), 60.0, 0.003, 0.95, 40.0, True),
     "soft": (Bonds(0.3, 4e-5), 60.0, 0.01, 1.1, 30.0, False),
 }

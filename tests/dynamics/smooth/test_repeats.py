@@ -10,9 +10,9 @@ from patchfem.dynamics.smooth.arrays import DONE
 from patchfem.dynamics.smooth.run import REPEATS, Motion, simulate
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
-from patchfem.friction.laws.tanh import Rate
+from patchfem.friction.laws.tanh import TanhLaw
 
-LAWS = {"tanh": Rate(0.3, 5e-3), "bonds": Bonds(0.3, 5e-6), "bouc-wen": BoucWen(0.3, 5e-6)}
+LAWS = {"tanh": TanhLaw(0.3, 5e-3), "bonds": Bonds(0.3, 5e-6), "bouc-wen": BoucWen(0.3, 5e-6)}
 MODES, SINE = one_mode(OMEGA, 0.02, MASS), SineDrive(49.0, OMEGA * 0.9)
 
 

@@ -15,7 +15,7 @@ from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
 from patchfem.friction.laws.lugre import LuGre
 from patchfem.friction.laws.stretch import points_element
-from patchfem.friction.laws.tanh import Rate
+from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.structure import drives
 
 LOAD, MASS = 115.65, 0.884
@@ -75,7 +75,7 @@ def sign_of_stretch(y, v):
         (LUGRE, ONE, ref.lugre, None, 1e-5),
         (BoucWen(0.3, 5e-6), ONE, ref.bouc_wen, sign_of_stretch, 1e-7),
         (BoucWen(0.3, 5e-6, 1.5, 0.8), ONE, ref.bouc_wen, sign_of_stretch, 1e-7),
-        (Rate(0.3, 1e-2), ONE, ref.tanh, None, 1e-7),
+        (TanhLaw(0.3, 1e-2), ONE, ref.tanh, None, 1e-7),
     ],
 )
 def test_exact_laws_are_their_rate_equations(law, modes, form, kink, near):

@@ -10,7 +10,7 @@ from patchfem.dynamics.smooth.arrays import DONE, REFUSED
 from patchfem.dynamics.smooth.run import Motion
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.stretch import points_element
-from patchfem.friction.laws.tanh import Rate
+from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.structure import drives
 
 RINGS = Bonds(0.3, 1e-6)
@@ -52,7 +52,7 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
     """104 cycles of a rate law far above critical damping: z falls by 1e31. A state within round-off of rest that
     sets off is no stop; it was taken for one at a 1e-12 of each step, for ever (hundreds of steps are enough)."""
     omega = 2 * np.pi * 162.4
-    free, law = drives.release(1 / 162.4), Rate(0.671, 1.569e-3).element(15.46)
+    free, law = drives.release(1 / 162.4), TanhLaw(0.671, 1.569e-3).element(15.46)
     run = Motion(
         one_mode(omega, 0.05, 0.7626),
         free,

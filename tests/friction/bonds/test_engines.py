@@ -12,7 +12,7 @@ from patchfem import build, plan
 from patchfem.core import SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import list_model, points_model
-from patchfem.friction.bonds.engines import ENGINES, choose, impossible
+from patchfem.friction.bonds.engines import ENGINES, choose_engine, unsupported_reason
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.runs.rig.interface import contact_model
@@ -55,7 +55,7 @@ def rig(tmp_path, engine="auto", reading="report", order=1, growth=""):
 
 
 def test_exact_choice_where_a_recursion_is_exact():
-    got = choose(Bonds(1.0, 1.0), 1e-3, 10.0, 200)
+    got = choose_engine(Bonds(1.0, 1.0), 1e-3, 10.0, 200)
     assert (got.engine, got.error, got.strips) == ("recursion", 0.0, 0.0)
 
 
@@ -64,9 +64,9 @@ def test_exact_choice_where_a_recursion_is_exact():
 )
 def test_exact_choice_follows_the_cost(stroke, steps, want):
     """Order 2: few live strips are cut off only; many are merged."""
-    got = choose(Bonds(1.0, 1.0, 2.0), 1e-3, stroke, steps)
+    got = choose_engine(Bonds(1.0, 1.0, 2.0), 1e-3, stroke, steps)
     assert got.engine == want and got.error <= 1e-4
-    other = choose(
+    other = choose_engine(
         Bonds(1.0, 1.0, 2.0),
         1e-3,
         stroke,
@@ -78,7 +78,7 @@ def test_exact_choice_follows_the_cost(stroke, steps, want):
 
 def test_always_tighter_tolerances_tighten_the_engine():
     found = [
-        choose(Bonds(1.0, 1.0, 0.5), tolerance, 1.0, 500, "merged")
+        choose_engine(Bonds(1.0, 1.0, 0.5), tolerance, 1.0, 500, "merged")
         for tolerance in (1e-2, 1e-3, 1e-4)
     ]
     assert (
@@ -89,15 +89,17 @@ def test_always_tighter_tolerances_tighten_the_engine():
         choice.error <= 0.1 * tolerance * 1.01
         for choice, tolerance in zip(found, (1e-2, 1e-3, 1e-4))
     )
-    pinned = choose(Bonds(1.0, 1.0, 0.5), 1e-3, 1.0, 500, "merged", 1e-4, 0.1)
+    pinned = choose_engine(Bonds(1.0, 1.0, 0.5), 1e-3, 1.0, 500, "merged", 1e-4, 0.1)
     assert (pinned.tail, pinned.merge) == (1e-4, 0.1)
 
 
 def test_refuses_a_recursion_of_any_other_law():
     for reading, order in (("report", 1.0), ("stretch", 2.0)):
         with pytest.raises(ValueError, match="order = 1"):
-            choose(Bonds(1.0, 1.0, order, reading), 1e-3, 1.0, 100, "recursion")
-        assert impossible("recursion", reading, order) and not impossible("merged", reading, order)
+            choose_engine(Bonds(1.0, 1.0, order, reading), 1e-3, 1.0, 100, "recursion")
+        assert unsupported_reason("recursion", reading, order) and not unsupported_reason(
+            "merged", reading, order
+        )
     # what a scene may name
     assert get_args(Accuracy.model_fields["quadrature"].annotation) == (
         "auto",

@@ -11,7 +11,7 @@ from patchfem.core import SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import list_model
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import cutoff
+from patchfem.friction.bonds.quadrature import cutoff_age
 
 GROWS = {"ratio": 0.5, "rest_growth": 0.3, "slip_growth": 0.05, "rest_speed": 1e-2}
 WAYS = {"direct": {}, "truncated": {"tail": 1e-9}, "merged": {"tail": 1e-9, "merge": 0.01}}
@@ -84,7 +84,7 @@ def test_exact_marches_of_every_list_agree(order, growth):
             200,
             window=3,
         )
-        for reach, merge in ((np.inf, 0.0), (cutoff(law.order, 1e-9), 0.005))
+        for reach, merge in ((np.inf, 0.0), (cutoff_age(law.order, 1e-9), 0.005))
     ]
     size = np.ptp(runs[0].window.slide)
     assert runs[1].window.slide == pytest.approx(runs[0].window.slide, abs=2e-6 * size)

@@ -1,4 +1,4 @@
-"""The stated error of merging, `engines.Choice.error`, against the list of every bond: forces and step means of any
+"""The stated error of merging, `engines.EngineChoice.error`, against the list of every bond: forces and step means of any
 path and law, growing bonds and small strokes among them."""
 
 import numpy as np
@@ -6,7 +6,7 @@ import pytest
 from friction_paths import random_walk
 from list_paths import STATUS, follow_list
 
-from patchfem.friction.bonds.engines import choose
+from patchfem.friction.bonds.engines import choose_engine
 from patchfem.friction.bonds.parameters import Bonds
 
 GROWN = {"ratio": 0.54, "rest_growth": 0.145, "slip_growth": 7.64, "rest_speed": 4.55e-4}
@@ -17,7 +17,7 @@ def share(law, path, steps, tolerance):
     moves = np.diff(path)
     way = np.sign(moves[moves != 0])
     strokes, dt = 1 + np.count_nonzero(way[1:] != way[:-1]), 2 * np.pi / steps
-    chosen = choose(
+    chosen = choose_engine(
         law, tolerance, np.abs(moves).sum() / strokes, max(way.size / strokes, 1), "merged"
     )
     whole, got = follow_list(law, path, dt), follow_list(law, path, dt, chosen.merge, chosen.tail)

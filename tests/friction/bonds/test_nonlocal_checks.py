@@ -21,7 +21,7 @@ from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
 from patchfem.friction.bonds.parameters import Bonds, grow
-from patchfem.friction.bonds.quadrature import Quadrature, cutoff
+from patchfem.friction.bonds.quadrature import Quadrature, cutoff_age
 from patchfem.friction.bonds.recursion import BondState, Recursion
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.runs.bench import bench as law_bench
@@ -348,7 +348,9 @@ def test_exact_extreme_orders_of_the_printed_law(order):
     for back, got in zip(60 - path[121:], force[120:]):
         assert got == pytest.approx(below(60 + back) - 2 * below(2 * back), abs=1e-12)
     assert float(
-        mpmath.gammainc(mpmath.mpf(order) + 1, cutoff(order, 1e-9), mpmath.inf, regularized=True)
+        mpmath.gammainc(
+            mpmath.mpf(order) + 1, cutoff_age(order, 1e-9), mpmath.inf, regularized=True
+        )
     ) == pytest.approx(1e-9, rel=1e-6)
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion, advance
+from patchfem.friction.bonds.recursion import Recursion, advance_bonds
 
 GROWTH = [{}, {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e-2}]
 X = np.linspace(-3, 3, 7)
@@ -77,10 +77,11 @@ def test_exact_slope_is_the_derivative_of_the_mean():
     bonds, sigma = np.array([[0.7, 0.2], [0.4, -0.1], [0.5, 0.3]]), np.array([1.0, 0.6])
     for dq in (-3.0, -0.4, -0.02, 0.01, 0.2, 1.5):
         h = 1e-5 * abs(dq)
-        slope = (advance(bonds, dq + h, sigma, 0.8)[1] - advance(bonds, dq - h, sigma, 0.8)[1]) / (
-            2 * h
-        )
-        assert advance(bonds, dq, sigma, 0.8)[2] == pytest.approx(slope, rel=1e-6, abs=1e-8)
+        slope = (
+            advance_bonds(bonds, dq + h, sigma, 0.8)[1]
+            - advance_bonds(bonds, dq - h, sigma, 0.8)[1]
+        ) / (2 * h)
+        assert advance_bonds(bonds, dq, sigma, 0.8)[2] == pytest.approx(slope, rel=1e-6, abs=1e-8)
 
 
 # ---- passivity

@@ -15,7 +15,7 @@ from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import Recursion
-from patchfem.friction.bonds.temperature import growth_at, surface_rise
+from patchfem.friction.bonds.temperature import growth_at_temperature, surface_temperature_rise
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -39,10 +39,12 @@ SUBSTRATE = 'substrate = "Ti-8Al-1Mo-1V"'
 )
 def test_exact_c13_rates_of_a_warm_surface(surface, want):
     """a_0 = 1e4, l_0 = 1e-9, T_a = 2500 K, T_l = 1500 K, as printed: the reference is infinite."""
-    rest, slip = growth_at(1e4, 1e-9, surface, np.inf, 2500.0, 1500.0)
+    rest, slip = growth_at_temperature(1e4, 1e-9, surface, np.inf, 2500.0, 1500.0)
     assert (rest, slip, np.sqrt(rest * slip)) == pytest.approx(want, rel=1e-8)
-    cold = growth_at(1e4, 1e-9, 293.15, np.inf, 2500.0, 1500.0)
-    assert growth_at(*cold, surface, 293.15, 2500.0, 1500.0) == pytest.approx(want[:2], rel=1e-8)
+    cold = growth_at_temperature(1e4, 1e-9, 293.15, np.inf, 2500.0, 1500.0)
+    assert growth_at_temperature(*cold, surface, 293.15, 2500.0, 1500.0) == pytest.approx(
+        want[:2], rel=1e-8
+    )
 
 
 @given(
@@ -55,11 +57,13 @@ def test_exact_c13_rates_of_a_warm_surface(surface, want):
 def test_always_the_reference_changes_no_bit(
     rest, slip, reference, rest_activation, slip_activation
 ):
-    assert growth_at(rest, slip, reference, reference, rest_activation, slip_activation) == (
+    assert growth_at_temperature(
+        rest, slip, reference, reference, rest_activation, slip_activation
+    ) == (
         rest,
         slip,
     )
-    assert growth_at(rest, slip, 400.0, reference, None, None) == (rest, slip)
+    assert growth_at_temperature(rest, slip, 400.0, reference, None, None) == (rest, slip)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +72,7 @@ def test_always_the_reference_changes_no_bit(
 )
 def test_refuses_temperatures_that_are_not_absolute(surface, reference):
     with pytest.raises(PatchfemError, match="above 0 K"):
-        growth_at(1.0, 1e-6, surface, reference, 2500.0, 1500.0)
+        growth_at_temperature(1.0, 1e-6, surface, reference, 2500.0, 1500.0)
 
 
 @pytest.mark.parametrize(
@@ -77,9 +81,9 @@ def test_refuses_temperatures_that_are_not_absolute(surface, reference):
 )
 def test_refuses_rates_beyond_floating_point(surface, key):
     with pytest.raises(PatchfemError, match=key):
-        growth_at(10.0, 2e-7, surface, 293.15, 2500.0, 1500.0)
+        growth_at_temperature(10.0, 2e-7, surface, 293.15, 2500.0, 1500.0)
     with pytest.raises(PatchfemError, match="slip_growth would be about 1e3"):
-        growth_at(10.0, 2e-7, 2.0, 293.15, None, 1500.0)
+        growth_at_temperature(10.0, 2e-7, 2.0, 293.15, None, 1500.0)
 
 
 # ---- a temperature per point
@@ -90,7 +94,9 @@ def test_exact_points_of_their_own_temperature_are_separate_runs(breakaway):
     """Three points at 250, 293.15 and 450 K in one call = three recursions with rates by hand."""
     law = Bonds(0.6, 2e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, breakaway=breakaway)
     hot, sigma = np.array([250.0, 293.15, 450.0]), np.array([1.0, 2.0, 0.5])
-    rest, slip = growth_at(law.rest_growth, law.slip_growth, hot, 293.15, 2500.0, 1500.0)
+    rest, slip = growth_at_temperature(
+        law.rest_growth, law.slip_growth, hot, 293.15, 2500.0, 1500.0
+    )
     engine = Recursion(replace(law, rest_growth=rest, slip_growth=slip))
     alone = [
         Recursion(
@@ -156,7 +162,7 @@ def test_exact_steady_friction_of_a_warm_bench():
 
 
 def test_exact_a_warm_rig_is_a_rig_with_the_rates_of_the_warm_surface():
-    rest, slip = growth_at(10.0, 2e-7, 393.15, 293.15, 2500.0, 1500.0)
+    rest, slip = growth_at_temperature(10.0, 2e-7, 393.15, 293.15, 2500.0, 1500.0)
     warm = loads(POINT + GROWING + WARM + SHORT, sets=["friction.rest_speed=10 um/s"])
     same = loads(
         POINT + GROWING + SHORT,
@@ -235,7 +241,7 @@ def test_exact_a_table_without_effect_is_remarked(text, says):
 def test_exact_rise_of_a_half_space_under_constant_heat(time, printed, within):
     """0.2 W on 1 cm2 of titanium: heat balance of the exact field 2 q sqrt(at) ierfc(z/2 sqrt(at))/k."""
     k, c = 7.0, 2.3e6
-    rise = surface_rise(2000.0, time, k, c)
+    rise = surface_temperature_rise(2000.0, time, k, c)
     assert rise == pytest.approx(printed, rel=within)
     reach = np.sqrt(k / c * time)
     z = np.linspace(0, 14 * reach, 40_001)

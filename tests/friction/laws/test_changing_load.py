@@ -14,7 +14,7 @@ from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.friction.laws.tanh import Rate
+from patchfem.friction.laws.tanh import TanhLaw
 from patchfem.runs.bench import bench as law_bench
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -58,7 +58,7 @@ def test_exact_other_orders_let_the_last_formed_bonds_go_first(order):
 
 LAWS = [
     Coulomb(0.3),
-    Rate(0.3, 1.0),
+    TanhLaw(0.3, 1.0),
     ElasticPlastic(0.3, 1.0),
     Recursion(Bonds(0.3, 1.0)),
     Quadrature(Bonds(0.3, 1.0), 0.0),
@@ -90,7 +90,7 @@ def test_exact_lost_contact_takes_force_and_memory(law):
 
 
 @pytest.mark.share(0, 1, 2, 3, 4, 5, 6)
-@pytest.mark.parametrize("law", [law for law in LAWS if not isinstance(law, (Coulomb, Rate))])
+@pytest.mark.parametrize("law", [law for law in LAWS if not isinstance(law, (Coulomb, TanhLaw))])
 @pytest.mark.parametrize("size", [0.1, 0.2])
 def test_exact_no_drift_under_a_load_dither_at_half_the_limit(law, size):
     """The slide that restores half the limit after every half cycle of the load is the same in every cycle: 0."""

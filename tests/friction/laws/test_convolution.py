@@ -16,7 +16,7 @@ from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import Recursion
-from patchfem.friction.laws.convolution import Convolution, average, limits
+from patchfem.friction.laws.convolution import Convolution, average_pressure, sliding_limits
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.runs.bench import bench
 from patchfem.runs.patch.ladder import solve_all
@@ -78,7 +78,7 @@ def test_exact_average_is_the_integral(order, way, length):
     sigma = rng.uniform(0.1, 2, 9)
     places = np.append(rng.uniform(nodes[0], nodes[-1], 6), nodes[[0, 4, -1]])
     truth = [by_quadrature(y, nodes, sigma, way, length, order) for y in places]
-    assert average(places, nodes, sigma, way, length, order) == pytest.approx(
+    assert average_pressure(places, nodes, sigma, way, length, order) == pytest.approx(
         truth, rel=1e-9, abs=1e-12
     )
 
@@ -91,11 +91,11 @@ def test_exact_average_is_the_integral(order, way, length):
 )
 def test_always_an_average_lies_between_nothing_and_the_largest_pressure(order, length, way, sigma):
     nodes = np.arange(len(sigma)) * 1.0
-    found = average(nodes, nodes, sigma, way, length, order)
+    found = average_pressure(nodes, nodes, sigma, way, length, order)
     assert (found >= -1e-9 * max(sigma)).all() and (found <= max(sigma) * (1 + 1e-9)).all()
-    assert average(-nodes[::-1], -nodes[::-1], sigma[::-1], -way, length, order) == pytest.approx(
-        found[::-1]
-    )
+    assert average_pressure(
+        -nodes[::-1], -nodes[::-1], sigma[::-1], -way, length, order
+    ) == pytest.approx(found[::-1])
 
 
 # ---- C9, C10: edges and waves
@@ -180,7 +180,7 @@ def test_exact_the_limits_of_an_uneven_pressure_differ_by_what_the_trailing_edge
     nodes = np.linspace(0, 40, 2001)
     weight = np.gradient(nodes)
     weight[[0, -1]] /= 2
-    forward, back = limits(nodes, 1 + nodes / 40, weight, 1.0, 0.0)
+    forward, back = sliding_limits(nodes, 1 + nodes / 40, weight, 1.0, 0.0)
     assert 60 - forward == pytest.approx(2 - 1 / 40, rel=1e-4) and 60 - back == pytest.approx(
         1 + 1 / 40, rel=1e-4
     )
@@ -230,7 +230,7 @@ def test_exact_a_symmetric_block_on_a_rig_is_coulomb_with_the_limit_of_the_avera
     scene = loads(text)
     found = run(plan(scene), estimate=False)
     patch = found.patch
-    forward, back = limits(
+    forward, back = sliding_limits(
         patch.x, patch.pressure.sigma_n, patch.pieces.interface.weight, 3e-4, 1.0
     )
     assert forward == pytest.approx(back, rel=1e-9) and 0.5 < forward / patch.pressure.load < 0.9

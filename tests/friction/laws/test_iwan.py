@@ -5,7 +5,7 @@ import pytest
 from law_runs import LOAD, bench_along, shrinking
 from scene_texts import COATED, DRIVE, MODE, mistakes, only
 
-from patchfem.friction.laws.iwan import largest, sliders
+from patchfem.friction.laws.iwan import max_yield_displacement, slider_cells
 from patchfem.scene.scene import loads
 
 LAW = 'law = "iwan"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nchi = -0.4\nbeta = 0.3\n'
@@ -30,11 +30,13 @@ def loading(slide, force, stiffness, chi, beta):
 
 @pytest.mark.parametrize("chi, beta", [(-0.4, 0.3), (-0.9, 0.0), (0.0, 2.0), (-0.99, 0.01)])
 def test_exact_the_four_parameters(chi, beta):
-    k, most = sliders(3.0, 2e6, chi, beta)
+    k, most = slider_cells(3.0, 2e6, chi, beta)
     assert (k > 0).all() and (np.diff(most) > 0).all() and most[0] > 0
     assert k.sum() == pytest.approx(2e6, rel=1e-14) and k @ most == pytest.approx(3.0, rel=1e-14)
-    assert largest(3.0, 2e6, chi, beta) == pytest.approx(density(3.0, 2e6, chi, beta)[2], rel=1e-14)
-    slide = np.linspace(0.0, 1.2, 1000) * largest(3.0, 2e6, chi, beta)
+    assert max_yield_displacement(3.0, 2e6, chi, beta) == pytest.approx(
+        density(3.0, 2e6, chi, beta)[2], rel=1e-14
+    )
+    slide = np.linspace(0.0, 1.2, 1000) * max_yield_displacement(3.0, 2e6, chi, beta)
     assert np.minimum.outer(slide, most) @ k == pytest.approx(
         loading(slide, 3.0, 2e6, chi, beta), abs=2e-6 * 3.0
     )

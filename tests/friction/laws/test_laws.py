@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.friction.laws.tanh import Rate
+from patchfem.friction.laws.tanh import TanhLaw
 
 ONE = upper_pressure([1.0, 0.5])
 PRESSURE = st.just(0.0) | st.floats(1e-6, 4)
@@ -76,7 +76,7 @@ def test_exact_rising_pressure_brings_unstressed_springs_and_slip_breaks_those_i
     )
 
 
-@pytest.mark.parametrize("law, share", [(Coulomb(0.3), 0.3), (Rate(0.3, 1.0), 0.3)])
+@pytest.mark.parametrize("law, share", [(Coulomb(0.3), 0.3), (TanhLaw(0.3, 1.0), 0.3)])
 def test_exact_a_held_traction_follows_a_falling_pressure_only(law, share):
     one = np.ones(1)
     state = law.step(law.start(one), 50.0, one, one, 1.0).state

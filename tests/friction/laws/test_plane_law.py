@@ -40,7 +40,7 @@ def test_exact_a_straight_slide_has_the_force_and_loss_of_the_rate_equations(see
         MOST * (1.0 if seed % 3 == 0 else draw.uniform()) * np.array([np.cos(turn), np.sin(turn)])
     )
     move = far * np.array([np.cos(way), np.sin(way)])
-    slide = plane.slide_straight((K, MOST), tuple(stretch), tuple(move))
+    slide = plane.advance_straight((K, MOST), tuple(stretch), tuple(move))
     force = np.array([slide.mean_x, slide.mean_y])
     after = np.array([slide.stretch_x, slide.stretch_y])
     mean, end, lost = by_rates(stretch, move)
@@ -70,5 +70,5 @@ def test_always_a_step_finds_the_slide_that_its_give_and_its_law_agree_on(seed):
     )
     assert 0 < count < 40
     np.testing.assert_allclose(slide, free - give @ [x, y], rtol=0, atol=1e-13 * np.abs(free).max())
-    mean = plane.slide_straight((K, MOST), tuple(stretch), tuple(slide))[:2]
+    mean = plane.advance_straight((K, MOST), tuple(stretch), tuple(slide))[:2]
     np.testing.assert_allclose([x, y], mean, rtol=0, atol=1e-8 * K * MOST)

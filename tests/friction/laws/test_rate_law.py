@@ -7,7 +7,7 @@ from scipy.integrate import quad, solve_ivp
 
 from patchfem import SceneError, load, plan, run
 from patchfem.core import Outcome
-from patchfem.friction.laws.tanh import Rate
+from patchfem.friction.laws.tanh import TanhLaw
 
 LOAD, LIMIT, MASS, OMEGA = 115.653761996773, 0.3 * 115.653761996773, 0.884, 2 * np.pi * 143
 LAW = POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "{} m/s"\n'
@@ -76,7 +76,7 @@ def test_order_loop_of_a_sine_is_two(speed):
 
 
 def test_always_a_jump_in_no_time_and_rest_are_answered():
-    law, sigma = Rate(0.3, 1e-3), np.array([2.0, 5.0])
+    law, sigma = TanhLaw(0.3, 1e-3), np.array([2.0, 5.0])
     jump = law.step(law.start(sigma), -1e-6, sigma, sigma, 0.0)
     assert jump.mean == pytest.approx(-0.3 * sigma) and jump.dissipated.min() > 0
     assert law.step(jump.state, 0.0, sigma, sigma, 1e-3).mean == pytest.approx(0.0 * sigma)

@@ -36,7 +36,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "model.slide.MAX_STEPS": "steps per cycle of a prescribed slide",
     "runs.rig.costs.MOST_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
     "dynamics.march.capacity.MOST_STRIPS": "number of entries in a list of bonds",
-    "friction.bonds.parameters.LONGEST": "estimated computing time of a run with a list of bonds [s]",
+    "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
     "runs.rig.costs.LONGEST": "estimated time to compute a whole motion by the event-to-event method [s]",
     "structure.drive_sizes.MAX_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
     "least 20 per cycle; of a longer release turning points and the last cycles",

@@ -27,7 +27,7 @@ from ....dynamics.lanes import names_kernels as at
 from ....dynamics.lanes import reading
 from ....dynamics.lanes import run as march
 from ....effects import is_bond_list, law_has_trait
-from ....friction.laws.iwan import largest as largest_slide
+from ....friction.laws.iwan import max_yield_displacement as largest_slide
 from ....model.model import Model
 from ....model.similar_models import SimilarModels, collect_columns, select_models
 from ....response.errors import ROUND, coarser_errors, convergence_error, signed

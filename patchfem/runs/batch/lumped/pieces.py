@@ -13,7 +13,7 @@ from ....dynamics.events.elements import JOINED, merged
 from ....dynamics.events.names_kernels import FORCE, HIGH, LOW, REACH
 from ....dynamics.events.reading import joined
 from ....effects import law_has_trait
-from ....friction.record import law_from
+from ....friction.record import make_law
 from ....response import run_events
 from ....response.errors import merged_cell_errors
 from ....response.measures import ROUND, energy_balance
@@ -77,7 +77,7 @@ def case_of(model, pairs: int = 0) -> Case:
     """Return the Case of a model with a single point; pairs: see `Numerics`."""
     if _holds(model):
         return Case(model, RigidElements(model, None, None).groups, 0.0, model.point.load)
-    element = law_from(model.friction, model.point.load).element(model.point.load)
+    element = make_law(model.friction, model.point.load).element(model.point.load)
     group = elements_of_law(element)
     for _ in range(pairs):
         group = merged(group)
