@@ -40,16 +40,16 @@ class Grooves:
     key: str = "normal.grooves"
 
     @property
-    def wave(self) -> float:
+    def wave_number(self) -> float:
         """Wave number k = 2 pi/wavelength [rad/m]."""
         return 2 * pi / self.wavelength
 
     @property
-    def steepest(self) -> float:
+    def max_slope(self) -> float:
         """Largest slope A k of the flanks [1]."""
-        return self.amplitude * self.wave
+        return self.amplitude * self.wave_number
 
-    def worn(self, depth: float, upper_share: float) -> "Grooves | None":
+    def after_wear(self, depth: float, upper_share: float) -> "Grooves | None":
         """Return the grooves after a mean worn depth [m] of both pieces; None once they are flat.
 
         The upper piece lost the fraction `upper_share` of this depth.
@@ -65,18 +65,24 @@ class Grooves:
     def height(self, q):
         """Return the height z = A (1 - cos(k q - phase)) [m] at relative displacements q [m]."""
         return (
-            2 * self.amplitude * np.sin(0.5 * (self.wave * np.asarray(q, float) - self.phase)) ** 2
+            2
+            * self.amplitude
+            * np.sin(0.5 * (self.wave_number * np.asarray(q, float) - self.phase)) ** 2
         )
 
     def slope(self, q):
         """Return the slope t = A k sin(k q - phase) [1] at relative displacements q [m]."""
-        return self.steepest * np.sin(self.wave * np.asarray(q, float) - self.phase)
+        return self.max_slope * np.sin(self.wave_number * np.asarray(q, float) - self.phase)
 
-    def bend(self, q):
+    def slope_derivative(self, q):
         """Return the derivative t' = A k^2 cos(k q - phase) [1/m] of the slope at q [m]."""
-        return self.steepest * self.wave * np.cos(self.wave * np.asarray(q, float) - self.phase)
+        return (
+            self.max_slope
+            * self.wave_number
+            * np.cos(self.wave_number * np.asarray(q, float) - self.phase)
+        )
 
-    def ratio(self, q, way, friction: float):
+    def force_ratio(self, q, way, friction: float):
         """Return tangential / vertical force (t + way mu)/(1 - way mu t) [1] at q [m].
 
         way: sign of the motion, 0 for a slide held by the flank alone; friction: coefficient mu [1].
@@ -86,42 +92,49 @@ class Grooves:
 
     def stiffness(self, load: float) -> float:
         """Return the stiffness N k^2 A [N/m] of small motions about the bottom under a load [N]."""
-        return load * self.wave**2 * self.amplitude
+        return load * self.wave_number**2 * self.amplitude
 
-    def capacity(self, load: float, friction: float) -> float:
+    def max_force(self, load: float, friction: float) -> float:
         """Return the largest force [N] that the steepest flank holds under a load N [N].
 
         It is N (A k + mu)/(1 - mu A k), or infinite if the flank locks.
         """
-        locks = friction * self.steepest >= 1
+        locks = friction * self.max_slope >= 1
         return (
             float("inf")
             if locks
-            else load * (self.steepest + friction) / (1 - friction * self.steepest)
+            else load * (self.max_slope + friction) / (1 - friction * self.max_slope)
         )
 
-    def rise(self, q0, q1):
+    def height_difference(self, q0, q1):
         """Return the height difference [m] between q0 and q1 [m] without cancellation."""
-        half, middle = 0.5 * self.wave * (q1 - q0), 0.5 * self.wave * (q1 + q0) - self.phase
+        half, middle = (
+            0.5 * self.wave_number * (q1 - q0),
+            0.5 * self.wave_number * (q1 + q0) - self.phase,
+        )
         return 2 * self.amplitude * np.sin(middle) * np.sin(half)
 
-    def lost(self, q0, q1, friction: float):
+    def friction_loss(self, q0, q1, friction: float):
         """Return the energy / vertical force [J/N] that friction dissipates from q0 to q1 [m].
 
         It is the integral of mu (1 + t^2)/(1 - way mu t) |dq| in closed form, for either direction.
         """
         q0, q1 = np.asarray(q0, float), np.asarray(q1, float)
         way = np.sign(q1 - q0)
-        turn, start, end = self.wave, self.wave * q0 - self.phase, self.wave * q1 - self.phase
+        turn, start, end = (
+            self.wave_number,
+            self.wave_number * q0 - self.phase,
+            self.wave_number * q1 - self.phase,
+        )
         span, c = end - start, way * friction
-        if friction * self.steepest < MAX_SERIES_SLOPE:
+        if friction * self.max_slope < MAX_SERIES_SLOPE:
             parts = _integrate_sine_powers(start, end, N_SERIES_TERMS + 2)
             total = sum(
-                (c * self.steepest) ** j * (parts[j] + self.steepest**2 * parts[j + 2])
+                (c * self.max_slope) ** j * (parts[j] + self.max_slope**2 * parts[j + 2])
                 for j in range(N_SERIES_TERMS)
             )
             return c * total / turn
-        b = c * self.steepest
+        b = c * self.max_slope
         root = np.sqrt(1 - b * b)
         whole = np.trunc(span / (2 * pi))
         half = 0.5 * (span - 2 * pi * whole)
@@ -130,20 +143,20 @@ class Grooves:
         arc = np.arctan2(root * np.sin(half), np.cos(half) - b * np.sin(middle))
         c = np.where(way == 0, 1.0, c)
         total = (
-            -self.steepest * 2 * np.sin(0.5 * span) * np.sin(0.5 * (start + end)) / c
+            -self.max_slope * 2 * np.sin(0.5 * span) * np.sin(0.5 * (start + end)) / c
             - span / c**2
             + (1 + 1 / c**2) * 2 / root * (arc + pi * whole)
         )
         return np.where(way == 0, 0.0, c * total / turn)
 
-    def least_mass(self, friction: float) -> float:
+    def min_mass_ratio(self, friction: float) -> float:
         """Return the minimum of t (t - mu)/(1 + mu t) [1] over the slopes t of the flanks.
 
         Where it is negative, its product with the lifted mass reduces the mass that the interface moves.
         """
         # the derivative is zero where mu t^2 + 2 t - mu = 0
         flank = (np.sqrt(1 + friction**2) - 1) / friction if friction > 0 else 0.0
-        flank = min(flank, self.steepest)
+        flank = min(flank, self.max_slope)
         return flank * (flank - friction) / (1 + friction * flank)
 
 

@@ -38,7 +38,7 @@ class LastTraction:
     """
 
     __slots__ = ()
-    at_once = True  # the load of such a law may change within a step of the motion
+    can_change_load = True  # the load of such a law may change within a step of the motion
 
     def start(self, sigma):
         """Return the state before any motion: no traction."""
@@ -79,10 +79,10 @@ class Element(NamedTuple):
     - numbers, memory: parameters (k,), of which the first is left to the engines, and memory (l,) at the start
     - limit: largest force [N], or the typical force if there is no largest
     - length: relative displacement [m] over which the law stretches before it slips; 0 without a stretch
-    - bounded: whether no force exceeds the limit
+    - is_bounded: whether no force exceeds the limit
     - form: contents of the memory, for engines that read it: "parallel" elements side by side, "points" of bonds,
       "places" of bonds under the pressure of the lower piece, "speed" for no memory, "flow" for one number, or ""
-    - sizes: typical magnitudes of the states of the rate equations, None if the law is not written as such
+    - state_scales: typical magnitudes of the states of the rate equations, None if the law is not written as such
     """
 
     kernels: str
@@ -90,6 +90,6 @@ class Element(NamedTuple):
     memory: np.ndarray
     limit: float
     length: float = 0.0
-    bounded: bool = True
+    is_bounded: bool = True
     form: str = ""
-    sizes: tuple | None = None
+    state_scales: tuple | None = None

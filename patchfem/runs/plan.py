@@ -388,6 +388,6 @@ def _groove_words(model: Model) -> list:
     g, mu = model.grooves, model.friction.static
     return [
         f"at their bottom the grooves act as a spring of stiffness N k^2 A = {g.stiffness(load):.4g} N/m; on their "
-        f"steepest flank the contact resists a force of up to {g.capacity(load, mu):.4g} N; without grooves "
+        f"steepest flank the contact resists a force of up to {g.max_force(load, mu):.4g} N; without grooves "
         f"friction would resist up to mu N = {mu * load:.4g} N"
     ]

@@ -32,7 +32,7 @@ def element_fields(patch, elements, states, length: float) -> ShearFields:
     traction, local_slip = np.zeros(shape), np.zeros(shape)
     for i, (slide, stretch) in enumerate(states):
         force = np.zeros(patch.x.size)
-        force[elements.points] = elements.share @ stretch
+        force[elements.points] = elements.force_matrix @ stretch
         traction[i] = force / weight
         local_slip[i] = slide - patch.giving @ force
         local_slip[i, elements.points] -= length * force[elements.points] / elements.limit

@@ -22,10 +22,10 @@ class SpreadElements(NamedTuple):
     """Stiffness [N/m] and rising yield displacements [m] of parallel elements."""
 
     stiffness: np.ndarray
-    yield_slide: np.ndarray
+    yield_displacement: np.ndarray
 
 
-def spread_elements(stiffness, yield_slide) -> SpreadElements:
+def spread_elements(stiffness, yield_displacement) -> SpreadElements:
     """Spread parallel elements evenly over ranges around their yield displacements.
 
     The sum of the stiffnesses and the friction limit stay. A range is as wide as the distance to the farther neighbour,
@@ -33,10 +33,10 @@ def spread_elements(stiffness, yield_slide) -> SpreadElements:
 
     Parameters
     ----------
-    stiffness, yield_slide : (t,) array_like
+    stiffness, yield_displacement : (t,) array_like
         [N/m] and, increasing, [m].
     """
-    k, y = np.asarray(stiffness, float), np.asarray(yield_slide, float)
+    k, y = np.asarray(stiffness, float), np.asarray(yield_displacement, float)
     starts = np.flatnonzero(np.diff(y, prepend=-np.inf) > SAME_YIELD_TOL * y)
     total = np.add.reduceat(k, starts)
     y = np.add.reduceat(k * y, starts) / total

@@ -56,43 +56,43 @@ MAX_BACKBONE_LENGTHS = 6
 class JenkinsSet:
     """Parallel Jenkins elements: springs in series with sliders.
 
-    - stiffness, yield_slide (t,): [N/m] and [m]; the sum of their products is the friction limit.
+    - stiffness, yield_displacement (t,): [N/m] and [m]; the sum of their products is the friction limit.
     - points (a,): Nodes of the contact set.
     - limit (a,): Yield forces of the points [N].
     - order (a,): Indices into `points`, the last point to yield first.
     - low (a, a): Lower Cholesky factor of the compliance in that order; empty for one spring in series with
       rigid points.
     - starts (t,): Index of the first yield of each element.
-    - reluctant: Number of points whose force at first has the wrong sign.
+    - n_reluctant: Number of points whose force at first has the wrong sign.
     """
 
     stiffness: np.ndarray
-    yield_slide: np.ndarray
+    yield_displacement: np.ndarray
     points: np.ndarray
     limit: np.ndarray
     order: np.ndarray
     low: np.ndarray
     starts: np.ndarray
-    reluctant: int
+    n_reluctant: int
 
     @cached_property
     def point_yields(self) -> np.ndarray:
         """Relative displacement (a,) [m] at which each point yields."""
         if not self.order.size:
-            return np.full(self.limit.size, self.yield_slide[0])
+            return np.full(self.limit.size, self.yield_displacement[0])
         out = np.empty(self.limit.size)
         counts = np.diff(np.append(self.starts, self.order.size))
-        out[self.order[::-1]] = np.repeat(self.yield_slide, counts)
+        out[self.order[::-1]] = np.repeat(self.yield_displacement, counts)
         return frozen_array(out)
 
     @cached_property
-    def share(self) -> np.ndarray:
+    def force_matrix(self) -> np.ndarray:
         """Matrix (a, t) [N/m] that gives the point forces from the stretches of the elements.
 
         It holds for any history.
         """
         if not self.low.size:
-            return self.limit[:, None] / self.yield_slide
+            return self.limit[:, None] / self.yield_displacement
         inverse, _ = dtrtri(self.low, lower=1)
         out = np.empty((self.limit.size, self.starts.size))
         out[self.order] = np.add.reduceat(
@@ -122,14 +122,14 @@ class Spectrum:
     tangential: np.ndarray | None = None
 
     @cached_property
-    def whole(self) -> "Spectrum":
+    def complete(self) -> "Spectrum":
         """The Spectrum with all modes."""
         if self.tangential is None:
             return self
         return _all_modes(self.tangential, self.points, self.limit, self.length)
 
     @cached_property
-    def slides(self) -> np.ndarray:
+    def displacements(self) -> np.ndarray:
         """Relative displacements [m] at which backbones are compared, denser at small values."""
         if self.tangential is None:
             displacement = self.shape @ (self.values * (self.shape.T @ self.limit))
@@ -141,7 +141,7 @@ class Spectrum:
     def modes(self, count: int) -> "ShearModes":
         """Return the first `count` modes."""
         if count > self.values.size and self.tangential is not None:
-            return self.whole.modes(count)
+            return self.complete.modes(count)
         return ShearModes(
             self.points,
             frozen_array(self.shape[:, :count]),
@@ -155,7 +155,7 @@ class Spectrum:
         return {}
 
     def backbone(self, count: int, shape=None, limit=None) -> np.ndarray:
-        """Return the friction force [N] of `count` modes at the relative displacements `slides`.
+        """Return the friction force [N] of `count` modes at `displacements`.
 
         Newton's method starts from the cached backbone of the most modes below `count`.
 
@@ -168,12 +168,12 @@ class Spectrum:
             Friction limits of these points [N].
         """
         if count > self.values.size and self.tangential is not None:
-            return self.whole.backbone(count, shape, limit)
+            return self.complete.backbone(count, shape, limit)
         count = min(count, self.values.size)
         if shape is None and count in self.cache:
             return self.cache[count].force
         n_cached = max((number for number in self.cache if number <= count), default=0)
-        start = np.zeros((self.slides.size, count))
+        start = np.zeros((self.displacements.size, count))
         if n_cached:
             start[:, :n_cached] = self.cache[n_cached].coordinates
         is_own = shape is None
@@ -181,7 +181,7 @@ class Spectrum:
             shape, limit = self.shape[:, :count], self.limit
         with one_thread(), np.errstate(over="ignore", invalid="ignore"):
             backbone = _solve_backbone(
-                limit, shape, self.values[:count], self.length, self.slides, start
+                limit, shape, self.values[:count], self.length, self.displacements, start
             )
         if is_own and np.isfinite(backbone.force).all():
             self.cache[count] = backbone
@@ -203,20 +203,20 @@ class ShearModes:
     - points (a,): Indices of the contact set.
     - shape (a, r): Slide of a point per unit of a modal coordinate.
     - stiffness (r,): Stiffness of the coordinates [N/m].
-    - of: All modes.
+    - spectrum: All modes.
     """
 
     points: np.ndarray
     shape: np.ndarray
     stiffness: np.ndarray
-    of: Spectrum
+    spectrum: Spectrum
 
     @cached_property
     def backbone_error(self) -> float:
         """Largest error of the force / friction limit, compared with 64 or four times as many modes."""
         count = self.stiffness.size
-        return self.of.relative_difference(
-            self.of.backbone(max(64, 4 * count)), self.of.backbone(count)
+        return self.spectrum.relative_difference(
+            self.spectrum.backbone(max(64, 4 * count)), self.spectrum.backbone(count)
         )
 
 
@@ -264,17 +264,19 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         c = _block(tangential, points)
         if local_length:
             c = c + np.diag(local_length / force)
-        sequence, yield_slides, reluctant = _find_order(c, force)
-    starts = np.flatnonzero(np.diff(yield_slides, prepend=-np.inf) > SAME_YIELD_TOL * yield_slides)
+        sequence, yield_displacements, n_reluctant = _find_order(c, force)
+    starts = np.flatnonzero(
+        np.diff(yield_displacements, prepend=-np.inf) > SAME_YIELD_TOL * yield_displacements
+    )
     return JenkinsSet(
         frozen_array(np.add.reduceat(sequence.root[::-1] ** 2, starts)),
-        frozen_array(yield_slides[starts]),
+        frozen_array(yield_displacements[starts]),
         frozen_array(points, np.int64),
         frozen_array(force),
         sequence.order,
         sequence.low,
         starts,
-        reluctant,
+        n_reluctant,
     )
 
 
@@ -284,14 +286,14 @@ class _Sequence(NamedTuple):
     - order (n,): Indices of the points.
     - low (n, n): Lower Cholesky factor L of the compliance in that order.
     - root, pull (n,): L^-1 1 and L' force.
-    - slides (n,): Slides of the yields [m], pull/root.
+    - displacements (n,): Slides of the yields [m], pull/root.
     """
 
     order: np.ndarray
     low: np.ndarray
     root: np.ndarray
     pull: np.ndarray
-    slides: np.ndarray
+    displacements: np.ndarray
 
     @property
     def is_sorted(self) -> bool:
@@ -299,7 +301,9 @@ class _Sequence(NamedTuple):
 
         This is the condition that the order of the points is right.
         """
-        return bool((self.slides[1:] <= self.slides[:-1] * (1 + SAME_YIELD_TOL)).all())
+        return bool(
+            (self.displacements[1:] <= self.displacements[:-1] * (1 + SAME_YIELD_TOL)).all()
+        )
 
 
 def _find_order(c: np.ndarray, force: np.ndarray) -> tuple:
@@ -309,17 +313,17 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> tuple:
     first has the wrong sign.
 
     While the first m points of an order stick, their rates solve the leading block of c = L L'. Thus the force that all
-    points lose by the m-th yield is the m-th row of L^-1 times (L^-1 1)_m, and the slides of the yields are
+    points lose by the m-th yield is the m-th row of L^-1 times (L^-1 1)_m, and the displacements of the yields are
     (L' force)/(L^-1 1). An order is right if these increase, as a rate only grows until its point yields. The first
-    order is that of the rates without yields, the next ones are those of the slides. Remaining errors are mended by
+    order is that of the rates without yields, the next ones are those of the displacements. Remaining errors are mended by
     exchanging neighbours, and at last by eliminating the points one by one.
     """
     rate = dpotrs(_factorise(c), np.ones(force.size), lower=1)[0]
-    order, slides = np.arange(force.size), _divide_or_inf(force, rate)
+    order, displacements = np.arange(force.size), _divide_or_inf(force, rate)
     for _ in range(MAX_SORTS + 1):
-        order = order[np.argsort(-slides, kind="stable")]
+        order = order[np.argsort(-displacements, kind="stable")]
         sequence = _yield_sequence(c, force, order)
-        slides = sequence.slides
+        displacements = sequence.displacements
         if sequence.is_sorted:
             break
     else:
@@ -327,7 +331,7 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> tuple:
         if exchanged is None:
             exchanged = _yield_sequence(c, force, _eliminate_points(c, force))
         sequence = exchanged
-    increasing = np.maximum.accumulate(sequence.slides[::-1])
+    increasing = np.maximum.accumulate(sequence.displacements[::-1])
     return sequence, increasing, int((rate <= 0).sum())
 
 
@@ -353,12 +357,12 @@ def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
     """
     low = sequence.low
     order, root, pull = (part.tolist() for part in (sequence.order, sequence.root, sequence.pull))
-    slides = sequence.slides.tolist()
+    displacements = sequence.displacements.tolist()
     pending, remaining = list(range(len(order) - 1))[::-1], MAX_EXCHANGES * len(order)
     while pending:
         k = pending.pop()
         is_neighbour = 0 <= k < len(order) - 1
-        if not (is_neighbour and slides[k + 1] > slides[k] * (1 + SAME_YIELD_TOL)):
+        if not (is_neighbour and displacements[k + 1] > displacements[k] * (1 + SAME_YIELD_TOL)):
             continue
         remaining -= 1
         if remaining < 0:
@@ -374,9 +378,9 @@ def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
         order[both] = order[both][::-1]
         for part in (root, pull):
             part[both] = c * part[k] + s * part[k + 1], s * part[k] - c * part[k + 1]
-        slides[both] = [a / b if b > 0 else np.inf for a, b in zip(pull[both], root[both])]
+        displacements[both] = [a / b if b > 0 else np.inf for a, b in zip(pull[both], root[both])]
         pending += [k + 1, k - 1]
-    return _Sequence(*map(np.array, (order, low, root, pull, slides)))
+    return _Sequence(*map(np.array, (order, low, root, pull, displacements)))
 
 
 def _factorise(c: np.ndarray) -> np.ndarray:
@@ -413,7 +417,7 @@ def scale_limits(elements: JenkinsSet, factor: float) -> JenkinsSet:
     """Return elements with `factor` > 0 times the yield forces and the same springs."""
     return replace(
         elements,
-        yield_slide=frozen_array(factor * elements.yield_slide),
+        yield_displacement=frozen_array(factor * elements.yield_displacement),
         limit=frozen_array(factor * elements.limit),
     )
 
@@ -657,7 +661,7 @@ def fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> G
         if on_gauss.error <= tolerance:
             return on_gauss
     every_point = frozen_array(np.arange(x.size), np.int64)
-    return GaussModes(replace(modes, points=every_point), modes.of.limit, 0.0)
+    return GaussModes(replace(modes, points=every_point), modes.spectrum.limit, 0.0)
 
 
 def modes_on_gauss(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
@@ -670,7 +674,7 @@ def modes_on_gauss(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
         Positions of the points [m].
     count : int
     """
-    spectrum, n_modes = modes.of, modes.stiffness.size
+    spectrum, n_modes = modes.spectrum, modes.stiffness.size
     positions, limit = gauss_rule(x, spectrum.limit, count)
     shape = np.stack([np.interp(positions, x, mode) for mode in modes.shape.T], axis=1)
     error = spectrum.relative_difference(
@@ -714,7 +718,7 @@ class _Backbone(NamedTuple):
     coordinates: np.ndarray
 
 
-def _solve_backbone(limit, shape, values, length, slides, start) -> _Backbone:
+def _solve_backbone(limit, shape, values, length, displacements, start) -> _Backbone:
     """Solve for first loading at all relative displacements (k,) by Newton's method.
 
     The law D (1 - exp(-xi/length)) saturates.
@@ -722,20 +726,20 @@ def _solve_backbone(limit, shape, values, length, slides, start) -> _Backbone:
     The coordinates `start` (k, r) are overwritten. No step moves a point back by more than MAX_BACK_STEP lengths,
     because the law is so steep there that Newton's method does not return.
     """
-    coordinates, pending, n_modes = start, np.arange(slides.size), values.size
+    coordinates, pending, n_modes = start, np.arange(displacements.size), values.size
     first, second = np.tril_indices(n_modes)
     products = (shape.T[first] * shape.T[second]).T
     entries = np.empty((n_modes, n_modes), np.int64)
     entries[first, second] = entries[second, first] = np.arange(first.size)
     for _ in range(400):
-        xi = slides[pending, None] - coordinates[pending] @ shape.T
+        xi = displacements[pending, None] - coordinates[pending] @ shape.T
         decay = np.exp(np.minimum(-xi / length, 700.0))
         residual = coordinates[pending] / values - (limit * (1 - decay)) @ shape
         tangent = ((limit * decay / length) @ products)[:, entries] + np.diag(1 / values)
         try:
             step = np.linalg.solve(tangent, residual[:, :, None])[:, :, 0]
         except np.linalg.LinAlgError:
-            return _Backbone(np.full(slides.size, np.nan), coordinates)
+            return _Backbone(np.full(displacements.size, np.nan), coordinates)
         change = step @ shape.T
         backward = np.where(change < 0, -change, 1.0)
         part = np.where(change < 0, (xi + MAX_BACKWARD_LENGTHS * length) / backward, 1.0).min(
@@ -749,7 +753,7 @@ def _solve_backbone(limit, shape, values, length, slides, start) -> _Backbone:
         pending = pending[~is_converged]
         if not pending.size:
             break
-    xi = slides[:, None] - coordinates @ shape.T
+    xi = displacements[:, None] - coordinates @ shape.T
     force = -np.expm1(np.minimum(-xi / length, 700.0)) @ limit
     force[pending] = np.nan
     return _Backbone(force, coordinates)

@@ -51,9 +51,9 @@ class WearState:
     - path: slip path (m,) [m] of the next cycle
     - trend: change (m,) [m] of the slip path per cycle over the last jump
     - length: length of the next automatic jump in cycles
-    - rough: worn depth (m,) [m] by the same jumps without halving
-    - strayed: sum [m] of the errors from the change of the slip path within the jumps
-    - used: slip path (m,) [m] that the last jump took
+    - coarse_depth: worn depth (m,) [m] by the same jumps without halving
+    - path_error: sum [m] of the errors from the change of the slip path within the jumps
+    - jump_path: slip path (m,) [m] that the last jump took
     """
 
     cycle: float
@@ -62,14 +62,14 @@ class WearState:
     path: np.ndarray
     trend: np.ndarray
     length: float
-    rough: np.ndarray
-    strayed: float
-    used: np.ndarray
+    coarse_depth: np.ndarray
+    path_error: float
+    jump_path: np.ndarray
 
     @property
     def error(self) -> float:
-        """Error [m] of the depth from the length of the jumps: the change by halving all of them, and `strayed`."""
-        return float(np.abs(self.depth - self.rough).max()) + self.strayed
+        """Error [m] of the depth from the length of the jumps: the change by halving all of them, and `path_error`."""
+        return float(np.abs(self.depth - self.coarse_depth).max()) + self.path_error
 
 
 def start_wear(problem: WearProblem, depth=None) -> WearState:
@@ -94,9 +94,9 @@ def start_wear(problem: WearProblem, depth=None) -> WearState:
         path=problem.path(depth),
         trend=zero,
         length=FIRST_JUMP_FRACTION * problem.cycles,
-        rough=depth,
-        strayed=0.0,
-        used=zero,
+        coarse_depth=depth,
+        path_error=0.0,
+        jump_path=zero,
     )
 
 
@@ -174,7 +174,7 @@ def _correct_path(
         again,
         path=path,
         trend=(path - state.path) / length,
-        strayed=state.strayed + path_error,
+        path_error=state.path_error + path_error,
     )
     return corrected, max(error, path_error / max(tolerance * scale, MIN_DEPTH))
 
@@ -187,11 +187,16 @@ def _take_halves(
     whole, whole_force = solve_jump(problem.press, state.depth, rate, length)
     half, _ = solve_jump(problem.press, state.depth, rate, length / 2)
     depth, force = solve_jump(problem.press, half, rate, length / 2)
-    rough = whole
-    if state.rough is not state.depth:
-        rough, _ = solve_jump(problem.press, state.rough, rate, length)
+    coarse_depth = whole
+    if state.coarse_depth is not state.depth:
+        coarse_depth, _ = solve_jump(problem.press, state.coarse_depth, rate, length)
     after = replace(
-        state, cycle=state.cycle + length, depth=depth, force=force, rough=rough, used=path
+        state,
+        cycle=state.cycle + length,
+        depth=depth,
+        force=force,
+        coarse_depth=coarse_depth,
+        jump_path=path,
     )
     depth_limit = tolerance * max(float(depth.max()), MIN_DEPTH)
     depth_error = float(np.abs(depth - whole).max()) / RICHARDSON_DIVISOR / depth_limit

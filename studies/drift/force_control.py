@@ -19,7 +19,7 @@ def held_at(engine, state, target: float, sigma, dt: float = 1.0, length: float 
     def after(dq):
         # the sum over the bonds once, not at every Gauss point of the increment
         if isinstance(engine, Quadrature):
-            return engine.carried(state, dq, sigma, sigma, dt)
+            return engine.advance(state, dq, sigma, sigma, dt)
         return engine.step(state, dq, sigma, sigma, dt).state
 
     def miss(dq):

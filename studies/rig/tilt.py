@@ -41,13 +41,13 @@ def main(tilts=TILTS, cycles: float = 200) -> list:
         patch = found.patch
         per_node = 0.30 * patch.pressure.sigma_n * patch.pieces.interface.weight
         group = jenkins_set(patch.pieces.tangential, per_node)
-        share = np.cumsum(group.stiffness * group.yield_slide) / per_node.sum()
+        share = np.cumsum(group.stiffness * group.yield_displacement) / per_node.sum()
         row = {
             "tilt": angle,
             "thresholds": (
-                group.yield_slide[0],
-                float(np.interp(0.5, share, group.yield_slide)),
-                group.yield_slide[-1],
+                group.yield_displacement[0],
+                float(np.interp(0.5, share, group.yield_displacement)),
+                group.yield_displacement[-1],
             ),
         }
         for name in (

@@ -28,8 +28,8 @@ def test_exact_friction_work_by_quadrature(mu, steep):
             )[0]
             for a, b in pairwise(edges)
         )
-        assert g.lost(q0, q1, mu) == pytest.approx(true, rel=1e-9, abs=1e-22)
-        assert g.rise(q0, q1) == pytest.approx(g.height(q1) - g.height(q0), abs=1e-18)
+        assert g.friction_loss(q0, q1, mu) == pytest.approx(true, rel=1e-9, abs=1e-22)
+        assert g.height_difference(q0, q1) == pytest.approx(g.height(q1) - g.height(q0), abs=1e-18)
 
 
 @pytest.mark.parametrize("way", [-1, 1])
@@ -39,8 +39,10 @@ def test_exact_ratio_by_the_statics_of_the_flank(way):
     angle = np.arctan(g.slope(q))
     push = np.sin(angle) + way * mu * np.cos(angle)
     carried = np.cos(angle) - way * mu * np.sin(angle)
-    np.testing.assert_allclose(g.ratio(q, way, mu), push / carried, rtol=1e-13)
-    np.testing.assert_allclose(g.ratio(q, way, mu), np.tan(angle + way * np.arctan(mu)), rtol=1e-12)
+    np.testing.assert_allclose(g.force_ratio(q, way, mu), push / carried, rtol=1e-13)
+    np.testing.assert_allclose(
+        g.force_ratio(q, way, mu), np.tan(angle + way * np.arctan(mu)), rtol=1e-12
+    )
 
 
 def test_exact_slope_stiffness_and_capacity():
@@ -48,11 +50,13 @@ def test_exact_slope_stiffness_and_capacity():
     q = np.linspace(0, 80e-6, 2001)
     np.testing.assert_allclose(g.slope(q), (g.height(q + d) - g.height(q - d)) / (2 * d), atol=1e-5)
     assert g.stiffness(load) == pytest.approx(load * (g.slope(d) - g.slope(-d)) / (2 * d), rel=1e-9)
-    assert g.capacity(load, mu) == pytest.approx(load * g.ratio(q, 1, mu).max(), rel=1e-6)
-    assert Grooves(80e-6, 7.5e-6).capacity(load, 2.0) == np.inf
+    assert g.max_force(load, mu) == pytest.approx(load * g.force_ratio(q, 1, mu).max(), rel=1e-6)
+    assert Grooves(80e-6, 7.5e-6).max_force(load, 2.0) == np.inf
     for one in (g, Grooves(80e-6, 1e-6)):  # the flanks of the second are less steep than the worst
         t = one.slope(q)
-        assert one.least_mass(mu) == pytest.approx((t * (t - mu) / (1 + mu * t)).min(), rel=1e-5)
+        assert one.min_mass_ratio(mu) == pytest.approx(
+            (t * (t - mu) / (1 + mu * t)).min(), rel=1e-5
+        )
 
 
 @pytest.mark.parametrize("share", [0.5, 0.2])
@@ -60,10 +64,10 @@ def test_exact_what_is_worn_off_is_what_the_flanks_lose(share):
     """Per area: the volume between the cosines of both pieces and their valleys, before and after a mean depth."""
     q, depth, g = np.linspace(0, 80e-6, 1000, endpoint=False), 3e-6, Grooves(80e-6, 7.5e-6)
     pieces = [
-        g.worn(depth, share) if larger else g.worn(depth * part / (1 - part), share)
+        g.after_wear(depth, share) if larger else g.after_wear(depth * part / (1 - part), share)
         for larger, part in ((True, max(share, 1 - share)), (False, min(share, 1 - share)))
     ]
     left = sum(float(one.height(q).mean()) for one in pieces)
     assert 2 * g.height(q).mean() - left == pytest.approx(depth, rel=1e-12)
-    assert g.worn(depth, share).amplitude == min(one.amplitude for one in pieces)
-    assert g.worn(7.6e-6 / max(share, 1 - share), share) is None
+    assert g.after_wear(depth, share).amplitude == min(one.amplitude for one in pieces)
+    assert g.after_wear(7.6e-6 / max(share, 1 - share), share) is None

@@ -216,13 +216,13 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
         limit = mu * solve_forces(pair.normal, x, gap + worn, np.array([load]))[0]
         group = jenkins_set(pair.tangential, limit)
         slide = brentq(
-            lambda q: group.stiffness @ np.minimum(q, group.yield_slide) - 0.6 * mu * load,
+            lambda q: group.stiffness @ np.minimum(q, group.yield_displacement) - 0.6 * mu * load,
             0.0,
-            group.yield_slide[-1],
+            group.yield_displacement[-1],
             xtol=1e-22,
         )
         shear = np.zeros(x.size)
-        shear[group.points] = group.share @ np.minimum(slide, group.yield_slide)
+        shear[group.points] = group.force_matrix @ np.minimum(slide, group.yield_displacement)
         slips = (limit > 0) & (shear > limit * (1 - 1e-9))
         return np.where(slips, 4 * np.abs(slide - pair.tangential @ shear), 0.0)
 

@@ -49,13 +49,13 @@ def test_exact_the_order_is_that_of_a_system_solved_anew_after_every_yield(
     limit, c = r.uniform(0.5, 2, count), half_plane(count)
     group = jenkins_set(c, limit, local)
     at, rates = yielded(c + np.diag(local / limit), limit)
-    assert group.yield_slide == pytest.approx(at, rel=1e-11)
+    assert group.yield_displacement == pytest.approx(at, rel=1e-11)
     share = -np.diff(rates, axis=0, append=np.zeros((1, count))).T
-    np.testing.assert_allclose(group.share, share, rtol=0, atol=1e-11 * np.abs(rates).max())
+    np.testing.assert_allclose(group.force_matrix, share, rtol=0, atol=1e-11 * np.abs(rates).max())
     np.testing.assert_allclose(
         group.stiffness, share.sum(axis=0), rtol=0, atol=1e-11 * rates.sum(axis=1).max()
     )
-    assert group.reluctant == np.sum(rates[0] <= 0)
+    assert group.n_reluctant == np.sum(rates[0] <= 0)
 
 
 @pytest.mark.parametrize("count", [8, 400])
@@ -64,14 +64,19 @@ def test_exact_mirrored_points_yield_at_once(count):
     apart = np.abs(np.subtract.outer(np.arange(float(count)), np.arange(float(count))))
     c = np.log(3 * count / np.where(apart > 0, apart, 0.3))
     group = jenkins_set(c, np.ones(count))
-    assert group.yield_slide.size == count // 2 and np.count_nonzero(group.share[:, 0]) == count
-    np.testing.assert_allclose(
-        group.share[: count // 2],
-        group.share[: count // 2 - 1 : -1],
-        rtol=0,
-        atol=1e-12 * group.share.max(),
+    assert (
+        group.yield_displacement.size == count // 2
+        and np.count_nonzero(group.force_matrix[:, 0]) == count
     )
-    np.testing.assert_allclose(group.share @ group.yield_slide, np.ones(count), rtol=1e-12)
+    np.testing.assert_allclose(
+        group.force_matrix[: count // 2],
+        group.force_matrix[: count // 2 - 1 : -1],
+        rtol=0,
+        atol=1e-12 * group.force_matrix.max(),
+    )
+    np.testing.assert_allclose(
+        group.force_matrix @ group.yield_displacement, np.ones(count), rtol=1e-12
+    )
 
 
 def test_refuses_a_compliance_that_is_not_positive_definite():

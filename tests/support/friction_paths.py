@@ -74,7 +74,7 @@ def pulled(law, path, pressure, dt=1.0) -> Pulled:
     state, rows = law.start(pressure(path[0])), []
     for k, dq in enumerate(np.diff(path)):
         given = state, float(dq), pressure(path[k]), pressure(path[k + 1]), float(times[k])
-        state = law.carried(*given) if isinstance(law, Quadrature) else law.step(*given).state
+        state = law.advance(*given) if isinstance(law, Quadrature) else law.step(*given).state
         rows.append(law.traction(state))
     return Pulled(np.array(rows), state)
 
@@ -88,7 +88,7 @@ def lengths_by_hand(law, path, times):
     """(length at the knots, length half way through each step): 2.10 at constant speed, solved in closed form."""
     knots, middles = [law.length], []
     for dq, dt in zip(np.diff(path), times):
-        if not law.grows or dt == 0:
+        if not law.has_growth or dt == 0:
             middles.append(knots[-1])
             knots.append(knots[-1])
             continue
@@ -128,7 +128,7 @@ def sum_by_hand(law, path, pressure, dt=1.0, pieces=None):
         if law.reading == "stretch":
             harm = harm_after[k + 1] + (1 - part) * abs(dq) / middles[k]
             f = (np.abs(u) / middles[k]) ** law.order * np.exp(-harm)
-        elif not law.grows:
+        elif not law.has_growth:
             f = (travel / law.length) ** law.order * np.exp(-travel / law.length)
         else:
             own = np.zeros_like(part)

@@ -83,7 +83,7 @@ def energy_by_hand(law, path, dt=1.0):
             f = (u / middles[k]) ** law.order * np.exp(-harm) / (law.order + 1)
         else:
             own = np.full(part.size, law.length)
-            if law.grows:
+            if law.has_growth:
                 own = np.zeros(part.size)
                 for j in range(k, len(steps)):
                     span = times[j] * (1 - part if j == k else 1.0)

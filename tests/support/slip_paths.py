@@ -9,7 +9,7 @@ def elements(group, path):
     """Resultant [N] at every reversal of parallel elements, each a spring in series with a slider."""
     settled, out = np.zeros(group.stiffness.size), []
     for q in path:
-        stretch = np.clip(q - settled, -group.yield_slide, group.yield_slide)
+        stretch = np.clip(q - settled, -group.yield_displacement, group.yield_displacement)
         settled = q - stretch
         out.append(group.stiffness @ stretch)
     return np.array(out)

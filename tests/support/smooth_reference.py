@@ -33,7 +33,7 @@ def rate_form(law: motion_laws.Law, start=(0.0,)) -> RateForm:
 def bonds(law, load) -> RateForm:
     """Return the rate form of `Bonds` in the stretch reading, p = 1."""
     keys = {"bond_length": law.length, "static": law.static, "kinetic": law.ratio * law.static}
-    if law.grows:
+    if law.has_growth:
         names = ("rest_growth", "slip_growth", "rest_speed")
         keys |= {name: getattr(law, name) for name in names}
     if law.initial < 1.0:

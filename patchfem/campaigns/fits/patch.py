@@ -309,7 +309,7 @@ def _elements(model: Model, patch) -> Elements:
         strips = strip_elements(patch, friction.static, element.length)
         return Elements(*map(np.concatenate, zip(*strips)))
     found = elements(patch, friction.static, element.length)
-    return Elements(found.stiffness, found.yield_slide)
+    return Elements(found.stiffness, found.yield_displacement)
 
 
 def _refuse(model: Model) -> None:

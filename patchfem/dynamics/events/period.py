@@ -134,7 +134,7 @@ class PeriodMap:
         memory = copied(point.memory)
         memory.place[:] = self.faces @ point.motion[: self.n]
         for f, one in enumerate(self.groups):
-            share = one.stiffness * one.yield_slide
+            share = one.stiffness * one.yield_displacement
             memory.slip[f] = (
                 share
                 @ (memory.place[f] - sorted_stretches(one, memory, f))

@@ -28,12 +28,12 @@ def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
     """Raise PatchfemError where friction under the lifted mass takes all of the mass that slides, 1 + m s t (t - mu)/(1
     + mu t) <= 0 on some flank, s [1/kg] the slide's acceleration per newton."""
     own = modes.mass / float(modes.slide @ modes.slide)
-    taken = -grooves.lifted_mass * grooves.least_mass(static)
+    taken = -grooves.lifted_mass * grooves.min_mass_ratio(static)
     if taken >= own:
         raise PatchfemError(
             f"a lifted mass of {grooves.lifted_mass:.6g} kg presses so hard on the downward flank that "
             f"friction exceeds the inertia of the sliding mass of {own:.6g} kg, and the motion is then "
-            f"not determined; the lifted mass must be below {own / -grooves.least_mass(static):.6g} "
+            f"not determined; the lifted mass must be below {own / -grooves.min_mass_ratio(static):.6g} "
             "kg",
             f"{grooves.key}.lifted_mass",
         )
@@ -98,7 +98,7 @@ class FlankModel:
     @property
     def limit(self) -> float:
         """Scale of the residuals [N]: the largest force of the steepest flank."""
-        return self.grooves.capacity(self.load, self.static)
+        return self.grooves.max_force(self.load, self.static)
 
     @property
     def reduction(self):
@@ -153,7 +153,9 @@ class ClimbingModel(FlankModel):
         """The Climbing with arrays of its own, at rest at the slide 0."""
         g = self.grooves
         share = np.array(self.share, float)
-        flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, self.law.kind])
+        flank = np.array(
+            [self.load, g.wave_number, g.amplitude, g.phase, g.lifted_mass, self.law.kind]
+        )
         normal = self.load * np.hypot(1.0, float(g.slope(0.0)))
         now_at = np.zeros(14)
         now_at[[VERTICAL, BEFORE, NORMAL]] = self.load, normal, normal
@@ -203,7 +205,7 @@ class GroovesRun(Run):
             )
             @ modes.slide
         )
-        lift = g.slope(out.slide) * along + g.bend(out.slide) * out.slide_rate**2
+        lift = g.slope(out.slide) * along + g.slope_derivative(out.slide) * out.slide_rate**2
         return replace(
             out, extra=out.extra | {"normal_load": self.model.load + g.lifted_mass * lift}
         )

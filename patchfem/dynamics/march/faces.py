@@ -45,7 +45,7 @@ def faces_of(model, prop, modal_system, mass: float):
         np.zeros((18, m)),
     )
     each = np.zeros((10, e))
-    each[6] = [one.limit if one.bounded else np.inf for one in elements]
+    each[6] = [one.limit if one.is_bounded else np.inf for one in elements]
     each[7] = [GOAL * (one.limit or max(scale, 1e-300)) for one in elements]
     modal = np.zeros((5, n))
     modal[0] = modal_system.push[0] / mass

@@ -128,7 +128,7 @@ class ContactModel:
 
 def element_model(element: Element, reduction=None) -> ContactModel:
     """A contact of one law on one slide."""
-    bound = element.limit if element.bounded else np.inf
+    bound = element.limit if element.is_bounded else np.inf
     fields = {
         "num": element.numbers[None],
         "mem": element.memory[None],
@@ -158,9 +158,9 @@ def coulomb_model(static: float, kinetic: float) -> ContactModel:
     return element_model(Coulomb(kinetic, static).element(1.0))
 
 
-def jenkins_model(stiffness, yield_slide, reduction=None) -> ContactModel:
+def jenkins_model(stiffness, yield_displacement, reduction=None) -> ContactModel:
     """Parallel Jenkins elements (t,) [N/m], [m]."""
-    return element_model(parallel_element(stiffness, yield_slide), reduction)
+    return element_model(parallel_element(stiffness, yield_displacement), reduction)
 
 
 def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:

@@ -197,7 +197,7 @@ def elements_of(model: Model) -> Elements:
     chosen = numerics.by_pieces(model, numerics.choose(model))
     groups = pieces.YieldingElements(model, chosen, patch).groups
     stiffness = np.concatenate([one.stiffness for one in groups])
-    limit = np.concatenate([one.stiffness * one.yield_slide for one in groups])
+    limit = np.concatenate([one.stiffness * one.yield_displacement for one in groups])
     direction = np.repeat(rows, [one.stiffness.size for one in groups], axis=0)
     return Elements("elements", direction, limit, stiffness, none)
 

@@ -145,7 +145,7 @@ def _merge_error_factor(law: Bonds) -> float:
     form = sum_form(law)
     if form == FORM_REPORT_GROWING:
         return MERGE_ERROR_PRINTED_GROWING
-    if law.grows:
+    if law.has_growth:
         return MERGE_ERROR_GROWING
     if form == FORM_REPORT and law.order < 1:
         return MERGE_ERROR_PRINTED_FRACTIONAL

@@ -21,7 +21,7 @@ def sum_form(law: Bonds) -> float:
     """Return the form of the sum over bonds that a law needs, see `list_rows_kernels`."""
     if law.reading == "stretch":
         return FORM_MOMENTS if law.order == 1 else FORM_POWER
-    return FORM_REPORT_GROWING if law.grows else FORM_REPORT
+    return FORM_REPORT_GROWING if law.has_growth else FORM_REPORT
 
 
 def cutoff_age(order: float, tail: float) -> float:

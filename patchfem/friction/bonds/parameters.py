@@ -42,7 +42,7 @@ class Bonds:
     breakaway: float = 0.0
 
     @property
-    def grows(self) -> bool:
+    def has_growth(self) -> bool:
         """Whether the bond length changes by eq. 2.10; else it is eps_0."""
         return self.rest_growth is not None
 
@@ -81,7 +81,7 @@ def growth_path_ratio(law: Bonds, speed: float) -> float:
     With this ratio a, the friction for reading="report" is mu (eps/eps_0) G(a; p). Eqs. 2.18 to 2.21 hold for small a,
     within 1.5 % up to 0.1 for p = 0 and 1; for a above 1 the friction itself vanishes.
     """
-    if not law.grows or speed == 0:
+    if not law.has_growth or speed == 0:
         return 0.0
     healing = law.rest_growth / speed**2
     weakening = 1 / law.slip_growth
@@ -172,7 +172,7 @@ def grow(law: Bonds, eps, v0: float, v1: float, increment: float, dt: float):
     float or (m,) array
         Bond length [m], at most eps_0.
     """
-    if not law.grows:
+    if not law.has_growth:
         return law.length
     healing, weakening = growth_exponents(law, v0, v1, increment, dt)
     total = healing + weakening

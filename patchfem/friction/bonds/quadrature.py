@@ -77,7 +77,7 @@ class Quadrature:
         reading="stretch" its component along the increment comes from the energy, so no step creates energy.
         """
         dq = np.atleast_1d(np.asarray(dq, float))
-        after = self.carried(state, dq, s0, s1, dt)
+        after = self.advance(state, dq, s0, s1, dt)
         before, end = self.stored(state), self.stored(after)
         gain = end - before
         if not dq.any():
@@ -97,7 +97,7 @@ class Quadrature:
                 end
                 if (s1 > 0).all()
                 else self.stored(
-                    self.carried(
+                    self.advance(
                         state,
                         dq,
                         s0,
@@ -130,7 +130,7 @@ class Quadrature:
         for a, b in pairwise(edges):
             for place, w in zip((a + b + (b - a) * _NODES) / 2, (b - a) / 2 * _WEIGHTS):
                 part = free + (1 - free) * place / length
-                here = self.carried(
+                here = self.advance(
                     state, part * dq, s0, s0 + part * (s1 - s0), part * dt, forming=(s0 + s1) / 2
                 )
                 sums = self.law.static * self._sums(here)
@@ -199,7 +199,7 @@ class Quadrature:
         sums[-1] *= 2
         return np.vstack([_summed(state, surviving_density(state)[:, None]), sums])
 
-    def carried(self, state: Strips, dq, s0, s1, dt: float, forming=None) -> Strips:
+    def advance(self, state: Strips, dq, s0, s1, dt: float, forming=None) -> Strips:
         """Return the bonds after an increment, without the means that `step` computes.
 
         This takes at most a tenth of the time of `step`. forming (m,) [Pa]: pressure at which new bonds form; by default
@@ -211,7 +211,7 @@ class Quadrature:
         speed = distance / dt if dt > 0 else 0.0
         middle = self._middle(state, dq, dt)
         length, way, play = self._damaging(state, dq, middle)
-        total = sum(growth_exponents(law, speed, speed, distance, dt)) if law.grows else 0.0
+        total = sum(growth_exponents(law, speed, speed, distance, dt)) if law.has_growth else 0.0
         now = (
             q + dq,
             path + length,

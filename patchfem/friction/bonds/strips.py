@@ -84,7 +84,7 @@ def strip_weights(state: Strips, law: Bonds) -> np.ndarray:
     if law.order == 1 and law.reading == "stretch":
         out[rest] = _stretch(state, rest, law)
         return out
-    if law.reading == "report" and not law.grows:
+    if law.reading == "report" and not law.has_growth:
         straight = _seen(state, rest)[1] == 0
         out[rest[straight]] = _sum_report_strips(state, rest[straight], law)
         rest = rest[~straight]
@@ -200,7 +200,7 @@ def _points(state: Strips, at, back, weight, law: Bonds) -> np.ndarray:
 
 def _own(state: Strips, at, back, law: Bonds):
     """Return the bond lengths (n, points) for reading="report": constant, or grown from zero."""
-    if not law.grows:
+    if not law.has_growth:
         return law.length
     part, (won, grown) = back / state.length[at][:, None], state.gain[:, at][..., None]
     age = state.now[3] - state.growth[at][:, None] + part * won

@@ -40,7 +40,7 @@ class BoucWen:
             self.static * load,
             self.length,
             form="flow",
-            sizes=(1.0,),
+            state_scales=(1.0,),
         )
 
     def stroke(self, w) -> tuple:

@@ -128,14 +128,14 @@ class Convolution:
     pattern: np.ndarray | None = None
     kept: dict = field(default_factory=dict)
     # the law has no stretch, so the load may change within a step of the motion
-    at_once: ClassVar[bool] = True
-    holds: ClassVar[bool] = True  # the last traction at rest
+    can_change_load: ClassVar[bool] = True
+    has_force_at_rest: ClassVar[bool] = True  # the last traction at rest
 
     def start(self, sigma) -> ConvolutionState:
         """Return the state before any motion: no traction, under a pressure sigma (m,) [Pa]."""
         return ConvolutionState(np.zeros_like(sigma), 0.0, 0.0)
 
-    def share(self, dq, dt):
+    def limit_fraction(self, dq, dt):
         """Return the fraction of the limit that is carried in increments dq [m]; 0 at rest."""
         return np.sign(dq)
 

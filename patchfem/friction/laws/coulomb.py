@@ -12,12 +12,12 @@ from ..protocol import Element, LastTraction, Step
 class Coulomb(LastTraction):
     """Set-valued kinetic friction under prescribed motion; at rest the last traction is kept.
 
-    `static` is what the contact carries at the instant a rest ends (`breaking`); it does no work.
+    `static` is what the contact carries at the instant a rest ends (`breakaway_traction`); it does no work.
     """
 
     kinetic: float
     static: float | None = None
-    holds: ClassVar[bool] = True  # the last traction at rest
+    has_force_at_rest: ClassVar[bool] = True  # the last traction at rest
 
     def element(self, load: float) -> Element:
         """Return the Element of a contact under a constant load [N]: static and kinetic force.
@@ -29,7 +29,7 @@ class Coulomb(LastTraction):
             "", np.array([0.0, static * load, self.kinetic * load]), np.zeros(1), static * load
         )
 
-    def share(self, dq, dt):
+    def limit_fraction(self, dq, dt):
         """Return the fraction of the limit that is carried in increments dq [m]; 0 at rest."""
         return np.sign(dq)
 
@@ -49,7 +49,7 @@ class Coulomb(LastTraction):
         mean = self.kinetic * (s0 + s1) / 2 * np.sign(dq)
         return Step(mean, mean * dq, self.kinetic * s1 * np.sign(dq))
 
-    def breaking(self, sigma, direction: float):
+    def breakaway_traction(self, sigma, direction: float):
         """Return the traction mu_s sigma (m,) [Pa] at the instant at which a rest ends.
 
         direction: sign of the motion.

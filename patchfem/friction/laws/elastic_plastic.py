@@ -84,13 +84,13 @@ class ElasticPlastic:
         )
 
 
-def parallel_element(stiffness, yield_slide) -> Element:
+def parallel_element(stiffness, yield_displacement) -> Element:
     """Return the Element of parallel elastic-plastic elements (eq. 3.12 with reversal).
 
-    stiffness (t,) [N/m]; yield_slide (t,) [m], the stretch at which each slips. The Element has the sum of their slip
+    stiffness (t,) [N/m]; yield_displacement (t,) [m], the stretch at which each slips. The Element has the sum of their slip
     forces as its limit. Kernels: `elastic_plastic_kernels`.
     """
-    k, most = (np.asarray(part, float) for part in (stiffness, yield_slide))
+    k, most = (np.asarray(part, float) for part in (stiffness, yield_displacement))
     limit, total = float(k @ most), float(k.sum())
     numbers = np.concatenate([[0.0, k.size], k, most])
     return Element(
@@ -103,14 +103,16 @@ def parallel_element(stiffness, yield_slide) -> Element:
     )
 
 
-def masing_loop(stiffness, yield_slide, slide) -> tuple:
+def masing_loop(stiffness, yield_displacement, slide) -> tuple:
     """Return the force at the reversals [N] and the area [J] of the steady loops of elements.
 
     The elements (t,) are in parallel; the displacement amplitudes u [m] have any shape. An element has the force
     k min(u, w), and the area 4 k w (u - w) where it slips.
     """
-    slips = np.maximum(np.asarray(slide)[..., None] - yield_slide, 0.0)
-    return slide * np.sum(stiffness) - slips @ stiffness, 4 * slips @ (stiffness * yield_slide)
+    slips = np.maximum(np.asarray(slide)[..., None] - yield_displacement, 0.0)
+    return slide * np.sum(stiffness) - slips @ stiffness, 4 * slips @ (
+        stiffness * yield_displacement
+    )
 
 
 def loop_from_keys(friction, load: float, slide) -> tuple:

@@ -30,17 +30,17 @@ class Iwan:
     """Parallel elements of a contact per newton of normal load.
 
     - stiffness (t,): [1/m]
-    - yield_slide (t,): yield displacement [m]
+    - yield_displacement (t,): yield displacement [m]
 
     All points of a contact have the same relative displacement and the same stretches.
     """
 
     stiffness: np.ndarray
-    yield_slide: np.ndarray
+    yield_displacement: np.ndarray
 
     def element(self, load: float) -> Element:
         """Return the Element under a constant load [N]: the parallel elements of `elastic_plastic`."""
-        return parallel_element(self.stiffness * load, self.yield_slide)
+        return parallel_element(self.stiffness * load, self.yield_displacement)
 
 
 def max_yield_displacement(force: float, stiffness: float, chi: float, beta: float) -> float:

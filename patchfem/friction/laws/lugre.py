@@ -44,9 +44,9 @@ class LuGre:
             np.zeros(1),
             self.static * load,
             self.static / self.stiffness,
-            False,
-            "flow",
-            (self.static / self.stiffness,),
+            is_bounded=False,
+            form="flow",
+            state_scales=(self.static / self.stiffness,),
         )
 
     def limit(self, speed):

@@ -15,7 +15,7 @@ def growth_numbers(law: Bonds) -> np.ndarray:
     They are a_s [m s-2], or -1 for a constant bond length, l_k [m], v_h [m/s], eps_0 [m], eps_k [m] and the fraction of
     the bond length that stretches without damage.
     """
-    if not law.grows:
+    if not law.has_growth:
         return np.array([CONSTANT_LENGTH, 1.0, 1.0, law.length, law.length, law.breakaway])
     return np.array(
         [
@@ -57,9 +57,9 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
             memory=np.array([law.length, law.initial, 0.0, 0.0, 0.0, 0.0]),
             limit=limit,
             length=law.length,
-            bounded=False,
+            is_bounded=False,
             form="points",
-            sizes=_state_sizes(law),
+            state_scales=_state_scales(law),
         )
     x, sigma_on_lower = (np.asarray(part, float) for part in pattern)
     head = [0.0, area.size, law.length]
@@ -71,17 +71,17 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
         memory=np.concatenate([[law.length], law.initial * sigma, np.zeros(4 * area.size)]),
         limit=limit,
         length=law.length,
-        bounded=False,
+        is_bounded=False,
         form="places",
     )
 
 
-def _state_sizes(law: Bonds) -> tuple | None:
+def _state_scales(law: Bonds) -> tuple | None:
     """Return typical magnitudes of (eps, m, z, s2).
 
     They are () for a constant length, and None if rates cannot integrate the law.
     """
-    if not law.grows:
+    if not law.has_growth:
         return ()
     if law.breakaway:
         return None

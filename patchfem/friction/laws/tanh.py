@@ -17,7 +17,7 @@ class TanhLaw(LastTraction):
 
     static: float
     speed: float
-    holds: ClassVar[bool] = False
+    has_force_at_rest: ClassVar[bool] = False
 
     def element(self, load: float) -> Element:
         """Return the `protocol.Element` of a contact under a constant load [N], of form "speed"."""
@@ -27,10 +27,10 @@ class TanhLaw(LastTraction):
             np.zeros(0),
             self.static * load,
             form="speed",
-            sizes=(),
+            state_scales=(),
         )
 
-    def share(self, dq, dt):
+    def limit_fraction(self, dq, dt):
         """Return the fraction of the limit that is carried in increments dq [m] over dt [s].
 
         For dt = 0 it is the sign of dq, because the speed is infinite.
@@ -48,7 +48,7 @@ class TanhLaw(LastTraction):
 
         The mean traction is that of the mean speed and the mean pressure of the step; all work is dissipated.
         """
-        part = self.share(dq, dt)
+        part = self.limit_fraction(dq, dt)
         mean = self.static * (s0 + s1) / 2 * part
         return Step(mean, mean * dq, self.static * s1 * part)
 

@@ -135,7 +135,7 @@ def no_lanes(model: Model) -> str:
     if rig.drive.cycles != int(rig.drive.cycles) or rig.drive.cycles < 20:
         return "the case has fewer than 20 cycles, or a number of cycles that is not whole"
     if (
-        law.grows
+        law.has_growth
         or law.order != 1
         or law.initial != 1
         or law.breakaway

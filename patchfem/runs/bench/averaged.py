@@ -59,10 +59,9 @@ def limit_tractions(model, patch, force) -> np.ndarray:
     """
     f, x = model.friction, patch.x
     sigma, weight = patch.pressure.sigma_n, patch.pieces.interface.weight
-    average = _law().average_pressure
-    shape = [
-        np.where(sigma > 0, average(x, x, sigma, way, f.bond_length, f.order), 0.0)
-        for way in (1.0, -1.0)
-    ]
-    one = [part / max(weight @ part, 1e-300) for part in shape]
+    one = []
+    for way in (1.0, -1.0):
+        average = _law().average_pressure(x, x, sigma, way, f.bond_length, f.order)
+        part = np.where(sigma > 0, average, 0.0)
+        one.append(part / max(weight @ part, 1e-300))
     return np.array([value * one[0 if value >= 0 else 1] for value in force])

@@ -119,7 +119,7 @@ def steps_of(model) -> int:
     if model.grooves is None or accuracy.steps_per_cycle is not None:
         return steps
     turns = (
-        model.grooves.wave
+        model.grooves.wave_number
         * float(np.abs(np.diff(slide.samples(steps)[1])).sum())
         / max(1.0, slide.cycles or 1.0)
     )

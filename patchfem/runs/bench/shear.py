@@ -54,7 +54,7 @@ def _elements(model, patch, time, slide, frames, watch) -> Slid:
     f = model.friction
     length = make_law(f).element(1.0).length
     found = elements(patch, f.static, length)
-    springs = found.stiffness, found.yield_slide
+    springs = found.stiffness, found.yield_displacement
     model = jenkins_model(*(watch.springs(*springs) if watch.springs else springs))
     done = follow_path(model, time, slide, frames, watch)
     tau, local = element_fields(patch, found, done.states, length)
@@ -128,7 +128,7 @@ def _points(model, patch, time, slide, frames, watch, engine) -> Slid:
             if found is None
             else lists_of(patch, law, shear, found)
         )
-    done = follow_path(contact, time, slide, frames, watch, law.grows)
+    done = follow_path(contact, time, slide, frames, watch, law.has_growth)
     refuse_missed(done)
     tau, local = point_fields(patch, law, contact.reduction, done.states)
     return Slid(

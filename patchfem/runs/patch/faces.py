@@ -130,7 +130,7 @@ def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
             np.concatenate, zip(*jenkins_elements.strip_elements(patch, static, length))
         ), None
     found = jenkins_elements.elements(patch, static, length)
-    return found.stiffness, found.yield_slide, found
+    return found.stiffness, found.yield_displacement, found
 
 
 def meshed(model) -> list:

@@ -21,7 +21,7 @@ class StripElements(NamedTuple):
     """
 
     stiffness: np.ndarray
-    yield_slide: np.ndarray
+    yield_displacement: np.ndarray
 
 
 def elements(patch: Patch, static: float, length: float) -> "shear_modes.JenkinsSet":
@@ -67,7 +67,7 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
         if not (static > 0 and force.any()):
             return StripElements(np.array([1 / giving.mean()]), np.zeros(1))
         found = shear_modes.jenkins_set(giving, static * force, length)
-        return StripElements(found.stiffness, found.yield_slide)
+        return StripElements(found.stiffness, found.yield_displacement)
 
     return store.reuse(
         ("strip elements", patch, static, length),

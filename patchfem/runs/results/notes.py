@@ -116,7 +116,7 @@ def of_growth(law, peak: float | None) -> list:
 
     peak: largest friction force of the run over mu_s N [1]; None if the load changes.
     """
-    if not law.grows:
+    if not law.has_growth:
         return []
     if law.reading == "report":
         return (

@@ -393,7 +393,7 @@ def not_smooth(model: Model) -> str:
     if model.side == "lower" and law_has_trait(model.friction.law, "bonds"):
         return "under a pressure that stays"
     element = smooth_element(model)
-    if element is None or element.sizes is None:
+    if element is None or element.state_scales is None:
         return f"for law '{model.friction.law}'"
     return (
         "in so many steps"
@@ -439,7 +439,7 @@ def smooth_steps(model: Model, element: "Element") -> float:
         else element.limit / model.friction.reference_speed * ease * clings(model, element)
     )
     path = 4 * model.speed_scale / omega
-    states = path / element.length if element.sizes and element.length else 0.0
+    states = path / element.length if element.state_scales and element.length else 0.0
     grown = model.friction.slip_growth if law_has_trait(model.friction.law, "bonds") else None
     if grown:
         states = max(states, path / grown)

@@ -166,7 +166,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
         strips = jenkins_elements.strip_elements(patch, f.static, one.length)
         return models.jenkins_model(*map(np.concatenate, zip(*strips)))
     found = jenkins_elements.elements(patch, f.static, one.length)
-    return models.jenkins_model(found.stiffness, found.yield_slide, found)
+    return models.jenkins_model(found.stiffness, found.yield_displacement, found)
 
 
 def _bonds(model: Model, numerics: Numerics, patch, load: float):
@@ -252,8 +252,10 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
         found, made[key] = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True), None
         if found.stiffness.size <= modes:
             few, limit, error = shear_modes.modes_on_gauss(found, patch.x[found.points], points)
-            whole = found.of.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * modes))
-            error += found.of.relative_difference(whole, found.of.backbone(found.stiffness.size))
+            whole = found.spectrum.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * modes))
+            error += found.spectrum.relative_difference(
+                whole, found.spectrum.backbone(found.stiffness.size)
+            )
             made[key] = (few, limit, error) if error <= 2 * tolerance else None
     return made[key]
 

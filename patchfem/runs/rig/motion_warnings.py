@@ -294,7 +294,7 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
 
     slides = raw.window.extra.get("slides", raw.window.slide[:, None])
     for group, slide in zip(pieces.YieldingElements(model, numerics, patch).groups, slides.T):
-        most, half = float(group.yield_slide.max(initial=0.0)), float(np.ptp(slide)) / 2
+        most, half = float(group.yield_displacement.max(initial=0.0)), float(np.ptp(slide)) / 2
         if most > half:
             return [
                 f"a part of the joint slips only at a slide above {format_length(most)}, but the slide in this motion is "

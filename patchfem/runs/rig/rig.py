@@ -255,7 +255,7 @@ def _extra(run: Coupled, notes: list) -> dict:
         out["events"] = run_events.events_of(raw.window, run.drive, raw.log, raw.held)
     reduced = getattr(raw.contact, "reduction", None)
     if reduced is not None:
-        out["elements" if hasattr(reduced, "yield_slide") else "shear_modes"] = int(
+        out["elements" if hasattr(reduced, "yield_displacement") else "shear_modes"] = int(
             np.size(reduced.stiffness)
         )
     if raw.summed is not None:

@@ -136,7 +136,7 @@ def worn_model(model, patch, depth):
     """
     wear, new = model.wear, {}
     if model.grooves is not None:
-        new["grooves"] = model.grooves.worn(mean_depth(patch, depth), wear.upper_share)
+        new["grooves"] = model.grooves.after_wear(mean_depth(patch, depth), wear.upper_share)
     if wear.friction is not None:
         law = new["friction"] = wear.friction.worn_law(model.friction, mean_depth(patch, depth))
         if model.rig is not None:
@@ -385,7 +385,7 @@ def _moment(patch, state: WearState, motion: _Motion) -> Moment:
     return Moment(
         state.cycle,
         state.depth,
-        state.used,
+        state.jump_path,
         patch.pressure.sigma_n,
         patch.pressure.gap,
         motion.last.miss,

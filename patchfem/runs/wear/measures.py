@@ -131,7 +131,7 @@ def jumped(model, found, measures: dict) -> dict:
     measures : dict
         Measures by name.
     """
-    rough = values(pressed(model.patch, found.patch.pair, frozen_array(found.state.rough)))
+    rough = values(pressed(model.patch, found.patch.pair, frozen_array(found.state.coarse_depth)))
     here = values(found.patch)
     other, ratio = (
         values(found.stripped[0]) if found.stripped else here,
@@ -208,8 +208,8 @@ def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
     asked, ratio = other_strips(model.patch)
     strips = _lost(asked, *found.stripped) if found.stripped else mine
     jumps = {
-        "worn_volume": float(np.vdot(np.abs(state.depth - state.rough), area))
-        + state.strayed * float(area.sum()),
+        "worn_volume": float(np.vdot(np.abs(state.depth - state.coarse_depth), area))
+        + state.path_error * float(area.sum()),
         "worn_depth_max": state.error,
     }
     out, before, first = {}, found.moments[0].values, model.wear.start

@@ -11,7 +11,7 @@ def test_exact_one_element_is_what_is_left_beside_one_that_carries_nothing():
     for k, y in ((2.0, 3.0), (1e7, 1e-6)):
         one, two = elements_of([k], [y]), elements_of([k, 0.0], [y, 1.0])
         np.testing.assert_array_equal(
-            [one.stiffness, one.yield_slide], [two.stiffness, two.yield_slide]
+            [one.stiffness, one.yield_displacement], [two.stiffness, two.yield_displacement]
         )
         assert (
             one.rank.tolist() == [0]
@@ -32,8 +32,8 @@ def test_exact_pairs_keep_stiffness_and_limit():
         assert found.limit == pytest.approx(all_of.limit, rel=1e-14)
         assert found.stiffness.sum() == pytest.approx(all_of.stiffness.sum(), rel=1e-14)
         # they are sorted and apart as they are made
-        again = elements_of(found.stiffness, found.yield_slide)
-        for name in ("stiffness", "yield_slide", "rank"):
+        again = elements_of(found.stiffness, found.yield_displacement)
+        for name in ("stiffness", "yield_displacement", "rank"):
             np.testing.assert_array_equal(getattr(found, name), getattr(again, name))
 
 
@@ -46,7 +46,7 @@ def test_order_two_of_the_cells_of_iwans_law():
     places = np.linspace(0.3, 0.7, 2001) * most.max()
 
     def force(parts):
-        return np.minimum(places[:, None], parts.yield_slide) @ parts.stiffness
+        return np.minimum(places[:, None], parts.yield_displacement) @ parts.stiffness
 
     first, second = (np.abs(force(a) - force(fine)).mean() for a in (coarse, coarser))
     assert second / first == pytest.approx(5, rel=0.15)  # (16 - 1)/(4 - 1)
@@ -63,6 +63,6 @@ def test_exact_fours_from_another_place_on_and_the_last_slider_alone():
         assert found.stiffness == pytest.approx(
             [*np.add.reduceat(parts.stiffness[:48], ends[:-1]), parts.stiffness[48]], rel=1e-14
         )
-        assert found.yield_slide[-1] == parts.yield_slide[-1] and found.limit == pytest.approx(
-            parts.limit, rel=1e-14
-        )
+        assert found.yield_displacement[-1] == parts.yield_displacement[
+            -1
+        ] and found.limit == pytest.approx(parts.limit, rel=1e-14)

@@ -11,8 +11,8 @@ from patchfem.dynamics.events.elements import elements_of, stretches, table_of, 
 class Follower:
     """Elements along prescribed slides, by the memory of the engine and one by one."""
 
-    def __init__(self, stiffness, yield_slide):
-        self.k, self.y = np.asarray(stiffness, float), np.asarray(yield_slide, float)
+    def __init__(self, stiffness, yield_displacement):
+        self.k, self.y = np.asarray(stiffness, float), np.asarray(yield_displacement, float)
         self.group = elements_of(self.k, self.y)
         self.table = table_of([self.group])
         self.memory = virgin(self.table, [0.0])
@@ -58,7 +58,7 @@ def test_exact_memory_is_that_of_elements_one_by_one(seed):
             k * stretches(one.group, one.memory, 0), k * one.stretch, atol=1e-12
         )
     # a turning point that says nothing more is forgotten
-    assert one.depth <= one.group.yield_slide.size + 1
+    assert one.depth <= one.group.yield_displacement.size + 1
 
 
 def test_refuses_elements_that_are_none():

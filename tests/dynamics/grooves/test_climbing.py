@@ -58,7 +58,7 @@ def twin(law, grooves, slide):
             if abs(after - old)[0] < 1e-13 * LOAD:
                 break
         final = law.press(step.state, half, after)
-        forces.append((LOAD * float(grooves.rise(q, end)) + pulled * path) / dq)
+        forces.append((LOAD * float(grooves.height_difference(q, end)) + pulled * path) / dq)
         losses.append(float((before.dissipated + step.dissipated + final.dissipated)[0]))
         state, normal, held = final.state, after, float(law.traction(final.state)[0])
     return np.array(forces), np.array(losses)

@@ -57,7 +57,7 @@ def test_exact_pieces_that_hardly_give_way_are_one_point(law):
 def test_exact_on_flat_ground_they_are_the_exact_set_of_elements():
     """Flanks of a slope of 1e-12: the force at the end of every step."""
     found = jenkins_set(GIVING, MU * LOAD * SHARE, LENGTH)
-    exact = march_slides(jenkins_model(found.stiffness, found.yield_slide), wave(200))[0]
+    exact = march_slides(jenkins_model(found.stiffness, found.yield_displacement), wave(200))[0]
     here = march_slides(giving(LAWS["elastic-plastic"], Grooves(80e-6, 1e-17), GIVING), wave(200))[
         0
     ]
@@ -115,8 +115,8 @@ def test_exact_coulombs_points_on_flat_ground_are_their_exact_elements(tolerance
     slide = np.concatenate(
         [np.linspace(0, 1, 40), np.linspace(1, -0.8, 60)[1:], np.linspace(-0.8, 3, 90)[1:]]
     )
-    slide *= found.yield_slide.max()
-    exact = march_slides(jenkins_model(found.stiffness, found.yield_slide), slide)[0]
+    slide *= found.yield_displacement.max()
+    exact = march_slides(jenkins_model(found.stiffness, found.yield_displacement), slide)[0]
     here = march_slides(coulomb(Grooves(80e-6, 1e-17), tolerance), slide)[0]
     assert np.abs(here[:-1, 0] - exact[:-1, 0]).max() < 0.17 * tolerance * MU * LOAD
 

@@ -35,7 +35,7 @@ def test_exact_without_friction_it_is_a_pendulum(angle):
     """A mass in a cosine valley, released at the angle k q: period 4 K(sin^2(angle/2))/w, small motions w^2 = N k^2
     A/m."""
     grooves, basis = Grooves(80e-6, 7.5e-6), modes(0.0, mass=1.2)
-    place = angle / grooves.wave
+    place = angle / grooves.wave_number
     period = 4 * ellipk(np.sin(angle / 2) ** 2) / np.sqrt(grooves.stiffness(115.0) / 1.2)
     done = march(
         basis,

@@ -192,7 +192,7 @@ def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(re
     state, before, found, stored = twin.start(sigma), sigma, [0.0], [0.0]
     for here, after in pairwise(path):
         now = np.interp(x + after, x, sigma, left=0.0, right=0.0)
-        state = twin.carried(state, after - here, before, now, 1e-3)
+        state = twin.advance(state, after - here, before, now, 1e-3)
         before = now
         found.append(weight * twin.traction(state).sum())
         stored.append(weight * twin.stored(state).sum())
@@ -242,7 +242,7 @@ def test_order_two_a_prescribed_load_is_that_of_the_numpy_sum(order, grows):
         assert response.extra["normal_load"] == pytest.approx(loads, abs=1e-9)
         state, found = twin.start(loads[:1]), [0.0]
         for k, dq in enumerate(np.diff(response.slide)):
-            state = twin.carried(state, dq, loads[k : k + 1], loads[k + 1 : k + 2], dt)
+            state = twin.advance(state, dq, loads[k : k + 1], loads[k + 1 : k + 2], dt)
             found.append(twin.traction(state)[0])
         gaps.append(np.abs(response.force - found).mean() / 39)
         book = done.ledger

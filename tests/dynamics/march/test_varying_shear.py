@@ -125,7 +125,7 @@ def test_exact_a_still_load_is_the_march_on_the_preload(name):
     force, soft = sets.reference.forces(0.0, 0.0), giving(crowned().x)
     if name == "plastic":
         group = jenkins_set(soft, 0.3 * force, 1e-6)
-        model = models.jenkins_model(group.stiffness, group.yield_slide)
+        model = models.jenkins_model(group.stiffness, group.yield_displacement)
     else:
         bonds = {
             "bonds": Bonds(0.3, 1e-6),

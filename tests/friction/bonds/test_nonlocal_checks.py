@@ -45,7 +45,7 @@ def settled_at(law, speed, ell):
     state = engine.start(one)
     for dq in np.diff(unit * (back[0] - back)):
         # the means of the steps are not asked for
-        state = engine.carried(state, dq, one, one, dq / speed)
+        state = engine.advance(state, dq, one, one, dq / speed)
     return float(engine.traction(state)[0])
 
 

@@ -374,7 +374,7 @@ def _by_law(models: SimilarModels, found: CaseResults) -> np.ndarray:
     first = models.first
     if not law_has_trait(first.friction.law, "bonds"):
         return np.zeros(len(models), bool)
-    if first.bonds.grows or first.bonds.order < 0 or first.bonds.reading != "stretch":
+    if first.bonds.has_growth or first.bonds.order < 0 or first.bonds.reading != "stretch":
         return np.ones(len(models), bool)
     if "drift_per_cycle" not in found.values:  # runs of less than a cycle have no drift
         return np.zeros(len(models), bool)

@@ -94,9 +94,9 @@ def _contacts(sets: list, held: list) -> np.ndarray:
             one.limit,
             pressed.patch.pressure.load,
             one.stiffness.sum(),
-            one.yield_slide[-1],
+            one.yield_displacement[-1],
         )
         for one, pressed in zip(sets, held)
     ]
-    tables = march.tables_of([(one.stiffness, one.yield_slide) for one in sets])
+    tables = march.tables_of([(one.stiffness, one.yield_displacement) for one in sets])
     return np.column_stack([rows, tables]).T
