@@ -18,14 +18,14 @@ class Elements:
     """Elements of one interface: springs k_j that slip at a stretch y_j, F = sum k_j e_j with |e_j| <= y_j, and a rigid
     element before them.
 
-    stiffness: (t,) [N/m]; yield_slide: (t,) [m], rising; rank: (a,) the element that each given one became part of, -1
+    stiffness: (t,) [N/m]; yield_displacement: (t,) [m], rising; rank: (a,) element that each given one became part of, -1
     for one without stiffness or yield slide, which carries nothing. static, kinetic [N]: limits of the rigid element,
     which holds the slide until its reaction reaches static and then slips under kinetic; static = 0 where there is
     none.
     """
 
     stiffness: np.ndarray
-    yield_slide: np.ndarray
+    yield_displacement: np.ndarray
     rank: np.ndarray
     static: float = 0.0
     kinetic: float = 0.0
@@ -33,16 +33,16 @@ class Elements:
     @property
     def limit(self) -> float:
         """Friction limit sum k_j y_j [N]."""
-        return float(self.stiffness @ self.yield_slide)
+        return float(self.stiffness @ self.yield_displacement)
 
 
-def elements_of(stiffness, yield_slide) -> Elements:
+def elements_of(stiffness, yield_displacement) -> Elements:
     """Elements from stiffness (a,) [N/m] >= 0 and yield slide (a,) [m] >= 0 in any order; equal yields become one.
 
     PatchfemError for values below zero or not finite.
     """
     k = np.asarray(stiffness, float)
-    y = np.asarray(yield_slide, float)
+    y = np.asarray(yield_displacement, float)
     if not (np.isfinite(k).all() and np.isfinite(y).all() and (k >= 0).all() and (y >= 0).all()):
         raise PatchfemError(
             "friction: the stiffness and the yield slide of each element must be finite and >= 0"
@@ -79,7 +79,7 @@ def merged(parts: Elements, count: int = 2, first: int = 0) -> Elements:
     """Fewer elements: each `count` that yield one after the other as one of their stiffness and limit together, from
     the number `first` on, and those before it; of an odd number the last one stays."""
     k = parts.stiffness
-    limit = parts.stiffness * parts.yield_slide
+    limit = parts.stiffness * parts.yield_displacement
     if not k.size:
         return parts
     last = k.size % 2
@@ -95,10 +95,10 @@ def merged(parts: Elements, count: int = 2, first: int = 0) -> Elements:
     )
 
 
-def cells_joined(count: int, first: int, stiffness, yield_slide) -> tuple:
+def cells_joined(count: int, first: int, stiffness, yield_displacement) -> tuple:
     """(stiffness [N/m], yield slide [m]) of elements (t,) each, `merged`."""
-    one = merged(Elements(stiffness, yield_slide, np.arange(stiffness.size)), count, first)
-    return one.stiffness, one.yield_slide
+    one = merged(Elements(stiffness, yield_displacement, np.arange(stiffness.size)), count, first)
+    return one.stiffness, one.yield_displacement
 
 
 class Table(NamedTuple):
@@ -125,7 +125,7 @@ def table_of(groups) -> Table:
     sums = np.zeros((3, len(groups), most + 1))
     for i, one in enumerate(groups):
         k = one.stiffness
-        y = one.yield_slide
+        y = one.yield_displacement
         reach[i, : y.size] = y
         for j, part in enumerate((k, k * y, k * y * y)):
             sums[j, i, 1 : y.size + 1] = np.cumsum(part)
@@ -198,8 +198,8 @@ def stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
 
 def sorted_stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
     """Stretch (t,) [m] of every element in the order of the yield slides, of the interface `face`."""
-    out = np.zeros(group.yield_slide.size)
-    y = group.yield_slide
+    out = np.zeros(group.yield_displacement.size)
+    y = group.yield_displacement
     first = int(memory.slipping[face])
     out[:first] = memory.way[face] * y[:first]
     for k in range(int(memory.depth[face]) - 1, -1, -1):

@@ -79,7 +79,7 @@ class SampledRun(GroovesRun):
         numbers = [
             1.0,
             model.load,
-            g.wave,
+            g.wave_number,
             g.amplitude,
             g.phase,
             g.lifted_mass,
@@ -87,15 +87,17 @@ class SampledRun(GroovesRun):
             model.kinetic,
             model.speed or 0.0,
         ]
-        element = Element(HERE, np.array(numbers), np.zeros(1), model.limit, sizes=(np.inf,) * 3)
+        element = Element(
+            HERE, np.array(numbers), np.zeros(1), model.limit, state_scales=(np.inf,) * 3
+        )
         self.motion_of = smooth.Motion(
             self.modes, self.drive, element, 1.0, TOLERANCE, start=InitialState(*self.state)
         )
         self.motion_of.ends_only(1)
         n = self.modes.omega.size
         least = self.motion_of.moving.work[24]
-        least[:n] = REST / g.wave
-        least[n : 2 * n] = REST / g.wave * self.motion_of.moving.now[PACE]
+        least[:n] = REST / g.wave_number
+        least[n : 2 * n] = REST / g.wave_number * self.motion_of.moving.now[PACE]
         self.booked = self._sums_of()
 
     def _sums_of(self) -> np.ndarray:

@@ -92,7 +92,7 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
     The first step is FIRST over the fastest rate of modes and drive.
     """
     n = modes.omega.size
-    l = len(element.sizes)
+    l = len(element.state_scales)
     size = 2 * n + l + 3
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
     state = np.zeros(size)
@@ -110,7 +110,7 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
     now[STIFF] = element.limit / element.length if element.length else 0.0
     now[[DRIVEN, MOVES]] = (drive.period, drive.moving)
     counters[PERIOD] = drive.period
-    work[24, 2 * n : -3] = element.sizes
+    work[24, 2 * n : -3] = element.state_scales
     rows = np.stack(
         [modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output]
     )
@@ -382,7 +382,7 @@ class Motion:
 
     def response(self, rows) -> Response:
         """Histories of sample rows (k, 2 n + 7). No force passes the limit of its law; the extension of a step may."""
-        if self.element.bounded:
+        if self.element.is_bounded:
             rows = rows.copy()
             force = 2 * self.modes.omega.size + 3
             np.clip(rows[:, force], -self.element.limit, self.element.limit, out=rows[:, force])

@@ -35,8 +35,8 @@ def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     (time, slide), (sigma, weight), law = path, pressure_of(model, patch), law_for(model, patch)
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
     move = np.diff(slide)
-    share = law.share(move, np.diff(time))
-    if law.holds:  # the last traction persists during rest
+    share = law.limit_fraction(move, np.diff(time))
+    if law.has_force_at_rest:  # the last traction persists during rest
         last = np.maximum.accumulate(np.where(move != 0, np.arange(move.size), -1))
         share = np.where(last < 0, 0.0, share[last])
     share = np.concatenate([[0.0], share])
@@ -47,7 +47,7 @@ def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     at = frame_numbers(slide.size, frames)
     tau = share[at, None] * limits[way[at]]
     for k, side in ends_of_rest(model, slide).items():
-        broken = law.breaking(sigma, side)
+        broken = law.breakaway_traction(sigma, side)
         force[k] = weight @ broken
         tau[at == k] = broken
     watch.tell(1.0)
@@ -78,16 +78,16 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     )
     load = float(weight @ sigma)
     move = np.diff(slide)
-    if law.holds:
+    if law.has_force_at_rest:
         last = np.maximum.accumulate(np.where(move != 0, np.arange(move.size), -1))
         way = np.append(0.0, np.where(last < 0, 0.0, np.sign(move)[last]))
-        ratio = grooves.ratio(slide, way, law.kinetic)
+        ratio = grooves.force_ratio(slide, way, law.kinetic)
         lowest, highest = (
-            grooves.ratio(slide[0], side, model.friction.static) for side in (-1.0, 1.0)
+            grooves.force_ratio(slide[0], side, model.friction.static) for side in (-1.0, 1.0)
         )
         # at rest before the motion, friction on the flank takes the value that balances the load
         ratio[way == 0] = np.clip(0.0, lowest, highest)
-        own = load * grooves.lost(slide[:-1], slide[1:], law.kinetic)
+        own = load * grooves.friction_loss(slide[:-1], slide[1:], law.kinetic)
     else:
         duration = np.diff(time)
         speed = np.divide(move, duration, out=np.zeros_like(move), where=duration > 0)
@@ -100,9 +100,9 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
             return load * phi * (1 + t**2) / (1 - phi * t)
 
         own = integrate_steps(slide, own_force)
-    rise = load * grooves.rise(slide[:-1], slide[1:])
+    rise = load * grooves.height_difference(slide[:-1], slide[1:])
     for k, side in ends_of_rest(model, slide).items():
-        ratio[k] = grooves.ratio(slide[k], side, model.friction.static)
+        ratio[k] = grooves.force_ratio(slide[k], side, model.friction.static)
     at = frame_numbers(slide.size, frames)
     watch.tell(1.0)
     losses = np.stack([np.zeros(slide.size), np.append(0.0, own)], axis=1)
@@ -141,4 +141,4 @@ def _along_flank(grooves, law, slide, speed) -> tuple:
     At slides [m] with speeds [m/s].
     """
     t = grooves.slope(slide)
-    return t, law.static * law.share(np.sqrt(1 + t**2) * speed, 1.0)
+    return t, law.static * law.limit_fraction(np.sqrt(1 + t**2) * speed, 1.0)

@@ -57,7 +57,7 @@ class BenchEngine:
 
     kind: int
     seconds: float
-    choice: "bond_engines.Choice | None" = None
+    choice: "bond_engines.EngineChoice | None" = None
 
     @property
     def name(self) -> str:
@@ -67,7 +67,7 @@ class BenchEngine:
 
 
 def bench_engine(
-    model, slide, points: int = 1, choice: "bond_engines.Choice | None" = None
+    model, slide, points: int = 1, choice: "bond_engines.EngineChoice | None" = None
 ) -> BenchEngine:
     """Return the engine of a bench.
 
@@ -78,7 +78,7 @@ def bench_engine(
         Samples of the slide [m].
     points : int
         Nodes of the interface.
-    choice : Choice, optional
+    choice : EngineChoice, optional
         Method of the sum over bonds, if it is known.
 
     Raises
@@ -90,7 +90,7 @@ def bench_engine(
     if model.slide.across is not None:
         return BenchEngine(PLANE, _stepped_seconds(model, slide, 1))
     if soft and (law_has_trait(f.law, "bonds") or model.grooves is not None):
-        modes = model.accuracy.shear_modes or shear_modes.SHEAR_MODES
+        modes = model.accuracy.shear_modes or shear_modes.N_SHEAR_MODES
         varies = model.grooves is not None or pressure_changes(model)
         if model.grooves is None and (
             is_bond_list(f) or engine_named(model) not in ("auto", "recursion")
@@ -134,7 +134,7 @@ def pressure_changes(model) -> bool:
     return model.load_varies or model.side == "lower"
 
 
-def sum_of(model, slide) -> "bond_engines.Choice":
+def sum_of(model, slide) -> "bond_engines.EngineChoice":
     """Return the method of the sum over bonds of a rigid slide along samples slide (k,) [m].
 
     It is chosen as in a rig, except that its error is relative to the force that is reached, which
@@ -145,7 +145,9 @@ def sum_of(model, slide) -> "bond_engines.Choice":
     stroke = max(stroke / law.length, 1e-9)
     goal = accuracy.tolerance * min(1.0, stroke)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    return bond_engines.choose(law, goal, stroke, steps, engine_named(model), tail, accuracy.merge)
+    return bond_engines.choose_engine(
+        law, goal, stroke, steps, engine_named(model), tail, accuracy.merge
+    )
 
 
 def engine_named(model) -> str:
@@ -162,7 +164,7 @@ def engine_named(model) -> str:
     return "merged" if apart and named in ("auto", "recursion") else named
 
 
-def smooth_sum_of(model, slide) -> "bond_engines.Choice | None":
+def smooth_sum_of(model, slide) -> "bond_engines.EngineChoice | None":
     """Return `sum_of` without merging, for a fit; None for other laws or a prescribed engine.
 
     With merging, the force would jump by the error of the sum when a value of the scene changes.
@@ -189,7 +191,9 @@ def strokes(slide) -> tuple:
     return float(np.abs(move).sum()) / count, max(way.size / count, 1.0)
 
 
-def _summed(model, slide, points: int, found: "bond_engines.Choice", lists: int = 1) -> BenchEngine:
+def _summed(
+    model, slide, points: int, found: "bond_engines.EngineChoice", lists: int = 1
+) -> BenchEngine:
     """Return the engine of a sum over bonds.
 
     lists: number of lists, one per point with shear modes, else 1.
@@ -208,10 +212,10 @@ def _summed(model, slide, points: int, found: "bond_engines.Choice", lists: int 
         * found.seconds
         * (strips / found.strips if found.strips else 1.0)
     )
-    if size * seconds > parameters.LONGEST:
+    if size * seconds > parameters.MAX_LIST_SECONDS:
         raise Missing(
             f"the sum over the list of bonds (about {strips:.0f} entries) would need a computing time of "
-            f"about {size * seconds:.0f} s, more than the limit of {parameters.LONGEST:.0f} s; lower "
+            f"about {size * seconds:.0f} s, more than the limit of {parameters.MAX_LIST_SECONDS:.0f} s; lower "
             "accuracy.steps_per_cycle or slide.cycles, or raise accuracy.tail or accuracy.merge",
             "",
         )

@@ -181,7 +181,9 @@ def _walked(laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: Wat
             )
             s0, losses[k] = s1, gains_and_losses(weight * lost)
             work[k] = work[k - 1] + dq @ np.atleast_2d(mean) @ weight
-        here = np.atleast_2d(law.breaking(s0, peaks[k]) if k in peaks else law.traction(state))
+        here = np.atleast_2d(
+            law.breakaway_traction(s0, peaks[k]) if k in peaks else law.traction(state)
+        )
         force[k], load[k], stored[k] = here @ weight, weight @ s0, weight @ law.stored(state)
         if k in pick:
             tau.append(here)
@@ -244,7 +246,7 @@ def _under_load(law, state, dq: float, s0, s1, dt: float) -> tuple:
     Half of the change is applied before the motion, half after it (order 1 if bonds are released,
     else 2). A law without stretch takes the change during the motion.
     """
-    if dq != 0 and getattr(law, "at_once", False):
+    if dq != 0 and getattr(law, "can_change_load", False):
         return law.step(state, dq, s0, s1, dt)
     half = (s0 + s1) / 2
     before = law.press(state, s0, half)

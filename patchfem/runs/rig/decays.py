@@ -16,7 +16,7 @@ from ...dynamics.harmonic import forces, quasi_static
 from ...dynamics.march import models
 from ...response.decay_curve import FAINT, DecayCurve, curve_of, of_turns, turns
 from ...response.errors import MAX_ORDER, error_of_change
-from ...slip.mesh_correction import SPREAD_FACTOR, spread
+from ...slip.mesh_correction import SPREAD_FACTOR, spread_elements
 from ..patch import faces
 from . import interface, numerics
 from .solution import Solution
@@ -188,9 +188,9 @@ def mesh_error(fine, rough, read) -> np.ndarray:
 
 
 def _spread(stiffness, slide) -> tuple:
-    """Return `slip.mesh_correction.spread` of elements in any order."""
+    """Return `slip.mesh_correction.spread_elements` of elements in any order."""
     order = np.argsort(slide, kind="stable")
-    return spread(stiffness[order], slide[order])
+    return spread_elements(stiffness[order], slide[order])
 
 
 def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:

@@ -15,9 +15,9 @@ import numpy as np
 from ...core import Missing
 from ...effects import law_has_trait
 from ...friction.bonds import engines
-from ...friction.bonds.list_forms_kernels import PRINTED_GROWING
-from ...friction.bonds.list_numbers import form_of
-from ...friction.bonds.parameters import LONGEST
+from ...friction.bonds.list_forms_kernels import FORM_REPORT_GROWING
+from ...friction.bonds.list_numbers import sum_form
+from ...friction.bonds.parameters import MAX_LIST_SECONDS
 from ...model.model import Model
 from ...structure.drive_sizes import drive_omega, max_acceleration, max_frequency_ratio
 from ..bench import engine as bench_engine
@@ -89,7 +89,7 @@ def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
         1e-9,
     )
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    return engines.choose(
+    return engines.choose_engine(
         law, accuracy.tolerance, stroke, numerics.steps / 2, engine, tail, accuracy.merge
     )
 
@@ -152,7 +152,8 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
         return 0.0
     released, printed = rig.drive.kind == "free", f.reading == "report"
     if (
-        released and (not printed or rig.start is None or form_of(model.bonds) != PRINTED_GROWING)
+        released
+        and (not printed or rig.start is None or sum_form(model.bonds) != FORM_REPORT_GROWING)
     ) or (not printed and model.bonds.order != 0):
         return 0.0
     needed = (
@@ -169,7 +170,7 @@ def least_held(model: Model) -> float:
     It is 1 for a driven block if each step leaves a strip that no path erases, i.e. for bonds that
     grow or that have no stiffness by their order; else MIN_STUCK_RATIO.
     """
-    leaves = form_of(model.bonds) == PRINTED_GROWING or model.friction.reading != "report"
+    leaves = sum_form(model.bonds) == FORM_REPORT_GROWING or model.friction.reading != "report"
     return 1.0 if leaves and model.rig.drive.kind != "free" else MIN_STUCK_RATIO
 
 
@@ -280,7 +281,7 @@ def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
         return False
     return (
         lists_grow(model)
-        if form_of(model.bonds) == PRINTED_GROWING
+        if sum_form(model.bonds) == FORM_REPORT_GROWING
         else strips > TURNING * numerics.cycles * numerics.steps
     )
 
@@ -342,13 +343,13 @@ class ListGuard:
         Raises
         ------
         Missing
-            If all steps would take more than LONGEST CPU seconds.
+            If all steps would take more than MAX_LIST_SECONDS CPU seconds.
         """
         now = thread_time()
         if self.start is None:
             self.start = now, fraction
         spent, done = now - self.start[0], fraction - self.start[1]
-        if done > 0 and spent > LONGEST / 60 and spent > LONGEST * done:
+        if done > 0 and spent > MAX_LIST_SECONDS / 60 and spent > MAX_LIST_SECONDS * done:
             raise Missing(_too_long(spent / done), "")
         if self.progress is not None:
             self.progress(fraction)
@@ -359,7 +360,7 @@ def _too_long(seconds: float, entries: float | None = None) -> str:
     length = "" if entries is None else f" (about {entries:.0f} entries)"
     return (
         f"the sum over the list of bonds{length} would need a computing time of about {seconds:.0f} s, more than "
-        f"the limit of {LONGEST:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, raise accuracy.tail or "
+        f"the limit of {MAX_LIST_SECONDS:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, raise accuracy.tail or "
         'accuracy.merge, or use reading = "stretch" with order = 1'
     )
 
@@ -395,5 +396,5 @@ def refuse_long_list(model: Model, numerics: Numerics) -> None:
     if not model.partial_slip:
         refuse_unresolved(model, numerics)
     entries, seconds = list_cost(model, numerics)
-    if seconds > LONGEST and not lists_grow(model):
+    if seconds > MAX_LIST_SECONDS and not lists_grow(model):
         raise Missing(_too_long(seconds, entries), "")
