@@ -17,7 +17,7 @@ class StripElements(NamedTuple):
     """Parallel elements of one strip.
 
     - stiffness (t,): [N/m].
-    - yield_slide (t,): slide at which each element yields [m].
+    - yield_displacement (t,): slide at which each element yields [m].
     """
 
     stiffness: np.ndarray

@@ -71,13 +71,13 @@ def _crossing(x, slides, amplitude: float) -> float:
 
 def cycle_work(found: JenkinsSet, amplitude: float) -> float:
     """Return the work [J] of parallel elements in a cycle between -amplitude and amplitude [m]."""
-    beyond = np.maximum(amplitude - found.yield_slide, 0.0)
-    return float(4 * (found.stiffness * found.yield_slide) @ beyond)
+    beyond = np.maximum(amplitude - found.yield_displacement, 0.0)
+    return float(4 * (found.stiffness * found.yield_displacement) @ beyond)
 
 
 def peak_force(found: JenkinsSet, amplitude: float) -> float:
     """Return the force [N] of parallel elements at a first slide of `amplitude` [m]."""
-    return float(found.stiffness @ np.minimum(found.yield_slide, amplitude))
+    return float(found.stiffness @ np.minimum(found.yield_displacement, amplitude))
 
 
 def slip_missed(patches, slip, tolerance: float) -> float:
