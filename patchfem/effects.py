@@ -175,10 +175,10 @@ EFFECTS = {
     "contact.step": Effect(GAP_MODULE, "g += height H(x - at)"),
     "contact.asperities.law=linear": Effect("", "C += diag(1/(k_n A)), C_tt += diag(1/(k_t A))"),
     "contact.asperities.law=exponential": Effect(
-        "patchfem.contact.skin_laws", "f = A p_0 exp(-s/u_0), s = g + theta x - delta + C f"
+        "patchfem.contact.asperity_laws", "f = A p_0 exp(-s/u_0), s = g + theta x - delta + C f"
     ),
     "contact.asperities.law=hertz": Effect(
-        "patchfem.contact.skin_laws", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 phi(z) dz"
+        "patchfem.contact.asperity_laws", "f = A 4/3 E* sqrt(R) eta int_s (z - s)^3/2 phi(z) dz"
     ),
     "contact.tilt": Effect(GAP_MODULE, "g += angle x"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),

@@ -117,12 +117,12 @@ MODULES_OF_SCENES = {  # what is run from Python -> text, modules that it loads,
     "patch": (
         PATCH,
         "contact.unilateral mesh.tensor",
-        "compiled contact.skin_laws contact.strips contact.conjugate_gradients elasticity.mortar elasticity.substructure "
-        "elasticity.fronts elasticity.recovery export mesh.anymesh response scipy skfem",
+        "compiled contact.asperity_laws contact.strips contact.conjugate_gradients elasticity.mortar "
+        "elasticity.substructure elasticity.fronts elasticity.recovery export mesh.anymesh response scipy skfem",
     ),
     "skin": (
         PATCH + '[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n',
-        "contact.skin_laws",
+        "contact.asperity_laws",
         PATCH_KEYS,
     ),
     "strips": (PATCH + "[contact.strips]\ncount = 2\n", "contact.strips", PATCH_KEYS),

@@ -7,7 +7,7 @@ forces f or pressures, the gap under load, the approach delta and the rotation t
 
 `gaps` has the shapes of the surfaces. `unilateral.press` solves for one patch, by the methods of `active_set`
 and, if they fail, of `conjugate_gradients`; `strip_compliance` holds C. `strips` presses patches side by side,
-bare or with asperities (`skin_laws`, `smooth_skin`). `edges` and `stiffness` derive quantities of a contact
+bare or with asperities (`asperity_laws`, `asperity_layer`). `edges` and `stiffness` derive quantities of a contact
 set. Read `gaps`, `unilateral` and `active_set` first.
 
 `contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `polygon_kernels`,

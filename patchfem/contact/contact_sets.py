@@ -2,7 +2,7 @@
 
 The motion consists of the approach delta and the rotation theta. The unilateral contact of `unilateral`, w = g + theta
 x - delta + C f >= 0, f >= 0, f . w = 0, is affine in (delta, theta) as long as its set of touching nodes stays. So the
-plane falls into convex polygons, one for each contact set. Motions are counted from a solved reference state: d = delta
+plane falls into convex polygons, one for each contact set. Motions are measured from a solved reference state: d = delta
 - delta0, t = theta - theta0.
 
 The energy E = f . C f/2 is convex and has the slopes dE/d(delta) = N and dE/d(theta) = -M, M = sum f x, across the
@@ -16,7 +16,9 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ..core import PatchfemError, frozen_array
 
-MAX_BYTES = 64e6  # bytes of stored contact sets; when they are full, the oldest set is replaced
+MAX_STORED_BYTES = (
+    64e6  # bytes of stored contact sets; when they are full, the oldest set is replaced
+)
 MAX_SIDES = 16  # sides of a polygon, as in `polygon_kernels`
 
 
@@ -112,14 +114,14 @@ class ContactSets:
         )
         return ContactSet(frozen_array(on, bool), frozen_array(rows), frozen_array(energy))
 
-    def arrays(self, room: float = MAX_BYTES) -> dict:
+    def arrays(self, max_bytes: float = MAX_STORED_BYTES) -> dict:
         """Return empty arrays of `press_kernels.SetArrays`, with the reference set in `wanted`.
 
         room: size of the contact sets that can be stored [bytes].
         """
         m = self.x.size
         # 25 m + 400 bytes: rows, set, polygon and names of one set
-        count = int(max(16, min(room / (25 * m + 400), 100_000)))
+        count = int(max(16, min(max_bytes / (25 * m + 400), 100_000)))
         names = np.random.default_rng(5).integers(-(2**63), 2**63, m, dtype=np.int64)
         return {
             "c": self.c.copy(),
@@ -141,7 +143,7 @@ class ContactSets:
             "side": np.zeros((2, 3, m)),
             "row": np.zeros(m + 3),
             "meta": np.zeros(5, np.int64),
-            **sides(count),
+            **make_empty_polygons(count),
         }
 
     def name(self, arrays: dict) -> int:
@@ -149,7 +151,7 @@ class ContactSets:
         return int(np.bitwise_xor.reduce(arrays["node"][self.reference.on], initial=0))
 
 
-def sides(count: int) -> dict:
+def make_empty_polygons(count: int) -> dict:
     """Return the empty polygon arrays of `press_kernels.SetArrays` for `count` contact sets."""
     return {
         "sides": np.zeros(count, np.int64),

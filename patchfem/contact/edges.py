@@ -35,11 +35,11 @@ class ContactEdge(NamedTuple):
 
 
 def edge_offset_fraction(aspect):
-    """Return the offset of an edge behind `ContactEdge.fraction`, over the length of a cell.
+    """Return the offset of an edge over the length of the last cell in contact.
 
-    The cell is the last one in contact. The offset decreases with the aspect, first with its square and then in
-    proportion. The three numbers fit Hertz contact on 35 meshes of aspects 1/8 to 4 within 0.0005; each of these is
-    known to 0.003.
+    The edge lies inside the position that `ContactEdge.fraction` gives. The offset decreases with
+    the aspect, first with its square and then in proportion. The three numbers fit Hertz contact on
+    35 meshes of aspects 1/8 to 4 within 0.0005; each of these is known to 0.003.
 
     Parameters
     ----------
@@ -50,8 +50,8 @@ def edge_offset_fraction(aspect):
     return 0.3048 - 0.0818 * aspect**2 / (1 + 0.585 * aspect)
 
 
-def edge_offset(inner, outer, fraction, row: float | None = None):
-    """Return the distances [m] of edges behind the positions that `ContactEdge.fraction` gives.
+def edge_offset(inner, outer, fraction, row_height: float | None = None):
+    """Return the distances [m] of edges inside the positions that `ContactEdge.fraction` gives.
 
     The cell length is interpolated between both cells by the fraction, so an edge does not jump where cells of two
     lengths meet.
@@ -62,11 +62,11 @@ def edge_offset(inner, outer, fraction, row: float | None = None):
         Lengths [m] of the last cell in contact and of the one beyond it.
     fraction : float or ndarray
         Fraction of the outer cell.
-    row : float, optional
+    row_height : float, optional
         Height of the first row of cells [m]; square cells without it.
     """
     cell = (1 - fraction) * inner + fraction * outer
-    return edge_offset_fraction(1.0 if row is None else row / cell) * cell
+    return edge_offset_fraction(1.0 if row_height is None else row_height / cell) * cell
 
 
 def _find_ends(active: np.ndarray) -> list:
@@ -77,7 +77,7 @@ def _find_ends(active: np.ndarray) -> list:
     ]
 
 
-def passed_fraction(force: float, force_rate: float, gap: float, gap_rate: float) -> float:
+def compute_edge_fraction(force: float, force_rate: float, gap: float, gap_rate: float) -> float:
     """Return the fraction of a cell that an edge has passed; 1/2 if it is not determined.
 
     Parameters
@@ -89,12 +89,13 @@ def passed_fraction(force: float, force_rate: float, gap: float, gap_rate: float
     """
     if not (force_rate > 0 and gap_rate > 0):
         return 0.5
-    since_entry, until_next = force / force_rate, gap / gap_rate
+    since_entry = force / force_rate
+    until_next = gap / gap_rate
     total = since_entry + until_next
     return float(since_entry / total) if total > 0 else 0.5
 
 
-def find_edges(normal, x, force, gap, softness=None, row: float | None = None) -> list:
+def find_edges(normal, x, force, gap, softness=None, row_height: float | None = None) -> list:
     """Find the edges of a contact set.
 
     Parameters
@@ -105,7 +106,7 @@ def find_edges(normal, x, force, gap, softness=None, row: float | None = None) -
         Positions [m], forces [N] and gap under load [m].
     softness : (m,) ndarray, optional
         Compliance [m/N] of the asperity layer alone, which has its edge at the node itself.
-    row : float, optional
+    row_height : float, optional
         Height of the first row of cells [m]; square cells without it.
 
     Returns
@@ -121,13 +122,14 @@ def find_edges(normal, x, force, gap, softness=None, row: float | None = None) -
     force_rate[index] = cho_solve(cho_factor(normal[np.ix_(index, index)]), np.ones(index.size))
     edges = []
     for node, side in ends:
-        outside, inside = node + side, node - side
+        outside = node + side
+        inside = node - side
         if not 0 <= inside < x.size:
             inside = outside
         gap_rate = 1 - normal[outside] @ force_rate
-        fraction = passed_fraction(force[node], force_rate[node], gap[outside], gap_rate)
+        fraction = compute_edge_fraction(force[node], force_rate[node], gap[outside], gap_rate)
         cell = abs(x[outside] - x[node])
-        offset = edge_offset(abs(x[node] - x[inside]), cell, fraction, row)
+        offset = edge_offset(abs(x[node] - x[inside]), cell, fraction, row_height)
         if softness is not None:
             offset *= 1 - softness[node] / normal[node, node]
         position = x[node] + fraction * (x[outside] - x[node]) - side * offset

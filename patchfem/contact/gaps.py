@@ -1,6 +1,6 @@
 """Shapes of the surfaces: functions of x [m] whose sum is the gap between the pieces.
 
-`STATED` has what a mesh or a holder needs to know of a shape besides its gap. A shape of which they need to
+`SHAPE_PROPERTIES` has what a mesh or a holder needs to know of a shape besides its gap. A shape of which they need to
 know nothing has no entry there.
 """
 
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Stated(NamedTuple):
+class ShapeProperties(NamedTuple):
     """Properties of a shape, each a function of the keys of its table, or None.
 
     - angle: angle [rad] by which the shape rotates the piece.
@@ -24,9 +24,9 @@ class Stated(NamedTuple):
     wave: Callable | None = None
 
 
-STATED = {
-    "tilt": Stated(angle=lambda keys: keys.angle),
-    "step": Stated(edge=lambda keys: (keys.at, keys.height)),
+SHAPE_PROPERTIES = {
+    "tilt": ShapeProperties(angle=lambda keys: keys.angle),
+    "step": ShapeProperties(edge=lambda keys: (keys.at, keys.height)),
 }
 
 

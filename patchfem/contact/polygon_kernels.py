@@ -11,14 +11,14 @@ from numba.core.options import DefaultOptions
 from ..compiled.jit import njit
 
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-ROUNDING = 1e-13  # rounding error of a force or gap over the largest of its terms
+ROUND_OFF = 1e-13  # rounding error of a force or gap over the largest of its terms
 MAX_SIDES = 16  # sides of a polygon; sets with more are checked node by node
 # half width of the box in which polygons are computed, over the openings of the reference state
 BOX_HALF_WIDTH = 100.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def units(sets):
+def polygon_units(sets):
     """Return the units of d [m] and of t [rad] in which polygons are computed.
 
     They are the size of the openings of the reference state, and this size over the largest |x|.
@@ -35,13 +35,13 @@ def write_polygon(sets, slot):
     leave the contact. Clipping is that of Sutherland and Hodgman (Comm. ACM 17, 32, 1974). Nodes at the ends of the
     contact come first, because they cut off most. A set with too many sides gets no polygon.
     """
-    unit_d, unit_t = units(sets)
+    unit_d, unit_t = polygon_units(sets)
     r0, r1, r2, on = sets.rows[slot, 0], sets.rows[slot, 1], sets.rows[slot, 2], sets.on[slot]
     top = 0.0
     for i in range(on.size):
         if on[i]:
             top = max(top, abs(r0[i]) + abs(r1[i]) * unit_d + abs(r2[i]) * unit_t)
-    sets.limit[slot, 0], sets.limit[slot, 1] = -4 * ROUNDING * top, -4 * ROUNDING * unit_d
+    sets.limit[slot, 0], sets.limit[slot, 1] = -4 * ROUND_OFF * top, -4 * ROUND_OFF * unit_d
     old, new = sets.corner[0], sets.corner[1]
     count = 4
     # a corner has two coordinates and the node whose line leads to the next corner, -1 for the box
@@ -96,12 +96,12 @@ def write_polygon(sets, slot):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def is_in_box(sets, d, t):
     """Return whether a motion (d [m], t [rad]) lies in the box in which polygons are computed."""
-    unit_d, unit_t = units(sets)
+    unit_d, unit_t = polygon_units(sets)
     return abs(d) <= BOX_HALF_WIDTH * unit_d and abs(t) <= BOX_HALF_WIDTH * unit_t
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def margin(sets, k, side, d, t):
+def side_margin(sets, k, side, d, t):
     """Return how far the force [N] or gap [m] of the node of a side is above its limit.
 
     k: slot of the set; d [m], t [rad]: motion of the holder.
@@ -122,7 +122,7 @@ def is_inside(sets, k, d, t):
     if sets.sides[k] == 0 or not is_in_box(sets, d, t):
         return False
     for side in range(sets.sides[k]):
-        if margin(sets, k, side, d, t) < 0:
+        if side_margin(sets, k, side, d, t) < 0:
             return False
     return True
 
@@ -138,8 +138,8 @@ def find_exit(sets, k, d, t, dd, dt):
     if sets.sides[k] == 0 or not (is_in_box(sets, d, t) and is_in_box(sets, d + dd, t + dt)):
         return out, found
     for side in range(sets.sides[k]):
-        here = margin(sets, k, side, d, t)
-        rate = margin(sets, k, side, d + dd, t + dt) - here
+        here = side_margin(sets, k, side, d, t)
+        rate = side_margin(sets, k, side, d + dd, t + dt) - here
         if rate < 0 and max(here, 0.0) < -rate * out:
             out, found = max(here, 0.0) / -rate, side
     return out, found

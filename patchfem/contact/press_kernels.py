@@ -1,6 +1,6 @@
 """Compiled search for the contact set at a motion of the holder.
 
-On each set forces and gaps are affine in the motion. The motion is counted from a reference state: closing d [m] and
+On each set forces and gaps are affine in the motion. The motion is measured from a reference state: closing d [m] and
 rotation t [rad]. The unknowns y of a set are the forces of its nodes in contact and the gaps of the others. The linear
 complementarity problem w = b + t x - d + C f then reads y = R (1, d, t). A node that enters or leaves the set is a
 principal pivot of the tableau [T | R].
@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiled.jit import njit
-from .polygon_kernels import NJIT_NO_REFCOUNT, ROUNDING, is_inside, write_polygon
+from .polygon_kernels import NJIT_NO_REFCOUNT, ROUND_OFF, is_inside, write_polygon
 
 FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
-# the compiler vectorises loops that search a minimum only with these flags
+# the compiler vectorises loops that search for a minimum only with these flags
 FASTMATH_MINIMUM = FASTMATH_FLAGS | {"nnan", "nsz"}
 N_BLOCK_EXCHANGES = 12  # sets that are tried with all failing nodes exchanged; more may cycle
 # relative residual above which the tableau is computed anew; below it one refinement reaches rounding errors
@@ -43,7 +43,7 @@ class SetArrays(NamedTuple):
     - node (m,): 64-bit names of the nodes.
 
     Tableau: tableau (m, m + 3), here (m,) the set to which it is pivoted, wanted (m,) the set that is
-    searched, side (2, 3, m) and row (m + 3,) workspaces.
+    searched for, side (2, 3, m) and row (m + 3,) workspaces.
 
     Stored sets:
 
@@ -266,16 +266,16 @@ def check_set(sets, k, d, t):
     gap.
     """
     r0, r1, r2, on = sets.rows[k, 0], sets.rows[k, 1], sets.rows[k, 2], sets.on[k]
-    top, pull, deep = 0.0, 0.0, 0.0
+    top, compute_energy, deep = 0.0, 0.0, 0.0
     for i in range(on.size):
         y = r0[i] + r1[i] * d + r2[i] * t
         term = abs(r0[i]) + abs(r1[i] * d) + abs(r2[i] * t)
         top = max(top, term if on[i] else 0.0)
-        pull = min(pull, y if on[i] else 0.0)
+        compute_energy = min(compute_energy, y if on[i] else 0.0)
         deep = min(deep, 0.0 if on[i] else y)
-    force = -ROUNDING * top
-    gap = -ROUNDING * (sets.base[3] + abs(d) + abs(t) * max(abs(sets.x[0]), abs(sets.x[-1])))
-    return pull >= force and deep >= gap, force, gap
+    force = -ROUND_OFF * top
+    gap = -ROUND_OFF * (sets.base[3] + abs(d) + abs(t) * max(abs(sets.x[0]), abs(sets.x[-1])))
+    return compute_energy >= force and deep >= gap, force, gap
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -297,7 +297,7 @@ def exchange_failing(sets, k, d, t, force, gap, is_single):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def locate(sets, k, d, t):
+def find_set(sets, k, d, t):
     """Find the contact set at a motion (d [m], t [rad]) from set k; return its slot or -1.
 
     Cost: 0.5 us for 400 nodes on a known set, 0.3 ms for a new one that differs by one node.
@@ -317,7 +317,7 @@ def locate(sets, k, d, t):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def begin(sets, name):
+def build_first_set(sets, name):
     """Compute the contact set `sets.wanted` from an empty tableau and return its slot.
 
     name: name of the set. The slot is -1 if the compliance is not positive definite on the set.
@@ -327,7 +327,7 @@ def begin(sets, name):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pull(sets, k, h, turn):
+def compute_energy(sets, k, h, turn):
     """Return the energy [J] of the preloaded contact on set k, and the slopes of the energy.
 
     The slopes are those in heave h = -d and in rotation. The load is N0 less the slope in heave, the moment M0 less
@@ -344,7 +344,7 @@ def press_state(sets, k, d, t, force):
 
     d [m], t [rad]: motion of the holder. force: (m,) array [N] for the forces, which are >= 0.
     """
-    energy, slope, turn = pull(sets, k, -d, t)
+    energy, slope, turn = compute_energy(sets, k, -d, t)
     for i in range(force.size):
         y = sets.rows[k, 0, i] + sets.rows[k, 1, i] * d + sets.rows[k, 2, i] * t
         force[i] = max(y, 0.0) if sets.on[k, i] else 0.0

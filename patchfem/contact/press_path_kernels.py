@@ -4,7 +4,7 @@ import numpy as np
 
 from ..compiled.jit import njit
 from .polygon_kernels import NJIT_NO_REFCOUNT, find_exit, is_inside
-from .press_kernels import FASTMATH_MINIMUM, check_set, locate, pull
+from .press_kernels import FASTMATH_MINIMUM, check_set, compute_energy, find_set
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
@@ -37,11 +37,11 @@ def cross_side(sets, k, side, d, t):
         name = sets.names[k] ^ sets.node[sets.edge[k, side]]
         if following >= 0 and sets.names[following] == name and is_inside(sets, following, d, t):
             return following
-        following = locate(sets, k, d, t)
+        following = find_set(sets, k, d, t)
         if following >= 0 and sets.names[following] == name and following != k:
             sets.beside[k, side] = following
         return following
-    return locate(sets, k, d, t)
+    return find_set(sets, k, d, t)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -68,7 +68,8 @@ def path_mean(sets, k, h, turn, dh, dt, out):
     """
     out[:] = 0.0
     at = 0.0
-    # fraction beyond a border at which the next set is searched, above rounding errors
+    # fraction of the increment beyond a border at which the next set is determined; it is larger
+    # than rounding errors
     small = 1e-10
     # the number of sets is limited, because rounding errors may make a path return to the same sets
     for _ in range(20 * sets.x.size + 100):
@@ -83,8 +84,8 @@ def path_mean(sets, k, h, turn, dh, dt, out):
                     _, f, g = check_set(sets, k, d, t)
                     share = find_first_failure(sets, k, d, t, -dh, dt, min(force, f), min(gap, g))
                     end = min(at + max(share, 0.0), 1.0)
-        _, a1, a2 = pull(sets, k, h + at * dh, turn + at * dt)
-        energy, b1, b2 = pull(sets, k, h + end * dh, turn + end * dt)
+        _, a1, a2 = compute_energy(sets, k, h + at * dh, turn + at * dt)
+        energy, b1, b2 = compute_energy(sets, k, h + end * dh, turn + end * dt)
         q, part, bend = sets.energy[k], 0.5 * (end - at), 0.5 * (end * end - at * at)
         out[0] += part * (a1 + b1)
         out[1] += part * (a2 + b2)

@@ -23,7 +23,7 @@ def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
     return float(np.linalg.solve(tangential[np.ix_(index, index)], np.ones(index.size)).sum())
 
 
-def coupled_stiffness(pieces: Compliance, closing: np.ndarray, active: np.ndarray) -> float:
+def coupled_stiffness(pieces: Compliance, coupling: np.ndarray, active: np.ndarray) -> float:
     """Return the tangential stiffness [N/m] of dissimilar bodies in full stick.
 
     Approach and rotation are fixed.
@@ -31,14 +31,14 @@ def coupled_stiffness(pieces: Compliance, closing: np.ndarray, active: np.ndarra
     Parameters
     ----------
     pieces : Compliance
-    closing : (m, m) ndarray
+    coupling : (m, m) ndarray
         Normal closing per shear force [m/N].
     active : (m,) bool ndarray
         Contact set; the stiffness of an empty one is 0.
     """
     here = np.ix_(*2 * (np.flatnonzero(active),))
     system = np.block(
-        [[pieces.normal[here], closing[here]], [closing[here].T, pieces.tangential[here]]]
+        [[pieces.normal[here], coupling[here]], [coupling[here].T, pieces.tangential[here]]]
     )
     slide = np.repeat([0.0, 1.0], len(system) // 2)
     with one_thread():

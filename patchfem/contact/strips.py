@@ -4,10 +4,10 @@ Strip j, at y_j from the middle, has the gap g(x) + roll y_j (or one of its own)
 strips is neglected. The motion q = (delta, -theta, -roll) of the holder, or as much of it as is free, is common to all
 strips: strip j closes by R_j q with R_j = (1, x, y_j).
 
-Asperities form a skin, a compliant layer with the local law P(s) in series with the pieces: a node of area A_i carries
+Asperities form a compliant layer with the local law P(s) in series with the pieces: a node of area A_i carries
 f_i = A_i P(s_i) at the separation s_i = g_i + theta x_i - delta + (C f)_i of the mean planes. P >= 0 decreases with s,
 so the solution is unique for every law, gap and control. A linear law adds 1/(k A_i) to the diagonal of C, and bare
-contact follows (`unilateral.solve`); `smooth_skin` solves the other laws. A patch with asperities is one strip.
+contact follows (`unilateral.solve`); `asperity_layer` solves the other laws. A patch with asperities is one strip.
 """
 
 from dataclasses import dataclass, replace
@@ -19,12 +19,12 @@ import numpy as np
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
 from ..elasticity.lapack import one_thread
 from .active_set import ContactProblem
-from .skin_laws import ExponentialSkin, LinearSkin, SmoothSkin
-from .smooth_skin import (
+from .asperity_laws import ExponentialAsperities, LinearAsperities, SmoothAsperities
+from .asperity_layer import (
     MIN_LOG_PRESSURE,
-    SkinProblem,
-    solve_skin_approach,
-    solve_smooth_skin,
+    AsperityProblem,
+    solve_asperity_layer,
+    solve_at_motion,
     solve_tangent,
 )
 from .strip_compliance import StripCompliance
@@ -194,7 +194,7 @@ def split_into_strips(pieces: Compliance, count: int) -> StripProperties:
 
 
 def compute_strip_residuals(
-    skin,
+    asperities,
     compliance: StripCompliance,
     x,
     weight,
@@ -213,7 +213,7 @@ def compute_strip_residuals(
 
     Parameters
     ----------
-    skin : LinearSkin, SmoothSkin or None
+    asperities : LinearAsperities, SmoothAsperities or None
     compliance : StripCompliance
     x, weight : (m,) ndarray
         Positions [m] and nodal areas [m2] of one strip.
@@ -239,16 +239,16 @@ def compute_strip_residuals(
     largest = max(force.max(), np.exp(MIN_LOG_PRESSURE))
     total = max(force.sum(), MIN_TOTAL_FORCE)
     residuals = {"tension": max(0.0, -force.min()) / largest}
-    if skin is None:
+    if asperities is None:
         residuals["penetration"] = np.max(np.maximum(0.0, -opening.min(axis=1)) / depth)
         residuals["complementarity"] = np.max(np.abs(force * opening).sum(axis=1) / (total * depth))
     else:
-        if isinstance(skin, LinearSkin):
-            rate = np.full(gap.shape, skin.k)
+        if isinstance(asperities, LinearAsperities):
+            rate = np.full(gap.shape, asperities.k)
         else:
-            rate = 1e-5 * skin.stiffness(opening)
+            rate = 1e-5 * asperities.stiffness(opening)
         gain = depth * (weight * rate).max(axis=1)
-        mismatch = np.abs(force - weight * skin.pressure(opening))
+        mismatch = np.abs(force - weight * asperities.pressure(opening))
         mismatch -= weight * np.exp(MIN_LOG_PRESSURE)
         residuals["law"] = np.max(np.maximum(0.0, mismatch.max(axis=1)) / (largest + gain))
     if load is not None:
@@ -272,8 +272,8 @@ def press_strips(
     approach: float | None = None,
     rotation: float = 0.0,
     spring: float = 0.0,
-    skin=None,
-    lateral: float | None = None,
+    asperities=None,
+    roll_moment: float | None = None,
 ) -> StripsState:
     """Press strips by one holder, under a load or by an approach.
 
@@ -299,9 +299,9 @@ def press_strips(
         Rotation [rad] that is already contained in the gap.
     spring : float
         Stiffness [N m/rad] of the holder against the rotation about y, unloaded at `rotation`.
-    skin : LinearSkin, SmoothSkin, optional
+    asperities : LinearAsperities, SmoothAsperities, optional
         Pressure law of the asperities; without a law the pieces are bare.
-    lateral : float, optional
+    roll_moment : float, optional
         Moment sum f y [N m] of a roll that is free from `roll` on; without it the roll is prescribed.
 
     Returns
@@ -311,7 +311,7 @@ def press_strips(
     Raises
     ------
     PatchfemError
-        For other combinations of controls, a moment that no pressure can carry, or an exponential skin without
+        For other combinations of controls, a moment that no pressure can carry, or an exponential law without
         reference under an approach.
     NotConverged
         If a residual exceeds 1e-9.
@@ -322,42 +322,44 @@ def press_strips(
     offsets = layout.offsets
     gap = np.broadcast_to(gap, (offsets.size, x.size)) + roll * offsets[:, None]
     is_held = spring and load is not None
-    _refuse_controls(skin, x, gap, load, None if is_held else moment, approach)
-    _refuse_roll(offsets, load, lateral)
-    if isinstance(skin, ExponentialSkin) and skin.reference is None and load:
-        skin = replace(skin, reference=load / (weight.sum() * offsets.size))
+    _refuse_controls(asperities, x, gap, load, None if is_held else moment, approach)
+    _refuse_roll(offsets, load, roll_moment)
+    if isinstance(asperities, ExponentialAsperities) and asperities.reference is None and load:
+        asperities = replace(asperities, reference=load / (weight.sum() * offsets.size))
     if load == 0:
         position = HolderPosition(float(gap.min()), rotation, roll)
-        return _make_state(skin, layout, np.zeros(gap.shape), gap - gap.min(), position)
-    loads = {"load": load, "moment": moment, "lateral": lateral}
+        return _make_state(asperities, layout, np.zeros(gap.shape), gap - gap.min(), position)
+    loads = {"load": load, "moment": moment, "roll_moment": roll_moment}
     problem = _holder_problem(layout, gap, loads, spring)
     with one_thread():
-        if isinstance(skin, SmoothSkin):
-            solution = _press_with_asperities(skin, compliance, layout, problem, approach)
+        if isinstance(asperities, SmoothAsperities):
+            solution = _press_with_asperities(asperities, compliance, layout, problem, approach)
         else:
-            solution = _press_bare(skin, compliance, layout, problem, approach)
+            solution = _press_bare(asperities, compliance, layout, problem, approach)
     force = solution.force.reshape(gap.shape)
-    delta, theta, rolled = _holder_position(solution.motion, moment, lateral)
+    delta, theta, rolled = _holder_position(solution.motion, moment, roll_moment)
     gap = gap + rolled * offsets[:, None]
     residuals = compute_strip_residuals(
-        skin, compliance, x, weight, gap, force, delta, theta, load, moment, spring
+        asperities, compliance, x, weight, gap, force, delta, theta, load, moment, spring
     )
-    if lateral is not None:
-        error = abs(force.sum(axis=1) @ offsets - lateral) / (load * np.ptp(offsets))
+    if roll_moment is not None:
+        error = abs(force.sum(axis=1) @ offsets - roll_moment) / (load * np.ptp(offsets))
         residuals = MappingProxyType({**residuals, "roll_balance": float(error)})
     # one node of a single strip may carry the load; `unilateral.solve` then chooses the rotation
-    if not isinstance(skin, SmoothSkin) and offsets.size > 1:
-        _refuse_loose_holder(force, moment is not None and spring == 0, lateral is not None)
-    _refuse_strip_residuals(skin, residuals)
-    if isinstance(skin, SmoothSkin):
+    if not isinstance(asperities, SmoothAsperities) and offsets.size > 1:
+        _refuse_loose_holder(force, moment is not None and spring == 0, roll_moment is not None)
+    _refuse_strip_residuals(asperities, residuals)
+    if isinstance(asperities, SmoothAsperities):
         opening = solution.separation.reshape(gap.shape)
     else:
         displacement = compliance.product(solution.force).reshape(gap.shape)
         opening = np.maximum(gap + theta * x - delta + displacement, 0.0)
-        pressed = 0.0 if skin is None else -force / (skin.k * weight)
+        pressed = 0.0 if asperities is None else -force / (asperities.k * weight)
         opening = np.where(force > 0, pressed, opening)
     position = HolderPosition(delta, rotation + theta, roll + rolled)
-    return _make_state(skin, layout, force, opening, position, solution.n_iterations, residuals)
+    return _make_state(
+        asperities, layout, force, opening, position, solution.n_iterations, residuals
+    )
 
 
 def _holder_problem(layout: StripLayout, gap, loads: dict, spring: float) -> ContactProblem:
@@ -366,7 +368,7 @@ def _holder_problem(layout: StripLayout, gap, loads: dict, spring: float) -> Con
     columns = {
         "load": np.ones(gap.size),
         "moment": np.tile(layout.x, n_strips),
-        "lateral": np.repeat(layout.offsets, layout.x.size),
+        "roll_moment": np.repeat(layout.offsets, layout.x.size),
     }
     given = [name for name, value in loads.items() if value is not None]
     return ContactProblem(
@@ -377,18 +379,18 @@ def _holder_problem(layout: StripLayout, gap, loads: dict, spring: float) -> Con
     )
 
 
-def _holder_position(motion, moment, lateral) -> HolderPosition:
+def _holder_position(motion, moment, roll_moment) -> HolderPosition:
     """Return the position of the holder from the motion (r,) of the rotations that are free."""
     theta = -float(motion[1]) if moment is not None else 0.0
-    roll = -float(motion[-1]) if lateral is not None else 0.0
+    roll = -float(motion[-1]) if roll_moment is not None else 0.0
     return HolderPosition(float(motion[0]), theta, roll)
 
 
-def _press_bare(skin, compliance, layout: StripLayout, problem: ContactProblem, approach):
+def _press_bare(asperities, compliance, layout: StripLayout, problem: ContactProblem, approach):
     """Solve bare strips, or strips with a linear asperity layer, which adds to the compliance."""
     warm_start = compliance.warm_start
-    if skin is not None:
-        compliance = compliance.add_to_diagonal(1 / (skin.k * layout.weight))
+    if asperities is not None:
+        compliance = compliance.add_to_diagonal(1 / (asperities.k * layout.weight))
         compliance = replace(compliance, warm_start=warm_start)
     if approach is not None:
         gap = problem.gap - approach
@@ -416,7 +418,7 @@ def _press_bare(skin, compliance, layout: StripLayout, problem: ContactProblem, 
 
 
 def _press_with_asperities(
-    skin, compliance, layout: StripLayout, problem: ContactProblem, approach
+    asperities, compliance, layout: StripLayout, problem: ContactProblem, approach
 ):
     """Solve strips with an asperity layer of a smooth pressure law.
 
@@ -431,14 +433,14 @@ def _press_with_asperities(
     )
     area = np.tile(layout.weight, layout.offsets.size)
     if approach is None:
-        solution = solve_smooth_skin(SkinProblem(skin, compliance, area, scaled))
+        solution = solve_asperity_layer(AsperityProblem(asperities, compliance, area, scaled))
         return solution._replace(motion=solution.motion * scale)
     moved = scaled._replace(gap=problem.gap - approach)
-    solution = solve_skin_approach(SkinProblem(skin, compliance, area, moved), np.zeros(0))
+    solution = solve_at_motion(AsperityProblem(asperities, compliance, area, moved), np.zeros(0))
     return solution._replace(motion=np.array([approach]))
 
 
-def _refuse_controls(skin, x, gap, load, moment, approach) -> None:
+def _refuse_controls(asperities, x, gap, load, moment, approach) -> None:
     """Raise PatchfemError for controls without a solution."""
     if (load is None) == (approach is None) or (moment is not None and load is None):
         raise PatchfemError("contact: give a load, a load and a moment, or an approach")
@@ -449,28 +451,32 @@ def _refuse_controls(skin, x, gap, load, moment, approach) -> None:
         )
     if load and moment is not None:
         refuse_tipping(moment / load, 0.0, np.ptp(x) / 2)
-    if load is None and isinstance(skin, ExponentialSkin) and skin.reference is None:
+    if (
+        load is None
+        and isinstance(asperities, ExponentialAsperities)
+        and asperities.reference is None
+    ):
         raise PatchfemError(
             'contact.approach with contact.asperities.law = "exponential": this law has no first touch '
             "from which an approach could be measured; give contact.load, or another law"
         )
 
 
-def _refuse_roll(offsets, load, lateral) -> None:
+def _refuse_roll(offsets, load, roll_moment) -> None:
     """Raise PatchfemError for a free roll that the strips cannot balance.
 
     This is a roll without load or second strip, or with a load line beyond the strips.
     """
-    if lateral is None:
+    if roll_moment is None:
         return
     if load is None or offsets.size < 2:
         raise PatchfemError(
             "contact.strips.roll: a holder that is free to rotate about x needs a load and at least "
             "two strips"
         )
-    if load > 0 and not offsets.min() < lateral / load < offsets.max():
+    if load > 0 and not offsets.min() < roll_moment / load < offsets.max():
         raise PatchfemError(
-            f"contact.strips.offset: the load line at {lateral / load:.6g} m lies beyond the middle of "
+            f"contact.strips.offset: the load line at {roll_moment / load:.6g} m lies beyond the middle of "
             f"the outermost strips at {offsets.max():.6g} m, where no pressure can balance it; raise "
             "contact.strips.count or lower the offset"
         )
@@ -488,9 +494,9 @@ def _refuse_loose_holder(force, rotation_is_free: bool, roll_is_free: bool) -> N
         raise NotConverged(LOOSE_ROLL_MESSAGE)
 
 
-def _refuse_strip_residuals(skin, residuals) -> None:
+def _refuse_strip_residuals(asperities, residuals) -> None:
     """Raise NotConverged, with the remedy for this pressure law, where a residual is too large."""
-    if isinstance(skin, SmoothSkin):
+    if isinstance(asperities, SmoothAsperities):
         place = "contact.asperities"
         remedy = (
             "; make the rough layer softer (raise the decay length or the height deviation), or "
@@ -502,12 +508,18 @@ def _refuse_strip_residuals(skin, residuals) -> None:
 
 
 def _make_state(
-    skin, layout, force, opening, position: HolderPosition, n_iterations: int = 0, residuals=()
+    asperities,
+    layout,
+    force,
+    opening,
+    position: HolderPosition,
+    n_iterations: int = 0,
+    residuals=(),
 ) -> StripsState:
     """Return the frozen state of strips; without load its outcome is no_contact."""
     is_pressed, stiffness = force.sum() > 0, None
-    if skin is not None:
-        stiffness = skin.stiffness(opening) * (force > 0) if is_pressed else force
+    if asperities is not None:
+        stiffness = asperities.stiffness(opening) * (force > 0) if is_pressed else force
     return StripsState(
         force=frozen_array(force),
         gap=frozen_array(opening),

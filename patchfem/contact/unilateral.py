@@ -4,7 +4,7 @@ Find nodal forces f >= 0 with w = g + theta x - delta + C f >= 0 and f . w = 0. 
 prescribed, or the load sum f = N. Under a load the rotation theta is prescribed (it is part of g), free under a moment,
 sum f x = M, or held by the spring of the holder, sum f x = M + K theta.
 
-`solve` counts the gap from the rest position of a rigid piece and uses the primal-dual active-set method; where that
+`solve` measures the gap from the rest position of a rigid piece and uses the primal-dual active-set method; where that
 cycles, conjugate gradients and the primal active-set method follow. `compute_residuals` checks every solution again and
 shares no intermediate result with the solver.
 """
@@ -413,7 +413,7 @@ def _open_interface(gap: np.ndarray, approach: float, rotation: float) -> Contac
 def _solve_and_check(
     pieces: Compliance, problem: ContactProblem, start, approach: float, rotation: float
 ) -> ContactState:
-    """Solve and check a contact problem whose gap is counted from `approach` [m].
+    """Solve and check a contact problem whose gap is measured from `approach` [m].
 
     A large offset of the gap then costs no digits.
     """

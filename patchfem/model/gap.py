@@ -89,10 +89,10 @@ class Gap:
         return min((wave for _, wave in self._values("wave")), default=inf)
 
     def _values(self, quantity: str) -> list:
-        """Return pairs (keys, value) of the shapes that have a quantity of `gaps.Stated`."""
+        """Return pairs (keys, value) of the shapes that have a quantity of `gaps.ShapeProperties`."""
         pairs = []
         for name, keys in self.shapes:
-            evaluate = getattr(gaps.STATED.get(name), quantity, None)
+            evaluate = getattr(gaps.SHAPE_PROPERTIES.get(name), quantity, None)
             if evaluate is not None:
                 pairs.append((keys, evaluate(keys)))
         return pairs

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from halfspace import press_periodic, wave_numbers
 
 from patchfem.closed_forms import contact as exact
-from patchfem.contact.skin_laws import HertzSkin
+from patchfem.contact.asperity_laws import HertzAsperities
 from patchfem.contact.unilateral import solve_forces
 
 CARBIDE, TITANIUM, COATING = (250e9, 0.24), (121e9, 0.32), 152.4e-6  # rig.toml
@@ -128,7 +128,7 @@ def separate(scatter: float, shape: str, coat: tuple = CARBIDE) -> float:
     if scatter == 0:
         return 1.5 * rate ** (2 / 3) * MEAN ** (1 / 3)
     if shape == "gaussian":
-        law = HertzSkin(RADIUS, density, scatter, modulus)
+        law = HertzAsperities(RADIUS, density, scatter, modulus)
         return float(law.stiffness(law.separation(np.array([MEAN])))[0])
 
     def carried(power: float, depth: float) -> float:

@@ -31,7 +31,7 @@ def compiled_sets(sets, room: float = 64e6) -> tuple:
     """(arrays of the search, slot of the reference set)."""
     arrays = sets.arrays(room)
     kept = PRESS.SetArrays(**arrays)
-    return kept, PRESS.begin(kept, sets.name(arrays))
+    return kept, PRESS.build_first_set(kept, sets.name(arrays))
 
 
 def solved_at(sets, d: float, t: float) -> np.ndarray:
@@ -72,7 +72,7 @@ def test_exact_forces_are_those_of_the_solver(room):
     kept, slot = compiled_sets(sets, room)
     force, apart = np.zeros(sets.x.size), 0
     for d, t in path(sets, state, 80):
-        slot = PRESS.locate(kept, slot, d, t)
+        slot = PRESS.find_set(kept, slot, d, t)
         check_state(sets, PRESS.press_state(kept, slot, d, t, force), force, d, t, 1e-12)
         apart += not force.any()
     assert apart >= 5 and kept.meta[2] > 16
@@ -85,7 +85,7 @@ def test_exact_many_pivots_do_not_wear_the_tableau():
     kept, slot = compiled_sets(sets, 0.0)
     force = np.zeros(sets.x.size)
     for d, t in path(sets, state, 400):
-        slot = PRESS.locate(kept, slot, d, t)
+        slot = PRESS.find_set(kept, slot, d, t)
     assert kept.meta[3] > 3000
     check_state(sets, PRESS.press_state(kept, slot, d, t, force), force, d, t, 1e-12)
 
@@ -103,7 +103,7 @@ def test_always_rough_surfaces_are_solved(seed):
     kept, slot = compiled_sets(sets)
     deep = np.abs(sets.opening).max()
     for d, t in rng.normal(size=(6, 2)) * [deep, deep / x[-1]]:
-        slot = PRESS.locate(kept, slot, d, t)
+        slot = PRESS.find_set(kept, slot, d, t)
         check_state(sets, PRESS.press_state(kept, slot, d, t, force), force, d, t, 1e-11)
 
 

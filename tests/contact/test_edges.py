@@ -62,7 +62,7 @@ def ends_of(block, load: float, radius: float = 57.7e-3) -> tuple:
     x, weight = pieces.interface.x, pieces.interface.weight
     found = press(pieces, x**2 / (2 * radius), load)
     force = found.sigma_n * weight
-    return force, edges.find_edges(pieces.normal, x, force, found.gap, row=row)
+    return force, edges.find_edges(pieces.normal, x, force, found.gap, row_height=row)
 
 
 def test_always_edges_of_hertz_lie_within_a_twentieth_of_their_cell(block):

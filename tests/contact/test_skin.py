@@ -14,8 +14,13 @@ from scipy.integrate import quad
 from scipy.stats import norm
 from skins import longer, solve, tangent
 
-from patchfem.contact import smooth_skin
-from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin, peak_integral
+from patchfem.contact import asperity_layer
+from patchfem.contact.asperity_laws import (
+    ExponentialAsperities,
+    HertzAsperities,
+    LinearAsperities,
+    peak_integral,
+)
 from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.strip_compliance import StripCompliance
 from patchfem.contact.strips import STRIP_RESIDUAL_TOL, compute_strip_residuals
@@ -24,8 +29,12 @@ from patchfem.core import NotConverged, Outcome, PatchfemError
 
 AREA = LENGTH * WIDTH
 MEAN = LOAD / AREA
-PEAKS = HertzSkin(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11)
-SKINS = {"linear": LinearSkin(1e13), "exponential": ExponentialSkin(0.5e-6, 1e6), "hertz": PEAKS}
+PEAKS = HertzAsperities(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11)
+SKINS = {
+    "linear": LinearAsperities(1e13),
+    "exponential": ExponentialAsperities(0.5e-6, 1e6),
+    "hertz": PEAKS,
+}
 each_skin = pytest.mark.parametrize("skin", SKINS.values(), ids=SKINS.keys())
 
 
@@ -39,7 +48,7 @@ def test_exact_reference_pressure_only_shifts_the_approach():
     c, x, weight = bodies()
     gap = rough(np.random.default_rng(1), x, 1e-6)
     one, two = (
-        solve(ExponentialSkin(1e-7, p), c, x, weight, gap, LOAD) for p in (None, 1e3 * MEAN)
+        solve(ExponentialAsperities(1e-7, p), c, x, weight, gap, LOAD) for p in (None, 1e3 * MEAN)
     )
     assert np.abs(one.force - two.force).max() <= 1e-11 * LOAD
     assert one.delta - two.delta == pytest.approx(1e-7 * np.log(1e3), rel=1e-9)
@@ -60,7 +69,9 @@ def test_order_one_a_stiff_linear_skin_tends_to_bare_contact(offset):
     gap, moment = GAPS["tilt"](x), None if offset is None else offset * LOAD
     bare = press(pair, gap, LOAD, moment)
     off = [
-        np.abs(solve(LinearSkin(k), c, x, weight, gap, LOAD, moment).pressure - bare.sigma_n).max()
+        np.abs(
+            solve(LinearAsperities(k), c, x, weight, gap, LOAD, moment).pressure - bare.sigma_n
+        ).max()
         / MEAN
         for k in (1e16, 1e17, 1e18)
     ]
@@ -69,7 +80,7 @@ def test_order_one_a_stiff_linear_skin_tends_to_bare_contact(offset):
     assert np.log10(off[1] / off[2]) == pytest.approx(1, abs=0.1)
 
 
-@pytest.mark.parametrize("skin", [ExponentialSkin(1e-6, MEAN), PEAKS])
+@pytest.mark.parametrize("skin", [ExponentialAsperities(1e-6, MEAN), PEAKS])
 def test_order_one_thin_smooth_skins_tend_to_bare_contact(skin):
     """P(s/t) with t -> 0, to within the logarithm of t."""
     c, x, weight = bodies()
@@ -105,7 +116,7 @@ def test_exact_forces_minimise_the_energy():
     c, x, weight = bodies()
     rng = np.random.default_rng(4)
     gap = rough(rng, x, 1e-7)
-    for skin in (ExponentialSkin(1e-7, 1e6), PEAKS):
+    for skin in (ExponentialAsperities(1e-7, 1e6), PEAKS):
         state = solve(skin, c, x, weight, gap, LOAD, 1e-3 * LOAD)
         slope = c @ state.force + gap - skin.separation(state.pressure)
         move = np.stack([np.ones(x.size), x / LENGTH], axis=1)
@@ -148,7 +159,7 @@ def test_always_the_tail_of_the_peaks_is_finite_and_keeps_its_law():
     assert np.abs(rate / peak_integral(middle)[1] - 1).max() <= 1e-6
 
 
-@pytest.mark.parametrize("skin", [ExponentialSkin(1e-7, 1e6), PEAKS])
+@pytest.mark.parametrize("skin", [ExponentialAsperities(1e-7, 1e6), PEAKS])
 def test_exact_separation_inverts_the_pressure(skin):
     wanted = 10.0 ** np.arange(-60, 16)
     assert np.abs(skin.pressure(skin.separation(wanted)) / wanted - 1).max() <= 1e-10
@@ -165,7 +176,7 @@ def test_exact_twice_the_gap_skin_and_load_doubles_the_pressure(skin):
     gap = 3e-5 * x + rough(np.random.default_rng(2), x, 1e-7)
     twice = {
         "linear": lambda: skin,
-        "exponential": lambda: ExponentialSkin(1e-6, 2e6),
+        "exponential": lambda: ExponentialAsperities(1e-6, 2e6),
         "hertz": lambda: replace(longer(skin, 2.0), density=2 * longer(skin, 2.0).density),
     }
     other = next(twice[name]() for name, law in SKINS.items() if law is skin)
@@ -257,8 +268,8 @@ def test_always_any_gap_load_moment_and_skin_converge(
         10**rough_size * rng.normal(size=x.size) if jagged else rough(rng, x, 10**rough_size)
     )
     skin = {
-        "linear": LinearSkin(10**stiff),
-        "exponential": ExponentialSkin(10**thin),
+        "linear": LinearAsperities(10**stiff),
+        "exponential": ExponentialAsperities(10**thin),
         "hertz": replace(PEAKS, deviation=10**thin),
     }[law]
     load = LOAD * 10**scale
@@ -275,7 +286,7 @@ def test_always_any_gap_load_moment_and_skin_converge(
 def test_always_any_approach_is_answered(depth, sign, seed, law):
     c, x, weight = bodies(40)
     gap = 1e-6 * np.random.default_rng(seed).normal(size=x.size)
-    skin = {**SKINS, "exponential": ExponentialSkin(1e-8, 1e6)}[law]
+    skin = {**SKINS, "exponential": ExponentialAsperities(1e-8, 1e6)}[law]
     state = solve(skin, c, x, weight, gap, approach=gap.min() + sign * 10**depth)
     assert (
         state.force.min() >= 0 and max(state.residuals.values(), default=0.0) <= STRIP_RESIDUAL_TOL
@@ -288,7 +299,7 @@ def test_always_any_approach_is_answered(depth, sign, seed, law):
 def test_exact_an_approach_about_the_floor_of_the_pressure_is_answered():
     c, x, weight = bodies(40)
     gap = 1e-6 * np.random.default_rng(0).normal(size=x.size)
-    skin = ExponentialSkin(1e-8, 1e6)
+    skin = ExponentialAsperities(1e-8, 1e6)
     edge = 1e-8 * (
         np.log(1e6) + 300
     )  # the separation at which the pressure is exp(MIN_LOG_PRESSURE)
@@ -302,13 +313,13 @@ def test_exact_an_approach_about_the_floor_of_the_pressure_is_answered():
 def test_exact_going_down_the_dual_alone_leads_to_the_same_answer(monkeypatch):
     c, x, weight = bodies(40)
     gap = 1e-5 * np.random.default_rng(9).normal(size=x.size)
-    newton = smooth_skin._solve_newton
-    for skin in (ExponentialSkin(1e-8, MEAN), replace(PEAKS, deviation=1e-8)):
+    newton = asperity_layer._solve_newton
+    for skin in (ExponentialAsperities(1e-8, MEAN), replace(PEAKS, deviation=1e-8)):
         for moment in (None, 2e-3 * LOAD):
             here = solve(skin, c, x, weight, gap, LOAD, moment)
             with monkeypatch.context() as without:  # Newton on the patch under its approach alone
                 without.setattr(
-                    smooth_skin,
+                    asperity_layer,
                     "_solve_newton",
                     lambda *a: None if a[0].contact.target.size else newton(*a),
                 )
@@ -344,14 +355,14 @@ def test_refuses_controls_without_an_answer():
     with pytest.raises(PatchfemError, match="tips over"):
         solve(PEAKS, c, x, weight, 0 * x, LOAD, 0.5 * LENGTH * LOAD)
     with pytest.raises(PatchfemError, match="no first touch"):
-        solve(ExponentialSkin(1e-6), c, x, weight, 0 * x, approach=1e-6)
+        solve(ExponentialAsperities(1e-6), c, x, weight, 0 * x, approach=1e-6)
     with pytest.raises(PatchfemError, match="rough layer is too large to compute"):
-        solve(ExponentialSkin(1e-9, 1e6), 0 * c, x, weight, 0 * x, approach=1e-3)
+        solve(ExponentialAsperities(1e-9, 1e6), 0 * c, x, weight, 0 * x, approach=1e-3)
 
 
 def test_refuses_an_answer_that_did_not_settle(monkeypatch):
     c, x, weight = bodies(40)
-    monkeypatch.setattr(smooth_skin, "MAX_NEWTON_STEPS", 1)
+    monkeypatch.setattr(asperity_layer, "MAX_NEWTON_STEPS", 1)
     with pytest.raises(NotConverged, match=r"contact\.asperities"):
         solve(PEAKS, c, x, weight, 1e-4 * x, LOAD)
 

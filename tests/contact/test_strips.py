@@ -12,7 +12,7 @@ from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 from skins import solve, tangent
 
 from patchfem.closed_forms.contact import wedge_linear, wedge_opening, wedge_skin
-from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin
+from patchfem.contact.asperity_laws import ExponentialAsperities, HertzAsperities, LinearAsperities
 from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.strip_compliance import StripCompliance
 from patchfem.contact.strips import (
@@ -29,9 +29,9 @@ AREA = LENGTH * WIDTH
 MEAN = LOAD / AREA
 SKINS = {
     "bare": None,
-    "linear": LinearSkin(1e13),
-    "exponential": ExponentialSkin(0.5e-6),
-    "hertz": HertzSkin(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11),
+    "linear": LinearAsperities(1e13),
+    "exponential": ExponentialAsperities(0.5e-6),
+    "hertz": HertzAsperities(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11),
 }
 each_skin = pytest.mark.parametrize("skin", SKINS.values(), ids=SKINS.keys())
 CONTROLS = {
@@ -65,7 +65,7 @@ def whole(skin, cells, gap, moment=None, spring=0.0, load=LOAD):
     """(nodal forces, delta, theta) of the undivided patch."""
     pair = coated_pair(cells)
     x, weight = pair.interface.x, pair.interface.weight
-    if skin is None or isinstance(skin, LinearSkin):
+    if skin is None or isinstance(skin, LinearAsperities):
         pair = Compliance(pair.interface, softer(skin, pair.normal, weight), pair.tangential)
         state = press(pair, gap, load, moment, spring=spring)
         return state.sigma_n * weight, state.approach, state.rotation
@@ -84,9 +84,9 @@ def random_gaps(rng, x, count, size):
 @pytest.mark.parametrize("angle", [0.0, 1e-4])
 def test_exact_strips_without_roll_are_one_patch(skin, control, angle):
     c, x, weight, y = real(8)
-    state = press_strips(c, x, weight, y, angle * x, load=LOAD, skin=skin, **control)
+    state = press_strips(c, x, weight, y, angle * x, load=LOAD, asperities=skin, **control)
     # an undivided one knows no spring
-    if isinstance(skin, ExponentialSkin | HertzSkin) and "spring" in control:
+    if isinstance(skin, ExponentialAsperities | HertzAsperities) and "spring" in control:
         control = {"moment": control["moment"] + control["spring"] * state.theta}
     force, delta, theta = whole(skin, 60, angle * x, **control)
     assert np.abs(8 * state.force - force).max() <= 1e-12 * LOAD
@@ -124,12 +124,18 @@ def dense_cases(number):
 @pytest.mark.parametrize("own", [False, True], ids=["alike", "diagonals of their own"])
 @pytest.mark.parametrize(
     "skin",
-    [None, LinearSkin(1e12), LinearSkin(1e15), ExponentialSkin(2e-7), SKINS["hertz"]],
+    [
+        None,
+        LinearAsperities(1e12),
+        LinearAsperities(1e15),
+        ExponentialAsperities(2e-7),
+        SKINS["hertz"],
+    ],
     ids=["bare", "soft", "stiff", "exponential", "hertz"],
 )
 def test_exact_answer_is_that_of_one_block_diagonal_operator(skin, own):
     """All strips as one patch; two of the strips with a diagonal of their own share a factorisation."""
-    is_linear = skin is None or isinstance(skin, LinearSkin)
+    is_linear = skin is None or isinstance(skin, LinearAsperities)
     for number, (c, x, weight, y, gap, roll, load, moment, spring) in enumerate(dense_cases(9)):
         if not is_linear:
             spring = 0.0
@@ -145,7 +151,7 @@ def test_exact_answer_is_that_of_one_block_diagonal_operator(skin, own):
             load,
             moment,
             spring=spring,
-            skin=skin,
+            asperities=skin,
         )
         places, opened = np.tile(x, y.size), (gap + roll * y[:, None]).ravel()
         if not is_linear:
@@ -185,7 +191,9 @@ def test_exact_rigid_pad_in_full_contact_has_the_centre_of_the_wedge_less_one_ov
 ):
     c, x, weight, y = rigid(count)
     roll = 0.7 * wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
-    state = press_strips(c, x, weight, y, np.zeros(1), roll, load=LOAD, skin=LinearSkin(1e13))
+    state = press_strips(
+        c, x, weight, y, np.zeros(1), roll, load=LOAD, asperities=LinearAsperities(1e13)
+    )
     _, centre, _, _ = wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)
     assert state.centre_y == pytest.approx(centre * (1 - 1 / count**2), rel=1e-12) and centre < 0
 
@@ -195,7 +203,9 @@ def test_order_two_rigid_pad_of_any_opening():
     roll = 9 * wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
     off = []
     for count in (4, 16, 64, 256):
-        state = press_strips(*rigid(count), np.zeros(1), roll, load=LOAD, skin=LinearSkin(1e13))
+        state = press_strips(
+            *rigid(count), np.zeros(1), roll, load=LOAD, asperities=LinearAsperities(1e13)
+        )
         off.append(abs(state.centre_y / wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)[1] - 1))
     assert off[-1] < 2e-5
     assert all(np.log(a / b) / np.log(4) == pytest.approx(2, abs=0.1) for a, b in pairwise(off[1:]))
@@ -206,7 +216,9 @@ def test_exact_rolled_pad_on_the_exponential_skin(ratio):
     """Centre L(1/2 - 1/B + 1/(exp(B) - 1)), B = roll L/u0; the sum over the middles of the strips is geometric."""
     count, u0 = 200, 2.5e-6
     roll = ratio * u0 / WIDTH
-    state = press_strips(*rigid(count), np.zeros(1), roll, load=LOAD, skin=ExponentialSkin(u0))
+    state = press_strips(
+        *rigid(count), np.zeros(1), roll, load=LOAD, asperities=ExponentialAsperities(u0)
+    )
     half = ratio / count / 2
     finite = -WIDTH * (0.5 - 1 / np.tanh(half) / 2 / count + 1 / np.expm1(ratio))
     assert state.centre_y == pytest.approx(finite, rel=1e-9)
@@ -221,7 +233,9 @@ def test_figure_yaw_moment_of_a_rolled_pad_on_a_linear_skin(roll, yaw):
     centre = wedge_linear(roll, 116.0, 0.01, 0.01, 1e13)[1]
     assert -0.4 * 116 * centre * 1e3 == pytest.approx(yaw, abs=0.05)
     c, x, weight, y = rigid(4000, length=0.01, width=0.01)
-    state = press_strips(c, x, weight, y, np.zeros(1), roll, load=116.0, skin=LinearSkin(1e13))
+    state = press_strips(
+        c, x, weight, y, np.zeros(1), roll, load=116.0, asperities=LinearAsperities(1e13)
+    )
     assert -state.yaw_moment(0.4) * 1e3 == pytest.approx(yaw, abs=0.05)
     assert state.yaw_moment(0.4) == pytest.approx(0.4 * state.load * state.centre_y, rel=1e-14)
 
@@ -233,12 +247,12 @@ def test_exact_mirrors(skin, control):
     c, x, weight, y = real(5, 30)
     c = (c + c[::-1, ::-1]) / 2
     gap = random_gaps(np.random.default_rng(4), x, 5, 3e-7)
-    state = press_strips(c, x, weight, y, gap, 3e-5, LOAD, skin=skin, **control)
-    over = press_strips(c, x, weight, y, gap[::-1], -3e-5, LOAD, skin=skin, **control)
+    state = press_strips(c, x, weight, y, gap, 3e-5, LOAD, asperities=skin, **control)
+    over = press_strips(c, x, weight, y, gap[::-1], -3e-5, LOAD, asperities=skin, **control)
     assert np.abs(over.force[::-1] - state.force).max() <= 1e-11 * LOAD
     assert over.centre_y == pytest.approx(-state.centre_y, rel=1e-10)
     back = control | {"moment": -control["moment"]} if control else control
-    turned = press_strips(c, x, weight[::-1], y, gap[:, ::-1], 3e-5, LOAD, skin=skin, **back)
+    turned = press_strips(c, x, weight[::-1], y, gap[:, ::-1], 3e-5, LOAD, asperities=skin, **back)
     assert np.abs(turned.force[:, ::-1] - state.force).max() <= 1e-11 * LOAD
     assert turned.moment == pytest.approx(-state.moment, rel=1e-9)
     assert turned.theta == pytest.approx(-state.theta, rel=1e-9, abs=1e-18)
@@ -247,8 +261,8 @@ def test_exact_mirrors(skin, control):
 # ------------------------------------------------------------------------------------------- the definitions themselves
 def law_of(skin, weight, opening, load, count):
     """Nodal force that the skin gives at a separation."""
-    if isinstance(skin, ExponentialSkin) and skin.reference is None:
-        skin = ExponentialSkin(skin.u0, load / (weight.sum() * count))
+    if isinstance(skin, ExponentialAsperities) and skin.reference is None:
+        skin = ExponentialAsperities(skin.u0, load / (weight.sum() * count))
     return weight * skin.pressure(opening)
 
 
@@ -269,7 +283,7 @@ def check(state, skin, c, x, weight, gap, roll, load, moment=None, spring=0.0, f
         assert opening.min() >= -1e-9 * depth and force.min() >= 0
         assert (force * np.abs(opening)).sum() <= 1e-9 * load * depth
         assert np.abs(state.gap - opening).max() <= 1e-9 * depth
-    elif isinstance(skin, LinearSkin):
+    elif isinstance(skin, LinearAsperities):
         rest = force / (skin.k * weight)
         assert np.all(np.abs(opening + rest)[force > 0] <= 1e-9 * (depth + rest.max()))
         assert opening[force == 0].min(initial=0.0) >= -1e-9 * depth
@@ -290,7 +304,9 @@ def check(state, skin, c, x, weight, gap, roll, load, moment=None, spring=0.0, f
 def test_exact_balances_of_a_rolled_pair(skin, control):
     c, x, weight, y = real(8)
     gap = 2e-5 * x + rough(np.random.default_rng(5), x, 2e-7)
-    state = press_strips(c, x, weight, y, gap, 1e-4, LOAD, rotation=0.25, skin=skin, **control)
+    state = press_strips(
+        c, x, weight, y, gap, 1e-4, LOAD, rotation=0.25, asperities=skin, **control
+    )
     free = state.theta - 0.25
     assert state.outcome is Outcome.DONE and (control or free == 0)
     check(state, skin, c, x, weight, gap, 1e-4, LOAD, free=free, **control)
@@ -303,7 +319,7 @@ def test_exact_balances_of_a_rolled_pair(skin, control):
     load=st.floats(-3, 2),
     where=st.one_of(st.none(), st.floats(-0.97, 0.97)),
     spring=st.one_of(st.just(0.0), st.floats(1.0, 1e6)),
-    skin=st.sampled_from([*SKINS.values(), LinearSkin(1e16), ExponentialSkin(2e-8)]),
+    skin=st.sampled_from([*SKINS.values(), LinearAsperities(1e16), ExponentialAsperities(2e-8)]),
     seed=st.integers(0, 2**32 - 1),
 )
 def test_always_any_gap_in_every_strip_is_solved(
@@ -326,16 +342,16 @@ def test_always_any_gap_in_every_strip_is_solved(
         load,
         moment,
         spring=spring if where is not None else 0.0,
-        skin=skin,
+        asperities=skin,
     )
     check(state, skin, c, x, weight, gap, roll, load, moment, spring)
 
 
 # ---------------------------------------------------------------------------------------------------------- hard cases
-@pytest.mark.parametrize("skin", [None, LinearSkin(1e13)])
+@pytest.mark.parametrize("skin", [None, LinearAsperities(1e13)])
 def test_exact_a_great_roll_presses_the_edge_strip_alone(skin):
     c, x, weight, y = real(8)
-    state = press_strips(c, x, weight, y, 1e-5 * x, 2e-2, load=LOAD, skin=skin)
+    state = press_strips(c, x, weight, y, 1e-5 * x, 2e-2, load=LOAD, asperities=skin)
     alone = press(
         Compliance(Interface(x, weight, WIDTH / 8), softer(skin, c, weight), c), 1e-5 * x, LOAD
     )
@@ -348,7 +364,9 @@ def test_exact_a_great_roll_presses_the_edge_strip_alone(skin):
 @each_skin
 def test_exact_zero_load_touches_and_carries_nothing(skin):
     c, x, weight, y = real(4)
-    state = press_strips(c, x, weight, y, 1e-5 * x + 3e-6, 1e-4, load=0.0, moment=0.0, skin=skin)
+    state = press_strips(
+        c, x, weight, y, 1e-5 * x + 3e-6, 1e-4, load=0.0, moment=0.0, asperities=skin
+    )
     assert state.outcome is Outcome.NO_CONTACT and not state.force.any()
     assert (state.load, state.moment, state.roll_moment, state.centre_y, state.fraction) == (
         0,
@@ -378,10 +396,10 @@ def test_exact_approach_presses_every_strip_for_itself():
 @each_skin
 def test_exact_approach_of_a_load_gives_the_load_back(skin):
     c, x, weight, y = real(6)
-    if isinstance(skin, ExponentialSkin):
-        skin = ExponentialSkin(skin.u0, MEAN)
-    loaded = press_strips(c, x, weight, y, 2e-5 * x, 1e-4, load=LOAD, skin=skin)
-    by = press_strips(c, x, weight, y, 2e-5 * x, 1e-4, approach=loaded.delta, skin=skin)
+    if isinstance(skin, ExponentialAsperities):
+        skin = ExponentialAsperities(skin.u0, MEAN)
+    loaded = press_strips(c, x, weight, y, 2e-5 * x, 1e-4, load=LOAD, asperities=skin)
+    by = press_strips(c, x, weight, y, 2e-5 * x, 1e-4, approach=loaded.delta, asperities=skin)
     assert by.load == pytest.approx(LOAD, rel=1e-9)
     assert np.abs(by.force - loaded.force).max() <= 1e-9 * LOAD
 
@@ -390,7 +408,7 @@ def test_exact_approach_of_a_load_gives_the_load_back(skin):
 @pytest.mark.parametrize("roll", [0.0, 1e-5, 1e-4, 1e-3])
 def test_always_few_steps_on_the_test_piece(skin, roll):
     c, x, weight, y = real(8, 200)
-    state = press_strips(c, x, weight, y, 1e-4 * x, roll, load=LOAD, skin=skin)
+    state = press_strips(c, x, weight, y, 1e-4 * x, roll, load=LOAD, asperities=skin)
     assert state.iterations <= 12
 
 
@@ -398,12 +416,14 @@ def test_always_few_steps_on_the_test_piece(skin, roll):
 @each_skin
 def test_order_two_tangent_is_the_difference_of_loads(skin):
     c, x, weight, y = real(5, 30)
-    if isinstance(skin, ExponentialSkin):
-        skin = ExponentialSkin(skin.u0, MEAN)
-    state = press_strips(c, x, weight, y, 2e-5 * x, 3e-5, load=LOAD, skin=skin)
+    if isinstance(skin, ExponentialAsperities):
+        skin = ExponentialAsperities(skin.u0, MEAN)
+    state = press_strips(c, x, weight, y, 2e-5 * x, 3e-5, load=LOAD, asperities=skin)
     step = 1e-5 * LOAD / strips_stiffness(c, weight, state)
     more, less = (
-        press_strips(c, x, weight, y, 2e-5 * x, 3e-5, approach=state.delta + h, skin=skin).load
+        press_strips(
+            c, x, weight, y, 2e-5 * x, 3e-5, approach=state.delta + h, asperities=skin
+        ).load
         for h in (step, -step)
     )
     assert (more - less) / (2 * step) == pytest.approx(strips_stiffness(c, weight, state), rel=1e-6)
@@ -422,7 +442,7 @@ def test_exact_stiffnesses_without_roll_are_those_of_one_patch():
         tangential_stiffness(pair.tangential, active), rel=1e-12
     )
     skin = SKINS["hertz"]
-    rough_one = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD, skin=skin)
+    rough_one = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD, asperities=skin)
     one = tangent(pair.tangential, pair.interface.weight, 0.8 * rough_one.stiffness[0])
     assert strips_stiffness(tangential, weight, rough_one, 0.8) == pytest.approx(one, rel=1e-12)
     stiff = strips_stiffness(tangential, weight, rough_one, np.inf)
@@ -442,7 +462,7 @@ def test_refuses_what_has_no_answer():
         {"load": -1.0},
         {"load": np.nan},
         {"load": 1.0, "roll": np.inf},
-        {"approach": 1e-6, "skin": ExponentialSkin(1e-6)},
+        {"approach": 1e-6, "asperities": ExponentialAsperities(1e-6)},
     ):
         with pytest.raises(PatchfemError, match="contact"):
             press_strips(c, x, weight, y, flat, **wrong)
@@ -471,9 +491,18 @@ def test_exact_a_free_roll_under_the_moment_of_a_held_one_is_that_roll(skin, con
     c, x, weight, y = real(6, 30)
     for seed, roll in ((3, 2e-5), (4, -1e-4)):
         gap = random_gaps(np.random.default_rng(seed), x, 6, 1e-6)
-        held = press_strips(c, x, weight, y, gap, roll, LOAD, skin=skin, **control)
+        held = press_strips(c, x, weight, y, gap, roll, LOAD, asperities=skin, **control)
         free = press_strips(
-            c, x, weight, y, gap, 0.0, LOAD, skin=skin, lateral=held.roll_moment, **control
+            c,
+            x,
+            weight,
+            y,
+            gap,
+            0.0,
+            LOAD,
+            asperities=skin,
+            roll_moment=held.roll_moment,
+            **control,
         )
         assert (
             free.roll == pytest.approx(roll, rel=1e-8)
@@ -481,7 +510,16 @@ def test_exact_a_free_roll_under_the_moment_of_a_held_one_is_that_roll(skin, con
         )
         assert np.abs(free.force - held.force).max() <= 1e-9 * LOAD
         other = press_strips(
-            c, x, weight, y, gap, 0.5 * roll, LOAD, skin=skin, lateral=held.roll_moment, **control
+            c,
+            x,
+            weight,
+            y,
+            gap,
+            0.5 * roll,
+            LOAD,
+            asperities=skin,
+            roll_moment=held.roll_moment,
+            **control,
         )
         assert other.roll == pytest.approx(roll, rel=1e-8)
 
@@ -489,13 +527,13 @@ def test_exact_a_free_roll_under_the_moment_of_a_held_one_is_that_roll(skin, con
 def test_exact_a_free_roll_closes_a_lateral_wedge():
     """Rigid pieces on a linear skin: the wedge closes, and a load line at e adds the pressure N e y / sum A y^2."""
     c, x, weight, y = rigid(9, 5)
-    wedge, skin, arm = 3e-5 * y[:, None] + np.zeros(x.size), LinearSkin(1e13), 0.4e-3
-    shut = press_strips(c, x, weight, y, wedge, load=LOAD, skin=skin, lateral=0.0)
+    wedge, skin, arm = 3e-5 * y[:, None] + np.zeros(x.size), LinearAsperities(1e13), 0.4e-3
+    shut = press_strips(c, x, weight, y, wedge, load=LOAD, asperities=skin, roll_moment=0.0)
     assert shut.roll == pytest.approx(-3e-5, rel=1e-12) and shut.pressure == pytest.approx(
         MEAN, rel=1e-10
     )
     spread = 5 * weight[0] * (y**2).sum()
-    leant = press_strips(c, x, weight, y, wedge, load=LOAD, skin=skin, lateral=arm * LOAD)
+    leant = press_strips(c, x, weight, y, wedge, load=LOAD, asperities=skin, roll_moment=arm * LOAD)
     assert leant.pressure[:, 0] == pytest.approx(MEAN + LOAD * arm * y / spread, rel=1e-10)
     assert leant.roll == pytest.approx(-3e-5 - LOAD * arm / (spread * 1e13), rel=1e-10)
 
@@ -507,7 +545,11 @@ def test_order_2_a_far_load_line_leaves_a_triangle_of_pressure(arm):
     errors = []
     for count in (40, 80, 160):
         state = press_strips(
-            *rigid(count), np.zeros(1), load=LOAD, skin=LinearSkin(1e13), lateral=arm * LOAD
+            *rigid(count),
+            np.zeros(1),
+            load=LOAD,
+            asperities=LinearAsperities(1e13),
+            roll_moment=arm * LOAD,
         )
         slope = 2 * LOAD / (1e13 * LENGTH * wanted**2)  # of the triangle: N = k L roll b^2 / 2
         errors.append(abs(-state.roll / slope - 1))
@@ -519,7 +561,7 @@ def test_exact_strips_that_roll_are_nodes_that_turn():
     c, x, weight, y = rigid(1, 24)
     for skin in (SKINS["linear"], SKINS["exponential"], SKINS["hertz"]):
         turned = press_strips(
-            c, x, weight, y, 1e-4 * x**2, load=LOAD, moment=1e-3 * LOAD, skin=skin
+            c, x, weight, y, 1e-4 * x**2, load=LOAD, moment=1e-3 * LOAD, asperities=skin
         )
         rolled = press_strips(
             np.zeros((1, 1)),
@@ -528,8 +570,8 @@ def test_exact_strips_that_roll_are_nodes_that_turn():
             x,
             1e-4 * x[:, None] ** 2,
             load=LOAD,
-            skin=skin,
-            lateral=1e-3 * LOAD,
+            asperities=skin,
+            roll_moment=1e-3 * LOAD,
         )
         assert rolled.roll == pytest.approx(turned.theta, rel=1e-10)
         assert rolled.force[:, 0] == pytest.approx(turned.force[0], rel=1e-9, abs=1e-12 * LOAD)
@@ -538,9 +580,9 @@ def test_exact_strips_that_roll_are_nodes_that_turn():
 def test_refuses_a_free_roll_that_nothing_determines():
     c, x, weight, y = real(4, 20)
     with pytest.raises(PatchfemError, match=r"contact\.strips\.roll"):
-        press_strips(c, x, weight, y, 0 * x, approach=1e-7, lateral=0.0)
+        press_strips(c, x, weight, y, 0 * x, approach=1e-7, roll_moment=0.0)
     with pytest.raises(PatchfemError, match=r"contact\.strips\.offset"):
-        press_strips(c, x, weight, y, 0 * x, load=LOAD, lateral=y[-1] * LOAD)
+        press_strips(c, x, weight, y, 0 * x, load=LOAD, roll_moment=y[-1] * LOAD)
     ridge = np.where(np.arange(4) == 1, 0.0, 1.0)[:, None] + 0 * x
     with pytest.raises(NotConverged, match="roll"):
-        press_strips(c, x, weight, y, ridge, load=LOAD, lateral=y[1] * LOAD)
+        press_strips(c, x, weight, y, ridge, load=LOAD, roll_moment=y[1] * LOAD)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from patchfem.contact.skin_laws import ExponentialSkin, LinearSkin
+from patchfem.contact.asperity_laws import ExponentialAsperities, LinearAsperities
 from patchfem.contact.strips import press_strips
 from patchfem.contact.unilateral import press, press_to_approach
 from patchfem.core import Compliance, Interface, Outcome
@@ -31,7 +31,7 @@ class State(NamedTuple):
 
 def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotation=0.0, spring=0.0):
     """The State of two bodies pressed through a skin of any law."""
-    if not isinstance(skin, LinearSkin):
+    if not isinstance(skin, LinearAsperities):
         one = press_strips(
             c,
             x,
@@ -43,7 +43,7 @@ def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotati
             approach=approach,
             rotation=rotation,
             spring=spring,
-            skin=skin,
+            asperities=skin,
         )
         return State(
             one.force[0],
@@ -83,7 +83,7 @@ def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotati
 
 def longer(skin, factor: float):
     """The law P(s/factor), `factor` times as long: of peaks with wider heights, and fewer of them."""
-    if isinstance(skin, ExponentialSkin):
+    if isinstance(skin, ExponentialAsperities):
         return replace(skin, u0=skin.u0 * factor)
     return replace(skin, deviation=skin.deviation * factor, density=skin.density * factor**-1.5)
 

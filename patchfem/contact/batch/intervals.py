@@ -25,7 +25,7 @@ BATCH_SIZE = 256  # cases that are solved together, so that their forces stay in
 MIN_PARABOLA_NODES = 3  # nodes in contact from which a stiffness is interpolated between sets
 
 
-class Pressed(NamedTuple):
+class ContactBatch(NamedTuple):
     """Contact solutions of q cases: nodes in contact, forces, openings and motions.
 
     - first, stop (q,): the nodes in contact, from `first` on and before `stop`.
@@ -81,7 +81,7 @@ class Intervals:
         # the sums of `arrays.NestedStretches`, filled for the left ends that were visited
         self.sums = np.zeros((x.size + 1, 3, x.size + 1))
 
-    def press(self, gap, load, moment=None, spring=0.0, known=None) -> Pressed:
+    def press(self, gap, load, moment=None, spring=0.0, known=None) -> ContactBatch:
         """Solve the contacts of q cases.
 
         Parameters
@@ -107,7 +107,7 @@ class Intervals:
         columns = np.broadcast_arrays(load, moment if is_free else 0.0, spring)
         return self._press(gap, np.stack(columns, axis=1).astype(float), known, is_free=is_free)
 
-    def _press(self, gap, loads: np.ndarray, known, *, is_free: bool) -> Pressed:
+    def _press(self, gap, loads: np.ndarray, known, *, is_free: bool) -> ContactBatch:
         n_cases, m = gap.shape
         gap = np.ascontiguousarray(gap)
         everywhere = ((0,), (m,))
@@ -126,7 +126,7 @@ class Intervals:
         nodes = np.arange(m)
         in_contact = (nodes >= cases.first[:, None]) & (nodes < cases.stop[:, None])
         residual = self._residual(cases, displacement, opening, is_free=is_free)
-        contacts = Pressed(
+        contacts = ContactBatch(
             first=cases.first,
             stop=cases.stop,
             force=cases.force,
@@ -247,7 +247,7 @@ class Intervals:
             cases.leaving[some, 0] = force[:, 0] / increase[:, 0]
             cases.gap_rate[some, 0] = 1 - increase @ self.c[nodes, a - 1]
 
-    def edge_positions(self, contacts: Pressed, softness, row: float) -> np.ndarray:
+    def edge_positions(self, contacts: ContactBatch, softness, row_height: float) -> np.ndarray:
         """Return the positions (2, q) [m] of the edges, as in `edges.ContactEdge`.
 
         An end of the interface that is in contact is an edge.
@@ -257,7 +257,7 @@ class Intervals:
         contacts : Pressed
         softness : (m,) ndarray
             Compliance [m/N] of the asperity layer alone; 0 without asperities.
-        row : float
+        row_height : float
             Height [m] of the first row of cells.
         """
         x = self.x
@@ -270,12 +270,14 @@ class Intervals:
             is_border = outer == node
             outer_cell = np.abs(x[node] - x[np.where(is_border, inner, outer)])
             inner_cell = np.abs(x[node] - x[np.where(inner == node, outer, inner)])
-            offset = elastic_fraction[node] * edge_offset(inner_cell, outer_cell, fraction, row)
+            offset = elastic_fraction[node] * edge_offset(
+                inner_cell, outer_cell, fraction, row_height
+            )
             between = x[node] + fraction * (x[outer] - x[node]) - side * offset
             positions.append(np.where(is_border, x[node], between))
         return np.clip(positions, x[0], x[-1])
 
-    def stiffness(self, contacts: Pressed, *, is_rotation: bool = False) -> np.ndarray:
+    def stiffness(self, contacts: ContactBatch, *, is_rotation: bool = False) -> np.ndarray:
         """Return the stiffnesses (q,) of contacts, as `edges.set_stiffness` does.
 
         The edges of the contacts lie between nodes. The stiffnesses are those of a translation [N/m], or of a rotation
@@ -306,7 +308,7 @@ class Intervals:
         return gap + motion[:, 1:] * x - motion[:, :1] + displacement
 
     def _edge_fractions(self, cases: Cases, opening) -> np.ndarray:
-        """Return `Pressed.fractions`; 1/2 where the set does not change with the approach."""
+        """Return `ContactBatch.fractions`; 1/2 where the set does not change with the approach."""
         m = self.x.size
         neighbour = np.stack([cases.first - 1, cases.stop], axis=1)
         has_neighbour = (neighbour >= 0) & (neighbour < m)

@@ -12,14 +12,15 @@ import numpy as np
 from scipy.fft import dct, idct
 
 from ...core import NotConverged
-from ..edges import ContactEdge, parabola_change, passed_fraction
+from ..edges import ContactEdge, compute_edge_fraction, parabola_change
 
-# compliance of a function of the free ends over the largest one; smaller functions are left out
-MIN_RELATIVE_SIZE = 1e-9
+# ratio of a compliance of the free ends to the largest one below which its function is left out
+MIN_RELATIVE_COMPLIANCE = 1e-9
 EQUATION_TOL = 1e-10  # relative residual of the equations on the active points
-# fraction of a cell by which an edge lies behind `ContactEdge.fraction`: Hertz contact, 24 rows of points, to 0.001
+# offset of an edge over the length of a cell (see `edges.edge_offset`), measured for Hertz contact on
+# 24 rows of points to 0.001
 EDGE_OFFSET_FRACTION = 0.189
-# number of points from which contacts count as equally long in the choice of the longest one
+# length in points above which contacts are not compared in the choice of the longest one
 MAX_REFERENCE_POINTS = 64
 
 
@@ -31,14 +32,14 @@ class PointCompliance:
     - area: Area of a cell [m2].
     - waves (n,): Compliance [m/Pa] for a pressure cos(j pi x/L), j = 0, 1, ...
     - modes (n, r): Functions of the free ends [1].
-    - sizes (r,): Compliance [m/N] of these functions.
+    - mode_compliances (r,): Compliance [m/N] of these functions.
     """
 
     x: np.ndarray
     area: float
     waves: np.ndarray
     modes: np.ndarray
-    sizes: np.ndarray
+    mode_compliances: np.ndarray
 
     @property
     def node_compliance(self) -> float:
@@ -48,12 +49,12 @@ class PointCompliance:
     @property
     def eigenvalue_bound(self) -> float:
         """Upper bound of the largest eigenvalue [m/N]."""
-        of_ends = float(np.abs(self.sizes) @ (self.modes**2).sum(axis=0))
+        of_ends = float(np.abs(self.mode_compliances) @ (self.modes**2).sum(axis=0))
         return float(self.waves.max()) / self.area + of_ends
 
     def product(self, force: np.ndarray) -> np.ndarray:
         """Return the displacements (n,) [m] of forces (n,) [N]."""
-        by_ends = self.modes @ (self.sizes * (force @ self.modes))
+        by_ends = self.modes @ (self.mode_compliances * (force @ self.modes))
         return idct(self.waves * dct(force)) / self.area + by_ends
 
     def solve_forces(
@@ -105,7 +106,7 @@ class SmoothModes(NamedTuple):
     """Functions (n, r) [1] and their compliances (r,) [m2/N]."""
 
     modes: np.ndarray
-    sizes: np.ndarray
+    mode_compliances: np.ndarray
 
 
 def smooth_modes(positions, change, x) -> SmoothModes:
@@ -124,9 +125,11 @@ def smooth_modes(positions, change, x) -> SmoothModes:
 
     cells = np.diff(positions)
     weight = np.sqrt((np.append(cells, 0.0) + np.append(0.0, cells)) / 2)
-    sizes, vectors = np.linalg.eigh(weight[:, None] * change * weight)
-    kept = np.abs(sizes) > MIN_RELATIVE_SIZE * np.abs(sizes).max(initial=0.0)
-    return SmoothModes(CubicSpline(positions, vectors[:, kept] / weight[:, None])(x), sizes[kept])
+    compliances, vectors = np.linalg.eigh(weight[:, None] * change * weight)
+    kept = np.abs(compliances) > MIN_RELATIVE_COMPLIANCE * np.abs(compliances).max(initial=0.0)
+    return SmoothModes(
+        CubicSpline(positions, vectors[:, kept] / weight[:, None])(x), compliances[kept]
+    )
 
 
 def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
@@ -151,7 +154,9 @@ def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
     for change in np.flatnonzero(active[1:] != active[:-1]):
         node, side = (int(change), 1) if active[change] else (int(change) + 1, -1)
         outside = node + side
-        fraction = passed_fraction(force[node], force_rate[node], gap[outside], gap_rate[outside])
+        fraction = compute_edge_fraction(
+            force[node], force_rate[node], gap[outside], gap_rate[outside]
+        )
         position = x[node] + side * cell * (fraction - EDGE_OFFSET_FRACTION)
         edges.append(ContactEdge(node, side, fraction, float(position)))
     return edges

@@ -11,7 +11,7 @@ energies never rises by itself. n: `contacts.arrays.Pressing`, c: the contact th
 import numpy as np
 
 from ...compiled.jit import njit
-from ...contact.press_kernels import locate, press_state, pull
+from ...contact.press_kernels import compute_energy, find_set, press_state
 from ...contact.press_path_kernels import path_mean
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ..interfaces import element_kernels as contact
@@ -84,10 +84,10 @@ def pressed(i, last, motion, mass, c, j, n, row):
         load = n.loads[i]
         n.now[0] = load
     else:
-        n.slot[0] = locate(n.sets, n.slot[0], -begin[0], begin[1])
+        n.slot[0] = find_set(n.sets, n.slot[0], -begin[0], begin[1])
         if n.slot[0] < 0:
             return 0.0
-        begin[2], begin[3], begin[4] = pull(n.sets, n.slot[0], begin[0], begin[1])
+        begin[2], begin[3], begin[4] = compute_energy(n.sets, n.slot[0], begin[0], begin[1])
         load, moment = max(n.sets.base[0] - begin[3], 0.0), moment - begin[4]
         if POINTED or last:
             press_state(n.sets, n.slot[0], -begin[0], begin[1], n.now)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...compiled import load as compiled
-from ...contact.contact_sets import ContactSets, sides
+from ...contact.contact_sets import ContactSets, make_empty_polygons
 from ...core import ModalBasis, PatchfemError, Response
 from ...effects import not_supported_message
 from ...friction.bonds.list_rows_kernels import STATUS
@@ -325,8 +325,8 @@ class VaryingLoadRun(Run):
         self.sets, now = press.SetArrays(**parts), np.full(x.size, model.preload)
         if model.load is None:
             heave, turn = model.rows[1:] @ self.state[0]
-            slot = press.locate(
-                self.sets, press.begin(self.sets, model.sets.name(parts)), -heave, turn
+            slot = press.find_set(
+                self.sets, press.build_first_set(self.sets, model.sets.name(parts)), -heave, turn
             )
             press.press_state(self.sets, slot, -heave, turn, now)
         if model.pointed:
@@ -436,7 +436,7 @@ def _one_point(load: float) -> dict:
         "side": np.zeros((2, 3, 1)),
         "row": np.zeros(4),
         "meta": np.zeros(5, np.int64),
-        **sides(1),
+        **make_empty_polygons(1),
     }
 
 

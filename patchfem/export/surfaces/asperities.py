@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...contact.skin_laws import HertzSkin
+from ...contact.asperity_laws import HertzAsperities
 from ...core import PatchfemError
 from ...formatting import format_length, format_quantity
 from ...surface.roughness.peaks import (
@@ -104,7 +104,7 @@ def _describe_split(cutoff: float | None) -> str:
 
 def _stiffness_ratio(peaks: Peaks) -> float:
     """Compute stiffness over pressure [1/m] of peaks at PRESSURE_FRACTION."""
-    law = HertzSkin(*peaks, 1.0)
+    law = HertzAsperities(*peaks, 1.0)
     separation = law.separation(np.array([PRESSURE_FRACTION]))
     return float(law.stiffness(separation)[0] / PRESSURE_FRACTION)
 

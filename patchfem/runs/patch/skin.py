@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...contact import skin_laws
+from ...contact import asperity_laws
 from ...contact.edges import MIN_RELATIVE_PRESSURE
 from ...contact.strips import press_strips
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
@@ -25,13 +25,13 @@ def skin_law(asked):
         pressure = (
             part.normal_stiffness * part.decay_length if part.normal_stiffness is not None else None
         )
-        return skin_laws.ExponentialSkin(part.decay_length, pressure)
+        return asperity_laws.ExponentialAsperities(part.decay_length, pressure)
     faces = [
         piece.coating.material if piece.coating else piece.substrate
         for piece in (asked.pieces.lower, asked.pieces.upper)
     ]
     modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
-    return skin_laws.HertzSkin(part.radius, part.density, part.height_deviation, modulus)
+    return asperity_laws.HertzAsperities(part.radius, part.density, part.height_deviation, modulus)
 
 
 def mean_stiffness(asked, pressure: float) -> float:
@@ -42,7 +42,7 @@ def mean_stiffness(asked, pressure: float) -> float:
     if asked.interface.skin.law == "linear":
         return asked.interface.skin.normal_stiffness
     law = skin_law(asked)
-    if isinstance(law, skin_laws.ExponentialSkin):
+    if isinstance(law, asperity_laws.ExponentialAsperities):
         return pressure / law.u0
     return float(law.stiffness(law.separation(np.array([pressure])))[0]) if pressure > 0 else 0.0
 
@@ -139,7 +139,7 @@ def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: fl
         approach=by,
         rotation=angle,
         spring=spring if by is None else 0.0,
-        skin=skin_law(asked),
+        asperities=skin_law(asked),
     )
     answer = ContactState(
         frozen_array(borne(state.pressure[0])),

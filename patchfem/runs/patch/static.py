@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.batch.intervals import Intervals, Pressed
+from ...contact.batch.intervals import ContactBatch, Intervals
 from ...contact.unilateral import RESIDUAL_TOL
 from ...core import ContactState, Measure, Outcome, frozen_array
 from ...elasticity.lapack import one_thread
@@ -77,7 +77,7 @@ class Level(NamedTuple):
 
     values: dict
     pressure: ContactState
-    contacts: Pressed
+    contacts: ContactBatch
     gap_range: np.ndarray
     x: np.ndarray
 

@@ -7,7 +7,7 @@ measures that depend on them.
 import numpy as np
 
 from ...contact import edges, stiffness
-from ...contact.skin_laws import LinearSkin, SmoothSkin
+from ...contact.asperity_laws import LinearAsperities, SmoothAsperities
 from ...contact.strip_compliance import StripCompliance
 from ...contact.strips import press_strips, split_into_strips, strip_offsets, strips_stiffness
 from ...core import Compliance, ContactState, frozen_array
@@ -58,9 +58,11 @@ def in_strips(asked, pieces: Compliance, gap, held: tuple, added=None, warm_star
         angle,
         spring if by is None else 0.0,
         skin,
-        lateral=None if offset is None else asked.loading.load * offset,
+        roll_moment=None if offset is None else asked.loading.load * offset,
     )
-    mean = (borne(state.pressure) if isinstance(skin, SmoothSkin) else state.pressure).mean(axis=0)
+    mean = (borne(state.pressure) if isinstance(skin, SmoothAsperities) else state.pressure).mean(
+        axis=0
+    )
     answer = ContactState(
         frozen_array(mean),
         frozen_array(state.gap.min(axis=0)),
@@ -72,7 +74,7 @@ def in_strips(asked, pieces: Compliance, gap, held: tuple, added=None, warm_star
         state.iterations,
         state.residuals,
     )
-    return pieces, answer, skin if isinstance(skin, SmoothSkin) else None, state
+    return pieces, answer, skin if isinstance(skin, SmoothAsperities) else None, state
 
 
 def skin_of(asked):
@@ -80,7 +82,7 @@ def skin_of(asked):
     if asked.interface.skin is None:
         return None
     if asked.interface.skin.law == "linear":
-        return LinearSkin(asked.interface.skin.normal_stiffness)
+        return LinearAsperities(asked.interface.skin.normal_stiffness)
 
     return skin_law(asked)
 
@@ -126,7 +128,7 @@ def strip_values(patch) -> dict:
     }
     if not state.load > 0:
         return out
-    return out | (_behind_skin if isinstance(patch.skin, SmoothSkin) else _between_nodes)(
+    return out | (_behind_skin if isinstance(patch.skin, SmoothAsperities) else _between_nodes)(
         patch, weight
     )
 

@@ -1,4 +1,4 @@
-"""Pressure laws of the skin, the compliant layer of asperities between rough surfaces.
+"""Pressure laws of the compliant layer of asperities between rough surfaces.
 
 The pressure P >= 0 decreases with the separation s of the mean planes. The linear law carries nothing beyond s = 0. The
 smooth laws have P > 0 at every s; they are computed by the logarithm of P, which neither overflows nor vanishes.
@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# nodes of the trapezoidal rule, whose error is below 1e-15 for an even analytic integrand
-_V = 0.1 * np.arange(1, 70)
+# nodes of the trapezoidal rule, whose error is below 1e-15 because the integrand is even and analytic
+TRAPEZOID_NODES = 0.1 * np.arange(1, 70)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class LinearSkin:
+class LinearAsperities:
     """Linear law of the asperity layer: P = k max(0, -s), k [Pa/m] > 0.
 
     -s > 0 is the compression of the layer; at s >= 0 it carries nothing.
@@ -30,7 +30,7 @@ class LinearSkin:
         return np.where(np.asarray(s) < 0, self.k, 0.0)
 
 
-class SmoothSkin:
+class SmoothAsperities:
     """Base of the smooth laws, with P > 0 at every separation; P and -dP/ds follow from log P.
 
     Each law has `log_pressure` and `separation`.
@@ -51,7 +51,7 @@ class SmoothSkin:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class ExponentialSkin(SmoothSkin):
+class ExponentialAsperities(SmoothAsperities):
     """Exponential law of the asperity layer: P = reference exp(-s/u0).
 
     u0 [m] > 0 is the decay length, reference [Pa] the pressure at s = 0. Without a reference `strips.press_strips`
@@ -72,7 +72,7 @@ class ExponentialSkin(SmoothSkin):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class HertzSkin(SmoothSkin):
+class HertzAsperities(SmoothAsperities):
     """Asperity layer of Hertzian peaks with Gaussian heights (Greenwood and Williamson 1966).
 
     P = 4/3 E* sqrt(R) eta int_s^inf (z - s)^3/2 phi(z) dz, mean height 0. radius: R [m] of a peak; density: eta [1/m2];
@@ -86,7 +86,7 @@ class HertzSkin(SmoothSkin):
     modulus: float
 
     @property
-    def _level(self) -> float:
+    def _log_pressure_factor(self) -> float:
         return np.log(4 / 3 * self.modulus * self.density * self.radius**0.5 * self.deviation**1.5)
 
     def log_pressure(self, s: np.ndarray) -> tuple:
@@ -95,14 +95,14 @@ class HertzSkin(SmoothSkin):
         The decay rate is -d(log P)/ds.
         """
         log, fall = peak_integral(np.asarray(s, float) / self.deviation)
-        return self._level + log, fall / self.deviation
+        return self._log_pressure_factor + log, fall / self.deviation
 
     def separation(self, pressure: np.ndarray) -> np.ndarray:
         """Separation s [m] that carries `pressure` [Pa] > 0.
 
         Newton's method on the concave log P; it starts from the steep side, so it is monotone.
         """
-        wanted = np.log(np.asarray(pressure, float)) - self._level
+        wanted = np.log(np.asarray(pressure, float)) - self._log_pressure_factor
         h = np.where(
             wanted < 0,
             np.sqrt(np.maximum(0.0, -2 * wanted)),
@@ -126,7 +126,7 @@ def peak_integral(h: np.ndarray) -> tuple:
     h = np.asarray(h, float)
     flat = np.maximum(h, -8.0).reshape(-1, 1)
     scale = 1 + np.maximum(flat, 0.0)
-    square = _V**2 / scale
+    square = TRAPEZOID_NODES**2 / scale
     weight = np.exp(-flat * square - square**2 / 2) * square
     low, high = weight.sum(axis=1), (weight * square).sum(axis=1)
     log = -(flat[:, 0] ** 2) / 2 + np.log(0.2 * high / np.sqrt(2 * np.pi * scale[:, 0]))

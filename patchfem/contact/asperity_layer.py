@@ -1,4 +1,4 @@
-"""Solver of strips with a smooth skin (a compliant asperity layer) under one rigid holder.
+"""Solver of strips with an asperity layer of a smooth law under one rigid holder.
 
 With the pressure law P of this layer, the nodal areas A and the notation of `active_set` the equations are
 
@@ -17,32 +17,34 @@ from scipy.linalg import cho_factor, cho_solve
 
 from ..core import NotConverged, PatchfemError
 from .active_set import ContactProblem
-from .skin_laws import SmoothSkin
+from .asperity_laws import SmoothAsperities
 from .strip_compliance import StripCompliance
 from .unilateral import solve
 
 MAX_NEWTON_STEPS = 60  # more steps do not converge either; the descent of the dual function follows
-MAX_DUAL_STEPS = 60  # steps of the descent, and trials along each of its directions
+# largest number of descent steps, and of trials along each direction of descent
+MAX_DUAL_STEPS = 60
 # log of the pressure [Pa] below which the asperity layer counts as untouched
 MIN_LOG_PRESSURE = -300.0
 # log of a force [N] above which the exponential function overflows in products
 MAX_LOG_FORCE = 600.0
-MIN_RELATIVE_SLOPE = 1e-18  # slope over the largest slope; a step does not change smaller forces
+# ratio of a slope to the largest slope below which a Newton step leaves the force unchanged
+MIN_RELATIVE_SLOPE = 1e-18
 NEWTON_TOL = 1e-12  # relative imbalance and relative change of pressure of a solution
 # pressure over the mean pressure to which an unloaded node may rise in one step
 MAX_PRESSURE_RISE = 0.01
 
 
-class SkinProblem(NamedTuple):
-    """Contact of strips through a skin, a compliant layer of asperities with a smooth law.
+class AsperityProblem(NamedTuple):
+    """Contact of strips through a compliant layer of asperities with a smooth law.
 
-    - skin: Pressure law of the layer.
+    - asperities: Pressure law of the layer.
     - compliance: Compliance of the pieces.
     - area (n,): Nodal areas [m2].
     - contact: Gap, motions and loads, with motions that close no node by more than 1.
     """
 
-    skin: SmoothSkin
+    asperities: SmoothAsperities
     compliance: StripCompliance
     area: np.ndarray
     contact: ContactProblem
@@ -62,7 +64,7 @@ class SkinProblem(NamedTuple):
         return contact.target - contact.motions.T @ force - contact.springs * motion
 
 
-class SkinSolution(NamedTuple):
+class AsperitySolution(NamedTuple):
     """Forces (n,) [N], separations (n,) [m], motion (r,) and number of iterations."""
 
     force: np.ndarray
@@ -122,7 +124,7 @@ def solve_tangent(compliance, motions, slope, values) -> tuple:
     return responses, tangent
 
 
-def _newton_step(problem: SkinProblem, slope, mismatch, imbalance) -> tuple:
+def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> tuple:
     """Return the Newton step (forces, motion, separations) of f = A P(s).
 
     slope: (n,) stiffness of the asperity layer [N/m]; mismatch: (n,) separation of the geometry less that of the law
@@ -142,11 +144,11 @@ def _newton_step(problem: SkinProblem, slope, mismatch, imbalance) -> tuple:
     return force, motion, mismatch - contact.motions @ motion + displacement
 
 
-def _solve_newton(problem: SkinProblem, separation, motion) -> SkinSolution | None:
+def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolution | None:
     """Solve by Newton's method from separations and motion; None if it does not converge."""
-    contact, skin = problem.contact, problem.skin
+    contact, asperities = problem.contact, problem.asperities
     for iteration in range(1, MAX_NEWTON_STEPS + 1):
-        log_pressure, decay = skin.log_pressure(separation)
+        log_pressure, decay = asperities.log_pressure(separation)
         log_force = log_pressure + np.log(problem.area)
         force = np.exp(np.minimum(log_force, MAX_LOG_FORCE))
         imbalance = problem.imbalance(force, motion)
@@ -173,29 +175,31 @@ def _solve_newton(problem: SkinProblem, separation, motion) -> SkinSolution | No
             law_force = np.exp(np.minimum(log_force + log_change, MAX_LOG_FORCE))
             new_force = np.maximum(force + force_change, 0.0)
             new_force = np.where(fraction < 1e-15, law_force, new_force)
-            return SkinSolution(new_force, separation + change, motion, iteration)
+            return AsperitySolution(new_force, separation + change, motion, iteration)
         along_log = -np.log1p(np.maximum(log_change, 0.0)) / decay
         careful = np.where(log_change > 0, along_log, change)
         load = contact.target[0] if imbalance.size else force.sum()
-        risen = skin.separation(np.array(MAX_PRESSURE_RISE * load / problem.area.sum()))
+        risen = asperities.separation(np.array(MAX_PRESSURE_RISE * load / problem.area.sum()))
         separation = separation + np.maximum(change, np.minimum(careful, risen - separation))
     return None
 
 
-def _guess_separation(problem: SkinProblem) -> np.ndarray | None:
+def _guess_separation(problem: AsperityProblem) -> np.ndarray | None:
     """Guess the separations of one strip under its approach; None without any contact.
 
     No node can carry more force than the one that flattens its overlap.
     """
-    skin, gap = problem.skin, problem.contact.gap
+    asperities, gap = problem.asperities, problem.contact.gap
     diagonal = problem.compliance.common.diagonal()
     separation = gap
-    if skin.log_pressure(separation)[0].max() <= MIN_LOG_PRESSURE:
+    if asperities.log_pressure(separation)[0].max() <= MIN_LOG_PRESSURE:
         return None
     if (diagonal > 0).all():
         overlap = np.maximum(-gap, np.abs(gap).max() * 1e-3)
-        separation = np.maximum(separation, skin.separation(overlap / (diagonal * problem.area)))
-    if skin.log_pressure(separation)[0].max() > -MIN_LOG_PRESSURE:
+        separation = np.maximum(
+            separation, asperities.separation(overlap / (diagonal * problem.area))
+        )
+    if asperities.log_pressure(separation)[0].max() > -MIN_LOG_PRESSURE:
         raise PatchfemError(
             "contact.approach: the pressure of the rough layer is too large to compute; give a smaller "
             "distance"
@@ -203,12 +207,12 @@ def _guess_separation(problem: SkinProblem) -> np.ndarray | None:
     return separation
 
 
-def _solve_strip(problem: SkinProblem) -> SkinSolution:
+def _solve_strip(problem: AsperityProblem) -> AsperitySolution:
     """Solve one strip under a prescribed approach."""
     gap, no_motion = problem.contact.gap, np.zeros(0)
     separation = _guess_separation(problem)
     if separation is None:
-        return SkinSolution(np.zeros(gap.size), gap, no_motion, 0)
+        return AsperitySolution(np.zeros(gap.size), gap, no_motion, 0)
     solution = _solve_newton(problem, separation, no_motion)
     if solution is None:
         raise NotConverged(
@@ -218,17 +222,17 @@ def _solve_strip(problem: SkinProblem) -> SkinSolution:
     return solution
 
 
-def solve_skin_approach(problem: SkinProblem, motion: np.ndarray) -> SkinSolution:
+def solve_at_motion(problem: AsperityProblem, motion: np.ndarray) -> AsperitySolution:
     """Solve every strip by itself under the prescribed motion of the holder.
 
     Parameters
     ----------
-    problem : SkinProblem
+    problem : AsperityProblem
     motion : (r,) ndarray
 
     Returns
     -------
-    SkinSolution
+    AsperitySolution
 
     Raises
     ------
@@ -244,9 +248,9 @@ def solve_skin_approach(problem: SkinProblem, motion: np.ndarray) -> SkinSolutio
     for strip, strip_gap in enumerate(gap.reshape(-1, n_nodes)):
         block = StripCompliance(problem.compliance.block(strip, every_node))
         prescribed = ContactProblem(strip_gap, np.zeros((n_nodes, 0)), np.zeros(0), np.zeros(0))
-        alone = SkinProblem(problem.skin, block, problem.area[:n_nodes], prescribed)
+        alone = AsperityProblem(problem.asperities, block, problem.area[:n_nodes], prescribed)
         solutions.append(_solve_strip(alone))
-    return SkinSolution(
+    return AsperitySolution(
         np.concatenate([solution.force for solution in solutions]),
         np.concatenate([solution.separation for solution in solutions]),
         motion,
@@ -254,15 +258,15 @@ def solve_skin_approach(problem: SkinProblem, motion: np.ndarray) -> SkinSolutio
     )
 
 
-def _try_approach(problem: SkinProblem, motion: np.ndarray) -> SkinSolution | None:
+def _try_approach(problem: AsperityProblem, motion: np.ndarray) -> AsperitySolution | None:
     """Solve the strips under a motion; None where the pressure is too large to compute."""
     try:
-        return solve_skin_approach(problem, motion)
+        return solve_at_motion(problem, motion)
     except PatchfemError:
         return None
 
 
-def _minimise_dual(problem: SkinProblem, approach: float, length: float) -> SkinSolution:
+def _minimise_dual(problem: AsperityProblem, approach: float, length: float) -> AsperitySolution:
     """Minimise the convex dual function of the motion, from an approach [m].
 
     The gradient of the dual function is the imbalance of load and moments. length [m]: decay length of the pressure
@@ -275,14 +279,16 @@ def _minimise_dual(problem: SkinProblem, approach: float, length: float) -> Skin
     solution = _try_approach(problem, motion)
     if solution is None:
         no_force = np.zeros(contact.gap.size)
-        return SkinSolution(no_force, problem.separation(no_force, motion), motion, 0)
+        return AsperitySolution(no_force, problem.separation(no_force, motion), motion, 0)
     n_iterations, min_imbalance = solution.n_iterations, np.inf
     for _ in range(MAX_DUAL_STEPS):
         imbalance = problem.imbalance(solution.force, solution.motion)
         if np.abs(imbalance).max() <= NEWTON_TOL * contact.target[0]:
             break
         min_imbalance = min(min_imbalance, np.abs(imbalance).max())
-        slope = problem.area * problem.skin.stiffness(solution.separation) * (solution.force > 0)
+        slope = (
+            problem.area * problem.asperities.stiffness(solution.separation) * (solution.force > 0)
+        )
         _, tangent = solve_tangent(problem.compliance, contact.motions, slope, slope)
         direction = np.linalg.solve(tangent + damping, imbalance)
         best, n_more = _search_dual(problem, solution, direction, min_imbalance)
@@ -293,8 +299,10 @@ def _minimise_dual(problem: SkinProblem, approach: float, length: float) -> Skin
     return solution._replace(n_iterations=n_iterations)
 
 
-def _search_dual(problem: SkinProblem, start: SkinSolution, direction, min_imbalance) -> tuple:
-    """Search the best solution along a direction of the motion by bisection.
+def _search_dual(
+    problem: AsperityProblem, start: AsperitySolution, direction, min_imbalance
+) -> tuple:
+    """Search for the best solution along a direction of the motion by bisection.
 
     Returns the solution and the number of iterations.
 
@@ -320,11 +328,11 @@ def _search_dual(problem: SkinProblem, start: SkinSolution, direction, min_imbal
     return best, n_iterations
 
 
-def _linearised_start(problem: SkinProblem) -> tuple:
+def _linearised_start(problem: AsperityProblem) -> tuple:
     """Return first separations and motion, from the law linearised at the mean pressure."""
     contact, mean_pressure = problem.contact, problem.mean_pressure
-    mean_separation = problem.skin.separation(np.array([mean_pressure]))
-    stiffness = mean_pressure * problem.skin.log_pressure(mean_separation)[1][0]
+    mean_separation = problem.asperities.separation(np.array([mean_pressure]))
+    stiffness = mean_pressure * problem.asperities.log_pressure(mean_separation)[1][0]
     # separation at which the tangent becomes zero
     first_touch = mean_separation[0] + mean_pressure / stiffness
     n_nodes = len(problem.compliance.common)
@@ -339,32 +347,32 @@ def _linearised_start(problem: SkinProblem) -> tuple:
     pressure = linear.force / problem.area
     outside = problem.separation(linear.force, linear.motion)
     on_tangent = np.where(linear.force > 0, first_touch - pressure / stiffness, outside)
-    on_law = problem.skin.separation(np.maximum(pressure, mean_pressure))
+    on_law = problem.asperities.separation(np.maximum(pressure, mean_pressure))
     return np.where(pressure > mean_pressure, on_law, on_tangent), linear.motion
 
 
-def solve_smooth_skin(problem: SkinProblem) -> SkinSolution:
+def solve_asperity_layer(problem: AsperityProblem) -> AsperitySolution:
     """Solve strips with a smooth asperity layer under a load and moments of free rotations.
 
     Parameters
     ----------
-    problem : SkinProblem
+    problem : AsperityProblem
 
     Returns
     -------
-    SkinSolution
+    AsperitySolution
         The best solution that was reached; the caller checks the residuals.
 
     Raises
     ------
     PatchfemError, NotConverged
-        As in `solve_skin_approach`.
+        As in `solve_at_motion`.
     """
     solution = _solve_newton(problem, *_linearised_start(problem))
     if solution is not None:
         return solution
-    mean_separation = problem.skin.separation(np.array([problem.mean_pressure]))
-    decay_length = 1 / problem.skin.log_pressure(mean_separation)[1][0]
+    mean_separation = problem.asperities.separation(np.array([problem.mean_pressure]))
+    decay_length = 1 / problem.asperities.log_pressure(mean_separation)[1][0]
     approach = problem.contact.gap.min() - mean_separation[0]
     dual = _minimise_dual(problem, approach, decay_length)
     refined = _solve_newton(problem, dual.separation, dual.motion)
