@@ -35,7 +35,7 @@ from .readings import BENT, Reading, find_ambiguity, find_worn_flanks
 from .reference import Reference, cut_at_wear, find_reference, has_grown, limit_hidden_wear
 from .search import Match
 from .section import Section
-from .specks import remove_specks
+from .specks import limit_left_out_wear, remove_specks
 from .worn import (
     NO_TRACKS,
     Tracks,
@@ -213,7 +213,8 @@ def compare_traces(
         return _check_flanks(_compare_apart(place, direction), shift, is_straight)
     if not keep_spikes:
         place = _remove_specks(place, is_straight)
-    return _compare_aligned(place, direction)
+    heights = after.z[::-1] if place.is_mirrored else after.z
+    return _compare_aligned(place, heights, direction)
 
 
 def _name_track_sizes(sizes) -> dict:
@@ -261,12 +262,17 @@ class _Wear(NamedTuple):
     is_exchanged: bool
 
 
-def _compare_aligned(place: Place, direction: str) -> Comparison:
-    """Compare two traces of the same part of a surface."""
+def _compare_aligned(place: Place, heights, direction: str) -> Comparison:
+    """Compare two traces of the same part of a surface.
+
+    heights (n,) [m]: those of the second trace before any was left out.
+    """
     before, after, alignment = place.before, place.after, place.alignment
     if are_identical(before, after):  # except for rounding the fit finds no shift and no tilt
         alignment = replace(alignment, state=frozen_array(np.zeros(5)))
-    wear = _measure_wear(alignment, make_section(alignment))
+    section = make_section(alignment)
+    left_out = limit_left_out_wear(alignment, section, before, after, heights)
+    wear = _measure_wear(alignment, section, left_out)
     is_unchanged = not wear.reference.kind and not wear.has_grown
     step = _common_step(before, after)
     notes = [*_note_steps(before, after), *_note_stretch(alignment)]
@@ -293,8 +299,11 @@ def _compare_aligned(place: Place, direction: str) -> Comparison:
     )
 
 
-def _measure_wear(alignment: Alignment, section: Section) -> _Wear:
-    """Measure worn depth and tracks of aligned traces, or give the reason why they are unknown."""
+def _measure_wear(alignment: Alignment, section: Section, left_out: float) -> _Wear:
+    """Measure worn depth and tracks of aligned traces, or give the reason why they are unknown.
+
+    left_out [m2]: area of the dips that were left out (`limit_left_out_wear`).
+    """
     reference = find_reference(alignment, section)
     grew = has_grown(alignment, section)
     reading = find_ambiguity(
@@ -305,7 +314,7 @@ def _measure_wear(alignment: Alignment, section: Section) -> _Wear:
     if reading.headline:
         reference = reference._replace(kind="")
     tracks = measure_tracks(alignment, section, BAND[1]) if reference.kind else NO_TRACKS
-    worn = measure_worn(alignment, section, tracks)
+    worn = measure_worn(alignment, section, tracks, left_out)
     is_mostly_deposit = worn.deposited > (worn.area.high or 0.0)
     if not worn.mean.low > 0 and is_mostly_deposit:
         reference = reference._replace(kind="")

@@ -37,6 +37,8 @@ MAX_CUT_SAMPLES = 5  # samples between a track and the end of the section, where
 MIN_WORN_FRACTION = 0.85
 MAX_GAP_FRACTION = 0.05  # unworn gap / width of the track, up to which both sides are one track
 MIN_WAVES_PER_TRACK = 3.0  # length of the shortest track / longest wave of the band
+# distance of two neighbours / median distance; above it, heights are missing between them
+MISSING_DISTANCE = 1.5
 
 _ONE_SIDE = "area above the first trace (before wear) within one track width"
 TEXTS = {
@@ -75,6 +77,18 @@ class Section(NamedTuple):
         """Length (n,) [m] that each sample represents."""
         return sample_lengths(self.x)
 
+    @property
+    def gap_errors(self) -> np.ndarray:
+        """Standard deviation (n - 1,) [m2] of the area between neighbours where heights are missing.
+
+        The depth may fall from that of one neighbour to that of the other anywhere in the gap. The
+        area is then uniformly distributed over a range of the gap times the difference in depth.
+        """
+        distance = np.diff(self.x)
+        median = np.median(distance)
+        gap = np.where(distance > MISSING_DISTANCE * median, distance - median, 0.0)
+        return gap * np.abs(np.diff(self.depth)) / np.sqrt(12)
+
     def integrate(self, inside) -> tuple:
         """Integrate the depth over samples (n,) bool; return area [m2] and standard deviation."""
         part = np.flatnonzero(inside)
@@ -83,7 +97,9 @@ class Section(NamedTuple):
         weight = np.where(inside, self.widths, 0.0)
         low, high = part[0], part[-1] + 1
         errors = self.draws[:, low:high] @ weight[low:high]
-        return float(weight @ self.depth), float(np.std(errors))
+        gap_errors = self.gap_errors[inside[1:] | inside[:-1]]
+        variance = np.var(errors) + gap_errors @ gap_errors
+        return float(weight @ self.depth), float(np.sqrt(variance))
 
 
 def noise_threshold(count: int, n_tests: int = N_TESTS) -> float:

@@ -1,4 +1,8 @@
-"""Dust and dropouts in one of two aligned traces: narrow features with very steep walls."""
+"""Dust and dropouts in one of two aligned traces: narrow features with very steep walls.
+
+A dip of a few samples may be a dropout of the instrument or a scratch. It is left out, and the upper
+end of the worn area contains it.
+"""
 
 from dataclasses import replace
 
@@ -8,7 +12,7 @@ from ...core import frozen_array
 from ...formatting import format_length
 from ..profile import MAD_TO_DEVIATION, Profile, find_runs, robust_deviation
 from .alignment import Alignment
-from .section import noise_threshold
+from .section import Section, noise_threshold
 
 N_AROUND = 101  # samples whose height differences give the roughness around a speck
 N_MEDIAN = 41  # samples of the running median from which specks deviate
@@ -74,6 +78,33 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
         margin = 0.5 * float(x[1] - x[0])
         is_speck[side] |= (x >= ends[0] - margin) & (x <= ends[1] + margin)
     return tuple(_mark_missing(profile, marked) for profile, marked in zip(profiles, is_speck))
+
+
+def limit_left_out_wear(
+    alignment: Alignment, section: Section, before: Profile, after: Profile, heights
+) -> float:
+    """Return the area [m2] of the dips of the second trace that were left out.
+
+    Parameters
+    ----------
+    alignment : Alignment
+    section : Section
+        Section of the same traces.
+    before, after : Profile
+        The traces that were aligned.
+    heights : (n,) array [m]
+        Heights of the second trace before any was left out.
+    """
+    is_dip = after.missing & np.isfinite(heights)
+    is_dip &= (after.x > section.x[0]) & (after.x < section.x[-1])
+    x = after.x[is_dip]
+    known = ~after.missing
+    aligned = np.interp(section.x, after.x[known], after.z[known])
+    datum = np.interp(x, section.x, section.depth - alignment.first + aligned)
+    first = np.interp(alignment.back(x), before.x[~before.missing], before.z[~before.missing])
+    counted = np.maximum(np.interp(x, section.x, section.depth), 0.0)
+    lost = np.maximum(first + datum - heights[is_dip] - counted, 0.0)
+    return float(lost.sum() * np.median(np.diff(after.x)))
 
 
 def _min_wall_step(

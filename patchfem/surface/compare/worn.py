@@ -16,7 +16,7 @@ from .alignment import Alignment
 from .flanks import PARTS, Flanks
 from .largest import measure_largest_depth
 from .model import Parameter
-from .robust import MAX_NOISE
+from .robust import MAX_NOISE, MAX_UNWORN
 from .search import MIN_SAMPLES
 from .section import (
     MIN_WAVES_PER_TRACK,
@@ -122,11 +122,14 @@ def make_section(alignment: Alignment) -> Section:
     return Section(alignment.x, alignment.worn_depth, noise, errors.depth, errors.correlation)
 
 
-def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn:
+def measure_worn(
+    alignment: Alignment, section: Section, tracks: Tracks, left_out: float = 0.0
+) -> Worn:
     """Measure the worn depth over the common part of two aligned traces.
 
     All depths are added, so that the noise of unworn heights cancels, except for heights that stand
-    clearly above the first trace, which are deposits.
+    clearly above the first trace, which are deposits. The upper ends of area and mean contain the wear
+    that noise hides (`limit_slight_wear`) and dips that were left out.
 
     Parameters
     ----------
@@ -134,6 +137,8 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
     section : Section
     tracks : Tracks
         The ends of the longest track are those of the worn part.
+    left_out : float
+        Area [m2] of the dips of the second trace that were left out.
     """
     is_deposit = section.depth < -MAX_NOISE * section.noise
     area, error = section.integrate(~is_deposit)
@@ -144,7 +149,9 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
     error = max(error, rounding)
     area = area if abs(area) > 1e-6 * alignment.noise * length else 0.0
     mean_error = float(np.hypot(error, area / section.x.size / SIDE)) / length
+    hidden = limit_slight_wear(section, alignment.unworn) + left_out
     mean = make_quantity(area / length, mean_error, "m", MEAN_TEXT, 0.0)
+    mean = mean._replace(high=mean.high + hidden / length)
     largest = measure_largest_depth(section, LARGEST_TEXT)
     for smaller in (mean, tracks.sizes.get("depth_floor")):
         if smaller is not None and smaller.value > largest.value:
@@ -155,7 +162,30 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
     within = None if extent is None else _measure_within(section, *extent.after)
     deposited = float(-(width[is_deposit] @ section.depth[is_deposit]))
     worn_area = make_quantity(area, error, "m2", AREA_TEXT, 0.0)
+    worn_area = worn_area._replace(high=worn_area.high + hidden)
     return Worn(largest, mean, worn_area, deposited, extent, within)
+
+
+def limit_slight_wear(section: Section, unworn) -> float:
+    """Estimate the largest worn area [m2] that is missing because noise hides slight wear.
+
+    Heights that wore less than the noise shows are taken as unworn. They lower the floor, from which
+    all depths are measured, by their sum / the number of unworn heights. As many heights may have worn
+    by up to 2.5 standard deviations of the noise as have worn by 2.5 to 5 of them.
+
+    Parameters
+    ----------
+    section : Section
+    unworn : (n,) bool array
+    """
+    relative = section.depth / section.noise
+    n_worn, n_grown = (
+        int(((side > MAX_UNWORN) & (side < 2 * MAX_UNWORN)).sum()) for side in (relative, -relative)
+    )
+    # noise alone is as often above the floor as below it
+    n_slight = max(n_worn - n_grown, 0)
+    deepest = MAX_UNWORN * float(np.median(section.noise))
+    return n_slight * deepest / max(int(unworn.sum()), 1) * float(section.widths.sum())
 
 
 def _measure_within(section: Section, start: Quantity, end: Quantity) -> Quantity | None:

@@ -109,6 +109,46 @@ def test_always_20_tracks_of_a_kind_hold_the_truth_in_9_of_10_intervals(kind, si
     assert scored(kind, sides, range(HELD_OUT + 10, HELD_OUT + 30))[0] >= 0.9
 
 
+@pytest.mark.parametrize("missing", [(-29, 1), (-1, 29)])
+def test_mean_depth_holds_where_the_heights_of_a_wall_are_missing(missing):
+    """30 heights are missing beside the wall; a straight line across the gap misses 15 um of 1 um."""
+    before, after, truth = ridged("band", HELD_OUT + 4, 0.0, 0.0)
+    place = (after.x - truth["from"]) / UM
+    is_missing = (place > missing[0]) & (place < missing[1])
+    z = frozen_array(np.where(is_missing, np.nan, after.z))
+    worn = compare_traces(before, Profile(after.x, z, "after")).worn
+    length = worn.area.value / worn.mean.value
+    assert worn.area.low <= truth["area_gross"] <= worn.area.high
+    assert worn.mean.low <= truth["area_gross"] / length <= worn.mean.high
+    assert abs(worn.area.value - truth["area_gross"]) > 8 * UM**2
+    assert worn.area.high - worn.area.low < 50 * UM**2
+
+
+def test_upper_end_of_the_area_holds_a_narrow_scratch_that_is_left_out():
+    before, after, truth = ridged("band", HELD_OUT + 5, 0.0, 0.0)
+    scratch = 5.0 * UM * np.maximum(1 - abs(after.x / UM - 300) / 2, 0)  # 5 um deep, 4 um wide
+    pair = before, Profile(after.x, frozen_array(after.z - scratch), "after")
+    worn = compare_traces(*pair).worn
+    area = truth["area_gross"] + scratch.sum() * UM
+    assert worn.area.value < area - 9 * UM**2 < area <= worn.area.high
+    kept = compare_traces(*pair, keep_spikes=True).worn
+    assert kept.area.value == pytest.approx(area, rel=0.005)
+    assert kept.area.high - kept.area.value < 9 * UM**2
+
+
+def test_upper_end_of_the_mean_holds_wear_of_tops_that_the_noise_hides():
+    """Tops lost up to 120 nm; of those that lost less than 50 nm none shows above 20 nm of noise per trace."""
+    before = ridged("band", HELD_OUT + 6, 0.0, 0.0)[0]
+    rough = before.z - before.z.mean()
+    top = np.sort(rough)[-400]
+    lost = np.clip(rough - top, 0.0, 0.12 * UM)
+    noise = 0.02 * UM * np.random.default_rng(6).standard_normal(lost.size)
+    mean = compare_traces(
+        before, Profile(before.x, frozen_array(rough - lost + noise), "after")
+    ).worn.mean
+    assert mean.value < lost.mean() <= mean.high < 1.5 * lost.mean()
+
+
 def test_always_without_pile_up_none_is_said_and_its_interval_is_not_nothing():
     before, after, _ = ridged("band", HELD_OUT + 2, 0.0, 0.0)
     found = compare_traces(before, after).tracks.sizes
