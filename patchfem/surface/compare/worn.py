@@ -149,7 +149,7 @@ def measure_worn(
     error = max(error, rounding)
     area = area if abs(area) > 1e-6 * alignment.noise * length else 0.0
     mean_error = float(np.hypot(error, area / section.x.size / SIDE)) / length
-    hidden = limit_slight_wear(section, alignment.unworn) + left_out
+    hidden = length * limit_slight_wear(alignment, section) + left_out
     mean = make_quantity(area / length, mean_error, "m", MEAN_TEXT, 0.0)
     mean = mean._replace(high=mean.high + hidden / length)
     largest = measure_largest_depth(section, LARGEST_TEXT)
@@ -166,17 +166,12 @@ def measure_worn(
     return Worn(largest, mean, worn_area, deposited, extent, within)
 
 
-def limit_slight_wear(section: Section, unworn) -> float:
-    """Estimate the largest worn area [m2] that is missing because noise hides slight wear.
+def limit_slight_wear(alignment: Alignment, section: Section) -> float:
+    """Estimate by how much [m] the floor may be too low because noise hides slight wear.
 
     Heights that wore less than the noise shows are taken as unworn. They lower the floor, from which
     all depths are measured, by their sum / the number of unworn heights. As many heights may have worn
     by up to 2.5 standard deviations of the noise as have worn by 2.5 to 5 of them.
-
-    Parameters
-    ----------
-    section : Section
-    unworn : (n,) bool array
     """
     relative = section.depth / section.noise
     n_worn, n_grown = (
@@ -185,7 +180,7 @@ def limit_slight_wear(section: Section, unworn) -> float:
     # noise alone is as often above the floor as below it
     n_slight = max(n_worn - n_grown, 0)
     deepest = MAX_UNWORN * float(np.median(section.noise))
-    return n_slight * deepest / max(int(unworn.sum()), 1) * float(section.widths.sum())
+    return n_slight * deepest / max(int(alignment.unworn.sum()), 1)
 
 
 def _measure_within(section: Section, start: Quantity, end: Quantity) -> Quantity | None:
@@ -264,10 +259,27 @@ def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tr
         return Tracks((), valley=valley)
     starts = [0, *(last + 1 for _, last in spans[:-1])]
     stops = [*(first for first, _ in spans[1:]), section.x.size]
-    sizes = [measure_track(section, span, free) for span, free in zip(spans, zip(starts, stops))]
+    floor_error = limit_slight_wear(alignment, section)
+    sizes = [
+        _raise_upper_ends(measure_track(section, span, free), floor_error)
+        for span, free in zip(spans, zip(starts, stops))
+    ]
     widest = max(range(len(spans)), key=lambda at: sizes[at]["width"].value)
     others = tuple(_name_other(track) for at, track in enumerate(sizes) if at != widest)
     return Tracks(spans, sizes[widest], valley, others)
+
+
+def _raise_upper_ends(sizes: dict, floor_error: float) -> dict:
+    """Raise the upper ends of depths and lost areas of a track by an error [m] of the floor."""
+    area_error = floor_error * sizes["width"].value
+    errors = {"depth_mean": floor_error, "depth_floor": floor_error, "step": floor_error}
+    errors |= {"area_gross": area_error, "area_net": area_error}
+    raised = {
+        name: sizes[name]._replace(high=sizes[name].high + error)
+        for name, error in errors.items()
+        if sizes[name].high is not None
+    }
+    return {**sizes, **raised}
 
 
 def _name_other(track: dict) -> dict:

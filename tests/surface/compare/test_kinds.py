@@ -8,6 +8,7 @@ import re
 import known_pairs
 import numpy as np
 import pytest
+import trace_pairs
 from pairs import UM
 from worn_kinds import made
 
@@ -174,6 +175,18 @@ def test_exact_dust_and_dropouts_of_many_samples_are_no_wear(shape):
     )
     assert one.removed[shape != "speck"] >= 8
     assert one.worn.largest.low <= pair.worn.max() <= one.worn.largest.high
+
+
+def test_two_places_with_similar_saw_teeth_have_no_depth():
+    """Three quarters of the heights agree within 30 % of the rms height, after a stretch of 0.5 %."""
+    pair = trace_pairs.draw_pair("elsewhere", 6)
+    traces = (
+        Profile(frozen_array(x), frozen_array(z), name)
+        for (x, z), name in ((pair.before, "before"), (pair.after, "after"))
+    )
+    one = compare_traces(*traces)
+    assert one.basis == ""
+    assert one.worn.mean.value is None
 
 
 @pytest.mark.parametrize("kind, seed", [("edge", 60), ("edge", 61), ("groove", 60)])
