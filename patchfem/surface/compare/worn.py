@@ -174,11 +174,10 @@ def limit_slight_wear(alignment: Alignment, section: Section) -> float:
     by up to 2.5 standard deviations of the noise as have worn by 2.5 to 5 of them.
     """
     relative = section.depth / section.noise
-    n_worn, n_grown = (
-        int(((side > MAX_UNWORN) & (side < 2 * MAX_UNWORN)).sum()) for side in (relative, -relative)
-    )
+    distance = np.abs(relative)
+    is_slight = (distance > MAX_UNWORN) & (distance < 2 * MAX_UNWORN)
     # noise alone is as often above the floor as below it
-    n_slight = max(n_worn - n_grown, 0)
+    n_slight = max(float(np.sign(relative[is_slight]).sum()), 0.0)
     deepest = MAX_UNWORN * float(np.median(section.noise))
     return n_slight * deepest / max(int(alignment.unworn.sum()), 1)
 
@@ -260,10 +259,9 @@ def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tr
     starts = [0, *(last + 1 for _, last in spans[:-1])]
     stops = [*(first for first, _ in spans[1:]), section.x.size]
     floor_error = limit_slight_wear(alignment, section)
-    sizes = [
-        _raise_upper_ends(measure_track(section, span, free), floor_error)
-        for span, free in zip(spans, zip(starts, stops))
-    ]
+    sizes = []
+    for span, free in zip(spans, zip(starts, stops)):
+        sizes.append(_raise_upper_ends(measure_track(section, span, free), floor_error))
     widest = max(range(len(spans)), key=lambda at: sizes[at]["width"].value)
     others = tuple(_name_other(track) for at, track in enumerate(sizes) if at != widest)
     return Tracks(spans, sizes[widest], valley, others)
@@ -272,14 +270,13 @@ def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tr
 def _raise_upper_ends(sizes: dict, floor_error: float) -> dict:
     """Raise the upper ends of depths and lost areas of a track by an error [m] of the floor."""
     area_error = floor_error * sizes["width"].value
-    errors = {"depth_mean": floor_error, "depth_floor": floor_error, "step": floor_error}
-    errors |= {"area_gross": area_error, "area_net": area_error}
-    raised = {
-        name: sizes[name]._replace(high=sizes[name].high + error)
-        for name, error in errors.items()
-        if sizes[name].high is not None
-    }
-    return {**sizes, **raised}
+    raised = dict(sizes)
+    for name in ("depth_mean", "depth_floor", "step", "area_gross", "area_net"):
+        size = sizes[name]
+        error = area_error if size.unit == "m2" else floor_error
+        if size.high is not None:
+            raised[name] = size._replace(high=size.high + error)
+    return raised
 
 
 def _name_other(track: dict) -> dict:
