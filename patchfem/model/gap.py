@@ -171,7 +171,7 @@ def build_gap(contact: Contact, lengths: ProfileLengths, resolve_path: Callable)
     """
     profile = contact.profile
     return Gap(
-        shapes=tuple((name, keys) for name, keys in contact.shapes.items() if name in GAP_SHAPES),
+        shapes=list_gap_shapes(contact),
         profile=resolve_path(profile.file) if profile is not None else None,
         average=lengths.average,
         limit=lengths.limit,
@@ -179,6 +179,11 @@ def build_gap(contact: Contact, lengths: ProfileLengths, resolve_path: Callable)
         side=find_shape_side(contact),
         material=profile is not None and profile.heights == "surface",
     )
+
+
+def list_gap_shapes(contact: Contact) -> tuple:
+    """Return (name, table) of each shape of a table [contact] that is a term of the gap."""
+    return tuple((name, keys) for name, keys in contact.shapes.items() if name in GAP_SHAPES)
 
 
 def find_shape_side(contact: Contact) -> str:

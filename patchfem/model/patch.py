@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ..mesh.ends import SHARP_END, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material
 from . import peaks, profile
-from .gap import DEFAULT_CELLS, Gap, ProfileLengths, build_gap
+from .gap import DEFAULT_CELLS, Gap, ProfileLengths, build_gap, list_gap_shapes
 
 TYPICAL_POINTS = 160  # number of interface nodes that a patch takes at the default tolerance
 LENGTH_TOL = 1e-9  # lengths that differ by a smaller fraction are equal
@@ -324,6 +324,12 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
             is_static=kind == "patch",
         ),
     )
+
+
+def replace_loading_and_shapes(patch: PatchModel, contact: Contact) -> PatchModel:
+    """Return a patch with the loading and the shapes of the gap of another table [contact]."""
+    gap = replace(patch.gap, shapes=list_gap_shapes(contact))
+    return replace(patch, gap=gap, loading=_build_loading(contact))
 
 
 def build_pieces(contact: Contact) -> PatchPieces:

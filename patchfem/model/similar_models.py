@@ -13,22 +13,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core import frozen_array
-from . import load as point_loads
-from . import rig as rigs
 from .law import complete_bond_length, load_of_scene
+from .load import build_point_load
 from .model import Model, write_resolved
+from .patch import replace_loading_and_shapes
+from .rig import build_rig
 
 if TYPE_CHECKING:
-    from ..scene.keys.tables import Drive, Structure
+    from ..scene.keys.tables import Drive, Friction, Structure
     from ..scene.overrides import PlainNumbers
-    from .patch import PatchModel
     from .rig import Rig
-
-# keys of the normal load of [friction], in the form of `PlainNumbers.by_place`
-LOAD_KEYS = (
-    ("normal", None, "load"),
-    ("contact", None, "load"),
-)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -91,6 +85,9 @@ def replace_numbers(
 ) -> Model:
     """Return the model that `build` returns for a scene with other values of the plain keys.
 
+    The numbers are written into the tables of the scene, and the functions of `build` read these tables again. So every
+    other key of a table keeps its effect. Parts that the numbers do not change are shared with `model`.
+
     Parameters
     ----------
     model : Model
@@ -105,77 +102,60 @@ def replace_numbers(
     Returns
     -------
     Model
-        Parts that the numbers do not change are shared with `model`.
     """
-    numbers = plain_numbers.by_place(values)
-    scene = plain_numbers.scene
-    tables = {table for table, _, _ in numbers}
-    if "structure" in tables and scene.structure.bonded is not None:
-        return _rebuild_rig(model, plain_numbers, values, sets)
+    scene = plain_numbers.make_scene(values, sets)
+    tables = plain_numbers.changed_tables()
     rig = model.rig
-    new = {}
-    if "normal" in tables:
-        new["point"] = replace(model.point, load=numbers["normal", None, "load"])
+    changes = {}
     if "contact" in tables:
-        new["patch"] = _replace_in_patch(model.patch, numbers)
-    if model.friction is not None and tables & {"friction", "normal", "contact"}:
-        law = scene.friction
-        if "friction" in tables:
-            law = plain_numbers.make_table("friction", numbers)
-        loads = [numbers[key] for key in LOAD_KEYS if key in numbers]
-        load = loads[0] if loads else load_of_scene(scene)
-        law = new["friction"] = complete_bond_length(law, load)
-        interfaces = tuple(replace(one, numbers=law) for one in rig.friction.interfaces)
-        rig = replace(rig, friction=replace(rig.friction, interfaces=interfaces))
-    if "drive" in tables:
-        rig = _replace_in_drive(rig, scene.drive, numbers)
-    if "structure" in tables:
-        rig = _replace_in_modes(rig, scene.structure, numbers)
-    unwritten = replace(model, source=None, rig=rig, **new)
-    write = partial(_write_resolved, plain_numbers, tuple(values), sets, unwritten)
-    source = replace(model.source, write=write, sets=plain_numbers.all_sets(sets))
+        changes["patch"] = replace_loading_and_shapes(model.patch, scene.contact)
+    if "structure" in tables and scene.structure.bonded is not None:
+        # the bonded spring couples the modes of the scene, so they are computed anew
+        rig = build_rig(scene)
+        changes["point"] = build_point_load(scene)
+        changes["friction"] = rig.friction.interfaces[0].numbers
+    else:
+        if "normal" in tables:
+            changes["point"] = build_point_load(scene)
+        if model.friction is not None and tables & {"friction", "normal", "contact"}:
+            law = changes["friction"] = complete_bond_length(scene.friction, load_of_scene(scene))
+            rig = _replace_law(rig, law)
+        if "drive" in tables:
+            rig = _replace_drive(rig, scene.drive)
+        if "structure" in tables:
+            rig = _replace_modes(rig, scene.structure)
+    unwritten = replace(model, source=None, rig=rig, **changes)
+    write = partial(write_resolved, scene, unwritten)
+    source = replace(model.source, write=write, sets=scene.sets)
     return replace(unwritten, source=source)
 
 
-def _replace_in_patch(patch: PatchModel, numbers: dict) -> PatchModel:
-    """Return a patch with other values of load and shapes."""
-    changes = {}
-    for (table, shape, key), value in numbers.items():
-        if table == "contact" and shape:
-            changes[shape] = {key: value}
-    if changes:
-        shapes = tuple(
-            (name, keys.model_copy(update=changes[name]) if name in changes else keys)
-            for name, keys in patch.gap.shapes
-        )
-        patch = replace(patch, gap=replace(patch.gap, shapes=shapes))
-    load = numbers.get(("contact", None, "load"))
-    return patch if load is None else patch.with_loading(load=load)
+def _replace_law(rig: Rig, law: Friction) -> Rig:
+    """Return a rig whose interfaces have another friction law."""
+    interfaces = tuple(replace(interface, numbers=law) for interface in rig.friction.interfaces)
+    return replace(rig, friction=replace(rig.friction, interfaces=interfaces))
 
 
-def _replace_in_drive(rig: Rig, keys: Drive, numbers: dict) -> Rig:
-    """Return a rig with other values of the drive."""
-    frequency = numbers.get(("drive", None, "frequency"), keys.frequency)
-    omega = 2 * np.pi * frequency
-    amplitude = numbers.get(("drive", None, "acceleration"), keys.acceleration)
+def _replace_drive(rig: Rig, drive: Drive) -> Rig:
+    """Return a rig with the frequency and the amplitude of another table [drive]."""
+    omega = 2 * np.pi * drive.frequency
+    amplitude = drive.acceleration
     if amplitude is None:
-        amplitude = keys.displacement * omega**2
+        amplitude = drive.displacement * omega**2
     signal = replace(rig.drive.signal, acceleration=amplitude, omega=omega)
-    return rig.with_signal(signal, frequency=frequency)
+    return rig.with_signal(signal, frequency=drive.frequency)
 
 
-def _replace_in_modes(rig: Rig, structure: Structure, numbers: dict) -> Rig:
-    """Return a rig without a bonded spring with other values of the modes."""
-    mass = numbers.get(("structure", None, "moving_mass"), structure.moving_mass)
-    columns = [
-        numbers.get(("structure", k, name), getattr(mode, name))
-        for name in ("frequency", "damping")
-        for k, mode in enumerate(structure.mode)
-    ]
+def _replace_modes(rig: Rig, structure: Structure) -> Rig:
+    """Return a rig without a bonded spring with the modes of another table [structure]."""
+    columns = [mode.frequency for mode in structure.mode]
+    columns += [mode.damping for mode in structure.mode]
     frequency, damping = np.split(np.array(np.broadcast_arrays(*columns)), 2)
     omega = 2 * np.pi * frequency
+    mass = structure.moving_mass
     modes = replace(rig.modes, omega=frozen_array(omega), zeta=frozen_array(damping), mass=mass)
-    first = next((k for k, mode in enumerate(structure.mode) if mode.frequency > 0), 0)
+    elastic_modes = [k for k, values in enumerate(frequency) if np.any(values > 0)]
+    first = elastic_modes[0] if elastic_modes else 0
     first_frequency = frequency[first]
     if frequency.ndim > 1:
         modes = replace(modes, damping=np.eye(len(omega))[:, :, None] * (2 * damping * omega))
@@ -192,25 +172,3 @@ def _replace_in_modes(rig: Rig, structure: Structure, numbers: dict) -> Rig:
         ),
         structure=replace(rig.structure, frequencies=frequency),
     )
-
-
-def _rebuild_rig(model: Model, plain_numbers: PlainNumbers, values: Sequence, sets: tuple) -> Model:
-    """Return the model with a rig built anew: a bonded spring changes the modes of the scene."""
-    scene = plain_numbers.make_scene(values, sets)
-    rig = rigs.build_rig(scene)
-    unwritten = replace(
-        model,
-        source=None,
-        rig=rig,
-        point=point_loads.build_point_load(scene),
-        friction=rig.friction.interfaces[0].numbers,
-    )
-    write = partial(write_resolved, scene, unwritten)
-    return replace(unwritten, source=replace(model.source, write=write, sets=scene.sets))
-
-
-def _write_resolved(
-    plain_numbers: PlainNumbers, values: Sequence, sets: tuple, model: Model
-) -> str:
-    """Write the resolved scene of a model."""
-    return write_resolved(plain_numbers.make_scene(values, sets), model)

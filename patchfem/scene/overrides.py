@@ -195,12 +195,12 @@ class PlainNumbers:
         `values` [SI] are those of the keys; `are_plain` must hold for them.
         """
         numbers = self.by_place(values)
-        tables = {place.table for place in numbers}
-        return replace(
-            self.scene,
-            sets=self.all_sets(sets),
-            **{name: self.make_table(name, numbers) for name in tables},
-        )
+        tables = {name: self.make_table(name, numbers) for name in self.changed_tables()}
+        return replace(self.scene, sets=self.all_sets(sets), **tables)
+
+    def changed_tables(self) -> set[str]:
+        """Return the names of the tables in which a number differs."""
+        return {key.place.table for key in self.keys}
 
 
 def _update(table: Any, values: dict[str, Any]) -> Any:

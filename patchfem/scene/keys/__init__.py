@@ -22,10 +22,9 @@ How to add a key
 
    If only some values of a selector such as `slide.kind` use the key, add it to these values in
    `scene.rules.selectors`; the keys of friction laws and waveforms stand in `effects`.
-3. Read the value where the model is built (folder `model`). No other code reads keys of a scene, with one exception: in
-   a sweep over a key of `overrides.PLAIN_KEYS`, such as normal.load, the number is put into a model that is already
-   built (`model.similar_models`). If the new key changes what such a number means, change that module too, and compare
-   a case of a sweep with the single run of the same scene.
+3. Read the value where the model is built (folder `model`). No other code reads keys of a scene. In a sweep over a key
+   of `overrides.PLAIN_KEYS`, such as normal.load, these functions get arrays in place of the swept numbers
+   (`model.similar_models`), so their formulas must take arrays as well.
 4. Run `python tests/support/reference`, which writes the key into the pages of the reference, and add a test that the
    key changes an answer and that a wrong value is refused (`tests/scene`).
 

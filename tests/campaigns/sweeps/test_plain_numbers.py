@@ -217,3 +217,16 @@ def test_exact_columns_of_models_are_the_numbers_of_each(name):
             np.testing.assert_array_equal(mine, theirs)
         few = collect_columns(alike.select([4, 2]), numbers_of_contact)
         np.testing.assert_array_equal(few, collect_columns(single, numbers_of_contact)[:, [4, 2]])
+
+
+def test_exact_models_made_from_the_first_see_what_a_new_key_does_to_the_load(monkeypatch):
+    """A key of [normal] that doubles the load, as a later version may have it, acts in a sweep as well."""
+    from patchfem.model import load
+
+    point = load.PointLoad
+    monkeypatch.setattr(load, "PointLoad", lambda force, *others: point(2 * force, *others))
+    asked = Asked(Path("a.toml"), SCENES["coulomb"])
+    sets, values = ("normal.load=3 N",), (3.0,)
+    assert asked._like(sets, values) is not None
+    assert asked.model(sets, values).point.load == 6.0
+    assert same(told(asked, sets, values), told(asked, sets, ()))
