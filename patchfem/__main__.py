@@ -156,11 +156,14 @@ def _unexpected(verb: str, left: list) -> str:
 
 def _removed_option(words: list) -> str:
     """State what replaces the first option among the words that was removed; "" without such an option."""
-    from .scene.keys.removed import sentence_on_option
+    from .scene.keys.removed import describe_removed_option
 
-    options = (word.partition("=")[0] for word in words[1:] if word.startswith("--"))
-    sentences = (sentence_on_option(words[0], option, f"{words[0]} {option}") for option in options)
-    return next(filter(None, sentences), "")
+    for word in words[1:]:
+        option = word.partition("=")[0]
+        sentence = describe_removed_option(words[0], option, f"{words[0]} {option}")
+        if word.startswith("--") and sentence:
+            return sentence
+    return ""
 
 
 def known(words: list) -> None:
@@ -353,7 +356,9 @@ def _once_more(lost) -> None:
         sys.__unraisablehook__(lost)
         return
     while True:
-        try:  # on a busy machine the interrupt comes before the thread is seen to run, and would be dropped here again
+        # on a busy machine the interrupt comes before the thread is seen to run, and would be
+        # dropped here again
+        try:
             again = threading.Timer(0.05, _thread.interrupt_main, ENDINGS[:1])
             again.daemon = True
             again.start()

@@ -52,7 +52,7 @@ from .runs.run import run as run_plan
 from .scene import axes, starting
 from .scene.files import require_files
 from .scene.keys import removed
-from .scene.keys.quantities import parse
+from .scene.keys.quantities import parse_quantity
 from .scene.overrides import BaseScene
 from .scene.scene import Scene, SceneError, loads
 from .scene.scene import load as load_file
@@ -136,7 +136,7 @@ def _refuse_removed(function: Callable) -> Callable:
     def called(*args: Any, **named: Any) -> Any:
         verb = function.__name__
         for name in named:
-            if sentence := removed.sentence_on_option(verb, f"--{name}", f"{verb}: {name}"):
+            if sentence := removed.describe_removed_option(verb, f"--{name}", f"{verb}: {name}"):
                 raise PatchfemError(sentence)
         return function(*args, **named)
 
@@ -224,7 +224,7 @@ def demo(**sets: Any) -> Result:
     """Run the scene that comes with the program: the rig of the 1985 report at 143 Hz and 5 g. sets are those of
     `load`.
     """
-    return run(starting.shipped_scene(), **sets)
+    return run(starting.find_shipped_scene(), **sets)
 
 
 def new(kind: str, /) -> str:
@@ -233,7 +233,7 @@ def new(kind: str, /) -> str:
     kind: patch, joint, bench, rig, beam, damper, shroud, linear, misalignment or wear. Raises PatchfemError for any
     other kind.
     """
-    return starting.template_text(_word(kind, "new"))
+    return starting.read_template(_word(kind, "new"))
 
 
 def cost(
@@ -744,7 +744,7 @@ def _metres(given: Any, what: str) -> float | None:
     """A length [m], from a number or from a text with its unit; None stays. PatchfemError for anything else."""
     try:
         return (
-            parse(given, "length")
+            parse_quantity(given, "length")
             if isinstance(given, str)
             else given
             if given is None

@@ -58,7 +58,7 @@ def match_inverted(folder) -> None:
 TRIED = {  # what was removed -> (how a user tries it, what the sentence says to use instead)
     **{
         f"method {name}": (partial(load, RIG, {"accuracy.method": name}), "use 'march'")
-        for name in removed.METHODS
+        for name in removed.REMOVED_METHODS
     },
     **{
         key: (partial(load, WORN if key.startswith("wear.") else RIG, {key: value}), instead)
@@ -82,7 +82,7 @@ TRIED = {  # what was removed -> (how a user tries it, what the sentence says to
             partial(load, GROOVED + KEYS[law], {"friction.law": law}),
             "use law 'coulomb'",
         )
-        for law in removed.LAWS_OVER_GROOVES
+        for law in removed.LAWS_REMOVED_OVER_GROOVES
     },
     "oscillating load over grooves": (
         partial(load, GROOVED, {"normal.amplitude": "10 N", "normal.frequency": "20 Hz"}),
@@ -126,8 +126,10 @@ def test_refuses_what_was_removed(tmp_path, name):
 
 
 def test_always_every_removed_option_is_tried():
-    assert {" ".join(pair) for pair in removed.OPTIONS} | set(removed.KEYS) <= set(TRIED)
-    assert {f"quadrature {name}" for name in removed.QUADRATURES} <= set(TRIED)
+    assert {" ".join(pair) for pair in removed.REMOVED_OPTIONS} | set(removed.REMOVED_KEYS) <= set(
+        TRIED
+    )
+    assert {f"quadrature {name}" for name in removed.REMOVED_QUADRATURES} <= set(TRIED)
 
 
 @pytest.mark.skipif(

@@ -16,7 +16,7 @@ from ..model import files as model_files
 from ..response import rows
 from ..runs import plan as plans
 from ..runs.patch import faces, result
-from ..scene.files import named_files
+from ..scene.files import list_named_files
 from .shared import Json, Refused, Sets, flag, model_of, note, say, scene_of
 from .sweep import Over
 
@@ -42,7 +42,7 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
             json.dumps(
                 {
                     "kind": found.kind,
-                    "effects": found.named(),
+                    "effects": found.effect_names(),
                     "remarks": found.remarks,
                     "notes": notes,
                 }
@@ -64,7 +64,7 @@ def _swept(scene: Path, sets, what: Over) -> tuple:
 def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
     """Faults of the files that a scene names, and into `notes` what a run would say of them; without such files
     nothing is imported for them."""
-    if not named_files(tables):
+    if not list_named_files(tables):
         return []
     return model_files.faults(tables, folder, whole, notes)
 

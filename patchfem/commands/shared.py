@@ -58,7 +58,7 @@ def placed(out: Path | None, name: str) -> Path:
 def quantity(text: str, kind: str, option: str) -> float | None:
     """The words of an option as a quantity of this kind in SI, None where there are none."""
     try:
-        return quantities.parse(text, kind) if text else None
+        return quantities.parse_quantity(text, kind) if text else None
     except ValueError as error:
         raise Refused(f"{option}: {error}") from None
 

@@ -23,10 +23,11 @@ def new(
     Example: patchfem new joint -o mine.toml
     """
     if not kind:
-        width = max(map(len, starting.KINDS))
-        print("\n".join(f"{name:<{width}}  {about}" for name, about in starting.KINDS.items()))
+        width = max(map(len, starting.TEMPLATE_DESCRIPTIONS))
+        for name, description in starting.TEMPLATE_DESCRIPTIONS.items():
+            print(f"{name:<{width}}  {description}")
         return
-    text = starting.template_text(kind)
+    text = starting.read_template(kind)
     if out is None:
         print(text, end="")
         return
@@ -34,7 +35,9 @@ def new(
         raise Refused(f"{out}: already exists; choose another file with -o, or remove it")
 
     atomic_write.write_text(out, text)
-    print(f"{out}: {starting.KINDS[kind]}\nnext: patchfem {starting.NEXT.get(kind, 'run')} {out}")
+    print(
+        f"{out}: {starting.TEMPLATE_DESCRIPTIONS[kind]}\nnext: patchfem {starting.NEXT_VERBS.get(kind, 'run')} {out}"
+    )
 
 
 def demo(*, out: Out = None, no_page: NoPage = False):
@@ -43,7 +46,7 @@ def demo(*, out: Out = None, no_page: NoPage = False):
 
     Example: patchfem demo
     """
-    scene = starting.shipped_scene()
+    scene = starting.find_shipped_scene()
     say(f"scene: {scene}; for another template run: patchfem new")
     run(scene, out=placed(out, "demo"), no_page=no_page)
 
@@ -86,4 +89,4 @@ def cite(scene: Path | None = None, /):
 
     Example: patchfem cite rig.toml
     """
-    print(sources.bibtex(scenes.load(scene).named() if scene is not None else ()), end="")
+    print(sources.bibtex(scenes.load(scene).effect_names() if scene is not None else ()), end="")

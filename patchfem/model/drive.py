@@ -49,7 +49,7 @@ def count_run_cycles(keys, signal) -> float:
 def _read_recorded_drive(scene) -> tuple:
     """Read the columns of drive.file of a scene; an error names the line of this key."""
     try:
-        path = scene.beside(scene.drive.file)
+        path = scene.resolve_path(scene.drive.file)
         if find_waveform(scene.drive).is_random:
             return signals.read_spectrum(path)
         return read_drive_file(path, scene.drive.kind)

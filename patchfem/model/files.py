@@ -11,7 +11,7 @@ from ..effects import find_waveform
 from ..exceptions import PatchfemError
 from ..inputs import measured
 from ..mesh import files
-from ..scene.files import file_exists, named_files
+from ..scene.files import file_exists, list_named_files
 from ..scene.rules import limits
 from . import (
     drive,
@@ -56,7 +56,7 @@ def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) 
         Key and message of each fault.
     """
     found = []
-    for key, file in named_files(tables):
+    for key, file in list_named_files(tables):
         path = folder / file
         if not file_exists(path):
             continue
@@ -91,7 +91,7 @@ def _select_interface(key: str, tables) -> tuple:
 def _check_reduction(tables, folder: Path) -> list:
     """Return the faults of the matrices of [structure.reduced] together; nothing is reduced."""
     table = tables.structure and tables.structure.reduced
-    matrices = [file for key, file in named_files(tables) if "reduced" in key]
+    matrices = [file for key, file in list_named_files(tables) if "reduced" in key]
     if not table or not all(file_exists(folder / file) for file in matrices):
         return []
     try:
@@ -141,7 +141,7 @@ def _check_profile(path: Path, tables, whole: bool) -> tuple:
 def _check_slide(path: Path, tables, whole: bool) -> None:
     """Check that the law and the contact can follow a path, including lateral motion."""
     has_lateral = len(slide.read_path_file(path)) == 3
-    if whole and has_lateral and (reason := limits.refuse_lateral_slide(tables)):
+    if whole and has_lateral and (reason := limits.find_lateral_slide_obstacle(tables)):
         raise PatchfemError(reason)
 
 

@@ -166,7 +166,7 @@ def build(scene: Scene) -> Model:
     patch_model = None
     if scene.contact is not None:
         with locate_errors(scene):
-            patch_model = patch.build_patch(scene.contact, scene.kind, scene.beside)
+            patch_model = patch.build_patch(scene.contact, scene.kind, scene.resolve_path)
     point = grooves = None
     if scene.friction is not None or (scene.structure is not None and scene.structure.interface):
         point = load.build_point_load(scene)
@@ -179,7 +179,7 @@ def build(scene: Scene) -> Model:
         patch_model = patch_model.with_mesh(edge_motion=edge_motion)
         if path is not None and grooves is None:
             patch_model = _request_slip_mesh(patch_model, path, law.friction)
-    effects = tuple(scene.named())
+    effects = tuple(scene.effect_names())
     model = Model(
         source=None,
         kind=scene.kind,
@@ -262,7 +262,7 @@ def _build_measured(scene: Scene) -> MeasuredFile | None:
     if not keys:
         return None
     gains = (keys.acceleration_gain, keys.displacement_gain)
-    return MeasuredFile(scene.beside(keys.file), gains, keys.reading, keys.reading_cutoff)
+    return MeasuredFile(scene.resolve_path(keys.file), gains, keys.reading, keys.reading_cutoff)
 
 
 @lru_cache(64)

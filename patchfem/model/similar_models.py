@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core import frozen_array
+from . import patch as patches
 from .law import complete_bond_length, load_of_scene
 from .load import build_point_load
 from .model import Model, write_resolved
-from .patch import replace_loading_and_shapes
 from .rig import build_rig
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def replace_numbers(
     rig = model.rig
     changes = {}
     if "contact" in tables:
-        changes["patch"] = replace_loading_and_shapes(model.patch, scene.contact)
+        changes["patch"] = patches.replace_loading_and_shapes(model.patch, scene.contact)
     if "structure" in tables and scene.structure.bonded is not None:
         # the bonded spring couples the modes of the scene, so they are computed anew
         rig = build_rig(scene)

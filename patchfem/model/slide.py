@@ -9,8 +9,8 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 from ..inputs import slides
-from ..scene.keys.quantities import KINDS
-from ..scene.rules.limits import refuse_lateral_slide
+from ..scene.keys.quantities import UNIT_FACTORS
+from ..scene.rules.limits import find_lateral_slide_obstacle
 from .file_cache import cache_by_file
 
 # steps per straight leg; the coarsest run of the error estimate keeps two of them
@@ -186,14 +186,14 @@ def build_slide(scene) -> SlidePath:
     amplitude = keys.amplitude or keys.distance
     if keys.kind == "file":
         try:
-            time, *columns = read_path_file(scene.beside(keys.file))
+            time, *columns = read_path_file(scene.resolve_path(keys.file))
         except PatchfemError as error:
             raise type(error)(f"{scene.where('slide.file')}: {error}") from None
         corners = (time, columns[0])
         amplitude = float(max(np.ptp(column) for column in columns)) / 2
         if len(columns) == 2:
             across = columns[1]
-            reason = refuse_lateral_slide(scene.tables())
+            reason = find_lateral_slide_obstacle(scene.tables())
             if reason:
                 raise PatchfemError(f"{scene.where('slide.file')}: {reason}")
     elif keys.kind == "dwell":
@@ -230,7 +230,11 @@ def _leg_lengths(rel_disp, across=None) -> np.ndarray:
 @cache_by_file
 def read_path_file(path: Path) -> tuple:
     """Read the columns of a path file (`inputs.slides.read_slide`)."""
-    units = {"time": KINDS["time"], "displacement": KINDS["length"], "lateral": KINDS["length"]}
+    units = {
+        "time": UNIT_FACTORS["time"],
+        "displacement": UNIT_FACTORS["length"],
+        "lateral": UNIT_FACTORS["length"],
+    }
     return slides.read_slide(path, units)
 
 

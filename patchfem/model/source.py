@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from ..core import NotConverged, PatchfemError
-from ..scene.lines import count_from_one, locate_key
+from ..scene.lines import locate_key, number_items_from_one
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -56,7 +56,7 @@ def locate_errors(source: Source) -> Iterator[None]:
         if error.key is None:
             raise
         where = source.where(error.key) if error.key else str(source.path)
-        located = type(error)(f"{where}: {count_from_one(str(error))}")
+        located = type(error)(f"{where}: {number_items_from_one(str(error))}")
         if isinstance(error, NotConverged):
             located.partial_result = error.partial_result
         raise located from None

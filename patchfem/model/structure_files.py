@@ -20,7 +20,7 @@ class FileModes(NamedTuple):
 
 def read_scene_modes(scene) -> FileModes:
     """Read the modes of structure.file of a scene; an error names the line of the key at fault."""
-    path = scene.beside(scene.structure.file)
+    path = scene.resolve_path(scene.structure.file)
     try:
         return read_modes(path, scene.structure, scene.drive, needs_interface=scene.kind == "rig")
     except PatchfemError as error:

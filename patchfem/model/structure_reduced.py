@@ -59,7 +59,7 @@ def build_reduced_modes(scene) -> ReducedModes:
     is_base_driven = scene.drive.kind == "base"
     output = structure.output_mass or 1
     try:
-        files = _find_files(table, scene.beside)
+        files = _find_files(table, scene.resolve_path)
         reduction, notes = _reduce(
             files,
             table.boundary,

@@ -80,7 +80,7 @@ def build_wear(scene: Scene) -> WearModel | None:
         table = wear.friction
         friction = WornFriction(table.depth, table.coefficient_factor, table.bond_length_factor)
     if wear.start is not None:
-        start = earlier_wear.read_earlier_wear(scene.beside(wear.start), scene.tables())
+        start = earlier_wear.read_earlier_wear(scene.resolve_path(wear.start), scene.tables())
     return WearModel(
         coefficient=wear.coefficient,
         cycles=wear.cycles,

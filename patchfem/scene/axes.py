@@ -1,7 +1,7 @@
 """Values of a key for the cases of a sweep: lists and ranges, as in --over and in [sweep].
 
 A text such as ``1 mm..9 mm:5, 12 mm`` becomes an `Axis`. If values are drawn at random, ``1 mm..9 mm`` and
-``5 mm +- 4 mm`` become a `Span`.
+``5 mm +- 4 mm`` become a `SampledRange`.
 """
 
 from __future__ import annotations
@@ -16,26 +16,43 @@ from typing import Any, NamedTuple, get_origin
 
 from ..core import PatchfemError
 from .keys import quantities
-from .keys.lookup import LIMITS, find_key, is_table_or_value, require_key, validate_value
-from .keys.types import inner_table, is_array, key_types, keys, quantity_kind, required_keys
+from .keys.lookup import (
+    LIMITS_BY_ERROR_TYPE,
+    find_key,
+    is_table_or_value,
+    require_key,
+    validate_value,
+)
+from .keys.types import (
+    attributes_by_key,
+    find_inner_table,
+    find_quantity_kind,
+    is_array_attribute,
+    list_key_types,
+    list_required_keys,
+)
 from .reader import read_set_value
 
 LENGTH_KEY = "drive.displacement"  # a key that holds a length, for `read_lengths`
-MAX_VALUES = 10_000_000  # values of one range; more would fill the memory with the cases of a sweep
+# values of one range; more would fill the memory with the cases of a sweep
+MAX_RANGE_VALUES = 10_000_000
 # ratio of the ends; a range of positive numbers with at least this ratio is logarithmic by default
-LOG_RATIO = 10
-N_SUGGESTED = 4  # keys of a table that a message suggests in place of the table
-DIGITS = 15  # significant digits of a value; a tenth of a range is 0.1 and not 0.1000000000000001
+MIN_LOG_RATIO = 10
+MAX_SUGGESTED_KEYS = 4  # keys of a table that a message suggests in place of the table
+# significant digits of a value; a tenth of a range is 0.1 and not 0.1000000000000001
+SIGNIFICANT_DIGITS = 15
 # magnitude up to which a whole number without a unit is written without a decimal point
-MAX_WHOLE = 1e15
-_NUMBER = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
-_RANGE = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
-_QUANTITY = re.compile(rf"{_NUMBER}\s*(.*)")
-_TOLERANCE = re.compile(
-    rf"({_NUMBER})\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)"
+MAX_EXACT_INTEGER = 1e15
+_NUMBER_PATTERN = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
+_RANGE_PATTERN = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
+_QUANTITY_PATTERN = re.compile(rf"{_NUMBER_PATTERN}\s*(.*)")
+_TOLERANCE_PATTERN = re.compile(
+    rf"({_NUMBER_PATTERN})\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)"
 )
-_PLAIN_NUMBER = re.compile(r"[-+]?(0|[1-9][0-9]{0,14})(\.[0-9]{1,20})?([eE][-+]?[0-9]{1,2})?")
-_OPENING = {"]": "[", "}": "{"}
+_PLAIN_NUMBER_PATTERN = re.compile(
+    r"[-+]?(0|[1-9][0-9]{0,14})(\.[0-9]{1,20})?([eE][-+]?[0-9]{1,2})?"
+)
+_OPENING_BRACKETS = {"]": "[", "}": "{"}
 
 
 class FormattedNumbers(Sequence):
@@ -60,8 +77,8 @@ class FormattedNumbers(Sequence):
 
     def __getitem__(self, index: int | slice) -> str | list[str]:
         if isinstance(index, slice):
-            return [_format(number, self.unit) for number in self.numbers[index]]
-        return _format(self.numbers[index], self.unit)
+            return [_format_with_unit(number, self.unit) for number in self.numbers[index]]
+        return _format_with_unit(self.numbers[index], self.unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +103,7 @@ class Axis:
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class SampledRange:
     """A key and the range from which its values are drawn.
 
     - key: dotted key of the scene.
@@ -101,16 +118,16 @@ class Span:
     unit: str
     log: bool
 
-    def axis(self, fractions: Iterable[float]) -> Axis:
+    def make_axis(self, fractions: Iterable[float]) -> Axis:
         """Return the axis of the values at these fractions of the range, each in [0, 1]."""
-        ends = _Ends(self.low, self.high, self.unit)
+        ends = _RangeEnds(self.low, self.high, self.unit)
         numbers = (_interpolate(ends, fraction, self.log) for fraction in fractions)
         texts = FormattedNumbers(array("d", numbers), self.unit)
-        read_value = _value_reader(self.key)
-        return Axis(self.key, texts, array("d", map(read_value, texts)), _si_unit(self.key))
+        read_value = _make_value_reader(self.key)
+        return Axis(self.key, texts, array("d", map(read_value, texts)), _find_si_unit(self.key))
 
 
-class _Ends(NamedTuple):
+class _RangeEnds(NamedTuple):
     """Ends of a range, both in `unit`."""
 
     low: Fraction | float
@@ -129,7 +146,7 @@ class _WrittenRange(NamedTuple):
 
 def read_axes(
     texts: Iterable[str], *, sampled: bool = False
-) -> tuple[list[Axis | Span], list[str]]:
+) -> tuple[list[Axis | SampledRange], list[str]]:
     """Read texts ``table.key=v1,v2,...``, where a value may be a range ``low..high:n``.
 
     Parameters
@@ -143,7 +160,7 @@ def read_axes(
     tuple
         The axes, and the sentences on mistakes.
     """
-    axes: list[Axis | Span] = []
+    axes: list[Axis | SampledRange] = []
     mistakes = []
     for text in texts:
         key, equals, values = (part.strip() for part in text.partition("="))
@@ -175,14 +192,14 @@ def read_lengths(text: str, name: str) -> list[float]:
     return lengths
 
 
-def read_table(table: Any) -> tuple[list[Axis | Span], list[tuple[str, str]]]:
+def read_table(table: Any) -> tuple[list[Axis | SampledRange], list[tuple[str, str]]]:
     """Return the axes of a plain table [sweep], and (key, sentence) for each of its mistakes."""
     if not isinstance(table, dict) or not table:
         example = '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"'
         return [], [("sweep", f"keys with their values are needed, such as {example}")]
-    axes: list[Axis | Span] = []
+    axes: list[Axis | SampledRange] = []
     mistakes = []
-    for key, values in _flatten(table):
+    for key, values in _flatten_table(table):
         sentences: list[str] = []
         if isinstance(values, list):
             values = ",".join(map(str, values))
@@ -228,7 +245,7 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
     require_key(key)
     texts = tuple(texts)
     _refuse_table(key, texts)
-    read_value = _value_reader(key)
+    read_value = _make_value_reader(key)
     values = []
     mistakes = []
     for text in texts:
@@ -242,7 +259,7 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
     if mistakes:
         raise ValueError("\n".join(mistakes))
     if all(isinstance(value, float) for value in values):
-        return Axis(key, texts, tuple(values), _si_unit(key))
+        return Axis(key, texts, tuple(values), _find_si_unit(key))
     return Axis(key, texts, texts, "")
 
 
@@ -256,10 +273,10 @@ def _append_axis(
         mistakes += [f"{key}: {line}" for line in str(error).split("\n")]
 
 
-def _read_axis(key: str, text: str, *, sampled: bool = False) -> Axis | Span:
+def _read_axis(key: str, text: str, *, sampled: bool = False) -> Axis | SampledRange:
     """Return the axis of the values in a text; ValueError with one line for each mistake."""
     require_key(key)
-    pieces = _split(text)
+    pieces = _split_at_commas(text)
     can_be_span = sampled and len(pieces) == 1
     texts: list[str] = []
     mistakes = []
@@ -271,7 +288,7 @@ def _read_axis(key: str, text: str, *, sampled: bool = False) -> Axis | Span:
             elif can_be_span:
                 return _make_span(key, written)
             else:
-                texts += _range_values(key, written)
+                texts += _list_range_values(key, written)
         except ValueError as error:
             mistakes.append(str(error))
     if mistakes:
@@ -283,7 +300,7 @@ def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | No
     """Return the range that a text such as ``1..9 mm:5`` stands for; None for a single value."""
     if not piece:
         raise ValueError("there is no value between two commas")
-    if not _is_number(key):
+    if not _holds_number(key):
         return None
     if about := _range_about(piece):
         if not is_sampled:
@@ -291,13 +308,13 @@ def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | No
                 f"{piece}: write this range as {about}:9 for 9 values in it, or as {about} with --random"
             )
         piece = f"{about}:lin"
-    match = _RANGE.fullmatch(piece) if ".." in piece else None
+    match = _RANGE_PATTERN.fullmatch(piece) if ".." in piece else None
     if match is None:
         return None
     # A bare number before the dots has the unit of the number after them, as in 1..9 mm.
     written = _WrittenRange(*match.groups())
-    low = _QUANTITY.fullmatch(written.low)
-    high = _QUANTITY.fullmatch(written.high)
+    low = _QUANTITY_PATTERN.fullmatch(written.low)
+    high = _QUANTITY_PATTERN.fullmatch(written.high)
     if low and high and high[1] and not low[1]:
         return written._replace(low=f"{written.low} {high[1]}")
     return written
@@ -308,7 +325,7 @@ def _range_about(text: str) -> str:
 
     ValueError if the width has another unit than the value.
     """
-    match = _TOLERANCE.fullmatch(text)
+    match = _TOLERANCE_PATTERN.fullmatch(text)
     if match is None:
         return ""
     number, unit, width, width_unit = match.groups()
@@ -324,48 +341,51 @@ def _range_about(text: str) -> str:
         )
     if width_unit == "%":
         half = abs(middle) * half / 100
-    return "..".join(_format(float(end), unit) for end in (middle - half, middle + half))
+    return "..".join(_format_with_unit(float(end), unit) for end in (middle - half, middle + half))
 
 
-def _flatten(table: dict, at: str = "") -> list[tuple[str, Any]]:
+def _flatten_table(table: dict, at: str = "") -> list[tuple[str, Any]]:
     """Return (dotted key, value) of a table whose keys may be dotted, in quotes or not."""
     pairs = []
     for key, value in table.items():
         path = f"{at}.{key}" if at else key
-        pairs += _flatten(value, path) if isinstance(value, dict) else [(path, value)]
+        pairs += _flatten_table(value, path) if isinstance(value, dict) else [(path, value)]
     return pairs
 
 
 def _refuse_table(key: str, texts: tuple) -> None:
     """Raise ValueError, which suggests keys, if plain values are given to a table."""
     model, name = find_key(key)
-    inner = inner_table(model, name)
+    inner = find_inner_table(model, name)
     if inner is None or is_table_or_value(model, name):
         return
     if all(text.startswith(("{", "[", '"', "'")) for text in texts):
         return
-    item = ".NAME" if is_array(model, name) else ""
-    required = required_keys(inner)
-    suggested = [*required, *(inner_key for inner_key in keys(inner) if inner_key not in required)]
+    item = ".NAME" if is_array_attribute(model, name) else ""
+    required = list_required_keys(inner)
+    suggested = [
+        *required,
+        *(inner_key for inner_key in attributes_by_key(inner) if inner_key not in required),
+    ]
     raise ValueError(
         "is a table without a value of its own; choose a key of this table: "
-        f"{', '.join(f'{key}{item}.{inner_key}' for inner_key in suggested[:N_SUGGESTED])}"
+        f"{', '.join(f'{key}{item}.{inner_key}' for inner_key in suggested[:MAX_SUGGESTED_KEYS])}"
     )
 
 
-def _si_unit(key: str) -> str:
-    return quantities.si_unit(quantity_kind(*find_key(key)))
+def _find_si_unit(key: str) -> str:
+    return quantities.si_unit(find_quantity_kind(*find_key(key)))
 
 
-def _is_number(key: str) -> bool:
+def _holds_number(key: str) -> bool:
     """Return whether a key holds one number, with or without a unit."""
     place = find_key(key)
-    types = key_types(*place)
-    is_single = inner_table(*place) is None and tuple not in map(get_origin, types)
+    types = list_key_types(*place)
+    is_single = find_inner_table(*place) is None and tuple not in map(get_origin, types)
     return is_single and (float in types or int in types)
 
 
-def _split(text: str) -> list[str]:
+def _split_at_commas(text: str) -> list[str]:
     """Split a text at its commas, except those inside brackets and quotes.
 
     A quote opens at the start of a value or inside brackets; anywhere else it is a character like others.
@@ -383,7 +403,7 @@ def _split(text: str) -> list[str]:
             quote = sign
         elif sign in "[{":
             brackets.append(sign)
-        elif sign in _OPENING and brackets and brackets[-1] == _OPENING[sign]:
+        elif sign in _OPENING_BRACKETS and brackets and brackets[-1] == _OPENING_BRACKETS[sign]:
             brackets.pop()
         elif sign == "," and not brackets:
             pieces.append(text[start:index].strip())
@@ -391,86 +411,87 @@ def _split(text: str) -> list[str]:
     return [*pieces, text[start:].strip()]
 
 
-def _value_reader(key: str) -> Callable[[str], float | str]:
+def _make_value_reader(key: str) -> Callable[[str], float | str]:
     """Return the function that converts a text of a key to SI; it keeps a text without number.
 
     The function raises ValueError if the key does not accept the text.
     """
     place = find_key(key)
-    is_number = _is_number(key)
-    takes_float = float in key_types(*place)
-    kind = quantity_kind(*place) if is_number else None
+    is_number = _holds_number(key)
+    takes_float = float in list_key_types(*place)
+    kind = find_quantity_kind(*place) if is_number else None
     if kind is not None:
-        return lambda text: quantities.parse(text, kind)
+        return lambda text: quantities.parse_quantity(text, kind)
 
     def read_value(text: str) -> float | str:
-        if is_number and takes_float and _PLAIN_NUMBER.fullmatch(text):
+        if is_number and takes_float and _PLAIN_NUMBER_PATTERN.fullmatch(text):
             # most drawn values are plain numbers; `read_set_value` is slow for thousands of them
             return float(text)
         value = read_set_value(key, text)
-        if isinstance(value, dict) and inner_table(*place) is not None:
+        if isinstance(value, dict) and find_inner_table(*place) is not None:
             return text
         has_number = isinstance(value, int | float) and not isinstance(value, bool)
-        validate_value(key, float(value) if has_number and takes_float else value, LIMITS)
+        validate_value(
+            key, float(value) if has_number and takes_float else value, LIMITS_BY_ERROR_TYPE
+        )
         return float(value) if has_number else text
 
     return read_value
 
 
-def _read_ends(key: str, written: _WrittenRange) -> _Ends:
+def _read_ends(key: str, written: _WrittenRange) -> _RangeEnds:
     """Return the ends of a range as exact fractions in the unit of the first."""
-    kind = quantity_kind(*find_key(key))
+    kind = find_quantity_kind(*find_key(key))
     texts = written[:2]
     if kind is None:
-        if any(re.fullmatch(quantities.NUMBER, text) is None for text in texts):
+        if any(re.fullmatch(quantities.NUMBER_PATTERN, text) is None for text in texts):
             raise ValueError(
                 f"{written.low}..{written.high}: both ends of this range must be plain numbers"
             )
-        return _Ends(*map(Fraction, texts), "")
+        return _RangeEnds(*map(Fraction, texts), "")
     for text in texts:
-        quantities.parse(text, kind)
+        quantities.parse_quantity(text, kind)
     (low, unit), (high, high_unit) = map(quantities.split_quantity, texts)
-    units = quantities.KINDS[kind]
-    low_factor, high_factor = (
-        Fraction(repr(units[quantities.normalize_unit(name)])) for name in (unit, high_unit)
-    )
-    return _Ends(Fraction(low), Fraction(high) * high_factor / low_factor, unit)
+    units = quantities.UNIT_FACTORS[kind]
+    names = (quantities.normalize_unit(name) for name in (unit, high_unit))
+    low_factor, high_factor = (Fraction(repr(units[name])) for name in names)
+    return _RangeEnds(Fraction(low), Fraction(high) * high_factor / low_factor, unit)
 
 
-def _require_range(ends: _Ends, written: _WrittenRange) -> None:
+def _require_range_ends(ends: _RangeEnds, written: _WrittenRange) -> None:
     if ends.low == ends.high:
         raise ValueError(f"{written.low}..{written.high}: both ends are the same value")
 
 
-def _is_log(ends: _Ends, spacing: str | None) -> bool:
+def _is_log(ends: _RangeEnds, spacing: str | None) -> bool:
     """Return whether a range is logarithmic: by its suffix, or by the ratio of its ends."""
     is_positive = ends.low > 0 and ends.high > 0
     if spacing is None and is_positive:
-        return max(ends.low / ends.high, ends.high / ends.low) >= LOG_RATIO
+        return max(ends.low / ends.high, ends.high / ends.low) >= MIN_LOG_RATIO
     if spacing == "log" and not is_positive:
         raise ValueError("a logarithmic range needs both ends > 0")
     return spacing == "log"
 
 
-def _range_values(key: str, written: _WrittenRange) -> list[str]:
+def _list_range_values(key: str, written: _WrittenRange) -> list[str]:
     """Return the values of a range as texts in the unit of its first end."""
     ends = _read_ends(key, written)
     count = int(written.count) if written.count else 0
-    if not 2 <= count <= MAX_VALUES:
+    if not 2 <= count <= MAX_RANGE_VALUES:
         raise ValueError(
-            f"{written.low}..{written.high}: give the number of values after a colon, from 2 to {MAX_VALUES}, such as "
+            f"{written.low}..{written.high}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as "
             ":9"
         )
-    _require_range(ends, written)
+    _require_range_ends(ends, written)
     is_log = _is_log(ends, written.spacing)
-    fractions = (Fraction(index, count - 1) for index in range(count))
-    return [_format(_interpolate(ends, fraction, is_log), ends.unit) for fraction in fractions]
+    values = (_interpolate(ends, Fraction(k, count - 1), is_log) for k in range(count))
+    return [_format_with_unit(value, ends.unit) for value in values]
 
 
-def _make_span(key: str, written: _WrittenRange) -> Span:
+def _make_span(key: str, written: _WrittenRange) -> SampledRange:
     """Return the range from which values are drawn."""
     ends = _read_ends(key, written)
-    if float not in key_types(*find_key(key)):
+    if float not in list_key_types(*find_key(key)):
         raise ValueError(
             f"{written.low}..{written.high}: a key that takes whole numbers takes no range; list the values, such as "
             "1,2,3"
@@ -480,12 +501,12 @@ def _make_span(key: str, written: _WrittenRange) -> Span:
             f"{written.low}..{written.high}:{written.count}: random values are drawn between the ends; leave out "
             f":{written.count}"
         )
-    _require_range(ends, written)
+    _require_range_ends(ends, written)
     log = _is_log(ends, written.spacing)
-    return Span(key, float(ends.low), float(ends.high), ends.unit, log)
+    return SampledRange(key, float(ends.low), float(ends.high), ends.unit, log)
 
 
-def _interpolate(ends: _Ends, fraction: Fraction | float, is_log: bool) -> float:
+def _interpolate(ends: _RangeEnds, fraction: Fraction | float, is_log: bool) -> float:
     """Return the value at a fraction of a range; exact fractions are rounded only once."""
     if not is_log:
         return float(ends.low + (ends.high - ends.low) * fraction)
@@ -494,10 +515,10 @@ def _interpolate(ends: _Ends, fraction: Fraction | float, is_log: bool) -> float
     return float(ends.low) * (float(ends.high) / float(ends.low)) ** float(fraction)
 
 
-def _format(value: float, unit: str) -> str:
-    """Return a value with its unit, rounded to DIGITS significant digits."""
-    number = float(f"{value:.{DIGITS}g}")
+def _format_with_unit(value: float, unit: str) -> str:
+    """Return a value with its unit, rounded to SIGNIFICANT_DIGITS significant digits."""
+    number = float(f"{value:.{SIGNIFICANT_DIGITS}g}")
     if unit:
         return f"{repr(number).removesuffix('.0')} {unit}"
-    is_whole = number.is_integer() and abs(number) < MAX_WHOLE
+    is_whole = number.is_integer() and abs(number) < MAX_EXACT_INTEGER
     return repr(int(number)) if is_whole else repr(number)

@@ -8,12 +8,17 @@ from typing import Any
 from ..effects import law_takes_key
 from .keys import tables
 from .keys.memoize import memoize
-from .keys.types import keys
-from .rules.accuracy import unused_settings
-from .rules.drive import unused_drive_keys
+from .keys.types import attributes_by_key
+from .rules.accuracy import find_unused_settings
+from .rules.drive import list_unused_drive_keys
 from .rules.friction import is_kinetic_unused, is_rest_speed_unused, is_temperature_unused
-from .rules.methods import unused_methods
-from .rules.selectors import ASPERITY_LAW, LAW, SLIDE_KIND, unused_keys
+from .rules.methods import list_unused_methods
+from .rules.selectors import (
+    ASPERITY_LAW_SELECTOR,
+    LAW_SELECTOR,
+    SLIDE_KIND_SELECTOR,
+    list_unused_keys,
+)
 
 SLIDE_DEFAULTS = {  # slide.kind -> defaults of the keys that this kind uses
     "sine": {"cycles": 1.0},
@@ -22,12 +27,12 @@ SLIDE_DEFAULTS = {  # slide.kind -> defaults of the keys that this kind uses
 }
 
 
-def complete(scene: tables.Tables, kind: str) -> tables.Tables:
+def complete_tables(scene: tables.Tables, kind: str) -> tables.Tables:
     """Return the tables of a valid scene with defaults filled in and unused keys reset to them."""
-    unused = list(unused_settings(scene, kind))
-    if scene.accuracy.method in unused_methods(kind):
+    unused = list(find_unused_settings(scene, kind))
+    if scene.accuracy.method in list_unused_methods(kind):
         unused.append("method")
-    changed = {"accuracy": _reset(scene.accuracy, unused)} if unused else {}
+    changed = {"accuracy": _reset_unused_keys(scene.accuracy, unused)} if unused else {}
     for name, complete_table in (
         ("contact", _complete_contact),
         ("friction", _complete_law),
@@ -43,8 +48,8 @@ def complete(scene: tables.Tables, kind: str) -> tables.Tables:
 
 @memoize
 def _complete_slide(slide: tables.Slide) -> tables.Slide:
-    slide = _reset(slide, unused_keys(slide, SLIDE_KIND))
-    return _fill(slide, SLIDE_DEFAULTS.get(slide.kind, {}))
+    slide = _reset_unused_keys(slide, list_unused_keys(slide, SLIDE_KIND_SELECTOR))
+    return _fill_missing_values(slide, SLIDE_DEFAULTS.get(slide.kind, {}))
 
 
 @memoize
@@ -67,21 +72,23 @@ def _complete_interface(interface: tables.Interface) -> tables.Interface:
 
 def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
     motion = 0.0 if index else mode.slide
-    mode = _fill(mode, {"base": motion, "output": motion})
-    return _fill(mode, {"accelerometer": mode.output, "gauge": mode.output})
+    mode = _fill_missing_values(mode, {"base": motion, "output": motion})
+    return _fill_missing_values(mode, {"accelerometer": mode.output, "gauge": mode.output})
 
 
 @memoize
 def _complete_drive(drive: tables.Drive) -> tables.Drive:
-    return _reset(drive, unused_drive_keys(drive))
+    return _reset_unused_keys(drive, list_unused_drive_keys(drive))
 
 
 @memoize
 def _complete_contact(contact: tables.Contact) -> tables.Contact:
     if contact.asperities:
-        asperities = _reset(contact.asperities, unused_keys(contact.asperities, ASPERITY_LAW))
+        asperities = _reset_unused_keys(
+            contact.asperities, list_unused_keys(contact.asperities, ASPERITY_LAW_SELECTOR)
+        )
         contact = contact.model_copy(update={"asperities": asperities})
-    return _reset(contact, ["element_size"]) if contact.mesh else contact
+    return _reset_unused_keys(contact, ["element_size"]) if contact.mesh else contact
 
 
 @memoize
@@ -92,18 +99,20 @@ def _complete_law(law: tables.Friction) -> tables.Friction:
         "temperature": is_temperature_unused(law),
     }
     unused = [key for key, is_unused in without_effect.items() if is_unused]
-    law = _reset(law, {*unused_keys(law, LAW), *unused})
-    return _fill(law, {"kinetic": law.static}) if law_takes_key(law.law, "kinetic") else law
+    law = _reset_unused_keys(law, {*list_unused_keys(law, LAW_SELECTOR), *unused})
+    if law_takes_key(law.law, "kinetic"):
+        return _fill_missing_values(law, {"kinetic": law.static})
+    return law
 
 
-def _fill(table: Any, values: dict[str, Any]) -> Any:
+def _fill_missing_values(table: Any, values: dict[str, Any]) -> Any:
     """Return a table with values, by attribute, in place of None."""
     missing = {name: value for name, value in values.items() if getattr(table, name) is None}
     return table.model_copy(update=missing)
 
 
-def _reset(table: Any, unused: Iterable[str]) -> Any:
+def _reset_unused_keys(table: Any, unused: Iterable[str]) -> Any:
     """Return a table with keys back at their defaults."""
     fields = type(table).model_fields
-    names = keys(type(table))
+    names = attributes_by_key(type(table))
     return table.model_copy(update={names[key]: fields[names[key]].default for key in unused})

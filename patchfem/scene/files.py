@@ -6,22 +6,22 @@ import os
 from pathlib import Path
 from typing import Any
 
-from .lines import key_lines
+from .lines import find_key_lines
 from .rules.scene_draft import SceneDraft
-from .rules.view import view
+from .rules.view import wrap_value
 
 
-def named_files(tables: Any) -> list[tuple[str, str]]:
+def list_named_files(tables: Any) -> list[tuple[str, str]]:
     """Return (dotted key, file) of every file that a scene, or its tables, names."""
-    scene = {name: view(getattr(tables, name)) for name in _TABLES}
+    scene = {name: wrap_value(getattr(tables, name)) for name in _TABLES_WITH_FILES}
     structure = scene["structure"]
     faces = structure.interface or ()
     keys_and_files = [
-        *_patch_files("contact", scene["contact"]),
+        *_list_patch_files("contact", scene["contact"]),
         *(
             file
             for index, face in enumerate(faces)
-            for file in _patch_files(f"structure.interface.{index}.contact", face.contact)
+            for file in _list_patch_files(f"structure.interface.{index}.contact", face.contact)
         ),
         ("slide.file", scene["slide"].file),
         ("drive.file", scene["drive"].file),
@@ -29,7 +29,7 @@ def named_files(tables: Any) -> list[tuple[str, str]]:
         # damping may also be a ratio, which names no file
         *(
             (f"structure.reduced.{key}", structure.reduced[key])
-            for key in _MATRICES
+            for key in _MATRIX_KEYS
             if structure.reduced
         ),
         ("measured.file", scene["measured"].file),
@@ -38,11 +38,11 @@ def named_files(tables: Any) -> list[tuple[str, str]]:
     return [(key, file) for key, file in keys_and_files if isinstance(file, str) and file]
 
 
-_TABLES = ("contact", "slide", "structure", "drive", "measured", "wear")
-_MATRICES = ("stiffness", "mass", "damping")
+_TABLES_WITH_FILES = ("contact", "slide", "structure", "drive", "measured", "wear")
+_MATRIX_KEYS = ("stiffness", "mass", "damping")
 
 
-def _patch_files(at: str, contact: Any) -> list[tuple[str, Any]]:
+def _list_patch_files(at: str, contact: Any) -> list[tuple[str, Any]]:
     """Return the keys of the files of the patch at `at`, each with its file or UNKNOWN."""
     asperities = contact.asperities
     return [
@@ -60,20 +60,20 @@ def file_exists(path: Path) -> bool:
         return False
 
 
-def absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
+def list_absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
     """Return (dotted key, message) of every file that the tables name and that does not exist."""
     return [
         (key, f"there is no file {folder / file}; paths are relative to the scene")
-        for key, file in named_files(tables)
+        for key, file in list_named_files(tables)
         if not file_exists(folder / file)
     ]
 
 
 def require_files(scene: Any) -> Any:
     """Return a scene; SceneError if a file that it names does not exist."""
-    absent = absent_files(scene, scene.path.parent)
+    absent = list_absent_files(scene, scene.path.parent)
     if absent:
-        draft = SceneDraft(str(scene.path), key_lines(scene.text), {})
+        draft = SceneDraft(str(scene.path), find_key_lines(scene.text), {})
         draft.sets = {key for key, _ in absent if key not in draft.lines}
         for key, message in absent:
             draft.add_mistake(key, message)
@@ -81,9 +81,9 @@ def require_files(scene: Any) -> Any:
     return scene
 
 
-def relative_files(scene: Any, folder: Path) -> list[str]:
+def make_relative_file_sets(scene: Any, folder: Path) -> list[str]:
     """Return ``table.key=value`` for each file of a scene, with paths from another folder."""
     return [
-        f"{key}={Path(os.path.relpath(scene.beside(file), folder)).as_posix()}"
-        for key, file in named_files(scene)
+        f"{key}={Path(os.path.relpath(scene.resolve_path(file), folder)).as_posix()}"
+        for key, file in list_named_files(scene)
     ]

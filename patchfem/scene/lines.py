@@ -8,15 +8,15 @@ from functools import lru_cache
 from pathlib import Path
 
 # Parts of a dotted key. No key of a scene has more than five, and the run time is quadratic in the number of parts.
-MAX_PARTS = 50
-_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
-_ITEM = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
-_ITEM_IN_MESSAGE = re.compile(
+MAX_KEY_PARTS = 50
+_BARE_KEY_PATTERN = re.compile(r"[A-Za-z0-9_-]+")
+_ITEM_PATTERN = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
+_ITEM_IN_MESSAGE_PATTERN = re.compile(
     r"\b((?:structure|drive)(?:\.[a-z_]+(?:\[[0-9]+\])?)+)\.([0-9]{1,9})(?![0-9a-zA-Z_])"
 )
-_BLANK = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
-_SCALAR = re.compile(r"[^,\]}\n#]*")
-_STRINGS = (
+_BLANK_PATTERN = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
+_SCALAR_PATTERN = re.compile(r"[^,\]}\n#]*")
+_STRING_PATTERNS = (
     re.compile(r'"""(?:\\[\s\S]|[^\\])*?"{3,5}'),
     re.compile(r"'''[\s\S]*?'{3,5}"),
     re.compile(r'"(?:\\.|[^"\\\n])*"'),
@@ -28,16 +28,16 @@ def split_key(key: str) -> list[str]:
     """Return the parts of a dotted key; an item ``mode[1]`` becomes ``mode`` and ``0``."""
     parts = []
     for piece in key.split("."):
-        item = _ITEM.fullmatch(piece.strip())
+        item = _ITEM_PATTERN.fullmatch(piece.strip())
         parts += [item[1], str(int(item[2]) - 1)] if item else [piece.strip()]
     return parts
 
 
-def count_from_one(text: str) -> str:
+def number_items_from_one(text: str) -> str:
     """Return a message in which ``structure.mode.0`` is written as ``structure.mode[1]``."""
-    changed = _ITEM_IN_MESSAGE.sub(lambda item: f"{item[1]}[{int(item[2]) + 1}]", text)
+    changed = _ITEM_IN_MESSAGE_PATTERN.sub(lambda item: f"{item[1]}[{int(item[2]) + 1}]", text)
     # an item inside another item needs a second pass
-    return changed if changed == text else count_from_one(changed)
+    return changed if changed == text else number_items_from_one(changed)
 
 
 def locate_key(path: str | Path, text: str, key: str) -> str:
@@ -52,18 +52,19 @@ def locate_key(path: str | Path, text: str, key: str) -> str:
     key : str
         Dotted key. Its table stands in for a key that is not written; without its table there is no line.
     """
-    lines = key_lines(text)
+    lines = find_key_lines(text)
     line = lines.get(key) or lines.get(key.rpartition(".")[0])
-    return f"{path}:{line}: {count_from_one(key)}" if line else f"{path}: {count_from_one(key)}"
+    place = f"{path}:{line}" if line else path
+    return f"{place}: {number_items_from_one(key)}"
 
 
 @lru_cache(16)
-def key_lines(text: str) -> dict[str, int]:
+def find_key_lines(text: str) -> dict[str, int]:
     """Return dotted key -> line, from 1, of a TOML text.
 
     A table has the line of its header; a table without a header that of the first key in it. Items of an array of
     tables count from 0, as in ``structure.mode.0.name``. A text that is not TOML gives the keys before the first error.
-    Raises TooManyParts for a key of more than MAX_PARTS parts.
+    Raises TooManyKeyParts for a key of more than MAX_KEY_PARTS parts.
     """
     scanner = _Scanner(text)
     try:
@@ -81,11 +82,11 @@ class _SyntaxError(Exception):
     """Error for a text that is not TOML at the cursor."""
 
 
-class TooManyParts(ValueError):
-    """Error for a key of more than MAX_PARTS parts in this `line`, counted from 1."""
+class TooManyKeyParts(ValueError):
+    """Error for a key of more than MAX_KEY_PARTS parts in this `line`, counted from 1."""
 
     def __init__(self, line: int) -> None:
-        super().__init__(f"a key has more than {MAX_PARTS} parts; write table.key")
+        super().__init__(f"a key has more than {MAX_KEY_PARTS} parts; write table.key")
         self.line = line
 
 
@@ -117,8 +118,8 @@ class _Scanner:
         *outer, name = self.scan_key()
         path = ""
         for part in outer:
-            path = self.last_item_path(_join(path, part))
-        path = _join(path, name)
+            path = self.last_item_path(_join_path(path, part))
+        path = _join_path(path, name)
         self.expect("]]" if is_array else "]")
         if is_array:
             self.lines.setdefault(path, line)
@@ -137,7 +138,7 @@ class _Scanner:
         line = self.current_line()
         path = prefix
         for part in self.scan_key():
-            path = _join(path, part)
+            path = _join_path(path, part)
             self.lines.setdefault(path, line)
         self.expect("=")
         self.scan_value(path)
@@ -152,7 +153,7 @@ class _Scanner:
         elif start in ('"', "'"):
             self.scan_string()
         else:
-            self.match(_SCALAR)
+            self.match(_SCALAR_PATTERN)
 
     def scan_item(self, path: str) -> None:
         """Read one item of an array."""
@@ -179,16 +180,16 @@ class _Scanner:
             if self.peek() in ('"', "'"):
                 parts.append(self.scan_string()[1:-1])
             else:
-                parts.append(self.match(_BARE_KEY))
+                parts.append(self.match(_BARE_KEY_PATTERN))
             self.peek()
             if not self.take("."):
                 return parts
-            if len(parts) >= MAX_PARTS:
-                raise TooManyParts(self.current_line())
+            if len(parts) >= MAX_KEY_PARTS:
+                raise TooManyKeyParts(self.current_line())
 
     def scan_string(self) -> str:
         """Read a string and return it with its quotes."""
-        for pattern in _STRINGS:
+        for pattern in _STRING_PATTERNS:
             if match := pattern.match(self.text, self.at):
                 self.at = match.end()
                 return match[0]
@@ -204,7 +205,7 @@ class _Scanner:
 
     def peek(self) -> str:
         """Skip blanks and comments and return the next character; "" at the end."""
-        self.at = _BLANK.match(self.text, self.at).end()
+        self.at = _BLANK_PATTERN.match(self.text, self.at).end()
         return self.text[self.at : self.at + 1]
 
     def take(self, mark: str) -> bool:
@@ -227,5 +228,5 @@ class _Scanner:
         return self._line
 
 
-def _join(path: str, name: str) -> str:
+def _join_path(path: str, name: str) -> str:
     return f"{path}.{name}" if path else name

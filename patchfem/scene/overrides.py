@@ -11,16 +11,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..effects import find_waveform
-from .files import named_files, require_files
-from .lines import key_lines, split_key
+from .files import list_named_files, require_files
+from .lines import find_key_lines, split_key
 from .reader import apply_set, read_tables
-from .rules.scene_draft import SceneDraft, find_inner
-from .rules.structure import HEAVY_DAMPING
+from .rules.scene_draft import SceneDraft, find_item_or_value
+from .rules.structure import MAX_USUAL_DAMPING
 from .rules.view import View
 from .scene import Scene, finish_scene
 
 # Tables that a BaseScene keeps, which saves the cases of a sweep from reading them again.
-MAX_TABLES = 4096
+MAX_CACHED_TABLES = 4096
 # Keys of a rig with sinusoidal base motion, or of a pressed patch. No rule or remark depends on their values as
 # long as they lie between 0 and this number (SI).
 PLAIN_KEYS = {
@@ -37,7 +37,7 @@ PLAIN_KEYS = {
     "drive.frequency": inf,
     "structure.moving_mass": inf,
     "structure.mode.frequency": inf,
-    "structure.mode.damping": HEAVY_DAMPING,
+    "structure.mode.damping": MAX_USUAL_DAMPING,
 }
 
 
@@ -58,7 +58,7 @@ class BaseScene:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self._lines = key_lines(scene.text)
+        self._lines = find_key_lines(scene.text)
         values = tomllib.loads(scene.text)
         values.pop("sweep", None)
         self._draft = SceneDraft(str(scene.path), self._lines, values)
@@ -86,10 +86,10 @@ class BaseScene:
                 apply_set(draft, assignment)
         scene = require_files(finish_scene(draft, base.path, base.text, (*base.sets, *sets)))
         for group in fresh:  # no SceneError was raised, so these tables are valid and can be reused
-            name = _table_name(group[0])
+            name = _find_table_name(group[0])
             read = draft.read_now.get(id(draft.raw.get(name)))
-            if read is not None and len(self._known) < MAX_TABLES:
-                keys = {key for key in draft.sets if _table_name(key) == name}
+            if read is not None and len(self._known) < MAX_CACHED_TABLES:
+                keys = {key for key in draft.sets if _find_table_name(key) == name}
                 self._known[group] = _ReadTable(name, draft.raw[name], read, keys)
         return scene
 
@@ -127,7 +127,7 @@ class BaseScene:
         return None if None in plain_keys else PlainNumbers(scene, tuple(plain_keys))
 
 
-class Place(NamedTuple):
+class NumberLocation(NamedTuple):
     """Location of a number in a scene.
 
     - table: table of the scene.
@@ -143,7 +143,7 @@ class Place(NamedTuple):
 class PlainKey(NamedTuple):
     """Location of a plain number, and the limit below which no rule depends on its value."""
 
-    place: Place
+    location: NumberLocation
     limit: float
 
 
@@ -162,30 +162,31 @@ class PlainNumbers:
         """Return whether no rule depends on these values (..., number of keys) [SI]."""
         return bool(np.all((values > 0) & (values < [key.limit for key in self.keys])))
 
-    def by_place(self, values: Sequence) -> dict[Place, Any]:
+    def values_by_location(self, values: Sequence) -> dict[NumberLocation, Any]:
         """Map the location of each key to its value, and that of a dependent kinetic coefficient."""
-        numbers = {key.place: value for key, value in zip(self.keys, values)}
-        static = Place("friction", None, "static")
+        numbers = {key.location: value for key, value in zip(self.keys, values)}
+        static = NumberLocation("friction", None, "static")
         if static in numbers and self.scene.friction.kinetic is not None:
             numbers[static._replace(name="kinetic")] = numbers[static]
         return numbers
 
-    def make_table(self, name: str, numbers: dict[Place, Any]) -> Any:
-        """Return a table of the scene with values replaced by those of `by_place`."""
+    def make_table(self, name: str, numbers: dict[NumberLocation, Any]) -> Any:
+        """Return a table of the scene with values replaced by those of `values_by_location`."""
         table = getattr(self.scene, name)
         updates: dict[int | str | None, dict[str, Any]] = {}
-        for place, value in numbers.items():
-            if place.table == name:
-                updates.setdefault(place.part, {})[place.name] = value
+        for location, value in numbers.items():
+            if location.table == name:
+                updates.setdefault(location.part, {})[location.name] = value
         changed = updates.pop(None, {})
         if name == "structure" and updates:
             modes = enumerate(table.mode)
-            changed["mode"] = tuple(_update(mode, updates.get(k, {})) for k, mode in modes)
+            changed["mode"] = tuple(_update_table(mode, updates.get(k, {})) for k, mode in modes)
         else:
-            changed |= {part: _update(getattr(table, part), new) for part, new in updates.items()}
-        return _update(table, changed)
+            for part, new in updates.items():
+                changed[part] = _update_table(getattr(table, part), new)
+        return _update_table(table, changed)
 
-    def all_sets(self, sets: Sequence[str]) -> tuple:
+    def replace_sets(self, sets: Sequence[str]) -> tuple:
         """Return all ``table.key=value`` of a scene whose keys are set by `sets`."""
         return (*self.scene.sets[: len(self.scene.sets) - len(self.keys)], *sets)
 
@@ -194,16 +195,16 @@ class PlainNumbers:
 
         `values` [SI] are those of the keys; `are_plain` must hold for them.
         """
-        numbers = self.by_place(values)
+        numbers = self.values_by_location(values)
         tables = {name: self.make_table(name, numbers) for name in self.changed_tables()}
-        return replace(self.scene, sets=self.all_sets(sets), **tables)
+        return replace(self.scene, sets=self.replace_sets(sets), **tables)
 
     def changed_tables(self) -> set[str]:
         """Return the names of the tables in which a number differs."""
-        return {key.place.table for key in self.keys}
+        return {key.location.table for key in self.keys}
 
 
-def _update(table: Any, values: dict[str, Any]) -> Any:
+def _update_table(table: Any, values: dict[str, Any]) -> Any:
     return table.model_copy(update=values) if values else table
 
 
@@ -214,7 +215,7 @@ def _is_plain_point(scene: Scene) -> bool:
     """
     if scene.kind != "rig" or scene.contact or scene.wear or not scene.normal:
         return False
-    has_plain_tables = not scene.normal.grooves and not named_files(scene)
+    has_plain_tables = not scene.normal.grooves and not list_named_files(scene)
     return has_plain_tables and _is_plain_motion(scene)
 
 
@@ -228,7 +229,7 @@ def _is_plain_patch(scene: Scene) -> bool:
         return False
     if contact.load_line or contact.strips or contact.grooves or contact.holder:
         return False
-    if any(key != "measured.file" for key, _ in named_files(scene)):
+    if any(key != "measured.file" for key, _ in list_named_files(scene)):
         return False
     return scene.kind == "patch" or (not scene.structure.bonded and _is_plain_motion(scene))
 
@@ -268,19 +269,19 @@ def _find_plain_key(scene: Scene, key: str) -> PlainKey | None:
     value = getattr(holder, pieces[-1], None)
     if value is None or not 0 < value < limit:
         return None
-    return PlainKey(Place(pieces[0], part, pieces[-1]), limit)
+    return PlainKey(NumberLocation(pieces[0], part, pieces[-1]), limit)
 
 
 def _group_by_table(sets: tuple[str, ...]) -> list[tuple[str, ...]]:
     """Return the assignments in groups, one for each table, in their order."""
     groups: dict[str, tuple[str, ...]] = {}
     for assignment in sets:
-        name = _table_name(assignment)
+        name = _find_table_name(assignment)
         groups[name] = (*groups.get(name, ()), assignment)
     return list(groups.values())
 
 
-def _table_name(key: str) -> str:
+def _find_table_name(key: str) -> str:
     """Return the name of the table of a dotted key, or of an assignment."""
     return key.partition("=")[0].partition(".")[0].strip()
 
@@ -289,7 +290,7 @@ def _copy_tables(raw: dict[str, Any], key: str) -> None:
     """Replace the tables above a dotted key by copies, in which the key can then be set."""
     holder: Any = raw
     for piece in split_key(key)[:-1]:
-        inner = find_inner(holder, piece)
+        inner = find_item_or_value(holder, piece)
         if isinstance(holder, dict) and isinstance(inner, dict):
             inner = holder[piece] = dict(inner)
         elif isinstance(holder, dict) and isinstance(inner, list):

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from .keys import quantities
-from .keys.lookup import KeyPlace, require_key, validate_value
-from .keys.types import inner_table, key_types, quantity_kind
+from .keys.lookup import KeyDefinition, require_key, validate_value
+from .keys.types import find_inner_table, find_quantity_kind, list_key_types
 from .reader import read_set_value
 
 
@@ -27,7 +27,7 @@ class Range:
         """SI unit of the key; "1" for a plain number."""
         return quantities.si_unit(self.kind)
 
-    def assigned(self, value: float) -> str:
+    def format_assignment(self, value: float) -> str:
         """Return the ``table.key=value`` that sets the key to exactly this value in SI."""
         text = quantities.format_si(value, self.kind) if self.kind else repr(float(value))
         return f"{self.key}={text}"
@@ -65,28 +65,28 @@ def _read_range(text: str) -> Range:
             f"{text}: table.key=low..high is needed, such as friction.bond_length=0.2 um..20 um"
         )
     try:
-        place = _require_number(key)
+        place = _require_number_key(key)
         low_value = _read_number(place, key, low)
         high_value = _read_number(place, key, high)
         if not low_value < high_value:
             raise ValueError(f"the low bound {low} must lie below the high bound {high}")
     except ValueError as error:
         raise ValueError(f"{key}: {error}") from None
-    return Range(key, low_value, high_value, quantity_kind(*place))
+    return Range(key, low_value, high_value, find_quantity_kind(*place))
 
 
-def _require_number(key: str) -> KeyPlace:
+def _require_number_key(key: str) -> KeyDefinition:
     """Find a key that holds one number; ValueError for any other."""
     place = require_key(key)
-    types = key_types(*place)
-    if inner_table(*place) is not None or tuple in types or float not in types:
+    types = list_key_types(*place)
+    if find_inner_table(*place) is not None or tuple in types or float not in types:
         raise ValueError(
             "is not a number that can vary; only quantities and plain numbers can be free"
         )
     return place
 
 
-def _read_number(place: KeyPlace, key: str, text: str) -> float:
+def _read_number(place: KeyDefinition, key: str, text: str) -> float:
     """Convert the string of a value to SI units; ValueError if the key does not accept it."""
     written = read_set_value(key, text)
     if isinstance(written, int) and not isinstance(written, bool):

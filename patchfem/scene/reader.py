@@ -11,30 +11,31 @@ from pydantic import ValidationError
 from . import suggestions
 from .keys import removed
 from .keys.lookup import (
-    LIMITS,
-    KeyPlace,
+    LIMITS_BY_ERROR_TYPE,
+    KeyDefinition,
     describe_error,
     find_key,
+    format_for_message,
     is_table_or_value,
-    show_value,
 )
 from .keys.tables import Tables
 from .keys.types import (
     Table,
+    advise_on_name,
+    attributes_by_key,
     build_table,
-    choices,
-    inner_table,
-    is_array,
-    key_types,
-    keys,
-    required_keys,
+    find_inner_table,
+    is_array_attribute,
+    list_key_types,
+    list_required_keys,
 )
-from .lines import count_from_one, split_key
+from .lines import number_items_from_one, split_key
 from .rules.scene_draft import SceneDraft
 
 # Numbers such as .3 and 5., which people write but TOML does not allow.
-_BARE_POINT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?")
-_PLAIN_TEXT = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')  # matches a string in quotes without escapes
+_BARE_POINT_PATTERN = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?")
+# matches a string in quotes without escapes
+_PLAIN_TEXT_PATTERN = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')
 
 
 def read_tables(draft: SceneDraft) -> None:
@@ -46,44 +47,46 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], at: 
     """Read the table at the dotted key `at`; report missing or wrong values, which become None."""
     if id(raw) in draft.read_before:
         return draft.read_before[id(raw)][1]
-    names = keys(model)
+    names = attributes_by_key(model)
     values = {}
     for key, value in raw.items():
         path = f"{at}.{key}" if at else key
         if key not in names:
             _report_unknown(draft, model, raw, key, at)
             continue
-        inner = inner_table(model, names[key])
+        inner = find_inner_table(model, names[key])
         is_value = not isinstance(value, dict) and is_table_or_value(model, names[key])
         if inner is not None and not is_value:
-            value = _read_inner(draft, KeyPlace(model, names[key]), value, path)
+            value = _read_inner(draft, KeyDefinition(model, names[key]), value, path)
         if value is not None:
             values[key] = value
-    valid = _validate(draft, model, values, at)
-    for key in required_keys(model):
+    valid = _validate_values(draft, model, values, at)
+    for key in list_required_keys(model):
         if key not in raw:
             draft.add_missing(f"{at}.{key}", "")
-    unknown = {names[key]: None for key in (*raw, *required_keys(model)) if key in names}
+    unknown = {names[key]: None for key in (*raw, *list_required_keys(model)) if key in names}
     table = build_table(model, unknown | valid)
     draft.read_now[id(raw)] = raw, table
     return table
 
 
-def _read_inner(draft: SceneDraft, place: KeyPlace, value: Any, path: str) -> Any:
+def _read_inner(draft: SceneDraft, place: KeyDefinition, value: Any, path: str) -> Any:
     """Read an inner table or array of tables; report anything else and return None."""
-    inner = inner_table(*place)
-    if not is_array(*place):
+    inner = find_inner_table(*place)
+    if not is_array_attribute(*place):
         if isinstance(value, dict):
             return _read_table(draft, inner, value, path)
-        draft.add_mistake(path, f"a table [{path}] is needed, not {show_value(value)}")
+        draft.add_mistake(path, f"a table [{path}] is needed, not {format_for_message(value)}")
     elif isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
         return tuple(_read_table(draft, inner, item, f"{path}.{k}") for k, item in enumerate(value))
     else:
-        draft.add_mistake(path, f"an array of tables [[{path}]] is needed, not {show_value(value)}")
+        draft.add_mistake(
+            path, f"an array of tables [[{path}]] is needed, not {format_for_message(value)}"
+        )
     return None
 
 
-def _validate(
+def _validate_values(
     draft: SceneDraft, model: type[Table], values: dict[str, Any], at: str
 ) -> dict[str, Any]:
     """Return attribute -> valid value; the first mistake of every other key is reported."""
@@ -94,7 +97,8 @@ def _validate(
         reported = set()
         # A key may accept several types; a value that only breaks a limit of one type was meant to be of this type.
         errors = sorted(
-            caught.errors(include_url=False), key=lambda error: error["type"] not in LIMITS
+            caught.errors(include_url=False),
+            key=lambda error: error["type"] not in LIMITS_BY_ERROR_TYPE,
         )
         for error in errors:
             key, *inside = error["loc"]
@@ -107,7 +111,10 @@ def _validate(
             if index is not None and isinstance(value, list) and index < len(value):
                 path = f"{path}.{index}"
                 value = value[index]
-            draft.add_mistake(path, describe_error(KeyPlace(model, keys(model)[key]), error, value))
+            draft.add_mistake(
+                path,
+                describe_error(KeyDefinition(model, attributes_by_key(model)[key]), error, value),
+            )
     return valid
 
 
@@ -116,34 +123,34 @@ def _report_unknown(
 ) -> None:
     """Report a key that the table at `at` does not have, with the key that was probably meant."""
     path = f"{at}.{key}" if at else key
-    if path in removed.KEYS:
-        draft.add_mistake(path, removed.KEYS[path])
+    if path in removed.REMOVED_KEYS:
+        draft.add_mistake(path, removed.REMOVED_KEYS[path])
         return
     is_table = _is_table(raw[key])
-    tables = [
-        name
-        for name, attribute in keys(model).items()
-        if inner_table(model, attribute) and not is_table_or_value(model, attribute)
-    ]
-    known = tables if is_table and tables else list(keys(model))
+    known = list(attributes_by_key(model))
+    if is_table:
+        known = _list_inner_tables(model) or known
     advice = f"known here: {', '.join(known)}" if known else "this table has no keys"
-    if meant := _find_meant(draft, model, raw, key, at):
+    if meant := _suggest_name(draft, model, raw, key, at):
         advice = f"did you mean '{meant}'?"
     draft.add_mistake(path, f"unknown {'table' if is_table else 'key'}; {advice}")
 
 
-def _find_meant(
+def _list_inner_tables(model: type[Table]) -> list[str]:
+    """Return the keys of a table that hold a table and cannot hold a plain value."""
+    names = attributes_by_key(model).items()
+    tables = [key for key, name in names if find_inner_table(model, name) is not None]
+    return [key for key in tables if not is_table_or_value(model, attributes_by_key(model)[key])]
+
+
+def _suggest_name(
     draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, at: str
 ) -> str:
     """Return the key or table that an unknown one probably stands for; "" if none is similar."""
     is_table = _is_table(raw[key])
     if not at and not is_table:
         # --set may be given a key without its table; the key then belongs to a table that has a key of this name.
-        owners = [
-            name
-            for name, attribute in keys(model).items()
-            if (inner := inner_table(model, attribute)) and key in keys(inner)
-        ]
+        owners = _list_tables_with_key(model, key)
         present = [name for name in owners if name in raw]
         if owners:
             return "' or '".join(f"{name}.{key}" for name in present[:1] or owners)
@@ -151,12 +158,19 @@ def _find_meant(
     is_set = (f"{at}.{key}" if at else key) in draft.sets
     written = {
         name: raw[name]
-        for name in (*keys(model), key)
+        for name in (*attributes_by_key(model), key)
         if name in raw and (not is_set or f"{at}.{name}".strip(".") in draft.sets)
     }
     if is_table:
         return suggestions.suggest_table(model, written, key)
     return suggestions.suggest_key(model, at, written, key, is_set=is_set)
+
+
+def _list_tables_with_key(model: type[Table], key: str) -> list[str]:
+    """Return the inner tables of a table that have a key of this name."""
+    names = attributes_by_key(model).items()
+    inner = {table: find_inner_table(model, name) for table, name in names}
+    return [name for name, table in inner.items() if table and key in attributes_by_key(table)]
 
 
 def _is_table(value: Any) -> bool:
@@ -172,14 +186,16 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
         assignment.encode()
     except UnicodeEncodeError:
         shown = assignment.encode(errors="backslashreplace").decode()
-        draft.add_bad_set(
+        draft.add_set_mistake(
             f"{shown}: contains bytes that are not UTF-8 text; save the file as UTF-8"
         )
         return
     key, equals, text = assignment.partition("=")
     pieces = split_key(key)
     if not equals or not all(pieces):
-        draft.add_bad_set(f"{assignment}: table.key=value is needed, such as contact.load=26 lbf")
+        draft.add_set_mistake(
+            f"{assignment}: table.key=value is needed, such as contact.load=26 lbf"
+        )
         return
     holder: Any = draft.raw
     for depth, piece in enumerate(pieces):
@@ -196,7 +212,7 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
             inner = holder[piece] = {}
             draft.sets.add(path)
         if not isinstance(inner, dict | list):
-            draft.add_bad_set(f"{key.strip()}: {path} is a value, not a table")
+            draft.add_set_mistake(f"{key.strip()}: {path} is a value, not a table")
             return
         holder = inner
     path = ".".join(pieces)
@@ -224,39 +240,39 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written: str) -> 
     is_number = wanted.isdecimal()
     if is_number and int(wanted) < len(items):
         return int(wanted)
-    table = count_from_one(above)
-    shown = count_from_one(path)
+    table = number_items_from_one(above)
+    shown = number_items_from_one(path)
     what = "such item" if is_number else f"'{wanted}'"
     known = [name for name in names if isinstance(name, str)]
     advice = f"{table} has {len(items)}, numbered from 1 as in {table}[1]"
     if known:
-        advice = choices(wanted, known)
+        advice = advise_on_name(wanted, known)
     if is_number and f"[{int(wanted) + 1}]" not in written:
         shown = f"{table}.{wanted}"
         advice += f"; {table}.0, with a dot, means {table}[1]"
-    draft.add_bad_set(f"{shown}: no {what} here; {advice}")
+    draft.add_set_mistake(f"{shown}: no {what} here; {advice}")
     return None
 
 
 def read_set_value(key: str, text: str) -> Any:
     """Return the plain value of a text of --set; a text that is not TOML stays a string."""
     model, name = find_key(key)
-    is_text_key = model is not None and str in key_types(model, name)
-    if _PLAIN_TEXT.fullmatch(text):
+    is_text_key = model is not None and str in list_key_types(model, name)
+    if _PLAIN_TEXT_PATTERN.fullmatch(text):
         return text[1:-1]
     try:
         content = tomllib.loads(f"value = {text}")
     except (ValueError, RecursionError):
-        return float(text) if _BARE_POINT.fullmatch(text) and not is_text_key else text
+        return float(text) if _BARE_POINT_PATTERN.fullmatch(text) and not is_text_key else text
     value = content["value"]
-    if _ends_in_comment(text) or len(content) > 1:  # as in "26#", where '#' belongs to the value
+    if _is_cut_by_comment(text) or len(content) > 1:  # as in "26#", where '#' belongs to the value
         return text
     if not isinstance(value, str | bool | int | float | list | dict):
         return text
     return text if is_text_key and isinstance(value, int | float) else value
 
 
-def _ends_in_comment(text: str) -> bool:
+def _is_cut_by_comment(text: str) -> bool:
     """Return whether TOML reads the end of a value as a comment."""
     if "#" not in text:
         return False

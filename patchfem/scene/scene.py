@@ -13,22 +13,23 @@ from textwrap import shorten
 from typing import Any
 
 from . import axes
-from .defaults import complete
-from .files import absent_files, relative_files, require_files
+from .defaults import complete_tables
+from .files import list_absent_files, make_relative_file_sets, require_files
 from .keys import tables
 from .lines import locate_key
 from .reader import apply_set, read_tables
-from .rules.check import check
+from .rules.check import check_scene
 from .rules.limits import check_combinations, find_unsupported_lateral_modes
 from .rules.scene_draft import SceneDraft, SceneError
 from .rules.structure import describe_hidden_modes
 from .sets import format_assignments, require_units
-from .text import format_toml, named_effects
+from .text import format_toml, list_named_effects
 from .toml_text import parse_text, read_text
 
 __all__ = ["Scene", "SceneError", "load", "loads", "move_scene", "read_sweep_axes"]
 
-MAX_LISTED = 160  # characters of effects or --set values that the text of a Scene object shows
+# characters of effects or --set values that the text of a Scene object shows
+MAX_LISTED_CHARACTERS = 160
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,10 @@ class Scene:
     notes: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        effects = shorten(", ".join(self.named()), MAX_LISTED)
-        sets = f"\n  with {shorten(', '.join(self.sets), MAX_LISTED)}" if self.sets else ""
+        effects = shorten(", ".join(self.effect_names()), MAX_LISTED_CHARACTERS)
+        sets = (
+            f"\n  with {shorten(', '.join(self.sets), MAX_LISTED_CHARACTERS)}" if self.sets else ""
+        )
         return f"Scene of {self.path.name}: {self.kind}; {effects}{sets}"
 
     def with_(self, **sets: Any) -> Scene:
@@ -87,15 +90,15 @@ class Scene:
         """Return the scene as TOML in SI with all defaults; loading it gives the same values."""
         return format_toml(self.tables())
 
-    def named(self) -> list[str]:
+    def effect_names(self) -> list[str]:
         """Return the effects that the scene names: tables, and ``table.key=value`` of selector keys."""
-        return [*named_effects(self), "sweep"] if self.sweep else named_effects(self)
+        return [*list_named_effects(self), "sweep"] if self.sweep else list_named_effects(self)
 
     def where(self, key: str) -> str:
         """Return ``FILE:LINE: key`` for a message about a key."""
         return locate_key(self.path, self.text, key)
 
-    def beside(self, name: str) -> Path:
+    def resolve_path(self, name: str) -> Path:
         """Return the path of a file whose name in the scene is relative to the folder of the scene."""
         return self.path.parent / name
 
@@ -120,7 +123,10 @@ def load(path: str | Path, sets: Iterable[str] = (), faults: Callable | None = N
     folder = Path(path).parent
 
     def find_file_faults(read: tables.Tables, is_valid: bool) -> Iterable[tuple[str, str]]:
-        return [*absent_files(read, folder), *(faults(read, folder, is_valid) if faults else ())]
+        return [
+            *list_absent_files(read, folder),
+            *(faults(read, folder, is_valid) if faults else ()),
+        ]
 
     return loads(read_text(path), path, sets, find_file_faults)
 
@@ -185,10 +191,10 @@ def finish_scene(
         With all mistakes at once.
     """
     read_tables(draft)
-    kind = check(draft)
+    kind = check_scene(draft)
     is_valid = not draft.has_mistakes
     check_combinations(draft, kind)
-    completed = complete(draft.tables, kind) if is_valid else None
+    completed = complete_tables(draft.tables, kind) if is_valid else None
     for key, message in find_unsupported_lateral_modes(completed) if completed else ():
         draft.add_mistake(key, message)
     for key, message in faults(draft.tables, not draft.has_mistakes) if faults else ():
@@ -207,7 +213,7 @@ def finish_scene(
 
 def move_scene(scene: Scene, path: Path) -> Scene:
     """Return a scene as if it were stored at another path; its files are named from there."""
-    return loads(scene.text, path, [*scene.sets, *relative_files(scene, path.parent)])
+    return loads(scene.text, path, [*scene.sets, *make_relative_file_sets(scene, path.parent)])
 
 
 def read_sweep_axes(text: str, path: str | Path) -> tuple[list, list[str]]:

@@ -7,60 +7,60 @@ import re
 
 from .keys.contact import Material
 from .keys.materials import MATERIALS
-from .keys.quantities import KINDS, NUMBER, si_unit
+from .keys.quantities import NUMBER_PATTERN, UNIT_FACTORS, si_unit
 from .keys.tables import Tables
 from .keys.types import (
     Table,
-    inner_table,
-    keys,
-    meaning,
+    attributes_by_key,
+    find_inner_table,
+    find_meaning,
+    find_quantity_kind,
     nested_validators,
-    quantity_kind,
 )
 from .rules.selectors import SELECTORS, split_keys
 
-DIALECT = "https://json-schema.org/draft/2020-12/schema"
+SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 # Part of a unit -> regular expression of all its spellings.
-SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
+UNIT_SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
 
 
 def make_schema() -> dict:
     """Return the JSON schema (draft 2020-12) of a scene: meaning, limits, default, unit of keys."""
     with nested_validators():
-        _rebuild(Tables)
+        _rebuild_validator(Tables)
     raw = Tables.model_json_schema(by_alias=True)
     definitions = raw.pop("$defs")
-    for model in _inner_models(Tables):
+    for model in _list_inner_models(Tables):
         definitions[model.__name__] = _describe_table(model, definitions[model.__name__])
     definitions[Material.__name__] = _describe_material(definitions[Material.__name__])
     scene = _describe_table(Tables, raw)
     scene["properties"]["sweep"] = _describe_sweep()
-    return {"$schema": DIALECT, "title": "patchfem scene", **scene, "$defs": definitions}
+    return {"$schema": SCHEMA_DIALECT, "title": "patchfem scene", **scene, "$defs": definitions}
 
 
-def _rebuild(model: type[Table]) -> None:
+def _rebuild_validator(model: type[Table]) -> None:
     """Build the validator of a table anew, after those of the tables inside it."""
-    for name in keys(model).values():
-        if inner := inner_table(model, name):
-            _rebuild(inner)
+    for name in attributes_by_key(model).values():
+        if inner := find_inner_table(model, name):
+            _rebuild_validator(inner)
     model.model_rebuild(force=True)
 
 
-def _inner_models(model: type[Table]) -> set[type[Table]]:
+def _list_inner_models(model: type[Table]) -> set[type[Table]]:
     """Return the models of all tables inside a table, at any depth."""
-    inner = {inner_table(model, name) for name in keys(model).values()} - {None}
-    return inner.union(*map(_inner_models, inner))
+    inner = {find_inner_table(model, name) for name in attributes_by_key(model).values()} - {None}
+    return inner.union(*map(_list_inner_models, inner))
 
 
 def _describe_table(model: type[Table], raw: dict) -> dict:
     """Return the schema of a table: the meaning of keys, no null, defaults as in a scene."""
+    properties = raw["properties"]
+    keys = attributes_by_key(model)
     schema = {
         "type": "object",
         "description": " ".join((model.__doc__ or "").split()),
         "additionalProperties": False,
-        "properties": {
-            key: _describe_key(model, key, raw["properties"][key]) for key in keys(model)
-        },
+        "properties": {key: _describe_key(model, key, properties[key]) for key in keys},
     }
     return schema | ({"required": raw["required"]} if raw.get("required") else {})
 
@@ -76,11 +76,11 @@ def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
     default = raw.get("default")
     if default not in (None, "", []) and not isinstance(default, dict):
         schema["default"] = default
-    name = keys(model)[key]
-    if kind := quantity_kind(model, name):
+    name = attributes_by_key(model)[key]
+    if kind := find_quantity_kind(model, name):
         _add_units(schema, kind)
-    if inner_table(model, name) in (None, Material):
-        clauses = (meaning(model, key), _describe_selection(model, key))
+    if find_inner_table(model, name) in (None, Material):
+        clauses = (find_meaning(model, key), _describe_selection(model, key))
         schema["description"] = "; ".join(filter(None, clauses))
     return schema
 
@@ -116,19 +116,19 @@ def _add_units(schema: dict, kind: str) -> None:
         schema["default"] = f"{schema['default']:g} {si_unit(kind)}"
     for part in (schema, *schema.get("anyOf", ()), schema.get("items", {})):
         if part.get("type") == "string":
-            part["pattern"] = quantity_pattern(kind)
+            part["pattern"] = make_quantity_pattern(kind)
 
 
-def quantity_pattern(kind: str) -> str:
+def make_quantity_pattern(kind: str) -> str:
     """Return the regular expression of a quantity of a kind of KINDS: a number, a blank, a unit."""
-    units = sorted(KINDS[kind], key=len, reverse=True)
-    return rf"^\s*{NUMBER}[ \t]+(?:{'|'.join(map(_unit_pattern, units))})\s*$"
+    units = sorted(UNIT_FACTORS[kind], key=len, reverse=True)
+    return rf"^\s*{NUMBER_PATTERN}[ \t]+(?:{'|'.join(map(_make_unit_pattern, units))})\s*$"
 
 
-def _unit_pattern(unit: str) -> str:
+def _make_unit_pattern(unit: str) -> str:
     """Return the regular expression of a unit in all its spellings."""
     parts = re.split(r"(\^2|\^3| |u)", unit)
-    return "".join(SPELLINGS.get(part, re.escape(part)) for part in parts)
+    return "".join(UNIT_SPELLINGS.get(part, re.escape(part)) for part in parts)
 
 
 def _describe_material(table: dict) -> dict:

@@ -9,10 +9,10 @@ from typing import Any
 
 from .keys.lookup import find_key
 from .keys.quantities import format_si
-from .keys.types import quantity_kind
+from .keys.types import find_quantity_kind
 from .rules.scene_draft import SceneError
 
-MAX_LENGTH = 1.0  # m; of the lengths of a joint only a radius can be larger
+MAX_JOINT_LENGTH = 1.0  # m; of the lengths of a joint only a radius can be larger
 
 
 def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
@@ -40,7 +40,7 @@ def format_values(key: str, values: Any) -> list[str]:
 
     Texts stay as they are, but for quotes around a text with a comma or a bracket; numbers in SI get the unit of the key.
     """
-    plain = _plain(values)
+    plain = _to_plain_value(values)
     items = plain if isinstance(plain, Iterable) else [plain]
     return [_format_value(key, item) for item in items]
 
@@ -82,14 +82,14 @@ def find_oversized_lengths(
     mistakes = []
     for name, value in values.items():
         key = f"{at}{name}"
-        value = _plain(value)
+        value = _to_plain_value(value)
         if isinstance(value, list | tuple):
             value = dict(enumerate(value))
         if isinstance(value, dict):
             mistakes += find_oversized_lengths(value, patch_length, f"{key}.")
         elif _is_length(key, value):
             is_beside = patch_length is not None and not key.startswith("contact.")
-            limit = patch_length if is_beside else MAX_LENGTH
+            limit = patch_length if is_beside else MAX_JOINT_LENGTH
             if abs(value) > limit:
                 mistakes.append(
                     f"--set: {key}: {value:g} without a unit means {value:g} m, which is longer than "
@@ -105,7 +105,7 @@ def _is_length(key: str, value: Any) -> bool:
     return is_number and _find_kind(key) == "length" and not key.endswith("radius")
 
 
-def _plain(value: Any) -> Any:
+def _to_plain_value(value: Any) -> Any:
     """Return a NumPy array or scalar as Python values, and any other value as it is."""
     return value.tolist() if hasattr(value, "tolist") else value
 
@@ -113,7 +113,7 @@ def _plain(value: Any) -> Any:
 def _find_kind(key: str) -> str | None:
     """Return the kind of quantity of a key; None for a plain value and an unknown key."""
     place = find_key(key)
-    return quantity_kind(*place) if place.model is not None else None
+    return find_quantity_kind(*place) if place.model is not None else None
 
 
 def _format_value(key: str, value: Any) -> str:
@@ -129,7 +129,7 @@ def _format_value(key: str, value: Any) -> str:
 
 def _format_toml(key: str, value: Any) -> str:
     """Return a TOML value with all digits; a number of a key with a unit becomes a text in SI."""
-    value = _plain(value)
+    value = _to_plain_value(value)
     if isinstance(value, dict):
         pairs = [f"{name} = {_format_toml(f'{key}.{name}', item)}" for name, item in value.items()]
         return f"{{{', '.join(pairs)}}}"

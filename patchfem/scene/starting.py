@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from ..core import Missing, PatchfemError
-from .keys.types import choices
+from .keys.types import advise_on_name
 
-FOLDER = Path(__file__).parent / "templates"
-KINDS = {
+TEMPLATE_FOLDER = Path(__file__).parent / "templates"
+TEMPLATE_DESCRIPTIONS = {
     "patch": "two coated pieces pressed together: contact area, pressure and stiffness",
     "joint": "a bolted lap joint moved to and fro: friction loop, stiffness and damping",
     "bench": "a friction law at one contact point, along a prescribed slide",
@@ -19,7 +19,7 @@ KINDS = {
     "wear": "how a tilted patch wears in over many cycles",
 }
 # Verb that answers the question of a kind, if it is not `run`.
-NEXT = {
+NEXT_VERBS = {
     "beam": "backbone",
     "damper": "sweep",
     "shroud": "sweep",
@@ -27,20 +27,22 @@ NEXT = {
 }
 
 
-def template_text(kind: str) -> str:
-    """Return the text of a scene of one of KINDS; PatchfemError for any other word."""
-    if kind not in KINDS:
-        raise PatchfemError(f"{kind}: unknown kind of scene; {choices(kind, KINDS)}")
-    return (FOLDER / f"{kind}.toml").read_text(encoding="utf-8")
+def read_template(kind: str) -> str:
+    """Return the text of a scene of one of TEMPLATE_DESCRIPTIONS; PatchfemError for any other word."""
+    if kind not in TEMPLATE_DESCRIPTIONS:
+        raise PatchfemError(
+            f"{kind}: unknown kind of scene; {advise_on_name(kind, TEMPLATE_DESCRIPTIONS)}"
+        )
+    return (TEMPLATE_FOLDER / f"{kind}.toml").read_text(encoding="utf-8")
 
 
-def shipped_scene() -> Path:
+def find_shipped_scene() -> Path:
     """Return the path of the example scene, a rig with measured responses.
 
     It lies in `studies/rig` of a checkout and in `templates/shipped` of an installed package. Missing if it was removed
     from the installation.
     """
-    for folder in (FOLDER / "shipped", FOLDER.parents[2] / "studies" / "rig"):
+    for folder in (TEMPLATE_FOLDER / "shipped", TEMPLATE_FOLDER.parents[2] / "studies" / "rig"):
         if (folder / "rig.toml").is_file():
             return folder / "rig.toml"
     raise Missing("the example scene is missing from this installation; install patchfem again")

@@ -5,7 +5,14 @@ from difflib import get_close_matches
 
 from pydantic import ValidationError
 
-from .keys.types import NAME_SIMILARITY, Table, inner_table, key_record, keys, required_keys
+from .keys.types import (
+    MIN_NAME_SIMILARITY,
+    Table,
+    attributes_by_key,
+    find_inner_table,
+    find_key_record,
+    list_required_keys,
+)
 from .rules.selectors import SELECTORS, split_keys
 
 
@@ -30,21 +37,21 @@ def suggest_key(
     is_set : bool
         Whether --set wrote the unknown key: the keys of the file are not in `written`, and one of them may be meant.
     """
-    free = [name for name in keys(model) if name not in written]
-    fitting = [name for name in free if _accepts(model, name, written[key])]
+    free = [name for name in attributes_by_key(model) if name not in written]
+    fitting = [name for name in free if _accepts_value(model, name, written[key])]
     words = set(key.lower().split("_"))
-    needed = _lacking_keys(model, at, written)
+    needed = _list_missing_keys(model, at, written)
     lacking = [name for name in fitting if name in needed]
     if is_set:
-        required = [name for name in required_keys(model) if name in fitting]
+        required = [name for name in list_required_keys(model) if name in fitting]
         lacking = required if len(required) == 1 else []
     candidates = (
-        _similar(key, fitting),
+        _find_similar_names(key, fitting),
         [name for name in fitting if words & set(name.split("_"))],
         [name for name in fitting if name.startswith(key.lower())],
         lacking,
-        _similar(key, free),
-        _similar(key, keys(model)),
+        _find_similar_names(key, free),
+        _find_similar_names(key, attributes_by_key(model)),
     )
     return next((names[0] for names in candidates if names), "")
 
@@ -65,12 +72,12 @@ def suggest_table(model: type[Table], written: dict, key: str) -> str:
     """
     inside = written[key][0] if isinstance(written[key], list) else written[key]
     n_shared = {}  # dotted name of a table -> number of keys that it shares with the unknown one
-    for name, inner in _inner_tables(model):
-        n_shared[name] = len(set(inside) & keys(inner).keys())
-        for deeper, last in _inner_tables(inner):
-            n_shared[f"{name}.{deeper}"] = len(set(inside) & keys(last).keys())
+    for name, inner in _list_inner_tables(model):
+        n_shared[name] = len(set(inside) & attributes_by_key(inner).keys())
+        for deeper, last in _list_inner_tables(inner):
+            n_shared[f"{name}.{deeper}"] = len(set(inside) & attributes_by_key(last).keys())
     best = max(n_shared, key=n_shared.get, default="")
-    similar = _similar(key, n_shared)
+    similar = _find_similar_names(key, n_shared)
     if similar and n_shared[similar[0]] >= n_shared[best]:
         return similar[0]
     if best and n_shared[best] > len(inside) / 2:
@@ -78,18 +85,18 @@ def suggest_table(model: type[Table], written: dict, key: str) -> str:
     return "".join(similar)
 
 
-def _similar(key: str, names: Iterable[str]) -> list[str]:
+def _find_similar_names(key: str, names: Iterable[str]) -> list[str]:
     """Return the most similar of some names in a list, which is empty if none is similar."""
-    return get_close_matches(key, names, 1, NAME_SIMILARITY)
+    return get_close_matches(key, names, 1, MIN_NAME_SIMILARITY)
 
 
-def _inner_tables(model: type[Table]) -> list[tuple[str, type[Table]]]:
+def _list_inner_tables(model: type[Table]) -> list[tuple[str, type[Table]]]:
     """Return (key, model) of the tables inside a table."""
-    pairs = ((key, inner_table(model, name)) for key, name in keys(model).items())
+    pairs = ((key, find_inner_table(model, name)) for key, name in attributes_by_key(model).items())
     return [(key, inner) for key, inner in pairs if inner is not None]
 
 
-def _accepts(model: type[Table], key: str, value: object) -> bool:
+def _accepts_value(model: type[Table], key: str, value: object) -> bool:
     """Return whether a key accepts a value."""
     try:
         model.model_validate({key: value})
@@ -98,16 +105,16 @@ def _accepts(model: type[Table], key: str, value: object) -> bool:
     return True
 
 
-def _lacking_keys(model: type[Table], at: str, written: dict) -> list[str]:
+def _list_missing_keys(model: type[Table], at: str, written: dict) -> list[str]:
     """Return keys that a table lacks: always required, by a selector, or under a condition."""
-    needed = list(required_keys(model))
+    needed = list(list_required_keys(model))
     if at in SELECTORS:
         selector = SELECTORS[at]
         value = written.get(selector.key)
         if isinstance(value, str) and value in selector.choices:
             needed += split_keys(selector.choices[value][0])
-    for key in keys(model):
-        record = key_record(model, key)
+    for key in attributes_by_key(model):
+        record = find_key_record(model, key)
         if record is not None and record.required:
             needed.append(key)
     return [key for key in needed if key not in written]

@@ -11,9 +11,9 @@ from .keys.contact import Material, OnePiece
 from .keys.memoize import memoize
 from .keys.quantities import format_si
 from .keys.tables import Accuracy, Drive, Interface, Measured, Tables
-from .keys.types import Table, inner_table, keys, quantity_kind
-from .rules.drive import unused_drive_keys
-from .rules.selectors import SELECTORS, unused_keys
+from .keys.types import Table, attributes_by_key, find_inner_table, find_quantity_kind
+from .rules.drive import list_unused_drive_keys
+from .rules.selectors import SELECTORS, list_unused_keys
 
 EFFECT_KEYS = ("kind", "law", "reading", "waveform")  # keys whose values are effects
 
@@ -23,22 +23,22 @@ def format_toml(table: Table) -> str:
     return "\n".join(_format_lines(table, "")).strip("\n") + "\n"
 
 
-def named_effects(tables: Any) -> list[str]:
+def list_named_effects(tables: Any) -> list[str]:
     """Return the names of the effects in a scene, such as ``contact.tilt``, ``slide.kind=sine``."""
     named: dict[str, None] = {}
     for name in Tables.model_fields:
         table = getattr(tables, name)
         if table is not None:
-            named |= dict.fromkeys(_table_effects(table, name))
+            named |= dict.fromkeys(_list_table_effects(table, name))
     return list(named)
 
 
 @memoize
-def _table_effects(table: Any, at: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(_find_effects(table, at)))
+def _list_table_effects(table: Any, at: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(_iterate_effects(table, at)))
 
 
-def _find_effects(table: Any, at: str) -> Iterator[str]:
+def _iterate_effects(table: Any, at: str) -> Iterator[str]:
     """Yield the effects of a table, an array of tables or a plain value."""
     if isinstance(table, Accuracy):
         if table.method != "auto":
@@ -48,10 +48,10 @@ def _find_effects(table: Any, at: str) -> Iterator[str]:
         if table.reading != "peak":
             yield f"{at}.reading={table.reading}"
     elif isinstance(table, tuple):
-        yield from _find_array_effects(table, at)
+        yield from _iterate_effects_of_items(table, at)
     elif isinstance(table, Table) and not isinstance(table, Material):
-        sources = _effect_sources(type(table))
-        unused = _unused_keys(table) if sources.selectors else ()
+        sources = _find_effect_sources(type(table))
+        unused = _list_unused_keys(table) if sources.selectors else ()
         selectors = [key for key in sources.selectors if key not in unused]
         yield from (f"{at}.{key}={getattr(table, key)}" for key in selectors)
         if not selectors:
@@ -59,18 +59,18 @@ def _find_effects(table: Any, at: str) -> Iterator[str]:
         for name in sources.tables:
             inner = getattr(table, name)
             if inner is not None:
-                yield from _find_effects(inner, f"{at}.{name}")
+                yield from _iterate_effects(inner, f"{at}.{name}")
 
 
-def _find_array_effects(items: tuple, at: str) -> Iterator[str]:
+def _iterate_effects_of_items(items: tuple, at: str) -> Iterator[str]:
     """Yield the effects of an array of tables; patches have the effects of [contact]."""
     for item in items:
-        for effect in _find_effects(item, at):
+        for effect in _iterate_effects(item, at):
             if "=" in effect and ".contact" not in effect:
                 yield effect
     for item in items:
         if isinstance(item, Interface) and item.contact is not None:
-            yield from _find_effects(item.contact, "contact")
+            yield from _iterate_effects(item.contact, "contact")
 
 
 class _EffectSources(NamedTuple):
@@ -81,31 +81,31 @@ class _EffectSources(NamedTuple):
 
 
 @cache
-def _effect_sources(model: type[Table]) -> _EffectSources:
+def _find_effect_sources(model: type[Table]) -> _EffectSources:
     names = list(model.model_fields)
     selectors = [key for key in EFFECT_KEYS if key in names]
     if issubclass(model, OnePiece):
         return _EffectSources(selectors, [])
-    return _EffectSources(selectors, [name for name in names if inner_table(model, name)])
+    return _EffectSources(selectors, [name for name in names if find_inner_table(model, name)])
 
 
-def _unused_keys(table: Table) -> Collection[str]:
+def _list_unused_keys(table: Table) -> Collection[str]:
     """Return the keys of a table that its selectors do not use."""
     for selector in SELECTORS.values():
         if isinstance(table, selector.model):
-            return unused_keys(table, selector)
+            return list_unused_keys(table, selector)
     if isinstance(table, Measured) and table.reading != "lowpass":
         return {"reading_cutoff"}
     if isinstance(table, Drive):
-        return unused_drive_keys(table)
+        return list_unused_drive_keys(table)
     return ()
 
 
 def _format_lines(table: Table, at: str) -> Iterator[str]:
     """Yield the lines of a table: its values, then the tables inside it."""
-    unused = _unused_keys(table)
+    unused = _list_unused_keys(table)
     inner = []
-    for key, name in keys(type(table)).items():
+    for key, name in attributes_by_key(type(table)).items():
         value = getattr(table, name)
         if value in (None, ()) or key in unused:
             continue
@@ -126,15 +126,15 @@ def _find_kind(table: Table, name: str) -> str | None:
     """Return the kind of quantity of an attribute; the levels of a force drive are forces."""
     if isinstance(table, Drive) and name == "levels" and table.kind == "force":
         return "force"
-    return quantity_kind(type(table), name)
+    return find_quantity_kind(type(table), name)
 
 
 def _format_value(value: Any, kind: str | None) -> str:
     """Return a value as TOML."""
     if isinstance(value, Material):
-        given = {key: getattr(value, name) for key, name in keys(Material).items()}
+        given = {key: getattr(value, name) for key, name in attributes_by_key(Material).items()}
         pairs = [
-            f"{key} = {_format_value(item, quantity_kind(Material, keys(Material)[key]))}"
+            f"{key} = {_format_value(item, find_quantity_kind(Material, attributes_by_key(Material)[key]))}"
             for key, item in given.items()
             if item is not None
         ]

@@ -9,25 +9,25 @@ from typing import Any, NamedTuple
 
 from ..disk.open_with_timeout import open_for_reading
 from ..effects import MAX_COORDINATES
-from .lines import MAX_PARTS, TooManyParts, key_lines
+from .lines import MAX_KEY_PARTS, TooManyKeyParts, find_key_lines
 from .rules.scene_draft import SceneDraft, SceneError
 
 # bytes; maximum size of a scene file, because larger data belong in files that the scene names
 MAX_BYTES = 32 * 2**20
-MAX_QUOTED = 60  # characters of a value that the advice on missing quotes repeats
+MAX_QUOTED_CHARACTERS = 60  # characters of a value that the advice on missing quotes repeats
 # Memory [B] and time [s] of a full matrix of n modes are these times 3 n^2 and n^3 (measured on one core).
 BYTES_PER_ENTRY = 8
-SECONDS_PER_CUBE = 1.5e-9
+SECONDS_PER_CUBED_MODE = 1.5e-9
 # A key with a value that opens neither quotes nor a bracket.
-_BARE_VALUE = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")
-_DECIMAL_POINT = re.compile(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)")
-_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+")
-_PERCENTAGE = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*%")
-_QUANTITY_OR_WORD = re.compile(
+_BARE_VALUE_PATTERN = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")
+_DECIMAL_POINT_PATTERN = re.compile(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)")
+_DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?\d+,\d+")
+_PERCENTAGE_PATTERN = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*%")
+_QUANTITY_OR_WORD_PATTERN = re.compile(
     r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
     r"[a-zA-Z][\w./ -]*"
 )
-_PLACE_OF_ERROR = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+_ERROR_POSITION_PATTERN = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
 class ParsedText(NamedTuple):
@@ -69,19 +69,19 @@ def parse_text(text: str, path: str | Path) -> ParsedText:
     SceneError if the text is not TOML, or lists more masses or modes than any run can use.
     """
     try:
-        if any(line.count(".") > MAX_PARTS for line in text.split("\n")):
+        if any(line.count(".") > MAX_KEY_PARTS for line in text.split("\n")):
             # refuses a key of very many parts, which tomllib would take minutes to read
-            key_lines(text)
+            find_key_lines(text)
         values = tomllib.loads(text)
-        _refuse_crowds(values, text, path)
-        return ParsedText(values, key_lines(text))
-    except TooManyParts as error:
+        _refuse_too_many_coordinates(values, text, path)
+        return ParsedText(values, find_key_lines(text))
+    except TooManyKeyParts as error:
         raise SceneError([f"{path}:{error.line}: {error}"]) from None
     except (ValueError, RecursionError) as error:
         raise SceneError([_describe_syntax(error, text, path)]) from None
 
 
-def _refuse_crowds(values: dict, text: str, path: str | Path) -> None:
+def _refuse_too_many_coordinates(values: dict, text: str, path: str | Path) -> None:
     """Raise SceneError for more masses or modes than any run can use, before reading them."""
     structure = values.get("structure")
     if not isinstance(structure, dict):
@@ -99,7 +99,7 @@ def _refuse_crowds(values: dict, text: str, path: str | Path) -> None:
             f"structure.{key}",
             f"{count} entries are more than the limit of {MAX_COORDINATES}; solving their modes as one full matrix "
             f"would take {1e-9 * BYTES_PER_ENTRY * 3 * count**2:.2g} GB of memory and about "
-            f"{SECONDS_PER_CUBE * count**3:.2g} s of computing time; give fewer entries, or give the modes themselves "
+            f"{SECONDS_PER_CUBED_MODE * count**3:.2g} s of computing time; give fewer entries, or give the modes themselves "
             "in structure.file",
         )
         draft.raise_mistakes()
@@ -110,7 +110,7 @@ def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
     if isinstance(error, RecursionError):
         return f"{path}:1: not valid TOML: nested too deeply"
     message = str(error)
-    place = _PLACE_OF_ERROR.search(message)
+    place = _ERROR_POSITION_PATTERN.search(message)
     line = text.count("\n") + (not text.endswith("\n"))
     where = ""
     if place:
@@ -124,23 +124,23 @@ def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
 
 def _advise_spelling(text: str, line: int) -> str:
     """Return how to write a value that lacks quotes or a digit in TOML; "" for other values."""
-    match = _BARE_VALUE.match([*text.split("\n"), ""][line - 1])
+    match = _BARE_VALUE_PATTERN.match([*text.split("\n"), ""][line - 1])
     if match is None:
         return ""
     key = match[1]
     value = match[2].strip()
-    point = _DECIMAL_POINT.fullmatch(value)
-    percentage = _PERCENTAGE.fullmatch(value)
+    point = _DECIMAL_POINT_PATTERN.fullmatch(value)
+    percentage = _PERCENTAGE_PATTERN.fullmatch(value)
     if point and (point[2] or point[3]):
         number = f"{point[1]}{point[2] or 0}.{point[3] or 0}{point[4]}"
         return f"; put a digit on both sides of the point: {key} = {number}"
-    if _DECIMAL_COMMA.fullmatch(value):
+    if _DECIMAL_COMMA_PATTERN.fullmatch(value):
         return f"; write the decimal comma as a point: {key} = {value.replace(',', '.')}"
     if value.lower() in ("true", "false"):
         return f"; {key} = {value.lower()}"
     if percentage:
         number = float(percentage[1]) / 100
         return f"; write a percentage as a plain number: {key} = {number:.12g}"
-    if _QUANTITY_OR_WORD.fullmatch(value) and len(value) < MAX_QUOTED:
+    if _QUANTITY_OR_WORD_PATTERN.fullmatch(value) and len(value) < MAX_QUOTED_CHARACTERS:
         return f'; put a quantity or a word in quotes: {key} = "{value}"'
     return ""

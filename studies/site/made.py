@@ -27,7 +27,7 @@ from patchfem.effects import EFFECTS, LAWS
 from patchfem.formatting import format_value
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
-from patchfem.scene.keys.types import keys, meaning
+from patchfem.scene.keys.types import attributes_by_key, find_meaning
 
 ROOT = Path(__file__).parents[2]
 SHOWN = [name for name in EFFECTS if not name.startswith("structure.interface.")]
@@ -75,7 +75,8 @@ def write(folder: Path) -> None:
     for name, text in pages.items():
         (folder / f"{name}.md").write_text(text, "utf-8")
     for path in (*folder.rglob("*.toml"), *folder.rglob("*.csv")):
-        path.unlink()  # the scenes stand on their pages; a scene of the repository is one that people wrote
+        # the scenes stand on their pages; a scene of the repository is one that people wrote
+        path.unlink()
     kept.write_text(state, "utf-8")
 
 
@@ -130,7 +131,7 @@ def about(effect: str) -> str:
     for row in re.findall(r"^\| (.+?) \| (.+) \|$", guide(), re.M):
         if row[0] in (f"`{value}`", f'`{key} = "{value}"`'):
             return linked(row[1][:1].upper() + row[1][1:].rstrip(".") + ".")
-    return f"One value of `{key}`: {meaning(TABLES[table], key)}."
+    return f"One value of `{key}`: {find_meaning(TABLES[table], key)}."
 
 
 def guide_file() -> Path:
@@ -265,11 +266,12 @@ def key_rows(name: str) -> list:
         ]
     model = TABLES[table]
     used = keys_page.NEEDS.get(f"{table}.{key}", {}).get(value, ("", ""))
-    named = [key, *" ".join(used).split()] if value else list(keys(model))
+    named = [key, *" ".join(used).split()] if value else list(attributes_by_key(model))
     rows = [
         keys_page._row(model, one, table)
         for one in named
-        if one in keys(model) and not keys_page._is_table(model, keys(model)[one])
+        if one in attributes_by_key(model)
+        and not keys_page._is_table(model, attributes_by_key(model)[one])
     ]
     head = ("key", "kind", "default", "required", "meaning")
     return [keys_page.grid(head, rows)] if rows else ["This effect has no keys."]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from command_line import cli
 
-from patchfem.scene.starting import KINDS, NEXT, template_text
+from patchfem.scene.starting import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, read_template
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "studies").glob("*/*.toml"))
@@ -61,12 +61,16 @@ def ran(path: Path, out: Path, *words) -> list:
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(one, marks=pytest.mark.slow) if one in NEXT else one for one in KINDS]
+    "kind",
+    [
+        pytest.param(one, marks=pytest.mark.slow) if one in NEXT_VERBS else one
+        for one in TEMPLATE_DESCRIPTIONS
+    ],
 )
 def test_always_a_template_says_no_warning(kind, tmp_path):
     path = tmp_path / f"{kind}.toml"
-    path.write_text(template_text(kind), "utf-8")
-    assert ran(path, tmp_path / "out", NEXT.get(kind, "run")) == []
+    path.write_text(read_template(kind), "utf-8")
+    assert ran(path, tmp_path / "out", NEXT_VERBS.get(kind, "run")) == []
 
 
 @pytest.mark.parametrize(

@@ -29,15 +29,15 @@ from patchfem.export.summary import loop_of
 from patchfem.response.outcome import OPEN_LOOP
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
-from patchfem.scene.keys.quantities import KINDS
-from patchfem.scene.starting import template_text
+from patchfem.scene.keys.quantities import UNIT_FACTORS
+from patchfem.scene.starting import read_template
 
-UNIT = {"g": 9.80665, "%": 0.01, "deg": KINDS["angle"]["deg"]}
+UNIT = {"g": 9.80665, "%": 0.01, "deg": UNIT_FACTORS["angle"]["deg"]}
 
 
 def run(tmp_path, kind, *words, **keys):
     path = tmp_path / f"{kind}.toml"
-    path.write_text(template_text(kind), "utf-8")
+    path.write_text(read_template(kind), "utf-8")
     sets = [
         word
         for key, value in keys.items()
@@ -50,7 +50,10 @@ def in_si(text: str) -> float:
     """The value of a text such as 14.80 ± 0.05 um."""
     number, _, unit = re.fullmatch(r"(\S+)( ± \S+)?(?: (\S.*))?", text.split(", ")[0]).groups()
     known = {
-        name: scale for units in KINDS.values() for name, scale in units.items() if name != "g"
+        name: scale
+        for units in UNIT_FACTORS.values()
+        for name, scale in units.items()
+        if name != "g"
     } | UNIT
     return float(number) * known.get(
         unit, {"mJ": 1e-3, "uJ": 1e-6, "J": 1.0, "mN": 1e-3, None: 1.0}.get(unit, 1.0)
@@ -152,7 +155,7 @@ def test_always_the_first_screen_has_an_example_of_every_verb_that_is_read():
 
 def test_always_a_plan_says_what_does_not_run_where_it_is_asked(tmp_path):
     path = tmp_path / "rig.toml"
-    path.write_text(template_text("rig"), "utf-8")
+    path.write_text(read_template("rig"), "utf-8")
     short, long = cli("plan", path).out, cli("plan", path, "-v").out
     assert (
         "\nabsent" not in short
@@ -397,7 +400,7 @@ def test_exact_the_loss_factor_of_an_elastic_plastic_bench():
 def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):
     """Half of critical and more: a mode that hardly swings."""
     path = tmp_path / "rig.toml"
-    path.write_text(template_text("rig"), "utf-8")
+    path.write_text(read_template("rig"), "utf-8")
     said = [
         cli("check", path, "--set", f"structure.mode.axial.damping={value}")
         for value in ("0.49", "0.5", "1")

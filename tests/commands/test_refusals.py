@@ -4,7 +4,7 @@ import pytest
 from command_line import cli
 from scene_texts import COULOMB, IWAN, POINT, SHORT, shaken
 
-from patchfem.scene.starting import template_text
+from patchfem.scene.starting import read_template
 
 RIG = POINT + COULOMB + SHORT
 TRACE = "x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(2001))
@@ -16,7 +16,7 @@ FILES = {
     + COULOMB
     + '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "10 Hz"\n',
     "joint.toml": shaken(IWAN),
-    "shipped.toml": template_text("rig"),
+    "shipped.toml": read_template("rig"),
     "cases.csv": "normal.load [N],friction.static\n10,0.3\n",
     "pairs.csv": "before,after\na.csv,b.csv\n",
     "trace.csv": TRACE,

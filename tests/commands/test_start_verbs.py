@@ -18,31 +18,36 @@ from patchfem.__main__ import VERBS, app, known
 from patchfem.commands import examine
 from patchfem.commands.sources import SOURCES, bibtex
 from patchfem.effects import EFFECTS
-from patchfem.scene.starting import KINDS, NEXT, shipped_scene, template_text
+from patchfem.scene.starting import (
+    NEXT_VERBS,
+    TEMPLATE_DESCRIPTIONS,
+    find_shipped_scene,
+    read_template,
+)
 
 known([])  # all verbs
 
 
 def test_exact_new_writes_what_it_prints(tmp_path):
     path = tmp_path / "mine.toml"
-    assert cli("new", "joint").out == template_text("joint") == pf.new("joint")
+    assert cli("new", "joint").out == read_template("joint") == pf.new("joint")
     answer = cli("new", "joint", "-o", path)
     assert (
         answer.code == 0
-        and path.read_text("utf-8") == template_text("joint")
+        and path.read_text("utf-8") == read_template("joint")
         and f"patchfem run {path}" in answer.out
     )
-    for kind, verb in NEXT.items():
+    for kind, verb in NEXT_VERBS.items():
         assert f"patchfem {verb} " in cli("new", kind, "-o", tmp_path / f"{kind}.toml").out
-        assert f"patchfem {verb} FILE" in " ".join(template_text(kind).replace("\n#", " ").split())
+        assert f"patchfem {verb} FILE" in " ".join(read_template(kind).replace("\n#", " ").split())
     path.write_text("mine", "utf-8")
     answer = cli("new", "rig", "-o", path)
     assert answer.code == 2 and "already exists" in answer.err and path.read_text("utf-8") == "mine"
 
 
 def test_exact_new_names_its_kinds():
-    assert [line.split()[0] for line in cli("new").out.splitlines()] == list(KINDS)
-    said = f"joitn: unknown kind of scene; did you mean 'joint'? use one of {', '.join(KINDS)}\n"
+    assert [line.split()[0] for line in cli("new").out.splitlines()] == list(TEMPLATE_DESCRIPTIONS)
+    said = f"joitn: unknown kind of scene; did you mean 'joint'? use one of {', '.join(TEMPLATE_DESCRIPTIONS)}\n"
     assert cli("new", "joitn")[::2] == (2, said)
     with pytest.raises(pf.PatchfemError, match="did you mean 'joint'"):
         pf.new("joitn")
@@ -58,7 +63,7 @@ def test_exact_the_demo_is_the_rig_of_the_report(tmp_path):
     few = {"drive.cycles": 3}
     assert (
         pf.demo(**few).measures["loop_area"].value
-        == pf.run(shipped_scene(), **few).measures["loop_area"].value
+        == pf.run(find_shipped_scene(), **few).measures["loop_area"].value
         > 0
     )
 
@@ -161,10 +166,12 @@ def test_exact_a_scene_cites_what_its_effects_stand_on(tmp_path):
     assert keys(cli("cite").out) == ["srinivasan1985", "patchfem"]
     path = tmp_path / "a.toml"
     path.write_text(
-        template_text("rig").replace('"coulomb"', '"nonlocal"\nbond_length = "1 um"'), "utf-8"
+        read_template("rig").replace('"coulomb"', '"nonlocal"\nbond_length = "1 um"'), "utf-8"
     )
     assert keys(cli("cite", path).out) == ["srinivasan1985", "patchfem", "oden1983"]
-    assert {"hueber2005", "archard1953"} <= set(keys(bibtex(load(template_text("wear")).named())))
+    assert {"hueber2005", "archard1953"} <= set(
+        keys(bibtex(load(read_template("wear")).effect_names()))
+    )
     assert {name for names, _ in SOURCES for name in names} <= set(EFFECTS)
 
 

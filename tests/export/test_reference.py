@@ -14,8 +14,13 @@ from patchfem.response.rows import TABLE as MOTION
 from patchfem.runs.results.patch_rows import TABLE as STATIC
 from patchfem.scene.keys.lookup import is_table_or_value
 from patchfem.scene.keys.materials import MATERIALS
-from patchfem.scene.keys.quantities import KINDS, parse
-from patchfem.scene.keys.types import inner_table, key_record, keys, meaning
+from patchfem.scene.keys.quantities import UNIT_FACTORS, parse_quantity
+from patchfem.scene.keys.types import (
+    attributes_by_key,
+    find_inner_table,
+    find_key_record,
+    find_meaning,
+)
 from patchfem.scene.scene import loads
 
 PAGE = text()
@@ -26,8 +31,8 @@ def plain() -> list:
     return [
         (model, key)
         for _, model in tables()
-        for key, name in keys(model).items()
-        if inner_table(model, name) is None or is_table_or_value(model, name)
+        for key, name in attributes_by_key(model).items()
+        if find_inner_table(model, name) is None or is_table_or_value(model, name)
     ]
 
 
@@ -46,11 +51,14 @@ def test_exact_the_committed_file_is_what_the_records_say():
 
 def test_always_every_key_has_a_sentence_and_may_have_a_condition():
     for model, key in plain():
-        said = meaning(model, key)
+        said = find_meaning(model, key)
         assert said and not said.endswith(".") and said == said.strip(), (model, key)
-        needed = key_record(model, key).required
+        needed = find_key_record(model, key).required
         assert needed == needed.strip().rstrip(".")
-        assert not (needed and model.model_fields[keys(model)[key]].is_required()), (model, key)
+        assert not (needed and model.model_fields[attributes_by_key(model)[key]].is_required()), (
+            model,
+            key,
+        )
 
 
 def test_refuses_a_key_without_a_sentence():
@@ -58,7 +66,7 @@ def test_refuses_a_key_without_a_sentence():
         angle: float
 
     with pytest.raises(KeyError, match=r"no record of Table\.angle"):
-        meaning(Table, "angle")
+        find_meaning(Table, "angle")
 
 
 def test_exact_nothing_is_left_out():
@@ -71,10 +79,10 @@ def test_exact_nothing_is_left_out():
     ):
         for name in names:
             assert f"| `{name}` |" in page, name
-    for kind, units in KINDS.items():
+    for kind, units in UNIT_FACTORS.items():
         row = next(line for line in PAGE.splitlines() if line.startswith(f"| {kind} | `"))
         assert all(f"`{unit}`" in row for unit in units)
-        parse(row.split('`"')[1].split('"`')[0], kind)  # its example
+        parse_quantity(row.split('`"')[1].split('"`')[0], kind)  # its example
 
 
 def test_exact_rows_say_kind_limits_default_and_what_needs_the_key():
@@ -148,7 +156,7 @@ def test_exact_the_page_of_limits_says_what_a_scene_is_answered():
 def test_always_the_page_of_limits_has_every_bound_of_whole_numbers():
     page = limits.FILE.read_text("utf-8")
     for header, model in tables():
-        for key, name in keys(model).items():
+        for key, name in attributes_by_key(model).items():
             if model.model_fields[name].annotation is int:
                 assert f"| `{header.strip('[]')}.{key}` | whole number, >= " in page, key
     for number, line in enumerate(

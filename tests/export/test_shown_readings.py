@@ -58,9 +58,9 @@ def test_exact_the_gauge_has_a_factor_of_its_own(tmp_path):
 
 
 def test_a_reading_is_an_effect_beside_its_rows(tmp_path):
-    named = scene_of(tmp_path, "measured.reading=fundamental").named()
+    named = scene_of(tmp_path, "measured.reading=fundamental").effect_names()
     assert named[-2:] == ["measured", "measured.reading=fundamental"]
-    assert scene_of(tmp_path).named()[-1] == "measured"
+    assert scene_of(tmp_path).effect_names()[-1] == "measured"
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,11 @@ def test_always_a_model_of_every_kind_is_frozen(text, kind):
 def test_always_a_model_keeps_the_scene_it_came_from(text, kind):
     scene = loads(text, "a.toml")
     source = build(scene).source
-    assert (source.text, source.title, source.effects) == (text, scene.title, tuple(scene.named()))
+    assert (source.text, source.title, source.effects) == (
+        text,
+        scene.title,
+        tuple(scene.effect_names()),
+    )
     again = loads(source.resolved)
     assert (
         again.kind == kind

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 
 import patchfem as pf
 from patchfem.runs.rig.steady import curves
-from patchfem.scene.starting import template_text
+from patchfem.scene.starting import read_template
 from patchfem.structure.drives import Sweep
 
 LAWS = ("none", "coulomb", "elastic-plastic", "chain", "iwan", "bouc-wen")
@@ -140,7 +140,7 @@ def test_always_the_peak_of_a_random_rig_is_within_its_bars(seed):
 
 def test_exact_the_curve_of_a_stuck_interface_has_the_peak_of_the_bonded_structure():
     """patchfem new damper under 100 kN: the platform stays on its spring, and the force meets one receptance."""
-    text = template_text("damper")
+    text = read_template("damper")
     one = text[: text.index("\n[sweep]")] + text[text.index("\n[accuracy]") :]
     found = pf.run(one, **{"structure.interface[1].load": "100 kN"}).measures
     mass, damp = np.diag([0.15, 0.25]), np.array([[2.0, -2], [-2, 12]])

@@ -5,15 +5,21 @@ from itertools import product
 from patchfem.effects import LAWS, SINE_WAVEFORM, WAVEFORMS
 from patchfem.runs.rig.engines import AUTOMATIC, ENGINES, FINDERS
 from patchfem.scene.keys.tables import Friction
-from patchfem.scene.rules.methods import FEATURES, SUPPORT, Joint, Motion, unsupported_feature
+from patchfem.scene.rules.methods import (
+    ENGINE_SUPPORT,
+    FEATURE_FINDERS,
+    Joint,
+    MotionFeatures,
+    find_unsupported_feature,
+)
 
 LEVELS = WAVEFORMS["levels"]
 
 
 def test_always_every_engine_has_a_row_of_what_it_takes():
-    assert set(ENGINES) == set(SUPPORT) and set(AUTOMATIC) <= set(ENGINES.values())
-    for one in SUPPORT.values():
-        assert set(one.features.split()) <= set(FEATURES)
+    assert set(ENGINES) == set(ENGINE_SUPPORT) and set(AUTOMATIC) <= set(ENGINES.values())
+    for one in ENGINE_SUPPORT.values():
+        assert set(one.features.split()) <= set(FEATURE_FINDERS)
     assert {one.like for one in FINDERS.values()} <= set(ENGINES)
 
 
@@ -28,7 +34,7 @@ def motions():
         (SINE_WAVEFORM, LEVELS),
     ):
         for count in (1, 2):
-            yield Motion(
+            yield MotionFeatures(
                 [Joint(Friction(law=law, static=0.3), soft)] * count,
                 varies,
                 yaws,
@@ -39,11 +45,13 @@ def motions():
 
 def reasons(m) -> list:
     """What the engines of method "exact" lack for a Motion."""
-    return [unsupported_feature(name, m) for name, one in ENGINES.items() if one.method == "exact"]
+    return [
+        find_unsupported_feature(name, m) for name, one in ENGINES.items() if one.method == "exact"
+    ]
 
 
 def test_exact_the_march_takes_all_that_others_lack():
     for m in motions():
-        assert unsupported_feature("march", m) == ""
+        assert find_unsupported_feature("march", m) == ""
         if m.load_change or m.spring:
-            assert all([*reasons(m), unsupported_feature("smooth", m)])
+            assert all([*reasons(m), find_unsupported_feature("smooth", m)])

@@ -5,14 +5,14 @@ from scene_texts import KEYS
 
 import patchfem as pf
 from patchfem.scene.scene import loads
-from patchfem.scene.starting import template_text
+from patchfem.scene.starting import read_template
 
 LAWS = "coulomb", "elastic-plastic", "nonlocal", "tanh", "lugre", "iwan"
 
 
 def scene(law, *sets):
     return loads(
-        template_text("rig").replace('"coulomb"', f'"{law}"\n{KEYS[law]}'),
+        read_template("rig").replace('"coulomb"', f'"{law}"\n{KEYS[law]}'),
         sets=("drive.cycles=40", *sets),
     )
 
@@ -32,7 +32,7 @@ def test_exact_a_progress_callback_changes_no_result(law, sets):
 def test_always_a_long_run_reports_its_progress():
     """Under a sweep, for a motion that repeats is not run to its end."""
     head, drive = (
-        template_text("rig")
+        read_template("rig")
         .replace('"coulomb"', f'"nonlocal"\n{KEYS["nonlocal"]}')
         .split("[drive]")
     )

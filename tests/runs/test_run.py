@@ -136,7 +136,7 @@ def test_exact_summary(done, name):
     assert 0 < seconds.get("contact", seconds["total"]) <= seconds["total"]
     named = [one["effect"] for one in summary["effects"]]
     assert all(set(one) == {"effect", "equations", "seconds"} for one in summary["effects"])
-    assert named == load(folder.with_suffix(".toml")).named()
+    assert named == load(folder.with_suffix(".toml")).effect_names()
     assert set(summary["not_in_scene"]) == {*EFFECTS} - set(named)
     fields = {"fields.vtkhdf"} if name in WITH_FIELDS else set()
     assert {path.name for path in folder.iterdir()} == {
@@ -178,7 +178,7 @@ def test_exact_measures_of_the_kind(done, name):
 def test_exact_resolved_scene_is_the_scene(done, name):
     folder, _ = done(name)
     first, again = load(folder.with_suffix(".toml")), load(folder / "scene.resolved.toml")
-    assert again.named() == first.named() and again.resolved() == first.resolved()
+    assert again.effect_names() == first.effect_names() and again.resolved() == first.resolved()
 
 
 @pytest.mark.share(0, 1, 3, 4, 5)
@@ -357,7 +357,7 @@ def test_always_shipped_scenes_load_and_plan(path):
     scene = load(path)
     found = plan(scene)
     assert found.kind == scene.kind and set(found.effects) <= set(EFFECTS)
-    assert scene.measured is None or scene.beside(scene.measured.file).is_file()
+    assert scene.measured is None or scene.resolve_path(scene.measured.file).is_file()
 
 
 def test_exact_plan_as_json(written):

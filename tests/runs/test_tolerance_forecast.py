@@ -6,7 +6,7 @@ from scene_texts import BENCH, POINT
 from tolerance_forecasts import cured, misses
 
 import patchfem as pf
-from patchfem.scene.starting import template_text
+from patchfem.scene.starting import read_template
 
 MODE = """\
 [structure]
@@ -45,7 +45,7 @@ bond_length = "1 um"
     + MODE
 )
 BONDS = BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')
-PATCH = template_text("patch").partition("[accuracy]")[0]
+PATCH = read_template("patch").partition("[accuracy]")[0]
 
 
 def asked(text: str, tolerance: float, keys: str = "") -> str:
@@ -111,9 +111,9 @@ def test_exact_what_is_foreseen_as_missed_is_missed_and_its_cure_meets_the_toler
         asked(BONDS, 1e-4, "steps_per_cycle = 2600\n"),
         asked(PATCH, 1e-4),
         asked(SOFT, 1e-2, "steps_per_cycle = 800\n"),
-        template_text("rig"),
-        template_text("linear"),
-        template_text("joint"),
+        read_template("rig"),
+        read_template("linear"),
+        read_template("joint"),
     ],
 )
 def test_always_nothing_is_foreseen_of_a_tolerance_that_is_met(text):

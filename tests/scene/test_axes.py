@@ -9,8 +9,8 @@ from scene_texts import BENCH, DRIVE, KILOGRAM, line_of, mistakes
 import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
-from patchfem.scene.axes import Span, describe_ranges, read_axes
-from patchfem.scene.keys.quantities import parse
+from patchfem.scene.axes import SampledRange, describe_ranges, read_axes
+from patchfem.scene.keys.quantities import parse_quantity
 from patchfem.scene.scene import loads
 from patchfem.scene.sets import format_values
 
@@ -124,21 +124,21 @@ def test_refuses_all_at_once():
 
 def test_exact_a_draw_holds_16_bytes_a_value_and_reads_what_it_writes():
     span = axis("contact.length=1 mm..9 mm", sampled=True)
-    drawn = span.axis(np.linspace(0, 1, 1001))
+    drawn = span.make_axis(np.linspace(0, 1, 1001))
     assert drawn.texts[0] == "1 mm" and drawn.texts[-1] == "9 mm" and len(drawn.texts) == 1001
     assert drawn.texts[1:3] == [drawn.texts[1], drawn.texts[2]] == ["1.008 mm", "1.016 mm"]
-    assert list(drawn.values) == [parse(text, "length") for text in drawn.texts]
+    assert list(drawn.values) == [parse_quantity(text, "length") for text in drawn.texts]
     assert drawn.texts.numbers.itemsize + drawn.values.itemsize == 16
 
 
 def test_exact_drawn_values_lie_between_the_ends():
     span = axis("contact.tilt.angle=1 mrad..100 mrad", sampled=True)
-    assert isinstance(span, Span) and span.log
+    assert isinstance(span, SampledRange) and span.log
     np.testing.assert_allclose(
-        span.axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14
+        span.make_axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14
     )
     even = axis("friction.static=0.2..0.6:lin", sampled=True)
-    np.testing.assert_allclose(even.axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14)
+    np.testing.assert_allclose(even.make_axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14)
     assert (
         "takes whole numbers takes no range"
         in read_axes(["contact.pairs=1..4"], sampled=True)[1][0]
@@ -167,7 +167,7 @@ def test_exact_a_table_of_a_scene_says_the_same():
         list(scene.sweep)
         == read_axes(["friction.static=0.1..0.6:6", "normal.load=26 lbf,100 N"])[0]
     )
-    assert scene.named()[-1] == "sweep" and loads(BENCH, "a.toml").sweep == ()
+    assert scene.effect_names()[-1] == "sweep" and loads(BENCH, "a.toml").sweep == ()
 
 
 def test_exact_a_key_that_only_the_table_holds_has_its_first_value():

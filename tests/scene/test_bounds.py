@@ -6,7 +6,7 @@ import pytest
 from scene_texts import BENCH, COULOMB, PATCH, POINT, RIG, STRUCTURE, mistakes
 
 from patchfem.scene.keys.tables import Tables
-from patchfem.scene.keys.types import annotation_parts, inner_table, keys
+from patchfem.scene.keys.types import attributes_by_key, find_inner_table, iterate_annotation_parts
 from patchfem.scene.scene import SceneError, load, loads
 
 MASSES = '[structure]\nmasses = [{}]\n[drive]\nkind = "base"\n'
@@ -17,13 +17,13 @@ def test_exact_every_whole_number_has_an_upper_bound():
 
 
 def _unbounded(model, at):
-    for key, name in keys(model).items():
-        inner = inner_table(model, name)
+    for key, name in attributes_by_key(model).items():
+        inner = find_inner_table(model, name)
         if inner is not None:
             yield from _unbounded(inner, f"{at}{key}.")
             continue
         field = model.model_fields[name]
-        found = [field.annotation, *field.metadata, *annotation_parts(field.annotation)]
+        found = [field.annotation, *field.metadata, *iterate_annotation_parts(field.annotation)]
         inside = [
             limit for one in found for limit in (one, *(getattr(one, "metadata", None) or ()))
         ]

@@ -54,7 +54,14 @@ def told(make) -> tuple:
         found = make()
     except SceneError as error:
         return ("refused", *error.mistakes)
-    return found.resolved(), found.kind, found.remarks, found.sets, found.named(), found.tables()
+    return (
+        found.resolved(),
+        found.kind,
+        found.remarks,
+        found.sets,
+        found.effect_names(),
+        found.tables(),
+    )
 
 
 @pytest.mark.parametrize(("text", "sets"), CHANGES)

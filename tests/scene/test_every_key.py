@@ -26,9 +26,9 @@ from torture.toml import known, text_of
 from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.keys.quantities import KINDS
+from patchfem.scene.keys.quantities import UNIT_FACTORS
 from patchfem.scene.keys.tables import Tables
-from patchfem.scene.keys.types import inner_table
+from patchfem.scene.keys.types import find_inner_table
 from patchfem.scene.scene import SceneError, loads
 
 FLAT = PIECE + 'load = "26 lbf"\nelement_size = "2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
@@ -103,11 +103,11 @@ def values(path: tuple, kind: str | None) -> list:
         return WORDS[name]
     if kind is not None:
         return SIZES.get(
-            kind, [f"{number} {next(iter(KINDS[kind]))}" for number in (0.7, 1e3, 1e7)]
+            kind, [f"{number} {next(iter(UNIT_FACTORS[kind]))}" for number in (0.7, 1e3, 1e7)]
         )
     model = Tables
     for key in path[:-1]:
-        model = inner_table(model, key) if isinstance(key, str) else model
+        model = find_inner_table(model, key) if isinstance(key, str) else model
     field = next(one for name, one in model.model_fields.items() if (one.alias or name) == path[-1])
     words = [
         one

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from patchfem.scene.scene import SceneError, loads
-from patchfem.scene.starting import template_text
+from patchfem.scene.starting import read_template
 
 MEANT = [  # kind of scene, what stands there, what was written, what was meant
     ("rig", "static = 0.3", "mu = 0.3", "static"),
@@ -37,7 +37,7 @@ MEANT = [  # kind of scene, what stands there, what was written, what was meant
     "kind, right, wrong, meant", MEANT, ids=[f"{wrong} {kind}" for kind, _, wrong, _ in MEANT]
 )
 def test_exact_the_key_that_was_meant(kind, right, wrong, meant):
-    text = template_text(kind)
+    text = read_template(kind)
     assert right in text
     with pytest.raises(SceneError) as refused:
         loads(text.replace(right, wrong, 1))
@@ -58,18 +58,18 @@ def test_exact_the_key_that_was_meant(kind, right, wrong, meant):
 )
 def test_exact_a_set_means_a_key_that_the_file_has(wrong, meant):
     with pytest.raises(SceneError, match=rf"^--set: \S+: unknown key; did you mean '{meant}'\?$"):
-        loads(template_text("rig"), sets=[wrong])
+        loads(read_template("rig"), sets=[wrong])
 
 
 def test_always_of_several_lengths_none_is_meant():
     with pytest.raises(SceneError, match="unknown key; known here: length, width, height"):
-        loads(template_text("patch"), sets=["contact.thicknes=1 mm"])
+        loads(read_template("patch"), sets=["contact.thicknes=1 mm"])
 
 
 @pytest.mark.parametrize("wrong", ["qqq = true", 'qqq = "blue"', "qqq = {a = 1}"])
 def test_always_what_nothing_tells_is_answered_by_all_that_is_known(wrong):
     with pytest.raises(SceneError) as refused:
-        loads(template_text("rig").replace('kind = "base"', f'kind = "base"\n{wrong}'))
+        loads(read_template("rig").replace('kind = "base"', f'kind = "base"\n{wrong}'))
     assert [
         line
         for line in refused.value.mistakes

@@ -10,7 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.scene.keys.quantities import EXAMPLES, KINDS, format_si, parse
+from patchfem.scene.keys.quantities import (
+    EXAMPLE_QUANTITIES,
+    UNIT_FACTORS,
+    format_si,
+    parse_quantity,
+)
 
 
 @pytest.mark.parametrize(
@@ -46,54 +51,54 @@ from patchfem.scene.keys.quantities import EXAMPLES, KINDS, format_si, parse
     ],
 )
 def test_exact_values(text, kind, value):
-    assert parse(text, kind) == value
+    assert parse_quantity(text, kind) == value
 
 
 def test_exact_pound_force_per_inch_and_its_relatives():
     pound, inch, gravity = Fraction("0.45359237"), Fraction("0.0254"), Fraction("9.80665")
-    assert parse("1 lbf", "force") == float(pound * gravity)
-    assert parse("1 lbf/in", "stiffness") == float(pound * gravity / inch)
-    assert parse("1 lbf in", "moment") == float(pound * gravity * inch)
-    assert parse("1 lbf ft", "moment") == float(pound * gravity * inch * 12)
-    assert parse("1 psi", "pressure") == float(pound * gravity / inch**2)
-    assert parse("1 ksi", "pressure") == float(1000 * pound * gravity / inch**2)
-    assert parse("1 Msi", "pressure") == float(10**6 * pound * gravity / inch**2)
-    assert parse("1 lb/in^3", "density") == float(pound / inch**3)
+    assert parse_quantity("1 lbf", "force") == float(pound * gravity)
+    assert parse_quantity("1 lbf/in", "stiffness") == float(pound * gravity / inch)
+    assert parse_quantity("1 lbf in", "moment") == float(pound * gravity * inch)
+    assert parse_quantity("1 lbf ft", "moment") == float(pound * gravity * inch * 12)
+    assert parse_quantity("1 psi", "pressure") == float(pound * gravity / inch**2)
+    assert parse_quantity("1 ksi", "pressure") == float(1000 * pound * gravity / inch**2)
+    assert parse_quantity("1 Msi", "pressure") == float(10**6 * pound * gravity / inch**2)
+    assert parse_quantity("1 lb/in^3", "density") == float(pound / inch**3)
 
 
-@pytest.mark.parametrize("unit", KINDS["length"])
+@pytest.mark.parametrize("unit", UNIT_FACTORS["length"])
 def test_exact_drawn_numbers_are_rounded_once(unit):
     for number in np.random.default_rng(7).lognormal(0, 20, 300).tolist():
-        exact = Fraction(repr(number)) * Fraction(repr(KINDS["length"][unit]))
-        assert parse(f"{number!r} {unit}", "length") == float(exact)
+        exact = Fraction(repr(number)) * Fraction(repr(UNIT_FACTORS["length"][unit]))
+        assert parse_quantity(f"{number!r} {unit}", "length") == float(exact)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", UNIT_FACTORS)
 def test_exact_every_kind_has_its_si_unit_first_and_a_valid_example(kind):
-    assert next(iter(KINDS[kind].values())) == 1.0
-    assert parse(EXAMPLES[kind], kind) > 0.0
+    assert next(iter(UNIT_FACTORS[kind].values())) == 1.0
+    assert parse_quantity(EXAMPLE_QUANTITIES[kind], kind) > 0.0
 
 
 @given(
     st.floats(allow_nan=False, allow_infinity=False),
-    st.sampled_from([k for k in KINDS if k != "temperature"]),
+    st.sampled_from([k for k in UNIT_FACTORS if k != "temperature"]),
 )
 def test_always_the_si_text_gives_back_the_same_float(value, kind):
-    assert parse(format_si(value, kind), kind) == value
+    assert parse_quantity(format_si(value, kind), kind) == value
 
 
-@given(st.text(max_size=40), st.sampled_from(list(KINDS)))
+@given(st.text(max_size=40), st.sampled_from(list(UNIT_FACTORS)))
 def test_always_a_finite_float_or_a_value_error(text, kind):
     try:
-        assert math.isfinite(parse(text, kind))
+        assert math.isfinite(parse_quantity(text, kind))
     except ValueError as error:
         assert str(error)
 
 
-@given(st.sampled_from(list(KINDS)), st.data())
+@given(st.sampled_from(list(UNIT_FACTORS)), st.data())
 def test_always_every_unit_of_a_kind_parses_as_its_factor(kind, data):
-    unit = data.draw(st.sampled_from(list(KINDS[kind])))
-    assert parse(f"1 {unit}", kind) == KINDS[kind][unit]
+    unit = data.draw(st.sampled_from(list(UNIT_FACTORS[kind])))
+    assert parse_quantity(f"1 {unit}", kind) == UNIT_FACTORS[kind][unit]
 
 
 @pytest.mark.parametrize(
@@ -154,7 +159,7 @@ def test_always_every_unit_of_a_kind_parses_as_its_factor(kind, data):
 )
 def test_refuses_traps(text, kind, says):
     with pytest.raises(ValueError) as caught:
-        parse(text, kind)
+        parse_quantity(text, kind)
     assert says in str(caught.value)
-    assert EXAMPLES[kind] in str(caught.value)
+    assert EXAMPLE_QUANTITIES[kind] in str(caught.value)
     assert len(str(caught.value)) < 400

@@ -2,7 +2,7 @@
 
 import gc
 
-from patchfem.scene.keys.memoize import MAX_RESULTS, memoize
+from patchfem.scene.keys.memoize import MAX_CACHED_RESULTS, memoize
 
 
 class Held:
@@ -29,7 +29,7 @@ def test_exact_asked_once_of_an_object_and_again_of_an_equal_one():
 def test_always_an_object_that_is_gone_answers_for_no_other():
     """A new object may have the id of one that is gone; those that are remembered are held."""
     number = memoize(lambda what: what.number)
-    for k in range(2 * MAX_RESULTS + 5):
+    for k in range(2 * MAX_CACHED_RESULTS + 5):
         assert number(Held(k)) == k
         if k % 500 == 0:
             # these are young; all that a long session holds would be gone through for nothing

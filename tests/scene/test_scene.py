@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from scene_texts import BENCH, FULL, LINEAR, PATCH, RIG
 
 from patchfem.scene.keys.materials import MATERIALS
-from patchfem.scene.lines import key_lines
+from patchfem.scene.lines import find_key_lines
 from patchfem.scene.scene import Scene, SceneError, load, loads
 
 
@@ -28,7 +28,7 @@ def test_exact_rig_in_si():
     assert scene.contact.substrate.name == "Ti-8Al-1Mo-1V" and scene.contact.tilt.angle == 1e-4
     assert scene.drive.acceleration == 49.03325 and scene.drive.cycles == 200.0
     assert scene.normal is None and scene.slide is None and scene.contact.shear is None
-    assert scene.beside("before.csv").as_posix() == "folder/before.csv"
+    assert scene.resolve_path("before.csv").as_posix() == "folder/before.csv"
 
 
 def test_exact_defaults():
@@ -74,12 +74,12 @@ def test_exact_kinds(text, kind):
 
 def test_exact_named_effects():
     extra = '[contact.shear]\n[accuracy]\nmethod = "march"\n[measured]\nfile = "t.csv"\n'
-    assert loads(RIG + extra).named() == [
+    assert loads(RIG + extra).effect_names() == [
         "contact", "contact.coating", "contact.tilt", "contact.shear", "friction.law=nonlocal",
         "friction.reading=stretch", "structure", "drive.kind=base", "drive.waveform=sine", "accuracy.method=march",
         "measured",
     ]  # fmt: skip
-    assert loads(BENCH).named() == ["normal", "friction.law=coulomb", "slide.kind=triangle"]
+    assert loads(BENCH).effect_names() == ["normal", "friction.law=coulomb", "slide.kind=triangle"]
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,11 @@ def test_exact_resolved_text_is_the_same_scene(text, sets):
     again = loads(scene.resolved())
     assert again.tables() == scene.tables()
     assert again.resolved() == scene.resolved()
-    assert (again.kind, again.named(), again.remarks) == (scene.kind, scene.named(), [])
+    assert (again.kind, again.effect_names(), again.remarks) == (
+        scene.kind,
+        scene.effect_names(),
+        [],
+    )
 
 
 def test_exact_resolved_text_has_no_unused_keys():
@@ -149,7 +153,7 @@ y = [{z = 1},
 w = \'\'\'it''s\'\'\'
 v = 1979-05-27 07:32:00
 '''
-    lines = key_lines(text)
+    lines = find_key_lines(text)
     expected = {"a": 1, "t": 4, "t.q.u": 5, "t.list": 6, "t.list.1": 7, "t.in": 9, "t.in.line.m.n": 9, "s": 10,
                 "s.m": 10, "s.m.0": 10, "s.m.0.x": 11, "s.m.1": 12, "s.m.1.y.1.z": 14, "s.m.1.sub": 15,
                 "s.m.1.sub.w": 16, "s.m.1.sub.v": 17}  # fmt: skip

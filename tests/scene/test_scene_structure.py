@@ -110,7 +110,7 @@ def test_exact_bonded_spring_in_a_run():
     k = 0.884 * w0 * w0 + 4e6
     x = 0.884 * 5 * 9.80665 / abs(k - 0.884 * w * w + 2j * 0.003 * w0 * w * 0.884)
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(x, rel=1e-9)
-    assert "structure.bonded" in scene.named() and result.plan.chain["bonded"] == 4e6
+    assert "structure.bonded" in scene.effect_names() and result.plan.chain["bonded"] == 4e6
     rig = result.plan.model.rig
     assert rig.structure.frequencies.max() == pytest.approx(
         np.sqrt(k / 0.884) / (2 * np.pi), rel=1e-12
@@ -182,7 +182,7 @@ def test_exact_starts_of_a_scene():
     one = driven(STRUCTURE, kind="free", displacement=1e-3)
     assert initial_state(one, build_modes(one)).z.tolist() == [1e-3]
     assert (
-        "structure.start" in scene.named()
+        "structure.start" in scene.effect_names()
         and loads(scene.resolved()).structure.start == scene.structure.start
     )
 

@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
-from patchfem.scene.keys.quantities import EXAMPLES, KINDS, parse
+from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES, UNIT_FACTORS, parse_quantity
 from patchfem.scene.scene import SceneError, loads
-from patchfem.scene.schema import make_schema, quantity_pattern
-from patchfem.scene.starting import KINDS as TEMPLATES
-from patchfem.scene.starting import template_text
+from patchfem.scene.schema import make_quantity_pattern, make_schema
+from patchfem.scene.starting import TEMPLATE_DESCRIPTIONS as TEMPLATES
+from patchfem.scene.starting import read_template
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "studies").rglob("*.toml"))
-RIG = template_text("rig")
+RIG = read_template("rig")
 WRONG = {  # what is changed in the scene of a rig, as neither the program nor the schema reads it
     "a bare number": ('"115 N"', "115"),
     "a unit of another kind": ('"115 N"', '"115 mm"'),
@@ -46,7 +46,7 @@ def test_always_it_accepts_the_scenes_that_ship(check, path):
 
 @pytest.mark.parametrize("kind", TEMPLATES)
 def test_always_it_accepts_the_scenes_to_start_from(check, kind):
-    assert check.is_valid(tomllib.loads(template_text(kind)))
+    assert check.is_valid(tomllib.loads(read_template(kind)))
 
 
 @pytest.mark.parametrize("right, wrong", WRONG.values(), ids=WRONG)
@@ -57,25 +57,25 @@ def test_refuses_what_the_program_refuses(check, right, wrong):
         loads(text)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", UNIT_FACTORS)
 def test_exact_a_quantity_is_what_the_unit_table_reads(kind):
     """Every unit of every kind, with each spelling of micro, powers and products: both read it or neither does."""
-    units = {unit for units in KINDS.values() for unit in units}
+    units = {unit for units in UNIT_FACTORS.values() for unit in units}
     units |= {
         unit.translate(signs)
         for unit in units
         for signs in ({ord("u"): "µ"}, {ord("u"): "μ"}, {ord(" "): "·"})
     } | {u.replace("^2", "²").replace("^3", "³") for u in units}
     for text in [f"{number} {unit}" for unit in units for number in ("1", "-2.5e-3", ".5")] + [
-        EXAMPLES[kind],
+        EXAMPLE_QUANTITIES[kind],
         "1",
         "",
     ]:
         try:
-            reads = bool(parse(text, kind)) or True
+            reads = bool(parse_quantity(text, kind)) or True
         except ValueError as error:
             reads = "below 0 K" in str(error)
-        assert bool(re.search(quantity_pattern(kind), text)) == reads, text
+        assert bool(re.search(make_quantity_pattern(kind), text)) == reads, text
 
 
 def test_always_every_key_says_what_it_means():
@@ -97,7 +97,7 @@ def test_exact_a_law_is_described_with_the_keys_that_the_program_asks_for():
     for law in keys["law"]["enum"]:
         try:
             loads(
-                template_text("bench")
+                read_template("bench")
                 .replace('"nonlocal"', f'"{law}"')
                 .replace("bond_length", "# ")
             )

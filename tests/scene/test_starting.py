@@ -8,7 +8,12 @@ from scipy.optimize import root
 import patchfem as pf
 from patchfem.core import Outcome, PatchfemError
 from patchfem.scene.scene import load, loads
-from patchfem.scene.starting import KINDS, NEXT, shipped_scene, template_text
+from patchfem.scene.starting import (
+    NEXT_VERBS,
+    TEMPLATE_DESCRIPTIONS,
+    find_shipped_scene,
+    read_template,
+)
 
 ENDS = {
     "patch": Outcome.DONE,
@@ -30,7 +35,7 @@ FLATS = 7e7  # N/m
     "kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "wear")) for kind in ENDS]
 )
 def test_always_it_runs_without_a_warning(kind):
-    result = pf.run(loads(template_text(kind)))
+    result = pf.run(loads(read_template(kind)))
     assert result.outcome == ENDS[kind] and not result.warnings
 
 
@@ -38,7 +43,7 @@ def test_exact_the_linear_scene_is_a_resonance_curve():
     """x = a/(w0² - w² + 2 i zeta w0 w) of the block against the base, off resonance."""
     from math import pi
 
-    measured = pf.run(loads(template_text("linear"))).measures["relative_displacement_amplitude"]
+    measured = pf.run(loads(read_template("linear"))).measures["relative_displacement_amplitude"]
     w0, w = 2 * pi * 143, 2 * pi * 140
     assert measured.value == pytest.approx(
         0.5 * 9.80665 / abs(w0**2 - w**2 + 2j * 0.003 * w0 * w), rel=1e-4
@@ -46,15 +51,15 @@ def test_exact_the_linear_scene_is_a_resonance_curve():
 
 
 def test_always_a_sweep_and_the_scene_of_the_rig_are_read():
-    scene = loads(template_text("misalignment"))
+    scene = loads(read_template("misalignment"))
     assert [axis.key for axis in scene.sweep] == ["contact.tilt.angle"] and scene.kind == "rig"
-    assert load(shipped_scene()).measured is not None
-    assert set(KINDS) == {*ENDS, *NEXT}
+    assert load(find_shipped_scene()).measured is not None
+    assert set(TEMPLATE_DESCRIPTIONS) == {*ENDS, *NEXT_VERBS}
 
 
 def test_exact_the_numbers_that_the_damper_tells():
     """Free and held frequency of two masses, the load of two flats of a wedge, the amplitude at the held resonance."""
-    text = template_text("damper")
+    text = read_template("damper")
     free, held = (
         np.sqrt(eigh(BLADE[0] + np.diag([0, k]), BLADE[1])[0][0]) / (2 * np.pi)
         for k in (0.0, FLATS)
@@ -69,7 +74,7 @@ def test_exact_the_numbers_that_the_damper_tells():
 
 def damper() -> str:
     """The scene of the damper, of one run."""
-    text = template_text("damper")
+    text = read_template("damper")
     return text[: text.index("\n[sweep]")] + text[text.index("\n[accuracy]") :]
 
 
@@ -131,7 +136,7 @@ def test_exact_the_best_load_of_the_damper_is_that_of_an_independent_balance():
 
 def test_exact_the_numbers_that_the_shrouds_tell():
     """Slides 0.3 sin(pi n/24); shrouds that hold are springs of friction limit over bond length."""
-    text = template_text("shroud")
+    text = read_template("shroud")
     for n, slide in ((2, "0.0776"), (4, "0.15"), (8, "0.2598")):
         assert (
             f"{0.3 * np.sin(np.pi * n / 24):.4f}".rstrip("0") == slide.ljust(6, "0").rstrip("0")
@@ -143,7 +148,7 @@ def test_exact_the_numbers_that_the_shrouds_tell():
 
 def test_always_the_beam_goes_from_the_bolted_to_the_free_frequency():
     found = pf.backbone(
-        loads(template_text("beam")), amplitudes=[1e-6, 3e-3], method="quasi-static"
+        loads(read_template("beam")), amplitudes=[1e-6, 3e-3], method="quasi-static"
     )
     f, zeta = (found[f"quasi_static_{name}"].values.ravel() for name in ("frequency", "damping"))
     assert f[0] == pytest.approx(150, rel=3e-3) and zeta[0] == pytest.approx(1e-3, rel=0.01)
@@ -152,4 +157,4 @@ def test_always_the_beam_goes_from_the_bolted_to_the_free_frequency():
 
 def test_refuses_a_kind_that_is_not_there():
     with pytest.raises(PatchfemError, match="joitn: unknown kind of scene; did you mean 'joint'"):
-        template_text("joitn")
+        read_template("joitn")

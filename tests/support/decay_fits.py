@@ -154,7 +154,9 @@ def least(one: Made, place: Path, wanted: list) -> float:
 
     def residual(values) -> np.ndarray:
         model = build(
-            base.override([key.assigned(float(value)) for key, value in zip(wanted, values)])
+            base.override(
+                [key.format_assignment(float(value)) for key, value in zip(wanted, values)]
+            )
         )
         curve = backbone(model, "", np.unique(amplitude), ("balance",), errors=False).curves[
             "balance"

@@ -155,7 +155,7 @@ class CurveModel:
     def model(self, values):
         """Build the rig with these values, with the modes that it has without the joint."""
         return model_without_joint(
-            self.base, [bound.assigned(value) for bound, value in zip(self.wanted, values)]
+            self.base, [bound.format_assignment(value) for bound, value in zip(self.wanted, values)]
         )
 
     def curve_of(self, model, method: str) -> np.ndarray:

@@ -17,7 +17,7 @@ from ...core import NotConverged, PatchfemError
 from ...effects import law_has_trait
 from ...identify.least_squares import Fit
 from ...inputs.loops import Loop, read_loop
-from ...scene.keys.quantities import KINDS
+from ...scene.keys.quantities import UNIT_FACTORS
 from ...scene.scene import Scene, SceneError
 from .loop_model import BenchModel
 from .loop_path import DEFAULT_OPTIONS, LoopOptions, read_offsets
@@ -31,9 +31,9 @@ MIN_INDEPENDENT = 0.6  # Independent rows / rows, below which a warning states t
 MIN_RMS = 1e-6
 MAX_FIRST_FORCE = 0.2  # Force in the first row / peak, above which the record cannot begin at rest.
 LOAD_UNITS = {
-    "time": KINDS["time"],
-    "displacement": KINDS["length"],
-    "force": KINDS["force"],
+    "time": UNIT_FACTORS["time"],
+    "displacement": UNIT_FACTORS["length"],
+    "force": UNIT_FACTORS["force"],
     "friction_ratio": {"": 1.0, "1": 1.0},
 }
 

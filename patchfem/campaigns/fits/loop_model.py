@@ -137,7 +137,7 @@ class BenchModel:
 
     def scene_at(self, values) -> Scene:
         """Return the scene with values of the free keys."""
-        assigned = [bound.assigned(value) for bound, value in zip(self.wanted, values)]
+        assigned = [bound.format_assignment(value) for bound, value in zip(self.wanted, values)]
         try:
             return self.base.override([*self.sets, *assigned])
         except SceneError as error:

@@ -106,7 +106,7 @@ class Problem:
 
     def assign(self, values: Sequence) -> list:
         """Return the strings that set the free keys to values (n,), after those of `sets`."""
-        assigned = [bound.assigned(value) for bound, value in zip(self.ranges, values)]
+        assigned = [bound.format_assignment(value) for bound, value in zip(self.ranges, values)]
         return [*self.sets, *assigned]
 
     def conclude(self, found: Fit, begin: float, doubts: Sequence = ()) -> FittedKeys:

@@ -20,7 +20,7 @@ from ...model.model import Model
 from ...runs.patch import ladder
 from ...runs.patch.press import areas
 from ...runs.wear import evolve
-from ...scene.keys.quantities import parse
+from ...scene.keys.quantities import parse_quantity
 from ...scene.ranges import Range
 from .problem import parse_ranges
 
@@ -93,7 +93,7 @@ def read_depth(text: str) -> MeasuredDepth:
             'such as "worn_depth_max=2.5 um..3.5 um", or the JSON file that compare writes'
         )
     try:
-        ends = [parse(part.strip(), "length") for part in value.split("..")]
+        ends = [parse_quantity(part.strip(), "length") for part in value.split("..")]
     except ValueError as error:
         raise PatchfemError(f"--to {name}: {error}") from None
     if len(ends) > 2 or not 0 < ends[0] <= ends[-1]:

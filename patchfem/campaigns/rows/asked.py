@@ -92,7 +92,7 @@ class Asked:
 
     def model(self, values) -> Model:
         """Return the model with values (n,) of the free keys, at the drive of the scene."""
-        sets = [self.wanted[k].assigned(values[k]) for k in self.inner]
+        sets = [self.wanted[k].format_assignment(values[k]) for k in self.inner]
         return model_without_joint(self.base, sets)
 
     def at(self, model: Model, condition: int) -> Model:

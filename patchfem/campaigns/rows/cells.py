@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...inputs.measured import read_table
-from ...scene.keys.quantities import parse
+from ...scene.keys.quantities import parse_quantity
 
 # m, one digit of the printed displacements: what lies below it counts as this in a ratio
 FLOOR = 0.01 * 25.4e-6
@@ -80,7 +80,7 @@ class Cells:
         if name not in KINDS:
             return text in value if name == "flag" else text == value
         try:
-            wanted = parse(text, KINDS[name])
+            wanted = parse_quantity(text, KINDS[name])
         except ValueError as error:
             raise PatchfemError(f"--hold {name}={text}: {error}") from None
         return abs(value - wanted) <= ALIKE * abs(wanted)

@@ -13,7 +13,7 @@ from pathlib import Path
 from ...response import rows
 from ...runs.results import patch_rows
 from ...scene.axes import Axis, read_axes
-from ...scene.keys.quantities import NUMBER
+from ...scene.keys.quantities import NUMBER_PATTERN
 from ...scene.lines import split_key
 from ...scene.scene import SceneError
 from ...scene.toml_text import read_text
@@ -190,7 +190,7 @@ def _refuse_all(asked: Asked, cases: Cases) -> None:
         if not mistakes:
             return
         for one in mistakes:  # drawn values differ, and what is wrong with them does not
-            found.setdefault(re.sub(NUMBER, "", one) if cases.drawn else one, one)
+            found.setdefault(re.sub(NUMBER_PATTERN, "", one) if cases.drawn else one, one)
     lines = list(found.values())
     raise SceneError(
         lines[:SHOWN] + ([f"and {len(lines) - SHOWN} more"] if len(lines) > SHOWN else [])

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...scene.axes import Axis, Span
+from ...scene.axes import Axis, SampledRange
 from .cases import Cases
 
 
-def drawn(parts: Sequence[Axis | Span], count: int, sobol: bool, seed: int) -> Cases:
+def drawn(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, seed: int) -> Cases:
     """`count` cases, the same for the same seed: between the ends of each span, evenly or evenly in its logarithm, and
     from the values of each list with equal chances.
 
@@ -23,10 +23,7 @@ def drawn(parts: Sequence[Axis | Span], count: int, sobol: bool, seed: int) -> C
         else np.random.default_rng(seed).random((count, len(parts)))
     )
     return Cases(
-        tuple(
-            part.axis(column.tolist()) if isinstance(part, Span) else _picked(part, column)
-            for part, column in zip(parts, shares.T)
-        ),
+        tuple(map(_picked, parts, shares.T)),
         True,
         True,
     )
@@ -40,7 +37,9 @@ def _sobol(width: int, count: int, seed: int) -> np.ndarray:
         return qmc.Sobol(width, scramble=True, rng=np.random.default_rng(seed)).random(count)
 
 
-def _picked(axis: Axis, shares: np.ndarray) -> Axis:
+def _picked(axis: Axis | SampledRange, shares: np.ndarray) -> Axis:
+    if isinstance(axis, SampledRange):
+        return axis.make_axis(shares.tolist())
     at = np.minimum((shares * len(axis.texts)).astype(int), len(axis.texts) - 1)
     return Axis(
         axis.key,

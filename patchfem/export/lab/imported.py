@@ -200,7 +200,7 @@ def _shapes(file: Path, asked, how: Estimate) -> tuple:
 def _quantity(text: str, kind: str, option: str) -> float | None:
     """The words of an option in SI, None where there are none."""
     try:
-        return quantities.parse(text, kind) if text else None
+        return quantities.parse_quantity(text, kind) if text else None
     except ValueError as error:
         raise PatchfemError(f"{option}: {error}") from None
 

@@ -27,7 +27,7 @@ ENDINGS = (".mat", ".npz")
 # singular value of the slides over the largest, below which they depend on one another
 DEPEND = 1e-6
 # what matrices with friction of the speed alone describe
-OF_SPEED = methods.Support("", "no-law faces levels")
+OF_SPEED = methods.EngineSupport("", "no-law faces levels")
 NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 
 
@@ -154,7 +154,7 @@ def _refuse(model: Model) -> None:
     rig = model.rig
     motion = engines.motion_of(model, steady=True)
     if _speeds(rig):
-        why = methods.first_unsupported(OF_SPEED, motion)
+        why = methods.find_first_unsupported(OF_SPEED, motion)
     else:
         why = engines.PIECES.lacks(model, steady=True)
     if why.startswith("for law"):

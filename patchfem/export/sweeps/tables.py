@@ -201,7 +201,7 @@ def _numbers(values: Sequence) -> np.ndarray:
 def _about(axis) -> dict:
     model, name = find_key(axis.key)
     try:
-        text = types.meaning(model, name)
+        text = types.find_meaning(model, name)
     except KeyError:
         text = axis.key
     return {"long_name": text, "key": axis.key} | (

@@ -2,7 +2,7 @@
 
 In: a Model with a rig, and its pressed patch. Out: a Result. Read `rig` first: the Solution of
 the engine, then the passes over it. `engines` has a record per engine;
-`scene.rules.methods.SUPPORT` says what each one can compute, and `runs.memory` what its
+`scene.rules.methods.ENGINE_SUPPORT` says what each one can compute, and `runs.memory` what its
 compiled code needs. The module of an engine (`march`, `pieces`, `smooth`, the folder `steady`)
 prepares the folder of `dynamics` that integrates (`march`, `events`, `smooth`, `harmonic`), and
 states which measures of the last cycles the engine knows itself. `reading` turns this into a

@@ -1,7 +1,7 @@
 """Engines of a rig as records: what each can compute, how it solves, coarse runs and cost.
 
 In: a Model. Out: its Engine (`engine_of`): the one that the scene names, or the first one that
-can compute it. `scene.rules.methods.SUPPORT` has one table of what each engine can compute, for
+can compute it. `scene.rules.methods.ENGINE_SUPPORT` has one table of what each engine can compute, for
 the rules of the scene and for this choice. The memory and the compile time of each engine are
 in `runs.memory`.
 """
@@ -27,7 +27,7 @@ from ...response.errors import (
     step_errors,
 )
 from ...scene.rules import methods
-from ...scene.rules.accuracy import fixed_settings, has_effect
+from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
 from ..patch import faces
 from .costs import dear_elements, dear_events, not_smooth, pieces_per_cycle
@@ -60,7 +60,7 @@ def function_of(where: str) -> Callable:
 
 
 class Engine(NamedTuple):
-    """Engine of a rig; `scene.rules.methods.SUPPORT` says what it can compute.
+    """Engine of a rig; `scene.rules.methods.ENGINE_SUPPORT` says what it can compute.
 
     The fields that name a function are "module function" of this folder, or "" for none.
 
@@ -126,7 +126,7 @@ class Engine(NamedTuple):
 
         steady: whether the drive is the sine of a curve instead of its own waveform.
         """
-        return methods.unsupported_feature(self.name, motion_of(model, steady))
+        return methods.find_unsupported_feature(self.name, motion_of(model, steady))
 
     def call(self, hook: str, *given) -> Any:
         """Call the function that a field names; None if it names none."""
@@ -143,7 +143,7 @@ def inexact(model: Model, steady: bool = False) -> str:
     return reasons[-1] if all(reasons) else ""
 
 
-def motion_of(model: Model, steady: bool = False) -> methods.Motion:
+def motion_of(model: Model, steady: bool = False) -> methods.MotionFeatures:
     """Return the properties of a model that decide which engines can compute it."""
     rig = model.rig
     spring = (
@@ -158,7 +158,7 @@ def motion_of(model: Model, steady: bool = False) -> methods.Motion:
     waveform = NO_WAVEFORM if steady else rig.drive.waveform
     laws = rig.friction.interfaces
     whole = model.partial_slip
-    return methods.Motion(
+    return methods.MotionFeatures(
         [methods.Joint(law.numbers, whole or law.partial_slip) for law in laws],
         "under a load that changes" if rig.friction.load_varies else "",
         rig.friction.strips_slide_apart,
@@ -506,6 +506,6 @@ def knobs_idle(model: Model, engine: str) -> list:
     plain = f"for engine '{engine}'"
     return [
         f"accuracy.{knob} has no meaning {where.get(knob, plain)} and is not used"
-        for knob in fixed_settings(model.accuracy)
+        for knob in list_fixed_settings(model.accuracy)
         if not has_effect(knob, model.kind, by)
     ]

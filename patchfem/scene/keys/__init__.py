@@ -13,7 +13,7 @@ How to add a key
 
        spacing: key(quantity("length", gt=0) | None, "distance between two bolts; default: one bolt") = None
 
-   A new kind of quantity needs its units in `KINDS` and an example in `EXAMPLES` of `quantities`.
+   A new kind of quantity needs its units in `UNIT_FACTORS` and an example in `EXAMPLE_QUANTITIES` of `quantities`.
 2. If the key needs or excludes another key, add a row to the rules of its table in `scene.rules`; the rules of [normal],
    [slide] and [measured] stand in `rules.check`, those of the other tables in the module of their name. The condition
    reads the values of the table in SI and the sentence names them in braces::
@@ -28,5 +28,5 @@ How to add a key
 4. Run `python tests/support/reference`, which writes the key into the pages of the reference, and add a test that the
    key changes an answer and that a wrong value is refused (`tests/scene`).
 
-A key that is removed gets a row in `removed.KEYS` with the sentence that the user reads.
+A key that is removed gets a row in `removed.REMOVED_KEYS` with the sentence that the user reads.
 """

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator
 
 from . import removed
-from .types import Share, Table, key, number, whole_number
+from .types import Fraction, Table, key, number, whole_number
 
 MAX_STEPS_PER_CYCLE = 10_000_000  # time steps; more would take days for a single cycle
 MAX_MODES = 10_000  # harmonics or shear modes; more of them make their dense matrices too large
@@ -13,7 +13,7 @@ MAX_MODES = 10_000  # harmonics or shear modes; more of them make their dense ma
 
 def _refuse_removed(value: object) -> object:
     """Return a value of a key; ValueError for a removed value, with what to use instead."""
-    for values in (removed.METHODS, removed.QUADRATURES):
+    for values in (removed.REMOVED_METHODS, removed.REMOVED_QUADRATURES):
         if isinstance(value, str) and value in values:
             raise ValueError(values[value])
     return value
@@ -48,12 +48,12 @@ class Accuracy(Table):
         "tolerance",
     ) = "auto"
     tail: key(
-        Share | None,
+        Fraction | None,
         "fraction of the bonds that `quadrature` 'truncated' neglects; default: set by the "
         "tolerance",
     ) = None
     merge: key(
-        Share | None,
+        Fraction | None,
         "width, in bond lengths, within which bonds are merged; default: set by the tolerance",
     ) = None
     harmonics: key(

@@ -14,14 +14,14 @@ from .materials import MATERIALS
 from .types import (
     Force,
     Length,
-    Place,
+    Position,
     Positive,
     Table,
     Text,
-    choices,
-    inner_table,
+    advise_on_name,
+    attributes_by_key,
+    find_inner_table,
     key,
-    keys,
     number,
     quantity,
     whole_number,
@@ -30,7 +30,7 @@ from .types import (
 Piece = Literal["upper", "lower"]
 MAX_PAIRS = 1_000_000  # equal patches; far more than any joint has
 MAX_STRIPS = 10_000  # strips over the width; the pressures of more strips would not fit into memory
-MATERIAL_NEEDED = (
+MATERIAL_REQUIREMENT = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
 )
 
@@ -55,9 +55,9 @@ def find_material(value: object) -> object:
     if isinstance(value, Material):
         return value
     if not isinstance(value, str):
-        raise ValueError(MATERIAL_NEEDED)
+        raise ValueError(MATERIAL_REQUIREMENT)
     if value not in MATERIALS:
-        raise ValueError(f"unknown material '{value}'; {choices(value, MATERIALS)}")
+        raise ValueError(f"unknown material '{value}'; {advise_on_name(value, MATERIALS)}")
     known = MATERIALS[value]
     return Material.model_construct(
         name=value, young=known.young, poisson=known.poisson, density=known.density
@@ -117,7 +117,7 @@ class LoadLine(Table):
     """An off-centre load, given by its offset or its moment; the upper piece is free to rotate."""
 
     offset: key(
-        Place | None,
+        Position | None,
         "distance of the load line from the middle of the patch; an offset > 0 moves the "
         "pressure towards +x",
         "unless `moment` is given",
@@ -153,7 +153,7 @@ class Holder(Table):
     ) = None
 
 
-def require_convex(value: object) -> object:
+def require_convex_radius(value: object) -> object:
     """Return the radius of a crown; ValueError for the negative radius of a hollow."""
     if str(value).lstrip().startswith("-"):
         raise ValueError(
@@ -168,7 +168,7 @@ class Crown(Table):
     """A cylindrical crown on one piece."""
 
     radius: key(
-        Annotated[Length, BeforeValidator(require_convex)],
+        Annotated[Length, BeforeValidator(require_convex_radius)],
         "radius of the crown: the gap grows as x^2/(2 radius)",
     )
     on: key(
@@ -181,8 +181,8 @@ class Crown(Table):
 class Step(Table):
     """A step of the gap at one position along x."""
 
-    height: key(Place, "height of the step: where x > `at`, the gap is wider by this height")
-    at: key(Place, "position x of the step; 0 is the middle of the patch")
+    height: key(Position, "height of the step: where x > `at`, the gap is wider by this height")
+    at: key(Position, "position x of the step; 0 is the middle of the patch")
     on: key(
         Piece,
         "piece that has the step; during the slide the pressure distribution moves with this piece",
@@ -299,7 +299,7 @@ class Grooves(Table):
     ) = 0.0
 
 
-def outermost_strip(width: float, count: int) -> float:
+def outermost_strip_distance(width: float, count: int) -> float:
     """Return the distance [m] from the middle of the patch to the middle of its outermost strip.
 
     `count` equal strips lie side by side over the width [m]. A load line must lie within this distance.
@@ -316,7 +316,7 @@ class Strips(Table):
         "angle by which the holder is rotated about x, which shifts the pressure sideways",
     ) = 0.0
     offset: key(
-        Place | None,
+        Position | None,
         "lateral position of the load line; if this key is given, the upper piece is free to "
         "rotate about x",
     ) = None
@@ -378,7 +378,7 @@ class Contact(Table):
     @property
     def shapes(self) -> dict:
         """Tables of the given shapes of the gap by name; the key `on` of a table names the piece."""
-        tables = {name: getattr(self, name) for name in _shape_names()}
+        tables = {name: getattr(self, name) for name in _list_shape_names()}
         return {name: table for name, table in tables.items() if table is not None}
 
     @property
@@ -394,7 +394,8 @@ class Contact(Table):
 
 
 @cache
-def _shape_names() -> tuple[str, ...]:
+def _list_shape_names() -> tuple[str, ...]:
     """Return the names of the tables in [contact] that have the key `on`."""
-    models = {name: inner_table(Contact, name) for name in Contact.model_fields}
-    return tuple(name for name, model in models.items() if model and "on" in keys(model))
+    models = {name: find_inner_table(Contact, name) for name in Contact.model_fields}
+    tables = {name: model for name, model in models.items() if model is not None}
+    return tuple(name for name, model in tables.items() if "on" in attributes_by_key(model))

@@ -14,17 +14,17 @@ from .contact import Material
 from .tables import Tables
 from .types import (
     Table,
-    allowed_values,
-    choices,
-    inner_table,
-    is_array,
-    key_types,
-    keys,
-    quantity_kind,
+    advise_on_name,
+    attributes_by_key,
+    find_inner_table,
+    find_quantity_kind,
+    is_array_attribute,
+    list_allowed_values,
+    list_key_types,
 )
 
-MAX_SHOWN = 60  # characters of a wrong value that a message shows
-MATERIAL_NEEDED = (
+MAX_SHOWN_CHARACTERS = 60  # characters of a wrong value that a message shows
+MATERIAL_REQUIREMENT = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
 )
 
@@ -36,7 +36,7 @@ class Limit(NamedTuple):
     sign: str
 
 
-LIMITS = {  # type of an error of pydantic -> the limit that the value breaks
+LIMITS_BY_ERROR_TYPE = {  # type of an error of pydantic -> the limit that the value breaks
     "greater_than": Limit("gt", ">"),
     "greater_than_equal": Limit("ge", ">="),
     "less_than": Limit("lt", "<"),
@@ -44,7 +44,7 @@ LIMITS = {  # type of an error of pydantic -> the limit that the value breaks
 }
 
 
-class KeyPlace(NamedTuple):
+class KeyDefinition(NamedTuple):
     """Table and attribute of a key; (None, "") for a key that no scene has."""
 
     model: type[Table] | None
@@ -52,7 +52,7 @@ class KeyPlace(NamedTuple):
 
 
 @lru_cache(1024)
-def find_key(key: str) -> KeyPlace:
+def find_key(key: str) -> KeyDefinition:
     """Find the table and the attribute that a dotted key names, with items by name or number."""
     model: type[Table] | None = Tables
     name = ""
@@ -62,23 +62,23 @@ def find_key(key: str) -> KeyPlace:
             is_item = False
             continue
         if name:
-            model = inner_table(model, name)
-        name = keys(model).get(piece, "") if model else ""
+            model = find_inner_table(model, name)
+        name = attributes_by_key(model).get(piece, "") if model else ""
         if not name:
-            return KeyPlace(None, "")
-        is_item = inner_table(model, name) is not None and is_array(model, name)
-    return KeyPlace(model, name)
+            return KeyDefinition(None, "")
+        is_item = find_inner_table(model, name) is not None and is_array_attribute(model, name)
+    return KeyDefinition(model, name)
 
 
-def require_key(key: str) -> KeyPlace:
+def require_key(key: str) -> KeyDefinition:
     """Find a key as `find_key` does; ValueError, with the nearest known key, if no scene has it."""
     place = find_key(key)
     if place.model is not None:
         return place
     table, _, last = key.rpartition(".")
-    owner = find_key(table) if table else KeyPlace(None, "")
-    inner = inner_table(*owner) if owner.model is not None else None
-    advice = f"; {choices(last, keys(inner))}" if inner is not None else ""
+    owner = find_key(table) if table else KeyDefinition(None, "")
+    inner = find_inner_table(*owner) if owner.model is not None else None
+    advice = f"; {advise_on_name(last, attributes_by_key(inner))}" if inner is not None else ""
     raise ValueError(f"not a key of a scene{advice}")
 
 
@@ -112,37 +112,37 @@ def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[st
     except ValidationError as caught:
         for error in caught.errors(include_url=False):
             if error["loc"][0] == alias and error["type"] not in ("missing", *ignored):
-                raise ValueError(describe_error(KeyPlace(model, name), error, value)) from None
+                raise ValueError(describe_error(KeyDefinition(model, name), error, value)) from None
     return valid
 
 
 @cache
 def is_table_or_value(model: type[Table], name: str) -> bool:
     """Return whether a key of a table also takes a plain value, as a material or a coating does."""
-    inner = key_types(model, name)[1:]
-    return inner_table(model, name) is Material or any(
+    inner = list_key_types(model, name)[1:]
+    return find_inner_table(model, name) is Material or any(
         get_origin(part) is Literal for part in inner
     )
 
 
 @cache
-def requirement(model: type[Table] | None, name: str) -> str:
+def describe_requirement(model: type[Table] | None, name: str) -> str:
     """Return what a key requires, as a clause of a message; "" for a table and an unknown key."""
     if model is None:
         return ""
-    types = key_types(model, name)
+    types = list_key_types(model, name)
     holds_array = tuple in map(get_origin, types)
-    if kind := quantity_kind(model, name):
+    if kind := find_quantity_kind(model, name):
         if holds_array:
-            return f"an array of quantities is needed, such as ['{quantities.EXAMPLES[kind]}']"
-        return quantities.requirement(kind)
+            return f"an array of quantities is needed, such as ['{quantities.EXAMPLE_QUANTITIES[kind]}']"
+        return quantities.describe_requirement(kind)
     if Material in types:
-        return MATERIAL_NEEDED
-    if allowed := allowed_values(model, name):
+        return MATERIAL_REQUIREMENT
+    if allowed := list_allowed_values(model, name):
         number = " (or a whole number)" if int in types else ""
         return f"one of {', '.join(allowed)} is needed{number}"
     if holds_array:
-        return "" if inner_table(model, name) else _array_requirement(types)
+        return "" if find_inner_table(model, name) else _describe_array_requirement(types)
     if float in types:
         return "a plain number is needed"
     if int in types:
@@ -150,7 +150,7 @@ def requirement(model: type[Table] | None, name: str) -> str:
     return "a text in quotes is needed"
 
 
-def _array_requirement(types: tuple) -> str:
+def _describe_array_requirement(types: tuple) -> str:
     """Return what an array of numbers without unit requires."""
     if float in types:
         return "plain numbers are needed, such as [1, 1.5]"
@@ -158,7 +158,7 @@ def _array_requirement(types: tuple) -> str:
     return f"{'' if is_open else 'two '}whole numbers are needed, such as [1, 2]"
 
 
-def describe_error(place: KeyPlace, error: Any, value: Any) -> str:
+def describe_error(place: KeyDefinition, error: Any, value: Any) -> str:
     """Return the sentence for an error of pydantic.
 
     Parameters
@@ -169,24 +169,24 @@ def describe_error(place: KeyPlace, error: Any, value: Any) -> str:
     value
         The wrong value as it is written.
     """
-    needed = requirement(*place)
-    if error["type"] in LIMITS:
-        limit = LIMITS[error["type"]]
+    needed = describe_requirement(*place)
+    if error["type"] in LIMITS_BY_ERROR_TYPE:
+        limit = LIMITS_BY_ERROR_TYPE[error["type"]]
         bound = error["ctx"][limit.name]
         bound = bound if isinstance(bound, int) else f"{bound:g}"
-        return f"must be {limit.sign} {bound}, not {show_value(value)}; {needed}"
+        return f"must be {limit.sign} {bound}, not {format_for_message(value)}; {needed}"
     if error["type"] == "too_short" and value and error["ctx"]["min_length"] > 1:
         return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
-    allowed = allowed_values(*place)
+    allowed = list_allowed_values(*place)
     if allowed and isinstance(value, str):
-        return f"unknown value {show_value(value)}; {choices(value, allowed)}"
-    return f"{needed or 'another value is needed'}, not {show_value(value)}"
+        return f"unknown value {format_for_message(value)}; {advise_on_name(value, allowed)}"
+    return f"{needed or 'another value is needed'}, not {format_for_message(value)}"
 
 
-def show_value(value: Any) -> str:
-    """Return a plain value as a message shows it, cut after MAX_SHOWN characters."""
+def format_for_message(value: Any) -> str:
+    """Return a plain value as a message shows it, cut after MAX_SHOWN_CHARACTERS characters."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, dict):
@@ -197,4 +197,4 @@ def show_value(value: Any) -> str:
         text = repr(value)
     except ValueError:
         return "a huge number"
-    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
+    return text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[: MAX_SHOWN_CHARACTERS - 3]}..."

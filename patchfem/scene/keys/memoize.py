@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import wraps
 
 # maximum number of cached results of one function; at this number, the cache is emptied
-MAX_RESULTS = 1024
+MAX_CACHED_RESULTS = 1024
 
 
 def memoize(function: Callable) -> Callable:
@@ -19,7 +19,7 @@ def memoize(function: Callable) -> Callable:
     def call(frozen, *others):
         entry = results.get((id(frozen), *others))
         if entry is None:
-            if len(results) >= MAX_RESULTS:
+            if len(results) >= MAX_CACHED_RESULTS:
                 results.clear()
             # The entry keeps the object alive; otherwise another object could get the same id.
             entry = (frozen, function(frozen, *others))

@@ -13,7 +13,7 @@ from functools import cache, lru_cache
 _POUND_FORCE = 4.4482216152605  # N, exact: 0.45359237 kg times standard gravity
 
 # Kind -> unit -> factor to SI. The first unit of each kind is its SI unit.
-KINDS: dict[str, dict[str, float]] = {
+UNIT_FACTORS: dict[str, dict[str, float]] = {
     "length": {
         "m": 1.0,
         "km": 1e3,
@@ -112,7 +112,7 @@ KINDS: dict[str, dict[str, float]] = {
 }
 
 # Kind -> a quantity that messages and the schema give as an example.
-EXAMPLES: dict[str, str] = {
+EXAMPLE_QUANTITIES: dict[str, str] = {
     "length": "12.7 mm",
     "area": "161 mm^2",
     "force": "26 lbf",
@@ -140,57 +140,58 @@ EXAMPLES: dict[str, str] = {
     "curvature": "0.05 1/um",
 }
 
-NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"  # regular expression of a number
-_QUANTITY = re.compile(rf"({NUMBER})[ \t]+(\S.*)")
-_BARE_NUMBER = re.compile(NUMBER)
-_NUMBER_JOINED_TO_UNIT = re.compile(rf"({NUMBER})([^\s0-9.,#+±-].*)")
-_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+")
-_MAX_LENGTH = 100  # characters of a quantity; a longer text is refused before it is analysed
-_MAX_SHOWN = 60  # characters of a wrong quantity that a message shows
+# regular expression of a number
+NUMBER_PATTERN = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+_QUANTITY_PATTERN = re.compile(rf"({NUMBER_PATTERN})[ \t]+(\S.*)")
+_BARE_NUMBER_PATTERN = re.compile(NUMBER_PATTERN)
+_JOINED_UNIT_PATTERN = re.compile(rf"({NUMBER_PATTERN})([^\s0-9.,#+±-].*)")
+_DECIMAL_COMMA_PATTERN = re.compile(r"[+-]?[0-9]+,[0-9]+")
+_MAX_CHARACTERS = 100  # characters of a quantity; a longer text is refused before it is analysed
+_MAX_SHOWN_CHARACTERS = 60  # characters of a wrong quantity that a message shows
 # Context with room for all digits of a product of a value and a factor.
-_EXACT = Context(prec=2 * _MAX_LENGTH, Emax=MAX_EMAX, Emin=MIN_EMIN)
+_EXACT_CONTEXT = Context(prec=2 * _MAX_CHARACTERS, Emax=MAX_EMAX, Emin=MIN_EMIN)
 
 
-def parse(text: object, kind: str) -> float:
+def parse_quantity(text: object, kind: str) -> float:
     """Return the SI value of a quantity ``"<number> <unit>"``, correctly rounded.
 
     ValueError, with the kind and an example, for a bare number, an unknown or ambiguous unit, a unit of another kind,
     anything but one number and one unit, and a value that is not finite.
     """
     if not isinstance(text, str):
-        raise ValueError(_not_text(text, kind))
+        raise ValueError(_describe_non_text(text, kind))
     words = text.strip()
-    match = _QUANTITY.fullmatch(words) if len(words) <= _MAX_LENGTH else None
+    match = _QUANTITY_PATTERN.fullmatch(words) if len(words) <= _MAX_CHARACTERS else None
     if match is None:
-        raise ValueError(_malformed(words, kind))
+        raise ValueError(_describe_malformed_text(words, kind))
     number, unit = match.groups()
-    factor = KINDS[kind].get(normalize_unit(unit))
+    factor = UNIT_FACTORS[kind].get(normalize_unit(unit))
     if factor is None:
-        raise ValueError(_wrong_unit(number, unit, kind))
+        raise ValueError(_describe_wrong_unit(number, unit, kind))
     try:
         return _multiply(number, factor, kind)
     except ValueError as error:
-        raise ValueError(f"'{words}' is {error}; {requirement(kind)}") from None
+        raise ValueError(f"'{words}' is {error}; {describe_requirement(kind)}") from None
 
 
 def split_quantity(text: str) -> tuple[str, str]:
-    """Return the number and the unit of a quantity that `parse` accepts, as they are written."""
-    return _QUANTITY.fullmatch(text).groups()
+    """Return the number and the unit of a quantity that `parse_quantity` accepts, as they are written."""
+    return _QUANTITY_PATTERN.fullmatch(text).groups()
 
 
 def si_unit(kind: str | None) -> str:
     """Return the SI unit of a kind; "1" for None, the kind of a plain number."""
-    return next(iter(KINDS[kind])) if kind else "1"
+    return next(iter(UNIT_FACTORS[kind])) if kind else "1"
 
 
 def format_si(value: float, kind: str) -> str:
-    """Return a value with its SI unit, as ``"0.0127 m"``; `parse` gives back the same float."""
+    """Return a value with its SI unit, as ``"0.0127 m"``; `parse_quantity` gives back the same float."""
     return f"{float(value)!r} {si_unit(kind)}"
 
 
-def requirement(kind: str) -> str:
+def describe_requirement(kind: str) -> str:
     """Return what a key of this kind requires, with an example, as the end of a message."""
-    return f"{_with_article(kind)} with its unit is needed, such as '{EXAMPLES[kind]}'"
+    return f"{_add_article(kind)} with its unit is needed, such as '{EXAMPLE_QUANTITIES[kind]}'"
 
 
 def _multiply(number: str, factor: float, kind: str) -> float:
@@ -204,7 +205,7 @@ def _multiply(number: str, factor: float, kind: str) -> float:
         raise ValueError("too large for a finite number")
     value = rounded
     if factor != 1.0:
-        value = float(_EXACT.multiply(Decimal(number), _exact_factor(factor)))
+        value = float(_EXACT_CONTEXT.multiply(Decimal(number), _exact_factor(factor)))
     if value == 0.0:
         raise ValueError("too small for a floating-point number")
     if kind == "temperature" and value < 0.0:
@@ -219,67 +220,67 @@ def _exact_factor(factor: float) -> Decimal:
 
 @lru_cache(256)
 def normalize_unit(unit: str) -> str:
-    """Return a unit as spelled in KINDS: u for micro, ^ for powers, one blank in a product."""
+    """Return a unit as spelled in UNIT_FACTORS: u for micro, ^ for powers, one blank in a product."""
     for sign, letter in (("µ", "u"), ("μ", "u"), ("²", "^2"), ("³", "^3"), ("·", " ")):
         unit = unit.replace(sign, letter)
     return " ".join(unit.split())
 
 
-def _not_text(value: object, kind: str) -> str:
+def _describe_non_text(value: object, kind: str) -> str:
     """Return the sentence on a value that is not a text."""
     reason = "not a quantity"
     if isinstance(value, bool):
         reason = f"{str(value).lower()} is not a quantity"
     elif isinstance(value, int | float):
         reason = "a bare number without a unit"
-    return f"{reason}; {requirement(kind)}"
+    return f"{reason}; {describe_requirement(kind)}"
 
 
-def _malformed(words: str, kind: str) -> str:
+def _describe_malformed_text(words: str, kind: str) -> str:
     """Return the sentence on a text that is not a number, a blank and a unit."""
-    shown = words if len(words) <= _MAX_SHOWN else f"{words[: _MAX_SHOWN - 3]}..."
-    glued = _NUMBER_JOINED_TO_UNIT.fullmatch(words)
-    if _BARE_NUMBER.fullmatch(words):
+    shown = (
+        words if len(words) <= _MAX_SHOWN_CHARACTERS else f"{words[: _MAX_SHOWN_CHARACTERS - 3]}..."
+    )
+    glued = _JOINED_UNIT_PATTERN.fullmatch(words)
+    if _BARE_NUMBER_PATTERN.fullmatch(words):
         reason = f"'{shown}' is a bare number without a unit"
     elif any(sign in words for sign in ("±", "+/-", "+-")):
         reason = f"'{shown}' has a tolerance: give only the nominal value"
-    elif _DECIMAL_COMMA.match(words):
+    elif _DECIMAL_COMMA_PATTERN.match(words):
         reason = f"'{shown}' has a comma: use a point as the decimal separator"
     elif "#" in words:
-        reason = f"'{shown}': '#' is ambiguous, write the name of the unit ({_units(kind)})"
+        reason = f"'{shown}': '#' is ambiguous, write the name of the unit ({_list_units(kind)})"
     elif re.match(r"[+-]?(nan|inf)", words, re.IGNORECASE):
         reason = f"'{shown}' is not a finite number"
-    elif glued and normalize_unit(glued[2]) in KINDS[kind]:
+    elif glued and normalize_unit(glued[2]) in UNIT_FACTORS[kind]:
         reason = f"'{shown}' lacks the space between number and unit: write '{glued[1]} {glued[2]}'"
     else:
-        reason = f"'{shown}' does not consist of one number and one unit ({_units(kind)})"
-    return f"{reason}; {requirement(kind)}"
+        reason = f"'{shown}' does not consist of one number and one unit ({_list_units(kind)})"
+    return f"{reason}; {describe_requirement(kind)}"
 
 
-def _wrong_unit(number: str, unit: str, kind: str) -> str:
+def _describe_wrong_unit(number: str, unit: str, kind: str) -> str:
     """Return the sentence on a unit that is not one of this kind."""
     plain = normalize_unit(unit)
-    advice = f"use one of {_units(kind)}, such as '{EXAMPLES[kind]}'"
-    other_kinds = [other for other, units in KINDS.items() if plain in units]
+    advice = f"use one of {_list_units(kind)}, such as '{EXAMPLE_QUANTITIES[kind]}'"
+    other_kinds = [other for other, units in UNIT_FACTORS.items() if plain in units]
     if "±" in unit or "+/-" in unit:
-        return (
-            f"'{number} {unit}' has a tolerance: give only the nominal value; {requirement(kind)}"
-        )
+        return f"'{number} {unit}' has a tolerance: give only the nominal value; {describe_requirement(kind)}"
     if kind == "force" and plain in ("lb", "lbs", "#"):
         return f"'{unit}' is ambiguous for a force; did you mean 'lbf'? {advice}"
     if kind == "temperature" and plain.lstrip("°").removeprefix("deg") in ("C", "F"):
         return f"'{unit}' is refused, because temperatures must be absolute; write 20 degC as '293.15 K'"
     if other_kinds:
         units_of = f"'{unit}' is a unit of {' or '.join(other_kinds)}"
-        return f"{units_of}, but {_with_article(kind)} is needed; {advice}"
+        return f"{units_of}, but {_add_article(kind)} is needed; {advice}"
     if plain.count("/") and " " in plain.split("/", 1)[1] and "(" not in plain:
         return f"'{unit}' is ambiguous: put the denominator in brackets; {advice}"
-    return f"unknown unit '{unit}' for {_with_article(kind)}; {advice}"
+    return f"unknown unit '{unit}' for {_add_article(kind)}; {advice}"
 
 
-def _with_article(kind: str) -> str:
+def _add_article(kind: str) -> str:
     return ("an " if kind[0] in "aeiou" else "a ") + kind
 
 
-def _units(kind: str) -> str:
-    return ", ".join(KINDS[kind])
+def _list_units(kind: str) -> str:
+    return ", ".join(UNIT_FACTORS[kind])

@@ -1,25 +1,27 @@
 """Options, keys and values that patchfem 1.0 no longer takes, and what to use instead."""
 
-VERSION = "patchfem 1.0"
-METHODS = {  # values of accuracy.method
-    name: f"'{name}' was removed in {VERSION}; use 'march' (studies/integrators compares the methods)"
+REMOVING_VERSION = "patchfem 1.0"
+REMOVED_METHODS = {  # values of accuracy.method
+    name: f"'{name}' was removed in {REMOVING_VERSION}; use 'march' (studies/integrators compares the methods)"
     for name in ("duhamel", "newmark", "euler")
 }
-LAWS_OVER_GROOVES = ("iwan", "bouc-wen", "lugre")
+LAWS_REMOVED_OVER_GROOVES = ("iwan", "bouc-wen", "lugre")
 # values of accuracy.quadrature
-QUADRATURES = {"exponential": f"'exponential' was removed in {VERSION}; use 'merged'"}
-KEYS = {
-    f"accuracy.{name}": f"this key of method '{method}' was removed in {VERSION}; use method 'march' without it"
+REMOVED_QUADRATURES = {
+    "exponential": f"'exponential' was removed in {REMOVING_VERSION}; use 'merged'"
+}
+REMOVED_KEYS = {
+    f"accuracy.{name}": f"this key of method '{method}' was removed in {REMOVING_VERSION}; use method 'march' without it"
     for name, method in (
         ("convergence", "duhamel"),
         ("convergence_tolerance", "duhamel"),
         ("stick_speed", "newmark"),
     )
 }
-KEYS["wear.scheme"] = (
-    f"this key was removed in {VERSION}; leave it out: contact and wear are always solved together in each jump"
+REMOVED_KEYS["wear.scheme"] = (
+    f"this key was removed in {REMOVING_VERSION}; leave it out: contact and wear are always solved together in each jump"
 )
-OPTIONS = {  # (verb, option): what to do instead
+REMOVED_OPTIONS = {  # (verb, option): what to do instead
     (
         "profile",
         "--level",
@@ -41,7 +43,7 @@ OPTIONS = {  # (verb, option): what to do instead
 }
 
 
-def sentence_on_option(verb: str, option: str, name: str) -> str:
+def describe_removed_option(verb: str, option: str, name: str) -> str:
     """State that an option was removed and what to do instead; "" for an option that was not.
 
     Parameters
@@ -51,6 +53,6 @@ def sentence_on_option(verb: str, option: str, name: str) -> str:
     name : str
         Option as the sentence calls it, such as "profile --tip" or, in Python, "profile: tip".
     """
-    if (verb, option) not in OPTIONS:
+    if (verb, option) not in REMOVED_OPTIONS:
         return ""
-    return f"{name} was removed in {VERSION}; {OPTIONS[verb, option]}"
+    return f"{name} was removed in {REMOVING_VERSION}; {REMOVED_OPTIONS[verb, option]}"

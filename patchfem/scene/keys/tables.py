@@ -13,20 +13,20 @@ from pydantic import Field, field_validator
 from ...effects import LAWS, WAVEFORMS
 from .accuracy import Accuracy
 from .contact import Contact, Grooves
-from .quantities import format_si, parse
+from .quantities import format_si, parse_quantity
 from .types import (
+    AbsoluteTemperature,
     Acceleration,
+    Duration,
     Force,
+    Fraction,
     Frequency,
-    Kelvin,
     Length,
     Mass,
-    NotNegative,
+    NonNegative,
     Number,
     PerMetre,
     Positive,
-    Seconds,
-    Share,
     Speed,
     Table,
     Text,
@@ -39,8 +39,8 @@ from .types import (
 
 LawName = Literal[tuple(LAWS)]
 WaveName = Literal[tuple(WAVEFORMS)]
-MAX_MASSES = 1_000_000  # largest number of a mass that a key may name
-MAX_ROWS = 2_000_000  # largest row of a matrix that a key may name
+MAX_MASS_NUMBER = 1_000_000  # largest number of a mass that a key may name
+MAX_ROW_NUMBER = 2_000_000  # largest row of a matrix that a key may name
 
 
 class Normal(Table):
@@ -66,9 +66,10 @@ class Normal(Table):
 class Temperature(Table):
     """Surface temperature, and activation temperatures for the growth of bonds."""
 
-    surface: key(Kelvin, "absolute temperature of the surfaces")
+    surface: key(AbsoluteTemperature, "absolute temperature of the surfaces")
     reference: key(
-        Kelvin, "absolute temperature for which `rest_growth` and `slip_growth` are given"
+        AbsoluteTemperature,
+        "absolute temperature for which `rest_growth` and `slip_growth` are given",
     )
     rest_activation: key(
         quantity("temperature", ge=0) | None,
@@ -84,9 +85,9 @@ class Friction(Table):
     """The friction law; `law` decides which of the other keys are needed."""
 
     law: key(LawName, "the friction law")
-    static: key(NotNegative, "coefficient of static friction mu_s")
+    static: key(NonNegative, "coefficient of static friction mu_s")
     kinetic: key(
-        NotNegative | None,
+        NonNegative | None,
         "coefficient of kinetic friction mu_k, at most `static`; default: `static`",
     ) = None
     reference_speed: key(
@@ -109,7 +110,7 @@ class Friction(Table):
         "the energy dissipated per cycle grows with the force amplitude to the power chi + 3",
     ) = None
     beta: key(
-        NotNegative | None,
+        NonNegative | None,
         "stiffness of the slider of law 'iwan' that slips last, divided by the stiffness of "
         "all other sliders together",
     ) = None
@@ -166,7 +167,7 @@ class Friction(Table):
         "default: 1e-3 of the largest sliding speed",
     ) = None
     initial_bonds: key(
-        Share, "fraction m_0 of all bonds that already exist when the run begins"
+        Fraction, "fraction m_0 of all bonds that already exist when the run begins"
     ) = 1.0
     breakaway: key(
         number(ge=0, le=1), "fraction of the bond length over which a bond stretches without damage"
@@ -285,20 +286,20 @@ class Bonded(Table):
     ) = None
 
 
-Between = tuple[whole_number(0, MAX_MASSES), whole_number(0, MAX_MASSES)]
+MassPair = tuple[whole_number(0, MAX_MASS_NUMBER), whole_number(0, MAX_MASS_NUMBER)]
 
 
 class Spring(Table):
     """A spring between two masses, or between a mass and the base."""
 
-    between: key(Between, "numbers of the two masses, counted from 1; 0 is the base")
+    between: key(MassPair, "numbers of the two masses, counted from 1; 0 is the base")
     stiffness: key(quantity("stiffness", ge=0), "stiffness of the spring")
 
 
 class Damper(Table):
     """A damper between two masses, or between a mass and the base."""
 
-    between: key(Between, "numbers of the two masses, counted from 1; 0 is the base")
+    between: key(MassPair, "numbers of the two masses, counted from 1; 0 is the base")
     coefficient: key(quantity("damping", ge=0), "damping coefficient, force per relative velocity")
 
 
@@ -308,12 +309,12 @@ class Interface(Friction):
     and tables of [contact] except approach and grooves."""
 
     between: key(
-        Between,
+        MassPair,
         "numbers of the two masses that rub, counted from 1; 0 is the base; the slide is the motion "
         "of the first mass minus the motion of the second",
     )
     lateral: key(
-        Between | None,
+        MassPair | None,
         "for an interface that slides in a plane: numbers of a second pair of masses or "
         "boundary coordinates; the motion of the first minus the motion of the second is the slide "
         "perpendicular to the slide of the pair `between`; the friction force, which is the resultant of both "
@@ -339,7 +340,7 @@ class Interface(Friction):
         return key.replace("contact", "structure.interface.contact", 1)
 
 
-Coordinate = whole_number(1, MAX_ROWS) | Text
+Coordinate = whole_number(1, MAX_ROW_NUMBER) | Text
 
 
 class Reduced(Table):
@@ -380,7 +381,7 @@ class Reduced(Table):
         "directions",
     ) = None
     slide: key(
-        Between | None,
+        MassPair | None,
         "numbers of the two boundary coordinates that the joint of [contact] or [normal] "
         "connects, counted from 1; 0 is the base; the slide is the motion of the first minus the motion of the "
         "second",
@@ -430,7 +431,7 @@ class Structure(Table):
         "masses that are connected by springs; these masses replace the modes",
     ) = None
     output_mass: key(
-        whole_number(1, MAX_MASSES) | None,
+        whole_number(1, MAX_MASS_NUMBER) | None,
         "number of the mass that carries the accelerometer; default: 1",
     ) = None
     spring: tuple[Spring, ...] = ()
@@ -546,7 +547,7 @@ class Drive(Table):
         "with kind `force` and waveform `sine`, `step` or `sweep`",
     ) = None
     mass: key(
-        whole_number(1, MAX_MASSES) | None,
+        whole_number(1, MAX_MASS_NUMBER) | None,
         "number of the mass on which the force acts; default: the force acts at the output",
     ) = None
     cycles: key(
@@ -556,7 +557,7 @@ class Drive(Table):
         "unless `duration` is given or the waveform is `sweep` or `file`",
     ) = None
     duration: key(
-        Seconds | None, "length of the run, or of each level, as a time; replaces `cycles`"
+        Duration | None, "length of the run, or of each level, as a time; replaces `cycles`"
     ) = None
     file: key(
         Text | None,
@@ -570,7 +571,7 @@ class Drive(Table):
         """Read the levels of a force drive: write each force in SI as if it were an acceleration."""
         if info.data.get("kind") != "force" or not isinstance(value, list | tuple):
             return value
-        return [format_si(parse(level, "force"), "acceleration") for level in value]
+        return [format_si(parse_quantity(level, "force"), "acceleration") for level in value]
 
 
 class WornFriction(Table):
@@ -602,7 +603,7 @@ class Wear(Table):
         "volume worn off both pieces together, divided by the "
         "product of load and slip path; with form 'energy', this volume divided by the friction work",
     )
-    upper_share: key(Share, "fraction of the worn depth that is worn off the upper piece") = 0.5
+    upper_share: key(Fraction, "fraction of the worn depth that is worn off the upper piece") = 0.5
     cycles: key(
         Positive,
         "number of cycles over which material is removed; each of these cycles is assumed equal to "

@@ -15,13 +15,13 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, WithJsonSchema, field
 from pydantic.types import AllowInfNan
 from pydantic_core import core_schema
 
-from .quantities import EXAMPLES, parse
+from .quantities import EXAMPLE_QUANTITIES, parse_quantity
 
 # Largest magnitude of a value in SI. Its fourth power, and products with it, stay within double precision.
-LARGEST = 1e50
+MAX_MAGNITUDE = 1e50
 # Kinds of quantities that are divisors in the equations of a rig. A magnitude that is not 0 must be at least
-# 1/LARGEST, which keeps the quotients finite.
-DIVIDED_BY = {
+# 1/MAX_MAGNITUDE, which keeps the quotients finite.
+DIVISOR_KINDS = {
     "mass",
     "frequency",
     "acceleration",
@@ -31,7 +31,7 @@ DIVIDED_BY = {
     "sweep rate",
 }
 # Minimum similarity ratio of difflib at which an unknown name is taken for a misspelling.
-NAME_SIMILARITY = 0.6
+MIN_NAME_SIMILARITY = 0.6
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,20 +53,20 @@ class Check:
         return self.make_schema(self.function, handler(source))
 
 
-Before = partial(Check, core_schema.no_info_before_validator_function)
-After = partial(Check, core_schema.no_info_after_validator_function)
+CheckBefore = partial(Check, core_schema.no_info_before_validator_function)
+CheckAfter = partial(Check, core_schema.no_info_after_validator_function)
 
 
 class Kind(str):
-    """Annotation of a key that holds a quantity of this kind of `quantities.KINDS`."""
+    """Annotation of a key that holds a quantity of this kind of `quantities.UNIT_FACTORS`."""
 
 
 def _require_magnitude(value: float, smallest: float) -> float:
-    """Return a value; ValueError if its magnitude is above LARGEST or in (0, `smallest`)."""
-    if value and not smallest <= abs(value) <= LARGEST:
-        allowed = f"must not exceed {LARGEST:g} in magnitude"
+    """Return a value; ValueError if its magnitude is above MAX_MAGNITUDE or in (0, `smallest`)."""
+    if value and not smallest <= abs(value) <= MAX_MAGNITUDE:
+        allowed = f"must not exceed {MAX_MAGNITUDE:g} in magnitude"
         if smallest:
-            allowed = f"must be 0 or have a magnitude from {smallest:g} to {LARGEST:g}"
+            allowed = f"must be 0 or have a magnitude from {smallest:g} to {MAX_MAGNITUDE:g}"
         raise ValueError(f"{value:g} in SI is outside the computable range; the value {allowed}")
     return value
 
@@ -77,19 +77,19 @@ def quantity(kind: str, **limits: float) -> Any:
     Parameters
     ----------
     kind : str
-        Kind of `quantities.KINDS`.
+        Kind of `quantities.UNIT_FACTORS`.
     **limits : float
         Limits in SI as `pydantic.Field` names them: gt, ge, lt, le.
     """
-    schema = {"type": "string", "examples": [EXAMPLES[kind]]}
-    smallest = 1 / LARGEST if kind in DIVIDED_BY else 0.0
+    schema = {"type": "string", "examples": [EXAMPLE_QUANTITIES[kind]]}
+    smallest = 1 / MAX_MAGNITUDE if kind in DIVISOR_KINDS else 0.0
     return Annotated[
         float,
         Kind(kind),
-        Before(partial(parse, kind=kind)),
+        CheckBefore(partial(parse_quantity, kind=kind)),
         WithJsonSchema(schema),
         Field(**limits),
-        After(partial(_require_magnitude, smallest=smallest)),
+        CheckAfter(partial(_require_magnitude, smallest=smallest)),
     ]
 
 
@@ -100,7 +100,7 @@ def number(**limits: float) -> Any:
         Strict(),
         AllowInfNan(False),
         Field(**limits),
-        After(partial(_require_magnitude, smallest=0.0)),
+        CheckAfter(partial(_require_magnitude, smallest=0.0)),
     ]
 
 
@@ -147,36 +147,37 @@ def key(kind: Any, meaning: str, required: str = "") -> Any:
 
 
 # types that many keys share
-Text = Annotated[str, Field(min_length=1), After(_require_printable)]
-Title = Annotated[str, After(_require_printable)]
+Text = Annotated[str, Field(min_length=1), CheckAfter(_require_printable)]
+Title = Annotated[str, CheckAfter(_require_printable)]
 Number = number()
-Share = number(ge=0, le=1)
+Fraction = number(ge=0, le=1)
 Positive = number(gt=0)
-NotNegative = number(ge=0)
-Place = quantity("length")
+NonNegative = number(ge=0)
+Position = quantity("length")
 Length = quantity("length", gt=0)
 Force = quantity("force", ge=0)
 Mass = quantity("mass", gt=0)
-Seconds = quantity("time", gt=0)
+Duration = quantity("time", gt=0)
 Frequency = quantity("frequency", gt=0)
 Speed = quantity("velocity", gt=0)
 Acceleration = quantity("acceleration", gt=0)
-Kelvin = quantity("temperature", gt=0)
+AbsoluteTemperature = quantity("temperature", gt=0)
 PerMetre = quantity("participation")
 
 
-_NESTED = object()  # state of _OUTER in which validators include those of inner tables
-_OUTER: ContextVar = ContextVar("outer", default=None)  # the table whose validator is being made
+_NESTED_STATE = object()  # state of _OUTER_TABLE in which validators include those of inner tables
+# the table whose validator is being made
+_OUTER_TABLE: ContextVar = ContextVar("outer", default=None)
 
 
 @contextmanager
 def nested_validators() -> Iterator[None]:
     """Make the validator of each table include those of inner tables, for the JSON schema."""
-    token = _OUTER.set(_NESTED)
+    token = _OUTER_TABLE.set(_NESTED_STATE)
     try:
         yield
     finally:
-        _OUTER.reset(token)
+        _OUTER_TABLE.reset(token)
 
 
 class Table(BaseModel):
@@ -191,16 +192,16 @@ class Table(BaseModel):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Callable) -> Any:
-        outer = _OUTER.get()
-        if outer is _NESTED:
+        outer = _OUTER_TABLE.get()
+        if outer is _NESTED_STATE:
             return handler(source)
         if outer is not None:
             return core_schema.no_info_plain_validator_function(cls._validate_inner)
-        token = _OUTER.set(cls)
+        token = _OUTER_TABLE.set(cls)
         try:
             return handler(source)
         finally:
-            _OUTER.reset(token)
+            _OUTER_TABLE.reset(token)
 
     @classmethod
     def _validate_inner(cls, value: Any) -> Any:
@@ -221,7 +222,7 @@ def build_table(model: type[Table], values: dict[str, Any]) -> Any:
     """
     table = model.__new__(model)
     for name, value in (
-        ("__dict__", _defaults(model) | values),
+        ("__dict__", _find_default_values(model) | values),
         ("__pydantic_fields_set__", set(values)),
         ("__pydantic_extra__", None),
         ("__pydantic_private__", None),
@@ -231,59 +232,57 @@ def build_table(model: type[Table], values: dict[str, Any]) -> Any:
 
 
 @cache
-def _defaults(model: type[Table]) -> dict[str, Any]:
-    fields = model.model_fields.items()
-    return {
-        name: field.get_default(call_default_factory=True)
-        for name, field in fields
-        if not field.is_required()
-    }
+def _find_default_values(model: type[Table]) -> dict[str, Any]:
+    optional = {name: key for name, key in model.model_fields.items() if not key.is_required()}
+    return {name: key.get_default(call_default_factory=True) for name, key in optional.items()}
 
 
-def choices(got: str, names: Iterable[str]) -> str:
+def advise_on_name(got: str, names: Iterable[str]) -> str:
     """Return the advice for a wrong name: ``did you mean 'x'? use one of x, y``."""
     known = list(names)
-    near = get_close_matches(got, known, 1, NAME_SIMILARITY)
+    near = get_close_matches(got, known, 1, MIN_NAME_SIMILARITY)
     near = near or [name for name in known if name.lower() == got.lower()]
     question = f"did you mean '{near[0]}'? " if near else ""
     return f"{question}use one of {', '.join(known)}"
 
 
 @cache
-def keys(model: type[BaseModel]) -> dict[str, str]:
+def attributes_by_key(model: type[BaseModel]) -> dict[str, str]:
     """Return key -> attribute of a table; they differ if the key is a reserved word of Python."""
     return {field.alias or name: name for name, field in model.model_fields.items()}
 
 
 @cache
-def required_keys(model: type[BaseModel]) -> list[str]:
+def list_required_keys(model: type[BaseModel]) -> list[str]:
     """Return the keys without which no table of this model is valid."""
-    return [key for key, name in keys(model).items() if model.model_fields[name].is_required()]
+    fields = model.model_fields
+    names = attributes_by_key(model)
+    return [key for key, name in names.items() if fields[name].is_required()]
 
 
-def annotation_parts(annotation: Any) -> Iterator[Any]:
+def iterate_annotation_parts(annotation: Any) -> Iterator[Any]:
     """Yield all parts of an annotation: types, metadata such as Kind, values of a Literal."""
     for part in (*getattr(annotation, "__metadata__", ()), *get_args(annotation)):
         yield part
-        yield from annotation_parts(part)
+        yield from iterate_annotation_parts(part)
 
 
 @cache
-def key_types(model: type[BaseModel], name: str) -> tuple[Any, ...]:
+def list_key_types(model: type[BaseModel], name: str) -> tuple[Any, ...]:
     """Return the annotation of an attribute and all its parts."""
     annotation = model.model_fields[name].annotation
-    return (annotation, *annotation_parts(annotation))
+    return (annotation, *iterate_annotation_parts(annotation))
 
 
-def key_record(model: type[BaseModel], written: str) -> KeyRecord | None:
+def find_key_record(model: type[BaseModel], written: str) -> KeyRecord | None:
     """Return the documentation of a key of a scene; None for a table, which has none."""
-    marks = model.model_fields[keys(model)[written]].metadata
+    marks = model.model_fields[attributes_by_key(model)[written]].metadata
     return next((mark for mark in marks if isinstance(mark, KeyRecord)), None)
 
 
-def meaning(model: type[BaseModel], written: str) -> str:
+def find_meaning(model: type[BaseModel], written: str) -> str:
     """Return the meaning of a key of a table; KeyError if the key is not documented."""
-    record = key_record(model, written)
+    record = find_key_record(model, written)
     if record is None:
         raise KeyError(
             f"no record of {model.__name__}.{written}: write its type as key(type, meaning)"
@@ -292,27 +291,27 @@ def meaning(model: type[BaseModel], written: str) -> str:
 
 
 @cache
-def quantity_kind(model: type[BaseModel], name: str) -> str | None:
+def find_quantity_kind(model: type[BaseModel], name: str) -> str | None:
     """Return the kind of quantity that an attribute or its items hold; None without a unit."""
-    marks = (*model.model_fields[name].metadata, *key_types(model, name))
+    marks = (*model.model_fields[name].metadata, *list_key_types(model, name))
     return next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
 
 
 @cache
-def inner_table(model: type[BaseModel], name: str) -> type[Table] | None:
+def find_inner_table(model: type[BaseModel], name: str) -> type[Table] | None:
     """Return the model of an attribute that holds a table or array of tables; None for a value."""
-    types = (part for part in key_types(model, name) if isinstance(part, type))
+    types = (part for part in list_key_types(model, name) if isinstance(part, type))
     return next((part for part in types if issubclass(part, Table)), None)
 
 
 @cache
-def is_array(model: type[BaseModel], name: str) -> bool:
+def is_array_attribute(model: type[BaseModel], name: str) -> bool:
     """Return whether an attribute holds an array, of values or of tables."""
     return get_origin(model.model_fields[name].annotation) is tuple
 
 
 @cache
-def allowed_values(model: type[BaseModel], name: str) -> tuple[str, ...]:
+def list_allowed_values(model: type[BaseModel], name: str) -> tuple[str, ...]:
     """Return the values of an attribute that takes one of a few words; () for any other."""
-    literals = (part for part in key_types(model, name) if get_origin(part) is Literal)
+    literals = (part for part in list_key_types(model, name) if get_origin(part) is Literal)
     return get_args(next(literals, None)) or ()

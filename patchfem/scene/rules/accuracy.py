@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 from ...effects import LAWS, is_bond_list, law_has_trait
 from ..keys.accuracy import Accuracy
 from ..keys.tables import Tables
-from .methods import Motion, motion_features
+from .methods import MotionFeatures, find_motion_features
 from .rule_table import Facts, Mistake, Remark, apply_rules
 from .scene_draft import SceneDraft
 
 
-class Scope(NamedTuple):
+class SettingScope(NamedTuple):
     """Where a numerical setting has an effect; texts are words separated by blanks.
 
     - kinds: kinds of scenes.
@@ -26,17 +26,18 @@ class Scope(NamedTuple):
     trait: str = ""
 
 
-SETTINGS: dict[str, Scope] = {  # numerical setting, a key of [accuracy] -> where it has an effect
-    "steps_per_cycle": Scope("bench rig linear", "auto bench march smooth harmonic"),
-    "tail": Scope("bench rig", "auto bench march", "bonds"),
-    "merge": Scope("bench rig", "auto bench march", "bonds"),
-    "harmonics": Scope("rig", "harmonic"),
-    "shear_modes": Scope("bench rig", "auto bench march"),
+# numerical setting, a key of [accuracy] -> where it has an effect
+SETTING_SCOPES: dict[str, SettingScope] = {
+    "steps_per_cycle": SettingScope("bench rig linear", "auto bench march smooth harmonic"),
+    "tail": SettingScope("bench rig", "auto bench march", "bonds"),
+    "merge": SettingScope("bench rig", "auto bench march", "bonds"),
+    "harmonics": SettingScope("rig", "harmonic"),
+    "shear_modes": SettingScope("bench rig", "auto bench march"),
 }
 
 
 def has_effect(setting: str, kind: str, method: str) -> bool:
-    """Return whether a key of SETTINGS has an effect in a kind of scene.
+    """Return whether a key of SETTING_SCOPES has an effect in a kind of scene.
 
     Parameters
     ----------
@@ -46,13 +47,13 @@ def has_effect(setting: str, kind: str, method: str) -> bool:
     method : str
         Value of accuracy.method, or the engine that was chosen.
     """
-    scope = SETTINGS[setting]
+    scope = SETTING_SCOPES[setting]
     return kind in scope.kinds.split() and method in scope.methods.split()
 
 
-def fixed_settings(accuracy: Accuracy) -> list[str]:
+def list_fixed_settings(accuracy: Accuracy) -> list[str]:
     """Return the numerical settings that a table [accuracy] fixes."""
-    return [setting for setting in SETTINGS if getattr(accuracy, setting) is not None]
+    return [setting for setting in SETTING_SCOPES if getattr(accuracy, setting) is not None]
 
 
 class QuadratureFacts(Facts):
@@ -117,33 +118,33 @@ def check_quadrature(draft: SceneDraft, kind: str) -> None:
 def check_settings(draft: SceneDraft, kind: str) -> None:
     """Remark on numerical settings that are fixed and have no effect in this scene."""
     if kind and draft.tables.accuracy is not None:
-        for setting, where in unused_settings(draft.tables, kind).items():
+        for setting, where in find_unused_settings(draft.tables, kind).items():
             draft.add_remark(
                 f"accuracy.{setting}", f"is not used, because it has no effect {where}"
             )
 
 
-def unused_settings(tables: Tables, kind: str) -> dict[str, str]:
+def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
     """Return setting -> words that tell where it has no effect, for settings without effect."""
     accuracy = tables.accuracy
     method = "bench" if kind == "bench" else accuracy.method or "auto"
     unused = {}
-    for setting in fixed_settings(accuracy):
-        if kind not in SETTINGS[setting].kinds.split():
+    for setting in list_fixed_settings(accuracy):
+        if kind not in SETTING_SCOPES[setting].kinds.split():
             where = f"in a {kind} scene"
         elif not has_effect(setting, kind, method):
             where = f"for method '{method}'" if kind != "bench" else "in a bench scene"
         else:
-            motion = motion_features(tables, "rig" if kind == "bench" else kind)
-            where = _no_effect_on_laws(setting, accuracy, motion)
+            motion = find_motion_features(tables, "rig" if kind == "bench" else kind)
+            where = _find_reason_without_effect(setting, accuracy, motion)
         if where:
             unused[setting] = where
     return unused
 
 
-def _no_effect_on_laws(setting: str, accuracy: Any, motion: Motion) -> str:
+def _find_reason_without_effect(setting: str, accuracy: Any, motion: MotionFeatures) -> str:
     """Return why a setting has no effect on the laws and patches of a motion; "" if it has."""
-    trait = SETTINGS[setting].trait
+    trait = SETTING_SCOPES[setting].trait
     laws = [joint.law for joint in motion.joints]
     if trait and not any(law_has_trait(law.law, trait) for law in laws):
         return f"without law '{next(name for name in LAWS if law_has_trait(name, trait))}'"

@@ -14,11 +14,11 @@ from .friction import check_laws
 from .grooves import check_grooves
 from .rule_table import Facts, Missing, Mistake, Remark, Rule, apply_rules
 from .scene_draft import SceneDraft
-from .selectors import SLIDE_KIND, check_selector
+from .selectors import SLIDE_KIND_SELECTOR, check_selector
 from .structure import advise_modes, check_energy_gain, check_structure
 from .wear import check_wear
 
-TABLES_OF_RUNS = ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
+RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
 
 
 class SimpleFacts(Facts):
@@ -30,10 +30,10 @@ class SimpleFacts(Facts):
         return find_waveform(self.draft.tables.drive).is_sine
 
     @property
-    def has_ageless_bonds(self) -> bool:
+    def is_law_independent_of_rest_time(self) -> bool:
         """Whether the friction law does not change at rest."""
         law = self.draft.tables.friction
-        return law is not None and _is_ageless(law)
+        return law is not None and _is_independent_of_rest_time(law)
 
 
 NORMAL_RULES = (
@@ -80,14 +80,14 @@ SLIDE_RULES = (
         "must be > 0 m for kind '{kind}'",
     ),
     Remark(
-        lambda s: s.kind == "dwell" and s.hold and s.has_ageless_bonds,
+        lambda s: s.kind == "dwell" and s.hold and s.is_law_independent_of_rest_time,
         "slide.hold",
         "has no effect, because no bond grows at rest; add friction.rest_growth and slip_growth to law 'nonlocal'",
     ),
 )
 
 
-def check(draft: SceneDraft) -> str:
+def check_scene(draft: SceneDraft) -> str:
     """Report all mistakes of a scene; return the kind of scene, "" if the tables define none."""
     check_patches(draft)
     _check_table(draft, "normal", NORMAL_RULES)
@@ -118,11 +118,11 @@ def _check_table(draft: SceneDraft, name: str, rules: tuple[Rule, ...]) -> None:
         return
     facts = SimpleFacts(draft, name, table)
     if name == "slide":
-        check_selector(facts, SLIDE_KIND)
+        check_selector(facts, SLIDE_KIND_SELECTOR)
     apply_rules(draft, rules, facts)
 
 
-def _is_ageless(law: Friction) -> bool:
+def _is_independent_of_rest_time(law: Friction) -> bool:
     """Return whether the force of a law does not depend on the time at rest."""
     return law_has_trait(law.law, "timeless") or (
         law_has_trait(law.law, "bonds") and law.rest_growth is None
@@ -131,7 +131,7 @@ def _is_ageless(law: Friction) -> bool:
 
 def _find_kind(draft: SceneDraft) -> str:
     """Return the kind of run that the tables define; report missing and conflicting tables."""
-    tables = {name for name in TABLES_OF_RUNS if draft.has(name)}
+    tables = {name for name in RUN_TABLES if draft.has(name)}
     if draft.has("structure.interface"):
         for name in sorted(tables & {"friction", "normal", "contact"}):
             instead = ""

@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
-from ..keys.contact import Contact, outermost_strip
-from .outlines import PIECES, check_outlines, flat_length
+from ..keys.contact import Contact, outermost_strip_distance
+from .outlines import PIECE_NAMES, check_outlines, find_flat_length
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
 from .scene_draft import SceneDraft
-from .selectors import ASPERITY_LAW, HERTZ_PEAKS, check_selector
+from .selectors import ASPERITY_LAW_SELECTOR, HERTZ_PEAK_DESCRIPTIONS, check_selector
 from .view import View
 
 # Height of a piece over its length. From 80 000 on, the stiffness of the piece is lost to round-off.
@@ -23,7 +23,7 @@ class PatchFacts(Facts):
     @cached_property
     def flat_length(self) -> float:
         """Length [m] over which both faces are flat and opposite; UNKNOWN if there is none."""
-        return flat_length(self)
+        return find_flat_length(self)
 
     @property
     def half_length(self) -> float:
@@ -48,7 +48,7 @@ class PatchFacts(Facts):
     @property
     def max_roll_offset(self) -> float:
         """Distance [m] from the middle of the patch to the middle of the outermost strip."""
-        return outermost_strip(self.width, self.strips.count)
+        return outermost_strip_distance(self.width, self.strips.count)
 
     @property
     def has_free_roll(self) -> bool:
@@ -176,7 +176,7 @@ LOAD_LINE_RULES = (
 )
 
 
-def patches(draft: SceneDraft) -> Iterator[tuple[str, Contact]]:
+def iterate_patches(draft: SceneDraft) -> Iterator[tuple[str, Contact]]:
     """Yield the dotted keys and tables of all patches: [contact] and those of interfaces."""
     if draft.tables.contact is not None:
         yield "contact", draft.tables.contact
@@ -187,13 +187,15 @@ def patches(draft: SceneDraft) -> Iterator[tuple[str, Contact]]:
 
 def check_patches(draft: SceneDraft) -> None:
     """Report mistakes inside [contact] and inside the patches of interfaces."""
-    for at, contact in patches(draft):
+    for at, contact in iterate_patches(draft):
         facts = PatchFacts(draft, at, contact)
         check_outlines(facts)
         apply_rules(draft, PATCH_RULES, facts)
         _check_coatings(facts)
         if contact.asperities is not None:
-            check_selector(Facts(draft, f"{at}.asperities", contact.asperities), ASPERITY_LAW)
+            check_selector(
+                Facts(draft, f"{at}.asperities", contact.asperities), ASPERITY_LAW_SELECTOR
+            )
         if facts.asperities.law == "hertz":
             _check_peaks(facts)
         if contact.load_line is not None:
@@ -205,7 +207,7 @@ def _check_coatings(patch: PatchFacts) -> None:
     pieces: list[tuple[str, Any, float]] = [
         (f"{patch.at}.coating.thickness", patch.coating, patch.height)
     ]
-    for name in PIECES:
+    for name in PIECE_NAMES:
         piece = patch[name]
         key = f"{patch.at}.{name}." + ("coating.thickness" if piece.coating else "height")
         if piece:
@@ -221,7 +223,11 @@ def _check_coatings(patch: PatchFacts) -> None:
 def _check_peaks(patch: PatchFacts) -> None:
     """Report peaks of law 'hertz' that are not described, described in part or described twice."""
     at = f"{patch.at}.asperities"
-    used = [keys for keys in HERTZ_PEAKS if patch.has_any(*(f"asperities.{key}" for key in keys))]
+    used = [
+        keys
+        for keys in HERTZ_PEAK_DESCRIPTIONS
+        if patch.has_any(*(f"asperities.{key}" for key in keys))
+    ]
     if len(used) > 1:
         second = next(key for key in used[1] if patch.has(f"asperities.{key}"))
         patch.draft.add_mistake(
@@ -232,6 +238,6 @@ def _check_peaks(patch: PatchFacts) -> None:
     others = (
         "" if used else "; instead you can give `from`, or rms_height, rms_slope and rms_curvature"
     )
-    for key in used[0] if used else HERTZ_PEAKS[0]:
+    for key in used[0] if used else HERTZ_PEAK_DESCRIPTIONS[0]:
         if not patch.has(f"asperities.{key}"):
             patch.draft.add_missing(f"{at}.{key}", f"law 'hertz' needs this key{others}")

@@ -8,15 +8,15 @@ from ...effects import Waveform, find_waveform
 from ..keys.tables import Drive
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
 from .scene_draft import SceneDraft
-from .selectors import WAVEFORM, check_selector, dependent_keys, unused_keys
+from .selectors import WAVEFORM_SELECTOR, check_selector, list_dependent_keys, list_unused_keys
 from .structure import check_driven_mass
 
 MIN_CYCLES = 0.25  # cycles of a run; a shorter one does not reach the first peak of the drive
 RELEASE_KEYS = {"displacement", "cycles", "duration"}  # keys of waveforms that a release also uses
-UNUSED_BY_KIND = {  # drive.kind -> keys that have no meaning, whatever the waveform
+KEYS_UNUSED_BY_KIND = {  # drive.kind -> keys that have no meaning, whatever the waveform
     "base": ("force", "mass"),
     "force": ("acceleration", "displacement"),
-    "free": ("waveform", *sorted(dependent_keys(WAVEFORM) - RELEASE_KEYS)),
+    "free": ("waveform", *sorted(list_dependent_keys(WAVEFORM_SELECTOR) - RELEASE_KEYS)),
 }
 
 
@@ -44,7 +44,7 @@ class DriveFacts(Facts):
         return self.kind == "base" and self.wave.takes("acceleration")
 
     @property
-    def can_be_displacement(self) -> bool:
+    def can_be_given_as_displacement(self) -> bool:
         """Whether a displacement may be given instead of this acceleration."""
         return self.is_accelerated and self.wave.takes("displacement")
 
@@ -76,17 +76,19 @@ SIZE_RULES = (
         "or drive.duration instead",
     ),
     Mistake(
-        lambda d: d.can_be_displacement and d.has("acceleration", "displacement"),
+        lambda d: d.can_be_given_as_displacement and d.has("acceleration", "displacement"),
         "drive.displacement",
         "`acceleration` and `displacement` exclude each other: keep one",
     ),
     Missing(
-        lambda d: d.can_be_displacement and not d.has_any("acceleration", "displacement"),
+        lambda d: d.can_be_given_as_displacement and not d.has_any("acceleration", "displacement"),
         "drive.acceleration",
         "or drive.displacement instead",
     ),
     Missing(
-        lambda d: d.is_accelerated and not d.can_be_displacement and not d.has("acceleration"),
+        lambda d: (
+            d.is_accelerated and not d.can_be_given_as_displacement and not d.has("acceleration")
+        ),
         "drive.acceleration",
         "waveform '{waveform}' needs this key",
     ),
@@ -189,10 +191,10 @@ def check_drive(draft: SceneDraft) -> None:
         return
     facts = DriveFacts(draft, "drive", drive)
     if facts.is_driven:
-        check_selector(facts, WAVEFORM)
+        check_selector(facts, WAVEFORM_SELECTOR)
     apply_rules(draft, SIZE_RULES, facts)
     check_driven_mass(draft)
-    for key in _unused_by_kind(drive):
+    for key in _list_keys_unused_by_kind(drive):
         if facts.has(key):
             draft.add_remark(
                 f"drive.{key}", f"has no meaning for kind '{drive.kind}' and is not used"
@@ -221,12 +223,12 @@ def _check_tones(drive: DriveFacts) -> None:
             )
 
 
-def unused_drive_keys(drive: Drive) -> set[str]:
+def list_unused_drive_keys(drive: Drive) -> set[str]:
     """Return the keys of [drive] that have no meaning for its kind or its waveform."""
-    by_waveform = unused_keys(drive, WAVEFORM) if drive.kind != "free" else ()
-    return {*_unused_by_kind(drive), *by_waveform}
+    by_waveform = list_unused_keys(drive, WAVEFORM_SELECTOR) if drive.kind != "free" else ()
+    return {*_list_keys_unused_by_kind(drive), *by_waveform}
 
 
-def _unused_by_kind(drive: Drive) -> tuple[str, ...]:
+def _list_keys_unused_by_kind(drive: Drive) -> tuple[str, ...]:
     """Return the keys of [drive] that have no meaning for its kind, whatever the waveform."""
-    return UNUSED_BY_KIND.get(drive.kind, ())
+    return KEYS_UNUSED_BY_KIND.get(drive.kind, ())

@@ -5,10 +5,10 @@ from __future__ import annotations
 from ...effects import law_has_trait, law_takes_key, laws_with_key, takes_stiffness_or_length
 from ..keys.contact import Contact
 from ..keys.tables import Friction
-from .methods import climbed_grooves
+from .methods import find_climbed_grooves
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
 from .scene_draft import SceneDraft
-from .selectors import LAW, check_selector
+from .selectors import LAW_SELECTOR, check_selector
 from .view import View
 
 
@@ -38,7 +38,7 @@ class LawFacts(Facts):
         return not self.has_unsupported_kinetic and self.kinetic > self.static
 
     @property
-    def order_needed(self) -> str:
+    def order_requirement(self) -> str:
         """Condition on `order` in words."""
         if self.has_trait("averaged"):
             return "> -1"
@@ -53,7 +53,7 @@ class LawFacts(Facts):
         return self.order <= -1 or (is_strict and self.order < 0)
 
     @property
-    def temperature_lacks(self) -> str:
+    def missing_temperature_keys(self) -> str:
         """Missing keys without which a surface temperature has no effect, in words."""
         if not self.rest_growth:
             return "keys for the growth of the bonds; add rest_growth and slip_growth"
@@ -65,9 +65,9 @@ class LawFacts(Facts):
         return takes_stiffness_or_length(self.table.law) and bool(self.stiffness)
 
     @property
-    def load_cause(self) -> str:
+    def load_change_description(self) -> str:
         """Cause of a changing load, as the scene writes it; "" for a constant load."""
-        return self.load_change or climbed_grooves(self.draft.tables)
+        return self.load_change or find_climbed_grooves(self.draft.tables)
 
 
 LAW_RULES = (
@@ -115,7 +115,7 @@ LAW_RULES = (
     Remark(
         lambda law: is_temperature_unused(law.table),
         "{at}.temperature",
-        "has no effect without {temperature_lacks}",
+        "has no effect without {missing_temperature_keys}",
     ),
     *(
         Missing(
@@ -125,22 +125,24 @@ LAW_RULES = (
         )
         for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth"))
     ),
-    Mistake(lambda law: law.is_order_wrong, "{at}.order", "must be {order_needed}, not {order}"),
+    Mistake(
+        lambda law: law.is_order_wrong, "{at}.order", "must be {order_requirement}, not {order}"
+    ),
     Mistake(
         lambda law: law.breakaway and law.reading == "report",
         "{at}.breakaway",
         "reading 'report' has no breakaway; use reading = 'stretch' or leave `breakaway` out",
     ),
     Mistake(
-        lambda law: law.has_unknown_springs and law.load_cause,
+        lambda law: law.has_unknown_springs and law.load_change_description,
         "{at}.stiffness",
-        "{load_cause} changes the load, and the number of springs in contact changes with the load; give bond_length "
-        "in place of stiffness",
+        "{load_change_description} changes the load, and the number of springs in contact changes "
+        "with the load; give bond_length in place of stiffness",
     ),
     Mistake(
         lambda law: (
             law.has_unknown_springs
-            and not law.load_cause
+            and not law.load_change_description
             and law.contact.approach
             and not law.contact.load
         ),
@@ -173,7 +175,7 @@ def check_laws(draft: SceneDraft) -> None:
 
 def _check_law(draft: SceneDraft, at: str, law: Friction, contact: Contact | None) -> None:
     facts = LawFacts(draft, at, law, contact)
-    check_selector(facts, LAW)
+    check_selector(facts, LAW_SELECTOR)
     apply_rules(draft, LAW_RULES, facts)
 
 

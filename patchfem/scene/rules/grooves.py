@@ -7,8 +7,8 @@ from typing import Any
 
 from ...effects import describe_law, is_bond_list, law_has_trait, law_supports, suggest_laws
 from ..keys import removed
-from .methods import lower_shapes, yaw_key
-from .rule_table import Facts, Mistake, apply_rules, unsupported
+from .methods import find_yaw_key, list_lower_shapes
+from .rule_table import Facts, Mistake, apply_rules, unsupported_rule
 from .scene_draft import SceneDraft
 
 
@@ -36,7 +36,7 @@ class GrooveFacts(Facts):
         return law_has_trait(self.law_table.law, "bonds")
 
     @property
-    def summed_key(self) -> str:
+    def key_against_recursion(self) -> str:
         """Key of the law that prevents the recursion over bonds; "" if nothing does."""
         law = self.scene.friction
         if not self.has_bonds or not (is_bond_list(self.law_table) or law.breakaway):
@@ -48,7 +48,10 @@ class GrooveFacts(Facts):
     @property
     def is_removed_law(self) -> bool:
         """Whether an earlier version computed the law over grooves."""
-        return not self.summed_key and self.law_table.law in removed.LAWS_OVER_GROOVES
+        return (
+            not self.key_against_recursion
+            and self.law_table.law in removed.LAWS_REMOVED_OVER_GROOVES
+        )
 
     @property
     def slope(self) -> float:
@@ -68,10 +71,10 @@ class GrooveFacts(Facts):
     @property
     def lower_shape(self) -> str:
         """Key of the first shape on the lower piece; "" if there is none."""
-        return next(iter(lower_shapes(self.draft.tables.contact)), "")
+        return next(iter(list_lower_shapes(self.draft.tables.contact)), "")
 
 
-LOCK_RULES = (
+LOCKING_RULES = (
     Mistake(
         lambda g: g.static * g.slope >= 1,
         "{at}.amplitude",
@@ -80,22 +83,29 @@ LOCK_RULES = (
         "{max_amplitude:.6g} m is needed, or a smaller `static`",
     ),
 )
-BESIDE_RULES = (
-    unsupported(lambda g: g.summed_key, "friction.{summed_key}", "with [{at}]", "recursion"),
+COMBINATION_RULES = (
+    unsupported_rule(
+        lambda g: g.key_against_recursion,
+        "friction.{key_against_recursion}",
+        "with [{at}]",
+        "recursion",
+    ),
     Mistake(
         lambda g: g.is_removed_law,
         "friction.law",
         "{law} with [{at}] was removed in patchfem 1.0; " + suggest_laws("grooves"),
     ),
-    unsupported(
+    unsupported_rule(
         lambda g: (
-            not g.summed_key and not g.is_removed_law and not law_supports(g.law_table, "grooves")
+            not g.key_against_recursion
+            and not g.is_removed_law
+            and not law_supports(g.law_table, "grooves")
         ),
         "friction.law",
         "{law} with [{at}]",
         "{law_advice}",
     ),
-    unsupported(
+    unsupported_rule(
         lambda g: g.has_bonds and g.scene.accuracy.quadrature in ("direct", "truncated", "merged"),
         "accuracy.quadrature",
         "'{scene.accuracy.quadrature}' with [{at}]",
@@ -107,14 +117,14 @@ BESIDE_RULES = (
         "harmonic balance with [{at}] was removed in patchfem 1.0; leave `harmonics` out: method 'harmonic' then "
         "integrates in time until the motion repeats",
     ),
-    unsupported(
+    unsupported_rule(
         lambda g: g.scene.contact.holder.tangential_stiffness,
         "contact.holder.tangential_stiffness",
         "with [{at}]",
         "out",
     ),
-    unsupported(
-        lambda g: g.scene.contact.strips and (yaw_key(g.draft.tables) or g.compliance),
+    unsupported_rule(
+        lambda g: g.scene.contact.strips and (find_yaw_key(g.draft.tables) or g.compliance),
         "{at}",
         "with strips that yaw or are elastic",
         "either",
@@ -124,17 +134,17 @@ BESIDE_RULES = (
         "normal.amplitude",
         "a normal load that oscillates over grooves was removed in patchfem 1.0; leave one of the two out",
     ),
-    unsupported(
+    unsupported_rule(
         lambda g: g.load_change and g.load_change != "normal.amplitude",
         "{load_change}",
         "with [{at}]",
         "either",
     ),
-    unsupported(lambda g: g.lower_shape, "{lower_shape}", "'lower' with [{at}]", "shapes"),
-    unsupported(
+    unsupported_rule(lambda g: g.lower_shape, "{lower_shape}", "'lower' with [{at}]", "shapes"),
+    unsupported_rule(
         lambda g: g.scene.structure.stiffening, "structure.stiffening", "with [{at}]", "either"
     ),
-    unsupported(
+    unsupported_rule(
         lambda g: g.scene.structure.bonded.wavelength,
         "structure.bonded.wavelength",
         "with [{at}]",
@@ -145,7 +155,7 @@ BESIDE_RULES = (
 
 def check_grooves(draft: SceneDraft, kind: str) -> None:
     """Report mistakes of the grooves of a scene."""
-    at = groove_key(draft)
+    at = find_groove_key(draft)
     if not at or not kind:
         return
     if kind not in ("bench", "rig"):
@@ -157,18 +167,18 @@ def check_grooves(draft: SceneDraft, kind: str) -> None:
     law = draft.tables.friction
     if law is None or law.law is None:
         return
-    grooves = GrooveFacts(draft, at, groove_table(draft).table)
-    apply_rules(draft, LOCK_RULES, grooves)
+    grooves = GrooveFacts(draft, at, find_groove_table(draft).table)
+    apply_rules(draft, LOCKING_RULES, grooves)
     if kind == "bench" and grooves.lifted_mass:
         draft.add_remark(
             f"{at}.lifted_mass",
             "has no meaning with [slide], because a prescribed slide has no inertia, and is not used",
         )
     if grooves.amplitude:
-        apply_rules(draft, BESIDE_RULES, grooves)
+        apply_rules(draft, COMBINATION_RULES, grooves)
 
 
-def groove_key(draft: SceneDraft) -> str:
+def find_groove_key(draft: SceneDraft) -> str:
     """Return the key of the grooves of a scene; "" without grooves."""
     for name in ("contact", "normal"):
         if draft.values[name].grooves:
@@ -176,6 +186,6 @@ def groove_key(draft: SceneDraft) -> str:
     return ""
 
 
-def groove_table(draft: SceneDraft) -> Any:
+def find_groove_table(draft: SceneDraft) -> Any:
     """Return the view of the grooves of a scene; UNKNOWN without grooves."""
     return draft.values.contact.grooves or draft.values.normal.grooves

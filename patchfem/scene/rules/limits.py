@@ -23,14 +23,14 @@ from ..keys.contact import Contact
 from ..keys.tables import Friction, Tables
 from .methods import (
     check_method,
-    compliance_key,
-    load_change_words,
-    lower_shapes,
-    yaw_key,
+    describe_load_change,
+    find_compliance_key,
+    find_yaw_key,
+    list_lower_shapes,
 )
-from .rule_table import Facts, Missing, Mistake, apply_rules, unsupported
+from .rule_table import Facts, Missing, Mistake, apply_rules, unsupported_rule
 from .scene_draft import SceneDraft
-from .view import View, view
+from .view import View, wrap_value
 
 UNSUPPORTED_KEY = "structure.mode.lateral"  # no run supports this key yet
 
@@ -55,39 +55,39 @@ class JointFacts(Facts):
     ) -> None:
         super().__init__(draft, at, law)
         self.kind = kind
-        self.contact = view(contact)
+        self.contact = wrap_value(contact)
         self.patch_at = "contact" if at == "friction" else f"{at}.contact"
 
     def has_trait(self, trait: str) -> bool:
         """Return whether the law has a trait of `effects.LAWS[...].traits`."""
         return law_has_trait(self.table.law, trait)
 
-    def carries(self, *words: str) -> bool:
+    def supports(self, *words: str) -> bool:
         """Return whether the law supports all these words of `effects.LAWS[...].supports`."""
         return all(law_supports(self.table, word) for word in words)
 
     @property
-    def law_name(self) -> str:
+    def law_description(self) -> str:
         """Law in words, with the reading or the order that makes it a sum over all bonds."""
         return describe_law(self.table)
 
     @property
-    def is_listed(self) -> bool:
+    def is_bond_list(self) -> bool:
         """Whether the law is a sum over all bonds."""
         return is_bond_list(self.table)
 
     @property
-    def load_change_words(self) -> str:
+    def load_change_description(self) -> str:
         """Cause of the changing load in words."""
-        return load_change_words(self.load_change)
+        return describe_load_change(self.load_change)
 
     @cached_property
     def yaw(self) -> str:
         """Key of the first mode that yaws the patch; "" if none does."""
-        return yaw_key(self.draft.tables)
+        return find_yaw_key(self.draft.tables)
 
     @property
-    def summed_key(self) -> str:
+    def key_against_recursion(self) -> str:
         """Key of the law that prevents the recursion over bonds."""
         if self.reading == "report":
             return "reading"
@@ -120,17 +120,17 @@ class JointFacts(Facts):
     @property
     def has_lower_shape(self) -> bool:
         """Whether a shape lies on the lower piece."""
-        return bool(self.contact and lower_shapes(self.contact.table))
+        return bool(self.contact and list_lower_shapes(self.contact.table))
 
     @property
-    def unlisted_feature(self) -> str:
+    def feature_of_recursion(self) -> str:
         """Feature that only the recursion over bonds can compute, in words; "" if there is none."""
         if self.has_lower_shape:
             return "a shape on the lower piece"
         return "friction.breakaway" if self.breakaway else ""
 
     @property
-    def breakaway_place(self) -> str:
+    def breakaway_circumstance(self) -> str:
         """Circumstance in which a breakaway needs order = 1, in words; "" if there is none."""
         if self.kind == "rig":
             return "in a rig"
@@ -140,7 +140,7 @@ class JointFacts(Facts):
     def has_constant_pressure(self) -> bool:
         """Whether the law requires constant pressure: it has memory and supports no varying load."""
         has_own_form = self.has_trait("memoryless") or self.has_trait("bonds")
-        return not has_own_form and not self.carries("varying-load")
+        return not has_own_form and not self.supports("varying-load")
 
     @property
     def can_slip_in_strips(self) -> bool:
@@ -150,44 +150,49 @@ class JointFacts(Facts):
         """
         patch = self.contact
         is_coupled = patch.asperities.tangential_ratio or patch.holder.tangential_stiffness
-        has_elements = self.carries("pieces", "shear")
+        has_elements = self.supports("pieces", "shear")
         return bool(self.kind == "rig" and patch.shear and not is_coupled and has_elements)
 
     @property
-    def is_soft_strip(self) -> bool:
+    def lacks_partial_slip_of_strips(self) -> bool:
         """Whether partial slip of the strips would be needed and cannot be computed."""
         return bool(self.contact.strips and self.compliance) and not self.can_slip_in_strips
 
 
 MOTION_RULES = (
-    unsupported(
-        lambda j: j.kind == "rig" and j.quadrature and j.unlisted_feature and not j.is_listed,
+    unsupported_rule(
+        lambda j: (
+            j.kind == "rig" and j.quadrature and j.feature_of_recursion and not j.is_bond_list
+        ),
         "accuracy.quadrature",
-        "'{quadrature}' with {unlisted_feature} in a rig",
+        "'{quadrature}' with {feature_of_recursion} in a rig",
         "use 'recursion' or 'auto'",
     ),
-    unsupported(
+    unsupported_rule(
         lambda j: (
             j.kind == "bench"
             and j.quadrature == "merged"
-            and (j.unlisted_feature or j.scene.normal.amplitude)
+            and (j.feature_of_recursion or j.scene.normal.amplitude)
         ),
         "accuracy.quadrature",
         "'merged' with friction.breakaway, or with a pressure that changes at a point during the slide,",
         "use 'auto', 'direct' or 'truncated'",
     ),
-    unsupported(
+    unsupported_rule(
         lambda j: j.kind == "bench" and j.has_constant_pressure and j.scene.normal.amplitude,
         "normal.amplitude",
         "with law '{law}'",
         suggest_laws("varying-load"),
     ),
-    unsupported(
+    unsupported_rule(
         lambda j: (
-            j.has_trait("bonds") and j.breakaway and abs(j.order - 1) > 0 and j.breakaway_place
+            j.has_trait("bonds")
+            and j.breakaway
+            and abs(j.order - 1) > 0
+            and j.breakaway_circumstance
         ),
         "friction.breakaway",
-        "with order = {order:g} {breakaway_place}",
+        "with order = {order:g} {breakaway_circumstance}",
         "order",
     ),
     Mistake(
@@ -195,14 +200,16 @@ MOTION_RULES = (
         "{yaw}",
         "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide independently",
     ),
-    unsupported(
-        lambda j: j.kind == "rig" and j.yaw and j.contact.strips and not j.carries("joints"),
+    unsupported_rule(
+        lambda j: j.kind == "rig" and j.yaw and j.contact.strips and not j.supports("joints"),
         "{yaw}",
-        "in strips with {law_name}",
+        "in strips with {law_description}",
         "{joints_advice}",
     ),
-    unsupported(
-        lambda j: j.contact.strips and not j.is_soft_strip and j.has_trait("averaged"),
+    unsupported_rule(
+        lambda j: (
+            j.contact.strips and not j.lacks_partial_slip_of_strips and j.has_trait("averaged")
+        ),
         "contact.strips",
         "with law '{law}'",
         "out",
@@ -214,41 +221,45 @@ CHANGING_LOAD_RULES = (
         "{load_change}",
         "a single contact point cannot heave or pitch: use [contact] in place of [normal]",
     ),
-    unsupported(
-        lambda j: not j.has_trait("bonds") and not j.carries("varying-load"),
+    unsupported_rule(
+        lambda j: not j.has_trait("bonds") and not j.supports("varying-load"),
         "friction.law",
-        "'{law}' with {load_change_words}",
+        "'{law}' with {load_change_description}",
         suggest_laws("varying-load"),
     ),
-    unsupported(
-        lambda j: j.has_trait("bonds") and (j.breakaway or (j.is_listed and j.reading != "report")),
-        "friction.{summed_key}",
-        "with {load_change_words}",
+    unsupported_rule(
+        lambda j: (
+            j.has_trait("bonds") and (j.breakaway or (j.is_bond_list and j.reading != "report"))
+        ),
+        "friction.{key_against_recursion}",
+        "with {load_change_description}",
         "recursion",
     ),
-    unsupported(
-        lambda j: j.compliance and j.has_trait("set-valued") and j.carries("shear"),
+    unsupported_rule(
+        lambda j: j.compliance and j.has_trait("set-valued") and j.supports("shear"),
         "friction.law",
-        "'{law}' with {load_change_words} and {compliance}",
+        "'{law}' with {load_change_description} and {compliance}",
         "stiff",
     ),
-    unsupported(
+    unsupported_rule(
         lambda j: j.scene.structure.stiffening,
         "structure.stiffening",
-        "with {load_change_words}",
+        "with {load_change_description}",
         "either",
     ),
-    unsupported(
+    unsupported_rule(
         lambda j: j.scene.structure.bonded.wavelength,
         "structure.bonded.wavelength",
-        "with {load_change_words}",
+        "with {load_change_description}",
         "either",
     ),
-    unsupported(lambda j: j.contact.strips, "contact.strips", "with {load_change_words}", "either"),
-    unsupported(
+    unsupported_rule(
+        lambda j: j.contact.strips, "contact.strips", "with {load_change_description}", "either"
+    ),
+    unsupported_rule(
         lambda j: j.contact.asperities.law in ("exponential", "hertz"),
         "contact.asperities.law",
-        "'{contact.asperities.law}' with {load_change_words}",
+        "'{contact.asperities.law}' with {load_change_description}",
         "linear",
     ),
 )
@@ -261,21 +272,23 @@ COMPLIANCE_RULES = (
         "{initial_bonds:g} with order = {order:g} and {compliance} gives points that no force can move: in the law as "
         "printed in the report, (R/eps)^order is unbounded for bonds at rest; set initial_bonds = 0 or use order >= 0",
     ),
-    unsupported(
-        lambda j: not j.has_trait("bonds") and not j.carries("shear"),
+    unsupported_rule(
+        lambda j: not j.has_trait("bonds") and not j.supports("shear"),
         "{at}.law",
         "'{law}' with {compliance}",
         f"leave out {{compliance}}, or {suggest_laws('shear')}",
     ),
-    unsupported(
-        lambda j: j.has_trait("set-valued") and j.carries("shear") and -1 < j.kinetic < j.static,
+    unsupported_rule(
+        lambda j: j.has_trait("set-valued") and j.supports("shear") and -1 < j.kinetic < j.static,
         "{at}.kinetic",
         "{kinetic:g} below static = {static:g} with {compliance}",
         "kinetic",
     ),
 )
 STRIPS_RULES = (
-    unsupported(lambda j: j.is_soft_strip, "{patch_at}.strips", "with {compliance}", "either"),
+    unsupported_rule(
+        lambda j: j.lacks_partial_slip_of_strips, "{patch_at}.strips", "with {compliance}", "either"
+    ),
 )
 INTERFACE_RULES = (
     Missing(
@@ -283,7 +296,7 @@ INTERFACE_RULES = (
         "{at}.load",
         "or give this interface a patch with [structure.interface.contact]",
     ),
-    unsupported(
+    unsupported_rule(
         lambda j: j.spread and law_takes_key(j.table.law, "spread"),
         "{at}.spread",
         "with masses, where an interface has no width",
@@ -291,21 +304,21 @@ INTERFACE_RULES = (
     ),
 )
 INTERFACE_LAW_RULES = (
-    unsupported(
-        lambda j: j.has_others and not j.carries("joints"),
+    unsupported_rule(
+        lambda j: j.has_others and not j.supports("joints"),
         "{at}.law",
-        "{law_name} with other interfaces",
+        "{law_description} with other interfaces",
         "{joints_advice}",
     ),
-    unsupported(
-        lambda j: j.lateral and not j.carries("plane"),
+    unsupported_rule(
+        lambda j: j.lateral and not j.supports("plane"),
         "{at}.lateral",
-        "with {law_name}",
+        "with {law_description}",
         "{plane_advice}",
     ),
 )
 INTERFACE_PATCH_RULES = (
-    unsupported(
+    unsupported_rule(
         lambda j: j.lateral,
         "{at}.lateral",
         "with [structure.interface.contact]",
@@ -316,13 +329,13 @@ INTERFACE_PATCH_RULES = (
         "{at}.load",
         "[structure.interface.contact] has its own load; leave this key out",
     ),
-    unsupported(
+    unsupported_rule(
         lambda j: j.has("contact.approach"),
         "{patch_at}.approach",
         "with [[structure.interface]]",
         "give contact.load instead",
     ),
-    unsupported(
+    unsupported_rule(
         lambda j: j.has("contact.grooves"),
         "{patch_at}.grooves",
         "with [[structure.interface]]",
@@ -330,16 +343,16 @@ INTERFACE_PATCH_RULES = (
     ),
 )
 PATCH_LAW_RULES = (
-    unsupported(
-        lambda j: not j.has_others and not j.compliance and not j.carries("joints"),
+    unsupported_rule(
+        lambda j: not j.has_others and not j.compliance and not j.supports("joints"),
         "{at}.law",
-        "{law_name} with [structure.interface.contact]",
+        "{law_description} with [structure.interface.contact]",
         "{joints_advice}",
     ),
-    unsupported(
-        lambda j: j.compliance and not j.carries("pieces", "shear"),
+    unsupported_rule(
+        lambda j: j.compliance and not j.supports("pieces", "shear"),
         "{at}.law",
-        "{law_name} with {compliance}",
+        "{law_description} with {compliance}",
         f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}",
     ),
     *STRIPS_RULES,
@@ -366,13 +379,13 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
     apply_rules(draft, MOTION_RULES, joint)
     if kind == "rig" and joint.load_change:
         apply_rules(draft, CHANGING_LOAD_RULES, joint)
-        for key in lower_shapes(draft.tables.contact):
-            feature = f"'lower' with {joint.load_change_words}"
+        for key in list_lower_shapes(draft.tables.contact):
+            feature = f"'lower' with {joint.load_change_description}"
             draft.add_mistake(key, not_supported_message(feature, "shapes"))
     if joint.compliance:
         apply_rules(draft, COMPLIANCE_RULES, joint)
     if joint.contact:
-        _check_sides(joint, _needs_upper(joint))
+        _check_shape_sides(joint, _find_upper_piece_need(joint))
         apply_rules(draft, STRIPS_RULES, joint)
 
 
@@ -385,14 +398,14 @@ def _check_interface(draft: SceneDraft, at: str, interface: Any) -> None:
     if not joint.contact:
         return
     apply_rules(draft, INTERFACE_PATCH_RULES, joint)
-    _check_sides(joint, "with [[structure.interface]]")
+    _check_shape_sides(joint, "with [[structure.interface]]")
     if interface.law is not None:
         apply_rules(draft, PATCH_LAW_RULES, joint)
-        if joint.compliance and joint.carries("pieces", "shear"):
+        if joint.compliance and joint.supports("pieces", "shear"):
             apply_rules(draft, COMPLIANCE_RULES, joint)
 
 
-def _needs_upper(joint: JointFacts) -> str:
+def _find_upper_piece_need(joint: JointFacts) -> str:
     """Return what requires that the shapes lie on the upper piece, in words; "" if nothing does."""
     law = f"with law '{joint.law}'"
     if joint.has_trait("bonds"):
@@ -405,7 +418,7 @@ def _needs_upper(joint: JointFacts) -> str:
     return f"in a rig {law}"
 
 
-def _check_sides(joint: JointFacts, only_upper: str) -> None:
+def _check_shape_sides(joint: JointFacts, only_upper: str) -> None:
     """Report shapes on different pieces, or on the lower piece if this is not supported.
 
     `only_upper` says in words what requires the upper piece; "" if the shapes may lie on the lower one.
@@ -425,16 +438,16 @@ def _check_sides(joint: JointFacts, only_upper: str) -> None:
         )
         draft.add_mistake(key, message)
         return
-    lower = lower_shapes(joint.contact.table, joint.patch_at)
+    lower = list_lower_shapes(joint.contact.table, joint.patch_at)
     if lower and only_upper:
         draft.add_mistake(lower[0], not_supported_message(f"'lower' {only_upper}", "shapes"))
 
 
-def refuse_lateral_slide(tables: Tables) -> str:
+def find_lateral_slide_obstacle(tables: Tables) -> str:
     """Return why a bench cannot follow a path file with lateral motion; "" if it can."""
     law = tables.friction
     scene = View(tables)
-    compliance = compliance_key(law, tables)
+    compliance = find_compliance_key(law, tables)
     either = ALTERNATIVES["either"]
     obstacles = (
         (
@@ -445,7 +458,7 @@ def refuse_lateral_slide(tables: Tables) -> str:
         (scene.friction.spread, "friction.spread", either),
         (scene.friction.breakaway, "friction.breakaway", either),
         (compliance, compliance, either),
-        (lower_shapes(tables.contact), "a shape on the lower piece", ALTERNATIVES["shapes"]),
+        (list_lower_shapes(tables.contact), "a shape on the lower piece", ALTERNATIVES["shapes"]),
         (scene.normal.amplitude, "normal.amplitude", either),
     )
     for is_there, feature, instead in obstacles:

@@ -29,7 +29,7 @@ class Joint(NamedTuple):
     compliance: str
 
 
-class Motion(NamedTuple):
+class MotionFeatures(NamedTuple):
     """Features of a scene that decide which engines can compute its motion.
 
     A feature that is a text is "" if the scene does not have it.
@@ -64,19 +64,19 @@ class Motion(NamedTuple):
         return self.spring.endswith("grooves]")
 
 
-class Support(NamedTuple):
+class EngineSupport(NamedTuple):
     """Features that an engine supports.
 
     - law: word of `effects.LAWS[...].supports` that every friction law must carry; "" for any law.
-    - features: names of FEATURES, separated by blanks.
+    - features: names of FEATURE_FINDERS, separated by blanks.
     """
 
     law: str
     features: str
 
 
-# Feature -> function of a Motion that returns the words after the name of the engine in a message; "" without it.
-FEATURES = {
+# Feature -> function of MotionFeatures that returns the words after the name of the engine in a message; "" without it.
+FEATURE_FINDERS = {
     "no-law": lambda motion: "" if motion.joints else "for law 'none'",
     "load": lambda motion: motion.load_change,
     "yaw": lambda motion: "with strips that yaw" if motion.strips_yaw else "",
@@ -94,36 +94,36 @@ FEATURES = {
     "faces": lambda motion: "with several interfaces" if len(motion.joints) > 1 else "",
     "levels": lambda motion: "with waveform 'levels'" if motion.waveform.has_levels else "",
 }
-SUPPORT = {  # engine of a rig -> what it supports; `runs.rig.engines` refers to these names
-    "exact": Support("exact", "no-law yaw faces levels"),
-    "piecewise": Support("pieces", "parts faces levels"),
-    "smooth": Support("", ""),
-    "march": Support("", " ".join(FEATURES)),
-    "harmonic": Support("", "no-law parts grooves spring faces levels"),
+ENGINE_SUPPORT = {  # engine of a rig -> what it supports; `runs.rig.engines` refers to these names
+    "exact": EngineSupport("exact", "no-law yaw faces levels"),
+    "piecewise": EngineSupport("pieces", "parts faces levels"),
+    "smooth": EngineSupport("", ""),
+    "march": EngineSupport("", " ".join(FEATURE_FINDERS)),
+    "harmonic": EngineSupport("", "no-law parts grooves spring faces levels"),
 }
 EXACT_ENGINES = ("exact", "piecewise")  # engines of accuracy.method = "exact"
-METHOD = "accuracy.method"
+METHOD_KEY = "accuracy.method"
 
 
-def unsupported_feature(engine: str, motion: Motion) -> str:
+def find_unsupported_feature(engine: str, motion: MotionFeatures) -> str:
     """Return the first feature of a motion that an engine does not support; "" if none."""
-    return first_unsupported(SUPPORT[engine], motion)
+    return find_first_unsupported(ENGINE_SUPPORT[engine], motion)
 
 
-def first_unsupported(support: Support, motion: Motion) -> str:
+def find_first_unsupported(support: EngineSupport, motion: MotionFeatures) -> str:
     """Return the first feature of a motion that is not supported, in words; "" if none."""
-    joint = _unsupported_joint(support, motion)
+    joint = _find_unsupported_joint(support, motion)
     if joint is not None:
         compliance = f" with {joint.compliance}" if joint.compliance else ""
         return f"for law '{joint.law.law}'{compliance}"
-    for name, describe in FEATURES.items():
+    for name, describe in FEATURE_FINDERS.items():
         words = describe(motion)
         if words and name not in support.features.split():
             return words
     return ""
 
 
-def _unsupported_joint(support: Support, motion: Motion) -> Joint | None:
+def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> Joint | None:
     """Return the first interface whose friction law is not supported; None if all are."""
     if not support.law:
         return None
@@ -145,36 +145,38 @@ def _is_supported(word: str, joint: Joint) -> bool:
 def check_method(draft: SceneDraft, kind: str) -> None:
     """Report an accuracy.method that cannot solve the scene; remark on one that is not used."""
     method = draft.values.accuracy.method
-    if method in unused_methods(kind):
-        draft.add_remark(METHOD, f"= '{method}' has no meaning in a {kind} scene and is not used")
-    check = {"exact": _refuse_exact, "harmonic": _refuse_harmonic}.get(method)
+    if method in list_unused_methods(kind):
+        draft.add_remark(
+            METHOD_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
+        )
+    check = {"exact": _find_exact_obstacle, "harmonic": _find_harmonic_obstacle}.get(method)
     if check and kind in ("rig", "linear"):
-        reason = check(motion_features(draft.tables, kind))
+        reason = check(find_motion_features(draft.tables, kind))
         if reason:
-            draft.add_mistake(METHOD, reason)
+            draft.add_mistake(METHOD_KEY, reason)
 
 
-def unused_methods(kind: str) -> tuple[str, ...]:
+def list_unused_methods(kind: str) -> tuple[str, ...]:
     """Return the methods without meaning in a kind of scene that has no time integration."""
     return ("exact", "march") if kind in ("patch", "bench") else ()
 
 
-def motion_features(tables: Tables, kind: str) -> Motion:
+def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
     """Return the features of a scene, as far as its tables could be read."""
     scene = View(tables)
     if kind != "rig":
-        return Motion(
-            [], "", False, nonlinear_spring(tables), find_waveform(tables.drive), tables.drive
+        return MotionFeatures(
+            [], "", False, find_nonlinear_spring(tables), find_waveform(tables.drive), tables.drive
         )
     tables_of_laws = [tables.friction, *(view.table for view in scene.structure.interface)]
     laws = [law for law in tables_of_laws if law is not None and law.law is not None]
-    load_change = load_change_key(tables) if laws else ""
-    lower = lower_shapes(tables.contact)
-    return Motion(
-        joints=[Joint(law, compliance_key(law, tables)) for law in laws],
-        load_change=load_change and f"with {load_change_words(load_change)}",
-        strips_yaw=bool(scene.contact.strips and yaw_key(tables)),
-        spring=nonlinear_spring(tables) or climbed_grooves(tables),
+    load_change = find_load_change_key(tables) if laws else ""
+    lower = list_lower_shapes(tables.contact)
+    return MotionFeatures(
+        joints=[Joint(law, find_compliance_key(law, tables)) for law in laws],
+        load_change=load_change and f"with {describe_load_change(load_change)}",
+        strips_yaw=bool(scene.contact.strips and find_yaw_key(tables)),
+        spring=find_nonlinear_spring(tables) or find_climbed_grooves(tables),
         waveform=find_waveform(tables.drive),
         drive=tables.drive,
         lower_shape=f"{lower[0]} = 'lower'" if lower else "",
@@ -182,19 +184,19 @@ def motion_features(tables: Tables, kind: str) -> Motion:
     )
 
 
-def compliance_key(law: Any, tables: Tables) -> str:
+def find_compliance_key(law: Any, tables: Tables) -> str:
     """Return the key that allows partial slip of the patch under a law; "" if there is none."""
     owner = law if isinstance(law, Interface) else tables.contact
     return owner.compliance_key if owner is not None else ""
 
 
-def lower_shapes(contact: Any, at: str = "contact") -> list[str]:
+def list_lower_shapes(contact: Any, at: str = "contact") -> list[str]:
     """Return the keys `on` of the shapes that lie on the lower piece."""
     shapes = contact.shapes if contact is not None else {}
     return [f"{at}.{name}.on" for name, shape in shapes.items() if shape.on == "lower"]
 
 
-def nonlinear_spring(tables: Tables) -> str:
+def find_nonlinear_spring(tables: Tables) -> str:
     """Return the key of the nonlinear spring of the rig; "" without one."""
     structure = View(tables).structure
     if structure.stiffening:
@@ -202,7 +204,7 @@ def nonlinear_spring(tables: Tables) -> str:
     return "structure.bonded.wavelength" if structure.bonded.wavelength else ""
 
 
-def climbed_grooves(tables: Tables) -> str:
+def find_climbed_grooves(tables: Tables) -> str:
     """Return the key of the grooves that the upper piece climbs; "" without or with flat ones."""
     for name in ("contact", "normal"):
         if View(tables)[name].grooves.amplitude:
@@ -210,7 +212,7 @@ def climbed_grooves(tables: Tables) -> str:
     return ""
 
 
-def yaw_key(tables: Tables) -> str:
+def find_yaw_key(tables: Tables) -> str:
     """Return the key of the first mode that yaws the patch; "" if none does."""
     for index, mode in enumerate(View(tables).structure.mode):
         if mode.yaw:
@@ -218,7 +220,7 @@ def yaw_key(tables: Tables) -> str:
     return ""
 
 
-def load_change_key(tables: Tables) -> str:
+def find_load_change_key(tables: Tables) -> str:
     """Return the key by which the load of a rig changes; "" if the load is constant."""
     scene = View(tables)
     if scene.normal.amplitude:
@@ -230,22 +232,26 @@ def load_change_key(tables: Tables) -> str:
     return ""
 
 
-def load_change_words(key: str) -> str:
+def describe_load_change(key: str) -> str:
     """Return the cause of a changing load, such as normal.amplitude or "a mode's pitch"."""
     return key if key == "normal.amplitude" else f"a mode's {key.rpartition('.')[2]}"
 
 
-def _refuse_exact(motion: Motion) -> str:
+def _find_exact_obstacle(motion: MotionFeatures) -> str:
     """Return why no exact solution of a motion exists; "" if there is one."""
-    reasons = {engine: unsupported_feature(engine, motion) for engine in EXACT_ENGINES}
+    reasons = {engine: find_unsupported_feature(engine, motion) for engine in EXACT_ENGINES}
     if not all(reasons.values()):
         return ""
-    carried = [name for name in EXACT_ENGINES if _unsupported_joint(SUPPORT[name], motion) is None]
+    carried = [
+        name
+        for name in EXACT_ENGINES
+        if _find_unsupported_joint(ENGINE_SUPPORT[name], motion) is None
+    ]
     why = reasons[carried[0] if carried else "exact"]
     return f"no exact solution exists {why}; use 'march' or leave `method` out"
 
 
-def _refuse_harmonic(motion: Motion) -> str:
+def _find_harmonic_obstacle(motion: MotionFeatures) -> str:
     """Return why harmonic balance cannot find the steady motion; "" if it can."""
     drive = motion.drive
     is_transient = motion.waveform.name and not motion.waveform.has_steady_motion
@@ -260,15 +266,15 @@ def _refuse_harmonic(motion: Motion) -> str:
             "'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
             "drive.displacement"
         )
-    if feature := unsupported_feature("harmonic", motion):
+    if feature := find_unsupported_feature("harmonic", motion):
         return not_supported_message(f"'harmonic' {feature}", "march")
-    is_exact = not all(unsupported_feature(engine, motion) for engine in EXACT_ENGINES)
+    is_exact = not all(find_unsupported_feature(engine, motion) for engine in EXACT_ENGINES)
     if not motion.joints or is_exact or motion.has_grooves:
         return ""  # with grooves, the method integrates in time until the motion repeats
-    return _refuse_harmonic_law(motion)
+    return _find_harmonic_law_obstacle(motion)
 
 
-def _refuse_harmonic_law(motion: Motion) -> str:
+def _find_harmonic_law_obstacle(motion: MotionFeatures) -> str:
     """Return why harmonic balance cannot use the law of a rig; "" if it can."""
     law = motion.joints[0].law
     if len(motion.joints) > 1:

@@ -5,23 +5,23 @@ from typing import Any
 from .rule_table import Facts
 from .view import UNKNOWN, View
 
-PIECES = ("upper", "lower")
+PIECE_NAMES = ("upper", "lower")
 END_KEYS = ("chamfer", "end_radius")
 # An end, or a difference of lengths, below this fraction of the length of a piece is smaller than any element.
 MIN_END_FRACTION = 1e-5
 
 
-def piece_length(contact: View, name: str) -> float:
+def find_piece_length(contact: View, name: str) -> float:
     """Return the length [m] of the piece "upper" or "lower"."""
     return contact[name].length or contact.length
 
 
-def flat_length(patch: View) -> float:
+def find_flat_length(patch: View) -> float:
     """Return the length [m] over which both faces are flat and opposite; UNKNOWN without one."""
     lengths = []
-    for name in PIECES:
+    for name in PIECE_NAMES:
         end = max(patch[name][key] or 0.0 for key in END_KEYS) if patch[name] else 0.0
-        length = piece_length(patch, name) - 2 * end
+        length = find_piece_length(patch, name) - 2 * end
         if not length > 0:
             return UNKNOWN
         lengths.append(length)
@@ -32,12 +32,12 @@ def check_outlines(patch: Facts) -> None:
     """Report mistakes in the lengths and the ends of the two pieces of a patch."""
     draft = patch.draft
     at = patch.at
-    for name in PIECES:
+    for name in PIECE_NAMES:
         if patch[name]:
             _check_ends(patch, name)
             _check_outline_keys_with_mesh(patch, name)
-    lengths = [piece_length(patch, name) for name in PIECES]
-    written = [name for name in PIECES if patch.has(f"{name}.length")]
+    lengths = [find_piece_length(patch, name) for name in PIECE_NAMES]
+    written = [name for name in PIECE_NAMES if patch.has(f"{name}.length")]
     difference = abs(lengths[0] - lengths[1])
     if written and 0 < difference < MIN_END_FRACTION * max(lengths):
         draft.add_mistake(
@@ -68,7 +68,7 @@ def _check_ends(patch: Facts, name: str) -> None:
     draft = patch.draft
     at = f"{patch.at}.{name}"
     piece: Any = patch[name]
-    length = piece_length(patch, name)
+    length = find_piece_length(patch, name)
     height = piece.height or patch.height
     coating = piece.coating or patch.coating
     thickness = getattr(coating, "thickness", None) or 0.0

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 from ...effects import not_supported_message
 from ..keys.types import Table
-from .methods import compliance_key, load_change_key
-from .scene_draft import SceneDraft, written_inside
+from .methods import find_compliance_key, find_load_change_key
+from .scene_draft import SceneDraft, find_value
 from .view import View
 
 
@@ -46,17 +46,17 @@ class Facts(View):
     @cached_property
     def load_change(self) -> str:
         """Key by which the load changes; "" if it is constant."""
-        return load_change_key(self.draft.tables)
+        return find_load_change_key(self.draft.tables)
 
     @cached_property
     def compliance(self) -> str:
         """Key of the compliance that allows partial slip of the patch; "" if there is none."""
-        return compliance_key(self.table, self.draft.tables)
+        return find_compliance_key(self.table, self.draft.tables)
 
     def has(self, *names: str) -> bool:
         """Return whether all of these keys of the table are written."""
         for name in names:
-            if written_inside(self._written, name) is None:
+            if find_value(self._written, name) is None:
                 return False
         return True
 
@@ -85,7 +85,7 @@ Missing = partial(Rule, SceneDraft.add_missing)
 Remark = partial(Rule, SceneDraft.add_remark)
 
 
-def unsupported(condition: Callable, key: str, feature: str, instead: str) -> Rule:
+def unsupported_rule(condition: Callable, key: str, feature: str, instead: str) -> Rule:
     """Return the rule for a combination that is not supported yet.
 
     Parameters

@@ -8,17 +8,18 @@ from functools import lru_cache
 from typing import Any
 
 from ...exceptions import PatchfemError
-from ..keys.lookup import find_key, requirement
+from ..keys.lookup import describe_requirement, find_key
 from ..keys.tables import Tables
 from ..keys.types import build_table
-from ..lines import count_from_one, split_key
+from ..lines import number_items_from_one, split_key
 from .view import View
 
 # sort order of the mistakes of --set, which are listed after those of all lines of a file
-SET_ORDER = 10**9
-MAX_WORD = 200  # characters; no key, unit or file name is as long, so a message cuts a longer word
-N_SHOWN = 60  # characters of a word longer than MAX_WORD that a message shows
-_LONG_WORD = re.compile(rf"[^\s/\\:]{{{MAX_WORD},}}")
+SET_MISTAKE_ORDER = 10**9
+# characters; no key, unit or file name is as long, so a message cuts a longer word
+MAX_WORD_CHARACTERS = 200
+N_SHOWN_CHARACTERS = 60  # characters of a word longer than MAX_WORD_CHARACTERS that a message shows
+_LONG_WORD_PATTERN = re.compile(rf"[^\s/\\:]{{{MAX_WORD_CHARACTERS},}}")
 
 
 class SceneError(PatchfemError):
@@ -82,23 +83,23 @@ class SceneDraft:
 
     def written_value(self, key: str) -> Any:
         """Return the plain value at a dotted key, with items by number; None without a value."""
-        return written_inside(self.raw, key)
+        return find_value(self.raw, key)
 
     def has_set_key(self, key: str) -> bool:
         """Return whether a key in the notation of --set, with items by name or number, is written."""
         value: Any = self.raw
         for piece in split_key(key):
-            value = find_inner(value, piece)
+            value = find_item_or_value(value, piece)
         return value is not None
 
     def add_mistake(self, key: str, message: str) -> None:
         """Add a mistake at the line of a key, or at that of the nearest table above it."""
         order, place = self._locate(key)
-        self._add(order, place, count_from_one(f"{self.display_key(key)}: {message}"))
+        self._add(order, place, number_items_from_one(f"{self.display_key(key)}: {message}"))
 
     def add_missing(self, key: str, reason: str) -> None:
         """Add a missing key as a mistake at the line of its table."""
-        needed = requirement(*find_key(key))
+        needed = describe_requirement(*find_key(key))
         clauses = dict.fromkeys(filter(None, ("missing", needed, reason)))
         self.add_mistake(key, "; ".join(clauses))
 
@@ -106,13 +107,13 @@ class SceneDraft:
         """Add a missing table as a mistake of the whole file."""
         self._add(0, self.path, f"missing [{name}]: {reason}")
 
-    def add_bad_set(self, text: str) -> None:
+    def add_set_mistake(self, text: str) -> None:
         """Add a --set that cannot be applied as a mistake."""
-        self._add(SET_ORDER, "--set", text)
+        self._add(SET_MISTAKE_ORDER, "--set", text)
 
     def add_remark(self, key: str, sentence: str) -> None:
         """Add a remark on a key that is not a mistake; `sentence` follows the name of the key."""
-        remark = count_from_one(f"{self.display_key(key)} {sentence}")
+        remark = number_items_from_one(f"{self.display_key(key)} {sentence}")
         if remark not in self.remarks:
             self.remarks.append(remark)
 
@@ -140,19 +141,19 @@ class SceneDraft:
         pieces = key.split(".")
         paths = [".".join(pieces[:count]) for count in range(len(pieces), 0, -1)]
         if self.sets.intersection(paths):
-            return SET_ORDER, "--set"
+            return SET_MISTAKE_ORDER, "--set"
         line = next((self.lines[path] for path in paths if path in self.lines), 0)
         return line, f"{self.path}:{line}" if line else self.path
 
     def _add(self, order: int, place: str, text: str) -> None:
-        text = _LONG_WORD.sub(lambda word: f"{word[0][:N_SHOWN]}...", text)
+        text = _LONG_WORD_PATTERN.sub(lambda word: f"{word[0][:N_SHOWN_CHARACTERS]}...", text)
         printable = "".join(sign if sign.isprintable() else " " for sign in text)
         self._mistakes.setdefault((order, f"{place}: {printable}"))
 
 
-def written_inside(value: Any, key: str) -> Any:
+def find_value(value: Any, key: str) -> Any:
     """Return the value at a dotted key of a plain table, with items by number; None without one."""
-    for piece in _pieces(key):
+    for piece in _split_at_dots(key):
         if isinstance(value, dict):
             value = value.get(piece)
         elif isinstance(value, list) and piece.isdecimal() and int(piece) < len(value):
@@ -162,7 +163,7 @@ def written_inside(value: Any, key: str) -> Any:
     return value
 
 
-def find_inner(holder: Any, piece: str) -> Any:
+def find_item_or_value(holder: Any, piece: str) -> Any:
     """Return the value under a key, name or number of a plain table or array; None without one."""
     if isinstance(holder, dict):
         return holder.get(piece)
@@ -175,5 +176,5 @@ def find_inner(holder: Any, piece: str) -> Any:
 
 
 @lru_cache(4096)
-def _pieces(key: str) -> tuple[str, ...]:
+def _split_at_dots(key: str) -> tuple[str, ...]:
     return tuple(key.split("."))

@@ -10,15 +10,15 @@ from pydantic import BaseModel
 from ... import effects
 from ..keys.contact import Asperities
 from ..keys.tables import Drive, Friction, Slide
-from ..keys.types import keys
+from ..keys.types import attributes_by_key
 from .rule_table import Facts
 
-HERTZ_PEAKS = (  # alternative descriptions of the peaks of law 'hertz'
+HERTZ_PEAK_DESCRIPTIONS = (  # alternative descriptions of the peaks of law 'hertz'
     ("radius", "density", "height_deviation"),
     ("from",),
     ("rms_height", "rms_slope", "rms_curvature"),
 )
-HAS_OWN_RULE = ("kinetic", "spread")  # unused keys of [friction] that other rules report
+KEYS_WITH_OWN_RULE = ("kinetic", "spread")  # unused keys of [friction] that other rules report
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -36,8 +36,8 @@ class Selector:
     choices: dict[str, tuple[str, str]]
 
 
-LAW = Selector(Friction, "law", {name: law.keys for name, law in effects.LAWS.items()})
-SLIDE_KIND = Selector(
+LAW_SELECTOR = Selector(Friction, "law", {name: law.keys for name, law in effects.LAWS.items()})
+SLIDE_KIND_SELECTOR = Selector(
     Slide,
     "kind",
     {
@@ -48,7 +48,7 @@ SLIDE_KIND = Selector(
         "file": ("file", ""),
     },
 )
-ASPERITY_LAW = Selector(
+ASPERITY_LAW_SELECTOR = Selector(
     Asperities,
     "law",
     {
@@ -60,11 +60,15 @@ ASPERITY_LAW = Selector(
         ),
     },
 )
-WAVEFORM = Selector(
+WAVEFORM_SELECTOR = Selector(
     Drive, "waveform", {name: waveform.keys for name, waveform in effects.WAVEFORMS.items()}
 )
 # tables whose selector the schema and the suggestions explain, by their dotted key
-SELECTORS = {"friction": LAW, "slide": SLIDE_KIND, "contact.asperities": ASPERITY_LAW}
+SELECTORS = {
+    "friction": LAW_SELECTOR,
+    "slide": SLIDE_KIND_SELECTOR,
+    "contact.asperities": ASPERITY_LAW_SELECTOR,
+}
 
 
 def split_keys(words: str) -> list[str]:
@@ -72,19 +76,23 @@ def split_keys(words: str) -> list[str]:
     return words.replace("|", " ").split()
 
 
-def unused_keys(table: BaseModel, selector: Selector) -> tuple[str, ...]:
+def list_unused_keys(table: BaseModel, selector: Selector) -> tuple[str, ...]:
     """Return the keys of a table that depend on the selector and have no meaning for its value."""
-    return _unused_keys(type(table), selector, getattr(table, selector.key))
+    return _list_keys_unused_by_value(type(table), selector, getattr(table, selector.key))
 
 
 @cache
-def _unused_keys(model: type[BaseModel], selector: Selector, value: str) -> tuple[str, ...]:
+def _list_keys_unused_by_value(
+    model: type[BaseModel], selector: Selector, value: str
+) -> tuple[str, ...]:
     used = split_keys(" ".join(selector.choices[value]))
-    return tuple(sorted((dependent_keys(selector) - set(used)) & keys(model).keys()))
+    return tuple(
+        sorted((list_dependent_keys(selector) - set(used)) & attributes_by_key(model).keys())
+    )
 
 
 @cache
-def dependent_keys(selector: Selector) -> frozenset[str]:
+def list_dependent_keys(selector: Selector) -> frozenset[str]:
     """Return the keys that at least one value of a selector requires or uses."""
     return frozenset(split_keys(" ".join(map(" ".join, selector.choices.values()))))
 
@@ -115,6 +123,6 @@ def check_selector(facts: Facts, selector: Selector) -> None:
                 f"{facts.at}.{written[-1]}",
                 f"{reason} takes either this key or {written[0]}, not both; leave one of the two keys out",
             )
-    for key in unused_keys(facts.table, selector):
-        if facts.has(key) and key not in HAS_OWN_RULE:
+    for key in list_unused_keys(facts.table, selector):
+        if facts.has(key) and key not in KEYS_WITH_OWN_RULE:
             draft.add_remark(f"{facts.at}.{key}", f"has no meaning for {reason} and is not used")

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 
 from ...effects import find_waveform, not_supported_message
 from ..keys.tables import Tables
-from ..keys.types import choices
+from ..keys.types import advise_on_name
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
 from .scene_draft import SceneDraft
 
-ARRAY_ENDINGS = (".npz", ".mat")
-UNIVERSAL_ENDINGS = (".uff", ".unv")
+ARRAY_EXTENSIONS = (".npz", ".mat")
+UNIVERSAL_EXTENSIONS = (".uff", ".unv")
 # Endings of matrices from finite-element programs, for [structure.reduced].
-MATRIX_ENDINGS = (
+MATRIX_EXTENSIONS = (
     ".mtx",
     ".mat",
     ".npz",
@@ -26,14 +26,15 @@ MATRIX_ENDINGS = (
 )
 # Damping ratio at which a free oscillation decays to a few per cent within one cycle; a larger one is probably a
 # wrong unit, because 1 % is 0.01.
-HEAVY_DAMPING = 0.5
+MAX_USUAL_DAMPING = 0.5
 # Excess over 1 of the sum of squared base participations that round-off of the mode shapes can cause.
 BASE_PARTICIPATION_TOL = 1e-9
-PLACE_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
-DESCRIPTIONS = ("mode", "masses", "file", "reduced")  # keys that describe a rig; a scene has one
+LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
+# keys that describe a rig; a scene has one
+DESCRIPTION_KEYS = ("mode", "masses", "file", "reduced")
 
 
-class Coordinates(NamedTuple):
+class CoordinateNumbers(NamedTuple):
     """Coordinates to which the numbers in `between` and `mass` refer.
 
     - number: number of masses or boundary coordinates; None if there are none, or if their number is not
@@ -47,7 +48,7 @@ class Coordinates(NamedTuple):
     key: str
 
     @classmethod
-    def from_structure(cls, structure: Any) -> Coordinates:
+    def from_structure(cls, structure: Any) -> CoordinateNumbers:
         """Return the coordinates to which the numbers in a table [structure] refer."""
         if structure.reduced is not None:
             number = len(structure.reduced.boundary or ()) or None
@@ -61,12 +62,12 @@ class StructureFacts(Facts):
 
     @cached_property
     def descriptions(self) -> list[str]:
-        """Keys of DESCRIPTIONS that are written."""
-        return [key for key in DESCRIPTIONS if self.has(key)]
+        """Keys of DESCRIPTION_KEYS that are written."""
+        return [key for key in DESCRIPTION_KEYS if self.has(key)]
 
     @property
     def second_description(self) -> str:
-        """Key of DESCRIPTIONS that is one too many; "" if there is none."""
+        """Key of DESCRIPTION_KEYS that is one too many; "" if there is none."""
         return self.descriptions[1] if len(self.descriptions) > 1 else ""
 
     @property
@@ -87,7 +88,7 @@ class StructureFacts(Facts):
     @property
     def is_universal(self) -> bool:
         """Whether structure.file is a universal file."""
-        return self.ending in UNIVERSAL_ENDINGS
+        return self.extension in UNIVERSAL_EXTENSIONS
 
     @property
     def has_masses(self) -> bool:
@@ -101,14 +102,14 @@ class StructureFacts(Facts):
         return next((name for k, name in enumerate(boundary) if name in boundary[:k]), None)
 
     @property
-    def ending(self) -> str:
+    def extension(self) -> str:
         """Ending of structure.file in lower case; "" without a file."""
-        return file_ending(self.file) if self.file else ""
+        return find_file_extension(self.file) if self.file else ""
 
     @property
-    def ending_advice(self) -> str:
-        """Advice on an ending of structure.file that cannot be read."""
-        return choices(self.ending, (*ARRAY_ENDINGS, ".uff"))
+    def extension_advice(self) -> str:
+        """Advice on an extension of structure.file that cannot be read."""
+        return advise_on_name(self.extension, (*ARRAY_EXTENSIONS, ".uff"))
 
     @property
     def n_interfaces(self) -> int:
@@ -180,7 +181,7 @@ DESCRIPTION_RULES = (
             f"structure.{key}",
             "names a place in a file of modes or responses, but the scene has no such file; give structure.file",
         )
-        for key in PLACE_KEYS
+        for key in LOCATION_KEYS
     ),
     Remark(
         lambda s: s.descriptions in (["masses"], ["reduced"]) and s.has("moving_mass"),
@@ -190,17 +191,17 @@ DESCRIPTION_RULES = (
 )
 FILE_RULES = (
     Mistake(
-        lambda s: s.file and s.ending not in (*ARRAY_ENDINGS, *UNIVERSAL_ENDINGS),
+        lambda s: s.file and s.extension not in (*ARRAY_EXTENSIONS, *UNIVERSAL_EXTENSIONS),
         "structure.file",
-        "the name ends in '{ending}'; {ending_advice}: matrices or modes as arrays, or universal files",
+        "the name ends in '{extension}'; {extension_advice}: matrices or modes as arrays, or universal files",
     ),
     *(
         Mistake(
             lambda s, key=key: s.file and not s.is_universal and s.has(key),
             f"structure.{key}",
-            f"names a place in a universal file; a {{ending}} file contains the array {key.removesuffix('_at')}",
+            f"names a place in a universal file; a {{extension}} file contains the array {key.removesuffix('_at')}",
         )
-        for key in PLACE_KEYS
+        for key in LOCATION_KEYS
     ),
     Missing(
         lambda s: s.is_universal and not s.has("moving_mass"),
@@ -302,7 +303,7 @@ def check_structure(draft: SceneDraft) -> None:
     apply_rules(draft, FILE_RULES, facts)
     if structure.reduced is not None:
         _check_matrix_files(draft)
-        _check_pair(draft, "structure.reduced.slide", structure.reduced.slide)
+        _check_mass_pair(draft, "structure.reduced.slide", structure.reduced.slide)
         apply_rules(draft, REDUCED_RULES, facts)
     apply_rules(draft, BONDED_RULES, facts)
     apply_rules(draft, STUCK_RULES, facts)
@@ -350,7 +351,7 @@ def _check_modes(draft: SceneDraft) -> None:
             )
         if mode.name:
             names.add(mode.name)
-        if mode.damping >= HEAVY_DAMPING:
+        if mode.damping >= MAX_USUAL_DAMPING:
             draft.add_remark(
                 f"structure.mode.{index}.damping",
                 f"= {mode.damping:g} is a damping ratio: 1 means critical damping, and 1 % is written 0.01",
@@ -416,7 +417,7 @@ def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
         for key in ("accelerometer", "gauge"):
             if getattr(mode.table, key) is not None and mode[key] != output:
                 written.append(f"structure.mode.{index}.{key}")
-    beside = _judged_at_output(draft)
+    beside = _find_output_dependent_key(draft)
     if written and beside:
         draft.add_mistake(
             written[0],
@@ -426,7 +427,7 @@ def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
         )
 
 
-def _judged_at_output(draft: SceneDraft) -> str:
+def _find_output_dependent_key(draft: SceneDraft) -> str:
     """Return the key whose effect depends on the motion of the output; "" if there is none."""
     for key in ("structure.travel", "structure.stiffening"):
         if draft.has(key):
@@ -453,36 +454,36 @@ def _check_masses(draft: SceneDraft) -> None:
         return
     for name in ("spring", "damper", "interface"):
         for index, item in enumerate(getattr(structure, name) or ()):
-            _check_pair(draft, f"structure.{name}.{index}.between", item.between)
+            _check_mass_pair(draft, f"structure.{name}.{index}.between", item.between)
     for index, interface in enumerate(structure.interface or ()):
         _check_lateral(draft, f"structure.interface.{index}.lateral", interface)
-    _check_number(draft, "structure.output_mass", structure.output_mass)
+    _check_mass_number(draft, "structure.output_mass", structure.output_mass)
 
 
-def _check_pair(draft: SceneDraft, key: str, pair: tuple | None) -> None:
+def _check_mass_pair(draft: SceneDraft, key: str, pair: tuple | None) -> None:
     """Report a pair of masses that is one mass, or that names a mass that does not exist."""
     if pair is None:
         return
     if pair[0] == pair[1]:
-        noun = Coordinates.from_structure(draft.tables.structure).noun
+        noun = CoordinateNumbers.from_structure(draft.tables.structure).noun
         place = f"{noun} {pair[0]}" if pair[0] else "the base"
         draft.add_mistake(
             key,
             f"joins {place} to itself; two different ends are needed, where 0 stands for the base",
         )
     for number in dict.fromkeys(pair):
-        _check_number(draft, key, number)
+        _check_mass_number(draft, key, number)
 
 
 def _check_lateral(draft: SceneDraft, key: str, interface: Any) -> None:
     """Report a second direction that shares a coordinate with the first, or that cannot be used."""
     pair = interface.lateral
-    _check_pair(draft, key, pair)
+    _check_mass_pair(draft, key, pair)
     if pair is None:
         return
     shared = sorted({*pair} & {*(interface.between or ())} - {0})
     if shared:
-        noun = Coordinates.from_structure(draft.tables.structure).noun
+        noun = CoordinateNumbers.from_structure(draft.tables.structure).noun
         draft.add_mistake(
             key,
             f"{noun} {shared[0]} is already in `between`; the second direction needs coordinates of its own, which "
@@ -498,9 +499,9 @@ def _check_lateral(draft: SceneDraft, key: str, interface: Any) -> None:
         draft.add_mistake(key, not_supported_message("with [structure.bonded]", instead))
 
 
-def _check_number(draft: SceneDraft, key: str, number: int | None) -> None:
+def _check_mass_number(draft: SceneDraft, key: str, number: int | None) -> None:
     """Report the number of a mass that does not exist."""
-    coordinates = Coordinates.from_structure(draft.tables.structure)
+    coordinates = CoordinateNumbers.from_structure(draft.tables.structure)
     if coordinates.number is None or number is None or number <= coordinates.number:
         return
     base = ""
@@ -524,23 +525,23 @@ def check_driven_mass(draft: SceneDraft) -> None:
             "leave drive.mass out",
         )
     else:
-        _check_number(draft, "drive.mass", drive.mass)
+        _check_mass_number(draft, "drive.mass", drive.mass)
 
 
 def _check_matrix_files(draft: SceneDraft) -> None:
-    """Report files of [structure.reduced] that cannot be read by their ending."""
+    """Report files of [structure.reduced] that cannot be read by their extension."""
     reduced = draft.tables.structure.reduced
     for key in ("stiffness", "mass", "damping"):
         file = getattr(reduced, key)
-        if isinstance(file, str) and file_ending(file) not in MATRIX_ENDINGS:
-            ending = file_ending(file)
+        if isinstance(file, str) and find_file_extension(file) not in MATRIX_EXTENSIONS:
+            extension = find_file_extension(file)
             draft.add_mistake(
                 f"structure.reduced.{key}",
-                f"the name ends in '{ending}'; {choices(ending, MATRIX_ENDINGS)}",
+                f"the name ends in '{extension}'; {advise_on_name(extension, MATRIX_EXTENSIONS)}",
             )
 
 
-def file_ending(name: str) -> str:
+def find_file_extension(name: str) -> str:
     """Return what follows the last dot of a file name, with the dot and in lower case."""
     return "." + name.rpartition(".")[2].lower()
 
@@ -553,7 +554,7 @@ def _check_start(draft: SceneDraft) -> None:
             "structure.start.displacement",
             "or structure.start.velocity, one value per mode or mass",
         )
-    count = Coordinates.from_structure(structure).number or len(structure.mode or ())
+    count = CoordinateNumbers.from_structure(structure).number or len(structure.mode or ())
     noun = "mode" if count == 1 else "modes"
     if structure.reduced is not None:
         noun = "boundary coordinates"

@@ -36,7 +36,7 @@ class View:
         self.table = table
 
     def __getattr__(self, name: str) -> Any:
-        value = UNKNOWN if self.table is None else view(getattr(self.table, name))
+        value = UNKNOWN if self.table is None else wrap_value(getattr(self.table, name))
         self.__dict__[name] = value  # the next access finds it without this method
         return value
 
@@ -44,12 +44,12 @@ class View:
         return getattr(self, name)
 
 
-def view(value: Any) -> Any:
+def wrap_value(value: Any) -> Any:
     """Wrap a value for the rules: a table becomes a View, and None becomes UNKNOWN."""
     if value is None:
         return UNKNOWN
     if isinstance(value, Table):
         return View(value)
     if isinstance(value, tuple):
-        return tuple(map(view, value))
+        return tuple(map(wrap_value, value))
     return value

@@ -4,8 +4,8 @@ from itertools import pairwise
 from math import pi
 
 from ...effects import Waveform, find_waveform, law_has_trait, law_takes_key, laws_with_key
-from .grooves import groove_key, groove_table
-from .rule_table import Facts, Missing, Mistake, Remark, apply_rules, unsupported
+from .grooves import find_groove_key, find_groove_table
+from .rule_table import Facts, Missing, Mistake, Remark, apply_rules, unsupported_rule
 from .scene_draft import SceneDraft
 from .view import UNKNOWN, View
 
@@ -27,7 +27,7 @@ class WearFacts(Facts):
     @property
     def groove_key(self) -> str:
         """Key of the grooves; "" without grooves."""
-        return groove_key(self.draft)
+        return find_groove_key(self.draft)
 
     @property
     def has_coating(self) -> bool:
@@ -59,7 +59,7 @@ class WearFacts(Facts):
     @property
     def slope(self) -> float:
         """Steepest slope of the flanks of the grooves."""
-        grooves = groove_table(self.draft)
+        grooves = find_groove_table(self.draft)
         return 2 * pi * grooves.amplitude / grooves.wavelength
 
     @property
@@ -78,73 +78,73 @@ class WearFacts(Facts):
         return 1 / self.slope / self.law.static
 
 
-BESIDE_RULES = (
+COMBINATION_RULES = (
     Mistake(
         lambda w: w.kind == "patch",
         "wear",
         "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]",
     ),
-    unsupported(
-        lambda w: w.groove_key and w.scene.normal and groove_table(w.draft).amplitude,
+    unsupported_rule(
+        lambda w: w.groove_key and w.scene.normal and find_groove_table(w.draft).amplitude,
         "wear",
         "with [{groove_key}]",
         "a [normal] contact has no area, so its wear has no depth: use [contact]",
     ),
-    unsupported(
+    unsupported_rule(
         lambda w: w.strip_compliance,
         "wear",
         "with contact.strips with {strip_compliance}",
         "leave out [wear] or {strip_compliance}",
     ),
-    unsupported(
+    unsupported_rule(
         lambda w: w.has_lower_shape,
         "wear",
         "with contact.strips with a shape on the lower piece",
         "leave out [wear] or put all shapes on the upper piece",
     ),
-    unsupported(
+    unsupported_rule(
         lambda w: w.scene.contact.strips and w.has("start"),
         "wear",
         "with contact.strips with wear.start",
         "leave out [wear] or leave out wear.start",
     ),
-    unsupported(
+    unsupported_rule(
         lambda w: w.kind == "rig" and w.scene.normal.amplitude,
         "wear",
         "with normal.amplitude",
         "leave out [wear] or the amplitude",
     ),
-    unsupported(
+    unsupported_rule(
         lambda w: w.scene.structure.interface,
         "wear",
         "with [[structure.interface]]",
         "leave out [wear] or describe a single interface by [friction] and [normal]",
     ),
-    unsupported(
+    unsupported_rule(
         lambda w: any(mode.normal or mode.pitch for mode in w.scene.structure.mode),
         "wear",
         "with modes with `normal` or `pitch`",
         "leave out [wear] or these keys",
     ),
-    unsupported(
+    unsupported_rule(
         lambda w: w.kind == "rig" and w.scene.drive.kind == "free",
         "wear",
         "with drive.kind = 'free'",
         "wear is computed from the last cycle of a steady motion: use kind 'base' or 'force'",
     ),
-    unsupported(
+    unsupported_rule(
         lambda w: w.kind == "rig" and w.wave.name and not w.wave.is_sine,
         "wear",
         "with drive.waveform = '{scene.drive.waveform}'",
         "wear is computed from the last cycle of a steady motion: use waveform 'sine'",
     ),
-    unsupported(
+    unsupported_rule(
         lambda w: w.kind == "rig" and w.scene.accuracy.method == "harmonic",
         "wear",
         "with accuracy.method 'harmonic'",
         "use 'auto', 'exact' or 'march'",
     ),
-    unsupported(
+    unsupported_rule(
         lambda w: law_has_trait(w.scene.friction.law, "averaged"),
         "wear",
         "with law '{law.law}'",
@@ -158,7 +158,7 @@ FRICTION_RULES = (
         "a [normal] contact has no area, so its wear has no depth: use [contact]",
     ),
     Mistake(
-        lambda w: w.depths and not _rises_from_zero(w.depths),
+        lambda w: w.depths and not _increases_from_zero(w.depths),
         "wear.friction.depth",
         'depths that rise from 0 are needed, such as ["0 um", "1 um", "5 um"]',
     ),
@@ -226,7 +226,7 @@ def check_wear(draft: SceneDraft, kind: str) -> None:
     if draft.tables.wear is None:
         return
     facts = WearFacts(draft, kind)
-    apply_rules(draft, BESIDE_RULES, facts)
+    apply_rules(draft, COMBINATION_RULES, facts)
     if facts.friction:
         apply_rules(draft, FRICTION_RULES, facts)
         _check_factors(facts)
@@ -251,6 +251,6 @@ def _check_factors(wear: WearFacts) -> None:
         wear.draft.add_mistake(f"wear.friction.{key}", message)
 
 
-def _rises_from_zero(values: tuple) -> bool:
+def _increases_from_zero(values: tuple) -> bool:
     """Return whether the first value is 0 and each is larger than the one before."""
     return values[0] == 0 and all(low < high for low, high in pairwise(values))

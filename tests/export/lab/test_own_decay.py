@@ -6,7 +6,7 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem.response.decay_curve import DecayCurve
-from patchfem.scene.starting import template_text
+from patchfem.scene.starting import read_template
 
 MODE = """\
 [structure]
@@ -199,7 +199,7 @@ def test_refuses_a_record_without_a_response_and_lists_its_columns(tmp_path):
 
 def test_exact_a_scene_with_a_sweep_is_exported_with_its_own_values(tmp_path):
     """The template of a blade with dampers has the table; without it the same matrices and elements are written."""
-    text = template_text("damper")
+    text = read_template("damper")
     assert "[sweep]" in text
     (tmp_path / "damper.toml").write_text(text, "utf-8")
     answer = cli("export", tmp_path / "damper.toml", "-o", tmp_path / "damper.npz")

@@ -12,7 +12,7 @@ from patchfem.export.pages import limits, peaks, ranked
 from patchfem.export.pages.headline import lead_of
 from patchfem.export.pages.sweep import page
 from patchfem.export.sweeps.page import read_table
-from patchfem.scene.starting import template_text
+from patchfem.scene.starting import read_template
 
 RIG = POINT + COULOMB + SHORT
 
@@ -357,7 +357,7 @@ def test_exact_curves_that_are_largest_at_an_end_are_counted():
 
 def test_exact_the_ends_of_swept_frequencies_are_read_back(tmp_path):
     scene = tmp_path / "damper.toml"
-    scene.write_text(template_text("damper"), "utf-8")
+    scene.write_text(read_template("damper"), "utf-8")
     answer = cli(
         "sweep",
         scene,
@@ -377,7 +377,7 @@ def test_always_motions_that_run_away_are_told_before_those_that_settle(tmp_path
     """Of the shipped rig friction alone does not limit the motion above 4 mu N / (pi m) = 5.067 g. The amplitude of the
     settled cases was told as that of all: up to 20 um beside motions of millimetres."""
     scene = tmp_path / "rig.toml"
-    scene.write_text(template_text("rig"), "utf-8")
+    scene.write_text(read_template("rig"), "utf-8")
     answer = cli(
         "sweep", scene, "--over", "drive.acceleration=3 g,4 g,5 g,5.5 g,6 g", "-o", tmp_path / "out"
     )
@@ -522,7 +522,7 @@ def test_exact_keys_whose_intervals_overlap_stand_in_no_order():
 def test_always_a_motionless_case_of_a_sweep_over_levels_has_no_peak_frequency(tmp_path):
     """Up to 3 g the block sticks at all frequencies: the first of them, 100.0 +- 0 Hz, was given as its peak."""
     scene = tmp_path / "rig.toml"
-    scene.write_text(template_text("rig"), "utf-8")
+    scene.write_text(read_template("rig"), "utf-8")
     swept = [
         "drive.waveform=sweep",
         "drive.from=140 Hz",

@@ -14,7 +14,7 @@ from patchfem.export.page_data import Motion, RunData, SceneText, Verdict
 from patchfem.export.pages.released import released, swung
 from patchfem.export.pages.sentences import headline
 from patchfem.export.report import picture
-from patchfem.scene.starting import template_text
+from patchfem.scene.starting import read_template
 
 IWAN = """
 [structure]
@@ -42,7 +42,7 @@ cycles = 60
 def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_path):
     """Every half swing takes 2 mu N/k off the amplitude; the block rests where the spring no longer pulls it on."""
     scene = tmp_path / "free.toml"
-    text = template_text("rig")
+    text = read_template("rig")
     text = re.sub(
         r"\[drive\].*?(?=\n\[)",
         '[drive]\nkind = "free"\nduration = "0.3 s"\n[structure.start]\n'

@@ -7,15 +7,15 @@ from typing import Literal, get_args, get_origin
 from patchfem.effects import EFFECTS, WAVEFORMS
 from patchfem.scene.keys.contact import Coating, Material
 from patchfem.scene.keys.lookup import is_table_or_value
-from patchfem.scene.keys.quantities import EXAMPLES, KINDS
+from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES, UNIT_FACTORS
 from patchfem.scene.keys.tables import Interface, Tables
 from patchfem.scene.keys.types import (
-    annotation_parts,
-    inner_table,
-    key_record,
-    keys,
-    meaning,
-    quantity_kind,
+    attributes_by_key,
+    find_inner_table,
+    find_key_record,
+    find_meaning,
+    find_quantity_kind,
+    iterate_annotation_parts,
 )
 from patchfem.scene.rules.limits import UNSUPPORTED_KEY
 from patchfem.scene.rules.selectors import SELECTORS, split_keys
@@ -42,8 +42,8 @@ See also [the guide](GUIDE.md), [the measures of a run](MEASURES.md), [materials
 def text() -> str:
     """The whole page of patchfem/scene/README.md, from the records that the program reads."""
     units = [
-        (kind, ", ".join(f"`{unit}`" for unit in units), f'`"{EXAMPLES[kind]}"`')
-        for kind, units in KINDS.items()
+        (kind, ", ".join(f"`{unit}`" for unit in units), f'`"{EXAMPLE_QUANTITIES[kind]}"`')
+        for kind, units in UNIT_FACTORS.items()
     ]
     sections = [
         HEAD,
@@ -63,7 +63,7 @@ def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
     model: the pydantic class to begin with; at: its header.
     """
     yield (at, model)
-    for key, name in keys(model).items():
+    for key, name in attributes_by_key(model).items():
         # it has the tables of [contact]
         if _is_table(model, name) and (model, name) != (
             Interface,
@@ -71,11 +71,11 @@ def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
         ):
             path = f"{at.strip('[]')}.{key}".strip(".")
             many = get_origin(model.model_fields[name].annotation) is tuple
-            yield from tables(inner_table(model, name), f"[[{path}]]" if many else f"[{path}]")
+            yield from tables(find_inner_table(model, name), f"[[{path}]]" if many else f"[{path}]")
 
 
 def _is_table(model: type, name: str) -> bool:
-    return inner_table(model, name) is not None and not is_table_or_value(model, name)
+    return find_inner_table(model, name) is not None and not is_table_or_value(model, name)
 
 
 def _keys() -> list:
@@ -86,7 +86,7 @@ def _keys() -> list:
         parent = model.__mro__[1]
         own = [
             key
-            for key, name in keys(model).items()
+            for key, name in attributes_by_key(model).items()
             if name in model.__annotations__ and not _is_table(model, name)
         ]
         about = " ".join((model.__doc__ or "").split())
@@ -112,21 +112,23 @@ def _keys() -> list:
 
 
 def _row(model: type, key: str, at: str) -> tuple:
-    name = keys(model)[key]
+    name = attributes_by_key(model)[key]
     field, path = model.model_fields[name], f"{at}.{key}".strip(".")
     default = "" if field.is_required() or field.default in (None, "") else field.default
     if isinstance(default, int | float):
-        default = " ".join([f"{default:g}", *list(KINDS.get(quantity_kind(model, name), ()))[:1]])
+        default = " ".join(
+            [f"{default:g}", *list(UNIT_FACTORS.get(find_quantity_kind(model, name), ()))[:1]]
+        )
     elif default:
         default = f"`{default}`"
     required = "yes" if field.is_required() else _needed(model, key, path.rpartition(".")[0])
-    said = meaning(model, key) + ("; not supported yet" if path == UNSUPPORTED_KEY else "")
+    said = find_meaning(model, key) + ("; not supported yet" if path == UNSUPPORTED_KEY else "")
     return f"`{key}`", _kind(model, name), default, required, said
 
 
 def _needed(model: type, key: str, table: str) -> str:
     """Condition that makes a key of a table necessary: "with law `tanh`", the values of a selector, or words."""
-    found = key_record(model, key)
+    found = find_key_record(model, key)
     said = [found.required] if found and found.required else []
     for selector, used in NEEDS.items():
         values = [f"`{value}`" for value, (needs, _) in used.items() if key in split_keys(needs)]
@@ -137,11 +139,11 @@ def _needed(model: type, key: str, table: str) -> str:
 
 def _kind(model: type, name: str) -> str:
     annotation = model.model_fields[name].annotation
-    types = (annotation, *annotation_parts(annotation))
+    types = (annotation, *iterate_annotation_parts(annotation))
     words = [
         f"`{value}`" for part in types if get_origin(part) is Literal for value in get_args(part)
     ]
-    if kind := quantity_kind(model, name):
+    if kind := find_quantity_kind(model, name):
         words.append(kind)
     elif Material in types:
         words = ["material"]
@@ -171,7 +173,11 @@ def _limits(model: type, name: str) -> list:
     annotation = model.model_fields[name].annotation
     marks = [
         inner
-        for mark in (*model.model_fields[name].metadata, annotation, *annotation_parts(annotation))
+        for mark in (
+            *model.model_fields[name].metadata,
+            annotation,
+            *iterate_annotation_parts(annotation),
+        )
         for inner in (mark, *getattr(mark, "metadata", ()))
     ]
     return list(
@@ -187,7 +193,7 @@ def _limits(model: type, name: str) -> list:
 def bounds() -> Iterator[tuple]:
     """(dotted key, kind with its bounds) of every key that is a whole number or has an upper bound."""
     for header, model in tables():
-        for key, name in keys(model).items():
+        for key, name in attributes_by_key(model).items():
             if _is_table(model, name):
                 continue
             said, bound = _kind(model, name), _limits(model, name)

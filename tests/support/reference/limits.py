@@ -4,7 +4,7 @@ import re
 from importlib import import_module
 
 from patchfem.runs.patch.result import COUPLED, SMALL
-from patchfem.scene.keys.types import DIVIDED_BY, LARGEST
+from patchfem.scene.keys.types import DIVISOR_KINDS, MAX_MAGNITUDE
 
 from .keys import FOLDER, bounds, grid
 from .tried import BENCHES, METHODS, MORE, POINT, RIG, RIGS, Beside, across, laws, refused
@@ -20,11 +20,11 @@ The last section says what the models neglect.
 """
 SIZES = {  # constant -> what it bounds and how it is written
     "scene.toml_text.MAX_BYTES": "bytes of a scene file",
-    "scene.lines.MAX_PARTS": "number of parts, separated by dots, of a key",
+    "scene.lines.MAX_KEY_PARTS": "number of parts, separated by dots, of a key",
     "scene.rules.contact.MAX_ELEMENTS": "number of elements along an interface that has element_size",
-    "scene.keys.tables.MAX_MASSES": "number of masses in structure.masses",
+    "scene.keys.tables.MAX_MASS_NUMBER": "number of masses in structure.masses",
     "effects.MAX_COORDINATES": "number of masses or modes of a rig",
-    "scene.axes.MAX_VALUES": "number of values in one range of a sweep",
+    "scene.axes.MAX_RANGE_VALUES": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MOST": "number of cases of a sweep",
     "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
     "inputs.records.MAX_BYTES": "bytes of a laboratory file",
@@ -127,11 +127,11 @@ def text() -> str:
         "### Messages",
         _said(notes),
         "## Numbers",
-        f"The magnitude of a quantity must be at most {LARGEST:g} in SI units. If the quantity is of a kind by "
+        f"The magnitude of a quantity must be at most {MAX_MAGNITUDE:g} in SI units. If the quantity is of a kind by "
         "which the program divides ("
-        + ", ".join(sorted(DIVIDED_BY))
+        + ", ".join(sorted(DIVISOR_KINDS))
         + "), its magnitude must also be at least "
-        f"{1 / LARGEST:g}, or exactly 0 if the key accepts 0. The following keys have narrower bounds:",
+        f"{1 / MAX_MAGNITUDE:g}, or exactly 0 if the key accepts 0. The following keys have narrower bounds:",
         _bounds(),
         "## Sizes",
         _sizes(),

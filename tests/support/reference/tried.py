@@ -5,7 +5,7 @@ from functools import cache
 from typing import NamedTuple
 
 from patchfem.effects import LAWS
-from patchfem.scene.rules.limits import refuse_lateral_slide
+from patchfem.scene.rules.limits import find_lateral_slide_obstacle
 from patchfem.scene.scene import SceneError, loads
 
 PATCH = """\
@@ -171,5 +171,5 @@ def refused(keys: str, beside: Beside, method: str = "") -> tuple:
 
 def across(keys: str) -> tuple:
     """Why a bench of one point with this law does not slide in two directions; () where it does."""
-    reason = refuse_lateral_slide(loads(POINT + BENCH + f"[friction]\n{keys}").tables())
+    reason = find_lateral_slide_obstacle(loads(POINT + BENCH + f"[friction]\n{keys}").tables())
     return (f"slide.file: {reason}",) if reason else ()

@@ -198,7 +198,7 @@ def _add(trial: Trial, tables: dict) -> None:
 
 def of_kind(trial: Trial, kind: str | None):
     """A value for a key: a quantity of its kind over thirty decades, else a number or a word."""
-    from patchfem.scene.keys.quantities import KINDS
+    from patchfem.scene.keys.quantities import UNIT_FACTORS
 
     if kind is None:
         return trial.draw(
@@ -212,7 +212,7 @@ def of_kind(trial: Trial, kind: str | None):
             "upper",
         )
     number = trial.draw(trial.wide(1e-15, 1e15), trial.wide(1e-3, 1e3), -trial.wide(1e-3, 1e3), 0)
-    return f"{number!r} {trial.draw(*KINDS[kind])}"
+    return f"{number!r} {trial.draw(*UNIT_FACTORS[kind])}"
 
 
 def anything(trial: Trial, value):

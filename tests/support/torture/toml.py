@@ -3,7 +3,7 @@
 from functools import cache
 
 from patchfem.scene.keys.tables import Tables
-from patchfem.scene.keys.types import inner_table, keys, quantity_kind
+from patchfem.scene.keys.types import attributes_by_key, find_inner_table, find_quantity_kind
 
 
 def text_of(tables: dict) -> str:
@@ -92,10 +92,10 @@ def known() -> tuple:
 
 
 def _known(model, at: tuple):
-    for key, name in keys(model).items():
-        inner = inner_table(model, name)
+    for key, name in attributes_by_key(model).items():
+        inner = find_inner_table(model, name)
         many = inner is not None and "tuple" in str(model.model_fields[name].annotation)
         path = (*at, key, 0) if many else (*at, key)
-        yield path, quantity_kind(model, name), inner
+        yield path, find_quantity_kind(model, name), inner
         if inner is not None and len(at) < 6:
             yield from _known(inner, path)

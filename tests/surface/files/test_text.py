@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from traces import UM, bumpy, text
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.scene.keys.quantities import KINDS
+from patchfem.scene.keys.quantities import UNIT_FACTORS
 from patchfem.surface.files.read import read_profile
 from patchfem.surface.files.units import UNITS
 
@@ -28,7 +28,7 @@ def read(tmp_path, content, name="before.csv"):
 
 
 def test_exact_units_are_those_of_the_package():
-    assert UNITS == KINDS["length"]
+    assert UNITS == UNIT_FACTORS["length"]
 
 
 X, Z = bumpy()

@@ -35,7 +35,7 @@ from ....response.measures import energy_balance
 from ....response.ringing import FAINT, PER_PERIOD, WIDEST, ringing
 from ....response.rows import larger_term
 from ....response.settling import steady_amplitudes, windows_of
-from ....scene.rules.accuracy import fixed_settings
+from ....scene.rules.accuracy import list_fixed_settings
 from ....structure.drive_sizes import max_acceleration
 from ...rig.motion_warnings import creeping_note
 from ...rig.pieces import CHANGES, read_off
@@ -157,7 +157,7 @@ def asks_more(model: Model) -> str:
     """Return why the requested accuracy of a model exceeds that of lanes; "" if it does not."""
     if (
         model.accuracy.method != "auto"
-        or fixed_settings(model.accuracy)
+        or list_fixed_settings(model.accuracy)
         or model.accuracy.tolerance < TIGHTEST
     ):
         return "the case asks for another method, or for an accuracy beyond that of a batch"
