@@ -1,519 +1,847 @@
-"""A step of one mode under a law of one stretch, of one case: Runge and Kutta's of order 4, each side of a reversal and
-of a kink of the law by itself, in parts where the speed passes a layer in which the force changes.
+"""A step under a law of one stretch, of one case, by the Runge-Kutta rule of order 4.
 
-Equation, in the angle of the drive: x'' + D x' + W x = P sin - f(z, x'), z' = g(z, x') x', z the stretch of the contact
-[m], the place of a case. f and g are those of `friction`, whose numbers have lengths in m and angles for times, so that
-a force is one over the mass [m]. Twin: a run by high order (`dynamics.smooth`).
+The equation in the angle of the drive is x'' + D x' + W x = P sin - f(z, x'), with z' = g(z, x') x'. MEMORY is the stretch
+z [m]. The functions f and g are those of the module `friction` (tanh, Bouc-Wen, LuGre, bonds), whose numbers have lengths
+in m and angles for times, so that f is a force over the mass [m].
+
+A step ends and starts anew where the slide reverses, and where the law has a kink at zero stretch. A law whose force
+changes in a thin layer of speeds (`HAS_SPEED_LAYER`) is followed through the layer in parts. A reference is the engine
+`dynamics.smooth`.
 """
 
 from math import cos, nan, sin
+from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import tanh_kernels as friction
-from .names_kernels import (
-    ACCELERATION,
-    BASE,
-    FIRST_OF_LAW,
-    FORCE,
-    IN,
+from .rigid_kernels import (
+    PROOF_TOL,
+    StepOutcome,
+    StickReading,
+    TriedStep,
+    can_extrapolate,
+    cubic_peak,
+    newton_on_cubic,
+    prepare_step,
+)
+from .rows_kernels import (
+    BASE_GAIN,
+    DAMPING,
+    DRIVE,
     LANES,
-    LOST,
-    MIDDLE,
-    OUT,
-    OWN,
-    PASSED,
-    PLACE,
-    SLIP_HIGH,
-    SLIP_LOW,
-    TURNED,
-    WAY,
-    D,
-    H,
-    P,
-    V,
-    W,
-    X,
-)
-from .rigid_kernels import PROVEN as PROVEN
-from .rigid_kernels import crossing, highest
-from .rigid_kernels import foretell as foretell
-from .rigid_kernels import settles as settles
-
-RESTS = TURNS_HELD = False  # it never holds
-# of its own state: friction, mean square of the stretches, friction work of the last step, whether that is read
-FELT, SQUARE, WORK, READS = range(OWN, OWN + 4)
-OWN_STATE, KEPT = 4, 2  # the friction and the mean square move on as a motion settles
-PARTS = 4  # of a step: a reversal and a kink on either side of it
-CORRECTED = 2  # times, by Newton, is the place of an event, which a cubic over a kink misses by the second order
-FINEST = 64  # parts of a step through a layer
-LAYER_EDGE = 5.0  # speed over that of the layer beyond which its force is taken as constant
-LAYER_STEP = 20.0  # change of the speed over that of the layer in a part of a step h, over h
-MIN_LAYER_STEP = 0.25  # the same of the finest steps, over the speed of the layer alone
-CLEAR = 2.0  # times the friction, by which the other forces exceed it where the speed of a step goes one way
-# irreversible share of the slide from which it slips; of the part of a step where it begins
-SHARE, HALVINGS = (
-    0.5,
-    24,
+    LAW_NUMBERS,
+    LAW_STATE,
+    LOOP_WORK,
+    LOOP_WORK_SIZE,
+    LOSS_SUM,
+    MAX_ACCELERATION,
+    MAX_FORCE,
+    MAX_SLIP,
+    MEMORY,
+    MIDPOINT_FACTOR,
+    MIN_SLIP,
+    NJIT_INLINE,
+    OUTPUT_GAIN,
+    SLIDE,
+    SLIP_SIGN,
+    SPEED,
+    STEP,
+    STIFFNESS,
+    WORK_SUM,
 )
 
+__all__ = [
+    "EVENT_KEEPS_STICK",
+    "N_KEPT",
+    "PROOF_TOL",
+    "STICK_IS_RIGID",
+    "can_extrapolate",
+    "friction_at_reversal",
+    "friction_force",
+    "friction_rate",
+    "irreversible_slide",
+    "is_sticking",
+    "prepare_step",
+    "records_own_peaks",
+    "resolve_step",
+    "restore_derived_state",
+    "set_derived_state",
+    "slide_at_reversal",
+    "slip_increment",
+    "stick_fractions",
+    "try_step",
+]
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def numbers(workspace, i):
-    """Return the numbers of the law (7,), the first one free, as its `rate_equation` takes them."""
-    at = FIRST_OF_LAW
+STICK_IS_RIGID = False
+EVENT_KEEPS_STICK = False
+# These rows are the state of the law.
+FRICTION = LAW_STATE  # friction [m]
+STRETCH_SQUARE = LAW_STATE + 1  # mean square of the stretches [m^2]
+STEP_WORK = LAW_STATE + 2  # friction work of the last step [m^2]
+IS_OBSERVED = LAW_STATE + 3  # 1 if the step is read
+N_LAW_STATE = 4
+N_KEPT = 2  # the friction and the mean square of the stretches follow the map of a cycle
+
+MAX_PARTS = 4  # a step has at most a reversal, and a kink on either side of it
+N_CORRECTIONS = 2  # Newton steps for the place of an event, which a cubic across a kink misses by the second order
+MAX_LAYER_PARTS = 64  # number of parts of a step through a layer
+LAYER_EDGE = 5.0  # speed over that of the layer beyond which the force is taken as constant
+LAYER_STEP = (
+    20.0  # change of the speed in a part, over the speed of the layer and the angle of the step
+)
+MIN_LAYER_STEP = 0.25  # smallest change of the speed in a part, over the speed of the layer
+FREE_FLIGHT_FACTOR = (
+    2.0  # the speed goes one way while the other forces exceed the friction by this factor
+)
+SLIP_FRACTION = 0.5  # an interface slips while more than this fraction of the slide is irreversible
+N_HALVINGS = 24  # bisections for the start of a slip, which leave 6e-8 of a segment
+SIGN_IN_LAYER = 1.0  # a law with a layer of speeds does not depend on the sign of the slip
+AT_START = 0  # instants of a step as in `observation_kernels`
+AT_END = 3
+
+
+class FlowState(NamedTuple):
+    """Slide, its derivative, friction, stretch [m], and mean square of the stretches [m^2]."""
+
+    slide: float
+    speed: float
+    friction: float
+    stretch: float
+    square: float
+
+
+class FirstEvent(NamedTuple):
+    """Fraction of a part at which its first event happens (1 without one), and whether the slide reverses there."""
+
+    fraction: float
+    is_reversal: bool
+
+
+class LayerPart(NamedTuple):
+    """Angle of a part of a step, the state at its end, and its friction work [m^2]."""
+
+    angle: float
+    end: FlowState
+    work: float
+
+
+@njit(**NJIT_INLINE)
+def law_numbers(workspace, lane):
+    """Return the numbers of the law (7,), as its `rate_equation` takes them; the first is not used."""
+    first = LAW_NUMBERS
     return (
         0.0,
-        workspace[at * LANES + i],
-        workspace[(at + 1) * LANES + i],
-        workspace[(at + 2) * LANES + i],
-        workspace[(at + 3) * LANES + i],
-        workspace[(at + 4) * LANES + i],
-        workspace[(at + 5) * LANES + i],
+        workspace[first * LANES + lane],
+        workspace[(first + 1) * LANES + lane],
+        workspace[(first + 2) * LANES + lane],
+        workspace[(first + 3) * LANES + lane],
+        workspace[(first + 4) * LANES + lane],
+        workspace[(first + 5) * LANES + lane],
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def layer_of_speeds(k, h):
-    """Return the speed at the edge of the layer, and the change of the speed in a part of a step h through it.
+@njit(**NJIT_INLINE)
+def layer_of_speeds(numbers, angle):
+    """Return the speed at the edge of the layer, and the change of the speed in a part of a step through it.
 
-    The numbers of a law with such a layer begin with its limit and 1 over the speed of the layer.
+    The numbers of a law with a layer begin with its limit and 1 over the speed of the layer.
     """
-    return LAYER_EDGE / k[2], max(LAYER_STEP * h, MIN_LAYER_STEP) / k[2]
+    return LAYER_EDGE / numbers[2], max(LAYER_STEP * angle, MIN_LAYER_STEP) / numbers[2]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def friction_force(x, v, way, place, sine, workspace, i):
-    """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
-    return friction.rate_equation(numbers(workspace, i), place, v, way)[0]
+@njit(**NJIT_INLINE)
+def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
+    """Return the friction over the mass in the angle of the drive [m], positive if it resists positive slip.
+
+    Parameters
+    ----------
+    x, v, slip_sign, memory, sine, workspace, lane
+        See `rigid_kernels.friction_force`.
+
+    Returns
+    -------
+    float
+    """
+    return friction.rate_equation(law_numbers(workspace, lane), memory, v, slip_sign)[0]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rise(v, a, way, place, workspace, i, when):
-    """Rate of the friction at a speed v and an acceleration a."""
-    _, gain, by_stretch, by_speed = friction.rate_equation(numbers(workspace, i), place, v, way)
-    return by_stretch * gain * v + by_speed * a
+@njit(**NJIT_INLINE)
+def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
+    """Return the rate of the friction.
+
+    Parameters
+    ----------
+    v, acceleration, slip_sign, memory, workspace, lane, when
+        See `rigid_kernels.friction_rate`.
+
+    Returns
+    -------
+    float
+    """
+    _, gain, by_stretch, by_rate = friction.rate_equation(
+        law_numbers(workspace, lane), memory, v, slip_sign
+    )
+    return by_stretch * gain * v + by_rate * acceleration
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def at_turn(x, way, place, turned, workspace, i):
-    """Friction at a turn of the slide, of the place there."""
-    return friction_force(x, 0.0, way, turned, 0.0, workspace, i)
+@njit(**NJIT_INLINE)
+def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
+    """Return the friction at a reversal of the slide, which follows from the stretch there.
+
+    Parameters
+    ----------
+    x, slip_sign, memory, event_memory, workspace, lane
+        See `rigid_kernels.friction_at_reversal`.
+
+    Returns
+    -------
+    float
+    """
+    return friction_force(x, 0.0, slip_sign, event_memory, 0.0, workspace, lane)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def irreversible_slide(x, place, workspace, i):
-    """Irreversible part of the slide."""
-    return x - place
+@njit(**NJIT_INLINE)
+def irreversible_slide(x, memory, workspace, lane):
+    """Return the irreversible part of a slide [m]; arguments as of `rigid_kernels.irreversible_slide`."""
+    return x - memory
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def path(place, pe, place1, v1, workspace, i):
-    """Friction work of a step over the mass [m^2]."""
-    return workspace[WORK * LANES + i]
+@njit(**NJIT_INLINE)
+def slip_increment(memory, event_memory, memory1, workspace, lane):
+    """Return the friction work of the last step over the mass [m^2], in place of a path of slip."""
+    return workspace[STEP_WORK * LANES + lane]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def followed(k, z, far, rises, way):
-    """Stretch after a slide `far` that raises it by `rises`, by the law itself where the slide alone tells."""
+@njit(**NJIT_INLINE)
+def stretch_after(numbers, stretch, slide, rise, slip_sign):
+    """Return the stretch after a slide that raises it by `rise`; a rate-independent law is integrated in closed form.
+
+    Parameters
+    ----------
+    numbers : tuple
+        See `law_numbers`.
+    stretch, slide, rise, slip_sign : float
+
+    Returns
+    -------
+    float
+    """
     if friction.IS_RATE_INDEPENDENT:
-        return friction.integrate_stretch(k, z, 0.0, far, way)[0]
-    return z + rises
+        return friction.integrate_stretch(numbers, stretch, 0.0, slide, slip_sign)[0]
+    return stretch + rise
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def run(workspace, i, state, way, drive, h):
-    """(x, x', friction, place, mean square of the stretches; friction work) after an angle h in the direction `way`
-    from the first five; drive: its sine at the start, in the middle and at the end."""
+@njit(**NJIT_INLINE)
+def runge_kutta_step(workspace, lane, state, slip_sign, sines, angle):
+    """Integrate the motion over an angle by the Runge-Kutta rule of order 4.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    state : FlowState
+    slip_sign : float
+        Sign of the slip.
+    sines : tuple of float
+        Sine of the drive at the start, in the middle and at the end.
+    angle : float
+        [rad]
+
+    Returns
+    -------
+    FlowState
+    float
+        Friction work [m^2].
+    """
     x, v, f, z, q = state
-    k, push = numbers(workspace, i), workspace[P * LANES + i]
-    damp, square, half = workspace[D * LANES + i], workspace[W * LANES + i], h / 2
-    g = friction.rate_equation(k, z, v, way)[1] * v
-    a = push * drive[0] - damp * v - square * x - f
-    v1, z1 = v + half * a, followed(k, z, half * v, half * g, way)
-    f1, gain, _, _ = friction.rate_equation(k, z1, v1, way)
-    g1, a1 = gain * v1, push * drive[1] - damp * v1 - square * (x + half * v) - f1
-    v2, z2 = v + half * a1, followed(k, z, half * v1, half * g1, way)
-    f2, gain, _, _ = friction.rate_equation(k, z2, v2, way)
-    g2, a2 = gain * v2, push * drive[1] - damp * v2 - square * (x + half * v1) - f2
-    v3, z3 = v + h * a2, followed(k, z, h * v2, h * g2, way)
-    f3, gain, _, _ = friction.rate_equation(k, z3, v3, way)
-    g3, a3 = gain * v3, push * drive[2] - damp * v3 - square * (x + h * v2) - f3
-    part = h / 6
-    far, ve = part * (v + 2 * (v1 + v2) + v3), v + part * (a + 2 * (a1 + a2) + a3)
-    work = part * (f * v + 2 * (f1 * v1 + f2 * v2) + f3 * v3)
-    ze = z + part * (g + 2 * (g1 + g2) + g3)
-    qe = ze * ze
+    k = law_numbers(workspace, lane)
+    drive = workspace[DRIVE * LANES + lane]
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    half = angle / 2
+    g = friction.rate_equation(k, z, v, slip_sign)[1] * v
+    a = drive * sines[0] - damping * v - stiffness * x - f
+    v1 = v + half * a
+    z1 = stretch_after(k, z, half * v, half * g, slip_sign)
+    f1, gain, _, _ = friction.rate_equation(k, z1, v1, slip_sign)
+    g1 = gain * v1
+    a1 = drive * sines[1] - damping * v1 - stiffness * (x + half * v) - f1
+    v2 = v + half * a1
+    z2 = stretch_after(k, z, half * v1, half * g1, slip_sign)
+    f2, gain, _, _ = friction.rate_equation(k, z2, v2, slip_sign)
+    g2 = gain * v2
+    a2 = drive * sines[1] - damping * v2 - stiffness * (x + half * v1) - f2
+    v3 = v + angle * a2
+    z3 = stretch_after(k, z, angle * v2, angle * g2, slip_sign)
+    f3, gain, _, _ = friction.rate_equation(k, z3, v3, slip_sign)
+    g3 = gain * v3
+    a3 = drive * sines[2] - damping * v3 - stiffness * (x + angle * v2) - f3
+    sixth = angle / 6
+    slide = sixth * (v + 2 * (v1 + v2) + v3)
+    speed = v + sixth * (a + 2 * (a1 + a2) + a3)
+    work = sixth * (f * v + 2 * (f1 * v1 + f2 * v2) + f3 * v3)
+    stretch = z + sixth * (g + 2 * (g1 + g2) + g3)
+    square = stretch * stretch
     if friction.IS_RATE_INDEPENDENT:
-        ze, qe, work = friction.integrate_stretch(k, z, q, far, way)
-    return (x + far, ve, friction.rate_equation(k, ze, ve, way)[0], ze, qe), work
+        stretch, square, work = friction.integrate_stretch(k, z, q, slide, slip_sign)
+    force = friction.rate_equation(k, stretch, speed, slip_sign)[0]
+    return FlowState(x + slide, speed, force, stretch, square), work
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def begin(workspace, i):
-    """Set the friction of a lane that takes a case."""
-    workspace[FELT * LANES + i] = friction_force(
-        workspace[X * LANES + i],
-        workspace[V * LANES + i],
-        workspace[WAY * LANES + i],
-        workspace[PLACE * LANES + i],
+@njit(**NJIT_INLINE)
+def set_derived_state(workspace, lane):
+    """Set the friction of a lane from its state."""
+    workspace[FRICTION * LANES + lane] = friction_force(
+        workspace[SLIDE * LANES + lane],
+        workspace[SPEED * LANES + lane],
+        workspace[SLIP_SIGN * LANES + lane],
+        workspace[MEMORY * LANES + lane],
         0.0,
         workspace,
-        i,
+        lane,
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def resume(workspace, i):
-    """Set what follows from a motion that moved on."""
-    begin(workspace, i)
+@njit(**NJIT_INLINE)
+def restore_derived_state(workspace, lane):
+    """Set what follows from an extrapolated motion."""
+    set_derived_state(workspace, lane)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def begun(workspace, i):
-    """State of a lane as `run` takes it."""
-    return (
-        workspace[X * LANES + i],
-        workspace[V * LANES + i],
-        workspace[FELT * LANES + i],
-        workspace[PLACE * LANES + i],
-        workspace[SQUARE * LANES + i],
+@njit(**NJIT_INLINE)
+def flow_state(workspace, lane):
+    """Return the `FlowState` of a lane."""
+    return FlowState(
+        workspace[SLIDE * LANES + lane],
+        workspace[SPEED * LANES + lane],
+        workspace[FRICTION * LANES + lane],
+        workspace[MEMORY * LANES + lane],
+        workspace[STRETCH_SQUARE * LANES + lane],
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def sticking(v, way, place, workspace, i):
-    """1 where less than SHARE of the slide is irreversible, 0 where it is not."""
-    gain = friction.rate_equation(numbers(workspace, i), place, v, way)[1]
-    return 1.0 if abs(1 - gain) < SHARE else 0.0
+@njit(**NJIT_INLINE)
+def is_sticking(v, slip_sign, memory, workspace, lane):
+    """Return 1 if at most SLIP_FRACTION of the slide is irreversible, otherwise 0."""
+    gain = friction.rate_equation(law_numbers(workspace, lane), memory, v, slip_sign)[1]
+    return 1.0 if abs(1 - gain) < SLIP_FRACTION else 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def ahead(workspace, i, s0, c0, s1, c1, reads):
-    """(x, x', place after a step; whether the slide turns or the law has a kink in it); reads: whether what the step
-    shows is read, so that the begin or end of a stick and a stretch that turns over count too."""
-    way, state = workspace[WAY * LANES + i], begun(workspace, i)
-    (x1, v1, f1, z1, q1), work = run(
-        workspace,
-        i,
-        state,
-        way,
-        (s0, workspace[MIDDLE * LANES + i] * (s0 + s1), s1),
-        workspace[H * LANES + i],
-    )
+@njit(**NJIT_INLINE)
+def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
+    """Compute a step as if no event lay inside it: no reversal, no kink of the law and no layer of speeds.
+
+    A step that is read must not contain the start or the end of a stick, nor a change of sign of the stretch.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0, s1, c1, is_observed
+        See `rigid_kernels.try_step`.
+
+    Returns
+    -------
+    TriedStep
+    """
+    slip_sign = workspace[SLIP_SIGN * LANES + lane]
+    angle = workspace[STEP * LANES + lane]
+    state = flow_state(workspace, lane)
+    sines = (s0, workspace[MIDPOINT_FACTOR * LANES + lane] * (s0 + s1), s1)
+    end, work = runge_kutta_step(workspace, lane, state, slip_sign, sines, angle)
     if friction.HAS_SPEED_LAYER:
-        edge, width = layer_of_speeds(numbers(workspace, i), workspace[H * LANES + i])
-        near = 0.0 if state[1] * v1 < 0.0 else min(abs(state[1]), abs(v1))
-        event = (near < edge and abs(v1 - state[1]) > width) or (reads and state[1] * v1 <= 0.0)
+        edge_speed, width = layer_of_speeds(law_numbers(workspace, lane), angle)
+        slowest = 0.0 if state.speed * end.speed < 0.0 else min(abs(state.speed), abs(end.speed))
+        event = (slowest < edge_speed and abs(end.speed - state.speed) > width) or (
+            is_observed and state.speed * end.speed <= 0.0
+        )
     else:
         event = (
-            way * v1 < 0.0
-            or ((reads or friction.HAS_ZERO_KINK) and state[3] * z1 < 0.0)
+            slip_sign * end.speed < 0.0
+            or ((is_observed or friction.HAS_ZERO_KINK) and state.stretch * end.stretch < 0.0)
             or (
-                reads
+                is_observed
                 and (
-                    v1 == 0.0
-                    or sticking(state[1], way, state[3], workspace, i)
-                    != sticking(v1, way, z1, workspace, i)
+                    end.speed == 0.0
+                    or is_sticking(state.speed, slip_sign, state.stretch, workspace, lane)
+                    != is_sticking(end.speed, slip_sign, end.stretch, workspace, lane)
                 )
             )
         )
-    workspace[FELT * LANES + i], workspace[SQUARE * LANES + i] = (
-        state[2] if event else f1,
-        state[4] if event else q1,
+    workspace[FRICTION * LANES + lane] = state.friction if event else end.friction
+    workspace[STRETCH_SQUARE * LANES + lane] = state.square if event else end.square
+    workspace[STEP_WORK * LANES + lane] = work
+    workspace[IS_OBSERVED * LANES + lane] = 1.0 if is_observed else 0.0
+    return TriedStep(end.slide, end.speed, end.stretch, event)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def hermite_root(y0, y1, m0, m1):
+    """Return the root in [0, 1] of the cubic with these values and slopes at its ends, from its secant on."""
+    c2 = 3 * (y1 - y0) - 2 * m0 - m1
+    c3 = m0 + m1 - 2 * (y1 - y0)
+    return newton_on_cubic(y0, m0, c2, c3, y0 / (y0 - y1))
+
+
+@njit(**NJIT_INLINE)
+def acceleration_at(workspace, lane, state, sine):
+    """Return the acceleration of a `FlowState`."""
+    return (
+        workspace[DRIVE * LANES + lane] * sine
+        - workspace[DAMPING * LANES + lane] * state.speed
+        - workspace[STIFFNESS * LANES + lane] * state.slide
+        - state.friction
     )
-    workspace[WORK * LANES + i], workspace[READS * LANES + i] = work, 1.0 if reads else 0.0
-    return x1, v1, z1, event
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def zero(y0, y1, m0, m1):
-    """u of [0, 1] at which the cubic with these values and slopes at its ends is 0, from the secant on."""
-    return crossing(y0, m0, 3 * (y1 - y0) - 2 * m0 - m1, m0 + m1 - 2 * (y1 - y0), y0 / (y0 - y1))
+def find_first_event(workspace, lane, start, end, slip_sign, sines, angle):
+    """Find the first event of a part of a step, by cubics of the speed and of the stretch.
+
+    Parameters
+    ----------
+    workspace, lane, slip_sign, sines, angle
+        See `runge_kutta_step`.
+    start, end : FlowState
+
+    Returns
+    -------
+    FirstEvent
+    """
+    numbers = law_numbers(workspace, lane)
+    v = start.speed
+    v1 = end.speed
+    fraction = 1.0
+    is_reversal = False
+    if slip_sign * v1 < 0.0:
+        is_reversal = True
+        fraction = 0.0
+        if slip_sign * v > 0.0:
+            a = acceleration_at(workspace, lane, start, sines[0])
+            a1 = acceleration_at(workspace, lane, end, sines[2])
+            fraction = hermite_root(v, v1, angle * a, angle * a1)
+    if friction.HAS_ZERO_KINK and start.stretch * end.stretch < 0.0:
+        gain = friction.rate_equation(numbers, start.stretch, v, slip_sign)[1]
+        gain1 = friction.rate_equation(numbers, end.stretch, v1, slip_sign)[1]
+        kink = hermite_root(start.stretch, end.stretch, angle * v * gain, angle * v1 * gain1)
+        if kink < fraction:
+            fraction = kink
+            is_reversal = False
+    return FirstEvent(fraction, is_reversal)
 
 
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def first_event(workspace, i, state, after, way, drive, h):
-    """(share of a run of the angle h up to its first event, whether the slide turns there); 1, False without one."""
-    k, push = numbers(workspace, i), workspace[P * LANES + i]
-    damp, square = workspace[D * LANES + i], workspace[W * LANES + i]
-    (x, v, f, z, _), (x1, v1, f1, z1, _) = state, after
-    u, turns = 1.0, False
-    if way * v1 < 0.0:
-        u = (
-            zero(
-                v,
-                v1,
-                h * (push * drive[0] - damp * v - square * x - f),
-                h * (push * drive[2] - damp * v1 - square * x1 - f1),
-            )
-            if way * v > 0.0
-            else 0.0
-        )
-        turns = True
-    if friction.HAS_ZERO_KINK and z * z1 < 0.0:
-        bend = zero(
-            z,
-            z1,
-            h * v * friction.rate_equation(k, z, v, way)[1],
-            h * v1 * friction.rate_equation(k, z1, v1, way)[1],
-        )
-        u, turns = (bend, False) if bend < u else (u, turns)
-    return u, turns
+@njit(**NJIT_INLINE)
+def hermite_cubic(y0, y1, m0, m1, u):
+    """Return the value at u of the cubic with these values and slopes at the ends of [0, 1].
 
+    Parameters
+    ----------
+    y0, y1, m0, m1, u : float
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def cubic(y, y1, m, m1, u):
-    """A cubic with these values and slopes at the ends of [0, 1], at u."""
+    Returns
+    -------
+    float
+    """
     w = 1 - u
-    return w * w * ((1 + 2 * u) * y + u * m) + u * u * ((1 + 2 * w) * y1 - w * m1)
+    return w * w * ((1 + 2 * u) * y0 + u * m0) + u * u * ((1 + 2 * w) * y1 - w * m1)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def folds():
-    """Whether `advance` folds what a step shows of itself."""
+def records_own_peaks():
+    """Return whether `resolve_step` adds the peaks and the work of a step to the readings itself."""
     return friction.HAS_SPEED_LAYER
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def furthest(x, v, x1, v1, h):
-    """Slide at the turn in a step that no event marks, that of its end without one."""
+@njit(**NJIT_INLINE)
+def slide_at_reversal(x, v, x1, v1, angle):
+    """Return the slide at a reversal in a step without an event, otherwise that of its end.
+
+    Parameters
+    ----------
+    x, v, x1, v1, angle
+        See `rigid_kernels.slide_at_reversal`.
+
+    Returns
+    -------
+    float
+    """
     u = v / (v - v1)
-    return cubic(x, x1, h * v, h * v1, u) if friction.HAS_SPEED_LAYER and v * v1 < 0.0 else x1
+    is_reversed = friction.HAS_SPEED_LAYER and v * v1 < 0.0
+    return hermite_cubic(x, x1, angle * v, angle * v1, u) if is_reversed else x1
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def onward(s, c, t):
-    """(sine, cosine) an angle t of up to a fifth after these, to 1e-9."""
+@njit(**NJIT_INLINE)
+def advance_angle(sine, cosine, angle):
+    """Return sine and cosine an angle of up to a fifth of a radian later, to 1e-9."""
+    t = angle
     t2 = t * t
-    cosine = 1 + t2 * (-1 / 2 + t2 * (1 / 24 - t2 * (1 / 720)))
-    sine = t * (1 + t2 * (-1 / 6 + t2 * (1 / 120 - t2 * (1 / 5040))))
-    return s * cosine + c * sine, c * cosine - s * sine
+    cosine_part = 1 + t2 * (-1 / 2 + t2 * (1 / 24 - t2 * (1 / 720)))
+    sine_part = t * (1 + t2 * (-1 / 6 + t2 * (1 / 120 - t2 * (1 / 5040))))
+    return sine * cosine_part + cosine * sine_part, cosine * cosine_part - sine * sine_part
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def by_speed(workspace, i, state, s, c, end):
-    """(angle, state at its end as of `run`, friction work) until the speed is `end`, by Runge and Kutta's rule over the
-    speed, in which the force of a layer is known beforehand; s, c: sine and cosine of the drive at the begin."""
+@njit(**NJIT_INLINE)
+def step_in_speed(workspace, lane, state, sine, cosine, end_speed):
+    """Integrate the motion until it has a given speed, by the Runge-Kutta rule of order 4 over the speed.
+
+    The force of a layer depends on the speed alone, so it is known beforehand.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    state : FlowState
+    sine, cosine : float
+        Of the drive at the start.
+    end_speed : float
+
+    Returns
+    -------
+    LayerPart
+    """
     x, v, f, z, q = state
-    k, push, damp, square = (
-        numbers(workspace, i),
-        workspace[P * LANES + i],
-        workspace[D * LANES + i],
-        workspace[W * LANES + i],
-    )
-    half = (end - v) / 2
-    middle, part = v + half, half / 3
-    fm, fe = friction.rate_equation(k, z, middle, 1.0)[0], friction.rate_equation(k, z, end, 1.0)[0]
-    r = 1 / (push * s - damp * v - square * x - f)
-    r1 = 1 / (push * onward(s, c, half * r)[0] - damp * middle - square * (x + half * v * r) - fm)
-    r2 = 1 / (
-        push * onward(s, c, half * r1)[0] - damp * middle - square * (x + half * middle * r1) - fm
-    )
-    r3 = 1 / (
-        push * onward(s, c, 2 * half * r2)[0]
-        - damp * end
-        - square * (x + 2 * half * middle * r2)
-        - fe
-    )
+    numbers = law_numbers(workspace, lane)
+    drive = workspace[DRIVE * LANES + lane]
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    half = (end_speed - v) / 2
+    middle = v + half
+    third = half / 3
+    fm = friction.rate_equation(numbers, z, middle, SIGN_IN_LAYER)[0]
+    fe = friction.rate_equation(numbers, z, end_speed, SIGN_IN_LAYER)[0]
+    # The angles per speed at the stages of the rule.
+    r = 1 / (drive * sine - damping * v - stiffness * x - f)
+    sine1 = advance_angle(sine, cosine, half * r)[0]
+    r1 = 1 / (drive * sine1 - damping * middle - stiffness * (x + half * v * r) - fm)
+    sine2 = advance_angle(sine, cosine, half * r1)[0]
+    r2 = 1 / (drive * sine2 - damping * middle - stiffness * (x + half * middle * r1) - fm)
+    sine3 = advance_angle(sine, cosine, 2 * half * r2)[0]
+    r3 = 1 / (drive * sine3 - damping * end_speed - stiffness * (x + 2 * half * middle * r2) - fe)
     mean = 2 * (r1 + r2)
-    return (
-        part * (r + mean + r3),
-        (x + part * (v * r + middle * mean + end * r3), end, fe, z, q),
-        part * (f * v * r + fm * middle * mean + fe * end * r3),
+    slide = third * (v * r + middle * mean + end_speed * r3)
+    return LayerPart(
+        third * (r + mean + r3),
+        FlowState(x + slide, end_speed, fe, z, q),
+        third * (f * v * r + fm * middle * mean + fe * end_speed * r3),
     )
+
+
+@njit(**NJIT_INLINE)
+def add_part_readings(workspace, lane, start, first, end, last, angle):
+    """Add the peaks and the loop of a part of a step to the readings.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    start, end : FlowState
+    first, last : tuple of float
+        Sine and cosine of the drive and acceleration at both ends.
+    angle : float
+        [rad]
+    """
+    output = workspace[OUTPUT_GAIN * LANES + lane]
+    base = workspace[BASE_GAIN * LANES + lane]
+    drive = workspace[DRIVE * LANES + lane]
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    sine, cosine, a = first
+    sine1, cosine1, a1 = last
+    rate = friction_rate(start.speed, a, SIGN_IN_LAYER, 0.0, workspace, lane, AT_START)
+    rate1 = friction_rate(end.speed, a1, SIGN_IN_LAYER, 0.0, workspace, lane, AT_END)
+    jerk = output * (drive * cosine - damping * a - stiffness * start.speed - rate) + base * cosine
+    jerk1 = (
+        output * (drive * cosine1 - damping * a1 - stiffness * end.speed - rate1) + base * cosine1
+    )
+    peak = cubic_peak(
+        output * a + base * sine, output * a1 + base * sine1, angle * jerk, angle * jerk1
+    )
+    force = cubic_peak(start.friction, end.friction, angle * rate, angle * rate1)
+    work = 0.5 * (start.friction + end.friction) * (end.slide - start.slide)
+    workspace[MAX_ACCELERATION * LANES + lane] = max(
+        workspace[MAX_ACCELERATION * LANES + lane], peak
+    )
+    workspace[MAX_FORCE * LANES + lane] = max(workspace[MAX_FORCE * LANES + lane], force)
+    workspace[LOOP_WORK * LANES + lane] += work
+    workspace[LOOP_WORK_SIZE * LANES + lane] += abs(work)
+
+
+@njit(**NJIT_INLINE)
+def count_layer_parts(workspace, lane, state, s0, s1, angle):
+    """Return the number of equal parts in which a step passes through a layer of speeds."""
+    numbers = law_numbers(workspace, lane)
+    edge_speed, width = layer_of_speeds(numbers, angle)
+    sines = (s0, workspace[MIDPOINT_FACTOR * LANES + lane] * (s0 + s1), s1)
+    end, _ = runge_kutta_step(workspace, lane, state, SIGN_IN_LAYER, sines, angle)
+    v = state.speed
+    slowest = 0.0 if v * end.speed < 0.0 else min(abs(v), abs(end.speed))
+    if slowest >= edge_speed:
+        return 1
+    return int(min(abs(end.speed - v) / width, MAX_LAYER_PARTS - 1.0)) + 1
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def through(workspace, i, s0, c0, s1, c1, h):
-    """`advance` of a law with a layer of speeds, in parts that follow it: of the speed, where this goes one way however
-    large the friction is, else like parts of the step. Adds to the sums of the step what the trapezoidal rule leaves
-    of them beside its ends, and folds the peaks and the loop of the parts."""
-    k, state, work, u, at = numbers(workspace, i), begun(workspace, i), 0.0, 1.0, 0.0
-    push, out, base = (
-        workspace[P * LANES + i],
-        workspace[OUT * LANES + i],
-        workspace[BASE * LANES + i],
-    )
-    damp, square = workspace[D * LANES + i], workspace[W * LANES + i]
-    most = k[1]
-    edge, width = layer_of_speeds(k, h)
-    begin = state[1]
-    free = push * s0 - damp * begin - square * state[0]
-    begins, side = free - state[2], 1.0 if free > 0.0 else -1.0
-    flies = side * free > CLEAR * most + h * abs(push * c0 - damp * begins - square * begin)
-    count = FINEST
+def resolve_layer_step(workspace, lane, s0, c0, s1, c1, angle):
+    """Compute a step of a law with a layer of speeds in parts that follow the layer.
+
+    Where the other forces drive the speed one way whatever the friction is, the parts are equal in speed, otherwise equal
+    in angle. The function adds to the sums of the step what the trapezoidal rule between its ends leaves out.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0, s1, c1, angle
+        See `rigid_kernels.resolve_step`.
+
+    Returns
+    -------
+    StepOutcome
+    """
+    numbers = law_numbers(workspace, lane)
+    state = flow_state(workspace, lane)
+    drive = workspace[DRIVE * LANES + lane]
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    edge_speed, width = layer_of_speeds(numbers, angle)
+    start_speed = state.speed
+    free = drive * s0 - damping * start_speed - stiffness * state.slide
+    start_rate = free - state.friction
+    side = 1.0 if free > 0.0 else -1.0
+    change = angle * abs(drive * c0 - damping * start_rate - stiffness * start_speed)
+    flies = side * free > FREE_FLIGHT_FACTOR * numbers[1] + change
+    n_parts = MAX_LAYER_PARTS
     if not flies:
-        (_, v1, _, _, _), _ = run(
-            workspace, i, state, 1.0, (s0, workspace[MIDDLE * LANES + i] * (s0 + s1), s1), h
-        )
-        near = 0.0 if begin * v1 < 0.0 else min(abs(begin), abs(v1))
-        count = int(min(abs(v1 - begin) / width, FINEST - 1.0)) + 1 if near < edge else 1
-    s, c, a = s0, c0, begins
-    xe, powers, squares = nan, 0.0, 0.0
-    for n in range(count):
-        v, rest, last = state[1], h - at, n == count - 1
-        part, follows, after, done = 0.0, flies and not last and side * v < edge, state, 0.0
+        n_parts = count_layer_parts(workspace, lane, state, s0, s1, angle)
+    s = s0
+    c = c0
+    a = start_rate
+    done = 0.0
+    work = 0.0
+    event = 1.0
+    event_slide = nan
+    work_sum = 0.0
+    loss_sum = 0.0
+    for n in range(n_parts):
+        v = state.speed
+        rest = angle - done
+        is_last = n == n_parts - 1
+        part = LayerPart(0.0, state, 0.0)
+        follows = flies and not is_last and side * v < edge_speed
         if follows:
-            end = -side * edge if side * v < -edge else v + side * width
-            part, after, done = by_speed(workspace, i, state, s, c, end)
-            follows = 0.0 < part < rest
+            end_speed = -side * edge_speed if side * v < -edge_speed else v + side * width
+            part = step_in_speed(workspace, lane, state, s, c, end_speed)
+            follows = 0.0 < part.angle < rest
         if not follows:
-            part, last = rest if flies or last else h / count, flies or last
-            drive = (s, onward(s, c, part / 2)[0], s1 if last else onward(s, c, part)[0])
-            after, done = run(workspace, i, state, 1.0, drive, part)
-        s2, c2 = (s1, c1) if last else onward(s, c, part)
-        (x, v, f, _, _), (x1, v1, f1, _, _) = state, after
-        a1 = push * s2 - damp * v1 - square * x1 - f1
-        if workspace[READS * LANES + i] > 0.0:
-            r, r1 = (
-                part * rise(v, a, 1.0, 0.0, workspace, i, 0),
-                part * rise(v1, a1, 1.0, 0.0, workspace, i, 3),
-            )
-            best = highest(
-                out * a + base * s,
-                out * a1 + base * s2,
-                part * (out * (push * c - damp * a - square * v) + base * c) - out * r,
-                part * (out * (push * c2 - damp * a1 - square * v1) + base * c2) - out * r1,
-            )
-            workspace[ACCELERATION * LANES + i] = max(workspace[ACCELERATION * LANES + i], best)
-            workspace[FORCE * LANES + i] = max(workspace[FORCE * LANES + i], highest(f, f1, r, r1))
-            area = 0.5 * (f + f1) * (x1 - x)
-            workspace[TURNED * LANES + i] += area
-            workspace[PASSED * LANES + i] += abs(area)
+            is_last = flies or is_last
+            t = rest if is_last else angle / n_parts
+            end_sine = s1 if is_last else advance_angle(s, c, t)[0]
+            sines = (s, advance_angle(s, c, t / 2)[0], end_sine)
+            end, part_work = runge_kutta_step(workspace, lane, state, SIGN_IN_LAYER, sines, t)
+            part = LayerPart(t, end, part_work)
+        t = part.angle
+        end = part.end
+        s2 = s1
+        c2 = c1
+        if not is_last:
+            s2, c2 = advance_angle(s, c, t)
+        v1 = end.speed
+        a1 = acceleration_at(workspace, lane, end, s2)
+        if workspace[IS_OBSERVED * LANES + lane] > 0.0:
+            add_part_readings(workspace, lane, state, (s, c, a), end, (s2, c2, a1), t)
         if v * v1 <= 0.0 and v != 0.0:
-            share = zero(v, v1, part * a, part * a1)
-            u, xe = (at + share * part) / h, cubic(x, x1, part * v, part * v1, share)
-        # Hermite's rule of the integral of a part
-        powers += part * (s * v + s2 * v1 + part / 6 * (c * v + s * a - c2 * v1 - s2 * a1)) / 2
-        squares += part * (v * v + v1 * v1 + part / 3 * (v * a - v1 * a1)) / 2
-        work, at, state, s, c, a = work + done, at + part, after, s2, c2, a1
-        if last:
+            place = hermite_root(v, v1, t * a, t * a1)
+            event = (done + place * t) / angle
+            event_slide = hermite_cubic(state.slide, end.slide, t * v, t * v1, place)
+        # Hermite's rule of the integrals of sin x' and x'^2 over the part.
+        work_sum += t * (s * v + s2 * v1 + t / 6 * (c * v + s * a - c2 * v1 - s2 * a1)) / 2
+        loss_sum += t * (v * v + v1 * v1 + t / 3 * (v * a - v1 * a1)) / 2
+        work += part.work
+        done += t
+        state = end
+        s = s2
+        c = c2
+        a = a1
+        if is_last:
             break
-    v, (x1, v1, f1, z1, q1) = begin, state
-    # the ends of the trapezoidal rule are those of the whole run
-    workspace[IN * LANES + i] += (
-        powers / h + h / 12 * (c1 * v1 + s1 * a - c0 * v - s0 * begins) - (s0 * v + s1 * v1) / 2
-    )
-    workspace[LOST * LANES + i] += (
-        squares / h + h / 6 * (v1 * a - v * begins) - (v * v + v1 * v1) / 2
-    )
-    workspace[FELT * LANES + i], workspace[SQUARE * LANES + i], workspace[WORK * LANES + i] = (
-        f1,
-        q1,
-        work,
-    )
-    turned = xe == xe
-    way = 1.0 if v1 > 0.0 else -1.0 if v1 < 0.0 else -workspace[WAY * LANES + i]
-    return (
-        x1,
+    v = start_speed
+    v1 = state.speed
+    # The trapezoidal rule over the run adds the ends of this step, and its correction the ends of the run.
+    work_ends = angle / 12 * (c1 * v1 + s1 * a - c0 * v - s0 * start_rate)
+    loss_ends = angle / 6 * (v1 * a - v * start_rate)
+    workspace[WORK_SUM * LANES + lane] += work_sum / angle + work_ends - (s0 * v + s1 * v1) / 2
+    workspace[LOSS_SUM * LANES + lane] += loss_sum / angle + loss_ends - (v * v + v1 * v1) / 2
+    workspace[FRICTION * LANES + lane] = state.friction
+    workspace[STRETCH_SQUARE * LANES + lane] = state.square
+    workspace[STEP_WORK * LANES + lane] = work
+    is_reversed = event_slide == event_slide
+    slip_sign = -workspace[SLIP_SIGN * LANES + lane]
+    if v1 != 0.0:
+        slip_sign = 1.0 if v1 > 0.0 else -1.0
+    if not is_reversed:
+        event_slide = state.slide
+    event_speed = 0.0 if is_reversed else v1
+    return StepOutcome(
+        state.slide,
         v1,
-        way,
-        z1,
-        u,
-        xe if turned else x1,
-        0.0 if turned else v1,
+        slip_sign,
+        state.stretch,
+        event,
+        event_slide,
+        event_speed,
         0.0,
-        xe if turned else x1,
+        event_slide,
         0.0,
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def advance(workspace, i, s0, c0, s1, c1, h):
-    """(x, v, way, place at the end of a step h; share u of the step up to a turn; x, v and place there; x where the
-    slide turns, that of the end without a turn; kink: 0, as no acceleration jumps).
+def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
+    """Compute a step that ends and starts anew where the slide reverses and where the law has a kink.
 
-    The step ends and begins anew where the slide turns, and where the law has a kink at no stretch. There the
-    irreversible part of the slide turns, so its range is told here.
+    The irreversible part of the slide reverses at a kink, so its range is updated here.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0, s1, c1, angle
+        See `rigid_kernels.resolve_step`.
+
+    Returns
+    -------
+    StepOutcome
     """
     if friction.HAS_SPEED_LAYER:
-        return through(workspace, i, s0, c0, s1, c1, h)
-    state, way, at, work, u = begun(workspace, i), workspace[WAY * LANES + i], 0.0, 0.0, 1.0
-    k, push, damp, square = (
-        numbers(workspace, i),
-        workspace[P * LANES + i],
-        workspace[D * LANES + i],
-        workspace[W * LANES + i],
-    )
-    xe = ve = ze = 0.0
-    for part in range(PARTS):
-        rest = h - at
-        middle, sine = at + rest / 2, s0 * cos(at) + c0 * sin(at)
-        drive = (sine, s0 * cos(middle) + c0 * sin(middle), s1)
-        after, done = run(workspace, i, state, way, drive, rest)
-        share, turns = first_event(workspace, i, state, after, way, drive, rest)
-        if part == PARTS - 1 or not (turns or share < 1.0):
+        return resolve_layer_step(workspace, lane, s0, c0, s1, c1, angle)
+    numbers = law_numbers(workspace, lane)
+    state = flow_state(workspace, lane)
+    first_sign = workspace[SLIP_SIGN * LANES + lane]
+    slip_sign = first_sign
+    event = 1.0
+    at_reversal = state
+    done = 0.0
+    work = 0.0
+    for part in range(MAX_PARTS):
+        rest = angle - done
+        sine = s0 * cos(done) + c0 * sin(done)
+        middle = done + rest / 2
+        sines = (sine, s0 * cos(middle) + c0 * sin(middle), s1)
+        end, part_work = runge_kutta_step(workspace, lane, state, slip_sign, sines, rest)
+        first = find_first_event(workspace, lane, state, end, slip_sign, sines, rest)
+        fraction = first.fraction
+        if part == MAX_PARTS - 1 or not (first.is_reversal or fraction < 1.0):
             break
-        if share > 0.0:
-            for _ in range(1 + CORRECTED):
-                end, middle = at + share * rest, at + share * rest / 2
-                drive = (sine, s0 * cos(middle) + c0 * sin(middle), s0 * cos(end) + c0 * sin(end))
-                (x, v, f, z, q), done = run(workspace, i, state, way, drive, share * rest)
-                gain = friction.rate_equation(k, z, v, way)[1] * v
-                miss, pace = (
-                    (v, push * drive[2] - damp * v - square * x - f) if turns else (z, gain)
+        if fraction > 0.0:
+            reached = state
+            for _ in range(1 + N_CORRECTIONS):
+                event_angle = done + fraction * rest
+                middle = done + fraction * rest / 2
+                event_sine = s0 * cos(event_angle) + c0 * sin(event_angle)
+                sines = (sine, s0 * cos(middle) + c0 * sin(middle), event_sine)
+                reached, part_work = runge_kutta_step(
+                    workspace, lane, state, slip_sign, sines, fraction * rest
                 )
-                if abs(miss) < rest * abs(pace):
-                    share = min(max(share - miss / (rest * pace), 0.0), 1.0)
-            work, at = work + done, end
-            v, z = 0.0 if turns else v, z if turns else 0.0
-            state = x, v, friction.rate_equation(k, z, v, way)[0], z, q
-            if not turns and workspace[READS * LANES + i] > 0.0:
-                workspace[SLIP_HIGH * LANES + i] = max(workspace[SLIP_HIGH * LANES + i], x)
-                workspace[SLIP_LOW * LANES + i] = min(workspace[SLIP_LOW * LANES + i], x)
-        if turns:
-            way, u, xe, ve, ze = -way, at / h, state[0], state[1], state[3]
-    x1, v1, f1, z1, q1 = after
-    workspace[FELT * LANES + i], workspace[SQUARE * LANES + i], workspace[WORK * LANES + i] = (
-        f1,
-        q1,
-        work + done,
+                v = reached.speed
+                z = reached.stretch
+                miss = z
+                rate = friction.rate_equation(numbers, z, v, slip_sign)[1] * v
+                if first.is_reversal:
+                    miss = v
+                    rate = acceleration_at(workspace, lane, reached, event_sine)
+                if abs(miss) < rest * abs(rate):
+                    fraction = min(max(fraction - miss / (rest * rate), 0.0), 1.0)
+            work += part_work
+            done = event_angle
+            v = 0.0 if first.is_reversal else reached.speed
+            z = reached.stretch if first.is_reversal else 0.0
+            force = friction.rate_equation(numbers, z, v, slip_sign)[0]
+            state = FlowState(reached.slide, v, force, z, reached.square)
+            if not first.is_reversal and workspace[IS_OBSERVED * LANES + lane] > 0.0:
+                slip = reached.slide
+                workspace[MAX_SLIP * LANES + lane] = max(workspace[MAX_SLIP * LANES + lane], slip)
+                workspace[MIN_SLIP * LANES + lane] = min(workspace[MIN_SLIP * LANES + lane], slip)
+        if first.is_reversal:
+            slip_sign = -slip_sign
+            event = done / angle
+            at_reversal = state
+    workspace[FRICTION * LANES + lane] = end.friction
+    workspace[STRETCH_SQUARE * LANES + lane] = end.square
+    workspace[STEP_WORK * LANES + lane] = work + part_work
+    if slip_sign == first_sign:
+        event = 1.0
+        at_reversal = end
+    return StepOutcome(
+        end.slide,
+        end.speed,
+        slip_sign,
+        end.stretch,
+        event,
+        at_reversal.slide,
+        at_reversal.speed,
+        at_reversal.stretch,
+        at_reversal.slide,
+        0.0,
     )
-    turned = way != workspace[WAY * LANES + i]
-    xe, ve, ze = (xe, ve, ze) if turned else (x1, v1, z1)
-    return x1, v1, way, z1, u if turned else 1.0, xe, ve, ze, xe, 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def between(begin, end, way, k, h, u):
-    """Place at the share u of a part of a step, by the law itself where the slide alone tells; arguments as of
-    `held`."""
-    (x, v, _, z), (x1, v1, _, z1) = begin, end
+def stretch_at(start, end, numbers, angle, u):
+    """Return the stretch inside a segment of a step.
+
+    Parameters
+    ----------
+    start, end : observation_kernels.Instant
+    numbers : tuple
+        See `law_numbers`.
+    angle : float
+        Angle of the segment [rad].
+    u : float
+        Fraction of the segment.
+
+    Returns
+    -------
+    float
+    """
+    slip_sign = start.state.slip_sign
+    x = start.state.slide
+    v = start.state.speed
+    z = start.state.memory
+    v1 = end.state.speed
+    z1 = end.state.memory
     if friction.IS_RATE_INDEPENDENT:
-        return friction.integrate_stretch(k, z, 0.0, cubic(x, x1, h * v, h * v1, u) - x, way)[0]
-    return cubic(
-        z,
-        z1,
-        h * v * friction.rate_equation(k, z, v, way)[1],
-        h * v1 * friction.rate_equation(k, z1, v1, way)[1],
-        u,
-    )
+        slide = hermite_cubic(x, end.state.slide, angle * v, angle * v1, u) - x
+        return friction.integrate_stretch(numbers, z, 0.0, slide, slip_sign)[0]
+    rate = v * friction.rate_equation(numbers, z, v, slip_sign)[1]
+    rate1 = v1 * friction.rate_equation(numbers, z1, v1, slip_sign)[1]
+    return hermite_cubic(z, z1, angle * rate, angle * rate1, u)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def sticks(begin, end, way, k, h, u):
-    """Whether less than SHARE of the slide is irreversible at the share u of a part of a step; arguments as of
-    `held`."""
-    (_, v, a, _), (_, v1, a1, _) = begin, end
-    speed = cubic(v, v1, h * a, h * a1, u)
-    return (
-        abs(1 - friction.rate_equation(k, between(begin, end, way, k, h, u), speed, way)[1]) < SHARE
+def sticks_at(start, end, numbers, angle, u):
+    """Return whether the interface sticks inside a segment of a step; arguments as of `stretch_at`."""
+    speed = hermite_cubic(
+        start.state.speed, end.state.speed, angle * start.acceleration, angle * end.acceleration, u
     )
+    stretch = stretch_at(start, end, numbers, angle, u)
+    gain = friction.rate_equation(numbers, stretch, speed, start.state.slip_sign)[1]
+    return abs(1 - gain) < SLIP_FRACTION
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def edge(begin, end, way, k, h, low, high, turns):
-    """Share of a part of a step, in [low, high], at which a stick begins or ends, or where it `turns` the stretch over;
-    arguments as of `held`."""
-    below, first = begin[3] < 0.0, sticks(begin, end, way, k, h, low)
-    for _ in range(HALVINGS):
+def find_stick_change(start, end, numbers, angle, low, high):
+    """Find by bisection where a stick starts or ends in a segment of a step.
+
+    Parameters
+    ----------
+    start, end, numbers, angle
+        See `stretch_at`.
+    low, high : float
+        Bounds of the fraction of the segment.
+
+    Returns
+    -------
+    float
+    """
+    sticks = sticks_at(start, end, numbers, angle, low)
+    for _ in range(N_HALVINGS):
         u = 0.5 * (low + high)
-        if (
-            (between(begin, end, way, k, h, u) < 0.0) == below
-            if turns
-            else sticks(begin, end, way, k, h, u) == first
-        ):
+        if sticks_at(start, end, numbers, angle, u) == sticks:
             low = u
         else:
             high = u
@@ -521,24 +849,53 @@ def edge(begin, end, way, k, h, low, high, turns):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def held(begin, end, way, workspace, i, h):
-    """(share of a part of a step in which the contact sticks; share inside it at which it begins to slip, 2: nowhere;
-    irreversible part of the slide where that turns inside it, that of its end without).
+def find_zero_stretch(start, end, numbers, angle):
+    """Find by bisection where the stretch changes its sign in a segment of a step; arguments as of `stretch_at`."""
+    low = 0.0
+    high = 1.0
+    for _ in range(N_HALVINGS):
+        u = 0.5 * (low + high)
+        is_negative = stretch_at(start, end, numbers, angle, u) < 0.0
+        if is_negative == (start.state.memory < 0.0):
+            low = u
+        else:
+            high = u
+    return low
 
-    begin, end: x, x', x'' and place at the ends of the part, of an angle h; in between, x, x' and, unless the law tells
-    it, the place are cubics. The irreversible part turns where there is no stretch; at a kink `advance` tells where.
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def stick_fractions(start, end, workspace, lane, angle):
+    """Return the `StickReading` of a segment of a step, between whose ends slide, speed and stretch are cubics.
+
+    The irreversible slide reverses where the stretch is 0; at a kink `resolve_step` notes where.
+
+    Parameters
+    ----------
+    start, end, workspace, lane, angle
+        See `rigid_kernels.stick_fractions`.
+
+    Returns
+    -------
+    StickReading
     """
-    k, (x, v, _, z), (x1, v1, _, z1) = numbers(workspace, i), begin, end
-    furthest, middle = irreversible_slide(x1, z1, workspace, i), 1.0
-    if z * z1 < 0.0:
-        middle = edge(begin, end, way, k, h, 0.0, 1.0, True)
-        furthest = furthest if friction.HAS_ZERO_KINK else cubic(x, x1, h * v, h * v1, middle)
-    first, last = sticks(begin, end, way, k, h, 0.0), sticks(begin, end, way, k, h, 1.0)
-    if first != last:
-        u = edge(begin, end, way, k, h, 0.0, 1.0, False)
-        return u if first else 1 - u, u if first else 2.0, furthest
-    if first or not sticks(begin, end, way, k, h, middle):
-        return 1.0 if first else 0.0, 2.0, furthest
-    # it slips at both ends, by stretches of opposite sign
-    u = edge(begin, end, way, k, h, middle, 1.0, False)
-    return u - edge(begin, end, way, k, h, 0.0, middle, False), u, furthest
+    numbers = law_numbers(workspace, lane)
+    x = start.state.slide
+    x1 = end.state.slide
+    extreme_slip = irreversible_slide(x1, end.state.memory, workspace, lane)
+    turnover = 1.0
+    if start.state.memory * end.state.memory < 0.0:
+        turnover = find_zero_stretch(start, end, numbers, angle)
+        if not friction.HAS_ZERO_KINK:
+            v = start.state.speed
+            extreme_slip = hermite_cubic(x, x1, angle * v, angle * end.state.speed, turnover)
+    sticks = sticks_at(start, end, numbers, angle, 0.0)
+    last_sticks = sticks_at(start, end, numbers, angle, 1.0)
+    if sticks != last_sticks:
+        u = find_stick_change(start, end, numbers, angle, 0.0, 1.0)
+        return StickReading(u if sticks else 1 - u, u if sticks else 2.0, extreme_slip)
+    if sticks or not sticks_at(start, end, numbers, angle, turnover):
+        return StickReading(1.0 if sticks else 0.0, 2.0, extreme_slip)
+    # The interface slips at both ends, with stretches of opposite sign.
+    release = find_stick_change(start, end, numbers, angle, turnover, 1.0)
+    stick = find_stick_change(start, end, numbers, angle, 0.0, turnover)
+    return StickReading(release - stick, release, extreme_slip)

@@ -1,544 +1,761 @@
-"""A step of one mode behind sliders side by side, of one case: of the fourth order between turns of the slide and
-closings of its loops, each found inside its step.
+"""A step behind sliders side by side, of one case: of the fourth order between reversals of the slide and closings of loops.
 
-Equation, in the angle of the drive: x'' + D x' + W x = P sin - f. Since the slide turned at FROM with the friction HELD
-it is f = HELD + side m G(|x - FROM|/m), where m = 2 (Masing's rule), and m = 1 from the start, and where
+The equation in the angle of the drive is x'' + D x' + W x = P sin - f. With the slide x_t and the friction f_t of the last
+reversal, and the direction s = +-1 since then, Masing's rule is
 
-    G(u) = K LENGTH g(u/LENGTH)
+    f = f_t + s m G(|x - x_t|/m),     G(u) = SPRING YIELD_LENGTH g(u/YIELD_LENGTH),
 
-is the force of a first loading, g the `curve`: a power (`power_curve_kernels`, Segalman's Iwan law) or a table
-(`table_curve_kernels`, a set of Jenkins elements). A loop that closes is forgotten. The place of a case is its
-friction. Twin: many elements, from event to event (`dynamics.events`).
+with m = 2, or m = 1 before the first reversal. G is the force of a first loading. The module `curve` has its shape g: a
+power (`power_curve_kernels`, Segalman's Iwan law) or a table (`table_curve_kernels`, a set of Jenkins elements). Reversals
+are pushed onto a stack, and a loop that closes is taken off it. MEMORY is the friction of the case. A reference is the
+engine `dynamics.events` with many elements.
 """
+
+from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from . import power_curve_kernels as curve
-from .names_kernels import (
-    CURVE,
-    ENDS,
-    GK,
-    HALF,
-    LANES,
-    LENGTH,
-    OWN,
-    OWN_MOST,
-    PAST,
-    PLACE,
-    STATES,
-    SUMS,
-    TOLD,
-    WAY,
-    WHERE,
-    D,
-    H,
-    K,
-    P,
-    V,
-    W,
-    X,
+from .rigid_kernels import (
+    PROOF_TOL,
+    StepOutcome,
+    StickReading,
+    TriedStep,
+    drive_after,
+    is_sticking,
+    records_own_peaks,
+    slide_at_reversal,
 )
-from .rigid_kernels import PROVEN, folds, furthest, sticking
+from .rows_kernels import (
+    CURVE_PLACE,
+    CURVE_STATE,
+    CYCLE_END_SIZE,
+    CYCLE_ENDS,
+    DAMPING,
+    DRIVE,
+    HALF_SLIP,
+    KINETIC,
+    LANES,
+    LAW_STATE,
+    MAX_KEPT,
+    MEMORY,
+    N_CYCLE_ENDS,
+    NJIT_INLINE,
+    SLIDE,
+    SLIP_SIGN,
+    SPEED,
+    SPRING,
+    STATE_ROWS,
+    STEP,
+    STIFFNESS,
+    SUM_ROWS,
+    YIELD_LENGTH,
+)
 
 __all__ = [
-    "KEPT",
-    "PROVEN",
-    "RESTS",
-    "TURNS_HELD",
-    "advance",
-    "ahead",
-    "at_turn",
-    "begin",
-    "folds",
-    "foretell",
+    "EVENT_KEEPS_STICK",
+    "N_KEPT",
+    "PROOF_TOL",
+    "STICK_IS_RIGID",
+    "can_extrapolate",
+    "friction_at_reversal",
     "friction_force",
-    "furthest",
-    "held",
+    "friction_rate",
     "irreversible_slide",
-    "path",
-    "resume",
-    "rise",
-    "settles",
-    "sticking",
+    "is_sticking",
+    "prepare_step",
+    "records_own_peaks",
+    "resolve_step",
+    "restore_derived_state",
+    "set_derived_state",
+    "slide_at_reversal",
+    "slip_increment",
+    "stick_fractions",
+    "try_step",
 ]
 
-RESTS = False  # it never holds
-TURNS_HELD = True  # an event may leave a stick as it is
-# of its own state: sign of the motion; m; slide, friction, irreversible slide and energy at the last turn; slide at
-# which something happens next; stiffness now, and in the step: at its begin, before and after its event, at its end;
-# path of slip in the step; friction at the last turn that was; whether it ever slipped, whether the first loading is
-# remembered, whether all sliders slip; largest gap of a loop that was dropped for want of room, over its size; number
-# of points behind; share of the step up to its event in which it sticks; side over m times the length; whole of the
-# sliders over their friction
-(
-    SIDE,
-    M,
-    FROM,
-    HELD,
-    SLIP_FROM,
-    ENERGY_FROM,
-    NEXT,
-    STIFF,
-    STIFF_0,
-    STIFF_1,
-    STIFF_2,
-    STIFF_3,
-    GONE,
-    AT_TURN,
-    EVER,
-    VIRGIN,
-    ALL,
-    DROPPED,
-    BEHIND,
-    STUCK_IN,
-    PER,
-    WHOLE,
-) = range(OWN, OWN + 22)
-STACK, EACH = OWN + 22, 4  # those points: slide, friction, irreversible slide and energy of each
-# those that move on as a motion settles: the first of these points
-DEPTH, KEPT = (
-    (CURVE - STACK) // EACH,
-    OWN_MOST,
-)
-FORM = SIDE, M, VIRGIN, ALL, BEHIND  # numbers that stay as they are then
-OWN_STATE = CURVE - OWN + curve.ROOM
-LEAST = 1e-30  # of w
-CLOSE = 1e-9  # of a step, by which Newton's last goes: what is left is of its square
-MOST = 32  # events of a step
-NOTHING, PASSES, TURNS, SLIPS = 0, 1, 2, 3  # what happens, what counts more last
-FAR = 1e300
+STICK_IS_RIGID = False
+EVENT_KEEPS_STICK = True
+
+# These rows are the state of the law. The four of the last reversal are pushed onto the stack together.
+DIRECTION = LAW_STATE  # sign of the speed
+BRANCH_SCALE = LAW_STATE + 1  # m of Masing's rule
+TURN_SLIDE = LAW_STATE + 2  # slide at the last reversal [m]
+TURN_FORCE = LAW_STATE + 3  # friction at the last reversal [m]
+TURN_SLIP = LAW_STATE + 4  # irreversible slide at the last reversal [m]
+TURN_ENERGY = LAW_STATE + 5  # elastic energy at the last reversal [m^2]
+NEXT_EVENT = LAW_STATE + 6  # slide of the next event [m]
+TANGENT = LAW_STATE + 7  # slope of the friction over the slide now
+TANGENT_START = LAW_STATE + 8  # the same at the start of the step
+TANGENT_BEFORE = LAW_STATE + 9  # the same before the event of the step
+TANGENT_AFTER = LAW_STATE + 10  # the same after the event
+TANGENT_END = LAW_STATE + 11  # the same at the end of the step
+STEP_SLIP = LAW_STATE + 12  # path of slip in the step [m]
+REVERSAL_FORCE = (
+    LAW_STATE + 13
+)  # friction at the last reversal that happened, also if its loop has closed [m]
+EVER_SLIPPED = LAW_STATE + 14  # 1 once half of the friction has slipped
+KEEPS_FIRST_LOADING = (
+    LAW_STATE + 15
+)  # 1 while the start of the first loading is at the bottom of the stack
+ALL_SLIP = LAW_STATE + 16  # 1 while all sliders slip
+MAX_DROPPED_GAP = (
+    LAW_STATE + 17
+)  # largest gap, over its size, of a loop that was dropped from a full stack
+N_REVERSALS = LAW_STATE + 18  # number of reversals on the stack
+STICK_FRACTION = LAW_STATE + 19  # fraction of the step before its event without a slip
+INVERSE_LENGTH = LAW_STATE + 20  # DIRECTION over m YIELD_LENGTH
+FORCE_RATIO = LAW_STATE + 21  # SPRING YIELD_LENGTH over KINETIC
+REVERSALS = (
+    LAW_STATE + 22
+)  # stack of slide, friction, irreversible slide and energy of the reversals
+REVERSAL_SIZE = 4
+MAX_REVERSALS = (CURVE_STATE - REVERSALS) // REVERSAL_SIZE
+N_KEPT = MAX_KEPT
+FORM_ROWS = (DIRECTION, BRANCH_SCALE, KEEPS_FIRST_LOADING, ALL_SLIP, N_REVERSALS)
+N_LAW_STATE = CURVE_STATE - LAW_STATE + curve.N_CURVE_STATE
+
+MIN_PLACE = 1e-30  # smallest place on the curve, whose logarithm a power needs
+EVENT_TOL = 1e-9  # last Newton step, as a fraction of a step; the error left is its square
+N_NEWTON = 6
+MAX_EVENTS = 32  # number of events in a step
+BEYOND_ALL = 1e300  # slide of an event that does not happen [m]
+SAME_SLIDE = 1e-9  # fraction of the branch by which a slide may miss an event that is at it
+
+# Kinds of events. Of several events in a step the one with the largest number is reported.
+NO_EVENT = 0
+CLOSING = 1
+REVERSAL = 2
+SLIP_CHANGE = 3
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def begin(workspace, i):
-    """Set what follows from the numbers and the state of a lane that takes a case, or has begun a branch."""
-    length = workspace[LENGTH * LANES + i]
-    workspace[PER * LANES + i] = workspace[SIDE * LANES + i] / (workspace[M * LANES + i] * length)
-    workspace[WHOLE * LANES + i] = workspace[K * LANES + i] * length / workspace[GK * LANES + i]
+class BranchState(NamedTuple):
+    """Slide, its derivative, friction, and slope of the friction over the slide."""
+
+    slide: float
+    speed: float
+    friction: float
+    tangent: float
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def settles(workspace, i):
-    """Whether the same points have been behind at the ends of the last cycles, and all of them are kept."""
-    same = STACK + EACH * workspace[BEHIND * LANES + i] <= OWN + KEPT
-    for k in range(ENDS):
-        for n in FORM:
-            before = workspace[(PAST + k * TOLD + len(STATES) + len(SUMS) + n - OWN) * LANES + i]
-            same = same and before == workspace[n * LANES + i]
-    return same
+class FirstEvent(NamedTuple):
+    """Fraction of a step at which its first event happens, and the kind of the event; 1 and NO_EVENT without one."""
+
+    fraction: float
+    kind: int
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def resume(workspace, i):
-    """Set what follows from a motion that moved on."""
-    begin(workspace, i)
-    curve.begin_at(within(workspace[X * LANES + i], workspace, i), workspace, i)
+@njit(**NJIT_INLINE)
+def set_derived_state(workspace, lane):
+    """Set what follows from the numbers of the case and from its branch."""
+    length = workspace[YIELD_LENGTH * LANES + lane]
+    branch_length = workspace[BRANCH_SCALE * LANES + lane] * length
+    full_force = workspace[SPRING * LANES + lane] * length
+    workspace[INVERSE_LENGTH * LANES + lane] = workspace[DIRECTION * LANES + lane] / branch_length
+    workspace[FORCE_RATIO * LANES + lane] = full_force / workspace[KINETIC * LANES + lane]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def place_of(x, workspace, i):
-    """Slide since the last turn at x, over that of all sliders there."""
-    return workspace[PER * LANES + i] * (x - workspace[FROM * LANES + i])
+@njit(**NJIT_INLINE)
+def can_extrapolate(workspace, lane):
+    """Return whether the stack has had the same form at the last cycle ends, and is kept in full there."""
+    stack_end = REVERSALS + REVERSAL_SIZE * workspace[N_REVERSALS * LANES + lane]
+    is_same = stack_end <= LAW_STATE + N_KEPT
+    for k in range(N_CYCLE_ENDS):
+        first = CYCLE_ENDS + k * CYCLE_END_SIZE + len(STATE_ROWS) + len(SUM_ROWS) - LAW_STATE
+        for row in FORM_ROWS:
+            before = workspace[(first + row) * LANES + lane]
+            is_same = is_same and before == workspace[row * LANES + lane]
+    return is_same
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def within(x, workspace, i):
-    """The place of x on the curve; up to twice the slide at which all slip as if they did not yet, which tells a step
-    beyond it where that is."""
-    return min(max(place_of(x, workspace, i), LEAST), 2.0 - workspace[ALL * LANES + i])
+@njit(**NJIT_INLINE)
+def restore_derived_state(workspace, lane):
+    """Set what follows from an extrapolated motion."""
+    set_derived_state(workspace, lane)
+    curve.start_at(clamped_place(workspace[SLIDE * LANES + lane], workspace, lane), workspace, lane)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def friction(x, workspace, i, when=curve.ASKED):
-    """(f, its slope over the slide) at x; when: as of the curve."""
-    m, side, stiff = workspace[M * LANES + i], workspace[SIDE * LANES + i], workspace[K * LANES + i]
-    g, slope = curve.force(within(x, workspace, i), workspace, i, when)
-    return workspace[HELD * LANES + i] + side * m * stiff * workspace[LENGTH * LANES + i] * g, (
-        1.0 - workspace[ALL * LANES + i]
-    ) * stiff * slope
+@njit(**NJIT_INLINE)
+def place_on_curve(x, workspace, lane):
+    """Return the slide since the last reversal over that at which all sliders slip."""
+    return workspace[INVERSE_LENGTH * LANES + lane] * (x - workspace[TURN_SLIDE * LANES + lane])
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def irreversible_slide(x, place, workspace, i, when=curve.ASKED):
-    """Irreversible part of the slide, the mean over the sliders by what each carries at most; when: as of the
-    curve."""
-    m, side, length = (
-        workspace[M * LANES + i],
-        workspace[SIDE * LANES + i],
-        workspace[LENGTH * LANES + i],
-    )
-    whole = workspace[K * LANES + i] * length
-    u = place_of(x, workspace, i)
+@njit(**NJIT_INLINE)
+def clamped_place(x, workspace, lane):
+    """Return the place of a slide on the curve, between MIN_PLACE and the slip of all sliders.
+
+    A branch whose sliders do not all slip yet goes on to 2, so that a step beyond 1 finds where its event is.
+    """
+    place = max(place_on_curve(x, workspace, lane), MIN_PLACE)
+    return min(place, 2.0 - workspace[ALL_SLIP * LANES + lane])
+
+
+@njit(**NJIT_INLINE)
+def branch_friction(x, workspace, lane, when=curve.IN_TABLE):
+    """Return the friction of the branch at a slide and its slope; `when` is that of the curve."""
+    m = workspace[BRANCH_SCALE * LANES + lane]
+    side = workspace[DIRECTION * LANES + lane]
+    spring = workspace[SPRING * LANES + lane]
+    force, slope = curve.force_and_slope(clamped_place(x, workspace, lane), workspace, lane, when)
+    friction = side * m * spring * workspace[YIELD_LENGTH * LANES + lane] * force
+    tangent = (1.0 - workspace[ALL_SLIP * LANES + lane]) * spring * slope
+    return workspace[TURN_FORCE * LANES + lane] + friction, tangent
+
+
+@njit(**NJIT_INLINE)
+def irreversible_slide(x, memory, workspace, lane, when=curve.IN_TABLE):
+    """Return the irreversible part of a slide [m]: the mean over the sliders, weighted by their friction.
+
+    Parameters
+    ----------
+    x, memory : float
+        Slide and friction [m].
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    when : int
+        Where the numbers of the curve are: IN_TABLE, PREPARED or AT_START of the module `curve`.
+
+    Returns
+    -------
+    float
+    """
+    m = workspace[BRANCH_SCALE * LANES + lane]
+    side = workspace[DIRECTION * LANES + lane]
+    length = workspace[YIELD_LENGTH * LANES + lane]
+    full_force = workspace[SPRING * LANES + lane] * length
+    u = place_on_curve(x, workspace, lane)
     w = min(u, 1.0)
-    slips = curve.slipped(
-        w, side * (place - workspace[HELD * LANES + i]) / (m * whole), workspace, i, when
-    )
-    return workspace[SLIP_FROM * LANES + i] + side * m * length * (
-        workspace[WHOLE * LANES + i] * slips + (u - w)
-    )
+    force = side * (memory - workspace[TURN_FORCE * LANES + lane]) / (m * full_force)
+    slip = workspace[FORCE_RATIO * LANES + lane] * curve.mean_slip(w, force, workspace, lane, when)
+    return workspace[TURN_SLIP * LANES + lane] + side * m * length * (slip + (u - w))
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def energy(x, place, slip, workspace, i):
-    """Elastic energy of the sliders [m^2]: what the friction took since the last turn without what slip lost, where the
-    irreversible slide is `slip`."""
-    m, side, length = (
-        workspace[M * LANES + i],
-        workspace[SIDE * LANES + i],
-        workspace[LENGTH * LANES + i],
+def slider_energy(x, memory, slip, workspace, lane):
+    """Return the elastic energy of the sliders over the mass [m^2].
+
+    It is the energy at the last reversal and the work of the friction since then, less what slip dissipates.
+
+    Parameters
+    ----------
+    x, memory : float
+        Slide and friction [m].
+    slip : float
+        Irreversible slide [m].
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+
+    Returns
+    -------
+    float
+    """
+    m = workspace[BRANCH_SCALE * LANES + lane]
+    side = workspace[DIRECTION * LANES + lane]
+    length = workspace[YIELD_LENGTH * LANES + lane]
+    limit = workspace[KINETIC * LANES + lane]
+    full_force = workspace[SPRING * LANES + lane] * length
+    distance = side * (x - workspace[TURN_SLIDE * LANES + lane])
+    turn_force = side * workspace[TURN_FORCE * LANES + lane]
+    w = min(distance / (m * length), 1.0)
+    force = (side * memory - turn_force) / (m * full_force)
+    loading = full_force * length * curve.loading_work(w, force, workspace, lane)
+    work = m * m * (loading + limit * (distance / m - w * length))
+    slip_loss = limit * side * (slip - workspace[TURN_SLIP * LANES + lane])
+    return workspace[TURN_ENERGY * LANES + lane] + turn_force * distance + work - slip_loss
+
+
+@njit(**NJIT_INLINE)
+def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
+    """Return the friction over the mass in the angle of the drive [m], which is the memory of the case.
+
+    Parameters
+    ----------
+    x, v, slip_sign, memory, sine, workspace, lane
+        See `rigid_kernels.friction_force`.
+
+    Returns
+    -------
+    float
+    """
+    return memory
+
+
+@njit(**NJIT_INLINE)
+def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
+    """Return the rate of the friction, by the slope that the last step noted for this instant.
+
+    Parameters
+    ----------
+    v, acceleration, slip_sign, memory, workspace, lane, when
+        See `rigid_kernels.friction_rate`.
+
+    Returns
+    -------
+    float
+    """
+    return v * workspace[(TANGENT_START + when) * LANES + lane]
+
+
+@njit(**NJIT_INLINE)
+def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
+    """Return the friction at the last reversal.
+
+    Parameters
+    ----------
+    x, slip_sign, memory, event_memory, workspace, lane
+        See `rigid_kernels.friction_at_reversal`.
+
+    Returns
+    -------
+    float
+    """
+    return workspace[REVERSAL_FORCE * LANES + lane]
+
+
+@njit(**NJIT_INLINE)
+def stick_fractions(start, end, workspace, lane, angle):
+    """Return the `StickReading` of a segment of a step; it sticks while less than half of the friction slips.
+
+    Parameters
+    ----------
+    start, end, workspace, lane, angle
+        See `rigid_kernels.stick_fractions`.
+
+    Returns
+    -------
+    StickReading
+    """
+    slip = irreversible_slide(end.state.slide, end.state.memory, workspace, lane)
+    # The noted fraction is that of the first segment, so it is deleted after that one has been read.
+    noted = workspace[STICK_FRACTION * LANES + lane]
+    workspace[STICK_FRACTION * LANES + lane] = 0.0
+    if start.state.slip_sign == 0.0:
+        return StickReading(1.0, 2.0, slip)
+    return StickReading(noted, 1.0 if noted > 0.0 else 2.0, slip)
+
+
+@njit(**NJIT_INLINE)
+def slip_increment(memory, event_memory, memory1, workspace, lane):
+    """Return the path of slip of the last step [m]; arguments as of `rigid_kernels.slip_increment`."""
+    return workspace[STEP_SLIP * LANES + lane]
+
+
+@njit(**NJIT_INLINE)
+def acceleration_and_rate(workspace, lane, state, s0, c0):
+    """Return the acceleration of a `BranchState` and the rate of the acceleration."""
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    drive = workspace[DRIVE * LANES + lane]
+    a0 = drive * s0 - damping * state.speed - stiffness * state.slide - state.friction
+    j0 = drive * c0 - damping * a0 - (stiffness + state.tangent) * state.speed
+    return a0, j0
+
+
+@njit(**NJIT_INLINE)
+def branch_state(workspace, lane):
+    """Return the `BranchState` of a lane."""
+    return BranchState(
+        workspace[SLIDE * LANES + lane],
+        workspace[SPEED * LANES + lane],
+        workspace[MEMORY * LANES + lane],
+        workspace[TANGENT * LANES + lane],
     )
-    whole, far = workspace[K * LANES + i] * length, side * (x - workspace[FROM * LANES + i])
-    held, most = side * workspace[HELD * LANES + i], workspace[GK * LANES + i]
-    w = min(far / (m * length), 1.0)
-    work = (
-        m
-        * m
-        * (
-            whole * length * curve.work(w, (side * place - held) / (m * whole), workspace, i)
-            + most * (far / m - w * length)
-        )
-    )
-    lost = most * side * (slip - workspace[SLIP_FROM * LANES + i])
-    return workspace[ENERGY_FROM * LANES + i] + held * far + work - lost
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def friction_force(x, v, way, place, sine, workspace, i):
-    """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
-    return place
+@njit(**NJIT_INLINE)
+def prepare_step(workspace, s0, c0):
+    """Look up the curves of all lanes at the slides that a Taylor series predicts for the end of the next step."""
+    if curve.LOOKS_AHEAD:
+        for lane in range(LANES):
+            t = workspace[STEP * LANES + lane]
+            state = branch_state(workspace, lane)
+            a0, j0 = acceleration_and_rate(workspace, lane, state, s0, c0)
+            x1 = state.slide + t * (state.speed + t * (a0 / 2 + t * j0 / 6))
+            workspace[CURVE_PLACE * LANES + lane] = clamped_place(x1, workspace, lane)
+        for lane in range(LANES):
+            curve.prepare(workspace, lane)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rise(v, a, way, place, workspace, i, when):
-    """Rate of the friction at a speed v at the begin of the last step (0), before and after its event, at its end."""
-    return v * workspace[(STIFF_0 + when) * LANES + i]
+@njit(**NJIT_INLINE)
+def hermite_step(workspace, lane, start, s0, c0, s1, c1, angle, when=curve.IN_TABLE):
+    """Integrate the motion of a branch over an angle by Hermite's rule.
 
+    The rule uses the acceleration and its rate at both ends. The law is evaluated once, at the slide that a Taylor series
+    predicts, and is followed from there along its slope.
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def at_turn(x, way, place, turned, workspace, i):
-    """Friction at the last turn of the slide."""
-    return workspace[AT_TURN * LANES + i]
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    start : BranchState
+    s0, c0, s1, c1 : float
+        Sine and cosine of the drive at both ends.
+    angle : float
+        [rad]
+    when : int
+        See `irreversible_slide`.
 
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def held(begin, end, way, workspace, i, h):
-    """(share of a part of a step in which less than half of the friction slips; 1 where a slip begins at its end
-    without an event there, else 2; irreversible part of the slide at its end)."""
-    within_slips = workspace[STUCK_IN * LANES + i] if way != 0.0 else 0.0
-    workspace[STUCK_IN * LANES + i] = 0.0  # it is of the first part
-    return (
-        1.0 if way == 0.0 else within_slips,
-        1.0 if within_slips > 0.0 else 2.0,
-        irreversible_slide(end[0], end[3], workspace, i),
-    )
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def path(place, pe, place1, v1, workspace, i):
-    """What the last step adds to the path of slip [m]."""
-    return workspace[GONE * LANES + i]
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rates(x, v, f, k, s0, c0, workspace, i):
-    """The acceleration and its rate."""
-    damp, square, push = (
-        workspace[D * LANES + i],
-        workspace[W * LANES + i],
-        workspace[P * LANES + i],
-    )
-    a0 = push * s0 - damp * v - square * x - f
-    return a0, push * c0 - damp * a0 - (square + k) * v
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def foretell(workspace, s0, c0):
-    """Find the curves of all lanes where Taylor foretells their slides at the end of the next step."""
-    if curve.FORETELLS:
-        for i in range(LANES):
-            x, v, h = workspace[X * LANES + i], workspace[V * LANES + i], workspace[H * LANES + i]
-            a0, j0 = rates(
-                x,
-                v,
-                workspace[PLACE * LANES + i],
-                workspace[STIFF * LANES + i],
-                s0,
-                c0,
-                workspace,
-                i,
-            )
-            workspace[WHERE * LANES + i] = within(
-                x + h * (v + h * (a0 / 2 + h * j0 / 6)), workspace, i
-            )
-        for i in range(LANES):
-            curve.find(workspace, i)
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def flow(x, v, f, k, s0, c0, s1, c1, h, workspace, i, when=curve.ASKED):
-    """(x, x', f, its slope) after an angle h, by the rule of Hermite on the acceleration and its rate at both ends: its
-    law is asked for at a place that Taylor foretells, and followed from there by its slope; when: as of the curve."""
-    damp, square, push = (
-        workspace[D * LANES + i],
-        workspace[W * LANES + i],
-        workspace[P * LANES + i],
-    )
-    a0, j0 = rates(x, v, f, k, s0, c0, workspace, i)
-    ahead_x, v1 = x + h * (v + h * (a0 / 2 + h * j0 / 6)), v + h * (a0 + h * j0 / 2)
-    ahead_f, k1 = friction(ahead_x, workspace, i, when)
-    x1 = ahead_x
+    Returns
+    -------
+    BranchState
+    """
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    drive = workspace[DRIVE * LANES + lane]
+    x = start.slide
+    v = start.speed
+    t = angle
+    a0, j0 = acceleration_and_rate(workspace, lane, start, s0, c0)
+    predicted = x + t * (v + t * (a0 / 2 + t * j0 / 6))
+    friction, tangent = branch_friction(predicted, workspace, lane, when)
+    x1 = predicted
+    v1 = v + t * (a0 + t * j0 / 2)
     for _ in range(2):
-        a1 = push * s1 - damp * v1 - square * x1 - ahead_f - k1 * (x1 - ahead_x)
-        j1 = push * c1 - damp * a1 - (square + k1) * v1
-        x1 = x + h * (v + h * ((7 * a0 + 3 * a1) / 20 + h * (3 * j0 - 2 * j1) / 60))
-        v1 = v + h * ((a0 + a1) / 2 + h * (j0 - j1) / 12)
-    return x1, v1, ahead_f + k1 * (x1 - ahead_x), k1
+        friction1 = friction + tangent * (x1 - predicted)
+        a1 = drive * s1 - damping * v1 - stiffness * x1 - friction1
+        j1 = drive * c1 - damping * a1 - (stiffness + tangent) * v1
+        x1 = x + t * (v + t * ((7 * a0 + 3 * a1) / 20 + t * (3 * j0 - 2 * j1) / 60))
+        v1 = v + t * ((a0 + a1) / 2 + t * (j0 - j1) / 12)
+    return BranchState(x1, v1, friction + tangent * (x1 - predicted), tangent)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def ends_at(x, workspace, i):
-    """Slide at which something happens next of a step that begins at x: as far as a step may go, at the latest."""
-    side, next_one = workspace[SIDE * LANES + i], workspace[NEXT * LANES + i]
-    far = x + side * workspace[M * LANES + i] * workspace[LENGTH * LANES + i] * (
-        curve.PART + FAR * workspace[ALL * LANES + i]
-    )
-    return min(next_one, far) if side > 0.0 else max(next_one, far)
+@njit(**NJIT_INLINE)
+def next_event_slide(x, workspace, lane):
+    """Return the slide at which a step from x ends at the latest: that of the next event, or the longest step."""
+    side = workspace[DIRECTION * LANES + lane]
+    length = workspace[BRANCH_SCALE * LANES + lane] * workspace[YIELD_LENGTH * LANES + lane]
+    longest = curve.MAX_STEP + BEYOND_ALL * workspace[ALL_SLIP * LANES + lane]
+    event = workspace[NEXT_EVENT * LANES + lane]
+    end = x + side * length * longest
+    return min(event, end) if side > 0.0 else max(event, end)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def ahead(workspace, i, s0, c0, s1, c1, reads):
-    """(x, x', friction after a step without a turn or a closing in it; whether there is one); reads: as of
-    `rigid_kernels`."""
-    x, v, f, k = (
-        workspace[X * LANES + i],
-        workspace[V * LANES + i],
-        workspace[PLACE * LANES + i],
-        workspace[STIFF * LANES + i],
+@njit(**NJIT_INLINE)
+def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
+    """Compute a step as if no event lay inside it: no reversal and no closing of a loop.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0, s1, c1, is_observed
+        See `rigid_kernels.try_step`.
+
+    Returns
+    -------
+    TriedStep
+    """
+    state = branch_state(workspace, lane)
+    side = workspace[DIRECTION * LANES + lane]
+    angle = workspace[STEP * LANES + lane]
+    end = hermite_step(workspace, lane, state, s0, c0, s1, c1, angle, curve.PREPARED)
+    event = (
+        side * end.speed < 0.0
+        or side * (end.slide - next_event_slide(state.slide, workspace, lane)) > 0.0
+        or (is_observed and end.speed == 0.0)
     )
-    side = workspace[SIDE * LANES + i]
-    x1, v1, f1, k1 = flow(
-        x, v, f, k, s0, c0, s1, c1, workspace[H * LANES + i], workspace, i, curve.FOUND
-    )
-    event = side * v1 < 0.0 or side * (x1 - ends_at(x, workspace, i)) > 0.0 or (reads and v1 == 0.0)
-    if reads:
-        workspace[STIFF_0 * LANES + i], workspace[STIFF_3 * LANES + i] = k, k1
-    workspace[STIFF * LANES + i] = k if event else k1
-    workspace[GONE * LANES + i] = side * (
-        irreversible_slide(x1, f1, workspace, i, curve.FOUND)
-        - irreversible_slide(x, f, workspace, i, curve.HERE)
-    )
-    curve.go_on(workspace, i, event)
-    return x1, v1, f1, event
+    if is_observed:
+        workspace[TANGENT_START * LANES + lane] = state.tangent
+        workspace[TANGENT_END * LANES + lane] = end.tangent
+    workspace[TANGENT * LANES + lane] = state.tangent if event else end.tangent
+    slip = irreversible_slide(state.slide, state.friction, workspace, lane, curve.AT_START)
+    slip1 = irreversible_slide(end.slide, end.friction, workspace, lane, curve.PREPARED)
+    workspace[STEP_SLIP * LANES + lane] = side * (slip1 - slip)
+    curve.finish_step(workspace, lane, event)
+    return TriedStep(end.slide, end.speed, end.friction, event)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def first_event(x, v, a0, x1, v1, a1, h, workspace, i):
-    """(share of a step at which something happens first, 1 where nothing does; what)."""
-    side, next_one = workspace[SIDE * LANES + i], ends_at(x, workspace, i)
-    # the speed as a cubic over the step, the slide as its integral
-    m0, m1 = h * a0, h * a1
-    c2, c3 = 3 * (v1 - v) - 2 * m0 - m1, m0 + m1 - 2 * (v1 - v)
-    share, what, far = 1.0, NOTHING, x1
-    if side * v1 < 0.0:
-        u = v / (v - v1) if side * v > 0.0 else 1.0 if side * m0 > 0.0 else 0.0
-        for _ in range(6):
-            slope, before = m0 + u * (2 * c2 + 3 * c3 * u), u
+def find_first_event(workspace, lane, start, a0, end, a1, angle):
+    """Find the first event of a step of a branch by Newton's method.
+
+    The speed is a cubic over the step, and the slide its integral.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    start, end : BranchState
+    a0, a1 : float
+        Accelerations at both ends.
+    angle : float
+        Angle of the step [rad].
+
+    Returns
+    -------
+    FirstEvent
+    """
+    side = workspace[DIRECTION * LANES + lane]
+    x = start.slide
+    v = start.speed
+    event_slide = next_event_slide(x, workspace, lane)
+    m0 = angle * a0
+    m1 = angle * a1
+    c2 = 3 * (end.speed - v) - 2 * m0 - m1
+    c3 = m0 + m1 - 2 * (end.speed - v)
+    fraction = 1.0
+    kind = NO_EVENT
+    last_slide = end.slide
+    if side * end.speed < 0.0:
+        u = 1.0 if side * m0 > 0.0 else 0.0
+        if side * v > 0.0:
+            u = v / (v - end.speed)
+        for _ in range(N_NEWTON):
+            slope = m0 + u * (2 * c2 + 3 * c3 * u)
+            before = u
             u = u - (v + u * (m0 + u * (c2 + u * c3))) / slope if slope != 0.0 else u
             u = min(max(u, 0.0), 1.0)
-            if abs(u - before) < CLOSE:
+            if abs(u - before) < EVENT_TOL:
                 break
-        share, what = u, TURNS
-        far = x + h * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4)))
-    if side * (far - next_one) > 0.0:
-        u, most = share * min(max((next_one - x) / (far - x), 0.0), 1.0), share
-        for _ in range(6):
-            speed, before = side * (v + u * (m0 + u * (c2 + u * c3))), u
-            gap = side * (x + h * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4))) - next_one)
-            u = min(max(u - gap / (h * speed), 0.0), most) if speed > 0.0 else u
-            if abs(u - before) < CLOSE:
+        fraction = u
+        kind = REVERSAL
+        last_slide = x + angle * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4)))
+    if side * (last_slide - event_slide) > 0.0:
+        u = fraction * min(max((event_slide - x) / (last_slide - x), 0.0), 1.0)
+        for _ in range(N_NEWTON):
+            speed = side * (v + u * (m0 + u * (c2 + u * c3)))
+            slide = x + angle * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4)))
+            before = u
+            if speed > 0.0:
+                u = min(max(u - side * (slide - event_slide) / (angle * speed), 0.0), fraction)
+            if abs(u - before) < EVENT_TOL:
                 break
-        share, what = u, PASSES
-    return share, what
+        fraction = u
+        kind = CLOSING
+    return FirstEvent(fraction, kind)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def recall(k, workspace, i):
-    """Go on from the point k behind, with all after it forgotten."""
-    for n in range(EACH):
-        workspace[(FROM + n) * LANES + i] = workspace[(STACK + EACH * k + n) * LANES + i]
-    workspace[BEHIND * LANES + i] = k
-    workspace[M * LANES + i] = 1.0 if k == 0 and workspace[VIRGIN * LANES + i] > 0.0 else 2.0
+def stacked_slide(k, workspace, lane):
+    """Return the slide of the kth reversal on the stack."""
+    return workspace[(REVERSALS + REVERSAL_SIZE * k) * LANES + lane]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def drop(workspace, i):
-    """Forget the loop behind whose closing changes the least: the one beside a loop of nearly its size."""
-    best, gap = 1, FAR
-    for k in range(1, DEPTH - 2):
-        apart = abs(
-            workspace[(STACK + EACH * (k + 2)) * LANES + i]
-            - workspace[(STACK + EACH * k) * LANES + i]
-        )
-        best, gap = (k, apart) if apart < gap else (best, gap)
-    size = abs(
-        workspace[(STACK + EACH * best) * LANES + i]
-        - workspace[(STACK + EACH * (best + 1)) * LANES + i]
+def restore_reversal(k, workspace, lane):
+    """Continue from the kth reversal on the stack, and forget those after it."""
+    for n in range(REVERSAL_SIZE):
+        stacked = workspace[(REVERSALS + REVERSAL_SIZE * k + n) * LANES + lane]
+        workspace[(TURN_SLIDE + n) * LANES + lane] = stacked
+    is_first_loading = k == 0 and workspace[KEEPS_FIRST_LOADING * LANES + lane] > 0.0
+    workspace[N_REVERSALS * LANES + lane] = k
+    workspace[BRANCH_SCALE * LANES + lane] = 1.0 if is_first_loading else 2.0
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def drop_smallest_loop(workspace, lane):
+    """Drop the loop from a full stack whose closing changes the least: the one beside a loop of nearly its size."""
+    best = 1
+    smallest_gap = BEYOND_ALL
+    for k in range(1, MAX_REVERSALS - 2):
+        gap = abs(stacked_slide(k + 2, workspace, lane) - stacked_slide(k, workspace, lane))
+        if gap < smallest_gap:
+            best = k
+            smallest_gap = gap
+    size = abs(stacked_slide(best, workspace, lane) - stacked_slide(best + 1, workspace, lane))
+    workspace[MAX_DROPPED_GAP * LANES + lane] = max(
+        workspace[MAX_DROPPED_GAP * LANES + lane], smallest_gap / size
     )
-    workspace[DROPPED * LANES + i] = max(workspace[DROPPED * LANES + i], gap / size)
-    for k in range(best, DEPTH - 2):
-        for n in range(EACH):
-            workspace[(STACK + EACH * k + n) * LANES + i] = workspace[
-                (STACK + EACH * (k + 2) + n) * LANES + i
+    for k in range(best, MAX_REVERSALS - 2):
+        for n in range(REVERSAL_SIZE):
+            workspace[(REVERSALS + REVERSAL_SIZE * k + n) * LANES + lane] = workspace[
+                (REVERSALS + REVERSAL_SIZE * (k + 2) + n) * LANES + lane
             ]
-    workspace[BEHIND * LANES + i] = DEPTH - 2
+    workspace[N_REVERSALS * LANES + lane] = MAX_REVERSALS - 2
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def turn_round(x, f, slip, workspace, i):
-    """Begin a branch where the slide turns."""
-    side, stored = workspace[SIDE * LANES + i], energy(x, f, slip, workspace, i)
-    if workspace[ALL * LANES + i] > 0.0:
-        workspace[VIRGIN * LANES + i] = workspace[BEHIND * LANES + i] = 0.0
+def start_branch(x, friction, slip, workspace, lane):
+    """Push the last reversal onto the stack and start a branch at a new one.
+
+    Parameters
+    ----------
+    x, friction, slip : float
+        Slide, friction and irreversible slide at the new reversal [m].
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    """
+    energy = slider_energy(x, friction, slip, workspace, lane)
+    if workspace[ALL_SLIP * LANES + lane] > 0.0:
+        # A slip of all sliders deletes their history.
+        workspace[KEEPS_FIRST_LOADING * LANES + lane] = 0.0
+        workspace[N_REVERSALS * LANES + lane] = 0.0
     else:
-        if workspace[BEHIND * LANES + i] >= DEPTH:
-            drop(workspace, i)
-        k = int(workspace[BEHIND * LANES + i])
-        for n in range(EACH):
-            workspace[(STACK + EACH * k + n) * LANES + i] = workspace[(FROM + n) * LANES + i]
-        workspace[BEHIND * LANES + i] = k + 1
-    workspace[FROM * LANES + i], workspace[HELD * LANES + i] = x, f
-    workspace[SLIP_FROM * LANES + i], workspace[ENERGY_FROM * LANES + i] = slip, stored
-    workspace[AT_TURN * LANES + i], workspace[SIDE * LANES + i], workspace[M * LANES + i] = (
-        f,
-        -side,
-        2.0,
-    )
-    workspace[ALL * LANES + i] = 0.0
+        if workspace[N_REVERSALS * LANES + lane] >= MAX_REVERSALS:
+            drop_smallest_loop(workspace, lane)
+        k = int(workspace[N_REVERSALS * LANES + lane])
+        for n in range(REVERSAL_SIZE):
+            last = workspace[(TURN_SLIDE + n) * LANES + lane]
+            workspace[(REVERSALS + REVERSAL_SIZE * k + n) * LANES + lane] = last
+        workspace[N_REVERSALS * LANES + lane] = k + 1
+    workspace[TURN_SLIDE * LANES + lane] = x
+    workspace[TURN_FORCE * LANES + lane] = friction
+    workspace[TURN_SLIP * LANES + lane] = slip
+    workspace[TURN_ENERGY * LANES + lane] = energy
+    workspace[REVERSAL_FORCE * LANES + lane] = friction
+    workspace[DIRECTION * LANES + lane] = -workspace[DIRECTION * LANES + lane]
+    workspace[BRANCH_SCALE * LANES + lane] = 2.0
+    workspace[ALL_SLIP * LANES + lane] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def close(x, slip, workspace, i):
-    """Forget the loop that closes here, if one does; a slide that all sliders follow goes on from where it would have
-    had to turn; slip: the irreversible slide."""
-    k, side, length = (
-        int(workspace[BEHIND * LANES + i]),
-        workspace[SIDE * LANES + i],
-        workspace[LENGTH * LANES + i],
-    )
-    if side * (x - closing(workspace, i)) < 0.0 or k == 0:
+def close_loop(x, slip, workspace, lane):
+    """Take a loop that closes at this slide off the stack.
+
+    If the outermost loop closes and the first loading is forgotten, all sliders slip; the branch then continues from the
+    reversal at which it would have had to start.
+
+    Parameters
+    ----------
+    x, slip : float
+        Slide and irreversible slide [m].
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    """
+    k = int(workspace[N_REVERSALS * LANES + lane])
+    side = workspace[DIRECTION * LANES + lane]
+    length = workspace[YIELD_LENGTH * LANES + lane]
+    if side * (x - closing_slide(workspace, lane)) < 0.0 or k == 0:
         return
-    if k == 1 and workspace[VIRGIN * LANES + i] == 0.0:
-        most, whole = workspace[GK * LANES + i], workspace[K * LANES + i] * length
-        gone, work = (
-            curve.slipped(1.0, most / whole, workspace, i, curve.ASKED),
-            curve.work(1.0, most / whole, workspace, i),
-        )
-        workspace[BEHIND * LANES + i], workspace[M * LANES + i] = 0.0, 2.0
-        workspace[FROM * LANES + i], workspace[HELD * LANES + i] = (
-            x - side * 2 * length,
-            -side * most,
-        )
-        workspace[SLIP_FROM * LANES + i] = slip - side * 2 * length * whole / most * gone
-        workspace[ENERGY_FROM * LANES + i] = whole * length * (work - gone)
+    if k == 1 and workspace[KEEPS_FIRST_LOADING * LANES + lane] == 0.0:
+        limit = workspace[KINETIC * LANES + lane]
+        full_force = workspace[SPRING * LANES + lane] * length
+        force = limit / full_force
+        mean_slip = curve.mean_slip(1.0, force, workspace, lane, curve.IN_TABLE)
+        work = curve.loading_work(1.0, force, workspace, lane)
+        slip_of_branch = side * 2 * length * full_force / limit * mean_slip
+        workspace[N_REVERSALS * LANES + lane] = 0.0
+        workspace[BRANCH_SCALE * LANES + lane] = 2.0
+        workspace[TURN_SLIDE * LANES + lane] = x - side * 2 * length
+        workspace[TURN_FORCE * LANES + lane] = -side * limit
+        workspace[TURN_SLIP * LANES + lane] = slip - slip_of_branch
+        workspace[TURN_ENERGY * LANES + lane] = full_force * length * (work - mean_slip)
     else:
-        recall(k - 1 if k == 1 else k - 2, workspace, i)
+        restore_reversal(k - 1 if k == 1 else k - 2, workspace, lane)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def closing(workspace, i):
-    """Slide at which the loop closes, or all sliders slip."""
-    k, side, start = (
-        int(workspace[BEHIND * LANES + i]),
-        workspace[SIDE * LANES + i],
-        workspace[FROM * LANES + i],
-    )
+def closing_slide(workspace, lane):
+    """Return the slide at which the loop closes, or at which all sliders slip."""
+    k = int(workspace[N_REVERSALS * LANES + lane])
+    start = workspace[TURN_SLIDE * LANES + lane]
     if k == 0:
-        return start + side * workspace[M * LANES + i] * workspace[LENGTH * LANES + i]
-    before = workspace[(STACK + EACH * (k - 1)) * LANES + i]
-    return 2 * before - start if k == 1 and workspace[VIRGIN * LANES + i] > 0.0 else before
+        length = workspace[BRANCH_SCALE * LANES + lane] * workspace[YIELD_LENGTH * LANES + lane]
+        return start + workspace[DIRECTION * LANES + lane] * length
+    before = stacked_slide(k - 1, workspace, lane)
+    if k == 1 and workspace[KEEPS_FIRST_LOADING * LANES + lane] > 0.0:
+        return 2 * before - start
+    return before
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def look_ahead(x, workspace, i):
-    """Note where something happens next, and whether half of the friction slips."""
-    begin(workspace, i)
-    side, size = (
-        workspace[SIDE * LANES + i],
-        workspace[M * LANES + i] * workspace[LENGTH * LANES + i],
-    )
-    far, end = side * (x - workspace[FROM * LANES + i]), closing(workspace, i)
-    slips = far >= size * workspace[HALF * LANES + i] * (1 - 1e-9)
-    half = workspace[FROM * LANES + i] + side * size * workspace[HALF * LANES + i]
-    if far >= size * (1 - 1e-9) and workspace[BEHIND * LANES + i] == 0.0:
-        end, workspace[ALL * LANES + i] = side * FAR, 1.0
-    workspace[NEXT * LANES + i] = end if slips or side * (half - end) > 0.0 else half
-    workspace[WAY * LANES + i] = side if slips else 0.0
-    workspace[EVER * LANES + i] = 1.0 if slips else workspace[EVER * LANES + i]
+def find_next_event(x, workspace, lane):
+    """Note the slide of the next event, and whether half of the friction slips."""
+    set_derived_state(workspace, lane)
+    side = workspace[DIRECTION * LANES + lane]
+    length = workspace[BRANCH_SCALE * LANES + lane] * workspace[YIELD_LENGTH * LANES + lane]
+    half_length = length * workspace[HALF_SLIP * LANES + lane]
+    distance = side * (x - workspace[TURN_SLIDE * LANES + lane])
+    end = closing_slide(workspace, lane)
+    slips = distance >= half_length * (1 - SAME_SLIDE)
+    half = workspace[TURN_SLIDE * LANES + lane] + side * half_length
+    if distance >= length * (1 - SAME_SLIDE) and workspace[N_REVERSALS * LANES + lane] == 0.0:
+        end = side * BEYOND_ALL
+        workspace[ALL_SLIP * LANES + lane] = 1.0
+    workspace[NEXT_EVENT * LANES + lane] = end if slips or side * (half - end) > 0.0 else half
+    workspace[SLIP_SIGN * LANES + lane] = side if slips else 0.0
+    if slips:
+        workspace[EVER_SLIPPED * LANES + lane] = 1.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def advance(workspace, i, s0, c0, s1, c1, h):
-    """(x, v, way, friction at the end of a step h; share u of the step up to the event that counts: where half of the
-    friction slips from or no longer, else a turn; x, v and friction there; x where the slide turns, that of the end
-    without a turn; kink: 0, as no acceleration jumps)."""
-    x, v, f, k = (
-        workspace[X * LANES + i],
-        workspace[V * LANES + i],
-        workspace[PLACE * LANES + i],
-        workspace[STIFF * LANES + i],
-    )
-    damp, square, push = (
-        workspace[D * LANES + i],
-        workspace[W * LANES + i],
-        workspace[P * LANES + i],
-    )
-    s, c, left, gone, weight = s0, c0, h, 0.0, NOTHING
-    workspace[STIFF_0 * LANES + i] = k
-    u, xe, ve, fe, turn, turned, stuck = 1.0, x, v, f, x, False, 0.0
-    workspace[STUCK_IN * LANES + i], slip = 0.0, irreversible_slide(x, f, workspace, i)
-    for events in range(MOST + 1):
-        x1, v1, f1, k1 = flow(x, v, f, k, s, c, s1, c1, left, workspace, i)
-        share, what = first_event(
-            x,
-            v,
-            push * s - damp * v - square * x - f,
-            x1,
-            v1,
-            push * s1 - damp * v1 - square * x1 - f1,
-            left,
-            workspace,
-            i,
-        )
-        if what == NOTHING or events == MOST or left <= 0.0:
+def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
+    """Compute a step with its reversals and closings of loops.
+
+    The event of the outcome is the start or the end of a slip of half of the friction, otherwise a reversal.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0, s1, c1, angle
+        See `rigid_kernels.resolve_step`.
+
+    Returns
+    -------
+    StepOutcome
+    """
+    state = branch_state(workspace, lane)
+    event = state
+    event_fraction = 1.0
+    event_kind = NO_EVENT
+    reversal_slide = state.slide
+    is_reversed = False
+    s = s0
+    c = c0
+    rest = angle
+    path = 0.0
+    stick_angle = 0.0
+    slip = irreversible_slide(state.slide, state.friction, workspace, lane)
+    workspace[TANGENT_START * LANES + lane] = state.tangent
+    workspace[STICK_FRACTION * LANES + lane] = 0.0
+    for n_events in range(MAX_EVENTS + 1):
+        end = hermite_step(workspace, lane, state, s, c, s1, c1, rest)
+        a0, _ = acceleration_and_rate(workspace, lane, state, s, c)
+        a1, _ = acceleration_and_rate(workspace, lane, end, s1, c1)
+        first = find_first_event(workspace, lane, state, a0, end, a1, rest)
+        if first.kind == NO_EVENT or n_events == MAX_EVENTS or rest <= 0.0:
             break
-        t = share * left
-        se, ce = (
-            s * (1 - t * t / 2 + t**4 / 24) + c * t * (1 - t * t / 6 + t**4 / 120),
-            c * (1 - t * t / 2 + t**4 / 24) - s * t * (1 - t * t / 6 + t**4 / 120),
-        )
-        begun, was = slip, workspace[WAY * LANES + i]
-        x, v, f, k = flow(x, v, f, k, s, c, se, ce, t, workspace, i)
-        f, before = friction(x, workspace, i)
-        slip = irreversible_slide(x, f, workspace, i)
-        gone += abs(slip - begun)
-        s, c, left, stuck = se, ce, left - t, stuck + (t if was == 0.0 else 0.0)
-        if what == TURNS:
-            v, turn, turned = 0.0, x, True
-            turn_round(x, f, slip, workspace, i)
+        t = first.fraction * rest
+        se, ce = drive_after(s, c, t)
+        slip_before = slip
+        sign_before = workspace[SLIP_SIGN * LANES + lane]
+        reached = hermite_step(workspace, lane, state, s, c, se, ce, t)
+        x = reached.slide
+        v = 0.0 if first.kind == REVERSAL else reached.speed
+        friction, tangent_before = branch_friction(x, workspace, lane)
+        slip = irreversible_slide(x, friction, workspace, lane)
+        path += abs(slip - slip_before)
+        s = se
+        c = ce
+        rest -= t
+        stick_angle += t if sign_before == 0.0 else 0.0
+        if first.kind == REVERSAL:
+            reversal_slide = x
+            is_reversed = True
+            start_branch(x, friction, slip, workspace, lane)
         else:
-            close(x, slip, workspace, i)
-        look_ahead(x, workspace, i)
-        f, k = friction(x, workspace, i)
-        slip = irreversible_slide(x, f, workspace, i) if what == PASSES else slip
-        now = SLIPS if workspace[WAY * LANES + i] != was else what
-        if now >= weight:
-            weight, u, xe, ve, fe = now, 1 - left / h, x, v, f
-            workspace[STIFF_1 * LANES + i], workspace[STIFF_2 * LANES + i] = before, k
-            workspace[STUCK_IN * LANES + i] = stuck / (h - left) if now == SLIPS else 0.0
-    workspace[GONE * LANES + i] = gone + abs(irreversible_slide(x1, f1, workspace, i) - slip)
-    workspace[STIFF * LANES + i] = workspace[STIFF_3 * LANES + i] = k1
-    curve.begin_at(within(x1, workspace, i), workspace, i)
-    if weight == NOTHING:
-        xe, ve, fe = x1, v1, f1
-        workspace[STIFF_1 * LANES + i] = workspace[STIFF_2 * LANES + i] = k1
-    return x1, v1, workspace[WAY * LANES + i], f1, u, xe, ve, fe, turn if turned else x1, 0.0
+            close_loop(x, slip, workspace, lane)
+        find_next_event(x, workspace, lane)
+        friction, tangent = branch_friction(x, workspace, lane)
+        if first.kind == CLOSING:
+            slip = irreversible_slide(x, friction, workspace, lane)
+        state = BranchState(x, v, friction, tangent)
+        changes_slip = workspace[SLIP_SIGN * LANES + lane] != sign_before
+        kind = SLIP_CHANGE if changes_slip else first.kind
+        if kind >= event_kind:
+            event_kind = kind
+            event_fraction = 1 - rest / angle
+            event = state
+            workspace[TANGENT_BEFORE * LANES + lane] = tangent_before
+            workspace[TANGENT_AFTER * LANES + lane] = tangent
+            fraction = stick_angle / (angle - rest) if changes_slip else 0.0
+            workspace[STICK_FRACTION * LANES + lane] = fraction
+    last_slip = irreversible_slide(end.slide, end.friction, workspace, lane)
+    workspace[STEP_SLIP * LANES + lane] = path + abs(last_slip - slip)
+    workspace[TANGENT * LANES + lane] = end.tangent
+    workspace[TANGENT_END * LANES + lane] = end.tangent
+    curve.start_at(clamped_place(end.slide, workspace, lane), workspace, lane)
+    if event_kind == NO_EVENT:
+        event = end
+        workspace[TANGENT_BEFORE * LANES + lane] = end.tangent
+        workspace[TANGENT_AFTER * LANES + lane] = end.tangent
+    return StepOutcome(
+        end.slide,
+        end.speed,
+        workspace[SLIP_SIGN * LANES + lane],
+        end.friction,
+        event_fraction,
+        event.slide,
+        event.speed,
+        event.friction,
+        reversal_slide if is_reversed else end.slide,
+        0.0,
+    )

@@ -1,33 +1,47 @@
-"""The force of a first loading of Segalman's Iwan law, without cells, over the stiffness and the slide LENGTH at which
-all slip:
+"""The force of a first loading of Segalman's Iwan law, in closed form.
 
-    g(w) = w (1 - q w^(chi + 1)/(chi + 2)), w up to 1
+With the force over the stiffness and YIELD_LENGTH, the slide over YIELD_LENGTH w, and the numbers chi and q of the law,
 
-Twin: many elements, from event to event (`dynamics.events`).
+    g(w) = w (1 - q w^(chi + 1)/(chi + 2)) up to w = 1.
+
+A reference is the engine `dynamics.events` with many elements.
 """
 
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .names_kernels import FIRST_OF_LAW, LANES
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from .rows_kernels import LANES, LAW_NUMBERS, NJIT_INLINE
 
-EXPONENT, SHARE = range(FIRST_OF_LAW, FIRST_OF_LAW + 2)  # numbers: chi + 1, q
-ROOM = 0  # numbers that it has in the state of a case
-PART = 1e300  # of LENGTH, over which a step may go: it bends so little that the end of it is found
-FORETELLS = False  # its places need not be found
-ASKED = FOUND = HERE = 0  # as of `table_curve_kernels`
+EXPONENT = LAW_NUMBERS  # chi + 1
+FRACTION = LAW_NUMBERS + 1  # q
+N_CURVE_STATE = 0  # number of rows that the curve has in the state of the law
+MAX_STEP = (
+    1e300  # longest step, over YIELD_LENGTH; the curve bends so little that no step is too long
+)
+LOOKS_AHEAD = False  # whether `prepare` has something to do
+# The numbers of the curve are everywhere the same; see `table_curve_kernels`.
+IN_TABLE = 0
+PREPARED = 0
+AT_START = 0
+ROUND_TO_WHOLE = (
+    6755399441055744.0  # 1.5 * 2^52: after adding it the last bits are the nearest whole number
+)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def power(w, a):
-    """w^a to 3e-13 for LEAST <= w <= 2 and 0 < a <= 1, by the bits of a number: no branch and no call, so that a
-    compiler takes several lanes at once; no fast-math, as its roundings are meant."""
+    """Return w^a to 3e-13, for masing_kernels.MIN_PLACE <= w <= 2 and 0 < a <= 1.
+
+    It uses the bits of a number, without a branch or a call, so that a compiler takes several lanes at once: the series of
+    the logarithm of the mantissa, then that of the power of two. It is compiled without fast-math, because the rounding
+    to a whole number relies on the order of the additions.
+    """
     bits = np.float64(w).view(np.int64)
-    part = np.int64((bits & 0xFFFFFFFFFFFFF) | 0x3FF0000000000000).view(np.float64)
-    more = 1.0 if part > 1.4142135623730951 else 0.0
-    part = part * (1 - 0.5 * more)
-    t = (part - 1) / (part + 1)
+    mantissa = np.int64((bits & 0xFFFFFFFFFFFFF) | 0x3FF0000000000000).view(np.float64)
+    is_large = 1.0 if mantissa > 1.4142135623730951 else 0.0
+    mantissa = mantissa * (1 - 0.5 * is_large)
+    t = (mantissa - 1) / (mantissa + 1)
     z = t * t
     log = (
         2.8853900817779268
@@ -46,9 +60,9 @@ def power(w, a):
             )
         )
     )
-    y = a * (((bits >> 52) - 1023) + more + log)
-    whole = y + 6755399441055744.0  # 1.5 of 2^52: its last bits are the whole number next to y
-    g = 0.6931471805599453 * (y - (whole - 6755399441055744.0))
+    y = a * (((bits >> 52) - 1023) + is_large + log)
+    whole = y + ROUND_TO_WHOLE
+    g = 0.6931471805599453 * (y - (whole - ROUND_TO_WHOLE))
     e = 1 + g * (
         1
         + g
@@ -78,39 +92,50 @@ def power(w, a):
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def force(w, workspace, i, when):
-    """(g, its slope) at w > 0."""
-    e, p = (
-        workspace[EXPONENT * LANES + i],
-        workspace[SHARE * LANES + i] * power(w, workspace[EXPONENT * LANES + i]),
-    )
-    return w * (1 - p / (e + 1)), 1 - p
+@njit(**NJIT_INLINE)
+def force_and_slope(w, workspace, lane, when):
+    """Return the force at w > 0 and its slope."""
+    exponent = workspace[EXPONENT * LANES + lane]
+    p = workspace[FRACTION * LANES + lane] * power(w, exponent)
+    return w * (1 - p / (exponent + 1)), 1 - p
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def slipped(w, g, workspace, i, when):
-    """Mean slip of the sliders, each by what it carries at most, times that of all, where their force is g."""
-    e = workspace[EXPONENT * LANES + i]
-    return e / (e + 2) * w * (w - g)
+@njit(**NJIT_INLINE)
+def mean_slip(w, force, workspace, lane, when):
+    """Return the slip at w, weighted by the friction of the sliders, over the stiffness and YIELD_LENGTH.
+
+    Parameters
+    ----------
+    w, force : float
+        Place on the curve, and the force there.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    when : int
+
+    Returns
+    -------
+    float
+    """
+    exponent = workspace[EXPONENT * LANES + lane]
+    return exponent / (exponent + 2) * w * (w - force)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def work(w, g, workspace, i):
-    """Integral of the force up to w, where it is g."""
-    return w * (w / 2 - (w - g) / (workspace[EXPONENT * LANES + i] + 2))
+@njit(**NJIT_INLINE)
+def loading_work(w, force, workspace, lane):
+    """Return the integral of the force up to w; arguments as of `mean_slip`."""
+    return w * (w / 2 - (w - force) / (workspace[EXPONENT * LANES + lane] + 2))
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find(workspace, i):
-    """Find nothing."""
+@njit(**NJIT_INLINE)
+def prepare(workspace, lane):
+    """Look up the curve of a lane; there is nothing to look up."""
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def go_on(workspace, i, event):
-    """Keep nothing."""
+@njit(**NJIT_INLINE)
+def finish_step(workspace, lane, event):
+    """Keep what the step looked up; there is nothing to keep."""
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def begin_at(w, workspace, i):
-    """Keep nothing."""
+@njit(**NJIT_INLINE)
+def start_at(w, workspace, lane):
+    """Look up the curve at the start of a step; there is nothing to look up."""

@@ -1,200 +1,285 @@
-"""What lanes show of their last cycles, as the numbers that runs from event to event give of theirs."""
+"""Energies and readings of a march in lanes, in the form in which `dynamics.events` gives those of its runs.
+
+Sums of a march are those of the trapezoidal rule; the formula of Euler and Maclaurin corrects them at their ends.
+"""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ..events import names_kernels as of
 from ..events.reading import Reading
-from . import names_kernels as at
-from .run import MASING, Cases, Marched, flows, own_of, own_state
+from . import rows_kernels as rows
+from .run import MASING, Cases, Marched, has_one_stretch, law_kernels, law_state
+
+# Readings of the interface of `dynamics.events` and of the lanes, with the power of the energy and of the frequency by
+# which a lane's reading is multiplied.
+INTERFACE_READINGS = (
+    (of.SLIP_HIGH, "MAX_SLIP", 0, 0),
+    (of.SLIP_LOW, "MIN_SLIP", 0, 0),
+    (of.RANGE, "MEAN_RANGE", 0, 0),
+    (of.FORCE, "MAX_FORCE", 1, 0),
+    (of.TURNED, "LOOP_WORK", 1, 0),
+    (of.PASSED, "LOOP_WORK_SIZE", 1, 0),
+    (of.STUCK, "STICK_ANGLE", 0, -1),
+    (of.FIRST, "FIRST_MEAN_SLIDE", 0, -1),
+    (of.LAST, "LAST_MEAN_SLIDE", 0, -1),
+    (of.F_FIRST, "FIRST_MEAN_FORCE", 1, -1),
+    (of.F_LAST, "LAST_MEAN_FORCE", 1, -1),
+)
+RUN_READINGS = (
+    (of.ACCELERATION, "MAX_ACCELERATION"),
+    (of.STARTS, "SLIP_STARTS"),
+    (of.START_COS, "START_COS"),
+    (of.START_SIN, "START_SIN"),
+)
 
 
-def books(law: str, cases: Cases, found: Marched, energy) -> dict:
-    """Energies (n,) [J] of whole runs by name; energy (n,) [kg s-2]: what a square of lengths stands for."""
-    h, b, e, first = found.step, found.begun, found.motion, found.start
-    left = found.history.shape[1] - found.ended - found.cycles
-    sums = {
-        k: e[:, k] + left * (e[:, k] - b[:, k]) / found.cycles
-        for k in (at.PATH, at.IN, at.LOST, at.POWER)
+class Integrals(NamedTuple):
+    """Integrals (n,) over the observed cycles with the cosine and the sine of the drive."""
+
+    cosine: np.ndarray
+    sine: np.ndarray
+
+
+class Harmonics(NamedTuple):
+    """Integrals of the slide, of the acceleration of the output, of the friction, and of the acceleration at 3 times."""
+
+    slide: Integrals
+    acceleration: Integrals
+    friction: Integrals
+    third_acceleration: Integrals
+
+
+def run_energies(law: str, cases: Cases, marched: Marched, energy) -> dict:
+    """Return the energies (n,) [J] of whole runs by name.
+
+    Parameters
+    ----------
+    law : str
+        As `run.load_loop` names it.
+    cases : Cases
+    marched : Marched
+    energy : (n,) array
+        Energy per square of a length [kg s-2].
+
+    Returns
+    -------
+    dict
+        The sums over cycles that repeat are those of the observed cycles.
+    """
+    step = marched.step
+    observed_start = marched.observed_start
+    end = marched.motion
+    n_repeated = marched.history.shape[1] - marched.n_before - marched.n_observed
+    sums = {}
+    for row in rows.SUM_ROWS:
+        growth = (end[:, row] - observed_start[:, row]) / marched.n_observed
+        sums[row] = end[:, row] + n_repeated * growth
+    x0 = marched.start[:, rows.SLIDE]
+    v0 = marched.start[:, rows.SPEED]
+    x1 = end[:, rows.SLIDE]
+    v1 = end[:, rows.SPEED]
+    rate0 = v0 * _free_acceleration(law, cases, marched.start)
+    rate1 = v1 * _free_acceleration(law, cases, end)
+    loss_ends = step / 2 * (v0**2 - v1**2) + step * step / 6 * (rate0 - rate1)
+    work_ends = step * step / 12 * (v0 - v1)
+    largest = np.abs(marched.history[:, :, :2]).max(axis=(1, 2))
+    elastic = _elastic_energy(law, cases, end) - _elastic_energy(law, cases, marched.start)
+    if has_one_stretch(law):
+        dissipated = sums[rows.SLIP_PATH] - elastic
+    else:
+        dissipated = cases.kinetic * sums[rows.SLIP_PATH]
+    stored = v1**2 - v0**2 + cases.stiffness * (x1**2 - x0**2)
+    peak_stored = np.maximum(cases.stiffness * largest**2, v0**2 + cases.stiffness * x0**2)
+    energies = {
+        "work_in": cases.drive * (step * sums[rows.WORK_SUM] + work_ends),
+        "viscous": cases.damping * (step * sums[rows.LOSS_SUM] + loss_ends),
+        "power": np.abs(cases.drive) * step * sums[rows.POWER_SUM],
+        "friction": dissipated + elastic,
+        "lost": dissipated,
+        "stored": 0.5 * stored,
+        "peak_stored": 0.5 * peak_stored,
     }
-    (x0, v0), (x1, v1) = ((m[:, at.X], m[:, at.V]) for m in (first, e))
-    gains = [
-        v * (-cases.damp * v - cases.square * x - _held(law, cases, m))
-        for x, v, m in ((x0, v0, first), (x1, v1, e))
-    ]
-    # the sums are those of the trapezoidal rule; its ends by Euler and Maclaurin
-    viscous = h * sums[at.LOST] + h / 2 * (v0**2 - v1**2) + h * h / 6 * (gains[0] - gains[1])
-    reach = np.abs(found.history[:, :, :2]).max(axis=(1, 2))
-    elastic = _elastic(law, cases, e) - _elastic(law, cases, first)
-    lost = sums[at.PATH] - elastic if flows(law) else cases.slip * sums[at.PATH]
-    out = {
-        "work_in": cases.push * (h * sums[at.IN] + h * h / 12 * (v0 - v1)),
-        "viscous": cases.damp * viscous,
-        "power": np.abs(cases.push) * h * sums[at.POWER],
-        "friction": lost + elastic,
-        "lost": lost,
-        "stored": 0.5 * (v1**2 - v0**2 + cases.square * (x1**2 - x0**2)),
-        "peak_stored": 0.5 * np.maximum(cases.square * reach**2, v0**2 + cases.square * x0**2),
-    }
-    return {name: energy * value for name, value in out.items()}
+    return {name: energy * value for name, value in energies.items()}
 
 
-def _held(law: str, cases: Cases, motion) -> np.ndarray:
-    """Friction where the drive passes 0."""
-    x, place, way = (motion[:, k] for k in (at.X, at.PLACE, at.WAY))
+def _free_acceleration(law: str, cases: Cases, motion) -> np.ndarray:
+    """Return the acceleration (n,) of a motion where the drive passes 0."""
+    x = motion[:, rows.SLIDE]
+    v = motion[:, rows.SPEED]
+    return -cases.damping * v - cases.stiffness * x - _friction(law, cases, motion)
+
+
+def _friction(law: str, cases: Cases, motion) -> np.ndarray:
+    """Return the friction (n,) of a motion where the drive passes 0 [m]."""
+    x = motion[:, rows.SLIDE]
+    memory = motion[:, rows.MEMORY]
+    slip_sign = motion[:, rows.SLIP_SIGN]
     if law in MASING:
-        return place
-    if flows(law):
-        return own_of(law, motion, "FELT")
-    return np.where(
-        way != 0,
-        way * cases.slip,
-        -cases.square * x if law == "rigid" else cases.spring * (x - place),
-    )
+        return memory
+    if has_one_stretch(law):
+        return law_state(law, motion, "FRICTION")
+    stick_force = -cases.stiffness * x if law == "rigid" else cases.spring * (x - memory)
+    return np.where(slip_sign != 0, slip_sign * cases.kinetic, stick_force)
 
 
-def _elastic(law: str, cases: Cases, motion) -> np.ndarray:
-    """Energy in the contact."""
+def _elastic_energy(law: str, cases: Cases, motion) -> np.ndarray:
+    """Return the elastic energy (n,) of the interface over the mass [m^2]."""
     if law in MASING:
-        return _of_sliders(law, cases, motion)
-    square = (
-        own_of(law, motion, "SQUARE")
-        if flows(law)
-        else (motion[:, at.X] - motion[:, at.PLACE]) ** 2
-    )
+        return _slider_energy(law, cases, motion)
+    if has_one_stretch(law):
+        square = law_state(law, motion, "STRETCH_SQUARE")
+    else:
+        square = (motion[:, rows.SLIDE] - motion[:, rows.MEMORY]) ** 2
     return 0.5 * cases.spring * square
 
 
-def _of_sliders(law: str, cases: Cases, motion) -> np.ndarray:
-    """Energy in the sliders of Masing's rule, as `masing_kernels.energy` has it."""
-    own = own_state(law)
-    side, m, begun, held, _, energy = (
-        motion[:, k - at.OWN + at.STATE] for k in range(own.SIDE, own.ENERGY_FROM + 1)
-    )
-    far, force = side * (motion[:, at.X] - begun) / m, side * (motion[:, at.PLACE] - held) / m
-    w, whole = np.minimum(far / cases.length, 1.0), cases.spring * cases.length**2
-    g = force / (cases.spring * cases.length)
+def _slider_energy(law: str, cases: Cases, motion) -> np.ndarray:
+    """Return the elastic energy (n,) of the sliders of Masing's rule, as `masing_kernels.slider_energy` computes it."""
+    side = law_state(law, motion, "DIRECTION")
+    m = law_state(law, motion, "BRANCH_SCALE")
+    turn_force = law_state(law, motion, "TURN_FORCE")
+    length = cases.yield_length
+    distance = side * (motion[:, rows.SLIDE] - law_state(law, motion, "TURN_SLIDE")) / m
+    w = np.minimum(distance / length, 1.0)
+    force = side * (motion[:, rows.MEMORY] - turn_force) / m / (cases.spring * length)
     if law == "masing":
-        e = cases.law[:, 0]
-        work, lost = w * (w / 2 - (w - g) / (e + 2)), e / (e + 2) * w * (w - g)
+        exponent = cases.law[:, 0]
+        work = w * (w / 2 - (w - force) / (exponent + 2))
+        slip = exponent / (exponent + 2) * w * (w - force)
     else:
-        table = cases.law[:, 3 : 3 + own.curve.BEGINS].reshape(
-            len(w), own.curve.YIELDS, own.curve.COLUMNS
-        )
-        last = np.sum(table[:, 1:, own.curve.YIELD] <= w[:, None], axis=1)
-        full, moment = (
-            table[np.arange(len(w)), last, column] for column in (own.curve.FORCE, own.curve.MOMENT)
-        )
-        work, lost = (w * (g + full) - moment) / 2, full * w - moment
-    work, lost = (whole * one + cases.slip * (far - w * cases.length) for one in (work, lost))
-    return energy + m * (side * held * far + m * work - lost)
+        curve = law_kernels(law).curve
+        table = cases.law[:, 3 : 3 + curve.PART_STARTS]
+        table = table.reshape(len(w), curve.N_YIELDS, curve.N_COLUMNS)
+        last = np.sum(table[:, 1:, curve.YIELD] <= w[:, None], axis=1)
+        row = table[np.arange(len(w)), last]
+        work = (w * (force + row[:, curve.FORCE]) - row[:, curve.MOMENT]) / 2
+        slip = row[:, curve.FORCE] * w - row[:, curve.MOMENT]
+    beyond = cases.kinetic * (distance - w * length)
+    work = cases.spring * length**2 * work + beyond
+    slip_loss = cases.spring * length**2 * slip + beyond
+    branch = side * turn_force * distance + m * work - slip_loss
+    return law_state(law, motion, "TURN_ENERGY") + m * branch
 
 
-def reading_of(law: str, cases: Cases, found: Marched, energy, omega, outward) -> Reading:
-    """Reading of the last cycles, (n,) runs alike; omega (n,) [rad/s]; outward (n, c, 2) [m]: extremes of the output in
-    the cycles at the end."""
-    n, b, e = len(omega), found.begun, found.motion
-    shown = {
-        name: found.shown[:, getattr(at, name) - at.SHOW]
-        for name in (
-            "ACCELERATION",
-            "STARTS",
-            "START_COS",
-            "START_SIN",
-            "SLIP_HIGH",
-            "SLIP_LOW",
-            "FORCE",
-            "STUCK",
-            "TURNED",
-            "PASSED",
-            "FIRST",
-            "LAST",
-            "F_FIRST",
-            "F_LAST",
-            "RANGE",
-            "SECANT",
-            "SEEN",
-        )
-    }
-    run, face, angle = np.zeros((n, of.OF_RUN)), np.zeros((n, of.OF_FACE)), 2 * np.pi * found.cycles
-    slide, push, pull, third = harmonics(law, cases, found, angle)
-    run[:, of.OUT_LOW], run[:, of.OUT_HIGH] = (
-        outward[:, :, 0].min(axis=1),
-        outward[:, :, 1].max(axis=1),
-    )
-    run[:, of.REACH] = np.abs(outward).max(axis=(1, 2))
-    run[:, [of.A_COS, of.A_SIN, of.A3_COS, of.A3_SIN]] = (
-        np.array([*push, *third]).T / omega[:, None]
-    )
-    for name in ("ACCELERATION", "STARTS", "START_COS", "START_SIN"):
-        run[:, getattr(of, name)] = shown[name]
-    last = found.history[:, -outward.shape[1] :]
-    face[:, of.LOW], face[:, of.HIGH] = last[..., 0].min(axis=1), last[..., 1].max(axis=1)
-    for name, unit in (
-        ("SLIP_HIGH", 1.0),
-        ("SLIP_LOW", 1.0),
-        ("RANGE", 1.0),
-        ("FORCE", energy),
-        ("TURNED", energy),
-        ("PASSED", energy),
-        ("STUCK", 1 / omega),
-        ("FIRST", 1 / omega),
-        ("LAST", 1 / omega),
-        ("F_FIRST", energy / omega),
-        ("F_LAST", energy / omega),
-    ):
-        face[:, getattr(of, name)] = unit * shown[name]
-    path = e[:, at.PATH] - b[:, at.PATH]  # friction work of a law of a stretch
-    face[:, of.WORK] = energy * (
-        path
-        if flows(law)
-        else cases.slip * path + _elastic(law, cases, e) - _elastic(law, cases, b)
-    )
-    face[:, [of.Q_COS, of.Q_SIN]] = np.array(slide).T / omega[:, None]
-    face[:, [of.F_COS, of.F_SIN]] = np.array(pull).T * (energy / omega)[:, None]
-    face[:, of.BEGIN], face[:, of.END] = b[:, at.X], e[:, at.X]
-    seen = shown["SEEN"] > 0
-    face[:, of.SECANT] = np.where(
-        seen, energy * shown["SECANT"] / np.where(seen, shown["SEEN"], 1.0), np.nan
-    )
+def reading_of_runs(law: str, cases: Cases, marched: Marched, energy, omega, extremes) -> Reading:
+    """Return the `Reading` of the observed cycles of n runs.
+
+    Parameters
+    ----------
+    law, cases, marched, energy
+        See `run_energies`.
+    omega : (n,) array
+        Angular frequency of the drive [rad/s].
+    extremes : (n, c, 2) array
+        Extremes of the output in the cycles of the window [m].
+
+    Returns
+    -------
+    Reading
+    """
+    n = len(omega)
+    start = marched.observed_start
+    end = marched.motion
+    run = np.zeros((n, of.OF_RUN))
+    face = np.zeros((n, of.OF_FACE))
+    angle = 2 * np.pi * marched.n_observed
+    harmonics = integrate_harmonics(law, cases, marched, angle)
+    run[:, of.OUT_LOW] = extremes[:, :, 0].min(axis=1)
+    run[:, of.OUT_HIGH] = extremes[:, :, 1].max(axis=1)
+    run[:, of.REACH] = np.abs(extremes).max(axis=(1, 2))
+    accelerations = np.array([*harmonics.acceleration, *harmonics.third_acceleration])
+    run[:, [of.A_COS, of.A_SIN, of.A3_COS, of.A3_SIN]] = accelerations.T / omega[:, None]
+    for column, name in RUN_READINGS:
+        run[:, column] = marched.reading(name)
+    last = marched.history[:, -extremes.shape[1] :]
+    face[:, of.LOW] = last[..., 0].min(axis=1)
+    face[:, of.HIGH] = last[..., 1].max(axis=1)
+    for column, name, energy_power, frequency_power in INTERFACE_READINGS:
+        unit = energy**energy_power * omega ** float(frequency_power)
+        face[:, column] = unit * marched.reading(name)
+    path = end[:, rows.SLIP_PATH] - start[:, rows.SLIP_PATH]
+    if has_one_stretch(law):
+        work = path
+    else:
+        elastic = _elastic_energy(law, cases, end) - _elastic_energy(law, cases, start)
+        work = cases.kinetic * path + elastic
+    face[:, of.WORK] = energy * work
+    face[:, [of.Q_COS, of.Q_SIN]] = np.array(harmonics.slide).T / omega[:, None]
+    face[:, [of.F_COS, of.F_SIN]] = np.array(harmonics.friction).T * (energy / omega)[:, None]
+    face[:, of.BEGIN] = start[:, rows.SLIDE]
+    face[:, of.END] = end[:, rows.SLIDE]
+    n_secants = marched.reading("N_SECANTS")
+    secant = marched.reading("SECANT_SUM") / np.where(n_secants > 0, n_secants, 1.0)
+    face[:, of.SECANT] = np.where(n_secants > 0, energy * secant, np.nan)
     return Reading(run, face[:, None], angle / omega, 2 * np.pi / omega)
 
 
-def harmonics(law: str, cases: Cases, found: Marched, angle) -> tuple:
-    """Integrals with cosine and sine over the last cycles: of the slide, of the acceleration of the output, of the
-    friction, which the equation leaves, and of the acceleration with those of three times the angle.
+def integrate_harmonics(law: str, cases: Cases, marched: Marched, angle) -> Harmonics:
+    """Return integrals over the observed cycles with the cosine and the sine of the drive.
 
-    Those of x'' follow from those of x by parts; the sums of x have their ends by Euler and Maclaurin, to the sixth
-    order but for laws of a stretch.
+    The integrals of x'' follow from those of x by parts, and those of the friction from the equation. The sums of x are
+    corrected at their ends to the sixth order, or to the fourth for a law of one stretch.
+
+    Parameters
+    ----------
+    law, cases, marched
+        See `run_energies`.
+    angle : (n,) array
+        Angle of the observed cycles [rad].
+
+    Returns
+    -------
+    Harmonics
     """
-    h, b, e = found.step, found.begun, found.motion
-    x, v = b[:, at.X] - e[:, at.X], b[:, at.V] - e[:, at.V]
-    a, j = _bends(law, cases, b, e)
-    c, s, c3, s3 = (h * found.shown[:, k - at.SHOW] for k in (at.C1, at.S1, at.C3, at.S3))
-    two, four = h * h / 12, h**4 / 720
-    c, c3 = (
-        c + h / 2 * x + two * v - four * (j - 3 * v),
-        c3 + h / 2 * x + two * v - four * (j - 27 * v),
+    step = marched.step
+    start = marched.observed_start
+    end = marched.motion
+    x = start[:, rows.SLIDE] - end[:, rows.SLIDE]
+    v = start[:, rows.SPEED] - end[:, rows.SPEED]
+    a, j = _end_differences(law, cases, start, end)
+    second = step * step / 12
+    fourth = step**4 / 720
+    trapezoid = step / 2 * x + second * v
+    cosine = step * marched.reading("COS_1") + trapezoid - fourth * (j - 3 * v)
+    cosine3 = step * marched.reading("COS_3") + trapezoid - fourth * (j - 27 * v)
+    sine = step * marched.reading("SIN_1") + second * x - fourth * (3 * a - x)
+    sine3 = step * marched.reading("SIN_3") + 3 * second * x - fourth * (9 * a - 27 * x)
+    by_cosine = -v - cosine
+    by_sine = x - sine
+    acceleration = Integrals(
+        cases.output_gain * by_cosine, cases.output_gain * by_sine + cases.base_gain * angle / 2
     )
-    s, s3 = s + two * x - four * (3 * a - x), s3 + 3 * two * x - four * (9 * a - 27 * x)
-    gain, side = -v - c, x - s
-    push = cases.out * gain, cases.out * side + cases.base * angle / 2
-    pull = (
-        -gain - cases.damp * (s - x) - cases.square * c,
-        cases.push * angle / 2 - side + cases.damp * c - cases.square * s,
+    friction = Integrals(
+        -by_cosine - cases.damping * (sine - x) - cases.stiffness * cosine,
+        cases.drive * angle / 2 - by_sine + cases.damping * cosine - cases.stiffness * sine,
     )
-    return (c, s), push, pull, (cases.out * (-v - 9 * c3), cases.out * (3 * x - 9 * s3))
+    third = Integrals(
+        cases.output_gain * (-v - 9 * cosine3), cases.output_gain * (3 * x - 9 * sine3)
+    )
+    return Harmonics(Integrals(cosine, sine), acceleration, friction, third)
 
 
-def _bends(law: str, cases: Cases, begun, motion) -> tuple:
-    """Differences of x'' and of x''' between two motions where the drive passes 0; as if the friction stayed under a
-    law of a stretch, whose steps are finer."""
-    x, v = (begun[:, k] - motion[:, k] for k in (at.X, at.V))
-    if flows(law):
-        return -cases.damp * v - cases.square * x, 0 * v
-    a = -cases.damp * v - cases.square * x - _held(law, cases, begun) + _held(law, cases, motion)
-    one, other = (
-        m[:, at.V]
-        * (own_of(law, m, "STIFF") if law in MASING else cases.spring * (m[:, at.WAY] == 0))
-        for m in (begun, motion)
-    )
-    return a, -cases.damp * a - cases.square * v - one + other
+def _end_differences(law: str, cases: Cases, start, end) -> tuple:
+    """Return the differences (n,) of x'' and of x''' between two motions where the drive passes 0.
+
+    The friction of a law of one stretch is taken as constant, because its steps are finer.
+    """
+    x = start[:, rows.SLIDE] - end[:, rows.SLIDE]
+    v = start[:, rows.SPEED] - end[:, rows.SPEED]
+    a = -cases.damping * v - cases.stiffness * x
+    if has_one_stretch(law):
+        return a, 0 * v
+    a = a - _friction(law, cases, start) + _friction(law, cases, end)
+    rate = _friction_rate(law, cases, start) - _friction_rate(law, cases, end)
+    return a, -cases.damping * a - cases.stiffness * v - rate
+
+
+def _friction_rate(law: str, cases: Cases, motion) -> np.ndarray:
+    """Return the rate of the friction (n,) of a motion."""
+    if law in MASING:
+        tangent = law_state(law, motion, "TANGENT")
+    else:
+        tangent = cases.spring * (motion[:, rows.SLIP_SIGN] == 0)
+    return motion[:, rows.SPEED] * tangent

@@ -1,50 +1,159 @@
-"""A step of one mode under Coulomb friction, of one case: exact between stops and releases, each found inside its step.
+"""A step under Coulomb friction, of one case: exact between stops and releases, each of which is found inside its step.
 
-Equation, in the angle of the drive: x'' + D x' + W x = P sin - f, f = +-GK in a slip and at most GS in a stick. Twin: a
-run from event to event (`dynamics.events`).
+The equation in the angle of the drive is x'' + D x' + W x = P sin - f. The friction f is +-KINETIC in a slip and at most
+STATIC in a stick. A reference is the engine `dynamics.events`.
+
+This module is the pattern of a law: every other law has the functions and constants that are in `LAW_PROTOCOL`.
 """
 
+from typing import NamedTuple
+
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .names_kernels import (
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from .rows_kernels import (
     A11,
     A12,
     A21,
     A22,
     CV,
     CX,
-    GK,
-    GS,
+    DAMPING,
+    DRIVE,
+    KINETIC,
     LANES,
+    NJIT_INLINE,
     RV,
     RX,
+    SLIDE,
+    SLIP_SIGN,
+    SPEED,
+    STATIC,
+    STIFFNESS,
     SV,
     SX,
-    WAY,
-    D,
-    P,
-    V,
-    W,
-    X,
 )
 
-RESTS = True  # nothing moves in a stick
-TURNS_HELD = False  # an event may leave a stick as it is
-PROVEN = 0.0  # of its range: by how much the end of a cycle after a leap may miss what this foretold; 0: no proof
-KEPT = 0  # of the first numbers of its own state, those that move on as a motion settles
+LAW_PROTOCOL = (
+    "STICK_IS_RIGID",  # whether nothing moves in a stick
+    "EVENT_KEEPS_STICK",  # whether a stick may go on after an event
+    "PROOF_TOL",  # error of an extrapolated cycle, as a fraction of its range, that is accepted; 0 asks for no proof
+    "N_KEPT",  # number of numbers of the state of the law that follow the map of a cycle
+    "friction_force",
+    "friction_rate",
+    "irreversible_slide",
+    "slip_increment",
+    "is_sticking",
+    "friction_at_reversal",
+    "stick_fractions",
+    "prepare_step",
+    "try_step",
+    "resolve_step",
+    "records_own_peaks",
+    "slide_at_reversal",
+    "set_derived_state",
+    "restore_derived_state",
+    "can_extrapolate",
+)
+STICK_IS_RIGID = True
+EVENT_KEEPS_STICK = False
+PROOF_TOL = 0.0
+N_KEPT = 0
+N_NEWTON = 3  # Newton steps from the secant; the cubic of a step is then solved to round-off
+N_CROSSING = 4  # Newton steps from a guess that is worse than the secant
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def root(y0, y1, m0, m1, least):
-    """(u, value, slope and integral up to u) of the cubic over [0, 1] with values y0, y1 and slopes m0, m1 where it
-    crosses 0, u from `least` to 1: three Newton steps from the secant."""
-    c2, c3 = 3 * (y1 - y0) - 2 * m0 - m1, m0 + m1 - 2 * (y1 - y0)
+class LaneState(NamedTuple):
+    """State of a lane: slide and its derivative [m], sign of the slip (0 in a stick) and memory of the law."""
+
+    slide: float
+    speed: float
+    slip_sign: float
+    memory: float
+
+
+class TriedStep(NamedTuple):
+    """State after a step without an event, and whether the step has one, which makes the state useless."""
+
+    slide: float
+    speed: float
+    memory: float
+    has_event: bool
+
+
+class StepOutcome(NamedTuple):
+    """State at the end of a step and its event.
+
+    - `slide`, `speed`, `slip_sign`, `memory`: at the end of the step.
+    - `event`: fraction of the step before the event, 1 without an event.
+    - `event_slide`, `event_speed`, `event_memory`: at the event, otherwise at the end.
+    - `reversal_slide`: slide where the speed changes its sign, otherwise at the end.
+    - `jump`: change of the acceleration at the event.
+    """
+
+    slide: float
+    speed: float
+    slip_sign: float
+    memory: float
+    event: float
+    event_slide: float
+    event_speed: float
+    event_memory: float
+    reversal_slide: float
+    jump: float
+
+
+class StickReading(NamedTuple):
+    """Stick and slip in a segment of a step.
+
+    - `fraction`: fraction of the segment in which the interface sticks.
+    - `slip_start`: fraction of the segment at which a slip starts inside it, 2 if none does.
+    - `extreme_slip`: irreversible slide [m] where it reverses in the segment, otherwise at the end.
+    """
+
+    fraction: float
+    slip_start: float
+    extreme_slip: float
+
+
+class CubicRoot(NamedTuple):
+    """Place of a root in [0, 1], and the value, slope and integral of the cubic there."""
+
+    place: float
+    value: float
+    slope: float
+    integral: float
+
+
+class Motion(NamedTuple):
+    """Slide and its derivative [m]."""
+
+    slide: float
+    speed: float
+
+
+@njit(**NJIT_INLINE)
+def cubic_root(y0, y1, m0, m1, lowest):
+    """Find where a cubic over [0, 1] crosses 0, by Newton's method from the secant.
+
+    Parameters
+    ----------
+    y0, y1, m0, m1 : float
+        Values and slopes of the cubic at both ends.
+    lowest : float
+        Lower bound of the place; the upper bound is 1.
+
+    Returns
+    -------
+    CubicRoot
+    """
+    c2 = 3 * (y1 - y0) - 2 * m0 - m1
+    c3 = m0 + m1 - 2 * (y1 - y0)
     u = y0 / (y0 - y1)
-    for _ in range(3):
+    for _ in range(N_NEWTON):
         u = u - (y0 + u * (m0 + u * (c2 + u * c3))) / (m0 + u * (2 * c2 + 3 * c3 * u))
-        u = u if u > least else least
+        u = u if u > lowest else lowest
         u = u if u < 1.0 else 1.0
-    return (
+    return CubicRoot(
         u,
         y0 + u * (m0 + u * (c2 + u * c3)),
         m0 + u * (2 * c2 + 3 * c3 * u),
@@ -52,192 +161,402 @@ def root(y0, y1, m0, m1, least):
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def highest(g0, g1, m0, m1):
-    """Largest size of a cubic over [0, 1] with these values and slopes at its ends, its vertex by the secant of the
-    slopes."""
-    ends = max(abs(g0), abs(g1))
+@njit(**NJIT_INLINE)
+def cubic_peak(g0, g1, m0, m1):
+    """Return the largest absolute value of a cubic over [0, 1].
+
+    The extremum inside is taken where the straight line through the slopes at the ends is 0.
+
+    Parameters
+    ----------
+    g0, g1, m0, m1 : float
+        Values and slopes of the cubic at both ends.
+
+    Returns
+    -------
+    float
+    """
+    at_ends = max(abs(g0), abs(g1))
     w = m0 / (m0 - m1)
-    rise = g1 - g0
-    vertex = g0 + w * (m0 + w * (3 * rise - 2 * m0 - m1 + w * (m0 + m1 - 2 * rise)))
-    return max(ends, abs(vertex)) if m0 * m1 < 0.0 else ends
+    difference = g1 - g0
+    inside = g0 + w * (m0 + w * (3 * difference - 2 * m0 - m1 + w * (m0 + m1 - 2 * difference)))
+    return max(at_ends, abs(inside)) if m0 * m1 < 0.0 else at_ends
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def friction_force(x, v, way, place, sine, workspace, i):
-    """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
-    held, most = (
-        workspace[P * LANES + i] * sine - workspace[W * LANES + i] * x,
-        workspace[GS * LANES + i],
-    )
-    return min(max(held, -most), most) if way == 0.0 else way * workspace[GK * LANES + i]
+@njit(**NJIT_INLINE)
+def drive_after(sine, cosine, angle):
+    """Return sine and cosine of the drive an angle of up to a step later, by their Taylor series."""
+    square = angle * angle
+    cosine_part = 1 - square / 2 + square * square / 24
+    sine_part = angle * (1 - square / 6 + square * square / 120)
+    return sine * cosine_part + cosine * sine_part, cosine * cosine_part - sine * sine_part
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rise(v, a, way, place, workspace, i, when):
-    """Rate of the friction at a speed v and an acceleration a; 0 for a rigid contact, whose stick has no motion."""
+@njit(**NJIT_INLINE)
+def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
+    """Return the friction over the mass in the angle of the drive [m], positive if it resists positive slip.
+
+    Parameters
+    ----------
+    x, v, slip_sign, memory : float
+        The fields of a `LaneState`.
+    sine : float
+        Sine of the drive.
+    workspace : array
+        See `rows_kernels`.
+    lane : int
+
+    Returns
+    -------
+    float
+    """
+    stick_force = workspace[DRIVE * LANES + lane] * sine - workspace[STIFFNESS * LANES + lane] * x
+    limit = workspace[STATIC * LANES + lane]
+    if slip_sign == 0.0:
+        return min(max(stick_force, -limit), limit)
+    return slip_sign * workspace[KINETIC * LANES + lane]
+
+
+@njit(**NJIT_INLINE)
+def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
+    """Return the rate of the friction; 0 for a rigid contact, whose output does not move in a stick.
+
+    Parameters
+    ----------
+    v, slip_sign, memory : float
+        Fields of a `LaneState`.
+    acceleration : float
+        Second derivative of the slide [m].
+    workspace, lane
+        See `friction_force`.
+    when : int
+        The instant of the step, as named in `observation_kernels`.
+
+    Returns
+    -------
+    float
+    """
     return 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def foretell(workspace, s0, c0):
-    """Find nothing ahead of a step."""
+@njit(**NJIT_INLINE)
+def prepare_step(workspace, s0, c0):
+    """Prepare a step of all lanes; there is nothing to prepare."""
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def folds():
-    """Whether `advance` folds what a step shows of itself."""
+def records_own_peaks():
+    """Return whether `resolve_step` adds the peaks and the work of a step to the readings itself."""
     return False
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def furthest(x, v, x1, v1, h):
-    """Slide at the turn in a step that no event marks, of which there is none."""
+@njit(**NJIT_INLINE)
+def slide_at_reversal(x, v, x1, v1, angle):
+    """Return the slide at a reversal in a step without an event; there is none, so it is that of the end.
+
+    Parameters
+    ----------
+    x, v, x1, v1 : float
+        Slide and speed at both ends of the step [m].
+    angle : float
+        Angle of the step [rad].
+
+    Returns
+    -------
+    float
+    """
     return x1
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def irreversible_slide(x, place, workspace, i):
-    """Irreversible part of the slide."""
-    return place
+@njit(**NJIT_INLINE)
+def irreversible_slide(x, memory, workspace, lane):
+    """Return the irreversible part of a slide [m]; arguments as of `friction_force`."""
+    return memory
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def path(place, pe, place1, v1, workspace, i):
-    """What a step adds to the path of slip [m]."""
-    return abs(pe - place) + abs(place1 - pe)
+@njit(**NJIT_INLINE)
+def slip_increment(memory, event_memory, memory1, workspace, lane):
+    """Return the path of slip of a step [m], from the memories at its start, event and end."""
+    return abs(event_memory - memory) + abs(memory1 - event_memory)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def at_turn(x, way, place, turned, workspace, i):
-    """Friction at a turn of the slide, the mean of what it is before and after it."""
+@njit(**NJIT_INLINE)
+def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
+    """Return the friction at a reversal of the slide; 0, the mean of its values before and after the reversal.
+
+    Parameters
+    ----------
+    x, slip_sign, memory : float
+        Slide at the reversal; sign and memory at the start of the step.
+    event_memory : float
+        Memory at the event.
+    workspace, lane
+        See `friction_force`.
+
+    Returns
+    -------
+    float
+    """
     return 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def sticking(v, way, place, workspace, i):
-    """1 where the contact sticks, 0 where it does not."""
-    return 1.0 if way == 0.0 else 0.0
+@njit(**NJIT_INLINE)
+def is_sticking(v, slip_sign, memory, workspace, lane):
+    """Return 1 if the interface sticks and 0 if it slips; arguments as of `friction_force`."""
+    return 1.0 if slip_sign == 0.0 else 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def held(begin, end, way, workspace, i, h):
-    """(share of a part of a step in which the contact sticks; share inside it at which it begins to slip, 2: nowhere;
-    irreversible part of the slide where that turns inside it, that of its end without)."""
-    return 1.0 if way == 0.0 else 0.0, 2.0, irreversible_slide(end[0], end[3], workspace, i)
+@njit(**NJIT_INLINE)
+def stick_fractions(start, end, workspace, lane, angle):
+    """Return the `StickReading` of a segment of a step.
+
+    Parameters
+    ----------
+    start, end : observation_kernels.Instant
+    workspace, lane
+        See `friction_force`.
+    angle : float
+        Angle of the segment [rad].
+
+    Returns
+    -------
+    StickReading
+    """
+    fraction = 1.0 if start.state.slip_sign == 0.0 else 0.0
+    slip = irreversible_slide(end.state.slide, end.state.memory, workspace, lane)
+    return StickReading(fraction, 2.0, slip)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def begin(workspace, i):
-    """Set what a law has of its own state by the common one when a lane takes a case: nothing."""
+def set_derived_state(workspace, lane):
+    """Set the state of the law that follows from the common state of a new case; there is none."""
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def settles(workspace, i):
-    """Whether the memory of a lane has had the same form at the ends of the last cycles, so that its numbers can move
-    on as the motion does."""
+def can_extrapolate(workspace, lane):
+    """Return whether the memory has had the same form at the last cycle ends, so that it follows the map of a cycle."""
     return True
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def resume(workspace, i):
-    """Set what follows from the common state and from the numbers that moved on with it: nothing."""
+def restore_derived_state(workspace, lane):
+    """Set the state of the law that follows from an extrapolated motion; there is none."""
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def crossing(y0, m0, c2, c3, u):
-    """u of [0, 1] at which y0 + m0 u + c2 u^2 + c3 u^3 is 0, by Newton's method from u."""
-    for _ in range(4):
+def newton_on_cubic(y0, m0, c2, c3, guess):
+    """Find the root of y0 + m0 u + c2 u^2 + c3 u^3 in [0, 1] by Newton's method from a guess.
+
+    Parameters
+    ----------
+    y0, m0, c2, c3, guess : float
+
+    Returns
+    -------
+    float
+    """
+    u = guess
+    for _ in range(N_CROSSING):
         slope = m0 + u * (2 * c2 + 3 * c3 * u)
         u = u - (y0 + u * (m0 + u * (c2 + u * c3))) / slope if slope != 0.0 else u
         u = min(max(u, 0.0), 1.0)
     return u
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def linear(workspace, i, s0, c0):
-    """(x, x') after a step in a slip."""
-    x, v = workspace[X * LANES + i], workspace[V * LANES + i]
-    pull = workspace[WAY * LANES + i] * workspace[GK * LANES + i]
+@njit(**NJIT_INLINE)
+def linear_step(workspace, lane, s0, c0):
+    """Return the `Motion` after a step in a slip, by the coefficients of the exact step."""
+    x = workspace[SLIDE * LANES + lane]
+    v = workspace[SPEED * LANES + lane]
+    friction = workspace[SLIP_SIGN * LANES + lane] * workspace[KINETIC * LANES + lane]
     x1 = (
-        workspace[A11 * LANES + i] * x
-        + workspace[A12 * LANES + i] * v
-        + workspace[SX * LANES + i] * s0
-        + workspace[CX * LANES + i] * c0
-        - pull * workspace[RX * LANES + i]
+        workspace[A11 * LANES + lane] * x
+        + workspace[A12 * LANES + lane] * v
+        + workspace[SX * LANES + lane] * s0
+        + workspace[CX * LANES + lane] * c0
+        - friction * workspace[RX * LANES + lane]
     )
     v1 = (
-        workspace[A21 * LANES + i] * x
-        + workspace[A22 * LANES + i] * v
-        + workspace[SV * LANES + i] * s0
-        + workspace[CV * LANES + i] * c0
-        - pull * workspace[RV * LANES + i]
+        workspace[A21 * LANES + lane] * x
+        + workspace[A22 * LANES + lane] * v
+        + workspace[SV * LANES + lane] * s0
+        + workspace[CV * LANES + lane] * c0
+        - friction * workspace[RV * LANES + lane]
     )
-    return x1, v1
+    return Motion(x1, v1)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def ahead(workspace, i, s0, c0, s1, c1, reads):
-    """(x, x', place after a step without a stop, a release or a turn in it; whether there is one); reads: whether what
-    the step shows is read, so that a speed that ends at 0 counts as a turn."""
-    x, way = workspace[X * LANES + i], workspace[WAY * LANES + i]
-    xs, vs = linear(workspace, i, s0, c0)
-    held = way == 0.0
-    n1 = workspace[P * LANES + i] * s1 - workspace[W * LANES + i] * x
-    event = abs(n1) > workspace[GS * LANES + i] if held else way * vs < 0.0 or (reads and vs == 0.0)
-    x1, v1 = x if held else xs, 0.0 if held else vs
-    return x1, v1, x1, event
+@njit(**NJIT_INLINE)
+def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
+    """Compute a step as if no event lay inside it: no stop, release or reversal.
 
+    Parameters
+    ----------
+    workspace, lane
+        See `friction_force`.
+    s0, c0, s1, c1 : float
+        Sine and cosine of the drive at both ends of the step.
+    is_observed : bool
+        Whether the step is read; a speed that ends at 0 is then a reversal.
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def advance(workspace, i, s0, c0, s1, c1, h):
-    """(x, v, way, place at the end of a step h; share u of the step up to an event; x, v and place there; x where the
-    slide turns, that of the end without a turn; kink: jump of the acceleration at the event).
-
-    way: sign of the slip, 0 stuck; s0, c0, s1, c1: sine and cosine of the drive at both ends.
+    Returns
+    -------
+    TriedStep
     """
-    x, v, way = workspace[X * LANES + i], workspace[V * LANES + i], workspace[WAY * LANES + i]
-    damp, square, push = (
-        workspace[D * LANES + i],
-        workspace[W * LANES + i],
-        workspace[P * LANES + i],
+    x = workspace[SLIDE * LANES + lane]
+    slip_sign = workspace[SLIP_SIGN * LANES + lane]
+    end = linear_step(workspace, lane, s0, c0)
+    is_stuck = slip_sign == 0.0
+    force = workspace[DRIVE * LANES + lane] * s1 - workspace[STIFFNESS * LANES + lane] * x
+    is_released = abs(force) > workspace[STATIC * LANES + lane]
+    stops = slip_sign * end.speed < 0.0 or (is_observed and end.speed == 0.0)
+    x1 = x if is_stuck else end.slide
+    return TriedStep(x1, 0.0 if is_stuck else end.speed, x1, is_released if is_stuck else stops)
+
+
+@njit(**NJIT_INLINE)
+def motion_from_rest(workspace, lane, angle, force, force_rate, force_bend):
+    """Return the `Motion` an angle after rest under force + force_rate t + force_bend t^2/2, by its Taylor series.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `friction_force`.
+    angle : float
+        Angle since the rest [rad], at most that of a step.
+    force, force_rate, force_bend : float
+
+    Returns
+    -------
+    Motion
+    """
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    t = angle
+    t2 = t * t
+    e2 = damping * damping - stiffness
+    slide = (
+        force * slide_by_force(t, damping, stiffness)
+        + force_rate * (t2 * t * (1.0 / 6 + t * (-damping / 24 + t * e2 / 120)))
+        + force_bend * (t2 * t2 * (1.0 / 24 - t * damping / 120))
     )
-    gk, gs = workspace[GK * LANES + i], workspace[GS * LANES + i]
-    pull = way * gk
-    xs, vs = linear(workspace, i, s0, c0)
-    n0, n1 = push * s0 - square * x, push * s1 - square * x
-    held = way == 0.0
-    side = way if not held else 1.0 if n1 > 0.0 else -1.0
-    y0 = gs - side * n0 if held else way * v
-    y1 = gs - side * n1 if held else way * vs
-    m0 = -side * push * c0 if held else way * (n0 - damp * v - pull)
-    m1 = -side * push * c1 if held else way * (push * s1 - square * xs - damp * vs - pull)
-    # a stop that does not hold to the end of its step is a release before the next one
-    u, miss, slope, area = root(y0, y1, h * m0, h * m1, -1.0 if held and y0 < 0.0 else 0.0)
-    event = y1 < 0.0
-    r = h - u * h
-    xe = x if held else x + way * h * area
-    n = side * (gs - miss) if held else slope * way / h + pull
-    sticks = (n if n > 0.0 else -n) <= gs
-    # what a constant force, and one that rises with the angle, moves in the rest r of the step
-    r2 = r * r
-    e2 = damp * damp - square
-    one = r2 * (0.5 + r * (-damp / 6 + r * (e2 / 24 - r * damp * (e2 - square) / 120)))
-    one_v = r * (1.0 + r * (-damp / 2 + r * (e2 / 6 - r * damp * (e2 - square) / 24)))
-    two = r2 * r * (1.0 / 6 + r * (-damp / 24 + r * e2 / 120))
-    two_v = r2 * (0.5 + r * (-damp / 6 + r * e2 / 24))
-    three = r2 * r2 * (1.0 / 24 - r * damp / 120)
-    three_v = r2 * r * (1.0 / 6 - r * damp / 24)
-    rise, bend = -side * slope / h, -(n + square * x)
-    free = n - side * gk
-    xr = x + free * one + rise * two + bend * three
-    vr = free * one_v + rise * two_v + bend * three_v
-    xf, vf = xs + 2 * pull * one, vs + 2 * pull * one_v
-    x1 = (xr if held else xe if sticks else xf) if event else x if held else xs
-    v1 = (vr if held else 0.0 if sticks else vf) if event else 0.0 if held else vs
-    way1 = (side if held else 0.0 if sticks else -way) if event else way
-    kink = (free if held else -slope * way / h if sticks else 2 * pull) if event else 0.0
-    u = u if event else 1.0
-    xe = xe if event else x1
-    turn = x1 if held or not event else xe
-    return x1, v1, way1, x1, u, xe, 0.0 if event else v1, xe, turn, kink
+    speed = (
+        force * speed_by_force(t, damping, stiffness)
+        + force_rate * (t2 * (0.5 + t * (-damping / 6 + t * e2 / 24)))
+        + force_bend * (t2 * t * (1.0 / 6 - t * damping / 24))
+    )
+    return Motion(slide, speed)
+
+
+@njit(**NJIT_INLINE)
+def slide_by_force(t, damping, stiffness):
+    """Return the slide an angle t after rest under a force of 1."""
+    e2 = damping * damping - stiffness
+    return t * t * (0.5 + t * (-damping / 6 + t * (e2 / 24 - t * damping * (e2 - stiffness) / 120)))
+
+
+@njit(**NJIT_INLINE)
+def speed_by_force(t, damping, stiffness):
+    """Return the speed an angle t after rest under a force of 1."""
+    e2 = damping * damping - stiffness
+    return t * (1.0 + t * (-damping / 2 + t * (e2 / 6 - t * damping * (e2 - stiffness) / 24)))
+
+
+@njit(**NJIT_INLINE)
+def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
+    """Compute a step with the stop or release inside it.
+
+    A stop that does not hold to the end of its step becomes a release before the next step.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0, s1, c1
+        See `try_step`.
+    angle : float
+        Angle of the step [rad].
+
+    Returns
+    -------
+    StepOutcome
+    """
+    if workspace[SLIP_SIGN * LANES + lane] == 0.0:
+        return release(workspace, lane, s0, c0, s1, c1, angle)
+    return stop(workspace, lane, s0, c0, s1, c1, angle)
+
+
+@njit(**NJIT_INLINE)
+def release(workspace, lane, s0, c0, s1, c1, angle):
+    """Compute a step from a stick, in which the interface may start to slip; arguments as of `resolve_step`."""
+    x = workspace[SLIDE * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    drive = workspace[DRIVE * LANES + lane]
+    static = workspace[STATIC * LANES + lane]
+    n0 = drive * s0 - stiffness * x
+    n1 = drive * s1 - stiffness * x
+    side = 1.0 if n1 > 0.0 else -1.0
+    reserve = static - side * n0
+    reserve1 = static - side * n1
+    if not reserve1 < 0.0:
+        return StepOutcome(x, 0.0, 0.0, x, 1.0, x, 0.0, x, x, 0.0)
+    lowest = -1.0 if reserve < 0.0 else 0.0
+    slope = -angle * side * drive * c0
+    root = cubic_root(reserve, reserve1, slope, -angle * side * drive * c1, lowest)
+    force = side * (static - root.value)
+    net_force = force - side * workspace[KINETIC * LANES + lane]
+    force_rate = -side * root.slope / angle
+    force_bend = -(force + stiffness * x)
+    rest = angle - root.place * angle
+    end = motion_from_rest(workspace, lane, rest, net_force, force_rate, force_bend)
+    x1 = x + end.slide
+    return StepOutcome(x1, end.speed, side, x1, root.place, x, 0.0, x, x1, net_force)
+
+
+@njit(**NJIT_INLINE)
+def stop(workspace, lane, s0, c0, s1, c1, angle):
+    """Compute a step from a slip, which may stop and then stick or slip back; arguments as of `resolve_step`."""
+    x = workspace[SLIDE * LANES + lane]
+    v = workspace[SPEED * LANES + lane]
+    sign = workspace[SLIP_SIGN * LANES + lane]
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    drive = workspace[DRIVE * LANES + lane]
+    friction = sign * workspace[KINETIC * LANES + lane]
+    end = linear_step(workspace, lane, s0, c0)
+    if not sign * end.speed < 0.0:
+        return StepOutcome(
+            end.slide,
+            end.speed,
+            sign,
+            end.slide,
+            1.0,
+            end.slide,
+            end.speed,
+            end.slide,
+            end.slide,
+            0.0,
+        )
+    rate = sign * (drive * s0 - stiffness * x - damping * v - friction)
+    rate1 = sign * (drive * s1 - stiffness * end.slide - damping * end.speed - friction)
+    root = cubic_root(sign * v, sign * end.speed, angle * rate, angle * rate1, 0.0)
+    stop_slide = x + sign * angle * root.integral
+    acceleration = root.slope * sign / angle
+    sticks = abs(acceleration + friction) <= workspace[STATIC * LANES + lane]
+    if sticks:
+        return StepOutcome(
+            stop_slide,
+            0.0,
+            0.0,
+            stop_slide,
+            root.place,
+            stop_slide,
+            0.0,
+            stop_slide,
+            stop_slide,
+            -acceleration,
+        )
+    rest = angle - root.place * angle
+    x1 = end.slide + 2 * friction * slide_by_force(rest, damping, stiffness)
+    v1 = end.speed + 2 * friction * speed_by_force(rest, damping, stiffness)
+    return StepOutcome(
+        x1, v1, -sign, x1, root.place, stop_slide, 0.0, stop_slide, stop_slide, 2 * friction
+    )

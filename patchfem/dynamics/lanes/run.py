@@ -1,115 +1,165 @@
-"""Cases of one mode, one interface and a sine as numbers, and their march in lanes."""
+"""Cases of one mode, one interface and a sine as arrays, and their march in lanes."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from ...compiled import instance, load
-from . import names_kernels as at
+from . import rows_kernels as rows
 
 HERE = "dynamics.lanes"
-MASING = "masing", "table"  # laws of Masing's rule, by the curve of their first loading
-TERMS = 24  # of a Taylor series over a step; what is left falls below round-off for rates up to 2 a step
-BEYOND = 1e300  # place of a yield that there is not
-# slide [m] beyond which a march ran away by too long steps, and energies would overflow
-AWAY = 1e100
-ONCE = 3  # cycles that are read of a motion that repeats
+MASING = ("masing", "table")  # laws of Masing's rule, named by the curve of their first loading
+N_TERMS = 24  # terms of a Taylor series over a step; the rest is below round-off for rates up to 2 per step
+NO_YIELD = 1e300  # place of the entries of a table after its last yield
+MAX_SLIDE = 1e100  # a larger slide [m] is that of a march that ran away with too long steps; its energies overflow
+N_PERIODIC = 3  # number of cycles that are read of a motion that repeats
 
 
 class Cases(NamedTuple):
-    """n cases of x'' + D x' + W x = P sin - f in the angle of their drive, x the slide [m].
+    """n cases of x'' + D x' + W x = P sin - f in the angle of their drive; x is the slide [m].
 
-    damp, square, push (n,): D, W, P; slip, stick (n,): f in a slip and the most of a stick; spring (n,): slope of f in
-    a stick, 0 of a rigid contact, length (n,) [m] over which it yields; out, base (n,) [m s-2]: acceleration of the
-    output over x'' and of the base over the sine; x, v (n,): start; law (n, k): what else a law asks for, of a law of a
-    stretch as its `rate_equation` takes it, of Masing's two numbers of its curve, chi + 1 and q of a power, the share of
-    `length` at which half of the friction slips, and the table of a table (`tables_of`).
+    - `damping`, `stiffness`, `drive` (n,): D, W and P.
+    - `kinetic`, `static` (n,): friction in a slip and largest friction in a stick [m].
+    - `spring` (n,): slope of the friction over the slide in a stick, 0 for a rigid contact.
+    - `yield_length` (n,): elastic slide at which the interface slips [m].
+    - `output_gain`, `base_gain` (n,) [m s-2]: acceleration of the output per x'', and of the base per sine.
+    - `x`, `v` (n,): slide and speed at the start.
+    - `law` (n, k): further numbers of the law. Laws of one stretch: as their `rate_equation` takes them. Masing's rule: two
+      numbers of the curve (chi + 1 and q of a power), the fraction of `yield_length` at which half of the friction slips,
+      and the table of a curve (`curve_tables`).
     """
 
-    damp: np.ndarray
-    square: np.ndarray
-    push: np.ndarray
-    slip: np.ndarray
-    stick: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    drive: np.ndarray
+    kinetic: np.ndarray
+    static: np.ndarray
     spring: np.ndarray
-    length: np.ndarray
-    out: np.ndarray
-    base: np.ndarray
+    yield_length: np.ndarray
+    output_gain: np.ndarray
+    base_gain: np.ndarray
     x: np.ndarray
     v: np.ndarray
     law: np.ndarray
 
 
 class Marched(NamedTuple):
-    """Cases after their march: motion (n, STATE) at the start, where the cycles begin that were read, and at the end;
-    history (n, c, 4) of all cycles; shown (n, SHOWN); ended, cycles (n,): cycles before those that were read, and how
-    many these are; numbers (n, NUMBERS and a table); step: angle."""
+    """n cases after their march.
+
+    - `start`, `observed_start`, `motion` (n, N_STATE and the state of the law): motion at the start, at the start of the
+      observed cycles, and at the end.
+    - `history` (n, c, 4): smallest and largest slide and phasor [m] of all cycles.
+    - `readings` (n, N_READINGS): readings of the observed cycles.
+    - `n_before`, `n_observed` (n,): number of cycles before the observed ones, and of these.
+    - `step`: angle of a step [rad].
+    """
 
     start: np.ndarray
-    begun: np.ndarray
+    observed_start: np.ndarray
     motion: np.ndarray
     history: np.ndarray
-    shown: np.ndarray
-    ended: np.ndarray
-    cycles: np.ndarray
-    numbers: np.ndarray
+    readings: np.ndarray
+    n_before: np.ndarray
+    n_observed: np.ndarray
     step: float
 
+    def reading(self, name: str) -> np.ndarray:
+        """Return a reading (n,) by its name in `rows_kernels`."""
+        return self.readings[:, getattr(rows, name) - rows.FIRST_READING]
 
-def flows(law: str) -> bool:
-    """Whether a law is one of a stretch, named as its kernels are: "friction.laws.tanh_kernels"."""
+
+def has_one_stretch(law: str) -> bool:
+    """Return whether a law is one of one stretch, which is named as its kernels: "friction.laws.tanh_kernels"."""
     return "." in law
 
 
-def kernels(law: str):
-    """Load the compiled loop of a law: "rigid", "yielding", "masing", "table" or the kernels of a stretch law."""
+@cache
+def load_loop(law: str):
+    """Load the compiled loop of a law: "rigid", "yielding", "masing", "table" or the kernels of a law of one stretch."""
     loop = f"{HERE}.loop_kernels"
-    if flows(law):
-        return instance(loop, {"law": instance(f"{HERE}.flowing_kernels", {"friction": law})})
-    if law == "table":
-        return instance(loop, {"law": own_state(law)})
-    return load(loop) if law == "rigid" else instance(loop, {"law": f"{HERE}.{law}_kernels"})
+    if law == "rigid":
+        return load(loop)
+    kernels = f"{HERE}.yielding_kernels" if law == "yielding" else law_kernels(law)
+    if has_one_stretch(law):
+        kernels = instance(f"{HERE}.flowing_kernels", {"friction": law})
+    parts = {"law": kernels, "lanes": instance(f"{HERE}.lane_kernels", {"law": kernels})}
+    others = {
+        name: instance(f"{HERE}.{name}_kernels", parts) for name in ("extrapolation", "observation")
+    }
+    return instance(loop, parts | others)
 
 
-def own_state(law: str):
-    """The kernels that name what a law has of its own in the state of a case; None where it has nothing."""
+def law_kernels(law: str):
+    """Return the kernels that name the rows of the state of a law; None if a law has no state of its own."""
     if law in ("rigid", "yielding"):
         return None
     if law == "table":
         return instance(f"{HERE}.masing_kernels", {"curve": f"{HERE}.table_curve_kernels"})
-    return load(f"{HERE}.{'flowing' if flows(law) else law}_kernels")
+    return load(f"{HERE}.{'flowing' if has_one_stretch(law) else law}_kernels")
 
 
-def tables_of(groups) -> np.ndarray:
-    """(n, m) what Masing's rule asks for of n sets of elements, each (stiffness (t,) [N/m], yield slide (t,) [m],
-    rising): two numbers of no meaning, the share of the last yield slide at which half of the friction slips, the table
-    of `table_curve_kernels`, which says how many they may be."""
-    of = load(f"{HERE}.table_curve_kernels")
-    head, whole = np.ones((len(groups), 3)), np.zeros((len(groups), of.SIZE))
-    out = whole[:, : of.BEGINS].reshape(len(groups), of.YIELDS, of.COLUMNS)
-    out[:, 1:, of.YIELD], out[:, 0, of.SLOPE] = BEYOND, 1.0
-    for first, one, of_parts, (k, y) in zip(head, out, whole, groups):
-        w, part, t = y / y[-1], k / k.sum(), len(k)
-        one[1 : t + 1, of.YIELD] = w
-        for column, values in ((of.FORCE, part * w), (of.MOMENT, part * w * w)):
-            one[1:, column] = np.append(np.cumsum(values), np.zeros(of.YIELDS - 1 - t))
-        # of those that are left: the last has none
-        one[1:t, of.SLOPE] = np.cumsum(part[:0:-1])[::-1]
-        first[2] = w[np.searchsorted(one[1:t, of.FORCE], 0.5 * one[t, of.FORCE])]
-        edges = np.linspace(w[0], w[-1], of.PARTS + 1)
-        of_parts[of.BEGINS : of.BEGINS + of.PARTS] = np.searchsorted(w, edges[:-1])
-        of_parts[of.LOWEST], of_parts[of.PER_PART] = w[0], of.PARTS / max(w[-1] - w[0], 1e-300)
-    return np.concatenate([head, whole], axis=1)
+def curve_tables(groups) -> np.ndarray:
+    """Return the numbers (n, m) that Masing's rule needs for n sets of Jenkins elements.
+
+    Parameters
+    ----------
+    groups : list of tuple
+        Stiffness (t,) [N/m] and increasing yield slides (t,) [m] of each set; t is less than
+        `table_curve_kernels.N_YIELDS`.
+
+    Returns
+    -------
+    (n, m) array
+        Two numbers without a meaning, the fraction of the last yield slide at which half of the friction slips, and the
+        table of `table_curve_kernels`.
+    """
+    curve = load(f"{HERE}.table_curve_kernels")
+    heads = np.ones((len(groups), 3))
+    tables = np.zeros((len(groups), curve.TABLE_SIZE))
+    yields = tables[:, : curve.PART_STARTS].reshape(len(groups), curve.N_YIELDS, curve.N_COLUMNS)
+    yields[:, 1:, curve.YIELD] = NO_YIELD
+    yields[:, 0, curve.SLOPE] = 1.0
+    for head, rows_of_table, table, (stiffness, yield_slide) in zip(heads, yields, tables, groups):
+        n = len(stiffness)
+        w = yield_slide / yield_slide[-1]
+        fraction = stiffness / stiffness.sum()
+        rows_of_table[1 : n + 1, curve.YIELD] = w
+        for column, values in ((curve.FORCE, fraction * w), (curve.MOMENT, fraction * w * w)):
+            after_last = np.zeros(curve.N_YIELDS - 1 - n)
+            rows_of_table[1:, column] = np.append(np.cumsum(values), after_last)
+        # The slope is the stiffness of the elements that have not yielded; after the last yield it is 0.
+        rows_of_table[1:n, curve.SLOPE] = np.cumsum(fraction[:0:-1])[::-1]
+        half_force = 0.5 * rows_of_table[n, curve.FORCE]
+        head[2] = w[np.searchsorted(rows_of_table[1:n, curve.FORCE], half_force)]
+        edges = np.linspace(w[0], w[-1], curve.N_PARTS + 1)
+        starts = slice(curve.PART_STARTS, curve.PART_STARTS + curve.N_PARTS)
+        table[starts] = np.searchsorted(w, edges[:-1])
+        table[curve.FIRST_YIELD] = w[0]
+        table[curve.PARTS_PER_SLIDE] = curve.N_PARTS / max(w[-1] - w[0], 1e-300)
+    return np.concatenate([heads, tables], axis=1)
 
 
-def scales(law: str, force, omega) -> np.ndarray:
-    """(n, k) what turns the numbers of a law of a stretch into those of cases; force (n,) [m/N]: of a case over that in
-    N; omega (n,) [rad/s]."""
-    one = np.ones(np.shape(omega))
+def number_scales(law: str, force, omega) -> np.ndarray:
+    """Return the factors (n, k) that turn the numbers of a law of one stretch into those of cases.
+
+    Parameters
+    ----------
+    law : str
+    force : (n,) array
+        Force of a case [m] per force in N.
+    omega : (n,) array
+        Angular frequency of the drive [rad/s].
+
+    Returns
+    -------
+    (n, k) array
+    """
+    ones = np.ones(np.shape(omega))
     units = {
-        "1": one,
-        "m": one,
-        "m/s": one / omega,
+        "1": ones,
+        "m": ones,
+        "m/s": ones / omega,
         "s/m": omega,
         "N": force,
         "N/m": force,
@@ -118,172 +168,263 @@ def scales(law: str, force, omega) -> np.ndarray:
     return np.stack([units[unit] for unit in load(law).NUMBER_UNITS.split()], axis=-1)
 
 
-def after(damp, square, h: float, begin: tuple, forces: tuple) -> tuple:
-    """(x, x') (n,) after an angle h of x'' + D x' + W x = g from (x, x') `begin`, by its Taylor series.
+def taylor_step(damping, stiffness, angle: float, start: tuple, forces: tuple) -> tuple:
+    """Integrate x'' + D x' + W x = g over an angle by its Taylor series.
 
-    forces: derivatives of g at the start, from order 0 on; those left out are 0.
+    Parameters
+    ----------
+    damping, stiffness : (n,) array
+    angle : float
+        [rad]
+    start : tuple of float
+        x and x' at the start.
+    forces : tuple of float
+        Derivatives of g at the start, from order 0 on; those left out are 0.
+
+    Returns
+    -------
+    (n,) array
+        x at the end.
+    (n,) array
+        x' at the end.
     """
-    y = [np.full(damp.shape, float(one)) for one in begin]
-    x, v, power = y[0] + h * y[1], y[1], 1.0
-    for k in range(TERMS):
-        y.append((forces[k] if k < len(forces) else 0.0) - damp * y[k + 1] - square * y[k])
-        power *= h / (k + 1)
-        x, v = x + y[k + 2] * power * h / (k + 2), v + y[k + 2] * power
+    y = [np.full(damping.shape, float(value)) for value in start]
+    x = y[0] + angle * y[1]
+    v = y[1]
+    power = 1.0
+    for k in range(N_TERMS):
+        force = forces[k] if k < len(forces) else 0.0
+        y.append(force - damping * y[k + 1] - stiffness * y[k])
+        power *= angle / (k + 1)
+        x = x + y[k + 2] * power * angle / (k + 2)
+        v = v + y[k + 2] * power
     return x, v
 
 
-def numbers_of(law: str, cases: Cases, steps: int) -> np.ndarray:
-    """(n, NUMBERS) of cases that march by so many steps a cycle, and behind them the table of a table."""
-    table = cases.law[:, 3:] if law == "table" else np.empty((len(cases.damp), 0))
-    found, h = (
-        np.concatenate([np.zeros((len(table), at.NUMBERS)), table], axis=1),
-        2 * np.pi / steps,
-    )
-    found[:, at.D - at.NUMBER : at.NUMBERS] = np.array(cases[:9]).T
-    if own_state(law):
-        found[:, at.H - at.NUMBER], found[:, at.MIDDLE - at.NUMBER] = h, 0.5 / np.cos(h / 2)
-        first = at.FIRST_OF_LAW - at.NUMBER
-        found[:, first : first + at.OF_LAW] = 1.0
-        found[:, first : first + min(at.OF_LAW, cases.law.shape[1])] = cases.law[:, : at.OF_LAW]
-        return found
-    sine, cosine = (
-        [float(np.round(wave(k * np.pi / 2))) for k in range(TERMS)] for wave in (np.sin, np.cos)
-    )
-    for stiff, first in ((0.0, at.A11), (cases.spring, at.B11)):
-        parts = [
-            after(cases.damp, cases.square + stiff, h, begin, forces)
-            for begin, forces in (
-                ((1, 0), ()),
-                ((0, 1), ()),
-                ((0, 0), (1.0,)),
-                ((0, 0), cosine),
-                ((0, 0), sine),
-            )
-        ]
-        (xx, vx), (xv, vv), force, *drive = parts
-        drive = [cases.push * one for pair in drive for one in pair]
-        found[:, first - at.NUMBER : first - at.NUMBER + 10] = np.array(
-            [xx, xv, vx, vv, *force, *drive]
-        ).T
-    return found
+def case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
+    """Return the rows `rows_kernels.FIRST_NUMBER` and following of cases, and then their tables.
+
+    Parameters
+    ----------
+    law : str
+    cases : Cases
+    steps : int
+        Number of steps of a cycle.
+
+    Returns
+    -------
+    (n, N_NUMBERS + t) array
+    """
+    n = len(cases.damping)
+    table = cases.law[:, 3:] if law == "table" else np.empty((n, 0))
+    numbers = np.concatenate([np.zeros((n, rows.N_NUMBERS)), table], axis=1)
+    angle = 2 * np.pi / steps
+    numbers[:, rows.DAMPING - rows.FIRST_NUMBER : rows.N_NUMBERS] = np.array(cases[:9]).T
+    if law_kernels(law):
+        numbers[:, rows.STEP - rows.FIRST_NUMBER] = angle
+        numbers[:, rows.MIDPOINT_FACTOR - rows.FIRST_NUMBER] = 0.5 / np.cos(angle / 2)
+        first = rows.LAW_NUMBERS - rows.FIRST_NUMBER
+        given = cases.law[:, : rows.N_LAW_NUMBERS]
+        numbers[:, first : first + rows.N_LAW_NUMBERS] = 1.0
+        numbers[:, first : first + given.shape[1]] = given
+        return numbers
+    for spring, first in ((0.0, rows.A11), (cases.spring, rows.B11)):
+        first -= rows.FIRST_NUMBER
+        numbers[:, first : first + 10] = step_coefficients(cases, spring, angle)
+    return numbers
 
 
-def table_of(steps: int) -> np.ndarray:
-    """(3, s + 1) sine and cosine at the steps of a cycle, and the step."""
+def step_coefficients(cases: Cases, spring, angle: float) -> np.ndarray:
+    """Return the coefficients (n, 10) of an exact step with a spring beside the mode; see `rows_kernels`."""
+    quarters = np.arange(N_TERMS) * np.pi / 2
+    sines = np.round(np.sin(quarters)).tolist()
+    cosines = np.round(np.cos(quarters)).tolist()
+    stiffness = cases.stiffness + spring
+
+    def respond(start, forces):
+        return taylor_step(cases.damping, stiffness, angle, start, forces)
+
+    by_slide = respond((1, 0), ())
+    by_speed = respond((0, 1), ())
+    by_force = respond((0, 0), (1.0,))
+    by_sine = [cases.drive * value for value in respond((0, 0), cosines)]
+    by_cosine = [cases.drive * value for value in respond((0, 0), sines)]
+    slide, speed = zip(by_slide, by_speed)
+    return np.array([*slide, *speed, *by_force, *by_sine, *by_cosine]).T
+
+
+def drive_table(steps: int) -> np.ndarray:
+    """Return sine and cosine of the drive at the steps of a cycle, and the angle of a step, (3, steps + 1)."""
     angle = 2 * np.pi * np.arange(steps + 1) / steps
     waves = np.array([np.sin(angle), np.cos(angle)])
-    waves[np.abs(waves) < 1e-15] = 0.0  # so that cycles are alike to the last bit
+    # The round-off of a zero would make cycles differ in the last bit.
+    waves[np.abs(waves) < 1e-15] = 0.0
     return np.concatenate([waves, np.full((1, steps + 1), 2 * np.pi / steps)])
 
 
-def begun_at(law: str, cases: Cases) -> np.ndarray:
-    """(n, STATE and more) motion of cases at their start."""
-    own = own_state(law)
-    motion = np.zeros((len(cases.damp), at.STATE + (own.OWN_STATE if own else 0)))
-    motion[:, at.X], motion[:, at.V], motion[:, at.PLACE] = cases.x, cases.v, cases.x
-    motion[:, at.WAY] = np.sign(cases.v) * (cases.spring == 0)
-    if flows(law):
-        motion[:, at.WAY], motion[:, at.PLACE] = (
-            np.where(cases.v == 0, np.sign(cases.push), np.sign(cases.v)),
-            0.0,
-        )
+def initial_motion(law: str, cases: Cases) -> np.ndarray:
+    """Return the motion (n, N_STATE and the state of the law) of cases at their start."""
+    kernels = law_kernels(law)
+    n_law_state = kernels.N_LAW_STATE if kernels else 0
+    motion = np.zeros((len(cases.damping), rows.N_STATE + n_law_state))
+    motion[:, rows.SLIDE] = cases.x
+    motion[:, rows.SPEED] = cases.v
+    motion[:, rows.MEMORY] = cases.x
+    motion[:, rows.SLIP_SIGN] = np.sign(cases.v) * (cases.spring == 0)
+    if has_one_stretch(law):
+        moving = np.where(cases.v == 0, np.sign(cases.drive), np.sign(cases.v))
+        motion[:, rows.SLIP_SIGN] = moving
+        motion[:, rows.MEMORY] = 0.0
     if law in MASING:
-        way = np.sign(np.select([cases.v != 0, cases.x != 0], [cases.v, -cases.x], cases.push))
-        way[way == 0] = 1.0
-        first, half = way * cases.length, cases.law[:, 2]
-        for place, value in (
-            (own.SIDE, way),
-            (own.M, 1.0),
-            (own.VIRGIN, 1.0),
-            (own.FROM, cases.x),
-            (own.STIFF, cases.spring),
-            (own.NEXT, cases.x + first * half),
+        moving = np.select([cases.v != 0, cases.x != 0], [cases.v, -cases.x], cases.drive)
+        direction = np.sign(moving)
+        direction[direction == 0] = 1.0
+        half_slip = direction * cases.yield_length * cases.law[:, 2]
+        for row, value in (
+            (kernels.DIRECTION, direction),
+            (kernels.BRANCH_SCALE, 1.0),
+            (kernels.KEEPS_FIRST_LOADING, 1.0),
+            (kernels.TURN_SLIDE, cases.x),
+            (kernels.TANGENT, cases.spring),
+            (kernels.NEXT_EVENT, cases.x + half_slip),
         ):
-            motion[:, place - at.OWN + at.STATE] = value
-        motion[:, at.PLACE] = 0.0
-    motion[:, at.HIGH] = motion[:, at.LOW] = cases.x
+            motion[:, row - rows.LAW_STATE + rows.N_STATE] = value
+        motion[:, rows.MEMORY] = 0.0
+    motion[:, rows.MAX_SLIDE] = cases.x
+    motion[:, rows.MIN_SLIDE] = cases.x
     return motion
 
 
-def own_of(law: str, motion, name: str) -> np.ndarray:
-    """(n,) a number of the own state of a law by its name."""
-    return motion[:, at.STATE + getattr(own_state(law), name) - at.OWN]
+def law_state(law: str, motion, name: str) -> np.ndarray:
+    """Return a row (n,) of the state of a law by its name."""
+    row = getattr(law_kernels(law), name)
+    return motion[:, rows.N_STATE + row - rows.LAW_STATE]
 
 
-def march_on(law: str, cases: Cases, motion, cycles: int, steps: int) -> tuple:
-    """(history (n, c, 4), motion at the end) of cases that march over `cycles` more from a motion (n, STATE and
-    more), or until they repeat; the last cycle then stands for those that follow."""
-    n, history = len(cases.damp), np.zeros((len(cases.damp), cycles, 4))
-    ended, motion, numbers = np.zeros(n, np.int64), motion.copy(), numbers_of(law, cases, steps)
-    kernels(law).march(
-        numbers,
-        np.arange(n),
-        motion,
-        table_of(steps),
-        cycles,
-        history,
-        ended,
-        *room_of(numbers, motion),
+def continue_march(law: str, cases: Cases, motion, cycles: int, steps: int) -> tuple:
+    """March cases over more cycles, or until they repeat; the last cycle then stands for those that follow.
+
+    Parameters
+    ----------
+    law : str
+    cases : Cases
+    motion : array
+        As `initial_motion` returns it.
+    cycles, steps : int
+        Number of cycles, and of steps of a cycle.
+
+    Returns
+    -------
+    history : (n, cycles, 4) array
+    motion : array
+        Motion at the end.
+    """
+    n = len(cases.damping)
+    history = np.zeros((n, cycles, 4))
+    n_done = np.zeros(n, np.int64)
+    motion = motion.copy()
+    numbers = case_numbers(law, cases, steps)
+    workspace = make_workspace(numbers, motion)
+    load_loop(law).march(
+        numbers, np.arange(n), motion, drive_table(steps), cycles, history, n_done, *workspace
     )
-    for case in np.flatnonzero(ended < cycles):
-        history[case, ended[case] :] = history[case, ended[case] - 1]
+    repeat_last_cycles(history, n_done)
     return history, motion
 
 
-def accelerations(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndarray:
-    """(n, cycles steps + 1) absolute acceleration of the output [m s-2] at every step from a motion (n, STATE and more)
-    on."""
-    n, numbers, motion = len(cases.damp), numbers_of(law, cases, steps), motion.copy()
-    out, ended = np.empty((n, cycles * steps + 1)), np.zeros(n, np.int64)
-    kernels(law).read(
+def repeat_last_cycles(history, n_done) -> None:
+    """Fill the history (n, c, 4) of cases whose motion repeats after so many cycles (n,)."""
+    for case in np.flatnonzero(n_done < history.shape[1]):
+        history[case, n_done[case] :] = history[case, n_done[case] - 1]
+
+
+def output_accelerations(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndarray:
+    """Return the absolute acceleration of the output [m s-2] at the start and after every step.
+
+    Parameters
+    ----------
+    law, cases, motion, cycles, steps
+        See `continue_march`.
+
+    Returns
+    -------
+    (n, cycles * steps + 1) array
+    """
+    n = len(cases.damping)
+    numbers = case_numbers(law, cases, steps)
+    motion = motion.copy()
+    accelerations = np.empty((n, cycles * steps + 1))
+    load_loop(law).observe(
         numbers,
         np.arange(n),
         motion,
-        table_of(steps),
+        drive_table(steps),
         cycles,
         np.zeros((n, cycles, 4)),
-        ended,
-        np.zeros((n, at.SHOWN)),
-        out,
-        *room_of(numbers, motion),
+        np.zeros(n, np.int64),
+        np.zeros((n, rows.N_READINGS)),
+        accelerations,
+        *make_workspace(numbers, motion),
     )
-    return out
+    return accelerations
 
 
-def room_of(numbers, motion) -> tuple:
-    """Room for the lanes of cases with such numbers and motions, and for the marks of their events."""
-    each = at.OWN + motion.shape[1] - at.STATE + numbers.shape[1] - at.NUMBERS
-    return np.zeros(each * at.LANES), np.zeros(at.LANES + 1, np.int64)
+def make_workspace(numbers, motion) -> tuple:
+    """Return the workspace of the lanes for cases with such numbers and motions, and numbers of lanes."""
+    n_law_state = motion.shape[1] - rows.N_STATE
+    table_size = numbers.shape[1] - rows.N_NUMBERS
+    n_rows = rows.LAW_STATE + n_law_state + table_size
+    return np.zeros(n_rows * rows.LANES), np.zeros(rows.LANES + 1, np.int64)
 
 
 def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> Marched:
-    """March cases over `cycles` by so many steps each; the last `window` of them are read, fewer of what repeats. All
-    numbers of a march that ran away are NaN.
+    """March cases from their start and read their last cycles.
+
+    Parameters
+    ----------
+    law : str
+        As `load_loop` names it.
+    cases : Cases
+    cycles, window : int
+        Number of all cycles, and of the last ones that are read; of a motion that repeats fewer are read.
+    steps : int
+        Number of steps of a cycle.
+
+    Returns
+    -------
+    Marched
+        All numbers of a march that ran away are NaN.
     """
-    loop, n = kernels(law), len(cases.damp)
-    numbers, table, order = numbers_of(law, cases, steps), table_of(steps), np.arange(n)
-    motion, history = begun_at(law, cases), np.zeros((n, cycles, 4))
-    start, ended, shown = motion.copy(), np.zeros(n, np.int64), np.zeros((n, at.SHOWN))
-    workspace = room_of(numbers, motion)
-    loop.march(numbers, order, motion, table, cycles - window, history, ended, *workspace)
-    begun, read = motion.copy(), np.where(ended < cycles - window, min(ONCE, window), window)
-    for count in np.unique(read).tolist():
-        loop.read(
+    loop = load_loop(law)
+    n = len(cases.damping)
+    numbers = case_numbers(law, cases, steps)
+    table = drive_table(steps)
+    order = np.arange(n)
+    start = initial_motion(law, cases)
+    motion = start.copy()
+    history = np.zeros((n, cycles, 4))
+    n_before = np.zeros(n, np.int64)
+    readings = np.zeros((n, rows.N_READINGS))
+    workspace = make_workspace(numbers, motion)
+    loop.march(numbers, order, motion, table, cycles - window, history, n_before, *workspace)
+    observed_start = motion.copy()
+    n_observed = np.where(n_before < cycles - window, min(N_PERIODIC, window), window)
+    for count in np.unique(n_observed).tolist():
+        loop.observe(
             numbers,
-            order[read == count],
+            order[n_observed == count],
             motion,
             table,
             count,
             history,
-            ended,
-            shown,
+            n_before,
+            readings,
             np.empty((n, 0)),
             *workspace,
         )
-    done = ended + read
-    for case in np.flatnonzero(done < cycles):  # a motion that repeats goes on as it is
-        history[case, done[case] :] = history[case, done[case] - 1]
-    away = ~(np.abs(history[:, :, :2]).max(axis=(1, 2), initial=0.0) < AWAY)
-    for one in (begun, motion, history, shown):
-        one[away] = np.nan
-    return Marched(start, begun, motion, history, shown, ended, read, numbers, 2 * np.pi / steps)
+    repeat_last_cycles(history, n_before + n_observed)
+    runs_away = ~(np.abs(history[:, :, :2]).max(axis=(1, 2), initial=0.0) < MAX_SLIDE)
+    for values in (observed_start, motion, history, readings):
+        values[runs_away] = np.nan
+    step = 2 * np.pi / steps
+    return Marched(start, observed_start, motion, history, readings, n_before, n_observed, step)

@@ -1,115 +1,150 @@
-"""The force of a first loading of parallel Jenkins elements, over their stiffness and the slide LENGTH of all of them:
-straight between their yields,
+"""The force of a first loading of parallel Jenkins elements, which is straight between their yields.
 
-    g(w) = F + S w,  F = sum k y and S = sum k of those that have, and have not, yielded.
+With the force over the stiffness and YIELD_LENGTH, and the slide over YIELD_LENGTH w,
 
-A case has its table behind its numbers (`run.tables_of`): of each yield its place, F, S and B = sum k y^2, one beside
-the other in the workspace of a lane. In a step it is walked through once, from where the last one ended, after an event from
-where the part of the way from the first yield to the last begins that holds it; what is found lies side by side with
-that of other lanes, as a compiler takes several at once only where it knows the distance of any two numbers. Twin: many
-elements, from event to event (`dynamics.events`).
+    g(w) = F + S w,
+
+where F = sum k y over the elements that have yielded and S = sum k over the others, with the stiffness k and the yield
+slide y of an element. A case has a table after its numbers (`run.curve_tables`): of each yield its place, F, S and
+B = sum k y^2. In a step the table is walked through once, from where the last step ended. After an event the walk starts
+at an equal part of the range of the yields, of which the table has the first yield. What is found is written into rows of
+the workspace, because a compiler takes several lanes at once only where it knows the distance of any two numbers. A
+reference is the engine `dynamics.events` with the elements themselves.
 """
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .names_kernels import CURVE, LANES, WHERE
+from .rows_kernels import CURVE_PLACE, CURVE_STATE, LANES, NJIT_INLINE
 
-YIELDS = 512  # of a case, the first of which is none and the last beyond all slides
-YIELD, FORCE, SLOPE, MOMENT, COLUMNS = range(5)
-# number of the yield; F, S and B at WHERE, F and B where the step begins
-AT, FOUND_F, FOUND_S, FOUND_B, HERE_F, HERE_B = range(WHERE + 1, WHERE + 7)
-# behind the yields: how many of them are below the begin of each equal part of the way from the first to the last; the
-# first, and parts over that way
-PARTS, BEGINS = 128, COLUMNS * YIELDS
-LOWEST, PER_PART = range(BEGINS + PARTS, BEGINS + PARTS + 2)
-# where the tables begin, and the numbers of one
-TABLE, SIZE = (
-    (WHERE + 7) * LANES,
-    BEGINS + PARTS + 2,
+N_YIELDS = 512  # number of yields of a table; the first is at 0 and the last beyond all slides
+# Columns of a yield.
+YIELD = 0
+FORCE = 1
+SLOPE = 2
+MOMENT = 3
+N_COLUMNS = 4
+# Rows of the workspace: number of the yield, F, S and B at CURVE_PLACE, and F and B at the start of the step.
+YIELD_INDEX = CURVE_PLACE + 1
+PREPARED_FORCE = CURVE_PLACE + 2
+PREPARED_SLOPE = CURVE_PLACE + 3
+PREPARED_MOMENT = CURVE_PLACE + 4
+START_FORCE = CURVE_PLACE + 5
+START_MOMENT = CURVE_PLACE + 6
+N_ROWS = CURVE_PLACE + 7
+# After the yields a table has the number of yields before each part of their range, the first yield, and the number of
+# parts per slide.
+N_PARTS = 128
+PART_STARTS = N_COLUMNS * N_YIELDS
+FIRST_YIELD = PART_STARTS + N_PARTS
+PARTS_PER_SLIDE = PART_STARTS + N_PARTS + 1
+TABLE_SIZE = PART_STARTS + N_PARTS + 2
+TABLE_START = N_ROWS * LANES  # place of the first table in the workspace
+N_CURVE_STATE = N_ROWS - CURVE_STATE  # number of rows that the curve has in the state of the law
+MAX_STEP = (
+    0.25  # longest step, over YIELD_LENGTH; Newton's method finds the end of a longer one badly
 )
-ROOM = WHERE + 7 - CURVE  # numbers that it has in the state of a case
-PART = 0.25  # of LENGTH, over which a step may go at most
-FORETELLS = True
-# where the numbers of a curve are: in its table, found ahead of a step, at its begin
-ASKED, FOUND, HERE = range(3)
+LOOKS_AHEAD = True  # whether `prepare` has something to do
+# Where the numbers of the curve are: in the table, looked up by `prepare`, or those of the start of the step.
+IN_TABLE = 0
+PREPARED = 1
+AT_START = 2
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def walk(at, w, workspace, i):
-    """Note the number of the last yield up to w, which is not far from the number `at`."""
-    first = TABLE + SIZE * i
-    while w >= workspace[first + COLUMNS * (at + 1)]:
-        at += 1
-    while w < workspace[first + COLUMNS * at]:
-        at -= 1
-    workspace[AT * LANES + i] = at
+@njit(**NJIT_INLINE)
+def walk_to(first_guess, w, workspace, lane):
+    """Walk from a yield to the last one up to w, and note its number."""
+    n = first_guess
+    table = TABLE_START + TABLE_SIZE * lane
+    while w >= workspace[table + N_COLUMNS * (n + 1)]:
+        n += 1
+    while w < workspace[table + N_COLUMNS * n]:
+        n -= 1
+    workspace[YIELD_INDEX * LANES + lane] = n
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def last(w, workspace, i):
-    """Place in the workspace of the last yield up to w: that of the last time, or from the begin of its part on."""
-    k, first = int(workspace[AT * LANES + i]), TABLE + SIZE * i
-    if w < workspace[first + COLUMNS * k] or w >= workspace[first + COLUMNS * (k + 1)]:
-        part = (w - workspace[first + LOWEST]) * workspace[first + PER_PART]
-        k = int(workspace[first + BEGINS + int(min(part, PARTS - 1.0))]) if part > 0.0 else 0
-        walk(k, w, workspace, i)
-    return first + COLUMNS * int(workspace[AT * LANES + i])
+@njit(**NJIT_INLINE)
+def find_yield(w, workspace, lane):
+    """Return the place in the workspace of the last yield up to w: the last one found, or by the part that holds w."""
+    k = int(workspace[YIELD_INDEX * LANES + lane])
+    table = TABLE_START + TABLE_SIZE * lane
+    if w < workspace[table + N_COLUMNS * k] or w >= workspace[table + N_COLUMNS * (k + 1)]:
+        part = (w - workspace[table + FIRST_YIELD]) * workspace[table + PARTS_PER_SLIDE]
+        k = 0
+        if part > 0.0:
+            k = int(workspace[table + PART_STARTS + int(min(part, N_PARTS - 1.0))])
+        walk_to(k, w, workspace, lane)
+    return table + N_COLUMNS * int(workspace[YIELD_INDEX * LANES + lane])
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find(workspace, i):
-    """Find the curve of a lane at WHERE."""
-    walk(int(workspace[AT * LANES + i]), workspace[WHERE * LANES + i], workspace, i)
-    place = TABLE + SIZE * i + COLUMNS * int(workspace[AT * LANES + i])
-    workspace[FOUND_F * LANES + i], workspace[FOUND_S * LANES + i] = (
-        workspace[place + FORCE],
-        workspace[place + SLOPE],
+@njit(**NJIT_INLINE)
+def prepare(workspace, lane):
+    """Look up the curve of a lane at CURVE_PLACE."""
+    start = int(workspace[YIELD_INDEX * LANES + lane])
+    walk_to(start, workspace[CURVE_PLACE * LANES + lane], workspace, lane)
+    place = TABLE_START + TABLE_SIZE * lane + N_COLUMNS * int(workspace[YIELD_INDEX * LANES + lane])
+    workspace[PREPARED_FORCE * LANES + lane] = workspace[place + FORCE]
+    workspace[PREPARED_SLOPE * LANES + lane] = workspace[place + SLOPE]
+    workspace[PREPARED_MOMENT * LANES + lane] = workspace[place + MOMENT]
+
+
+@njit(**NJIT_INLINE)
+def finish_step(workspace, lane, event):
+    """Start the next step where this one ended, unless it contains an event."""
+    force = workspace[START_FORCE * LANES + lane]
+    moment = workspace[START_MOMENT * LANES + lane]
+    workspace[START_FORCE * LANES + lane] = (
+        force if event else workspace[PREPARED_FORCE * LANES + lane]
     )
-    workspace[FOUND_B * LANES + i] = workspace[place + MOMENT]
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def go_on(workspace, i, event):
-    """Begin the next step where this one ended, unless it holds an event."""
-    f, b = workspace[HERE_F * LANES + i], workspace[HERE_B * LANES + i]
-    workspace[HERE_F * LANES + i] = f if event else workspace[FOUND_F * LANES + i]
-    workspace[HERE_B * LANES + i] = b if event else workspace[FOUND_B * LANES + i]
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def begin_at(w, workspace, i):
-    """Begin the next step at w."""
-    at = last(w, workspace, i)
-    workspace[HERE_F * LANES + i], workspace[HERE_B * LANES + i] = (
-        workspace[at + FORCE],
-        workspace[at + MOMENT],
+    workspace[START_MOMENT * LANES + lane] = (
+        moment if event else workspace[PREPARED_MOMENT * LANES + lane]
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def force(w, workspace, i, when):
-    """(g, its slope) at w > 0."""
-    if when == FOUND:
-        return workspace[FOUND_F * LANES + i] + workspace[FOUND_S * LANES + i] * w, workspace[
-            FOUND_S * LANES + i
-        ]
-    at = last(w, workspace, i)
-    return workspace[at + FORCE] + workspace[at + SLOPE] * w, workspace[at + SLOPE]
+@njit(**NJIT_INLINE)
+def start_at(w, workspace, lane):
+    """Look up the curve at the start of a step."""
+    place = find_yield(w, workspace, lane)
+    workspace[START_FORCE * LANES + lane] = workspace[place + FORCE]
+    workspace[START_MOMENT * LANES + lane] = workspace[place + MOMENT]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def slipped(w, g, workspace, i, when):
-    """Mean slip of the sliders, each by what it carries at most, times that of all."""
-    if when == FOUND:
-        return workspace[FOUND_F * LANES + i] * w - workspace[FOUND_B * LANES + i]
-    if when == HERE:
-        return workspace[HERE_F * LANES + i] * w - workspace[HERE_B * LANES + i]
-    at = last(w, workspace, i)
-    return workspace[at + FORCE] * w - workspace[at + MOMENT]
+@njit(**NJIT_INLINE)
+def force_and_slope(w, workspace, lane, when):
+    """Return the force at w > 0 and its slope."""
+    if when == PREPARED:
+        slope = workspace[PREPARED_SLOPE * LANES + lane]
+        return workspace[PREPARED_FORCE * LANES + lane] + slope * w, slope
+    place = find_yield(w, workspace, lane)
+    return workspace[place + FORCE] + workspace[place + SLOPE] * w, workspace[place + SLOPE]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def work(w, g, workspace, i):
-    """Integral of the force up to w, where it is g."""
-    at = last(w, workspace, i)
-    return (w * (g + workspace[at + FORCE]) - workspace[at + MOMENT]) / 2
+@njit(**NJIT_INLINE)
+def mean_slip(w, force, workspace, lane, when):
+    """Return the slip at w, weighted by the friction of the sliders, over the stiffness and YIELD_LENGTH.
+
+    Parameters
+    ----------
+    w, force : float
+        Place on the curve, and the force there.
+    workspace, lane
+        See `rigid_kernels.friction_force`.
+    when : int
+        Where the numbers of the curve are.
+
+    Returns
+    -------
+    float
+    """
+    if when == PREPARED:
+        moment = workspace[PREPARED_MOMENT * LANES + lane]
+        return workspace[PREPARED_FORCE * LANES + lane] * w - moment
+    if when == AT_START:
+        return workspace[START_FORCE * LANES + lane] * w - workspace[START_MOMENT * LANES + lane]
+    place = find_yield(w, workspace, lane)
+    return workspace[place + FORCE] * w - workspace[place + MOMENT]
+
+
+@njit(**NJIT_INLINE)
+def loading_work(w, force, workspace, lane):
+    """Return the integral of the force up to w; arguments as of `mean_slip`."""
+    place = find_yield(w, workspace, lane)
+    return (w * (force + workspace[place + FORCE]) - workspace[place + MOMENT]) / 2

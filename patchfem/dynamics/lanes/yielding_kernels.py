@@ -1,315 +1,522 @@
-"""A step of one mode behind one elastic-plastic element, of one case: exact between yields and stops, each found inside
-its step.
+"""A step behind one elastic-plastic element, of one case: exact between yields and stops, each found inside its step.
 
-Equation, in the angle of the drive: x'' + D x' + W x = P sin - f, f = K (x - place) in a stick, +-GK in a slip, which
-begins at |x - place| = LENGTH. Twin: a run from event to event (`dynamics.events`).
+The equation in the angle of the drive is x'' + D x' + W x = P sin - f. In a stick f = SPRING (x - memory), in a slip
+f = +-KINETIC; a slip starts at |x - memory| = YIELD_LENGTH. A reference is the engine `dynamics.events`.
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .names_kernels import (
-    A11,
-    A12,
-    A21,
-    A22,
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from .rigid_kernels import (
+    N_KEPT,
+    Motion,
+    StepOutcome,
+    StickReading,
+    TriedStep,
+    irreversible_slide,
+    is_sticking,
+    newton_on_cubic,
+    prepare_step,
+    records_own_peaks,
+    restore_derived_state,
+    set_derived_state,
+    slide_at_reversal,
+    slip_increment,
+)
+from .rigid_kernels import linear_step as linear_slip
+from .rows_kernels import (
     B11,
     B12,
     B21,
     B22,
-    CV,
-    CX,
-    GK,
+    CYCLE_ENDS,
+    DAMPING,
+    DRIVE,
+    KINETIC,
     LANES,
-    LENGTH,
-    PAST,
-    PATH,
-    PLACE,
+    MEMORY,
+    NJIT_INLINE,
     QV,
     QX,
-    RV,
-    RX,
-    STATES,
-    SV,
-    SX,
+    SLIDE,
+    SLIP_PATH,
+    SLIP_SIGN,
+    SPEED,
+    SPRING,
+    STATE_ROWS,
+    STIFFNESS,
     TV,
     TX,
     UV,
     UX,
-    WAY,
-    D,
-    K,
-    P,
-    V,
-    W,
-    X,
-)
-from .rigid_kernels import (
-    KEPT,
-    begin,
-    crossing,
-    folds,
-    foretell,
-    furthest,
-    irreversible_slide,
-    path,
-    resume,
-    sticking,
+    YIELD_LENGTH,
 )
 
 __all__ = [
-    "KEPT",
-    "PROVEN",
-    "RESTS",
-    "TURNS_HELD",
-    "advance",
-    "ahead",
-    "at_turn",
-    "begin",
-    "folds",
-    "foretell",
+    "EVENT_KEEPS_STICK",
+    "N_KEPT",
+    "PROOF_TOL",
+    "STICK_IS_RIGID",
+    "can_extrapolate",
+    "friction_at_reversal",
     "friction_force",
-    "furthest",
-    "held",
+    "friction_rate",
     "irreversible_slide",
-    "path",
-    "resume",
-    "rise",
-    "settles",
-    "sticking",
+    "is_sticking",
+    "prepare_step",
+    "records_own_peaks",
+    "resolve_step",
+    "restore_derived_state",
+    "set_derived_state",
+    "slide_at_reversal",
+    "slip_increment",
+    "stick_fractions",
+    "try_step",
 ]
 
-RESTS = False  # a stick moves its spring
-TURNS_HELD = False
-PROVEN = 1e-7  # as of `rigid_kernels`
-LEAST = 1e-3  # of the length over which it yields: slip of a cycle that sets the stretch anew
+STICK_IS_RIGID = False
+EVENT_KEEPS_STICK = False
+PROOF_TOL = 1e-7
+MIN_SLIP = 1e-3  # path of slip over YIELD_LENGTH of a cycle that determines the memory anew
+N_NEWTON = 4  # Newton steps for the place of an event, which is then exact to round-off
+AFTER_EVENT = 2  # instant of a step as in `observation_kernels`
+TINY = 1e-300  # keeps a divisor above 0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def settles(workspace, i):
-    """Whether the last cycle slips, so that no earlier one tells its stretch: while a motion settles, a yield or a
-    reversal may move across the end of a cycle, where the stretch is no longer what the map of the cycle before gives,
-    and without a slip it is kept for good."""
-    return (
-        workspace[PATH * LANES + i] - workspace[(PAST + len(STATES)) * LANES + i]
-        > LEAST * workspace[LENGTH * LANES + i]
+class SpeedCurve(NamedTuple):
+    """The step as if it had no event: the speed is v + u (m0 + u (c2 + u c3)) over 0 <= u <= 1."""
+
+    x: float
+    v: float
+    m0: float
+    c2: float
+    c3: float
+    angle: float
+
+
+class CurveEvent(NamedTuple):
+    """Event on a `SpeedCurve`: fraction of the step, speed and its first two rates, and factor of the spring.
+
+    The factor is that by which the spring of the stick acts on the correction after the event.
+    """
+
+    place: float
+    speed: float
+    rate: float
+    second_rate: float
+    factor: float
+
+
+@njit(**NJIT_INLINE)
+def can_extrapolate(workspace, lane):
+    """Return whether the last cycle slips, so that no earlier cycle determines its memory.
+
+    While a motion settles, a yield or a reversal may move across the end of a cycle, where the memory is no longer what
+    the map of the cycle before gives. Without a slip the error would be kept for ever.
+    """
+    path = (
+        workspace[SLIP_PATH * LANES + lane]
+        - workspace[(CYCLE_ENDS + len(STATE_ROWS)) * LANES + lane]
     )
+    return path > MIN_SLIP * workspace[YIELD_LENGTH * LANES + lane]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def friction_force(x, v, way, place, sine, workspace, i):
-    """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
-    return workspace[K * LANES + i] * (x - place) if way == 0.0 else way * workspace[GK * LANES + i]
+@njit(**NJIT_INLINE)
+def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
+    """Return the friction over the mass in the angle of the drive [m], positive if it resists positive slip.
+
+    Parameters
+    ----------
+    x, v, slip_sign, memory, sine, workspace, lane
+        See `rigid_kernels.friction_force`.
+
+    Returns
+    -------
+    float
+    """
+    if slip_sign == 0.0:
+        return workspace[SPRING * LANES + lane] * (x - memory)
+    return slip_sign * workspace[KINETIC * LANES + lane]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rise(v, a, way, place, workspace, i, when):
-    """Rate of the friction at a speed v and an acceleration a; what holds on after an event moves there in its slip."""
-    return workspace[K * LANES + i] * v if way == 0.0 and when != 2 else 0.0
+@njit(**NJIT_INLINE)
+def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
+    """Return the rate of the friction; 0 after an event, because a stick that starts there moves with its slip.
+
+    Parameters
+    ----------
+    v, acceleration, slip_sign, memory, workspace, lane, when
+        See `rigid_kernels.friction_rate`.
+
+    Returns
+    -------
+    float
+    """
+    rate = workspace[SPRING * LANES + lane] * v
+    return rate if slip_sign == 0.0 and when != AFTER_EVENT else 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def at_turn(x, way, place, turned, workspace, i):
-    """Friction at a turn of the slide, before which it may have slipped."""
-    most = workspace[GK * LANES + i]
-    return min(max(friction_force(x, 0.0, way, place, 0.0, workspace, i), -most), most)
+@njit(**NJIT_INLINE)
+def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
+    """Return the friction at a reversal of the slide, before which the interface may have slipped.
+
+    Parameters
+    ----------
+    x, slip_sign, memory, event_memory, workspace, lane
+        See `rigid_kernels.friction_at_reversal`.
+
+    Returns
+    -------
+    float
+    """
+    limit = workspace[KINETIC * LANES + lane]
+    friction = friction_force(x, 0.0, slip_sign, memory, 0.0, workspace, lane)
+    return min(max(friction, -limit), limit)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def held(begin, end, way, workspace, i, h):
-    """As of `rigid_kernels`; a stick whose place moves begins with a slip that turns, whose speed falls as a line."""
-    slip, speed = abs(end[3] - begin[3]) if way == 0.0 else 0.0, abs(begin[1]) * h
+@njit(**NJIT_INLINE)
+def stick_fractions(start, end, workspace, lane, angle):
+    """Return the `StickReading` of a segment of a step.
+
+    A stick whose memory moves begins with a slip that reverses, whose speed falls linearly.
+
+    Parameters
+    ----------
+    start, end, workspace, lane, angle
+        See `rigid_kernels.stick_fractions`.
+
+    Returns
+    -------
+    StickReading
+    """
+    if start.state.slip_sign != 0.0:
+        return StickReading(0.0, 2.0, end.state.memory)
+    slip = abs(end.state.memory - start.state.memory)
+    speed = abs(start.state.speed) * angle
     slips = min(2 * slip / speed, 1.0) if speed > 0.0 else 0.0
-    return 1.0 - slips if way == 0.0 else 0.0, 0.0 if slips > 0.0 else 2.0, end[3]
+    return StickReading(1.0 - slips, 0.0 if slips > 0.0 else 2.0, end.state.memory)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def linear(workspace, i, s0, c0):
-    """(x, x') after a step in the state in which it begins."""
-    x, v, way, place = (
-        workspace[X * LANES + i],
-        workspace[V * LANES + i],
-        workspace[WAY * LANES + i],
-        workspace[PLACE * LANES + i],
+@njit(**NJIT_INLINE)
+def linear_step(workspace, lane, s0, c0):
+    """Return the `Motion` after a step that stays in the stick or the slip in which it starts."""
+    x = workspace[SLIDE * LANES + lane]
+    v = workspace[SPEED * LANES + lane]
+    is_stuck = workspace[SLIP_SIGN * LANES + lane] == 0.0
+    spring_force = workspace[SPRING * LANES + lane] * workspace[MEMORY * LANES + lane]
+    slip = linear_slip(workspace, lane, s0, c0)
+    stick_slide = (
+        workspace[B11 * LANES + lane] * x
+        + workspace[B12 * LANES + lane] * v
+        + workspace[TX * LANES + lane] * s0
+        + workspace[UX * LANES + lane] * c0
+        + spring_force * workspace[QX * LANES + lane]
     )
-    pull, hold = way * workspace[GK * LANES + i], workspace[K * LANES + i] * place
-    xs = (
-        workspace[A11 * LANES + i] * x
-        + workspace[A12 * LANES + i] * v
-        + workspace[SX * LANES + i] * s0
-        + workspace[CX * LANES + i] * c0
-        - pull * workspace[RX * LANES + i]
+    stick_speed = (
+        workspace[B21 * LANES + lane] * x
+        + workspace[B22 * LANES + lane] * v
+        + workspace[TV * LANES + lane] * s0
+        + workspace[UV * LANES + lane] * c0
+        + spring_force * workspace[QV * LANES + lane]
     )
-    vs = (
-        workspace[A21 * LANES + i] * x
-        + workspace[A22 * LANES + i] * v
-        + workspace[SV * LANES + i] * s0
-        + workspace[CV * LANES + i] * c0
-        - pull * workspace[RV * LANES + i]
-    )
-    xh = (
-        workspace[B11 * LANES + i] * x
-        + workspace[B12 * LANES + i] * v
-        + workspace[TX * LANES + i] * s0
-        + workspace[UX * LANES + i] * c0
-        + hold * workspace[QX * LANES + i]
-    )
-    vh = (
-        workspace[B21 * LANES + i] * x
-        + workspace[B22 * LANES + i] * v
-        + workspace[TV * LANES + i] * s0
-        + workspace[UV * LANES + i] * c0
-        + hold * workspace[QV * LANES + i]
-    )
-    return xh if way == 0.0 else xs, vh if way == 0.0 else vs
+    return Motion(stick_slide if is_stuck else slip.slide, stick_speed if is_stuck else slip.speed)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def ahead(workspace, i, s0, c0, s1, c1, reads):
-    """(x, x', place after a step without a stop, a yield or a turn in it; whether there is one); reads: as of
-    `rigid_kernels`."""
-    v, way, place = (
-        workspace[V * LANES + i],
-        workspace[WAY * LANES + i],
-        workspace[PLACE * LANES + i],
+@njit(**NJIT_INLINE)
+def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
+    """Compute a step as if no event lay inside it: no stop, yield or reversal.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0, s1, c1, is_observed
+        See `rigid_kernels.try_step`.
+
+    Returns
+    -------
+    TriedStep
+    """
+    v = workspace[SPEED * LANES + lane]
+    slip_sign = workspace[SLIP_SIGN * LANES + lane]
+    memory = workspace[MEMORY * LANES + lane]
+    length = workspace[YIELD_LENGTH * LANES + lane]
+    end = linear_step(workspace, lane, s0, c0)
+    is_stuck = slip_sign == 0.0
+    yields = is_stuck and abs(end.slide - memory) > length
+    is_reversed = v * end.speed < 0.0 or (is_observed and end.speed == 0.0)
+    memory1 = memory if is_stuck else end.slide - slip_sign * length
+    return TriedStep(end.slide, end.speed, memory1, yields or is_reversed)
+
+
+@njit(**NJIT_INLINE)
+def slip_correction(angle, damping, stiffness, event):
+    """Return the `Motion` that is to be added an angle after an event, where the spring changes its action.
+
+    It solves d'' + damping d' + stiffness d = factor (speed t + rate t^2/2 + second_rate t^3/6) from rest, with the fields
+    of the `CurveEvent`, by its Taylor series.
+    """
+    t = angle
+    t2 = t * t
+    e2 = damping * damping - stiffness
+    by_speed = event.factor * event.speed
+    by_rate = event.factor * event.rate
+    by_second_rate = event.factor * event.second_rate
+    slide = 1.0 / 6 + t * (-damping / 24 + t * (e2 / 120 - t * damping * (e2 - stiffness) / 720))
+    rate_slide = 1.0 / 24 + t * (-damping / 120 + t * e2 / 720)
+    second_slide = 1.0 / 120 - t * damping / 720
+    speed = 0.5 + t * (-damping / 6 + t * e2 / 24)
+    rate_speed = 1.0 / 6 + t * (-damping / 24 + t * e2 / 120)
+    second_speed = 1.0 / 24 - t * damping / 120
+    return Motion(
+        t2
+        * t
+        * (by_speed * slide + t * (by_rate * rate_slide + t * by_second_rate * second_slide)),
+        t2 * (by_speed * speed + t * (by_rate * rate_speed + t * by_second_rate * second_speed)),
     )
-    x1, v1 = linear(workspace, i, s0, c0)
-    length, held = workspace[LENGTH * LANES + i], way == 0.0
-    yields = held and abs(x1 - place) > length
-    return (
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def find_reversal_in_slip(event, spring, angle):
+    """Find the angle from a yield to the reversal of the slip by Newton's method; at most `angle`.
+
+    The speed of the stick goes on as a parabola, and the slip adds the force that the spring lacks.
+    """
+    v = event.speed
+    a = event.rate
+    j = event.second_rate
+    square = a * a - 2 * v * j
+    is_reversed = square > 0.0 > a * v
+    t = min(2 * abs(v) / (abs(a) + sqrt(square)) if is_reversed else angle, angle)
+    for _ in range(N_NEWTON):
+        speed = v + t * (a + t * (j / 2 + spring * (v / 2 + t * (a / 6 + t * j / 24))))
+        slope = a + t * (j + spring * (v + t * (a / 2 + t * j / 6)))
+        t = min(max(t - speed / slope, 0.0), angle) if slope != 0.0 else t
+    return t
+
+
+@njit(**NJIT_INLINE)
+def continue_in_stick(start, damping, stiffness, force, angle):
+    """Return the `Motion` an angle after a start, d'' + damping d' + stiffness d = force, by its Taylor series.
+
+    Parameters
+    ----------
+    start : Motion
+    damping, stiffness, force : float
+    angle : float
+        [rad]
+
+    Returns
+    -------
+    Motion
+    """
+    t = angle
+    a = force - damping * start.speed - stiffness * start.slide
+    j = -damping * a - stiffness * start.speed
+    k = -damping * j - stiffness * a
+    return Motion(
+        start.slide + t * (start.speed + t * (a / 2 + t * (j / 6 + t * k / 24))),
+        start.speed + t * (a + t * (j / 2 + t * k / 6)),
+    )
+
+
+@njit(**NJIT_INLINE)
+def slide_on(curve, u):
+    """Return the slide at a place of a `SpeedCurve`."""
+    return curve.x + curve.angle * u * (
+        curve.v + u * (curve.m0 / 2 + u * (curve.c2 / 3 + u * curve.c3 / 4))
+    )
+
+
+@njit(**NJIT_INLINE)
+def speed_on(curve, u):
+    """Return the speed at a place of a `SpeedCurve`."""
+    return curve.v + u * (curve.m0 + u * (curve.c2 + u * curve.c3))
+
+
+@njit(**NJIT_INLINE)
+def event_on(curve, u, speed, factor):
+    """Return the `CurveEvent` at a place of a `SpeedCurve`, with a speed that is known better than the curve gives it."""
+    rate = (curve.m0 + u * (2 * curve.c2 + 3 * curve.c3 * u)) / curve.angle
+    second_rate = (2 * curve.c2 + 6 * curve.c3 * u) / (curve.angle * curve.angle)
+    return CurveEvent(u, speed, rate, second_rate, factor)
+
+
+@njit(**NJIT_INLINE)
+def find_yield(curve, memory, side, length, top, highest):
+    """Find the place on a `SpeedCurve` where the spring reaches its yield length.
+
+    Parameters
+    ----------
+    curve : SpeedCurve
+    memory : float
+        Slide of the unloaded spring [m].
+    side : float
+        Sign of the yield.
+    length : float
+        Yield length [m].
+    top : float
+        Upper bound of the place: the reversal after which the spring is unloaded again, otherwise 1.
+    highest : float
+        Largest extension of the spring up to there [m].
+
+    Returns
+    -------
+    float
+    """
+    reserve = side * (curve.x - memory) - length
+    u = top * min(max(-reserve / (highest - length - reserve), 0.0), 1.0)
+    if top < 1.0:
+        # Beside a reversal the slide is a parabola, from which its secant is far.
+        bend = abs(curve.m0 + top * (2 * curve.c2 + 3 * curve.c3 * top))
+        bow = curve.angle * max(bend, TINY)
+        u = max(top - sqrt(2 * (highest - length) / bow), 0.0)
+    for _ in range(N_NEWTON):
+        miss = side * (slide_on(curve, u) - memory) - length
+        speed = side * speed_on(curve, u)
+        u = min(max(u - miss / (curve.angle * speed), 0.0), top) if speed > 0.0 else u
+    return u
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
+    """Compute a step with the stop, the yield or the reversal inside it.
+
+    The speed of the step without an event is taken as a cubic, and the slide as its integral, so an event is found to the
+    fourth order. After the event the exact step is corrected by what the change of the spring adds.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0, s1, c1, angle
+        See `rigid_kernels.resolve_step`.
+
+    Returns
+    -------
+    StepOutcome
+    """
+    x = workspace[SLIDE * LANES + lane]
+    v = workspace[SPEED * LANES + lane]
+    sign = workspace[SLIP_SIGN * LANES + lane]
+    memory = workspace[MEMORY * LANES + lane]
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    drive = workspace[DRIVE * LANES + lane]
+    end = linear_step(workspace, lane, s0, c0)
+    friction = friction_force(x, v, sign, memory, s0, workspace, lane)
+    friction1 = friction_force(end.slide, end.speed, sign, memory, s1, workspace, lane)
+    m0 = angle * (drive * s0 - damping * v - stiffness * x - friction)
+    m1 = angle * (drive * s1 - damping * end.speed - stiffness * end.slide - friction1)
+    c2 = 3 * (end.speed - v) - 2 * m0 - m1
+    c3 = m0 + m1 - 2 * (end.speed - v)
+    curve = SpeedCurve(x, v, m0, c2, c3, angle)
+    is_crossed = v * end.speed < 0.0
+    is_reversed = is_crossed or (sign != 0.0 and sign * v < 0.0)
+    u = 0.0 if is_reversed else 1.0
+    if is_crossed:
+        u = newton_on_cubic(v, m0, c2, c3, v / (v - end.speed))
+    if sign != 0.0:
+        return resolve_slip(workspace, lane, curve, end, is_reversed, u)
+    return resolve_stick(workspace, lane, curve, end, is_reversed, u)
+
+
+@njit(**NJIT_INLINE)
+def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
+    """Compute a step from a slip, which sticks from its reversal on.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `resolve_step`.
+    curve : SpeedCurve
+    end : Motion
+        Motion after the step without an event.
+    is_reversed : bool
+    reversal : float
+        Place of the reversal on the curve.
+
+    Returns
+    -------
+    StepOutcome
+    """
+    sign = workspace[SLIP_SIGN * LANES + lane]
+    length = workspace[YIELD_LENGTH * LANES + lane]
+    if not is_reversed:
+        memory = end.slide - sign * length
+        return StepOutcome(
+            end.slide, end.speed, sign, memory, 1.0, end.slide, end.speed, memory, end.slide, 0.0
+        )
+    spring = workspace[SPRING * LANES + lane]
+    turn = slide_on(curve, reversal)
+    memory = turn - sign * length
+    x1 = end.slide
+    v1 = end.speed
+    if reversal < 1.0:
+        rest = curve.angle - reversal * curve.angle
+        stiffness = workspace[STIFFNESS * LANES + lane] + spring
+        event = event_on(curve, reversal, 0.0, -spring)
+        change = slip_correction(rest, workspace[DAMPING * LANES + lane], stiffness, event)
+        x1 += change.slide
+        v1 += change.speed
+    return StepOutcome(x1, v1, 0.0, memory, reversal, turn, 0.0, memory, turn, 0.0)
+
+
+@njit(**NJIT_INLINE)
+def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
+    """Compute a step from a stick, in which the element may yield; arguments as of `resolve_slip`."""
+    memory = workspace[MEMORY * LANES + lane]
+    spring = workspace[SPRING * LANES + lane]
+    length = workspace[YIELD_LENGTH * LANES + lane]
+    damping = workspace[DAMPING * LANES + lane]
+    stiffness = workspace[STIFFNESS * LANES + lane]
+    turn = slide_on(curve, reversal) if is_reversed else end.slide
+    side = 1.0 if turn > memory else -1.0
+    if not is_reversed or abs(turn - memory) <= abs(end.slide - memory):
+        side = 1.0 if end.slide > memory else -1.0
+    highest = max(side * (turn - memory), side * (end.slide - memory))
+    if not highest > length:
+        return StepOutcome(
+            end.slide, end.speed, 0.0, memory, 1.0, end.slide, end.speed, memory, turn, 0.0
+        )
+    turns_beyond = is_reversed and side * (turn - memory) > length
+    top = reversal if turns_beyond else 1.0
+    u = find_yield(curve, memory, side, length, top, highest)
+    event_speed = speed_on(curve, u)
+    event_slide = memory + side * length
+    if u >= 1.0:
+        return StepOutcome(
+            end.slide, end.speed, side, memory, u, event_slide, event_speed, memory, turn, 0.0
+        )
+    rest = curve.angle - u * curve.angle
+    event = event_on(curve, u, event_speed, spring)
+    change = slip_correction(rest, damping, stiffness, event)
+    sign1 = side
+    x1 = end.slide + change.slide
+    v1 = end.speed + change.speed
+    memory1 = x1 - side * length
+    if turns_beyond:
+        # The slip reverses later than the stick would, or not in this step.
+        is_reversed = side * v1 < 0.0
+        if is_reversed:
+            slip_angle = find_reversal_in_slip(event, spring, rest)
+            change = slip_correction(slip_angle, damping, stiffness, event)
+            turn = slide_on(curve, u + slip_angle / curve.angle) + change.slide
+            sign1 = 0.0
+            memory1 = turn - side * length
+            force = spring * (memory1 - memory)
+            change = continue_in_stick(
+                change, damping, stiffness + spring, force, rest - slip_angle
+            )
+            x1 = end.slide + change.slide
+            v1 = end.speed + change.speed
+    return StepOutcome(
         x1,
         v1,
-        place if held else x1 - way * length,
-        yields or v * v1 < 0.0 or (reads and v1 == 0.0),
+        sign1,
+        memory1,
+        u,
+        event_slide,
+        event_speed,
+        memory,
+        turn if is_reversed else x1,
+        0.0,
     )
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bent(r, damp, stiff, one, two, three):
-    """(Slide, speed) an angle r after rest of d'' + damp d' + stiff d = one r + two r^2 / 2 + three r^3 / 6."""
-    r2, e2 = r * r, damp * damp - stiff
-    of_one, of_one_v = (
-        1.0 / 6 + r * (-damp / 24 + r * (e2 / 120 - r * damp * (e2 - stiff) / 720)),
-        0.5 + r * (-damp / 6 + r * e2 / 24),
-    )
-    of_two, of_two_v = (
-        1.0 / 24 + r * (-damp / 120 + r * e2 / 720),
-        1.0 / 6 + r * (-damp / 24 + r * e2 / 120),
-    )
-    of_three, of_three_v = 1.0 / 120 - r * damp / 720, 1.0 / 24 - r * damp / 120
-    return r2 * r * (one * of_one + r * (two * of_two + r * three * of_three)), r2 * (
-        one * of_one_v + r * (two * of_two_v + r * three * of_three_v)
-    )
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def last_slip(v, a, j, spring, most):
-    """Angle of a slip that begins at a speed v and turns within `most`: the speed of the stick goes on as
-    v + a r + j r^2 / 2, and the slip adds the spring's lack of pull."""
-    square = a * a - 2 * v * j
-    r = min(2 * abs(v) / (abs(a) + sqrt(square)) if square > 0.0 > a * v else most, most)
-    for _ in range(4):
-        speed = v + r * (a + r * (j / 2 + spring * (v / 2 + r * (a / 6 + r * j / 24))))
-        slope = a + r * (j + spring * (v + r * (a / 2 + r * j / 6)))
-        r = min(max(r - speed / slope, 0.0), most) if slope != 0.0 else r
-    return r
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def held_on(d, dv, damp, stiff, hold, r):
-    """(Slide, speed) an angle r after (d, dv) of d'' + damp d' + stiff d = hold."""
-    a = hold - damp * dv - stiff * d
-    j = -damp * a - stiff * dv
-    k = -damp * j - stiff * a
-    return d + r * (dv + r * (a / 2 + r * (j / 6 + r * k / 24))), dv + r * (
-        a + r * (j / 2 + r * k / 6)
-    )
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def advance(workspace, i, s0, c0, s1, c1, h):
-    """(x, v, way, place at the end of a step h; share u of the step up to an event; x, v and place there; x where the
-    slide turns, that of the end without a turn; kink: jump of the acceleration at the event, none here).
-
-    way: sign of the slip, 0 in a stick; s0, c0, s1, c1: sine and cosine of the drive at both ends.
-    """
-    x, v, way, place = (
-        workspace[X * LANES + i],
-        workspace[V * LANES + i],
-        workspace[WAY * LANES + i],
-        workspace[PLACE * LANES + i],
-    )
-    damp, square, push = (
-        workspace[D * LANES + i],
-        workspace[W * LANES + i],
-        workspace[P * LANES + i],
-    )
-    spring, length = workspace[K * LANES + i], workspace[LENGTH * LANES + i]
-    xs, vs = linear(workspace, i, s0, c0)
-    a0 = push * s0 - damp * v - square * x - friction_force(x, v, way, place, s0, workspace, i)
-    a1 = push * s1 - damp * vs - square * xs - friction_force(xs, vs, way, place, s1, workspace, i)
-    # the speed as a cubic over the step, the slide as its integral
-    m0, m1 = h * a0, h * a1
-    c2, c3 = 3 * (vs - v) - 2 * m0 - m1, m0 + m1 - 2 * (vs - v)
-    turns = v * vs < 0.0 or (way != 0.0 and way * v < 0.0)
-    ut = crossing(v, m0, c2, c3, v / (v - vs)) if v * vs < 0.0 else 0.0 if turns else 1.0
-    turn = x + h * ut * (v + ut * (m0 / 2 + ut * (c2 / 3 + ut * c3 / 4))) if turns else xs
-    u, x1, v1, way1, xe, ve, pe, place1, grazes = 1.0, xs, vs, way, xs, vs, place, place, False
-    if way != 0.0:
-        pe = place1 = xs - way * length
-        if turns:  # it stops, and holds on by its spring
-            u, xe, ve, way1, pe = ut, turn, 0.0, 0.0, turn - way * length
-            place1 = pe
-            speed, rate, more = (
-                0.0,
-                (m0 + ut * (2 * c2 + 3 * c3 * ut)) / h,
-                (2 * c2 + 6 * c3 * ut) / (h * h),
-            )
-            part = -spring
-    else:
-        side = 1.0 if turn > place else -1.0
-        if not turns or abs(turn - place) <= abs(xs - place):
-            side = 1.0 if xs > place else -1.0
-        far = max(side * (turn - place), side * (xs - place))
-        if far > length:
-            top = ut if turns and side * (turn - place) > length else 1.0
-            y0 = side * (x - place) - length
-            u = top * min(max(-y0 / (far - length - y0), 0.0), 1.0)
-            # a parabola from the turn, beside which the slope of a line is far from that of the
-            # slide
-            if top < 1.0:
-                bow = h * max(abs(m0 + top * (2 * c2 + 3 * c3 * top)), 1e-300)
-                u = max(top - sqrt(2 * (far - length) / bow), 0.0)
-            for _ in range(4):
-                now = x + h * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4))) - place
-                speed = side * (v + u * (m0 + u * (c2 + u * c3)))
-                u = (
-                    min(max(u - (side * now - length) / (h * speed), 0.0), top)
-                    if speed > 0.0
-                    else u
-                )
-            ve = v + u * (m0 + u * (c2 + u * c3))
-            xe = place + side * length
-            way1, speed = side, ve
-            rate, more = (m0 + u * (2 * c2 + 3 * c3 * u)) / h, (2 * c2 + 6 * c3 * u) / (h * h)
-            part, grazes = spring, turns and side * (turn - place) > length
-    if u < 1.0:
-        r, stiff = h - u * h, square + (spring if way1 == 0.0 else 0.0)
-        d, dv = bent(r, damp, stiff, part * speed, part * rate, part * more)
-        x1, v1 = xs + d, vs + dv
-        if way1 != 0.0:
-            place1 = x1 - way1 * length
-        if grazes:  # it turns in its slip, later than it would in a stick, or not in this step
-            turns = side * v1 < 0.0
-            if turns:
-                r = last_slip(ve, rate, more, spring, r)
-                d, dv = bent(r, damp, square, spring * speed, spring * rate, spring * more)
-                w = u + r / h
-                turn = x + h * w * (v + w * (m0 / 2 + w * (c2 / 3 + w * c3 / 4))) + d
-                way1, place1 = 0.0, turn - side * length
-                d, dv = held_on(
-                    d, dv, damp, square + spring, spring * (place1 - place), h - u * h - r
-                )
-                x1, v1 = xs + d, vs + dv
-    return x1, v1, way1, place1, u, xe, ve, pe, turn if turns else x1, 0.0

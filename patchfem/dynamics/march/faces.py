@@ -24,16 +24,20 @@ def faces_of(model, prop, modal_system, mass: float):
         for parts in ([one.numbers for one in elements], [one.memory for one in elements])
     )
     for k, one in enumerate(elements):
-        num[k, : one.numbers.size], mem[k, : one.memory.size] = one.numbers, one.memory
+        num[k, : one.numbers.size] = one.numbers
+        mem[k, : one.memory.size] = one.memory
         num[k, 0] = numbers[one.kernels or COULOMB]
-    there, scale = getattr(model, "patch", None) is not None, getattr(model, "scale", 0.0)
+    there = getattr(model, "patch", None) is not None
+    scale = getattr(model, "scale", 0.0)
     ports = np.array([one.port for one in model.joints], np.int64)
     mates = [k + one.mate for k, one in enumerate(model.joints)]
     holds = np.array(
         [k for k, one in enumerate(elements) if (one.kernels or COULOMB) == COULOMB], np.int64
     )
     quick = prop.rows * prop.push[1] if not prop.dense.size else prop.rows @ prop.dense[n:, 2 * n :]
-    gamma, m, at = quick @ prop.rows.T / mass, holds.size, ports[holds]
+    gamma = quick @ prop.rows.T / mass
+    m = holds.size
+    at = ports[holds]
     gives = [give[np.ix_(at, at)] for give in (prop.beta, gamma, prop.rows @ prop.rows.T / mass)]
     stops = arrays.Stops(
         holds,

@@ -76,23 +76,33 @@ EACH = 5  # columns of an element in a row: slide, speed, force, slip, mean forc
 def sampled(q, v, motion, row, c, j):
     """(force, energy of friction, slip, energy of springs) at a sample: of the contact, or else of the first element;
     slide, speed, force and slip of every element into its row."""
-    n, m = motion.shape[1], 2 * motion.shape[1] + 7
-    first, slip, energy, springs = 0.0, q, 0.0, 0.0
+    n = motion.shape[1]
+    m = 2 * motion.shape[1] + 7
+    first = 0.0
+    slip = q
+    energy = 0.0
+    springs = 0.0
     for e in range(j.of.shape[1]):
-        here, rate = 0.0, 0.0
+        here = 0.0
+        rate = 0.0
         for k in range(n):
             here += j.rows[j.of[PORT, e], k] * motion[0, k]
             rate += j.rows[j.of[PORT, e], k] * motion[1, k]
         force, stock, moved = law.read_memory(j.num[e], j.mem[e], here, rate)
-        j.each[PLACE, e], j.each[PACE, e] = here, rate
+        j.each[PLACE, e] = here
+        j.each[PACE, e] = rate
         at = m + EACH * e
-        row[at], row[at + 1], row[at + 2], row[at + 3] = here, rate, force, moved
+        row[at] = here
+        row[at + 1] = rate
+        row[at + 2] = force
+        row[at + 3] = moved
         if j.of[RUBS, e]:
             energy += stock
         else:
             springs += stock
         if e == 0 and j.of[RUBS, 0]:
-            first, slip = force, moved
+            first = force
+            slip = moved
     if THERE:
         first, stock, slip = contact.state(c, q, v)
         energy += stock
@@ -105,9 +115,13 @@ def held(motion, modal_system, drive, force, row, j):
     """Write the forces of the set-valued elements at a sample into their memory and the row: kinetic friction of those
     that slide, of those that rest what leaves them no acceleration. Returns the force [N] of the first element where it
     is one of them and no contact is there, else `force`; drive [m s-2]."""
-    s, m, accel, count = j.stops, 2 * motion.shape[1] + 7, modal_system.workspace[0], j.of.shape[1]
+    s = j.stops
+    m = 2 * motion.shape[1] + 7
+    accel = modal_system.workspace[0]
+    count = j.of.shape[1]
     for i in range(s.names.size):
-        e, way = s.element[i], s.field[WAY, i]
+        e = s.element[i]
+        way = s.field[WAY, i]
         limit = j.num[e, 1] if abs(way) == 2.0 else j.num[e, 2]
         j.mem[e, 0] = np.sign(way) * limit
         row[m + EACH * e + 2] = j.mem[e, 0]
@@ -160,7 +174,9 @@ def turned(e, turn, j, dt):
         if j.of[MATE, e] != e:
             return turned_in_plane(e, turn, j) if j.of[MATE, e] > e else (0.0, 0)
     p = j.of[PORT, e]
-    beta, dq, tries = j.gives[BETA, p, p], j.each[STEP, e], 1
+    beta = j.gives[BETA, p, p]
+    dq = j.each[STEP, e]
+    tries = 1
     mine = j.port[FREE, p] - elsewhere(e, p, j)
     if STOPS:
         if j.num[e, 0] == HOLDS:
@@ -184,7 +200,8 @@ def turned(e, turn, j, dt):
     change = abs(used - j.each[PULL, e]) / (
         j.each[CLOSE, e] + ROUND * (abs(mine) / beta + abs(used))
     )
-    j.each[STEP, e], j.each[PULL, e] = dq, used
+    j.each[STEP, e] = dq
+    j.each[PULL, e] = used
     return change if tries >= 0 else np.inf, abs(tries)
 
 
@@ -192,16 +209,18 @@ def turned(e, turn, j, dt):
 def turned_in_plane(e, turn, j):
     """`turned` of both directions of the element whose first one is e."""
     f = j.of[MATE, e]
-    p, r = j.of[PORT, e], j.of[PORT, f]
-    xx, xy, yy = j.gives[BETA, p, p], j.gives[BETA, p, r], j.gives[BETA, r, r]
+    p = j.of[PORT, e]
+    r = j.of[PORT, f]
+    xx = j.gives[BETA, p, p]
+    xy = j.gives[BETA, p, r]
+    yy = j.gives[BETA, r, r]
     x = j.port[FREE, p] - elsewhere(e, p, j) + xy * j.each[PULL, f]
     y = j.port[FREE, r] - elsewhere(f, r, j) + xy * j.each[PULL, e]
-    dx, dy = j.each[STEP, e], j.each[STEP, f]
+    dx = j.each[STEP, e]
+    dy = j.each[STEP, f]
     if turn == 0:
-        dx, dy = (
-            2 * j.each[WENT, e] - j.each[WENT_BEFORE, e],
-            2 * j.each[WENT, f] - j.each[WENT_BEFORE, f],
-        )
+        dx = 2 * j.each[WENT, e] - j.each[WENT_BEFORE, e]
+        dy = 2 * j.each[WENT, f] - j.each[WENT_BEFORE, f]
     dx, dy, pull, across, tries = plane.solve_plane_step(
         (x, y),
         (xx, xy, yy),
@@ -214,14 +233,18 @@ def turned_in_plane(e, turn, j):
         abs(pull - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * (abs(x) / xx + abs(pull))),
         abs(across - j.each[PULL, f]) / (j.each[CLOSE, e] + ROUND * (abs(y) / yy + abs(across))),
     )
-    j.each[STEP, e], j.each[STEP, f], j.each[PULL, e], j.each[PULL, f] = dx, dy, pull, across
+    j.each[STEP, e] = dx
+    j.each[STEP, f] = dy
+    j.each[PULL, e] = pull
+    j.each[PULL, f] = across
     return change if tries >= 0 else np.inf, abs(tries)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def turned_contact(q, v, dt, c, j):
     """Solve the contact on port 0 with all elements held: (its slide, change of its force over its goal, iterations)."""
-    free, beta = j.port[FREE, 0] - elsewhere(-1, 0, j), j.gives[BETA, 0, 0]
+    free = j.port[FREE, 0] - elsewhere(-1, 0, j)
+    beta = j.gives[BETA, 0, 0]
     dq, _, tries = contact.solve(free, beta, q, v, dt, c, j.own[AIM])
     used = (free - dq) / beta
     change = abs(used - j.own[FORCE_OWN]) / (
@@ -235,7 +258,11 @@ def turned_contact(q, v, dt, c, j):
 def solve_coupled_forces(q, v, modal_system, c, j):
     """Forces of contact and elements over a step, in j.own and j.each: (slide of the contact, iterations), < 0
     where they do not agree. Every element takes its turn, a set-valued one by the mean force alone."""
-    count, dt, iterations, last_worst, dq = j.of.shape[1], modal_system.dt, 0, np.inf, 0.0
+    count = j.of.shape[1]
+    dt = modal_system.dt
+    iterations = 0
+    last_worst = np.inf
+    dq = 0.0
     for turn in range(TURNS):
         worst = 0.0
         if THERE:
@@ -284,18 +311,22 @@ def between(j):
             if j.num[e, 0] != HOLDS:
                 slide -= j.gives[BETA, p, j.of[PORT, e]] * j.each[PULL, e]
                 speed -= j.gives[GAMMA, p, j.of[PORT, e]] * j.each[PULL, e]
-        s.field[FREE, i], s.field[RATE, i] = slide, speed
+        s.field[FREE, i] = slide
+        s.field[RATE, i] = speed
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def taken(j):
     """Forces and slides of the set-valued elements into j.each; the largest change of a force over its
     goal."""
-    s, worst = j.stops, 0.0
+    s = j.stops
+    worst = 0.0
     for i in range(s.names.size):
-        e, force = s.element[i], s.field[MEAN, i]
+        e = s.element[i]
+        force = s.field[MEAN, i]
         worst = max(worst, abs(force - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * abs(force)))
-        j.each[PULL, e], j.each[STEP, e] = force, s.field[DQ, i]
+        j.each[PULL, e] = force
+        j.each[STEP, e] = s.field[DQ, i]
     return worst
 
 
@@ -304,7 +335,8 @@ def still(motion, modal_system, table, at, j):
     """Whether all set-valued elements rest through the step and at its end, held by static friction."""
     if not stops.stays(j.stops):
         return False
-    end, accel = j.modal[ROOM : ROOM + 2], modal_system.workspace[0]
+    end = j.modal[ROOM : ROOM + 2]
+    accel = modal_system.workspace[0]
     pushed(modal_system, j, accel)
     for i in range(j.stops.names.size):
         e = j.stops.element[i]
@@ -332,7 +364,11 @@ def passed(q, v, motion, modal_system, table, at, c, j):
     (slide of the contact, iterations, True), False where no such step is found or it would give energy. Which of them
     stop and go is settled in the first turns; then the slides that follow from it are kept.
     """
-    s, iterations, last_worst, dq, dt = j.stops, 0, np.inf, 0.0, modal_system.dt
+    s = j.stops
+    iterations = 0
+    last_worst = np.inf
+    dq = 0.0
+    dt = modal_system.dt
     for i in range(s.names.size):
         s.field[START, i] = j.each[PACE, s.element[i]]
     for turn in range(FEW):
@@ -439,7 +475,8 @@ def blown(motion, mass, j):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def committed(q, v, dq, motion, modal_system, c, j):
     """Move the memories of contact and elements by the step: (energy dissipated [J], False where one is full)."""
-    lost, ok = 0.0, True
+    lost = 0.0
+    ok = True
     if THERE:
         speed = 0.0
         for k in range(modal_system.slide.size):
@@ -489,11 +526,13 @@ def committed(q, v, dq, motion, modal_system, c, j):
 def limited(load0, load1, mu, j):
     """The set-valued elements under a load that goes from load0 to load1 [N] in the step; mu (2,): static and kinetic
     coefficient."""
-    s, load1 = j.stops, max(load1, 0.0)
+    s = j.stops
+    load1 = max(load1, 0.0)
     for i in range(s.names.size):
         e = s.element[i]
         for k in range(2):
-            s.limit[STATIC + k, i], s.limit[STATIC + k + END, i] = mu[k] * load0, mu[k] * load1
+            s.limit[STATIC + k, i] = mu[k] * load0
+            s.limit[STATIC + k + END, i] = mu[k] * load1
             j.num[e, 1 + k] = 0.5 * mu[k] * (load0 + load1)
 
 
@@ -509,10 +548,9 @@ def capped(j):
 def slide_freely(used, j):
     """Let the one set-valued element slide through the step under a mean force [N], without a blow; its slide [m]."""
     f = j.stops.field
-    j.each[PULL, 0], j.each[STEP, 0], j.own[KNOWN] = (
-        used,
-        j.port[FREE, 0] - j.gives[BETA, 0, 0] * used,
-        1.0,
-    )
-    f[BLOW, 0], f[WAY, 0] = 0.0, 1.0 if used >= 0 else -1.0
+    j.each[PULL, 0] = used
+    j.each[STEP, 0] = j.port[FREE, 0] - j.gives[BETA, 0, 0] * used
+    j.own[KNOWN] = 1.0
+    f[BLOW, 0] = 0.0
+    f[WAY, 0] = 1.0 if used >= 0 else -1.0
     return j.each[STEP, 0]

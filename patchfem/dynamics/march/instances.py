@@ -52,7 +52,8 @@ def loop_of(
     """The loop of a rig: its `march` and `follow`. kind: of the contact; laws: modules of the elements beside it or in
     its place; load: STEADY, WHOLE or POINTS; there: whether the contact is; several: whether more than one rub; plane:
     whether any slides in a plane."""
-    contact, named = contact_of(kind), {}
+    contact = contact_of(kind)
+    named = {}
     flags = {
         "MANY": bool(laws),
         "STOPS": COULOMB in laws,

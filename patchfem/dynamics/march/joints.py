@@ -35,7 +35,8 @@ def _spring(port: int, numbers, potential) -> Joint:
 def in_planes(joints, planes) -> list:
     """Joints of interfaces (i,) on ports of their numbers with those behind them that are second directions of the ones
     where planes (i,) is true, on ports from i on."""
-    count, second = len(joints), [k for k, plane in enumerate(planes) if plane]
+    count = len(joints)
+    second = [k for k, plane in enumerate(planes) if plane]
     out = list(joints)
     for at, k in enumerate(second, count):
         out[k] = replace(joints[k], mate=at - k)

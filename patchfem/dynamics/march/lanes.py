@@ -47,7 +47,8 @@ def fits(modes: ModalBasis) -> bool:
 
 def _rig(kernels, modes: ModalBasis, prop) -> np.ndarray:
     """The rows of a rig as the kernels take them."""
-    n, out = modes.omega.size, np.zeros((kernels.RIGS + 1, 3))
+    n = modes.omega.size
+    out = np.zeros((kernels.RIGS + 1, 3))
     for first, rows in (
         (kernels.ZZ, prop.free),
         (kernels.BY_Z, prop.push),
@@ -71,24 +72,25 @@ def _rig(kernels, modes: ModalBasis, prop) -> np.ndarray:
 
 def _table(kernels, modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
     """The table of the steps of a cycle under a drive of 1 m s-2."""
-    n, unit = modes.omega.size, replace(drive, acceleration=1.0)
-    found, out = prop.tables(unit, 0, steps), np.zeros((steps, kernels.COLUMNS))
+    n = modes.omega.size
+    unit = replace(drive, acceleration=1.0)
+    found = prop.tables(unit, 0, steps)
+    out = np.zeros((steps, kernels.COLUMNS))
     for k in range(8):  # one column of each kind per mode
         out[:, k * kernels.RIG : k * kernels.RIG + n] = found[:, k * n : (k + 1) * n]
     angle = 2 * np.pi * np.arange(steps) / steps
     for forms in (kernels.WORKS, kernels.LOSSES):  # of forces [N] in place of accelerations
         out[:, forms + 2 * kernels.RIG : forms + 3 * kernels.RIG] /= modes.mass
     out[:, kernels.REST : kernels.REST + 2] = found[:, 8 * n : 8 * n + 2]
-    out[:, kernels.PORT], out[:, kernels.WAVE :] = (
-        found[:, 8 * n + 3],
-        np.array([np.cos(angle), np.sin(angle)]).T,
-    )
+    out[:, kernels.PORT] = found[:, 8 * n + 3]
+    out[:, kernels.WAVE :] = np.array([np.cos(angle), np.sin(angle)]).T
     return out
 
 
 def _room(kernels, cases: list) -> np.ndarray:
     """The workspace of cases at rest; of one too few lanes the last case has more than one."""
-    out, points = np.zeros((kernels.NUMBERS, kernels.LANES)), kernels.POINTS
+    out = np.zeros((kernels.NUMBERS, kernels.LANES))
+    points = kernels.POINTS
     for i in range(kernels.LANES):
         one = cases[min(i, len(cases) - 1)]
         few, modes = one.shape.shape
@@ -112,38 +114,34 @@ def march(
     modes: ModalBasis, drive: SineDrive, cases: list, cycles: int, steps: int, window: int
 ) -> Marched:
     """March cases of `Points` over so many cycles of a drive, each under its own amplitude, from rest."""
-    kernels, prop = load(KERNELS), propagator(modes, drive, steps)
-    rig, table, n, parts = (
-        _rig(kernels, modes, prop),
-        _table(kernels, modes, drive, steps, prop),
-        len(cases),
-        [],
-    )
+    kernels = load(KERNELS)
+    prop = propagator(modes, drive, steps)
+    rig = _rig(kernels, modes, prop)
+    table = _table(kernels, modes, drive, steps, prop)
+    n = len(cases)
+    parts = []
     for first in range(0, n, kernels.LANES):
-        workspace, few = (
-            _room(kernels, cases[first : first + kernels.LANES]),
-            min(kernels.LANES, n - first),
-        )
-        history, work = np.zeros((cycles, 4, kernels.LANES)), np.zeros(kernels.LANES)
+        workspace = _room(kernels, cases[first : first + kernels.LANES])
+        few = min(kernels.LANES, n - first)
+        history = np.zeros((cycles, 4, kernels.LANES))
+        work = np.zeros(kernels.LANES)
         samples = np.zeros((window * steps + 1, kernels.KEPT, kernels.LANES))
         kernels.march(workspace.ravel(), rig, table, history, samples, work)
         parts.append((workspace[:, :few], history[:, :, :few], samples[:, :, :few], work[:few]))
     workspace, history, samples, work = (np.concatenate(one, axis=-1) for one in zip(*parts))
-    m, r, names = (
-        modes.omega.size,
-        kernels.RIG,
-        (
-            "WORK_IN",
-            "VISCOUS",
-            "POWER",
-            "LOST",
-            "PEAK",
-            "BOOKED",
-            "SAMPLED",
-            "PASSED",
-            "GONE",
-            "CREATED",
-        ),
+    m = modes.omega.size
+    r = kernels.RIG
+    names = (
+        "WORK_IN",
+        "VISCOUS",
+        "POWER",
+        "LOST",
+        "PEAK",
+        "BOOKED",
+        "SAMPLED",
+        "PASSED",
+        "GONE",
+        "CREATED",
     )
     book = {name.lower(): workspace[getattr(kernels, name)] for name in names}
     moving = (

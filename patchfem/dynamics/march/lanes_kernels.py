@@ -95,7 +95,9 @@ def shape(x, far):
     )
     f1 = 1 - y * f2
     e = 1 - y * f1
-    f1, f2, e = 0.5 * f1 * (1 + e), 0.5 * f2 + 0.25 * f1 * f1, e * e
+    f2 = 0.5 * f2 + 0.25 * f1 * f1
+    f1 = 0.5 * f1 * (1 + e)
+    e = e * e
     if far:
         y = min(x, LONG) / 256
         d = 1 - y * (
@@ -114,11 +116,9 @@ def shape(x, far):
         d = d * d
         over = 1 / max(x, SHORT)
         one = (1 - d) * over
-        f1, f2, e = (
-            one if x > SHORT else f1,
-            (1 - one) * over if x > SHORT else f2,
-            d if x > SHORT else e,
-        )
+        f1 = one if x > SHORT else f1
+        f2 = (1 - one) * over if x > SHORT else f2
+        e = d if x > SHORT else e
     return f1, f2, e
 
 
@@ -126,10 +126,13 @@ def shape(x, far):
 def add_point(s, workspace, i, j, y, over, far):
     """Residual and lower half of the Hessian `s` (9) at the step y (3) with what the point j adds."""
     g0, g1, g2, h00, h01, h02, h11, h12, h22 = s
-    a, b = workspace[(SHAPE + j) * LANES + i], workspace[(SHAPE + POINTS + j) * LANES + i]
-    limit, stretch = workspace[(OF_POINT + j) * LANES + i], workspace[(STRETCH + j) * LANES + i]
+    a = workspace[(SHAPE + j) * LANES + i]
+    b = workspace[(SHAPE + POINTS + j) * LANES + i]
+    limit = workspace[(OF_POINT + j) * LANES + i]
+    stretch = workspace[(STRETCH + j) * LANES + i]
     xi = y[0] - a * y[1] - b * y[2]
-    way, x = 1.0 if xi > 0.0 else -1.0, abs(xi) * over
+    way = 1.0 if xi > 0.0 else -1.0
+    x = abs(xi) * over
     f1, f2, _ = shape(x, far)
     force = limit * (stretch * f1 + way * x * f2)
     slope = limit * over * (f1 - f2) * max(1 - way * stretch, 0.0)
@@ -149,27 +152,19 @@ def add_point(s, workspace, i, j, y, over, far):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def turn(workspace, i, beta, far):
     """A turn of Newton's method in a lane; where the last step went too far, half of it is taken back."""
-    y0, y1, y2 = (
-        workspace[Y * LANES + i],
-        workspace[(Y + 1) * LANES + i],
-        workspace[(Y + 2) * LANES + i],
-    )
-    p0, p1, p2 = (
-        workspace[P * LANES + i],
-        workspace[(P + 1) * LANES + i],
-        workspace[(P + 2) * LANES + i],
-    )
-    length, fall, done = (
-        workspace[LENGTH * LANES + i],
-        workspace[FALL * LANES + i],
-        workspace[DONE * LANES + i],
-    )
-    over, one, two, y = (
-        1 / length,
-        0.5 * workspace[KAPPA * LANES + i],
-        0.5 * workspace[(KAPPA + 1) * LANES + i],
-        (y0, y1, y2),
-    )
+    y0 = workspace[Y * LANES + i]
+    y1 = workspace[(Y + 1) * LANES + i]
+    y2 = workspace[(Y + 2) * LANES + i]
+    p0 = workspace[P * LANES + i]
+    p1 = workspace[(P + 1) * LANES + i]
+    p2 = workspace[(P + 2) * LANES + i]
+    length = workspace[LENGTH * LANES + i]
+    fall = workspace[FALL * LANES + i]
+    done = workspace[DONE * LANES + i]
+    over = 1 / length
+    one = 0.5 * workspace[KAPPA * LANES + i]
+    two = 0.5 * workspace[(KAPPA + 1) * LANES + i]
+    y = (y0, y1, y2)
     s = (
         (y0 - workspace[FREE * LANES + i]) / beta,
         one * (2 * workspace[B * LANES + i] + y1),
@@ -190,19 +185,20 @@ def turn(workspace, i, beta, far):
     g0, g1, g2, h00, h01, h02, h11, h12, h22 = add_point(s, workspace, i, 5, y, over, far)
     back = g0 * p0 + g1 * p1 + g2 * p2 > 0.5 * fall
     r00 = 1 / h00
-    l1, l2 = h01 * r00, h02 * r00
-    r11, m = 1 / (h11 - l1 * h01), h12 - l2 * h01
+    l1 = h01 * r00
+    l2 = h02 * r00
+    r11 = 1 / (h11 - l1 * h01)
+    m = h12 - l2 * h01
     l3 = m * r11
     r1 = g1 - l1 * g0
     n2 = -(g2 - l2 * g0 - l3 * r1) / (h22 - l2 * h02 - l3 * m)
     n1 = -r1 * r11 - l3 * n2
     n0 = -g0 * r00 - l1 * n1 - l2 * n2
-    one, two, slopes = (
-        workspace[REACH * LANES + i],
-        workspace[(REACH + 1) * LANES + i],
-        h00 - 1 / beta,
-    )
-    size, least = abs(n0) + one * abs(n1) + two * abs(n2), abs(y0) - one * abs(y1) - two * abs(y2)
+    one = workspace[REACH * LANES + i]
+    two = workspace[(REACH + 1) * LANES + i]
+    slopes = h00 - 1 / beta
+    size = abs(n0) + one * abs(n1) + two * abs(n2)
+    least = abs(y0) - one * abs(y1) - two * abs(y2)
     # where no point turns over in this step, what the forces bend in it is told by their slopes, which a drag has not
     near = size <= NEAR * length or (
         least > size and slopes * size * size <= CURVED * workspace[LIMIT * LANES + i] * length
@@ -211,10 +207,8 @@ def turn(workspace, i, beta, far):
     workspace[Y * LANES + i] = y0 + on * (-0.5 * p0 if back else n0)
     workspace[(Y + 1) * LANES + i] = y1 + on * (-0.5 * p1 if back else n1)
     workspace[(Y + 2) * LANES + i] = y2 + on * (-0.5 * p2 if back else n2)
-    workspace[P * LANES + i], workspace[(P + 1) * LANES + i] = (
-        0.5 * p0 if back else n0,
-        0.5 * p1 if back else n1,
-    )
+    workspace[P * LANES + i] = 0.5 * p0 if back else n0
+    workspace[(P + 1) * LANES + i] = 0.5 * p1 if back else n1
     workspace[(P + 2) * LANES + i] = 0.5 * p2 if back else n2
     workspace[FALL * LANES + i] = 0.5 * fall if back else -(g0 * n0 + g1 * n1 + g2 * n2)
     workspace[DONE * LANES + i] = 1.0 if done > 0.0 or (near and not back) else 0.0
@@ -225,20 +219,21 @@ def moved(s, workspace, i, j, y, over, far):
     """Move the point j by the step y (3); `s`: its work over the limit, the rise of its square, force and square with
     what it adds."""
     worked, rise, force, square = s
-    a, b = workspace[(SHAPE + j) * LANES + i], workspace[(SHAPE + POINTS + j) * LANES + i]
-    limit, stretch, old = (
-        workspace[(OF_POINT + j) * LANES + i],
-        workspace[(STRETCH + j) * LANES + i],
-        workspace[(SQUARE + j) * LANES + i],
-    )
+    a = workspace[(SHAPE + j) * LANES + i]
+    b = workspace[(SHAPE + POINTS + j) * LANES + i]
+    limit = workspace[(OF_POINT + j) * LANES + i]
+    stretch = workspace[(STRETCH + j) * LANES + i]
+    old = workspace[(SQUARE + j) * LANES + i]
     xi = y[0] - a * y[1] - b * y[2]
-    way, x = 1.0 if xi > 0.0 else -1.0, abs(xi) * over
+    way = 1.0 if xi > 0.0 else -1.0
+    x = abs(xi) * over
     f1, f2, e = shape(x, far)
     far_x = min(x, LONG)
     new = e * (old + 2 * way * stretch * x + x * x) + (2 - e * (far_x * far_x + 2 * far_x + 2))
     new = new if x < LONG else 2.0
     one = stretch * e + way * (1 - e)
-    workspace[(STRETCH + j) * LANES + i], workspace[(SQUARE + j) * LANES + i] = one, new
+    workspace[(STRETCH + j) * LANES + i] = one
+    workspace[(SQUARE + j) * LANES + i] = new
     return (
         worked + limit * (stretch * f1 + way * x * f2) * xi,
         rise + limit * (new - old),
@@ -250,18 +245,15 @@ def moved(s, workspace, i, j, y, over, far):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def commit(workspace, i, beta, far):
     """Move the points and the pieces of a lane by its solved step and add to their sums."""
-    y0, y1, y2 = (
-        workspace[Y * LANES + i],
-        workspace[(Y + 1) * LANES + i],
-        workspace[(Y + 2) * LANES + i],
-    )
-    length, used = workspace[LENGTH * LANES + i], (workspace[FREE * LANES + i] - y0) / beta
-    over, y, b1, b2 = (
-        1 / length,
-        (y0, y1, y2),
-        workspace[B * LANES + i] + y1,
-        workspace[(B + 1) * LANES + i] + y2,
-    )
+    y0 = workspace[Y * LANES + i]
+    y1 = workspace[(Y + 1) * LANES + i]
+    y2 = workspace[(Y + 2) * LANES + i]
+    length = workspace[LENGTH * LANES + i]
+    used = (workspace[FREE * LANES + i] - y0) / beta
+    over = 1 / length
+    y = (y0, y1, y2)
+    b1 = workspace[B * LANES + i] + y1
+    b2 = workspace[(B + 1) * LANES + i] + y2
     s = moved((0.0, 0.0, 0.0, 0.0), workspace, i, 0, y, over, far)
     s = moved(s, workspace, i, 1, y, over, far)
     s = moved(s, workspace, i, 2, y, over, far)
@@ -273,28 +265,28 @@ def commit(workspace, i, beta, far):
         + workspace[KAPPA * LANES + i] * b1 * b1
         + workspace[(KAPPA + 1) * LANES + i] * b2 * b2
     )
-    work, q = used * y0, workspace[PLACE * LANES + i]
-    gone, noise = (
-        work - (energy - workspace[ENERGY * LANES + i]),
-        workspace[LIMIT * LANES + i] * (1e-12 * abs(y0) + 1e-15 * abs(q)),
-    )
-    workspace[B * LANES + i], workspace[(B + 1) * LANES + i], workspace[USED * LANES + i] = (
-        b1,
-        b2,
-        used,
-    )
+    work = used * y0
+    q = workspace[PLACE * LANES + i]
+    gone = work - (energy - workspace[ENERGY * LANES + i])
+    noise = workspace[LIMIT * LANES + i] * (1e-12 * abs(y0) + 1e-15 * abs(q))
+    workspace[B * LANES + i] = b1
+    workspace[(B + 1) * LANES + i] = b2
+    workspace[USED * LANES + i] = used
     workspace[LOST * LANES + i] += worked - 0.5 * length * rise
     workspace[BOOKED * LANES + i] += work
     workspace[PASSED * LANES + i] += abs(work)
     workspace[SAMPLED * LANES + i] += 0.5 * (workspace[FORCE * LANES + i] + force) * y0
     workspace[GONE * LANES + i] += gone if gone > -noise else 0.0
     workspace[CREATED * LANES + i] -= gone if gone < -noise else 0.0
-    workspace[FORCE * LANES + i], workspace[ENERGY * LANES + i] = force, energy
+    workspace[FORCE * LANES + i] = force
+    workspace[ENERGY * LANES + i] = energy
     # the next guess, as the last three steps went on
     for k in range(3):
-        here, last = workspace[(Y + k) * LANES + i], workspace[(LAST + k) * LANES + i]
+        here = workspace[(Y + k) * LANES + i]
+        last = workspace[(LAST + k) * LANES + i]
         workspace[(Y + k) * LANES + i] = 3 * (here - last) + workspace[(BEFORE + k) * LANES + i]
-        workspace[(BEFORE + k) * LANES + i], workspace[(LAST + k) * LANES + i] = last, here
+        workspace[(BEFORE + k) * LANES + i] = last
+        workspace[(LAST + k) * LANES + i] = here
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -318,16 +310,12 @@ def flow(workspace, i, k, mode, push):
         rate,
     ) = mode
     more_z, more_v, work_z, work_v, work_f, lost_z, lost_v, lost_f = push
-    z, v, f, drive = (
-        workspace[(Z + k) * LANES + i],
-        workspace[(V + k) * LANES + i],
-        slide * workspace[USED * LANES + i],
-        workspace[PUSH * LANES + i],
-    )
-    z1, v1 = (
-        zz * z + zv * v - by_z * f + drive * more_z,
-        vz * z + vv * v - by_v * f + drive * more_v,
-    )
+    z = workspace[(Z + k) * LANES + i]
+    v = workspace[(V + k) * LANES + i]
+    f = slide * workspace[USED * LANES + i]
+    drive = workspace[PUSH * LANES + i]
+    z1 = zz * z + zv * v - by_z * f + drive * more_z
+    v1 = vz * z + vv * v - by_v * f + drive * more_v
     workspace[WORK * LANES + i] += drive * (work_z * z + work_v * v - work_f * f)
     workspace[LOSS_NOW * LANES + i] += (
         drive * (lost_z * z + lost_v * v - lost_f * f)
@@ -335,7 +323,8 @@ def flow(workspace, i, k, mode, push):
         + (loss_vv * v - loss_vf * f) * v
         + loss_ff * f * f
     )
-    workspace[(Z + k) * LANES + i], workspace[(V + k) * LANES + i] = z1, v1
+    workspace[(Z + k) * LANES + i] = z1
+    workspace[(V + k) * LANES + i] = v1
     workspace[PLACE * LANES + i] += slide * z1
     workspace[OUT * LANES + i] += output * z1
     workspace[RATE * LANES + i] += output * v1
@@ -345,14 +334,14 @@ def flow(workspace, i, k, mode, push):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def opened(workspace, i, work, lost, cosine, sine):
     """Begin the sums of a step of a lane over the modes, with what the drive alone gives and takes of 1 m s-2."""
-    out, square = (
-        workspace[OUT * LANES + i],
-        workspace[PUSH * LANES + i] * workspace[PUSH * LANES + i],
-    )
+    out = workspace[OUT * LANES + i]
+    square = workspace[PUSH * LANES + i] * workspace[PUSH * LANES + i]
     workspace[COS * LANES + i] += out * cosine
     workspace[SIN * LANES + i] += out * sine
-    workspace[OUT0 * LANES + i], workspace[RATE0 * LANES + i] = out, workspace[RATE * LANES + i]
-    workspace[WORK * LANES + i], workspace[LOSS_NOW * LANES + i] = square * work, square * lost
+    workspace[OUT0 * LANES + i] = out
+    workspace[RATE0 * LANES + i] = workspace[RATE * LANES + i]
+    workspace[WORK * LANES + i] = square * work
+    workspace[LOSS_NOW * LANES + i] = square * lost
     workspace[PLACE * LANES + i] = workspace[OUT * LANES + i] = workspace[
         RATE * LANES + i
     ] = workspace[MOVING * LANES + i] = 0.0
@@ -361,21 +350,17 @@ def opened(workspace, i, work, lost, cosine, sine):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def closed(workspace, i, half_mass):
     """Add a step of a lane to the sums of its run and cycle."""
-    place, out, work = (
-        workspace[PLACE * LANES + i],
-        workspace[OUT * LANES + i],
-        workspace[WORK * LANES + i],
-    )
+    place = workspace[PLACE * LANES + i]
+    out = workspace[OUT * LANES + i]
+    work = workspace[WORK * LANES + i]
     workspace[WORK_IN * LANES + i] += work
     workspace[POWER * LANES + i] += abs(work)
     workspace[VISCOUS * LANES + i] += workspace[LOSS_NOW * LANES + i]
     held = workspace[ENERGY * LANES + i] + half_mass * workspace[MOVING * LANES + i]
     workspace[PEAK * LANES + i] = max(workspace[PEAK * LANES + i], held)
     workspace[FAR * LANES + i] = max(workspace[FAR * LANES + i], abs(place))
-    workspace[LOW * LANES + i], workspace[HIGH * LANES + i] = (
-        min(workspace[LOW * LANES + i], out),
-        max(workspace[HIGH * LANES + i], out),
-    )
+    workspace[LOW * LANES + i] = min(workspace[LOW * LANES + i], out)
+    workspace[HIGH * LANES + i] = max(workspace[HIGH * LANES + i], out)
     workspace[SLIP * LANES + i] = (
         place
         - workspace[MEAN * LANES + i] * workspace[B * LANES + i]
@@ -432,9 +417,12 @@ def turned(workspace, dt):
         turns += 1.0 if workspace[RATE0 * LANES + i] * workspace[RATE * LANES + i] < 0.0 else 0.0
     for i in range(LANES if turns > 0.0 else 0):
         if workspace[RATE0 * LANES + i] * workspace[RATE * LANES + i] < 0.0:
-            a, b = workspace[OUT0 * LANES + i], workspace[OUT * LANES + i]
-            p, r = workspace[RATE0 * LANES + i] * dt, workspace[RATE * LANES + i] * dt
-            big, mid = 2 * (a - b) + p + r, 3 * (b - a) - 2 * p - r
+            a = workspace[OUT0 * LANES + i]
+            b = workspace[OUT * LANES + i]
+            p = workspace[RATE0 * LANES + i] * dt
+            r = workspace[RATE * LANES + i] * dt
+            big = 2 * (a - b) + p + r
+            mid = 3 * (b - a) - 2 * p - r
             root = sqrt(max(mid * mid - 3 * big * p, 0.0))
             for sign in (1.0, -1.0):
                 s = -p / (mid + sign * root)
@@ -468,13 +456,11 @@ def step(workspace, rig, row):
     else:
         for i in range(LANES):
             commit(workspace, i, beta, True)
-    work, lost, cosine, sine, half_mass = (
-        row[REST],
-        row[REST + 1],
-        row[WAVE],
-        row[WAVE + 1],
-        0.5 * rig[RIGS, 1],
-    )
+    work = row[REST]
+    lost = row[REST + 1]
+    cosine = row[WAVE]
+    sine = row[WAVE + 1]
+    half_mass = 0.5 * rig[RIGS, 1]
     for i in range(LANES):
         opened(workspace, i, work, lost, cosine, sine)
     for k in range(RIG):
@@ -518,10 +504,8 @@ def keep(workspace, sample):
     for i in range(LANES):
         for k in range(2 * RIG):
             sample[k, i] = workspace[k * LANES + i]
-        sample[2 * RIG, i], sample[2 * RIG + 1, i] = (
-            workspace[FORCE * LANES + i],
-            workspace[SLIP * LANES + i],
-        )
+        sample[2 * RIG, i] = workspace[FORCE * LANES + i]
+        sample[2 * RIG + 1, i] = workspace[SLIP * LANES + i]
 
 
 @njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
@@ -532,7 +516,8 @@ def march(workspace, rig, table, history, samples, work):
     steps of a cycle; history (c, 4, LANES) [m]: least and largest output of a cycle, real and imaginary part of its
     phasor; samples (w s + 1, KEPT, LANES): of the last w cycles; work (LANES,) [J]: friction work before these.
     """
-    steps, cycles = table.shape[0], history.shape[0]
+    steps = table.shape[0]
+    cycles = history.shape[0]
     first = cycles - (samples.shape[0] - 1) // steps
     for c in range(cycles):
         for i in range(LANES):
@@ -545,12 +530,8 @@ def march(workspace, rig, table, history, samples, work):
                 keep(workspace, samples[(c - first) * steps + s])
             step(workspace, rig, table[s])
         for i in range(LANES):
-            history[c, 0, i], history[c, 1, i] = (
-                workspace[LOW * LANES + i],
-                workspace[HIGH * LANES + i],
-            )
-            history[c, 2, i], history[c, 3, i] = (
-                2 * workspace[COS * LANES + i] / steps,
-                -2 * workspace[SIN * LANES + i] / steps,
-            )
+            history[c, 0, i] = workspace[LOW * LANES + i]
+            history[c, 1, i] = workspace[HIGH * LANES + i]
+            history[c, 2, i] = 2 * workspace[COS * LANES + i] / steps
+            history[c, 3, i] = -2 * workspace[SIN * LANES + i] / steps
     keep(workspace, samples[samples.shape[0] - 1])

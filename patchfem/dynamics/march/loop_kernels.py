@@ -31,7 +31,10 @@ def seen(i, last, drive, motion, modal_system, row, c, j, n):
     """Sample i as (slide, its rate, output; force, energy and slip of the interface; energy of what stands beside it),
     written into its row; drive: acceleration of the step before."""
     q, v, out = sample(row, motion, modal_system.slide, modal_system.output)
-    force, energy, slip, beside = 0.0, 0.0, 0.0, 0.0
+    force = 0.0
+    energy = 0.0
+    slip = 0.0
+    beside = 0.0
     if PRESSED:
         beside = pressing.pressed(i, last, motion, modal_system.mass, c, j, n, row)
         if n.slot[0] < 0:
@@ -62,13 +65,13 @@ def march(first, steps, motion, modal_system, table, c, j, n, travel, ledger, ro
     Returns (steps done, status): 0 finished, 1 travel exceeded, 2 memory of the contact full, 3 not finite, 4 no
     contact set fits.
     """
-    slide, dt, around, size = (
-        modal_system.slide,
-        modal_system.dt,
-        table.shape[0],
-        2 * modal_system.slide.size,
-    )
-    accel, scratch, beta = modal_system.workspace[0], modal_system.workspace[1:], modal_system.beta
+    slide = modal_system.slide
+    dt = modal_system.dt
+    around = table.shape[0]
+    size = 2 * modal_system.slide.size
+    accel = modal_system.workspace[0]
+    scratch = modal_system.workspace[1:]
+    beta = modal_system.beta
     if PRESSED:
         n.few[:] = 0.0
         n.few[0] = n.sets.base[0]
@@ -113,7 +116,8 @@ def march(first, steps, motion, modal_system, table, c, j, n, travel, ledger, ro
             work = faces.worked(dq, rows[i], j)
         else:
             push_back(used, slide, modal_system.mass, accel)
-            rows[i, size + 4], work = used, used * dq
+            rows[i, size + 4] = used
+            work = used * dq
             if PRESSED:
                 pressing.pushed(n, modal_system.mass, accel)
         move(
@@ -159,12 +163,15 @@ def follow(path, dt, c, goal, lost, forces):
     irreversible slip; lost (k, 2): energy dissipated in the step that follows, energy stored at the sample. Returns the
     steps that did not converge or found the memory of the contact full.
     """
-    bad, before = 0, 0.0
+    bad = 0
+    before = 0.0
     for i in range(path.size):
         dq = path[i + 1] - path[i] if i < path.size - 1 else before * dt
         v = dq / dt if dt > 0 else 0.0
         force, energy, slip = contact.state(c, path[i], 0.5 * (before + v) if i else v)
-        forces[i, 0], forces[i, 2], lost[i, 1] = force, slip, energy
+        forces[i, 0] = force
+        forces[i, 2] = slip
+        lost[i, 1] = energy
         if i == path.size - 1:
             break
         mean, good = contact.given(dq, path[i], v, dt, c, goal)

@@ -173,7 +173,8 @@ def march(
     run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
     total = round(cycles * steps_per_cycle)
     samples = Samples(deque(maxlen=max(window, 2)))
-    last, snapshots = samples.last, []
+    last = samples.last
+    snapshots = []
     asked = {round(mark * steps_per_cycle) for mark in marks}
     slot = slot_of(
         run,
@@ -182,10 +183,14 @@ def march(
         lambda: fresh(modes, drive, model, steps_per_cycle, travel, start),
     )
     found = [mark_of(*one, one[0]) for one in samples.marks]
-    behind, folds = total - max(window, 2) * steps_per_cycle, folds and run.folds and not asked
+    behind = total - max(window, 2) * steps_per_cycle
+    folds = folds and run.folds and not asked
     if folds and not run.folded(behind, samples):
-        run, samples = fresh(modes, drive, model, steps_per_cycle, travel, start), Samples(last)
-        folds, whole = False, True  # it ends before: once more, cycle by cycle
+        run = fresh(modes, drive, model, steps_per_cycle, travel, start)
+        samples = Samples(last)
+        # it ends before: once more, cycle by cycle
+        folds = False
+        whole = True
     elif not (
         folds
         or whole
@@ -195,15 +200,14 @@ def march(
     ):
         run = fresh(modes, drive, model, steps_per_cycle, travel, start)
         samples.again = True
-    extremes, phasors = samples.extremes, samples.phasors
+    extremes = samples.extremes
+    phasors = samples.phasors
     # capacity: how many more samples of cycles before the window may be kept;
     # picked: first step of a cycle -> its samples worth keeping
-    capacity, whole, picked, even = (
-        samples.capacity,
-        whole or bool(asked),
-        {},
-        stored_samples_per_cycle(drive, cycles, wanted=even),
-    )
+    capacity = samples.capacity
+    whole = whole or bool(asked)
+    picked = {}
+    even = stored_samples_per_cycle(drive, cycles, wanted=even)
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle
     while run.done < total and run.outcome is None:
@@ -237,7 +241,8 @@ def march(
             progress(run.done / total)
     run.check()
     if not (whole or folds):
-        extremes, phasors = ends_of(last, run), []
+        extremes = ends_of(last, run)
+        phasors = []
     end = mark_of(run, list(last)[-window:], extremes)
     rows, start = _joined(list(last))
     number = np.concatenate([*samples.kept_at, start + np.arange(len(rows))])
@@ -279,7 +284,8 @@ def _left_out(samples: Samples, run, count: int) -> int:
     samples.last.clear()
     samples.extremes += [samples.extremes[-1]] * count
     samples.phasors += [samples.phasors[-1]] * count
-    pick, begin = thinned(rows[None], run)[0], 2 * run.modes.omega.size + 6
+    pick = thinned(rows[None], run)[0]
+    begin = 2 * run.modes.omega.size + 6
     shown = np.arange(1, 1 + min(count, -(-max(0, samples.capacity) // len(pick))))[:, None]
     # friction work, and what is dissipated and created, since the start
     sums = slice(begin, begin + 3)
@@ -320,19 +326,20 @@ class Run:
     """The arrays of one march and its clock."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
-        self.modes, self.drive, self.model, self.travel, self.loops = (
-            modes,
-            drive,
-            model,
-            travel,
-            loops,
-        )
+        self.modes = modes
+        self.drive = drive
+        self.model = model
+        self.travel = travel
+        self.loops = loops
         self.prop = propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
         self.contact = model.build()
         self.state = np.zeros((2, modes.omega.size))
         if start is not None:
             self.state[:] = start.z, start.v
-        self.ledger, self.done, self.outcome, self.message = np.zeros(9), 0, None, ""
+        self.ledger = np.zeros(9)
+        self.done = 0
+        self.outcome = None
+        self.message = ""
         self.totals = np.zeros(3)
         self.second = np.zeros(2)  # friction work off the samples, and what went to and fro [J]
         self.ledger[0] = self.motion()  # what is released at the start counts as work in
@@ -348,16 +355,15 @@ class Run:
             self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
         )
         # of `repeats`: states at the last look and one cycle before the next, their sizes; the books a cycle before
-        self.looks, self.books, self.change = (
-            np.zeros((3, sum(map(len, self._carried())))),
-            np.zeros(14),
-            np.inf,
-        )
+        self.looks = np.zeros((3, sum(map(len, self._carried()))))
+        self.books = np.zeros(14)
+        self.change = np.inf
 
     def fork(self, drive):
         """A copy of the march as it stands that goes on by itself, under another drive."""
         twin = copy(self)
-        twin.drive, twin.periodic = drive, None
+        twin.drive = drive
+        twin.periodic = None
         for name, value in vars(self).items():
             if isinstance(value, np.ndarray):
                 setattr(twin, name, value.copy())
@@ -392,7 +398,8 @@ class Run:
 
         Asked for at the end of every cycle, or of those that `dynamics.periodicity.until_look` names.
         """
-        number, size = self.done // self.prop.steps, self.looks.shape[1]
+        number = self.done // self.prop.steps
+        size = self.looks.shape[1]
         if not size or self.periodic is None or not (looked_at(number) or looked_at(number + 1)):
             return False
         rows = self._carried()
@@ -404,7 +411,9 @@ class Run:
         self.looks[2] = np.maximum(self.looks[2], sizes)
         scale = np.where(self.looks[2] > 0, self.looks[2], 1.0)
         change, last = (float(np.max(np.abs(now - then) / scale)) for then in self.looks[:2])
-        before, self.change, self.looks[0] = self.change, change, now
+        before = self.change
+        self.change = change
+        self.looks[0] = now
         known = left > 0 and number >= 4 * APART  # two changes between looks
         return (
             known
@@ -426,7 +435,8 @@ class Run:
         path = np.array([self.modes.slide @ self.state[0], self.modes.slide @ place])
         if path[0] != path[1]:
             self._slid(path)
-        self.state[:], self.done = (place, rate), 0
+        self.state[:] = (place, rate)
+        self.done = 0
 
     def _slid(self, path) -> None:
         """Move the memory of the contact along a slide, path (2,) [m], in a second."""
@@ -442,7 +452,10 @@ class Run:
 
     def books_anew(self) -> None:
         """Begin the books here, with the energies that are there, at the start of a cycle of a drive that repeats."""
-        self.ledger[:], self.totals[:], self.second[:], self.done = 0.0, 0.0, 0.0, 0
+        self.ledger[:] = 0.0
+        self.totals[:] = 0.0
+        self.second[:] = 0.0
+        self.done = 0
         self.ledger[0] = self.motion() + self.strained()
 
     def mark(self, cycles: int, window: int) -> Mark:
@@ -468,7 +481,8 @@ class Run:
     def _beside(self, out, rows) -> Response:
         """Histories with the elements beside the first: `extra` has slides, slide_rates, forces, slips (k, i) of the
         interfaces and spring_forces (k, s), and lateral_slides and so on (k, i) of those in a plane, 0 of others."""
-        modes, faces = self.modes, self.faces
+        modes = self.modes
+        faces = self.faces
         parts, (ports, rubs, mates) = self._elements(rows), faces.of
         second = mates < np.arange(mates.size)
         rubs = (rubs == 1) & ~second
@@ -476,10 +490,8 @@ class Run:
         if self.model.patch is None:
             # of the first element, counted already
             push += np.outer(out.force, modes.slide) / modes.mass
-        extra, names = (
-            out.extra | {"spring_forces": parts[:, ~(rubs | second), 2]},
-            ("slides", "slide_rates", "forces", "slips"),
-        )
+        extra = out.extra | {"spring_forces": parts[:, ~(rubs | second), 2]}
+        names = ("slides", "slide_rates", "forces", "slips")
         if rubs.any():
             extra |= {name: parts[:, rubs, k] for k, name in enumerate(names)}
         for k, name in enumerate(names if second.any() else ()):
@@ -516,14 +528,12 @@ class Run:
     def folded(self, steps: int, samples: Samples) -> bool:
         """March to the step of this number as `passed` does, and keep the extremes and phasors of its cycles and the
         sample of the largest slide."""
-        n, around, table, far, at, number = (
-            2 * self.modes.omega.size,
-            self.prop.steps,
-            None,
-            np.zeros(self.width + 3),
-            np.zeros(1, np.int64),
-            -1,
-        )
+        n = 2 * self.modes.omega.size
+        around = self.prop.steps
+        table = None
+        far = np.zeros(self.width + 3)
+        at = np.zeros(1, np.int64)
+        number = -1
         kernels = load(PASSING)
         workspace = np.zeros(n + 7), far, at, np.zeros((14, kernels.BLOCK))
         while self.done < steps and self.outcome is None:
@@ -540,25 +550,25 @@ class Run:
                 self.table(size * count),
             )
             if rows is not table:
-                table, held = (
+                table = rows
+                held = kernels.passing.held(
+                    self.state,
+                    self.modal_system,
                     rows,
-                    kernels.passing.held(
-                        self.state,
-                        self.modal_system,
-                        rows,
-                        self.contact,
-                        GOAL * self.model.limit,
-                        float(self.model.limit),
-                        float(self.travel),
-                        self.ledger,
-                        self.totals,
-                        *workspace,
-                    ),
+                    self.contact,
+                    GOAL * self.model.limit,
+                    float(self.model.limit),
+                    float(self.travel),
+                    self.ledger,
+                    self.totals,
+                    *workspace,
                 )
-            phase, at[0] = 2 * np.pi * (begin % around + np.arange(size + 1)) / around, -1
+            phase = 2 * np.pi * (begin % around + np.arange(size + 1)) / around
+            at[0] = -1
             trace = np.array([0 * phase, 0 * phase, np.cos(phase), np.sin(phase)])
             did, status = kernels.passing.call_with_bound_args(held, row, sums, trace, seen)
-            self.done, number = begin + did, begin + int(at[0]) - row if at[0] >= 0 else number
+            self.done = begin + did
+            number = begin + int(at[0]) - row if at[0] >= 0 else number
             self.totals += sums[:3]
             self.second += sums[3:]
             self._judge(status)
@@ -580,7 +590,9 @@ class Run:
         Returns parts of cycles (k,): (first step, rows (k, steps + 1, width), friction works (k,) [J]), the whole ones
         and what was begun of the next where the run ends.
         """
-        first, n, whole = self.done, 2 * self.modes.omega.size + 6, self.prop.steps
+        first = self.done
+        n = 2 * self.modes.omega.size + 6
+        whole = self.prop.steps
         together = min(
             PIECES, AT_ONCE // whole, (stop - first) // whole, until_look(-(-first // whole))
         )
@@ -624,7 +636,8 @@ class Run:
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, self.width))
             rows[-1] = 0.0  # what belongs to the step after the last one is nothing yet
-            kept, begin = keep(self.contact, *self._moving()), self._before_a_fling()
+            kept = keep(self.contact, *self._moving())
+            begin = self._before_a_fling()
             did, status = self._steps(int(piece), rows)
             while status == FULL:
                 self.contact = lengthened(
@@ -634,7 +647,8 @@ class Run:
             if begin and self._flung(rows[: did + 1]):
                 for array, old in zip((*self.contact, *self._moving()), begin):
                     array[...] = old
-                did, status = self._steps(did - 1, rows)[0], 1
+                did = self._steps(did - 1, rows)[0]
+                status = 1
                 self.message = (
                     f"beyond a displacement of {format_length(self._out(rows[did]), 3)} the motion grows without "
                     "limit, because the force of the softening spring no longer pulls the block back; the "
@@ -736,7 +750,8 @@ class Run:
         What blows take at the end of a step, from slides that stop or hold, has no slide to be read off: where all that
         rubs is set-valued it counts.
         """
-        n, model = 2 * self.modes.omega.size, self.model
+        n = 2 * self.modes.omega.size
+        model = self.model
         smooth = not model.joints or getattr(model, "patch", None) is not None
         out = sampled_work(rows[:, n], rows[:, n + 2]) if smooth else np.zeros(len(rows) - 1)
         blows = rows[:-1, n + 6].copy()
@@ -791,7 +806,8 @@ class Run:
 
     def watched(self, rows) -> tuple:
         """Slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in booked rows."""
-        n, parts = 2 * self.modes.omega.size, self._elements(rows)
+        n = 2 * self.modes.omega.size
+        parts = self._elements(rows)
         return np.column_stack([rows[:, n + 1], parts[:, :, 1]]), np.column_stack(
             [rows[:, n + 3], parts[:, :, 3]]
         )
@@ -806,7 +822,8 @@ class Run:
 
     def strained(self) -> float:
         """Energy stored in what rubs, in springs and in the contact that presses [J]."""
-        n, rows = 2 * self.modes.omega.size, np.zeros((1, self.width))
+        n = 2 * self.modes.omega.size
+        rows = np.zeros((1, self.width))
         self.loops.march(
             self.model,
             0,

@@ -97,10 +97,8 @@ class ContactModel:
             return {}
         if hasattr(contact, "bondlist"):
             # as if all bonds of a point were stretched alike
-            load, share = (
-                contact.points[4],
-                contact.statuses[:, STATUS.force],
-            )
+            load = contact.points[4]
+            share = contact.statuses[:, STATUS.force]
             here = load * pressures_of(contact)
             return {
                 "bonds": np.stack(
@@ -175,7 +173,8 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
         )
     if shear is None:
         return element_model(points_element(law, area, sigma, pattern))
-    area, sigma = np.asarray(area, float)[shear.points], np.asarray(sigma, float)[shear.points]
+    area = np.asarray(area, float)[shear.points]
+    sigma = np.asarray(sigma, float)[shear.points]
     fields = arrays.sheared(
         law.static * area / law.length,
         law.length,

@@ -27,7 +27,8 @@ REST = 1e-12  # of the square of the largest rate of a cycle, as of `dynamics.cy
 def folded(work, rise, q, after, mean, limit, sums):
     """Add a step from the slide q to `after` [m] to the sums: its work and the rise of the interface's energy [J], the
     mean of the forces at its ends [N]."""
-    lost, noise = work - rise, limit * (1e-12 * abs(after - q) + 1e-15 * abs(q))
+    lost = work - rise
+    noise = limit * (1e-12 * abs(after - q) + 1e-15 * abs(q))
     sums[WORK] += work
     sums[LOST] += lost if lost > -noise else 0.0
     sums[CREATED] -= lost if lost < -noise else 0.0
@@ -55,13 +56,15 @@ def swung(c, did, slides):
 
     slides (did,): increments of the slide [m].
     """
-    way, last = c.flow[WAY], c.last
+    way = c.flow[WAY]
+    last = c.last
     for k in range(c.y.shape[1]):
         swing = 2 * (way * c.drag[PULL, k] / c.kappa[k - 1] - c.b[k - 1]) if k > 0 else 0.0
         for m in range(max(0, did - 3), did):
             here = slides[m] if k == 0 else swing if m % 2 == 0 else -swing
             c.y[0, k] = 3 * (here - last[0, k]) + last[1, k]
-            last[1, k], last[0, k] = last[0, k], here
+            last[1, k] = last[0, k]
+            last[0, k] = here
         if k > 0 and did % 2:
             c.b[k - 1] += swing
     c.ready[:] = 0.0
@@ -71,28 +74,24 @@ def swung(c, did, slides):
 def flown(k, count, motion, modal_system, table, at, accel, workspace):
     """Move a mode by `count` steps of a force that stays, by row `at` of the table on; what it shows and takes is added
     to `workspace`."""
-    n, z, v = motion.shape[1], motion[0, k], motion[1, k]
-    zz, zv, vz, vv = (
-        modal_system.free[0, k],
-        modal_system.free[1, k],
-        modal_system.free[2, k],
-        modal_system.free[3, k],
-    )
-    by_z, by_v, slide, output, square = (
-        modal_system.push[0, k] * accel,
-        modal_system.push[1, k] * accel,
-        modal_system.slide[k],
-        modal_system.output[k],
-        modal_system.omega[k] * modal_system.omega[k],
-    )
-    a, b, d, e, f, g = (
-        modal_system.loss[0, k],
-        modal_system.loss[1, k],
-        modal_system.loss[2, k],
-        modal_system.loss[3, k] * accel,
-        modal_system.loss[4, k] * accel,
-        modal_system.loss[5, k] * accel * accel,
-    )
+    n = motion.shape[1]
+    z = motion[0, k]
+    v = motion[1, k]
+    zz = modal_system.free[0, k]
+    zv = modal_system.free[1, k]
+    vz = modal_system.free[2, k]
+    vv = modal_system.free[3, k]
+    by_z = modal_system.push[0, k] * accel
+    by_v = modal_system.push[1, k] * accel
+    slide = modal_system.slide[k]
+    output = modal_system.output[k]
+    square = modal_system.omega[k] * modal_system.omega[k]
+    a = modal_system.loss[0, k]
+    b = modal_system.loss[1, k]
+    d = modal_system.loss[2, k]
+    e = modal_system.loss[3, k] * accel
+    f = modal_system.loss[4, k] * accel
+    g = modal_system.loss[5, k] * accel * accel
     for s in range(count):
         row = at + s
         workspace[POWER, s] += (
@@ -110,7 +109,8 @@ def flown(k, count, motion, modal_system, table, at, accel, workspace):
         workspace[PLACE, s] += output * z
         workspace[PACE, s] += output * v
         workspace[STORED, s] += v * v + square * z * z
-    motion[0, k], motion[1, k] = z, v
+    motion[0, k] = z
+    motion[1, k] = v
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -136,13 +136,17 @@ def dragged_on(
     The sample at the end of the last of them is not read; none between is as far. Modes go over a BLOCK of steps one
     after the other, and once more over those before the drag ends in it.
     """
-    way, n, size, at = c.flow[WAY], motion.shape[1], 2 * motion.shape[1], first % table.shape[0]
-    force, accel, begun = (
-        way * c.drag[PULL, 0],
-        modal_system.workspace[0],
-        modal_system.workspace[1:],
-    )
-    least, taken, energy, swing = 0.0, 0.0, c.eps[0] * c.drag[PULL, 0], 0.0
+    way = c.flow[WAY]
+    n = motion.shape[1]
+    size = 2 * motion.shape[1]
+    at = first % table.shape[0]
+    force = way * c.drag[PULL, 0]
+    accel = modal_system.workspace[0]
+    begun = modal_system.workspace[1:]
+    least = 0.0
+    taken = 0.0
+    energy = c.eps[0] * c.drag[PULL, 0]
+    swing = 0.0
     for k in range(c.b.size):
         y = 2 * (way * c.drag[PULL, k + 1] / c.kappa[k] - c.b[k])
         least += c.drag[REACH, k + 1] * abs(y)
@@ -155,7 +159,8 @@ def dragged_on(
         for s in range(block):
             workspace[part, s] = 0.0
     for k in range(n):
-        begun[0, k], begun[1, k] = motion[0, k], motion[1, k]
+        begun[0, k] = motion[0, k]
+        begun[1, k] = motion[1, k]
         flown(k, block, motion, modal_system, table, at, accel[k], workspace)
     did = 0
     for s in range(block):
@@ -163,8 +168,11 @@ def dragged_on(
         dq = after - q
         if way * dq <= least:
             break
-        did, swings = s + 1, 1.0 if s % 2 == 0 else -1.0  # forth, then back
-        odd, power = 0.5 * (1.0 + swings), workspace[POWER, s] + table[at + s, 4 * size]
+        # forth, then back
+        did = s + 1
+        swings = 1.0 if s % 2 == 0 else -1.0
+        odd = 0.5 * (1.0 + swings)
+        power = workspace[POWER, s] + table[at + s, 4 * size]
         folded(force * dq, swings * swing, q, after, force, limit, sums)
         ledger[0] += power
         ledger[1] += workspace[DAMPED, s] + table[at + s, 4 * size + 1]
@@ -174,14 +182,17 @@ def dragged_on(
             ledger[4], energy + odd * swing + 0.5 * modal_system.mass * workspace[STORED, s]
         )
         ledger[8] += force * dq
-        trace[OUT, i + did], trace[RATE, i + did] = workspace[PLACE, s], workspace[PACE, s]
-        q, workspace[SLIDE, s] = after, dq
+        trace[OUT, i + did] = workspace[PLACE, s]
+        trace[RATE, i + did] = workspace[PACE, s]
+        q = after
+        workspace[SLIDE, s] = dq
         c.flow[SLID] += dq
         if not (abs(workspace[PLACE, s]) <= travel and np.isfinite(q + workspace[SPEED, s])):
             break
     if did < block:
         for k in range(n):
-            motion[0, k], motion[1, k] = begun[0, k], begun[1, k]
+            motion[0, k] = begun[0, k]
+            motion[1, k] = begun[1, k]
             flown(k, did, motion, modal_system, table, at, accel[k], workspace[7:])
     if did:
         swung(c, did, workspace[SLIDE])
@@ -209,15 +220,19 @@ def through(
 ):
     """March a cycle of samples as of `trace`, the first step by row `first` of the table (in turns); (steps done,
     status) as of `loop_kernels.march`."""
-    count, n, size, dt, around = (
-        trace.shape[1] - 1,
-        motion.shape[1],
-        2 * motion.shape[1],
-        modal_system.dt,
-        table.shape[0],
-    )
-    accel, scratch, i, open_step = modal_system.workspace[0], modal_system.workspace[1:], 0, False
-    work, q0, force0, energy0 = 0.0, 0.0, 0.0, 0.0
+    count = trace.shape[1] - 1
+    n = motion.shape[1]
+    size = 2 * motion.shape[1]
+    dt = modal_system.dt
+    around = table.shape[0]
+    accel = modal_system.workspace[0]
+    scratch = modal_system.workspace[1:]
+    i = 0
+    open_step = False
+    work = 0.0
+    q0 = 0.0
+    force0 = 0.0
+    energy0 = 0.0
     while True:
         q, v, out = sample(row, motion, modal_system.slide, modal_system.output)
         force, energy, slip = contact.state(c, q, v)
@@ -236,7 +251,8 @@ def through(
         rate = 0.0
         for k in range(n):
             rate += modal_system.output[k] * motion[1, k]
-        trace[OUT, i], trace[RATE, i] = out, rate
+        trace[OUT, i] = out
+        trace[RATE, i] = rate
         reached(row, first + i, totals, sums, far, far_at)
         if status or i == count:
             return i, status
@@ -258,7 +274,8 @@ def through(
                 workspace,
             )
             if did:
-                i, open_step = i + did, False
+                i = i + did
+                open_step = False
                 continue
         at = (first + i) % around
         free = free_slide(motion, modal_system.reach, 0, table, at)
@@ -285,16 +302,26 @@ def through(
             after += modal_system.slide[k] * motion[1, k]
         lost, _ = contact.commit(dq, used, q, v, after, dt, c)
         ledger[3] += lost
-        q0, force0, energy0, open_step, i = q, force, energy, True, i + 1
+        q0 = q
+        force0 = force
+        energy0 = energy
+        open_step = True
+        i = i + 1
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def shown(trace, dt, seen):
     """Extremes of the output between the samples of a cycle, by the cubic through values and rates as
     `cycles.hermite_extremes` has it, and its phasor, into seen (4,)."""
-    count, low, high, re, im, fastest = trace.shape[1] - 1, np.inf, -np.inf, 0.0, 0.0, 0.0
+    count = trace.shape[1] - 1
+    low = np.inf
+    high = -np.inf
+    re = 0.0
+    im = 0.0
+    fastest = 0.0
     for i in range(count + 1):
-        low, high = min(low, trace[OUT, i]), max(high, trace[OUT, i])
+        low = min(low, trace[OUT, i])
+        high = max(high, trace[OUT, i])
         fastest = max(fastest, abs(trace[RATE, i]))
     for i in range(count):
         re += trace[OUT, i] * trace[COS, i]
@@ -302,15 +329,23 @@ def shown(trace, dt, seen):
     for i in range(count):
         if not trace[RATE, i] * trace[RATE, i + 1] < -REST * fastest * fastest:
             continue
-        a, b, p, r = trace[OUT, i], trace[OUT, i + 1], trace[RATE, i] * dt, trace[RATE, i + 1] * dt
-        big, mid = 2 * (a - b) + p + r, 3 * (b - a) - 2 * p - r
+        a = trace[OUT, i]
+        b = trace[OUT, i + 1]
+        p = trace[RATE, i] * dt
+        r = trace[RATE, i + 1] * dt
+        big = 2 * (a - b) + p + r
+        mid = 3 * (b - a) - 2 * p - r
         root = np.sqrt(max(mid * mid - 3 * big * p, 0.0))
         for sign in (1.0, -1.0):
             s = -p / (mid + sign * root)
             if 0.0 <= s <= 1.0:
                 value = a + p * s + mid * s * s + big * s * s * s
-                low, high = min(low, value), max(high, value)
-    seen[LOW], seen[HIGH], seen[RE], seen[IM] = low, high, 2 * re / count, 2 * im / count
+                low = min(low, value)
+                high = max(high, value)
+    seen[LOW] = low
+    seen[HIGH] = high
+    seen[RE] = 2 * re / count
+    seen[IM] = 2 * im / count
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)

@@ -41,35 +41,57 @@ def press_step(n, k0, begin, f1, f2, turn, out):
 
     The slopes have a convex potential, so the answer is unique; inside one set one step finds it.
     """
-    sets, beta, arm = n.sets, n.beta, n.arm[0]
-    b11, b12, b21, b22 = beta[1, 1], beta[1, 2], beta[2, 1], beta[2, 2]
-    dh, dt = turn[0], turn[1]
-    old_h, old_t, step_h, step_t, part, best = dh, dt, 0.0, 0.0, 1.0, np.inf
+    sets = n.sets
+    beta = n.beta
+    arm = n.arm[0]
+    b11 = beta[1, 1]
+    b12 = beta[1, 2]
+    b21 = beta[2, 1]
+    b22 = beta[2, 2]
+    dh = turn[0]
+    dt = turn[1]
+    old_h = dh
+    old_t = dt
+    step_h = 0.0
+    step_t = 0.0
+    part = 1.0
+    best = np.inf
     k = k0
     for count in range(1, 100):
         k = path_mean(sets, k0, begin[0], begin[1], dh, dt, out)
         if k < 0:
             return k, count, np.inf
-        p1, p2 = b11 * out[0] + b12 * out[1], b21 * out[0] + b22 * out[1]
-        r1, r2 = dh - f1 + p1, dt - f2 + p2
+        p1 = b11 * out[0] + b12 * out[1]
+        p2 = b21 * out[0] + b22 * out[1]
+        r1 = dh - f1 + p1
+        r2 = dt - f2 + p2
         size = abs(r1) + arm * abs(r2)
         noise = 4e-16 * (abs(dh) + abs(f1) + abs(p1) + arm * (abs(dt) + abs(f2) + abs(p2)))
-        turn[0], turn[1] = dh, dt
+        turn[0] = dh
+        turn[1] = dt
         if size <= noise:
             return k, count, 0.0
         if size < best * (1 - 0.1 * part) or best == np.inf:
-            best, part, old_h, old_t = size, 1.0, dh, dt
-            j11, j12 = 1 + b11 * out[5] + b12 * out[7], b11 * out[6] + b12 * out[8]
-            j21, j22 = b21 * out[5] + b22 * out[7], 1 + b21 * out[6] + b22 * out[8]
+            best = size
+            part = 1.0
+            old_h = dh
+            old_t = dt
+            j11 = 1 + b11 * out[5] + b12 * out[7]
+            j12 = b11 * out[6] + b12 * out[8]
+            j21 = b21 * out[5] + b22 * out[7]
+            j22 = 1 + b21 * out[6] + b22 * out[8]
             det = j11 * j22 - j12 * j21
-            step_h, step_t = (j22 * r1 - j12 * r2) / det, (j11 * r2 - j21 * r1) / det
+            step_h = (j22 * r1 - j12 * r2) / det
+            step_t = (j11 * r2 - j21 * r1) / det
         else:
             part *= 0.5
             if part < 1e-9 or size <= 64 * noise or (part < 0.2 and best <= 1e3 * noise):
-                turn[0], turn[1] = old_h, old_t
+                turn[0] = old_h
+                turn[1] = old_t
                 k = path_mean(sets, k0, begin[0], begin[1], old_h, old_t, out)
                 return k, count, best / (b11 + b22 / (arm * arm) + 2 / sets.base[4])
-        dh, dt = old_h - part * step_h, old_t - part * step_t
+        dh = old_h - part * step_h
+        dt = old_t - part * step_t
     return k, 100, best / (b11 + b22 / (arm * arm) + 2 / sets.base[4])
 
 
@@ -77,9 +99,14 @@ def press_step(n, k0, begin, f1, f2, turn, out):
 def pressed(i, last, motion, mass, c, j, n, row):
     """Load [N], moment [N m], energy [J] of the preloaded contact, heave and pitch at sample i into the last columns of
     its row; what rubs knows its load. The energy [J]; n.slot < 0 where no contact set fits."""
-    begin, load, moment, m = n.few[17:22], n.few[0], n.sets.base[1], row.size - 5
+    begin = n.few[17:22]
+    load = n.few[0]
+    moment = n.sets.base[1]
+    m = row.size - 5
     begin[0], begin[1] = place_of(motion, n.rows, 1), place_of(motion, n.rows, 2)
-    begin[2], begin[3], begin[4] = 0.0, 0.0, 0.0
+    begin[2] = 0.0
+    begin[3] = 0.0
+    begin[4] = 0.0
     if n.loads.size > 0:
         load = n.loads[i]
         n.now[0] = load
@@ -88,17 +115,16 @@ def pressed(i, last, motion, mass, c, j, n, row):
         if n.slot[0] < 0:
             return 0.0
         begin[2], begin[3], begin[4] = compute_energy(n.sets, n.slot[0], begin[0], begin[1])
-        load, moment = max(n.sets.base[0] - begin[3], 0.0), moment - begin[4]
+        load = max(n.sets.base[0] - begin[3], 0.0)
+        moment = moment - begin[4]
         if POINTED or last:
             press_state(n.sets, n.slot[0], -begin[0], begin[1], n.now)
     n.few[0] = load
-    row[m], row[m + 1], row[m + 2], row[m + 3], row[m + 4] = (
-        load,
-        moment,
-        begin[2],
-        begin[0],
-        begin[1],
-    )
+    row[m] = load
+    row[m + 1] = moment
+    row[m + 2] = begin[2]
+    row[m + 3] = begin[0]
+    row[m + 4] = begin[1]
     weigh(load, load, c, j, n)
     if STOPS:
         faces.capped(j)
@@ -172,17 +198,33 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
     The force jumps where a stop inside the step comes or goes with the guess; where none is its own answer, the mean
     force of the whole step, which does not jump between stick and slip at one coefficient, is sought in turn.
     """
-    few, beta, load, goal = n.few, n.beta, n.few[0], n.goal[0]
-    force, turn, out, begin = few[3:5], few[6:8], few[8:17], few[17:22]
-    given, coupled = n.loads.size > 0, beta[0, 1] != 0 or beta[0, 2] != 0
+    few = n.few
+    beta = n.beta
+    load = n.few[0]
+    goal = n.goal[0]
+    force = few[3:5]
+    turn = few[6:8]
+    out = few[8:17]
+    begin = few[17:22]
+    given = n.loads.size > 0
+    coupled = beta[0, 1] != 0 or beta[0, 2] != 0
     moves = not given and (beta[1, 1] != 0 or beta[2, 2] != 0)
-    heave, pitch = (
-        free_slide(motion, modal_system.reach, 1, table, at),
-        free_slide(motion, modal_system.reach, 2, table, at),
-    )
-    guess, count, wrong, end, bad = n.mean[0], 0, 0.0, n.slot[0], False
-    low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
-    dq, used, after, whole, last = 0.0, 0.0, load, False, MOST
+    heave = free_slide(motion, modal_system.reach, 1, table, at)
+    pitch = free_slide(motion, modal_system.reach, 2, table, at)
+    guess = n.mean[0]
+    count = 0
+    wrong = 0.0
+    end = n.slot[0]
+    bad = False
+    low = -np.inf
+    high = np.inf
+    last_f = 0.0
+    last_r = np.inf
+    dq = 0.0
+    used = 0.0
+    after = load
+    whole = False
+    last = MOST
     if given:
         after = n.loads[i + 1]
         n.now[0] = after
@@ -203,7 +245,8 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
             if end < 0:
                 n.slot[0] = end
                 return dq, used, count
-            force[0], force[1] = out[0], out[1]
+            force[0] = out[0]
+            force[1] = out[1]
             count += its
             after = 2 * max(n.sets.base[0] - out[0], 0.0) - load
             if POINTED:
@@ -225,7 +268,11 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
                     dq = faces.slide_freely(used, j)
                     break
                 if not whole:
-                    whole, last, low, high, last_r = True, outer + MOST, -np.inf, np.inf, np.inf
+                    whole = True
+                    last = outer + MOST
+                    low = -np.inf
+                    high = np.inf
+                    last_r = np.inf
                     continue
             bad = bad or abs(miss) > goal
             break
@@ -236,11 +283,13 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
         following = used
         if last_r < np.inf and miss != last_r:
             following = guess - miss * (guess - last_f) / (miss - last_r)
-        last_f, last_r = guess, miss
+        last_f = guess
+        last_r = miss
         if not (low < following < high) or outer % 8 == 0:
             following = 0.5 * (low + high) if low > -np.inf and high < np.inf else used
         guess = following
-    n.mean[0], n.slot[0] = used, end
+    n.mean[0] = used
+    n.slot[0] = end
     if moves:
         few[0] = max(n.sets.base[0] - out[3], 0.0)
     return dq, used, -count if bad else count

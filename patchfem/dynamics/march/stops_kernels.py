@@ -75,13 +75,11 @@ def shared(which, count, s):
     b and x are in the order of the names. Of dependent faces it is the smallest x. False where A has no positive
     diagonal.
     """
-    a, b, x, r, names = (
-        s.system[:count, :count],
-        s.field[RIGHT],
-        s.field[FOUND],
-        s.field[MISS],
-        s.names,
-    )
+    a = s.system[:count, :count]
+    b = s.field[RIGHT]
+    x = s.field[FOUND]
+    r = s.field[MISS]
+    names = s.names
     if count == 1:
         give = s.gives[which, names[0], names[0]]
         x[0] = b[0] / give
@@ -118,9 +116,11 @@ def resting(s):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def forces_at(x, s):
     """Forces of all faces at the place x of the step and their slopes, into s.field; False where there are none."""
-    f, count = s.field, resting(s)
+    f = s.field
+    count = resting(s)
     for e in range(s.names.size):
-        which, way = STATIC if abs(f[WAY, e]) == 2.0 else KINETIC, np.sign(f[WAY, e])
+        which = STATIC if abs(f[WAY, e]) == 2.0 else KINETIC
+        way = np.sign(f[WAY, e])
         f[FORCE, e] = way * bound(which, e, x, s)
         f[SLOPE, e] = way * (s.limit[which + END, e] - s.limit[which, e])
     for part in range(2):
@@ -149,7 +149,9 @@ def forces_at(x, s):
 def let_go(e, way, s):
     """Let face e slide along way, or carry its static friction where the others that rest hold it."""
     f = s.field
-    f[WAY, e], f[SLIDES, e] = way, 0.0  # no more among those that rest
+    # no more among those that rest
+    f[WAY, e] = way
+    f[SLIDES, e] = 0.0
     count = resting(s)
     for i in range(count):
         f[RIGHT, i] = s.gives[TUG, s.names[i], e]
@@ -172,11 +174,13 @@ def settled(x, s):
     for _ in range(2 * s.names.size + 2):
         if not forces_at(x, s):
             return False
-        worst, who = 1e-9, -1
+        worst = 1e-9
+        who = -1
         for e in range(s.names.size):
             over = abs(f[FORCE, e]) / max(bound(STATIC, e, x, s), 1e-300) - 1
             if f[WAY, e] == 0.0 and over > worst:
-                worst, who = over, e
+                worst = over
+                who = e
         if who < 0:
             return True
         let_go(who, 1.0 if f[FORCE, who] > 0 else -1.0, s)
@@ -198,9 +202,12 @@ def passes_zero(speed, start, bend):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def pulls(e, x, dt, s):
     """(change of speed [m/s] of face e per length of the step at the place x, half of the slope of that)."""
-    start, bend, f = 0.0, 0.0, s.field
+    start = 0.0
+    bend = 0.0
+    f = s.field
     for k in range(s.names.size):
-        g, rise = dt * s.gives[TUG, e, k], f[LAST, k] - f[FIRST, k]
+        g = dt * s.gives[TUG, e, k]
+        rise = f[LAST, k] - f[FIRST, k]
         start += g * (f[FIRST, k] + rise * x - f[FORCE, k])
         bend += 0.5 * g * (rise - f[SLOPE, k])
     if f[SPEED, e] == 0.0:  # just let go: forward but for round-off
@@ -211,20 +218,27 @@ def pulls(e, x, dt, s):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def next_event(x, dt, s):
     """(how far from the place x the next face stops or goes, which, the way it goes or 0)."""
-    f, y, who, way = s.field, 1.0 - x, -1, 0.0
+    f = s.field
+    y = 1.0 - x
+    who = -1
+    way = 0.0
     for e in range(s.names.size):
         if abs(f[WAY, e]) == 1.0:
             start, bend = pulls(e, x, dt, s)
             at = passes_zero(f[WAY, e] * f[SPEED, e], f[WAY, e] * start, f[WAY, e] * bend)
             if at < y:
-                y, who, way = at, e, 0.0
+                y = at
+                who = e
+                way = 0.0
         elif f[WAY, e] == 0.0:
             for sign in (1.0, -1.0):
                 rise = sign * f[SLOPE, e] - (s.limit[STATIC + END, e] - s.limit[STATIC, e])
                 if rise > 0:
                     at = max((bound(STATIC, e, x, s) - sign * f[FORCE, e]) / rise, 0.0)
                     if at < y:
-                        y, who, way = at, e, sign
+                        y = at
+                        who = e
+                        way = sign
     return y, who, way
 
 
@@ -240,14 +254,17 @@ def moved(x, y, who, dt, s):
             f[MISS, e] = f[SPEED, e] + y * (start + y * bend)
     for e in range(s.names.size):
         if abs(f[WAY, e]) == 1.0:
-            last, f[SPEED, e] = abs(f[SPEED, e]), f[MISS, e]
+            last = abs(f[SPEED, e])
+            f[SPEED, e] = f[MISS, e]
             least = 1e-12 * last if last > 0.0 else -1.0  # alike faces stop at once
             if (
                 e == who
                 or (who < 0 and f[WAY, e] * f[SPEED, e] <= 0)
                 or f[WAY, e] * f[SPEED, e] <= least
             ):
-                f[SPEED, e], f[WAY, e], f[SLIDES, e] = 0.0, 0.0, 0.0
+                f[SPEED, e] = 0.0
+                f[WAY, e] = 0.0
+                f[SLIDES, e] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -270,13 +287,16 @@ def followed(dt, s):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def slides_on(s):
     """Whether all faces slide the way they do to the end of the step; ways and speeds stand in s.field then."""
-    f, count = s.field, s.names.size
+    f = s.field
+    count = s.names.size
     for e in range(count):
-        f[WAY, e], f[SLIDES, e] = np.sign(f[START, e]), 1.0
+        f[WAY, e] = np.sign(f[START, e])
+        f[SLIDES, e] = 1.0
         if f[START, e] == 0.0:
             return False
     for e in range(count):
-        dq, end = f[FREE, e], f[RATE, e]
+        dq = f[FREE, e]
+        end = f[RATE, e]
         for k in range(count):
             force = f[WAY, k] * bound(KINETIC, k, 0.5, s)
             dq -= s.gives[BETA, e, k] * force
@@ -294,7 +314,8 @@ def asked(dt, s):
     First of all faces at once. Those that rest are held by what the step itself asks of them beside those that slide:
     the others' accelerations are right to the first order in the step alone, which would place a release anywhere.
     """
-    f, faces = s.field, s.names.size
+    f = s.field
+    faces = s.names.size
     for stage in range(2):
         count = faces
         if stage == 0:
@@ -320,11 +341,13 @@ def asked(dt, s):
             if not shared(which, count, s):
                 return False
             for i in range(count):
-                e, found = s.names[i], f[FOUND, i]
+                e = s.names[i]
+                found = f[FOUND, i]
                 if part == 0:
                     f[MEAN, e] = found
                 else:
-                    first, last = 3 * f[MEAN, e] - 2 * found, 4 * found - 3 * f[MEAN, e]
+                    first = 3 * f[MEAN, e] - 2 * found
+                    last = 4 * found - 3 * f[MEAN, e]
                     f[FIRST, e] = first if stage == 0 else f[FIRST, e] + first - f[FORCE, e]
                     f[LAST, e] = (
                         last if stage == 0 else f[LAST, e] + last - f[FORCE, e] - f[SLOPE, e]
@@ -338,7 +361,8 @@ def watched(dt, s):
 
     Rows FREE, RATE, START and REST are given. Where modes swing within the step nothing inside it can be told.
     """
-    f, resolved = s.field, True
+    f = s.field
+    resolved = True
     for e in range(s.names.size):
         give = dt * s.gives[TUG, e, e]
         resolved = (
@@ -352,12 +376,10 @@ def watched(dt, s):
     if not resolved or not asked(dt, s):
         return False
     for e in range(s.names.size):
-        f[SPEED, e], f[WAY, e], f[SLIDE, e], f[MEAN, e] = (
-            f[START, e],
-            np.sign(f[START, e]),
-            0.0,
-            0.0,
-        )
+        f[SPEED, e] = f[START, e]
+        f[WAY, e] = np.sign(f[START, e])
+        f[SLIDE, e] = 0.0
+        f[MEAN, e] = 0.0
         f[SLIDES, e] = abs(f[WAY, e])
     return followed(dt, s)
 
@@ -366,7 +388,8 @@ def watched(dt, s):
 def met(s):
     """Mean forces of all faces, row MEAN, that give the slides that were found, and their slides, row DQ; False where
     none are found."""
-    f, count = s.field, 0
+    f = s.field
+    count = 0
     for e in range(s.names.size):
         if f[SLIDES, e] == 1.0:
             f[MEAN, e] = f[WAY, e] * bound(KINETIC, e, 0.5, s)
@@ -385,7 +408,8 @@ def met(s):
         most = max(s.limit[STATIC, e], s.limit[STATIC + END, e])
         f[MEAN, e] = min(max(f[MEAN, e] + f[FOUND, i], -most), most)
     for e in range(s.names.size):
-        f[DQ, e], size = f[FREE, e], abs(f[FREE, e])
+        f[DQ, e] = f[FREE, e]
+        size = abs(f[FREE, e])
         for k in range(s.names.size):
             part = s.gives[BETA, e, k] * f[MEAN, k]
             f[DQ, e] -= part
@@ -399,7 +423,9 @@ def met(s):
 def blows(s):
     """Blows, row BLOW [N s], that bring every face that stopped, went, turned or rests to its speed; work that all
     friction takes in the step [J]."""
-    f, count, work = s.field, 0, 0.0
+    f = s.field
+    count = 0
+    work = 0.0
     for e in range(s.names.size):
         f[BLOW, e] = 0.0
         work += f[MEAN, e] * f[DQ, e]
@@ -423,9 +449,11 @@ def blows(s):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def brought(motion, s):
     """After a step by mean forces alone: blows that bring the faces without a slide to rest, as the modes move."""
-    f, count = s.field, 0
+    f = s.field
+    count = 0
     for e in range(s.names.size):
-        f[BLOW, e], f[WAY, e] = 0.0, np.sign(f[DQ, e])
+        f[BLOW, e] = 0.0
+        f[WAY, e] = np.sign(f[DQ, e])
         if f[DQ, e] == 0.0:
             f[RIGHT, count] = speed_of(motion, e, s)
             s.names[count] = e
@@ -447,7 +475,8 @@ def speed_of(motion, e, s):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def struck(motion, mass, s):
     """Strike the modes by the blows, in place; energy that they take [J]. Faces at rest are noted in row REST."""
-    f, lost = s.field, 0.0
+    f = s.field
+    lost = 0.0
     for k in range(motion.shape[1]):
         change = 0.0
         for e in range(s.names.size):
@@ -488,18 +517,23 @@ def reactions(motion, modal_system, drive, accel, scratch, s):
 def stays(s):
     """Whether all faces rest at the start of the step, and mean forces below their static friction hold them, row MEAN;
     ways, slides and speeds stand in s.field then."""
-    f, faces = s.field, s.names.size
+    f = s.field
+    faces = s.names.size
     for e in range(faces):
         if f[REST, e] == 0.0 and f[START, e] != 0.0:
             return False
-        s.names[e], f[RIGHT, e] = e, f[FREE, e]
+        s.names[e] = e
+        f[RIGHT, e] = f[FREE, e]
     if not shared(BETA, faces, s):
         return False
     for e in range(faces):
         if abs(f[FOUND, e]) > min(s.limit[STATIC, e], s.limit[STATIC + END, e]):
             return False
         f[MEAN, e] = f[FOUND, e]
-        f[WAY, e], f[SLIDES, e], f[SLIDE, e], f[SPEED, e] = 0.0, 0.0, 0.0, 0.0
+        f[WAY, e] = 0.0
+        f[SLIDES, e] = 0.0
+        f[SLIDE, e] = 0.0
+        f[SPEED, e] = 0.0
     return True
 
 
@@ -512,7 +546,8 @@ def stays_to_the_end(motion, modal_system, drive, accel, scratch, s):
     """
     faces = s.names.size
     for e in range(faces):
-        s.field[RIGHT, e], s.names[e] = speed_of(motion, e, s), e
+        s.field[RIGHT, e] = speed_of(motion, e, s)
+        s.names[e] = e
     if not shared(TUG, faces, s):
         return False
     for k in range(accel.size):

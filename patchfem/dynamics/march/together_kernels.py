@@ -64,7 +64,8 @@ def along(t, y, step, trial, j, dt):
 def slope_at(y, step, j, dt, hess):
     """Newton's equations at y (n,): minus the slope in `step`, the Hessian, the forces of the laws; the largest change
     of a force over its goal."""
-    n, worst = y.size, 0.0
+    n = y.size
+    worst = 0.0
     for i in range(n):
         step[i] = -y[i] / j.modal[GIVE, i]
         for k in range(n):
@@ -91,8 +92,12 @@ def solve_smooth(j, dt):
 
     Returns the iterations, below 0 where the minimum was not reached.
     """
-    y, step, trial, hess = j.modal[ROOM], j.modal[ROOM + 1], j.modal[ROOM + 2], j.hess
-    n, count = y.size, j.of.shape[1]
+    y = j.modal[ROOM]
+    step = j.modal[ROOM + 1]
+    trial = j.modal[ROOM + 2]
+    hess = j.hess
+    n = y.size
+    count = j.of.shape[1]
     for i in range(n):
         y[i] = 0.0
         for e in range(count):
@@ -105,7 +110,9 @@ def solve_smooth(j, dt):
             return -turn
         solve(hess, step)
         begin = along(0.0, y, step, trial, j, dt)
-        low, high, t = 0.0, np.inf, 1.0
+        low = 0.0
+        high = np.inf
+        t = 1.0
         for _ in range(40):
             here = along(t, y, step, trial, j, dt)
             if abs(here) <= 0.1 * abs(begin):
@@ -129,20 +136,24 @@ def equations(j, dt, known):
     force in more ways than one; one that slips keeps its force. known: the slides of those that do not slip all the way
     stand in j.stops instead (`stops_kernels`).
     """
-    count, beta, face = j.of.shape[1], j.gives[BETA], 0
+    count = j.of.shape[1]
+    beta = j.gives[BETA]
+    face = 0
     for e in range(count):
         p = j.of[PORT, e]
-        dq, own = j.port[FREE, p], beta[p, p]
+        dq = j.port[FREE, p]
+        own = beta[p, p]
         for k in range(count):
             dq -= beta[p, j.of[PORT, k]] * j.each[PULL, k]
         if j.num[e, 0] == HOLDS:
-            holds, goal = (
+            holds = (
                 abs(j.each[PULL, e]) < j.num[e, 1] * (1 - 1e-12)
-                and abs(j.each[PULL, e]) != j.num[e, 2],
-                0.0,
+                and abs(j.each[PULL, e]) != j.num[e, 2]
             )
+            goal = 0.0
             if known:
-                holds, goal = j.stops.field[SLIDES, face] == 0.0, j.stops.field[SLIDE, face]
+                holds = j.stops.field[SLIDES, face] == 0.0
+                goal = j.stops.field[SLIDE, face]
             face += 1
             j.each[LACK, e] = (dq - goal) / own if holds else 0.0
             for k in range(count):
@@ -164,7 +175,9 @@ def equations(j, dt, known):
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def in_plane(e, f, dx, j):
     """The two of Newton's equations of an element whose directions are e and f; dx [m]: slide of e."""
-    beta, p, r = j.gives[BETA], j.of[PORT, e], j.of[PORT, f]
+    beta = j.gives[BETA]
+    p = j.of[PORT, e]
+    r = j.of[PORT, f]
     dy = j.port[FREE, r]
     for k in range(j.of.shape[1]):
         dy -= beta[r, j.of[PORT, k]] * j.each[PULL, k]
@@ -172,7 +185,8 @@ def in_plane(e, f, dx, j):
     j.each[LACK, e] = slide.mean_x - j.each[PULL, e]
     j.each[LACK, f] = slide.mean_y - j.each[PULL, f]
     for k in range(j.of.shape[1]):
-        one, other = beta[p, j.of[PORT, k]], beta[r, j.of[PORT, k]]
+        one = beta[p, j.of[PORT, k]]
+        other = beta[r, j.of[PORT, k]]
         j.system[e, k] = slide.slope.xx * one + slide.slope.xy * other
         j.system[f, k] = slide.slope.yx * one + slide.slope.yy * other
     j.system[e, e] += 1.0
@@ -183,7 +197,8 @@ def in_plane(e, f, dx, j):
 def newton_turn(j, dt, known):
     """One Newton step on the forces of all elements at once, without a patch; False where it fails. known: as of
     `equations`."""
-    count, miss = j.of.shape[1], j.each[LACK]
+    count = j.of.shape[1]
+    miss = j.each[LACK]
     equations(j, dt, known)
     # pivots in place: 1 + slope beta leads its row for laws that resist
     if not eliminate(j.system, miss):

@@ -120,7 +120,8 @@ def sets_of(patch, spring: float = 0.0) -> ContactSets:
             not_supported_message("[contact.strips] with a normal load that changes", "either")
         )
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    c, x = patch.pieces.normal, patch.x
+    c = patch.pieces.normal
+    x = patch.x
     if spring > 0:
         c = c + np.outer(x, x) / spring
     return ContactSets(c, x, patch.pressure.gap - c @ force, force > 0)
@@ -142,7 +143,9 @@ def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
 
     shear: ShearModes on the points, None of pieces that are rigid in shear; limit [N]: scale of the residuals.
     """
-    memory, size, plastic = np.zeros((3, normal.size)), normal.size, law.kind == PLASTIC
+    memory = np.zeros((3, normal.size))
+    size = normal.size
+    plastic = law.kind == PLASTIC
     memory[1 if plastic else 0] = normal if plastic else normal * law.force[3]
     psi, kappa = (np.zeros((size, 0)), ()) if shear is None else (shear.shape, shear.stiffness)
     weight = np.full(size, law.static / (1.0 if plastic else law.length))
@@ -218,7 +221,8 @@ class VaryingLoadModel:
     @property
     def joints(self) -> tuple:
         """The set-valued element, under the preload."""
-        law, load = self.law, self.preload
+        law = self.law
+        load = self.preload
         return (
             (Joint(0, Coulomb(law.force[1], law.static).element(load)),) if self.set_valued else ()
         )
@@ -319,10 +323,13 @@ class VaryingLoadRun(Run):
 
     def _pressing(self) -> arrays.Pressing:
         """The load at the start, and what rubs under it; the contact sets stand apart, for any run may ask them."""
-        model, press = self.model, compiled("contact.press_kernels")
+        model = self.model
+        press = compiled("contact.press_kernels")
         parts = model.sets.arrays() if model.load is None else _one_point(model.preload)
-        x, slot = parts["x"], 0
-        self.sets, now = press.SetArrays(**parts), np.full(x.size, model.preload)
+        x = parts["x"]
+        slot = 0
+        self.sets = press.SetArrays(**parts)
+        now = np.full(x.size, model.preload)
         if model.load is None:
             heave, turn = model.rows[1:] @ self.state[0]
             slot = press.find_set(
@@ -367,7 +374,8 @@ class VaryingLoadRun(Run):
         lost = work - np.diff(rows[:, n + 5])
         size = np.maximum(self.model.limit, np.abs(rows[:-1, n + 4]))
         digit = np.abs(rows[:, : n // 2]) @ np.abs(self.modes.slide)
-        slip_path, beta = np.abs(np.diff(rows[:, n])), self.prop.beta[0, 0]
+        slip_path = np.abs(np.diff(rows[:, n]))
+        beta = self.prop.beta[0, 0]
         digit = np.maximum(digit[1:], digit[:-1]) + beta * size
         noise = (
             size * (1e-12 * slip_path + 2e-15 * digit)
@@ -383,10 +391,8 @@ class VaryingLoadRun(Run):
         found = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
         c = self.contact
         if self.model.law.kind == LISTS:  # as if all bonds of a point were stretched alike
-            force, law = (
-                self.model.law.static * c.points[4] * c.statuses[:, STATUS.force],
-                self.model.law,
-            )
+            force = self.model.law.static * c.points[4] * c.statuses[:, STATUS.force]
+            law = self.model.law
             found = {
                 "b": c.b.copy(),
                 "memory": np.stack([nodal, law.length / law.static * force, 0 * nodal]),
@@ -404,7 +410,9 @@ class VaryingLoadRun(Run):
 
     def response(self, rows, number) -> Response:
         """Histories; `extra` has normal_load [N], normal_moment [N m], normal_energy [J], heave [m] and turn [rad]."""
-        out, modes, model = super().response(rows, number), self.modes, self.model
+        out = super().response(rows, number)
+        modes = self.modes
+        model = self.model
         extra = out.extra | dict(zip(PRESS, rows[:, -5:].T))
         if model.load is not None:
             return replace(out, extra=extra)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from patchfem.dynamics.lanes import names_kernels as at
 from patchfem.dynamics.lanes import reading, run
+from patchfem.dynamics.lanes import rows_kernels as at
 from patchfem.friction.laws.iwan import max_yield_displacement
 
 FLOWS = tuple(f"friction.laws.{law}_kernels" for law in ("tanh", "stretch", "bouc_wen", "lugre"))
@@ -29,7 +29,7 @@ def cases(law: str, count: int, seed: int = 1) -> run.Cases:
     if law == "table":
         sets = [elements(r, one) for one in slip]
         spring, length = (np.array(part) for part in zip(*((k.sum(), y[-1]) for k, y in sets)))
-        numbers = run.tables_of(sets)
+        numbers = run.curve_tables(sets)
     if law in FLOWS:
         speed, length = (
             slip * r.uniform(0.3, 2, count),
@@ -82,15 +82,17 @@ def test_always_a_thin_layer_needs_no_fine_steps(law, size, most):
     know the amplitude. Without parts of a step tanh erred by up to 1e-3, by rates of the stretch bonds ran away."""
     some, tanh = cases(law, 40), law == FLOWS[0]
     numbers = np.stack(
-        [some.slip, 0 * some.slip + 1 / size] if tanh else [some.slip / size, 0 * some.slip + size],
+        [some.kinetic, 0 * some.kinetic + 1 / size]
+        if tanh
+        else [some.kinetic / size, 0 * some.kinetic + size],
         1,
     )
     if law == FLOWS[2]:
-        numbers = np.stack([some.slip, *(0 * some.slip + one for one in (size, 1.0, 0.5))], 1)
+        numbers = np.stack([some.kinetic, *(0 * some.kinetic + one for one in (size, 1.0, 0.5))], 1)
     some = some._replace(
         law=numbers,
-        length=0 * some.slip + (0 if tanh else size),
-        spring=0 * some.slip if tanh else some.slip / size,
+        yield_length=0 * some.kinetic + (0 if tanh else size),
+        spring=0 * some.kinetic if tanh else some.kinetic / size,
     )
     reach = [
         np.ptp(run.march(law, some, 40, 4, steps).history[:, -4:, :2], axis=(1, 2)) / 2
@@ -115,18 +117,18 @@ def test_exact_a_case_leaps_to_where_it_would_march(law):
     """Motion, extremes and phasors of a march that leaps are those of a march by three cycles at a time, which never
     leaps."""
     some, cycles = cases(law, 60, 11), 150
-    begun = run.begun_at(law, some)
-    history, motion = run.march_on(law, some, begun, cycles, 96)
+    begun = run.initial_motion(law, some)
+    history, motion = run.continue_march(law, some, begun, cycles, 96)
     parts, step = [], begun
     for _ in range(cycles // 3):
-        part, step = run.march_on(law, some, step, 3, 96)
+        part, step = run.continue_march(law, some, step, 3, 96)
         parts.append(part)
     sizes, apart = (
         np.ptp(history[:, -1, :2], axis=1),
         np.abs(history - np.concatenate(parts, axis=1)).max(axis=(1, 2)),
     )
     assert np.all(apart < 2e-6 * sizes) and np.mean(apart > 0) > 0.5
-    for place in (at.X, at.V, at.PLACE):
+    for place in (at.SLIDE, at.SPEED, at.MEMORY):
         assert np.all(np.abs(motion - step)[:, place] < 2e-6 * sizes)
 
 
@@ -148,10 +150,10 @@ def test_exact_a_case_does_not_leap_while_its_extremes_are_at_the_ends_of_its_cy
         none,
         np.array([[0.50039206, 0.25, 1.0]]),
     )
-    begun = run.begun_at("masing", some)
-    history, step = run.march_on("masing", some, begun, 300, 96)[0], begun
+    begun = run.initial_motion("masing", some)
+    history, step = run.continue_march("masing", some, begun, 300, 96)[0], begun
     for _ in range(100):
-        part, step = run.march_on("masing", some, step, 3, 96)
+        part, step = run.continue_march("masing", some, step, 3, 96)
     np.testing.assert_allclose(history[0, -1], part[0, -1], rtol=0, atol=1e-6)
 
 
@@ -163,7 +165,7 @@ def test_exact_a_case_is_the_same_in_any_company(law):
     order = np.random.default_rng(2).permutation(70)
     mixed = run.march(law, run.Cases(*(part[order] for part in some)), 30, 3, 48)
     whole = run.march(law, some, 30, 3, 48)
-    for name in ("motion", "history", "shown", "ended"):
+    for name in ("motion", "history", "readings", "n_before"):
         np.testing.assert_array_equal(getattr(mixed, name), getattr(whole, name)[order])
 
 
@@ -193,7 +195,7 @@ def test_always_energies_balance(law):
     cases, and 8 times less at twice the steps in their middle, 4 times behind a table."""
     some, gaps = cases(law, 100), []
     for steps in (96, 192):
-        book = reading.books(law, some, run.march(law, some, 40, 4, steps), np.ones(100))
+        book = reading.run_energies(law, some, run.march(law, some, 40, 4, steps), np.ones(100))
         gap = np.abs(book["work_in"] - book["stored"] - book["friction"] - book["viscous"])
         gaps.append(gap / (book["power"] + book["peak_stored"]))
     assert np.quantile(gaps[0], 0.98) < 1e-4 and np.median(gaps[0]) < 5e-6
@@ -205,12 +207,12 @@ def test_always_energies_balance(law):
 def test_always_a_march_that_ran_away_has_no_numbers_and_prints_nothing(law):
     """By 8 steps a cycle of a mode that is 10 times as fast; energies overflowed."""
     some = cases(law, 60, 3)
-    some = some._replace(square=some.square * np.where(np.arange(60) % 2, 1, 100))
+    some = some._replace(stiffness=some.stiffness * np.where(np.arange(60) % 2, 1, 100))
     found = run.march(law, some, 60, 6, 8)
-    book, angle = reading.books(law, some, found, np.ones(60)), np.ones((60, 6, 2))
-    reading.reading_of(law, some, found, np.ones(60), np.ones(60), angle)
+    book, angle = reading.run_energies(law, some, found, np.ones(60)), np.ones((60, 6, 2))
+    reading.reading_of_runs(law, some, found, np.ones(60), np.ones(60), angle)
     assert np.isfinite(book["work_in"][1::2]).all() and np.isnan(book["work_in"][::2]).any()
-    assert (np.isnan(book["stored"]) == np.isnan(found.motion[:, at.X])).all()
+    assert (np.isnan(book["stored"]) == np.isnan(found.motion[:, at.SLIDE])).all()
 
 
 def test_exact_without_friction_a_march_is_the_closed_form():
@@ -240,20 +242,20 @@ def test_exact_without_friction_a_march_is_the_closed_form():
             values, vectors = np.linalg.eig(matrix)
             turned = vectors @ np.diag(np.exp(values * 14 * np.pi)) @ np.linalg.inv(vectors)
             want = forced + (turned @ (np.array([0, 0.1]) - forced)).real
-            np.testing.assert_allclose(found.motion[k, [at.X, at.V]], want, atol=1e-12)
+            np.testing.assert_allclose(found.motion[k, [at.SLIDE, at.SPEED]], want, atol=1e-12)
 
 
 @pytest.mark.parametrize("law", ["table", "friction.laws.stretch_kernels"])
 def test_exact_accelerations_are_those_of_the_equation(law):
     """At every fourth step, where a march of so many steps alone ends: by its motion and friction."""
     some, steps = cases(law, 35), 64
-    begun, table = run.begun_at(law, some), run.table_of(64)
-    found, motion = run.accelerations(law, some, begun, 2, steps), begun.copy()
-    numbers = run.numbers_of(law, some, steps)
+    begun, table = run.initial_motion(law, some), run.drive_table(64)
+    found, motion = run.output_accelerations(law, some, begun, 2, steps), begun.copy()
+    numbers = run.case_numbers(law, some, steps)
     for k in range(4, 2 * steps + 1, 4):
         first = (k - 4) % steps
-        part, workspace = table[:, first : first + 5].copy(), run.room_of(numbers, motion)
-        run.kernels(law).march(
+        part, workspace = table[:, first : first + 5].copy(), run.make_workspace(numbers, motion)
+        run.load_loop(law).march(
             numbers,
             np.arange(35),
             motion,
@@ -265,17 +267,17 @@ def test_exact_accelerations_are_those_of_the_equation(law):
         )
         sine, pull = (
             table[0, k % steps],
-            run.own_of(law, motion, "FELT") if law in FLOWS else motion[:, at.PLACE],
+            run.law_state(law, motion, "FRICTION") if law in FLOWS else motion[:, at.MEMORY],
         )
         want = (
-            some.out
+            some.output_gain
             * (
-                some.push * sine
-                - some.damp * motion[:, at.V]
-                - some.square * motion[:, at.X]
+                some.drive * sine
+                - some.damping * motion[:, at.SPEED]
+                - some.stiffness * motion[:, at.SLIDE]
                 - pull
             )
-            + some.base * sine
+            + some.base_gain * sine
         )
         np.testing.assert_allclose(found[:, k], want, rtol=1e-9, atol=1e-12)
 
@@ -284,18 +286,22 @@ def test_exact_accelerations_are_those_of_the_equation(law):
 def test_exact_a_set_of_elements_loses_what_masing_says(steps):
     """Energy of a cycle that repeats: 4 k y (A - y) of each element that yields, y < A, half the range of the slide."""
     some = cases("table", 60)
-    found = run.march("table", some._replace(damp=0.05 * np.ones(60)), 300, 2, steps)
-    settled = np.flatnonzero(found.ended + found.cycles < 300)
+    found = run.march("table", some._replace(damping=0.05 * np.ones(60)), 300, 2, steps)
+    settled = np.flatnonzero(found.n_before + found.n_observed < 300)
     half = np.ptp(found.history[:, -1, :2], axis=1) / 2
-    lost = some.slip * (found.motion[:, at.PATH] - found.begun[:, at.PATH]) / found.cycles
-    of = run.own_state("table").curve
+    lost = (
+        some.kinetic
+        * (found.motion[:, at.SLIP_PATH] - found.observed_start[:, at.SLIP_PATH])
+        / found.n_observed
+    )
+    of = run.law_kernels("table").curve
     # of each yield its place, and the force up to it
-    table = some.law[:, 3 : 3 + of.BEGINS].reshape(60, -1, of.COLUMNS)
+    table = some.law[:, 3 : 3 + of.PART_STARTS].reshape(60, -1, of.N_COLUMNS)
     y, force = (
         scale[:, None] * part
         for scale, part in (
-            (some.length, table[:, 1:, 0]),
-            (some.spring * some.length, np.diff(table[:, :, 1])),
+            (some.yield_length, table[:, 1:, 0]),
+            (some.spring * some.yield_length, np.diff(table[:, :, 1])),
         )
     )
     want = np.sum(np.where(force > 0, 4 * force * np.maximum(half[:, None] - y, 0.0), 0.0), axis=1)

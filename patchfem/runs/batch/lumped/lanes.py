@@ -23,8 +23,8 @@ from zlib import crc32
 
 import numpy as np
 
-from ....dynamics.lanes import names_kernels as at
 from ....dynamics.lanes import reading
+from ....dynamics.lanes import rows_kernels as at
 from ....dynamics.lanes import run as march
 from ....effects import is_bond_list, law_has_trait
 from ....friction.laws.iwan import max_yield_displacement as largest_slide
@@ -208,7 +208,7 @@ def of_law(model: Model) -> tuple:
 
 def steps_of(models: Sequence[Model]) -> np.ndarray:
     """Return the steps per cycle (n,) of models of one law; 0 if there would be too many."""
-    smooth = march.flows(KINDS[models[0].friction.law])
+    smooth = march.has_one_stretch(KINDS[models[0].friction.law])
     ends = [(CALM * steps / (2 * np.pi), steps) for steps in SMOOTH] if smooth else RATES
     return steps_at(collect_columns(models, _rate)[0], ends)
 
@@ -241,7 +241,7 @@ def _rate(model: Model) -> tuple:
     )
     scale = modes.slide[0] ** 2 / modes.mass
     stiff = _contact(model)[0] * scale
-    if not march.flows(KINDS[model.friction.law]):
+    if not march.has_one_stretch(KINDS[model.friction.law]):
         return (rate_of(model, _contact(model)[0]),)
     rate = damper
     if model.friction.law == "tanh":
@@ -276,7 +276,7 @@ def _contact(model: Model) -> tuple:
             share,
             half,
         )
-    if march.flows(KINDS[friction.law]):
+    if march.has_one_stretch(KINDS[friction.law]):
         *numbers, length = of_law(model)
         return 0.0 if friction.law == "tanh" else static / length, length, *numbers
     return (
@@ -373,7 +373,7 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
         np.flatnonzero(~exact & (2 * steps <= SMOOTH[-1])),
     )
     wrong = contradicted(found, ones, looked, exact, times)
-    if wrong and again.size and march.flows(law):
+    if wrong and again.size and march.has_one_stretch(law):
         finer, exact[again], *_ = _side_by_side(
             select_models(models, again), _of(cases, again), 2 * steps[again]
         )
@@ -431,7 +431,7 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     found, exact, steps = CaseResults.blank(len(models)), np.zeros(len(models), bool), steps.copy()
     reach = np.zeros(len(models))
     law, cycles, meshed = kind_of(models[0]), group(models[0])[0], {}
-    fewest, known, flows = steps // 2, {}, march.flows(law)
+    fewest, known, flows = steps // 2, {}, march.has_one_stretch(law)
     now, smooth = int(fewest.min()), flows or law in march.MASING
     finest = (SMOOTH if smooth else RATES[-1])[-1]
 
@@ -668,7 +668,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
     errors |= {
         name: errors[name] + error for name, error in (meshed or {}).items() if name in errors
     }
-    slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
+    slips = found.reading("MAX_SLIP") - found.reading("MIN_SLIP")
     stuck = slips / 2 <= np.maximum(
         c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2))
     )
@@ -684,7 +684,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
         )
         steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | open_ones
     if law in march.MASING:
-        exact |= march.own_of(law, found.motion, "DROPPED") > DROPPED
+        exact |= march.law_state(law, found.motion, "MAX_DROPPED_GAP") > DROPPED
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
     nowhere = np.zeros(len(models), bool)  # lost cases are returned separately
@@ -705,14 +705,14 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
         steady,
         again=False,
     )
-    ended = np.isfinite(found.motion[:, at.X] + coarser[0]["friction_work"])
+    ended = np.isfinite(found.motion[:, at.SLIDE] + coarser[0]["friction_work"])
     return runs, exact, faint | ~ended
 
 
 def may_ring(cases, found) -> np.ndarray:
     """Return whether a stick of the last cycles is long enough for a ringing, (n,)."""
-    own = np.sqrt(np.maximum(cases.square + cases.spring - cases.damp**2 / 4, 0.0))
-    return found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
+    own = np.sqrt(np.maximum(cases.stiffness + cases.spring - cases.damping**2 / 4, 0.0))
+    return found.reading("LONGEST_STICK") * own >= RINGS
 
 
 def stays(cases, found) -> np.ndarray:
@@ -722,10 +722,10 @@ def stays(cases, found) -> np.ndarray:
     """
     last = found.history[:, -2:, :2]
     change = np.abs(last[:, 1] - last[:, 0]).max(axis=1) / np.maximum(
-        -np.expm1(-np.pi * cases.damp), 1e-300
+        -np.expm1(-np.pi * cases.damping), 1e-300
     )
-    gain = np.abs(cases.out) * (cases.square + cases.spring) * change
-    return gain > FAINT / 3 * found.shown[:, at.ACCELERATION - at.SHOW]
+    gain = np.abs(cases.output_gain) * (cases.stiffness + cases.spring) * change
+    return gain > FAINT / 3 * found.reading("MAX_ACCELERATION")
 
 
 def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
@@ -750,29 +750,35 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         ring_frequency [Hz] and ring_damping [1] by name, their errors, which cases (n,) need a
         single run, and which need more steps.
     """
-    (stuck, window, steps), n, faint = read, len(found.ended), np.zeros(len(found.ended), bool)
+    (stuck, window, steps), n, faint = (
+        read,
+        len(found.n_before),
+        np.zeros(len(found.n_before), bool),
+    )
     out = tuple({name: np.full(n, np.nan) for name in RING} for _ in range(2))
     if law == "rigid":  # a rigid interface with one mode does not move in a stick
         return *out, faint, faint
-    rings, marched = may_ring(cases, found), found.ended >= found.history.shape[1] - window
-    held = found.shown[:, at.STUCK - at.SHOW] > 2 * np.pi * (found.cycles - 1e-6)
+    rings, marched = may_ring(cases, found), found.n_before >= found.history.shape[1] - window
+    held = found.reading("STICK_ANGLE") > 2 * np.pi * (found.n_observed - 1e-6)
     if law == "yielding":
         _of_springs(cases, c, found, held & rings & marched, out)
         return *out, rings & ~held, faint
     # a periodic motion does not ring, but the start may remain in a stick of all cycles
     may = (
-        (rings & marched & (march.own_of(law, found.motion, "EVER") > 0))
+        (rings & marched & (march.law_state(law, found.motion, "EVER_SLIPPED") > 0))
         | (stays(cases, found) & stuck)
         if law in march.MASING
         else stays(cases, found) & (stuck | rings)
     )
     untold, told = may & ~held, may & held
-    strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.square + cases.spring, 1.0)))
+    strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.stiffness + cases.spring, 1.0)))
     # the stride of a case does not depend on other cases
     strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(int)
     where = np.flatnonzero(told)
     every = (
-        march.accelerations(law, _of(cases, where), found.begun[where], window, steps)
+        march.output_accelerations(
+            law, _of(cases, where), found.observed_start[where], window, steps
+        )
         if where.size
         else ()
     )
@@ -781,7 +787,7 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         time = np.linspace(0, 2 * np.pi * window / omega, len(signal))
         values, apart = ringing(time, signal, [(0.0, time[-1])], omega)
         # with so few steps, a ringing may be missed
-        faint[case] = not values and march.flows(law) and steps < RINGING
+        faint[case] = not values and march.has_one_stretch(law) and steps < RINGING
         for name, value in values.items():
             out[0][name][case], out[1][name][case] = value, OF_FIT * apart[name]
     return *out, untold, faint
@@ -793,25 +799,29 @@ def _of_springs(cases, c: dict, found, held, out: tuple) -> None:
     It is known in closed form, with the criteria of `response.ringing`; `out` is filled: values and
     errors by name.
     """
-    beta, half, angle = cases.square + cases.spring, cases.damp / 2, 2 * np.pi * found.cycles
+    beta, half, angle = (
+        cases.stiffness + cases.spring,
+        cases.damping / 2,
+        2 * np.pi * found.n_observed,
+    )
     own, far = np.sqrt(np.maximum(beta - half**2, 0.0)), beta - 1
-    whole = far**2 + cases.damp**2
-    begun, place = found.begun, found.begun[:, at.PLACE]
+    whole = far**2 + cases.damping**2
+    begun, place = found.observed_start, found.observed_start[:, at.MEMORY]
     with np.errstate(
         all="ignore"
     ):  # the motion without that of the sine and without the stretch of the spring
-        z = begun[:, at.X] - cases.spring * place / beta + cases.push * cases.damp / whole
-        other = (begun[:, at.V] - cases.push * far / whole + half * z) / own
+        z = begun[:, at.SLIDE] - cases.spring * place / beta + cases.drive * cases.damping / whole
+        other = (begun[:, at.SPEED] - cases.drive * far / whole + half * z) / own
         damping = half / np.sqrt(beta)
         forced = (angle > 3 * np.pi) & (damping < 1e-3) & (np.abs(own - np.round(own)) < 1e-2)
-        size = np.abs(cases.out) * beta * np.hypot(z, other)
+        size = np.abs(cases.output_gain) * beta * np.hypot(z, other)
         told = (
             held
             & (angle * own >= 3 * np.pi)
             & (damping < WIDEST)
             & ~forced
             & (whole > 1e-18 * beta**2)
-            & (size > FAINT * found.shown[:, at.ACCELERATION - at.SHOW])
+            & (size > FAINT * found.reading("MAX_ACCELERATION"))
         )
     for name, value in zip(RING, (own * c["omega"] / (2 * np.pi), damping)):
         out[0][name][told], out[1][name][told] = value[told], 0.0
@@ -851,7 +861,7 @@ def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
         if not where.size:
             break
         here, before = _of(cases, where), motion
-        more, motion = march.march_on(law, here, before, max(1, int(share * part)), steps)
+        more, motion = march.continue_march(law, here, before, max(1, int(share * part)), steps)
         history = np.concatenate([history, more], axis=1)
         late = history.shape[1] > MORE * part
         least = _left(here, before, motion, more.shape[1])
@@ -860,7 +870,7 @@ def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
         ranges = np.ptp(history[:, -part:, :2], axis=2) / 2
         known = error < near * ranges[:, -1]
         if law == "yielding":
-            known &= _goes_on(ranges, cases.length[where], value, error)
+            known &= _goes_on(ranges, cases.yield_length[where], value, error)
         out[:, where[known]], lost[where[known]] = (value[known], error[known]), False
         where, motion, history = where[~known], motion[~known], history[~known]
     return tuple(out), lost
@@ -893,10 +903,12 @@ def _left(cases, before, motion, cycles: int) -> np.ndarray:
     It follows from the change in `cycles` cycles, and from the smallest decay by the damper in
     them: with a slow beat, the extremes hardly change while it is largest.
     """
-    own, half = np.sqrt(cases.square + cases.spring), cases.damp / 2
-    step = np.hypot(motion[:, at.X] - before[:, at.X], (motion[:, at.V] - before[:, at.V]) / own)
+    own, half = np.sqrt(cases.stiffness + cases.spring), cases.damping / 2
+    step = np.hypot(
+        motion[:, at.SLIDE] - before[:, at.SLIDE], (motion[:, at.SPEED] - before[:, at.SPEED]) / own
+    )
     goes = -np.expm1(
-        -2 * np.pi * cycles * (half - np.sqrt(np.maximum(half**2 - cases.square, 0.0)))
+        -2 * np.pi * cycles * (half - np.sqrt(np.maximum(half**2 - cases.stiffness, 0.0)))
     )
     return step * (1 - goes) / np.maximum(goes, 1e-300)
 
@@ -950,7 +962,9 @@ def cases_of(models, contacts=None) -> tuple:
     )
     law, scale, numbers = kind_of(models[0]), slide**2 / (mass * w**2), np.array(numbers).T
     numbers = (
-        numbers * march.scales(law, scale, w) if march.flows(law) else numbers.reshape(len(w), -1)
+        numbers * march.number_scales(law, scale, w)
+        if march.has_one_stretch(law)
+        else numbers.reshape(len(w), -1)
     )
     cases = march.Cases(
         damping / w,
@@ -1039,8 +1053,10 @@ def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
     found, window = march.march(law, cases, cycles, window_of(cycles), steps), window_of(cycles)
     extremes = found.history[:, :, :2] * c["ratio"][:, None, None]
     extremes[c["ratio"] < 0] = extremes[c["ratio"] < 0, :, ::-1]
-    book = reading.books(law, cases, found, c["energy"])
-    seen = reading.reading_of(law, cases, found, c["energy"], c["omega"], extremes[:, -window:])
+    book = reading.run_energies(law, cases, found, c["energy"])
+    seen = reading.reading_of_runs(
+        law, cases, found, c["energy"], c["omega"], extremes[:, -window:]
+    )
     with np.errstate(all="ignore"):
         values = read_off(seen, book, True, True, c["stiffness"], c["size"])
     values |= {

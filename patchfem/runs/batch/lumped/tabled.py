@@ -48,7 +48,7 @@ def moved(models, held: list, say) -> tuple:
     sets = [[one.groups[0] for one in (pressed.fine, pressed.coarse)] for pressed in held]
     rates = [lanes.rate_of(model, fine.stiffness.sum()) for model, (fine, _) in zip(models, sets)]
     steps = lanes.steps_at(rates, lanes.OF_TABLE)
-    most = load(f"{march.HERE}.table_curve_kernels").YIELDS - 1
+    most = load(f"{march.HERE}.table_curve_kernels").N_YIELDS - 1
     fit = (steps > 0) & [max(one.stiffness.size for one in pair) < most for pair in sets]
     found, lost = CaseResults.blank(len(models)), np.zeros(len(models), bool)
 
@@ -98,5 +98,5 @@ def _contacts(sets: list, held: list) -> np.ndarray:
         )
         for one, pressed in zip(sets, held)
     ]
-    tables = march.tables_of([(one.stiffness, one.yield_displacement) for one in sets])
+    tables = march.curve_tables([(one.stiffness, one.yield_displacement) for one in sets])
     return np.column_stack([rows, tables]).T

@@ -1,0 +1,465 @@
+"""Readings of the last cycles: peaks, loop, sticks and phasors, folded while the lanes march.
+
+Between two instants that the march knows, the acceleration and the friction are cubics through their values and rates, so
+a peak between steps is found too. A step with an event is read in two segments, before and after the event.
+"""
+
+from math import nan
+from typing import NamedTuple
+
+from ...compiled.jit import njit
+from . import lane_kernels as lanes
+from . import rigid_kernels as law
+from .rigid_kernels import LaneState, cubic_peak, drive_after
+from .rows_kernels import (
+    BASE_GAIN,
+    CASE_INDEX,
+    COS_1,
+    COS_3,
+    CURRENT_STICK,
+    CYCLE_START,
+    DAMPING,
+    DRIVE,
+    FIRST_MEAN_FORCE,
+    FIRST_MEAN_SLIDE,
+    FIRST_READING,
+    FORCE_AT_MAX,
+    FORCE_AT_MIN,
+    FORCE_SUM,
+    GROUP_BITS,
+    LANES,
+    LAST_MEAN_FORCE,
+    LAST_MEAN_SLIDE,
+    LONGEST_STICK,
+    LOOP_WORK,
+    LOOP_WORK_SIZE,
+    MAX_ACCELERATION,
+    MAX_FORCE,
+    MAX_SLIDE,
+    MAX_SLIP,
+    MEAN_RANGE,
+    MEMORY,
+    MIN_SLIDE,
+    MIN_SLIP,
+    N_READINGS,
+    N_SECANTS,
+    NJIT_INLINE,
+    OUTPUT_GAIN,
+    SECANT_SUM,
+    SIN_1,
+    SIN_3,
+    SLIDE,
+    SLIDE_SUM,
+    SLIP_SIGN,
+    SLIP_STARTS,
+    START_COS,
+    START_SIN,
+    STICK_ANGLE,
+    STIFFNESS,
+)
+
+# `friction_rate` of a law is asked for at these instants of a step.
+AT_START = 0
+BEFORE_EVENT = 1
+AFTER_EVENT = 2
+AT_END = 3
+
+
+class Instant(NamedTuple):
+    """Sine and cosine of the drive, state, friction and acceleration of a lane at an instant."""
+
+    sine: float
+    cosine: float
+    state: LaneState
+    friction: float
+    acceleration: float
+
+
+class Peaks(NamedTuple):
+    """Largest absolute acceleration of the output [m s-2] and largest absolute friction [m] of a segment."""
+
+    acceleration: float
+    friction: float
+
+
+@njit(**NJIT_INLINE)
+def instant_at(workspace, lane, sine, cosine, state):
+    """Return the `Instant` of a state."""
+    friction = law.friction_force(
+        state.slide, state.speed, state.slip_sign, state.memory, sine, workspace, lane
+    )
+    acceleration = (
+        workspace[DRIVE * LANES + lane] * sine
+        - workspace[DAMPING * LANES + lane] * state.speed
+        - workspace[STIFFNESS * LANES + lane] * state.slide
+        - friction
+    )
+    return Instant(sine, cosine, state, friction, acceleration)
+
+
+@njit(**NJIT_INLINE)
+def output_acceleration(workspace, lane, instant):
+    """Return the absolute acceleration of the output [m s-2]."""
+    return (
+        workspace[OUTPUT_GAIN * LANES + lane] * instant.acceleration
+        + workspace[BASE_GAIN * LANES + lane] * instant.sine
+    )
+
+
+@njit(**NJIT_INLINE)
+def output_jerk(workspace, lane, instant, friction_rate):
+    """Return the rate of the acceleration of the output, from the rate of the friction."""
+    free_rate = (
+        workspace[DRIVE * LANES + lane] * instant.cosine
+        - workspace[DAMPING * LANES + lane] * instant.acceleration
+        - workspace[STIFFNESS * LANES + lane] * instant.state.speed
+    )
+    # The output of an interface that sticks rigidly moves with the base alone.
+    is_fixed = law.STICK_IS_RIGID and instant.state.slip_sign == 0.0
+    gain = 0.0 if is_fixed else workspace[OUTPUT_GAIN * LANES + lane]
+    base_rate = workspace[BASE_GAIN * LANES + lane] * instant.cosine
+    return gain * (free_rate - friction_rate) + base_rate
+
+
+@njit(**NJIT_INLINE)
+def segment_peaks(workspace, lane, first, last, angle, when, last_when):
+    """Return the peaks between two instants, by cubics through values and rates.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `lane_kernels.resolve_lane_step`.
+    first, last : Instant
+    angle : float
+        Angle between them [rad].
+    when, last_when : int
+        Which instants of the step they are. They are constants of the call, because a compiler takes several lanes at
+        once only if it knows the rows of the workspace.
+
+    Returns
+    -------
+    Peaks
+    """
+    rate = friction_rate_at(workspace, lane, first, when)
+    last_rate = friction_rate_at(workspace, lane, last, last_when)
+    acceleration = cubic_peak(
+        output_acceleration(workspace, lane, first),
+        output_acceleration(workspace, lane, last),
+        angle * output_jerk(workspace, lane, first, rate),
+        angle * output_jerk(workspace, lane, last, last_rate),
+    )
+    friction = cubic_peak(first.friction, last.friction, angle * rate, angle * last_rate)
+    return Peaks(acceleration, friction)
+
+
+@njit(**NJIT_INLINE)
+def friction_rate_at(workspace, lane, instant, when):
+    """Return the rate of the friction at an instant of the step."""
+    state = instant.state
+    return law.friction_rate(
+        state.speed,
+        instant.acceleration,
+        state.slip_sign,
+        state.memory,
+        workspace,
+        lane,
+        when,
+    )
+
+
+@njit(**NJIT_INLINE)
+def observe_step(workspace, lane, s0, c0, s1, c1, angle):
+    """Move a lane over a step without an event and add its readings; a lane that has an event is marked and stays.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0, s1, c1, angle
+        See `lane_kernels.resolve_lane_step`.
+    """
+    state = lanes.lane_state(workspace, lane)
+    first = instant_at(workspace, lane, s0, c0, state)
+    stick = law.is_sticking(state.speed, state.slip_sign, state.memory, workspace, lane)
+    tried = law.try_step(workspace, lane, s0, c0, s1, c1, True)
+    event = tried.has_event
+    x1 = tried.slide
+    end = LaneState(x1, tried.speed, state.slip_sign, tried.memory)
+    last = instant_at(workspace, lane, s1, c1, end)
+    slip = law.irreversible_slide(x1, tried.memory, workspace, lane)
+    peaks = segment_peaks(workspace, lane, first, last, angle, AT_START, AT_END)
+    # All rows are read before the first one is written, otherwise a compiler does not take several lanes at once.
+    highest = workspace[MAX_SLIDE * LANES + lane]
+    lowest = workspace[MIN_SLIDE * LANES + lane]
+    current_stick = workspace[CURRENT_STICK * LANES + lane]
+    longest = workspace[LONGEST_STICK * LANES + lane]
+    max_slip = workspace[MAX_SLIP * LANES + lane]
+    min_slip = workspace[MIN_SLIP * LANES + lane]
+    force_at_max = workspace[FORCE_AT_MAX * LANES + lane]
+    force_at_min = workspace[FORCE_AT_MIN * LANES + lane]
+    acceleration = workspace[MAX_ACCELERATION * LANES + lane]
+    friction = workspace[MAX_FORCE * LANES + lane]
+    stick_now = current_stick + angle * stick
+    moves = lanes.accept_step(workspace, lane, state, s1, c1, tried, x1)
+    work = moves * 0.5 * (first.friction + last.friction) * (x1 - state.slide)
+    workspace[MAX_ACCELERATION * LANES + lane] = (
+        acceleration if event else max(acceleration, peaks.acceleration)
+    )
+    workspace[MAX_FORCE * LANES + lane] = friction if event else max(friction, peaks.friction)
+    workspace[STICK_ANGLE * LANES + lane] += moves * angle * stick
+    workspace[LONGEST_STICK * LANES + lane] = longest if event else max(longest, stick_now)
+    workspace[CURRENT_STICK * LANES + lane] = current_stick if event else stick * stick_now
+    workspace[MAX_SLIP * LANES + lane] = max_slip if event else max(max_slip, slip)
+    workspace[MIN_SLIP * LANES + lane] = min_slip if event else min(min_slip, slip)
+    workspace[LOOP_WORK * LANES + lane] += work
+    workspace[LOOP_WORK_SIZE * LANES + lane] += abs(work)
+    add_sample(workspace, lane, s1, c1, moves * x1, moves * last.friction)
+    # The slide does not reverse at an extreme of a step without an event.
+    workspace[FORCE_AT_MAX * LANES + lane] = force_at_max if event or not x1 > highest else nan
+    workspace[FORCE_AT_MIN * LANES + lane] = force_at_min if event or not x1 < lowest else nan
+
+
+@njit(**NJIT_INLINE)
+def add_sample(workspace, lane, sine, cosine, slide, friction):
+    """Add a sample to the phasors and to the means."""
+    workspace[COS_1 * LANES + lane] += slide * cosine
+    workspace[SIN_1 * LANES + lane] += slide * sine
+    workspace[COS_3 * LANES + lane] += slide * (cosine * (4 * cosine * cosine - 3))
+    workspace[SIN_3 * LANES + lane] += slide * (sine * (3 - 4 * sine * sine))
+    workspace[SLIDE_SUM * LANES + lane] += slide
+    workspace[FORCE_SUM * LANES + lane] += friction
+
+
+@njit(**NJIT_INLINE)
+def observe_event_step(workspace, lane, s0, c0, s1, c1, angle):
+    """Move a lane over a step with an event and add its readings, those before and after the event.
+
+    Parameters
+    ----------
+    workspace, lane, s0, c0, s1, c1, angle
+        See `lane_kernels.resolve_lane_step`.
+    """
+    highest = workspace[MAX_SLIDE * LANES + lane]
+    lowest = workspace[MIN_SLIDE * LANES + lane]
+    start, outcome = lanes.resolve_lane_step(workspace, lane, s0, c0, s1, c1, angle)
+    event_angle = outcome.event * angle
+    se, ce = drive_after(s0, c0, event_angle)
+    x = outcome.event_slide
+    v = outcome.event_speed
+    memory = outcome.event_memory
+    before = LaneState(x, v, start.slip_sign, memory)
+    after = LaneState(x, v, outcome.slip_sign, memory)
+    end = LaneState(outcome.slide, outcome.speed, outcome.slip_sign, outcome.memory)
+    first = instant_at(workspace, lane, s0, c0, start)
+    first_end = instant_at(workspace, lane, se, ce, before)
+    second = instant_at(workspace, lane, se, ce, after)
+    last = instant_at(workspace, lane, s1, c1, end)
+    add_sticks(workspace, lane, (first, first_end), (second, last), outcome.event, angle)
+    add_slip_range(workspace, lane, before, end)
+    reversal_force = law.friction_at_reversal(
+        outcome.reversal_slide, start.slip_sign, start.memory, memory, workspace, lane
+    )
+    if not law.records_own_peaks():
+        peaks = segment_peaks(
+            workspace, lane, first, first_end, event_angle, AT_START, BEFORE_EVENT
+        )
+        last_peaks = segment_peaks(
+            workspace, lane, second, last, angle - event_angle, AFTER_EVENT, AT_END
+        )
+        add_peaks(workspace, lane, peaks.acceleration, peaks.friction)
+        add_peaks(workspace, lane, last_peaks.acceleration, last_peaks.friction)
+        if outcome.reversal_slide != outcome.slide:
+            add_peaks(workspace, lane, 0.0, abs(reversal_force))
+        work = 0.5 * (first.friction + first_end.friction) * (x - start.slide)
+        last_work = 0.5 * (second.friction + last.friction) * (outcome.slide - x)
+        workspace[LOOP_WORK * LANES + lane] += work + last_work
+        workspace[LOOP_WORK_SIZE * LANES + lane] += abs(work) + abs(last_work)
+    add_sample(workspace, lane, s1, c1, outcome.slide, last.friction)
+    is_reversed = start.speed != 0.0 and start.speed * outcome.speed <= 0.0
+    force = reversal_force if is_reversed else nan
+    if max(outcome.slide, outcome.reversal_slide) > highest:
+        workspace[FORCE_AT_MAX * LANES + lane] = force
+    if min(outcome.slide, outcome.reversal_slide) < lowest:
+        workspace[FORCE_AT_MIN * LANES + lane] = force
+
+
+@njit(**NJIT_INLINE)
+def add_peaks(workspace, lane, acceleration, friction):
+    """Update the largest acceleration and the largest friction."""
+    workspace[MAX_ACCELERATION * LANES + lane] = max(
+        workspace[MAX_ACCELERATION * LANES + lane], acceleration
+    )
+    workspace[MAX_FORCE * LANES + lane] = max(workspace[MAX_FORCE * LANES + lane], friction)
+
+
+@njit(**NJIT_INLINE)
+def add_slip_range(workspace, lane, event, end):
+    """Update the range of the irreversible slide with the states at the event and at the end of a step."""
+    slip = law.irreversible_slide(event.slide, event.memory, workspace, lane)
+    last_slip = law.irreversible_slide(end.slide, end.memory, workspace, lane)
+    workspace[MAX_SLIP * LANES + lane] = max(
+        workspace[MAX_SLIP * LANES + lane], max(slip, last_slip)
+    )
+    workspace[MIN_SLIP * LANES + lane] = min(
+        workspace[MIN_SLIP * LANES + lane], min(slip, last_slip)
+    )
+
+
+@njit(**NJIT_INLINE)
+def add_sticks(workspace, lane, first, second, event, angle):
+    """Add the sticks and the start of a slip in a step with an event, and the extremes of the slip.
+
+    Parameters
+    ----------
+    workspace, lane
+        See `lane_kernels.resolve_lane_step`.
+    first, second : tuple of Instant
+        Both ends of the segments before and after the event.
+    event : float
+        Fraction of the step before the event.
+    angle : float
+        Angle of the step [rad].
+    """
+    event_angle = event * angle
+    slip_sign = first[0].state.slip_sign
+    last_sign = second[0].state.slip_sign
+    stick = law.stick_fractions(first[0], first[1], workspace, lane, event_angle)
+    last_stick = law.stick_fractions(second[0], second[1], workspace, lane, angle - event_angle)
+    stick_angle = angle * (event * stick.fraction)
+    last_angle = angle * ((1 - event) * last_stick.fraction)
+    workspace[STICK_ANGLE * LANES + lane] += stick_angle + last_angle
+    current = workspace[CURRENT_STICK * LANES + lane] + stick_angle
+    workspace[LONGEST_STICK * LANES + lane] = max(workspace[LONGEST_STICK * LANES + lane], current)
+    continues = event >= 1.0 or (law.EVENT_KEEPS_STICK and last_sign == 0.0)
+    current = current if stick.fraction > 0.0 and continues else 0.0
+    workspace[CURRENT_STICK * LANES + lane] = current + last_angle
+    is_released = slip_sign == 0.0 and last_sign != 0.0
+    start = event_angle + (angle - event_angle) * last_stick.slip_start
+    if stick.slip_start <= 1.0:
+        start = event_angle * stick.slip_start
+    if is_released:
+        start = event_angle
+    if is_released or stick.slip_start <= 1.0 or last_stick.slip_start <= 1.0:
+        sine, cosine = drive_after(first[0].sine, first[0].cosine, start)
+        workspace[SLIP_STARTS * LANES + lane] += 1.0
+        workspace[START_COS * LANES + lane] += 1 - 2 * sine * sine
+        workspace[START_SIN * LANES + lane] += 2 * sine * cosine
+    workspace[MAX_SLIP * LANES + lane] = max(
+        workspace[MAX_SLIP * LANES + lane], max(stick.extreme_slip, last_stick.extreme_slip)
+    )
+    workspace[MIN_SLIP * LANES + lane] = min(
+        workspace[MIN_SLIP * LANES + lane], min(stick.extreme_slip, last_stick.extreme_slip)
+    )
+
+
+@njit(**NJIT_INLINE)
+def lane_friction(lane, workspace, sine):
+    """Return the friction of a lane [m] at a sine of the drive."""
+    state = lanes.lane_state(workspace, lane)
+    return law.friction_force(
+        state.slide, state.speed, state.slip_sign, state.memory, sine, workspace, lane
+    )
+
+
+@njit(**NJIT_INLINE)
+def start_observed_cycle(lane, workspace):
+    """Begin the readings of a cycle."""
+    workspace[CYCLE_START * LANES + lane] = workspace[SLIDE * LANES + lane]
+    workspace[SLIDE_SUM * LANES + lane] = 0.0
+    workspace[FORCE_SUM * LANES + lane] = 0.5 * lane_friction(lane, workspace, 0.0)
+    is_fixed = law.STICK_IS_RIGID and workspace[SLIP_SIGN * LANES + lane] == 0.0
+    workspace[FORCE_AT_MAX * LANES + lane] = 0.0 if is_fixed else nan
+    workspace[FORCE_AT_MIN * LANES + lane] = 0.0 if is_fixed else nan
+
+
+@njit(**NJIT_INLINE)
+def finish_observed_cycle(lane, workspace, is_first, n_cycles, angle):
+    """Add the range, the secant stiffness and the means of a cycle to the readings.
+
+    Parameters
+    ----------
+    lane, workspace
+        See `lane_kernels.resolve_lane_step`.
+    is_first : bool
+        Whether this is the first observed cycle.
+    n_cycles : int
+        Number of observed cycles.
+    angle : float
+        Angle of a step [rad].
+    """
+    size = workspace[MAX_SLIDE * LANES + lane] - workspace[MIN_SLIDE * LANES + lane]
+    drift = workspace[CYCLE_START * LANES + lane] - workspace[SLIDE * LANES + lane]
+    force_at_max = workspace[FORCE_AT_MAX * LANES + lane]
+    force_at_min = workspace[FORCE_AT_MIN * LANES + lane]
+    # The slide of a rigid stick has an extreme at an end of the cycle without a reversal; its mean friction is 0.
+    if law.STICK_IS_RIGID and size > 0.0:
+        force_at_max = force_at_max if force_at_max == force_at_max else 0.0
+        force_at_min = force_at_min if force_at_min == force_at_min else 0.0
+    secant = (force_at_max - force_at_min) / size
+    workspace[MEAN_RANGE * LANES + lane] += size / n_cycles
+    if secant == secant and size > 0.0:
+        workspace[N_SECANTS * LANES + lane] += 1.0
+        workspace[SECANT_SUM * LANES + lane] += secant
+    slide = angle * (workspace[SLIDE_SUM * LANES + lane] + 0.5 * drift)
+    friction = angle * (
+        workspace[FORCE_SUM * LANES + lane] - 0.5 * lane_friction(lane, workspace, 0.0)
+    )
+    if is_first:
+        workspace[FIRST_MEAN_SLIDE * LANES + lane] = slide
+        workspace[FIRST_MEAN_FORCE * LANES + lane] = friction
+    workspace[LAST_MEAN_SLIDE * LANES + lane] = slide
+    workspace[LAST_MEAN_FORCE * LANES + lane] = friction
+
+
+@njit(**NJIT_INLINE)
+def record_accelerations(workspace, acceleration, step, sine):
+    """Write the acceleration of the output after so many steps, unless `acceleration` (n, 0) asks for none."""
+    for lane in range(LANES if acceleration.shape[1] > 0 else 0):
+        case = workspace[CASE_INDEX * LANES + lane]
+        if case >= 0.0:
+            instant = instant_at(workspace, lane, sine, 0.0, lanes.lane_state(workspace, lane))
+            acceleration[int(case), step] = output_acceleration(workspace, lane, instant)
+
+
+@njit(**NJIT_INLINE)
+def load_observed_cases(first, cases, order, motion, workspace):
+    """Put the cases from the number `first` of the order into the lanes and clear their readings."""
+    for lane in range(LANES):
+        lanes.load_case(order[min(first + lane, len(order) - 1)], lane, cases, motion, workspace)
+        for n in range(FIRST_READING, FIRST_READING + N_READINGS):
+            workspace[n * LANES + lane] = 0.0
+        slip = law.irreversible_slide(
+            workspace[SLIDE * LANES + lane], workspace[MEMORY * LANES + lane], workspace, lane
+        )
+        workspace[MAX_SLIP * LANES + lane] = slip
+        workspace[MIN_SLIP * LANES + lane] = slip
+        if first + lane >= len(order):
+            workspace[CASE_INDEX * LANES + lane] = -1.0
+
+
+@njit(**NJIT_INLINE)
+def observe_cycle(workspace, marked, table, n_busy, acceleration, first_step):
+    """March the first lanes, `n_busy` of them, over a cycle and read it.
+
+    Parameters
+    ----------
+    workspace, marked, table, acceleration : array
+        See `loop_kernels.observe`.
+    n_busy : int
+        Number of lanes that have a case.
+    first_step : int
+        Number of steps before this cycle.
+    """
+    angle = table[2, 0]
+    width = (n_busy + (1 << GROUP_BITS) - 1) >> GROUP_BITS << GROUP_BITS
+    for lane in range(n_busy):
+        start_observed_cycle(lane, workspace)
+    for k in range(table.shape[1] - 1):
+        s0 = table[0, k]
+        c0 = table[1, k]
+        s1 = table[0, k + 1]
+        c1 = table[1, k + 1]
+        law.prepare_step(workspace, s0, c0)
+        for lane in range(width):
+            observe_step(workspace, lane, s0, c0, s1, c1, angle)
+        for n in range(lanes.collect_marked_lanes(workspace, marked, n_busy)):
+            observe_event_step(workspace, marked[n], s0, c0, s1, c1, angle)
+        record_accelerations(workspace, acceleration, first_step + k + 1, s1)
