@@ -1,4 +1,4 @@
-"""Many runs of one scene: fits, error against cost, a scene before and after wear, sweeps.
+"""Studies of many runs of one scene: fits, error against cost, wear comparisons, sweeps.
 
 Read `cost` first.
 """

@@ -1,4 +1,8 @@
-"""A scene pressed with the surface before and with the surface after: its measures side by side with their errors."""
+"""Measures of a scene with the surface before and with the surface after wear, side by side.
+
+In: two models that differ only in the gap. Out: `Pressed`, the measures of both runs with their
+errors.
+"""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,7 +15,7 @@ from ..runs.plan import plan
 from ..runs.results.result import surface_of
 from ..runs.run import run
 
-SHOWN = {  # measure: (in words, what a scene needs for it)
+SHOWN = {  # by measure: its text in a sentence, and what a scene needs for it
     "pressure_peak": ("largest pressure", "[contact]"),
     "contact_fraction": ("fraction of the patch length that is in contact", "[contact]"),
     "normal_stiffness": ("normal stiffness K_n", "[contact]"),
@@ -28,8 +32,22 @@ SHOWN = {  # measure: (in words, what a scene needs for it)
 
 
 class Side(NamedTuple):
-    """One run: its measures by name, outcome, sentence, nodes x (n,) [m], normal stress there (n,) [Pa], warnings and
-    notes."""
+    """Results of one run.
+
+    Attributes
+    ----------
+    measures : dict
+        Measures by name.
+    outcome : str
+    sentence : str
+        The outcome as a sentence.
+    x : (n,) array
+        Positions of the nodes [m].
+    stress : (n,) array
+        Normal stress at the nodes [Pa].
+    warnings : list
+        Warnings and notes.
+    """
 
     measures: dict
     outcome: str
@@ -40,10 +58,18 @@ class Side(NamedTuple):
 
 
 class Pressed(NamedTuple):
-    """A scene pressed with both surfaces.
+    """A scene that was run with both surfaces.
 
-    title: of the scene; before, after: `Side`, None where that run failed; failed: sentences of what failed; lacking:
-    sentences of what this scene cannot tell.
+    Attributes
+    ----------
+    title : str
+        Title of the scene.
+    before, after : Side or None
+        None if the run failed.
+    failed : tuple of str
+        Reasons why runs failed.
+    lacking : tuple of str
+        Measures that this scene cannot give, and why.
     """
 
     title: str
@@ -53,7 +79,10 @@ class Pressed(NamedTuple):
     lacking: tuple
 
     def rows(self) -> list:
-        """(name, words, measure before, measure after) of what at least one run has; a measure may be None."""
+        """Return the measures that at least one run has.
+
+        They are tuples (name, text, measure before, measure after), where a measure may be None.
+        """
         sides = [one.measures if one is not None else {} for one in (self.before, self.after)]
         return [
             (name, words, *(side.get(name) for side in sides))
@@ -63,13 +92,27 @@ class Pressed(NamedTuple):
 
 
 def _there(measure: Measure | None) -> bool:
+    """Return whether a measure is known."""
     return measure is not None and measure.value is not None
 
 
 def pressed(before: Model, after: Model, title: str, say: Callable | None = None) -> Pressed:
-    """Run a model with the surface before in its gap and one with the surface after, all else alike.
+    """Run a model with the surface before and one with the surface after; all else is equal.
 
-    A run that is refused or does not converge is told in `failed`; the other one is still there.
+    A run that is refused or does not converge is described in `failed`; the other run is still
+    given.
+
+    Parameters
+    ----------
+    before, after : Model
+    title : str
+        Title of the scene.
+    say : callable, optional
+        Takes a line of progress.
+
+    Returns
+    -------
+    Pressed
     """
     sides, failed = [], []
     for name, model in (("before", before), ("after", after)):
@@ -94,6 +137,7 @@ def pressed(before: Model, after: Model, title: str, say: Callable | None = None
 
 
 def _side(model: Model, say) -> Side:
+    """Run a model and return its results."""
     result = run(plan(model), say)
     outcome, surface = result.outcome, surface_of(result.patch, result.fields)
     return Side(
@@ -107,9 +151,10 @@ def _side(model: Model, say) -> Side:
 
 
 def data_of(found: Pressed) -> dict:
-    """The runs as plain data in SI."""
+    """Return the runs as plain data in SI."""
 
     def side(one: Measure | None):
+        """Return value, error and unit of a measure; None for None."""
         return None if one is None else {"value": one.value, "error": one.error, "unit": one.unit}
 
     out = {

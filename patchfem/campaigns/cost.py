@@ -1,9 +1,14 @@
-"""Error of a scene against computing time, for several tolerances or for several values of one numerical setting.
+"""Error of a scene against computing time, over tolerances or values of a numerical setting.
 
-Read `tolerance_curve` first: it runs the scene at each tolerance, and where a run misses its tolerance it tries the
-setting that the run itself proposes. `curve` varies one setting alone.
+In: a model, and the setting that varies. Out: a list of `Cost`, one per run, and sentences on the
+cheapest setting that meets a tolerance.
 
-Seconds are CPU seconds of this process and its children: other work on the machine does not change them.
+Read `tolerance_curve` first: it runs the scene at several tolerances, and if a run misses its
+tolerance, it tries the setting that the warnings of this run propose. `curve` varies one setting
+alone.
+
+Times are CPU seconds of this process and its children, because other work on the machine does not
+change them.
 """
 
 import os
@@ -36,32 +41,57 @@ __all__ = [
     "tolerance_curve",
     "turned_by",
 ]
-TOLERANCE = "tolerance"  # name of the curve over tolerances, beside KNOBS
-TIMINGS = 3  # of a short run; the shortest counts, because other work only adds to it
-LONG = 0.3  # CPU seconds from which a run is timed once: timings of it differ by some percent
-# CPU seconds for the settings that runs propose, so that `cost` takes some seconds
+TOLERANCE = "tolerance"  # name of the curve over tolerances, which is accepted in addition to KNOBS
+# Timings of a short run; the shortest one counts, because other work on the machine only adds time.
+TIMINGS = 3
+# CPU seconds above which a run is timed only once, because its timings differ by a few percent
+LONG = 0.3
+# CPU seconds that runs with proposed settings may take in total, so that `cost` ends within seconds
 MAX_TRIAL_SECONDS = 10.0
-# how a warning of a run ends: the tolerance, what to do, and of this the setting that can be tried here
+# A warning of a run ends with its tolerance and what to do; this second part may name a setting
+# that can be tried here.
 _REMEDY = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 _PROPOSED = re.compile(r"set accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)")
-APART = 1.5  # ratio of the seconds by the clock to those of the processor from which both are told
-NOISE = 1.1  # ratio of seconds up to which two runs cost the same
-JITTER = 2e-3  # CPU seconds by which timings of one short run differ
-STUCK = 0.9  # ratio of the least error over the largest from which a knob does not help
-UNTURNED = 1e-11  # relative change of a measure that a knob leaves as it is
-ROUND = 1e-6  # of the floor of a measure, below which its change is one of round-off
+APART = 1.5  # elapsed time / CPU time above which both times are reported
+NOISE = 1.1  # ratio of CPU seconds up to which two runs count as equally expensive
+JITTER = 2e-3  # CPU seconds by which timings of the same short run differ
+STUCK = 0.9  # smallest / largest error above which a setting does not help
+UNTURNED = 1e-11  # relative change of a measure below which a setting does not affect it
+ROUND = 1e-6  # fraction of the floor of a measure below which a change of it is round-off
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cost:
     """One run of a cost curve.
 
-    label: of the setting, or of all settings that gave this run, bit for bit; value: of the knob in SI, None where the
-    scene's tolerance chose; words: the setting in a sentence; CPU seconds of the whole run with its error estimates,
-    the least of so many timings, and those by the clock in the same timing. By measure: values; errors, as the run
-    states them, in the unit of the value; floors of these; distances to the run `best`, which has none itself.
-    tolerance: what the run was asked for; remedies: what its warnings propose where it misses the tolerance; steps: of
-    a cycle, None if it has none.
+    Attributes
+    ----------
+    label : str
+        Label of the setting, or of all settings that gave this run bit for bit.
+    value : float or None
+        Value of the setting in SI; None if the tolerance of the scene chose it.
+    words : str
+        The setting as part of a sentence.
+    seconds : float
+        CPU seconds of the whole run with its error estimates: the smallest of `timings` timings.
+    wall_seconds : float
+        Elapsed seconds in the same timing.
+    timings : int
+        Number of timings.
+    values : dict
+        Values by measure.
+    errors : dict
+        Errors by measure as the run states them, in the unit of the value.
+    floors : dict
+        Floors of the errors by measure.
+    distances : dict
+        Distances to the best run by measure; empty for the best run.
+    tolerance : float
+        Tolerance that was set for the run.
+    remedies : tuple of str
+        What the warnings of the run propose if it misses the tolerance.
+    steps : int or None
+        Time steps per cycle; None if the run has none.
     """
 
     label: str
@@ -79,30 +109,33 @@ class Cost:
     steps: int | None = None
 
     def meets_tolerance(self) -> bool:
-        """Whether every stated error is within the tolerance that the run was asked for."""
+        """Return whether every stated error is within the tolerance that was set for the run."""
         return all(
             error <= allowed_error(self.tolerance, self.values[name], self.floors[name])
             for name, error in self.errors.items()
         )
 
     def off(self, name: str) -> float | None:
-        """Error of a measure: the larger of what the run states and its distance to the best; None without either."""
+        """Return the error of a measure; None if it is not known.
+
+        It is the larger of the error that the run states and its distance to the best run.
+        """
         known = [part[name] for part in (self.errors, self.distances) if name in part]
         return max(known, default=None)
 
     def waited(self) -> bool:
-        """Whether the clock ran so much longer than the processor that both are told."""
+        """Return whether the elapsed time exceeds the CPU time so much that both are reported."""
         return self.wall_seconds > APART * self.seconds
 
     def same_as(self, other) -> bool:
-        """Whether two settings of numbers gave the same run, bit for bit."""
+        """Return whether two settings that are numbers gave the same run bit for bit."""
         return None not in (self.value, other.value) and (self.values, self.errors) == (
             other.values,
             other.errors,
         )
 
     def within(self, name: str, tolerance: float) -> bool:
-        """Whether the error of a measure is at most tolerance * |value| + floor."""
+        """Return whether the error of a measure is at most tolerance * |value| + floor."""
         off = self.off(name)
         return off is not None and off <= allowed_error(
             tolerance, self.values[name], self.floors[name]
@@ -110,7 +143,7 @@ class Cost:
 
 
 def tolerance_curve(model: Model, say=None) -> list:
-    """Run a model at several tolerances, that of its scene among them.
+    """Run a model at several tolerances, including that of its scene.
 
     Parameters
     ----------
@@ -121,18 +154,24 @@ def tolerance_curve(model: Model, say=None) -> list:
     Returns
     -------
     list of Cost
-        From the widest to the tightest tolerance. Behind a run that misses its tolerance stand the runs with the
-        settings that were tried next, which have the same `tolerance`.
+        From the largest to the smallest tolerance. A run that misses its tolerance is followed by
+        the runs with the proposed settings, which have the same `tolerance`.
+
+    Raises
+    ------
+    NotConverged
+        If no run succeeds.
     """
     with locate_errors(model.source):
         wanted = with_tolerance(model)
-        # imports and compiling stay out of the times
+        # The first run includes imports and compilation, which the timings must not contain.
         _tried(wanted[0], "first run, not timed", None)
         runs, spent = [], 0.0
         for setting in wanted:
             one = _timed(setting, True, say)
             while one is not None:
-                if runs and one.same_as(runs[-1]):  # the faster timing holds for both
+                # The runs are identical, so the faster timing holds for both.
+                if runs and one.same_as(runs[-1]):
                     quick = min(runs[-1], one, key=lambda each: each.seconds)
                     runs[-1], one = (
                         replace(each, seconds=quick.seconds, wall_seconds=quick.wall_seconds)
@@ -154,7 +193,20 @@ def tolerance_curve(model: Model, say=None) -> list:
 
 
 def _proposed(setting: Setting, one: Cost, seconds: float) -> Setting | None:
-    """Return the setting that the warnings of a run propose; None if there is none that takes at most `seconds`."""
+    """Return the setting that the warnings of a run propose, or None.
+
+    None if no warning proposes a setting that is larger than the present one, or if the run with it
+    would take longer than `seconds`.
+
+    Parameters
+    ----------
+    setting : Setting
+        Setting of the run.
+    one : Cost
+        The run.
+    seconds : float
+        CPU seconds that the next run may take.
+    """
     for remedy in one.remedies:
         if found := _PROPOSED.match(remedy):
             key, count = found[1], int(found[2])
@@ -163,7 +215,7 @@ def _proposed(setting: Setting, one: Cost, seconds: float) -> Setting | None:
                 or (one.steps if key == "steps_per_cycle" else 1)
                 or 1
             )
-            # the time of a run grows about as its steps, modes or harmonics
+            # The time of a run grows about in proportion to its steps, modes or harmonics.
             if before < count and one.seconds * count / before <= seconds:
                 label = f"{one.tolerance:g}, {count} {key.replace('_', ' ')}"
                 return Setting(
@@ -176,10 +228,26 @@ def _proposed(setting: Setting, one: Cost, seconds: float) -> Setting | None:
 
 
 def curve(model: Model, knob: str, say=None) -> list:
-    """Cost of every value of a knob, coarse to fine; knob: of KNOBS, or TOLERANCE.
+    """Run a model with several values of a numerical setting, from coarse to fine.
 
-    What its tolerance chooses stands behind the values that a scene pins. PatchfemError for a knob that this scene does
-    not have.
+    Parameters
+    ----------
+    model : Model
+    knob : str
+        One of KNOBS, or TOLERANCE.
+    say : callable, optional
+        Takes a line of text per run.
+
+    Returns
+    -------
+    list of Cost
+        Identical neighbours are merged. The value that the tolerance chooses follows after the
+        fixed values.
+
+    Raises
+    ------
+    PatchfemError
+        If the scene does not have this setting, or if fewer than three values can be run.
     """
     if knob == TOLERANCE:
         return tolerance_curve(model, say)
@@ -192,7 +260,7 @@ def curve(model: Model, knob: str, say=None) -> list:
                 "",
             )
         wanted = settings(model, knob)
-        # imports and compiling stay out of the times
+        # The first run includes imports and compilation, which the timings must not contain.
         _tried(wanted[0], "first run, not timed", None)
         runs, done = [], 0
         for one in wanted:
@@ -214,7 +282,10 @@ def curve(model: Model, knob: str, say=None) -> list:
 
 
 def _best(runs: list) -> Cost:
-    """The finest run; of it and of what the tolerance chooses the one that states most of the smaller errors."""
+    """Return the run that serves as reference: the finest value, or what the tolerance chooses.
+
+    Of these two it is the run whose stated errors are the smaller ones for most measures.
+    """
     *_, last = runs
     if last.value is not None:
         return last
@@ -228,6 +299,7 @@ def _best(runs: list) -> Cost:
 
 
 def _distances(one: Cost, best: Cost) -> dict:
+    """Return the distances of the values of a run from those of the best run, by measure."""
     return {
         name: abs(value - best.values[name])
         for name, value in one.values.items()
@@ -236,8 +308,11 @@ def _distances(one: Cost, best: Cost) -> dict:
 
 
 def _one_run(first: Cost, second: Cost) -> Cost:
-    """Two settings that gave the same run as one, named by both; in a sentence by the one of the scene, which has no
-    number."""
+    """Merge two settings that gave the same run into one run with both labels.
+
+    In a sentence it is named by the shorter text, which is that of the setting without a number,
+    chosen by the scene.
+    """
     quick = min(first, second, key=lambda one: one.seconds)
     return replace(
         first,
@@ -250,10 +325,20 @@ def _one_run(first: Cost, second: Cost) -> Cost:
 
 
 def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
-    """A setting run TIMINGS times, or once where that is long and nothing was compiled, or where it is the run `before`
-    over again; None where it cannot be run.
+    """Run a setting several times and return its cost; None if it cannot be run.
 
-    coarse: a mesh of a file may be split once more for its estimate.
+    It is timed TIMINGS times, or once if the run is long and nothing was compiled, or if it repeats
+    a run in `before`.
+
+    Parameters
+    ----------
+    setting : Setting
+    coarse : bool
+        Whether the mesh of a file may be split once more for its error estimate.
+    say : callable or None
+        Takes a line of text.
+    before : sequence of Cost
+        Runs with which this one may be identical.
     """
     timings, one = [], None
     while one is None or (
@@ -295,13 +380,16 @@ def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
 
 
 def _cpu() -> float:
-    """CPU seconds of this process, all its threads, and of its children that have ended."""
+    """Return the CPU seconds of all threads of this process and of its children that have ended."""
     children = os.times()
     return process_time() + children.children_user + children.children_system
 
 
 def _compiled() -> int:
-    """How many functions have their machine code kept: a run that adds one has compiled it."""
+    """Return the number of functions whose machine code is cached.
+
+    A run that increases this number has compiled a function.
+    """
     try:
         return len(os.listdir(cache_folder() / "code"))
     except OSError:
@@ -309,7 +397,11 @@ def _compiled() -> int:
 
 
 def _tried(setting: Setting, label: str, say, coarse: bool = True) -> tuple | None:
-    """(Measures, warnings, steps per cycle) of a setting, condensed anew; None if it does not converge or memory ends."""
+    """Return (measures, warnings, steps per cycle) of a setting; None if the run fails.
+
+    The run does not use cached compliances. It fails if it does not converge or needs more memory
+    than there is.
+    """
     try:
         if setting.level:
             fine, *more = solve_split(setting.model.patch, setting.level, coarse)
@@ -327,8 +419,11 @@ def _tried(setting: Setting, label: str, say, coarse: bool = True) -> tuple | No
 
 
 def turned_by(runs: list) -> list:
-    """Names of the measures that the knob changes at all, beyond 1e-11 of their value and the round-off of their floor,
-    in the order of the runs."""
+    """Return the names of the measures that the setting changes, in the order of the runs.
+
+    A measure counts as changed if it differs by more than UNTURNED times its value and by more than
+    the round-off of its floor.
+    """
     return [
         name
         for name in runs[0].values
@@ -342,9 +437,10 @@ def turned_by(runs: list) -> list:
 
 
 def cheapest(runs: list, tolerance: float) -> dict:
-    """Label of the quickest run within the tolerance, by measure; None where no run is.
+    """Return, by measure, the label of the fastest run within the tolerance, or None.
 
-    A coarse run that is right by chance does not count: no finer run may leave the tolerance again.
+    A coarse run that is accurate by chance does not count: no finer run may exceed the tolerance
+    again.
     """
     out = {}
     for name in turned_by(runs):
@@ -354,15 +450,17 @@ def cheapest(runs: list, tolerance: float) -> dict:
 
 
 def _confirmed(runs: list, good) -> list:
-    """Runs for which good(run) holds and holds for every finer one that has an error; what the tolerance chooses
-    stands by itself."""
+    """Return the runs for which good(run) holds, and holds for every finer run with an error.
+
+    What the tolerance chooses is judged on its own.
+    """
     chain, alone, out = (
         [one for one in runs if one.value is not None],
         [one for one in runs if one.value is None],
         [],
     )
     for one in reversed(chain):
-        # a best run that only the others are measured against
+        # The best run has no error if it only serves as the reference of the others.
         if not one.errors and not one.distances:
             continue
         if not good(one):
@@ -372,8 +470,11 @@ def _confirmed(runs: list, good) -> list:
 
 
 def quickest(runs: list, tolerance: float) -> Cost | None:
-    """The run with least CPU seconds that has all measures within a tolerance, of those that cost the same the one
-    with the smallest setting; None where no run has."""
+    """Return the run with the fewest CPU seconds that has all measures within a tolerance.
+
+    Of runs that are equally expensive it is the one that comes first, with the coarsest setting.
+    None if there is no such run.
+    """
     names = stated_names(runs)
     good = _confirmed(
         runs, lambda one: all(one.within(name, tolerance) for name in names if name in one.values)
@@ -385,7 +486,7 @@ def quickest(runs: list, tolerance: float) -> Cost | None:
 
 
 def sentence(runs: list, tolerance: float) -> str:
-    """Say which setting meets a tolerance in the least time, or which measure misses it in the best run."""
+    """Return which setting meets a tolerance in the least time, or which measure misses it."""
     names = stated_names(runs)
     if one := quickest(runs, tolerance):
         return (
@@ -411,8 +512,7 @@ def sentence(runs: list, tolerance: float) -> str:
 
 
 def _effect(runs: list, tolerance: float) -> str:
-    """That a setting changes nothing, or nothing that counts, as words behind the sentence on its errors; "" where it
-    does."""
+    """Return a clause that says that the settings change nothing, or nothing relevant; else ""."""
     turned = turned_by(runs)
     if len(runs) < 2 or any(
         one.distances.get(name, 0.0)
@@ -433,10 +533,10 @@ def _seconds(one: Cost) -> str:
 
 
 class WorstError(NamedTuple):
-    """The measure of a run that is farthest from a tolerance.
+    """The measure of a run whose error is largest compared with its tolerance.
 
-    share: its error over what a tolerance of 1 would allow, to be compared with the tolerance; name: of the measure, ""
-    if no error is known.
+    share: error / error that a tolerance of 1 would allow, to be compared with the tolerance; name:
+    of the measure, "" if no error is known.
     """
 
     share: float
@@ -444,7 +544,7 @@ class WorstError(NamedTuple):
 
 
 def worst_error(one: Cost, names: list, tolerance: float) -> WorstError:
-    """Find the measure, of `names`, that is farthest from a tolerance in a run."""
+    """Find the measure, of `names`, whose error in a run is largest compared with a tolerance."""
     sizes = {
         name: abs(one.values[name]) + one.floors[name] / tolerance
         for name in names
@@ -457,12 +557,12 @@ def worst_error(one: Cost, names: list, tolerance: float) -> WorstError:
 
 
 def worst_of_run(one: Cost) -> WorstError:
-    """`worst_error` of all measures of a run for the tolerance that it was asked for."""
+    """Return `worst_error` of all measures of a run for the tolerance that was set for it."""
     return worst_error(one, list(one.values), one.tolerance)
 
 
 def stated_names(runs: list) -> list:
-    """Measures whose error any run states, or all where none does."""
+    """Return the measures whose error is stated by any run; all measures if no run states one."""
     return [name for name in runs[-1].values if any(name in one.errors for one in runs)] or list(
         runs[-1].values
     )

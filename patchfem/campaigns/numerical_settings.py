@@ -1,4 +1,4 @@
-"""Numerical settings of a model that can be turned: which it has, and its values from coarse to fine."""
+"""Numerical settings that can be varied in a model, and their values from coarse to fine."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -11,25 +11,34 @@ from ..runs.rig import numerics
 from ..scene.rules.accuracy import has_effect
 
 KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
-LEVELS = 5  # values of a knob, each twice as fine as the one before
-TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)  # of a mesh that is chosen
-# of a whole scene; tighter ones take long and few scenes meet them
+LEVELS = 5  # number of values of a setting; each is twice as fine as the one before
+TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)  # tolerances of a mesh that is chosen automatically
+# Tolerances of a whole scene; smaller ones take long, and few scenes meet them.
 SCENE_TOLERANCES = (
     1e-1,
     1e-2,
     1e-3,
     1e-4,
 )
-MOST_CELLS = 1600  # columns of the finest even mesh
+MOST_CELLS = 1600  # columns of the finest uniform mesh
 MOST_STEPS = 12800
-MIDDLE = {"shear_modes": 8, "jumps": 8}  # of the values where the scene pins none
+MIDDLE = {"shear_modes": 8, "jumps": 8}  # middle value, if the scene does not set the key
 
 
 class Setting(NamedTuple):
-    """One value of a knob.
+    """One value of a numerical setting.
 
-    label: for tables; value: of the knob in SI, None where the scene's tolerance chooses; words: the setting in a
-    sentence; level: halvings of the edges of a mesh file.
+    Attributes
+    ----------
+    label : str
+        Label for tables.
+    value : float or None
+        Value in SI; None if the tolerance of the scene chooses it.
+    words : str
+        The setting as part of a sentence.
+    model : Model
+    level : int
+        Number of times that the edges of a mesh file are halved.
     """
 
     label: str
@@ -40,10 +49,12 @@ class Setting(NamedTuple):
 
 
 def knobs_of(model: Model) -> list:
-    """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps, its shear modes and its
-    jumps over cycles of wear."""
+    """Return the settings, of KNOBS, that have an effect on a model.
+
+    They are its element size, time steps, shear modes, and the jumps over cycles of wear.
+    """
     out, engine = ["element_size"] if model.patch is not None else [], plan(model).engine
-    # that of its sum over bonds takes the same steps
+    # The sum over the bonds takes the same steps as a bench.
     engine = "bench" if model.kind == "bench" else engine
     out += [
         knob
@@ -60,8 +71,10 @@ def knobs_of(model: Model) -> list:
 
 
 def settings(model: Model, knob: str) -> list:
-    """Settings of a knob, coarse to fine, that of the scene itself among them; one that its tolerance chooses is last
-    where the others are numbers."""
+    """Return the values of a setting from coarse to fine, including that of the scene.
+
+    A value that the tolerance chooses comes last if the others are numbers.
+    """
     if knob == "element_size":
         if model.patch.mesh.file is not None:
             return [
@@ -75,6 +88,7 @@ def settings(model: Model, knob: str) -> list:
 
 
 def _split_words(level: int) -> str:
+    """Describe a mesh file whose edges are halved `level` times."""
     return (
         f"contact.mesh with every element edge halved {level} times"
         if level
@@ -83,7 +97,10 @@ def _split_words(level: int) -> str:
 
 
 def with_tolerance(model: Model) -> list:
-    """Settings for a row of values of accuracy.tolerance, wide to tight, that of the scene among them."""
+    """Return settings for several values of accuracy.tolerance, from large to small.
+
+    The tolerance of the scene is one of them.
+    """
     own = model.accuracy.tolerance
     models = {one: with_setting(model, "tolerance", one) for one in SCENE_TOLERANCES} | {own: model}
     return [
@@ -98,7 +115,7 @@ def with_setting(model: Model, key: str, value: float) -> Model:
 
 
 def _by_tolerance(model: Model) -> list:
-    """Meshes that tolerances choose; one named twice is that of the scene."""
+    """Return meshes that several tolerances choose; the label of the scene's mesh has no number."""
     own = model.accuracy.tolerance
     return [
         Setting(
@@ -112,7 +129,7 @@ def _by_tolerance(model: Model) -> list:
 
 
 def _even(model: Model) -> list:
-    """Even meshes, and of a static patch the mesh that its tolerance chooses."""
+    """Return uniform meshes, and for a static patch also the mesh that its tolerance chooses."""
     length, out = model.patch.pieces.length, []
     middle = round(length / model.patch.even_element_size)
     for power in range(-3, LEVELS - 3):
@@ -128,7 +145,7 @@ def _even(model: Model) -> list:
 
 
 def _counted(model: Model, knob: str) -> list:
-    """Values of a knob that counts, around that of the scene."""
+    """Return values of a setting that is a whole number, around the value of the scene."""
     pinned, middle = _pinned(model, knob), _middle(model, knob)
     words, out = "{} " + knob.replace("_", " "), []
     for power in range(-2, LEVELS - 2):
@@ -145,10 +162,12 @@ def _counted(model: Model, knob: str) -> list:
 
 
 def _pinned(model: Model, knob: str) -> int | None:
+    """Return the value of a setting in the scene; None if it does not set one."""
     return model.wear.jumps if knob == "jumps" else getattr(model.accuracy, knob)
 
 
 def _middle(model: Model, knob: str) -> int:
+    """Return the middle of the values of a setting."""
     if knob != "steps_per_cycle":
         return _pinned(model, knob) or MIDDLE[knob]
     if model.kind == "bench":
@@ -158,6 +177,7 @@ def _middle(model: Model, knob: str) -> int:
 
 
 def _with(model: Model, knob: str, value: int) -> Model:
+    """Return a model with another value of a setting that is a whole number."""
     if knob == "jumps":
         return replace(model, wear=replace(model.wear, jumps=value))
     return with_setting(model, knob, value)

@@ -19,23 +19,27 @@ from ...response.errors import error_of_change
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
 from .records import Curve
 
-# Tried in turn, each with four times the samples per cycle of the one before.
+# They are tried in turn, each with four times the samples per cycle of the one before.
 HARMONICS = (
     9,
     19,
     39,
 )
 MAX_SAMPLES = 65536  # Samples per cycle: more take too long, and 39 harmonics need fewer.
-N_SAMPLES = 4096  # Samples of a cycle from which its largest motion is read.
+N_SAMPLES = 4096  # Samples of a cycle from which the largest motion is read.
 ROUND = 1e-9  # Relative error of a value by round-off.
 AMPLITUDE_TOL = 1e-7  # Relative tolerance of an amplitude, if the steps do not reach ROUND.
-MAX_STEPS = 8  # Secant steps to the motion that has the wanted amplitude at the output.
+MAX_STEPS = 8  # Secant steps to the motion that has the requested amplitude at the output.
 # Least slope of the logarithms of both amplitudes with which a secant step is taken.
 MIN_SLOPE = 0.1
 
 
 class FreeMotion(NamedTuple):
-    """A `harmonic.backbone.Free`, its unknowns (N,), and amplitude at the output / coordinate."""
+    """A free motion.
+
+    free: a `harmonic.backbone.Free`; unknowns: (N,); reach: amplitude at the output / amplitude of
+    the coordinate.
+    """
 
     free: object
     unknowns: np.ndarray
@@ -81,9 +85,19 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
 
 
 def _read_motions(group: Group, joint: Joint, amplitudes, harmonics: int, count=None) -> np.ndarray:
-    """Return frequency [Hz], damping and loss [J] (3, k) of the free motions.
+    """Return frequency [Hz], damping ratio and loss [J] (3, k) of the free motions.
 
-    NaN where none is found, and from the amplitude number `count` on.
+    They are NaN if no motion is found, and for all amplitudes after the first `count`.
+
+    Parameters
+    ----------
+    group : Group
+    joint : Joint
+    amplitudes : (k,) array
+        At the output [m].
+    harmonics : int
+    count : int, optional
+        Number of amplitudes for which motions are computed; by default all.
     """
     order = np.arange(harmonics + 1)
     out = np.full((3, len(amplitudes)), np.nan)
@@ -99,9 +113,10 @@ def _read_motions(group: Group, joint: Joint, amplitudes, harmonics: int, count=
 def find_free_motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
     """Find the free motions at amplitudes (k,) [m] of the output.
 
-    Each is sought from the one before. Without one, as beyond a fold of the curve, it is sought from
-    the sticking mode, the first also by way of a small amplitude. Those that are missing are then
-    sought from the next larger one that was found.
+    The search starts from the motion at the amplitude before. If there is none, for example after a
+    fold of the curve, it starts from the sticking mode, for the first motion also via a small
+    amplitude. Motions that are still missing are then searched for from the motion at the next
+    larger amplitude.
 
     Parameters
     ----------
@@ -109,13 +124,13 @@ def find_free_motions(group: Group, joint: Joint, amplitudes, harmonics: int) ->
         Steady loops of the laws.
     joint : Joint
     amplitudes : (k,) array
-        Rising [m].
+        Increasing [m].
     harmonics : int
 
     Returns
     -------
     list of Free or None
-        `dynamics.harmonic.backbone.Free`; None where no motion is found.
+        `dynamics.harmonic.backbone.Free`; None if no motion is found.
     """
     search = _FreeMotionSearch(group, joint, amplitudes, harmonics)
     out: list = [None] * len(amplitudes)
@@ -129,7 +144,17 @@ def find_free_motions(group: Group, joint: Joint, amplitudes, harmonics: int) ->
 
 
 class _FreeMotionSearch:
-    """The equations of the free motion, and the sticking mode from which a search begins."""
+    """Equations of the free motion, and the sticking mode from which a search starts.
+
+    Parameters
+    ----------
+    group : Group
+        Steady loops of the laws.
+    joint : Joint
+    amplitudes : (k,) array
+        Increasing, at the output [m].
+    harmonics : int
+    """
 
     def __init__(self, group: Group, joint: Joint, amplitudes, harmonics: int):
         modes = joint.modes
@@ -148,7 +173,7 @@ class _FreeMotionSearch:
         self.small = MIN_AMPLITUDE_FACTOR * float(joint.slip_amplitude) / self.reach
 
     def continue_from(self, near: FreeMotion | None, amplitude: float) -> FreeMotion | None:
-        """Return the motion at an amplitude [m], from that at another one; None without it."""
+        """Return the motion at an amplitude [m], starting from another motion; None if it fails."""
         if near is None:
             return None
         here = amplitude / near.reach
@@ -159,7 +184,10 @@ class _FreeMotionSearch:
             return None
 
     def begin(self, amplitude: float, is_first: bool) -> FreeMotion | None:
-        """Return the motion at an amplitude [m], from the sticking mode; None without it."""
+        """Return the motion at an amplitude [m], starting from the sticking mode; None if it fails.
+
+        is_first: whether a search via a small amplitude is tried as well.
+        """
         here = amplitude / self.reach
         try:
             if is_first:
@@ -174,10 +202,25 @@ class _FreeMotionSearch:
 def _reach_amplitude(
     equations: FreeBalance, joint: Joint, x, here: float, amplitude: float
 ) -> FreeMotion:
-    """Return the motion that has an amplitude [m] at the output, by secant steps.
+    """Find the motion that has an amplitude [m] at the output, by secant steps.
 
-    x: unknowns (N,) at an amplitude `here` [m] of the coordinate. The steps end at ROUND, or at
-    AMPLITUDE_TOL if they lead no further.
+    The steps end at ROUND, or at AMPLITUDE_TOL if they lead no further.
+
+    Parameters
+    ----------
+    equations : FreeBalance
+    joint : Joint
+    x : (N,) array
+        Unknowns at the amplitude `here`.
+    here : float
+        Amplitude of the coordinate [m].
+    amplitude : float
+        Requested amplitude at the output [m].
+
+    Raises
+    ------
+    NotConverged
+        If no motion with this amplitude is found.
     """
     slope = 1.0
     before = None
@@ -213,7 +256,10 @@ def _reach_amplitude(
 
 
 def _solve_from_stuck(equations: FreeBalance, first, small: float, here: float) -> np.ndarray:
-    """Solve at an amplitude `here` [m] from the sticking mode, at once or by way of a small one."""
+    """Solve at an amplitude `here` [m], starting from the sticking mode.
+
+    If this fails, solve first at the amplitude `small` [m] and continue from there.
+    """
     try:
         return equations.solve(first, here)[0]
     except NotConverged:
@@ -229,7 +275,10 @@ def half_range(harmonics) -> float:
 
 
 def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
-    """Return the curve under rigid friction; it begins where the motion no longer stops on the way."""
+    """Return the curve under rigid friction.
+
+    It begins at the amplitude above which the motion does not stop within a cycle.
+    """
     model, modes = joint.model, joint.modes
     if model.rig.springs.is_nonlinear or not modes.omega.all():
         raise PatchfemError(

@@ -1,4 +1,4 @@
-"""Steady friction loops of the contact of a rig alone, driven by a sine on a bench."""
+"""Steady friction loops of the contact of a rig on a bench, driven by a sine."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -9,13 +9,13 @@ from ...runs.bench import bench
 from ...runs.bench.engine import steps_of
 from ...runs.rig import decays
 
-FIRST_CYCLES = 3.0  # Cycles of the first loop, of which the last is read.
+FIRST_CYCLES = 3.0  # Cycles of the first loop; the last of them is read.
 MAX_CYCLES = 192.0  # Most laws are steady after a few cycles; growing bonds take tens.
 LOOP_MEASURES = ("secant_stiffness", "loop_area")
 
 
 class BenchLoop(NamedTuple):
-    """A run on a bench, its model and its steps."""
+    """A run on a bench, with its model and number of steps."""
 
     run: object
     model: Model
@@ -23,9 +23,9 @@ class BenchLoop(NamedTuple):
 
 
 class SettledLoop(NamedTuple):
-    """A steady run on a bench, its model and its steps.
+    """A steady run on a bench, with its model and number of steps.
 
-    change: by which the later half of its cycles changed each of LOOP_MEASURES.
+    change: change of each of LOOP_MEASURES by the later half of the cycles.
     """
 
     run: object
@@ -35,7 +35,24 @@ class SettledLoop(NamedTuple):
 
 
 def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float) -> BenchLoop:
-    """Run cycles of the contact alone under a sine of amplitude `slide` [m]; patch: pressed."""
+    """Run the contact alone under a sine.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the rig.
+    patch : Patch or None
+        Pressed patch.
+    slide : float
+        Amplitude of the sine [m].
+    frequency : float
+        Frequency of the sine [Hz].
+    cycles : float
+
+    Returns
+    -------
+    BenchLoop
+    """
     path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None, None)
     alone = replace(decays.steadily(model), kind="bench", rig=None, slide=path)
     steps = steps_of(alone)
@@ -43,7 +60,23 @@ def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float)
 
 
 def settle_loop(model: Model, patch, slide: float, frequency: float) -> SettledLoop:
-    """Double the cycles until the loop changes within the tolerance, up to MAX_CYCLES."""
+    """Double the cycles until the loop changes within the tolerance, up to MAX_CYCLES.
+
+    Parameters
+    ----------
+    model : Model
+        Model of the rig.
+    patch : Patch or None
+        Pressed patch.
+    slide : float
+        Amplitude of the sine [m].
+    frequency : float
+        Frequency of the sine [Hz].
+
+    Returns
+    -------
+    SettledLoop
+    """
     tolerance = model.accuracy.tolerance
     cycles = FIRST_CYCLES
     found = run_loop(model, patch, slide, frequency, cycles)

@@ -21,7 +21,7 @@ from .quasi_static import compute_static_curve
 from .records import METHODS, Backbone, Curve, LossExponents, ModeFrequencies
 
 ROUND = 1e-9  # Relative error of a value by round-off.
-AMPLITUDE_TOL = 1e-7  # Relative tolerance of the ends of two curves.
+AMPLITUDE_TOL = 1e-7  # Relative tolerance of the first and last amplitudes of two curves.
 # Amplitude / that at which all of the contact slips, above which it is gross slip.
 GROSS_SLIP_BEGIN = 3.0
 FLUTTER_TOL = 1e-8  # Relative error of the amplitude of flutter, below the digits that are printed.
@@ -40,19 +40,20 @@ def backbone(
     Parameters
     ----------
     model : Model
-        Of a rig.
+        Model of a rig.
     mode : str
         Name of the mode; "" for the first.
     amplitudes : (k,) array, optional
-        Rising, at the output [m]. By default from a hundredth of the amplitude at which all of the
-        contact slips to 15 times this amplitude, or to where the mode moves as if it were free.
+        Increasing, at the output [m]. By default from a hundredth of the amplitude at which all of
+        the contact slips to 15 times this amplitude, or to the amplitude at which the mode moves as
+        if it were free.
     methods : sequence of str
-        Of METHODS.
+        From METHODS.
     progress : callable, optional
         Takes the name of a method that begins, and a sentence on the time of a long decay.
     errors : bool
-        Whether the errors of the mesh, of the cells of a law and of modes left out are computed; the
-        values are the same without, in less than half the time.
+        Whether the errors of the mesh, of the cells of a law and of missing modes are computed; the
+        values are the same without them, in less than half the time.
 
     Returns
     -------
@@ -61,7 +62,7 @@ def backbone(
     Raises
     ------
     PatchfemError
-        For a scene that has no rig or no such mode.
+        If the scene has no rig, or the rig does not have this mode.
     """
     with locate_errors(model.source):
         joint = build_joint(model, mode)._replace(has_errors=errors)
@@ -94,7 +95,27 @@ def backbone(
 
 
 def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve:
-    """Compute the curve by a method; NotConverged or PatchfemError if there is none."""
+    """Compute the curve of a mode by one method.
+
+    Parameters
+    ----------
+    joint : Joint
+    amplitudes : (k,) array
+        Increasing, at the output [m].
+    method : str
+        One of METHODS.
+    progress : callable, optional
+        Takes a sentence on the time of a long decay.
+
+    Returns
+    -------
+    Curve
+
+    Raises
+    ------
+    NotConverged, PatchfemError
+        If there is no curve.
+    """
     if joint.is_linear:
         return compute_level_curve(joint, amplitudes, method)
     if method == "decay":
@@ -105,7 +126,10 @@ def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve
 
 
 def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
-    """Add the error of modes that a reduced structure lacks; richer: the curve with more of them."""
+    """Add the error of modes that a reduced structure lacks.
+
+    richer: the curve of the structure with more modes.
+    """
     low, high = richer.amplitude[[0, -1]] * [1 - AMPLITUDE_TOL, 1 + AMPLITUDE_TOL]
     curve = curve.at((curve.amplitude >= low) & (curve.amplitude <= high))
     if not curve.amplitude.size:
@@ -122,7 +146,7 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
 
 
 def _summarise(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:
-    """Return the backbone of the curves at the amplitudes (k,) [m] that were asked for."""
+    """Return the backbone of the curves at the requested amplitudes (k,) [m]."""
     exponents = LossExponents()
     first = curves.get("quasi-static", curves.get("balance"))
     remarks = [*notes.note_linear_rig(joint), *notes.note_gaps(wanted, curves)]
@@ -194,8 +218,9 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
 def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
     """Return the slopes of ln(loss) over ln(amplitude) in micro-slip and in gross slip.
 
-    In micro-slip it is the slope from the first to the last point, in gross slip that of the last two
-    points. A loss counts if it is MIN_LOSS_RATIO times its error and no round-off of the energy.
+    In micro-slip it is the slope from the first to the last point, in gross slip that of the last
+    two points. A loss counts if it exceeds MIN_LOSS_RATIO times its error and the round-off of the
+    energy.
     """
     theory = _theoretical_exponent(joint)
     if curve is None or curve.amplitude.size < 2 or not joint.friction_limit:
@@ -210,6 +235,7 @@ def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
     gross = np.flatnonzero(known & (amplitude > GROSS_SLIP_BEGIN * slip))[-2:]
 
     def slope(points) -> float | None:
+        """Return the slope from the first to the last of some points; None for fewer than two."""
         if points.size < 2:
             return None
         i, j = points[0], points[-1]
@@ -219,10 +245,10 @@ def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
 
 
 def _theoretical_exponent(joint: Joint) -> float | None:
-    """Return the exponent of the loss in micro-slip by theory, if one applies.
+    """Return the theoretical exponent of the loss in micro-slip; None if no theory applies.
 
-    It is chi + 3 of sliders (Segalman 2005), 3 of bonds and of pieces whose pressure falls to 0 at its
-    edges (Cattaneo, Mindlin).
+    It is chi + 3 for sliders (Segalman 2005), and 3 for bonds and for pieces whose pressure falls
+    to 0 at the edges of the contact (Cattaneo, Mindlin).
     """
     friction = joint.model.friction
     if friction is None or not joint.friction_limit:
@@ -234,11 +260,11 @@ def _theoretical_exponent(joint: Joint) -> float | None:
 
 
 def _flutter_amplitude(joint: Joint, method: str, curve: Curve) -> float | None:
-    """Find the largest amplitude [m] at which the damping falls through zero.
+    """Find the largest amplitude [m] at which the damping changes from positive to negative.
 
-    The curve gives the two amplitudes between which the root lies. Brent's method on damping × amplitude,
+    The curve gives the two amplitudes that enclose the root. Brent's method on damping × amplitude,
     which is a straight line under Coulomb friction, computes further points of the same curve. None
-    without such a root.
+    if there is no such root.
     """
     falls = np.flatnonzero((curve.damping[:-1] > 0) & (curve.damping[1:] <= 0))
     if not falls.size:
@@ -249,6 +275,7 @@ def _flutter_amplitude(joint: Joint, method: str, curve: Curve) -> float | None:
     known = {low: loss_low, high: loss_high}
 
     def net_loss(log_amplitude: float) -> float:
+        """Return damping x amplitude at the logarithm of an amplitude."""
         if log_amplitude not in known:
             amplitude = np.array([np.exp(log_amplitude)])
             point = compute_curve(joint._replace(has_errors=False), amplitude, method)

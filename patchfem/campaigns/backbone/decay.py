@@ -25,26 +25,31 @@ from .records import Curve
 
 ROUND = 1e-9  # Relative error of a value by round-off.
 N_SAMPLES = 4096  # Samples of a cycle of a free motion.
-FIRST_CYCLES = 50  # Cycles of the first decay; longer ones follow until it has come down.
-MAX_CYCLES_ONE_MODE = 12800  # A longer decay takes minutes.
-MAX_CYCLES = 3200  # The same for several modes, each cycle of which takes longer.
+# Cycles of the first decay; longer ones follow until the amplitude is small enough.
+FIRST_CYCLES = 50
+MAX_CYCLES_ONE_MODE = 12800  # Cycles of the longest decay of one mode; a longer one takes minutes.
+MAX_CYCLES = 3200  # The same for several modes, for which each cycle takes longer.
 MAX_CYCLES_TURNS = 102400  # For one mode with elastic elements, of which only reversals are stored.
-N_START_STEPS = 12  # Amplitudes on the way to the free motion in which a release begins.
-MAX_RAISED = 3  # Releases from a higher amplitude than the one before.
-MAX_RAISE_FACTOR = 8.0  # Largest ratio of two such amplitudes.
-END_FACTOR = 0.8  # End of a decay / smallest amplitude, so that coarser runs reach it, too.
-N_FREE_SWINGS = 3.0  # Periods of the free mode within which a decay shows its first swings.
-MAX_DOUBLINGS = 3  # Doublings of the time steps.
-MAX_OTHER_MODES = 0.1  # Motion of other modes / amplitude, above which it is no decay of this mode.
-N_BEAT_SWINGS = 8  # Half swings on both sides, among which the effect of other modes is largest.
+# Amplitudes at which the free motion of a release is computed, up to that of the release.
+N_START_STEPS = 12
+MAX_RAISED = 3  # Repeated releases from a higher amplitude.
+MAX_RAISE_FACTOR = 8.0  # Largest ratio of the amplitudes of two successive releases.
+# End of a decay / smallest amplitude, so that coarser runs reach this amplitude as well.
+END_FACTOR = 0.8
+N_FREE_SWINGS = 3.0  # Periods of the free mode within which the first swings of a decay appear.
+MAX_DOUBLINGS = 3  # Largest number of times that the time steps are halved.
+# Motion of other modes / amplitude, above which the decay is not one of this mode.
+MAX_OTHER_MODES = 0.1
+# Half swings before and after, over which the maximum effect of other modes is taken.
+N_BEAT_SWINGS = 8
 EQUAL_SWINGS_TOL = 1e-7  # Relative difference of two half swings, up to which nothing slips.
 STUCK_FRACTION = 0.999  # Stiffness / stiffness without slip, above which a contact sticks.
 ANNOUNCED_SECONDS = 20.0  # CPU seconds of a decay, above which it is announced.
-COARSER_RUNS_FACTOR = 2.0  # CPU seconds of a decay with its coarser runs / without.
+COARSER_RUNS_FACTOR = 2.0  # CPU seconds of a decay with its coarser runs / without them.
 
 
 class Release(NamedTuple):
-    """A run of a release: its model, its numerics and its Solution."""
+    """Run of a release: its model, its numerical settings and its Solution."""
 
     model: Model
     numerics: object
@@ -52,25 +57,34 @@ class Release(NamedTuple):
 
 
 class DecayReading(NamedTuple):
-    """Frequency [Hz] and damping (2, k) of a release, with the errors of reading and of coarser runs."""
+    """Frequency [Hz] and damping ratio (2, k) read from a release, and their errors (2, k).
+
+    reading_error: of the reading from reversal to reversal; run_error: from coarser runs.
+    """
 
     value: np.ndarray
     reading_error: np.ndarray
     run_error: np.ndarray
 
     def known(self) -> np.ndarray:
-        """Return at which amplitudes (k,) a value and its errors are known."""
+        """Return the amplitudes (k,) bool at which values and errors are known."""
         return np.isfinite(self.value + self.run_error).all(axis=0)
 
 
 class _GrowingRelease(NotConverged):
-    """A release whose swings grow: a negative damping supplies more than friction dissipates."""
+    """Raised if the swings of a release grow: negative damping supplies more than is dissipated."""
 
 
 def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
-    """Return the curve of a release from the largest amplitude, as far as it comes down.
+    """Return the curve of a release from the largest amplitude, as far as it decays.
 
-    progress: takes a sentence on the time that a long decay takes.
+    Parameters
+    ----------
+    joint : Joint
+    amplitudes : (k,) array
+        Increasing, at the output [m].
+    progress : callable, optional
+        Takes a sentence on the time that a long decay takes.
     """
     n_decaying, release = _release_from_largest_decaying(joint, amplitudes, progress)
     release, reading = _refine(joint, release, amplitudes)
@@ -130,7 +144,7 @@ def _note_mixed(amplitudes) -> list:
 
 
 def _note_growing(amplitudes) -> list:
-    """Return a sentence on amplitudes (k,) [m] above those from which a release decays."""
+    """Return a sentence on amplitudes (k,) [m] from which a release grows."""
     if not amplitudes.size:
         return []
     return [
@@ -154,14 +168,14 @@ def _note_unknown_modes(joint: Joint, known, motion) -> list:
 
 
 class RefinedRelease(NamedTuple):
-    """A release with time steps that meet the tolerance, or the finest ones, and its reading."""
+    """A release and its reading, with time steps that meet the tolerance or the smallest ones."""
 
     release: Release
     reading: DecayReading
 
 
 def _refine(joint: Joint, release: Release, amplitudes) -> RefinedRelease:
-    """Double the time steps until the errors of coarser runs meet the tolerance."""
+    """Halve the time steps until the errors from coarser runs meet the tolerance."""
     model, how, _ = release
     engine = ENGINES[how.engine]
     tolerance = joint.model.accuracy.tolerance
@@ -181,7 +195,7 @@ def _refine(joint: Joint, release: Release, amplitudes) -> RefinedRelease:
 
 
 def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReading:
-    """Read a release at amplitudes (k,) [m], with what coarser runs change."""
+    """Read a release at amplitudes (k,) [m], with errors from coarser runs."""
     model, how, found = release
     engine = ENGINES[how.engine]
     read = _read(joint, found)
@@ -194,6 +208,7 @@ def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReadin
     known: dict = {}
 
     def curve(variant) -> np.ndarray:
+        """Return frequency [Hz] and damping (2, k) of another run at the same amplitudes."""
         if variant not in known:
             whole = replace(variant.numerics, whole=True)
             run = engine.run(model, whole, variant.patch, 0, None, None)
@@ -209,19 +224,19 @@ def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReadin
         if one.runs:
             beside = value if one.beside is None else curve(one.beside)
             runs = one.runs if one.of == "cells" else one.runs[:1]
-            # NaN where one of the runs does not come down so far.
+            # NaN if one of the runs does not decay to this amplitude.
             error += np.max([np.abs(curve(run) - beside) for run in runs], axis=0)
     return DecayReading(value, reading_error, error)
 
 
 def _measure_other_modes(joint: Joint, found, amplitudes) -> np.ndarray:
-    """Return the motion of other modes in a Solution / its amplitude (k,), at amplitudes (k,) [m].
+    """Return the motion of other modes / amplitude (k,) in a Solution, at amplitudes (k,) [m].
 
-    It is the distance of the modal coordinates, and of their rates / omega, from those of the balance's
-    free motion of that amplitude, at a reversal, both relative to the motion along the shape of the
-    sticking mode. It is 0 where all contacts stick: the motion along this shape is then free of other
-    modes, as long as no displacement is larger than one in which the balance finds no slip. NaN where
-    one of the two is not known.
+    It is the distance of the modal coordinates, and of their rates / omega, from those of the free
+    motion by harmonic balance at the same amplitude, at a reversal; both are divided by their
+    motion along the shape of the sticking mode. It is 0 if all contacts stick, because the motion
+    along this shape is then free of other modes, provided that no displacement is larger than one
+    at which the balance finds no slip. It is NaN if the motion or the balance is not known.
     """
     out = np.full(amplitudes.size, np.nan)
     motion, shape = found.response, joint.shape
@@ -262,7 +277,7 @@ def _measure_other_modes(joint: Joint, found, amplitudes) -> np.ndarray:
 def _distance_to_free_motion(free, shape, place, rate) -> float:
     """Return the distance of modal coordinates (n,) and rates / omega (n,) from a free motion.
 
-    Each is divided by its own part along the shape (n,) of the sticking mode.
+    Both are divided by their component along the shape (n,) of the sticking mode.
     """
     order = np.arange(free.modal.shape[0])[:, None]
     free_place = np.apply_along_axis(synthesis, 0, free.modal, N_SAMPLES)
@@ -278,16 +293,27 @@ def _distance_to_free_motion(free, shape, place, rate) -> float:
 
 
 def _sticks(group: Group, free) -> np.ndarray:
-    """Whether each interface (i,) has its stiffness without slip in a free motion."""
+    """Return whether each interface (i,) of a free motion has its stiffness without slip."""
     force, slide = free.forces[:, 1], free.slides[:, 1]
     stiffness = STUCK_FRACTION * group.stiffness()
     return np.real(force * np.conj(slide)) >= stiffness * np.abs(slide) ** 2
 
 
 def _release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> tuple:
-    """Release from the largest of rising amplitudes (k,) [m] whose release does not grow.
+    """Release the mode from the largest amplitude whose release does not grow.
 
-    Returns the number of amplitudes up to that one, and the Release.
+    Parameters
+    ----------
+    joint : Joint
+    amplitudes : (k,) array
+        Increasing, at the output [m].
+    progress : callable, optional
+        Takes a sentence on the time that a long decay takes.
+
+    Returns
+    -------
+    tuple
+        Number of amplitudes up to the one of the release, and the Release.
     """
     for count in range(amplitudes.size, 0, -1):
         try:
@@ -301,7 +327,7 @@ def _release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> t
 
 
 def _grows(joint: Joint, found) -> bool:
-    """Whether the swings of a Solution become larger along the shape of the sticking mode."""
+    """Return whether the swings of a Solution grow along the shape of the sticking mode."""
     motion, shape = found.response, joint.shape
     _, places = turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     swings = np.abs(np.diff(places))
@@ -309,10 +335,10 @@ def _grows(joint: Joint, found) -> bool:
 
 
 def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
-    """Release the mode for so many cycles that it comes down from the largest to the smallest amplitude.
+    """Release the mode and compute as many cycles as the decay to the smallest amplitude takes.
 
-    The release begins so high that its first reading lies above the largest amplitude. Each longer run
-    is announced by the time per cycle of the one before.
+    The release begins at an amplitude at which the first reading is above the largest amplitude.
+    Each longer run is announced with a time that follows from the time per cycle of the run before.
     """
     travel = joint.model.rig.springs.travel
     omega = joint.modes.omega
@@ -342,7 +368,7 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
         if not read.time.size:
             if cycles >= max_cycles or end >= free_swings:
                 return release
-            # Cycles are those of the sticking mode; a swing in slip can last hundreds of them.
+            # The cycles are those of the sticking mode; a swing in slip can last hundreds of them.
             cycles = min(8 * cycles, max_cycles)
             continue
         high, low = read.amplitude[0], read.amplitude[-1]
@@ -362,7 +388,7 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
 
 
 def _choose_numerics(joint: Joint, begin: float, cycles: int) -> tuple:
-    """Return the model of a release from an amplitude [m], and its numerics."""
+    """Return the model of a release from an amplitude `begin` [m], and its numerical settings."""
     model = release_model(joint, begin)
     drive = replace(model.rig.drive, cycles=float(cycles))
     model = replace(model, rig=replace(model.rig, drive=drive))
@@ -374,8 +400,19 @@ def _choose_numerics(joint: Joint, begin: float, cycles: int) -> tuple:
 
 
 def _raise_release(joint: Joint, begin: float, high: float, largest: float) -> float:
-    """Return a higher amplitude [m] of a release whose first reading `high` lies below `largest`."""
-    # Friction takes two static deflections per half swing.
+    """Return a higher amplitude [m] for a release whose first reading is below `largest`.
+
+    Parameters
+    ----------
+    joint : Joint
+    begin : float
+        Amplitude of the release so far [m].
+    high : float
+        Its first reading [m].
+    largest : float
+        Amplitude [m] that the first reading must exceed.
+    """
+    # Friction reduces the amplitude by two static deflections per half swing.
     rest = joint.amplitude_at(joint.deflection) if joint.friction_limit else 0.0
     limit = max(MAX_RAISE_FACTOR * begin, RELEASE_FACTOR * (begin + 2 * rest))
     raised = begin * RELEASE_FACTOR * largest / high
@@ -399,10 +436,11 @@ def release_model(joint: Joint, amplitude: float) -> Model:
 
 
 def _start(joint: Joint, amplitude: float) -> InitialState:
-    """Return the start of a release at an amplitude [m] of the output.
+    """Return the initial state of a release at an amplitude [m] of the output.
 
-    It is the free motion by balance, in which no other mode moves by itself. Where this is not known, it
-    is the shape of the mode: with the contact stuck, or free once all of the contact slips.
+    It is the free motion by harmonic balance, in which no other mode is excited. If this is not
+    known, it is the shape of the mode: with the contact stuck, or without the contact at amplitudes
+    at which all of it slips.
     """
     modes = joint.modes
     at_rest = np.zeros(modes.omega.size)
@@ -465,9 +503,10 @@ def _read(joint: Joint, found, turns=turns) -> DecayCurve:
 
 
 def _coupling(joint: Joint) -> float:
-    """Return the effect of other modes along the shape of the sticking mode / that at the output.
+    """Return the coupling of other modes along the shape of the sticking mode, at most 1.
 
-    They are coupled by dampers; the ratio is at most 1.
+    It is the effect of other modes along this shape / their effect at the output. Dampers couple
+    the modes.
     """
     modes = joint.modes
     omega = joint.held[0] or modes.omega[joint.mode]

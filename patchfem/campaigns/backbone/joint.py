@@ -18,17 +18,21 @@ from ...runs.rig import decays
 from ...runs.rig.plan import held_by
 from .bench_loops import settle_loop
 
-AMPLITUDES_PER_DECADE = 8  # Of the default amplitudes.
+AMPLITUDES_PER_DECADE = 8  # Number of default amplitudes per decade.
 MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude / that at which all of the contact slips.
 MAX_AMPLITUDE_FACTOR = 15.0  # Largest amplitude / that at which all of the contact slips.
 # Smallest amplitude under rigid friction / the static deflection by friction.
 MIN_RIGID_FACTOR = 2.0
-# Largest amplitude / that at which a softening spring no longer turns the block.
+# Largest amplitude / amplitude at which a softening spring no longer returns the block.
 SOFTENING_END = 0.7
-HARDENING_END = 3.0  # Largest amplitude / that at which a hardening spring is as stiff as the mode.
-RELEASE_FACTOR = 1.15  # Release of a decay / largest amplitude: its first swings show the release.
-LINEAR_AMPLITUDES = (1e-6, 1e-3, 4)  # First [m], last [m] and number for a linear rig.
-STUCK_FRACTION = 1e-5  # Of the amplitude at which all of the contact slips: nothing slips here.
+# Largest amplitude / amplitude at which a hardening spring is as stiff as the mode.
+HARDENING_END = 3.0
+# Release of a decay / largest amplitude, because the first swings still depend on the release.
+RELEASE_FACTOR = 1.15
+# First [m] and last [m] amplitude and their number for a linear rig.
+LINEAR_AMPLITUDES = (1e-6, 1e-3, 4)
+# Fraction of the amplitude at which all of the contact slips; at this one nothing slips.
+STUCK_FRACTION = 1e-5
 ALL_METHODS_CURE = "; use --method quasi-static"
 NO_CLOSED_FORM = (
     "the friction loop of bonds has a closed form only with reading = "
@@ -47,10 +51,10 @@ class Joint(NamedTuple):
     coarser : tuple
         Patches on coarser meshes, or None.
     mode : int
-        Number of the coordinate of the mode.
+        Index of the coordinate of the mode.
     held : tuple
-        Angular frequency [rad/s], None if nothing gives way, and shape (n,) of the mode with the
-        contact stuck.
+        Angular frequency [rad/s], or None if nothing is elastic, and shape (n,) of the mode with
+        the contact stuck.
     stiffness : (i,) array
         Tangential stiffness [N/m] of each interface while nothing slips.
     has_errors : bool
@@ -87,7 +91,7 @@ class Joint(NamedTuple):
 
     @property
     def face(self) -> int:
-        """Number of the interface whose force on the mode rises most with the amplitude."""
+        """Index of the interface whose force on the mode increases most with the amplitude."""
         slides = np.abs(self.modes.interfaces @ self.shape)
         is_elastic = np.isfinite(self.stiffness) & (self.stiffness > 0)
         return int(np.argmax(slides * np.where(is_elastic, self.stiffness, 1)))
@@ -111,7 +115,7 @@ class Joint(NamedTuple):
 
     @property
     def is_linear(self) -> bool:
-        """Whether neither friction acts nor a spring is nonlinear."""
+        """Whether no friction acts and no spring is nonlinear."""
         interfaces = self.model.rig.friction.interfaces
         others = 0.0
         if len(interfaces) > 1:
@@ -141,8 +145,9 @@ class Joint(NamedTuple):
     def slip_displacement(self) -> float:
         """Relative displacement [m] at which all of the contact slips.
 
-        Of rigid friction it is the static deflection by friction; of springs alone, the displacement
-        at which a cubic spring doubles the mode's stiffness, or which an interlock has.
+        For rigid friction it is the static deflection by friction. For springs alone it is the
+        displacement at which a cubic spring doubles the stiffness of the mode, or the one of an
+        interlock.
         """
         rig = self.model.rig
         if not self.friction_limit:
@@ -153,7 +158,7 @@ class Joint(NamedTuple):
         return self.friction_limit / stiffness if stiffness else self.deflection
 
     def amplitude_at(self, slide):
-        """Return the amplitude at the output [m] whose interface has the displacement `slide` [m]."""
+        """Return the amplitude at the output [m] at which the interface moves by `slide` [m]."""
         return self.reach / (abs(self.face_slide) or 1.0) * slide
 
     @property
@@ -162,7 +167,7 @@ class Joint(NamedTuple):
         return self.amplitude_at(self.slip_displacement)
 
     def default_amplitudes(self) -> np.ndarray:
-        """Return amplitudes (k,) [m] from a sticking contact to a mode that moves as if it were free."""
+        """Return amplitudes (k,) [m] from a sticking contact to a mode that moves as if free."""
         rig = self.model.rig
         if self.is_linear:
             return np.geomspace(*LINEAR_AMPLITUDES) * min(
@@ -194,7 +199,10 @@ class Joint(NamedTuple):
         return min(travel, own * (SOFTENING_END if rig.springs.cubic < 0 else HARDENING_END))
 
     def steady_laws(self) -> Group:
-        """Return the steady loops of all laws; PatchfemError if a law has none of its own."""
+        """Return the steady loops of all laws.
+
+        PatchfemError if a law has no steady loop in closed form.
+        """
         try:
             return decays.laws_on(self.model, self.patch)
         except PatchfemError:
@@ -206,7 +214,7 @@ class Joint(NamedTuple):
             raise PatchfemError(NO_CLOSED_FORM + cure) from None
 
     def require_steady_loops(self, method: str) -> None:
-        """Raise PatchfemError for a contact whose steady loops do not give the free motion."""
+        """Raise PatchfemError if the steady loops of the contact do not determine the free motion."""
         model = self.model
         reason = ""
         if model.grooves is not None:
@@ -221,7 +229,7 @@ class Joint(NamedTuple):
             raise PatchfemError(f"{method} cannot be computed {reason}")
 
     def space_errors(self, read: Callable) -> np.ndarray | float:
-        """Return the errors of read(Group) by the mesh and by the cells of a density of sliders."""
+        """Return the errors of read(Group) by the mesh and by the discrete sliders of a law."""
         model = self.model
         has_cells = any(
             law_has_trait(one.numbers.law, "cells") for one in model.rig.friction.interfaces
@@ -312,7 +320,7 @@ def _refuse_mode(joint: Joint) -> None:
 
 
 def _find_mode(rig, name: str) -> int:
-    """Return the number of the coordinate of a mode; "" is the first mode of the scene."""
+    """Return the index of the coordinate of a mode; "" is the first mode of the scene."""
     modes, names = rig.modes, list(rig.modes.names)
     count = modes.omega.size
     if not rig.structure.lists_modes:
@@ -337,8 +345,8 @@ def _find_mode(rig, name: str) -> int:
 def _stuck_stiffness(joint: Joint) -> np.ndarray:
     """Return the tangential stiffness (i,) [N/m] of each interface while nothing slips.
 
-    It is that of the laws' loops where they have a closed form, that of a small loop on a bench if
-    there is one interface, else the one of the plan (`joint.stiffness`).
+    It is that of the loops of the laws if they have a closed form, that of a small loop on a bench
+    if there is one interface, else the one of the plan (`joint.stiffness`).
     """
     model, planned = joint.model, joint.stiffness
     load_changes = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart

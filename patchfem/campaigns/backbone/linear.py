@@ -7,16 +7,24 @@ from .joint import Joint
 from .records import Curve
 
 ROUND = 1e-9  # Relative error of a value by round-off.
-# Fixed-point steps to the negative damping that keeps the motion up; they converge fast.
+# Fixed-point steps to the negative damping that maintains the motion; they converge fast.
 N_STEPS = 8
 
 
 def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
-    """Return the level curve of a linear rig.
+    """Return the constant curve of a linear rig.
 
-    By decay, frequency and damping ratio are those of the damped mode. By the other methods, a
-    negative damping g of every coordinate keeps the motion up: the frequency is that of this motion,
-    and the damping ratio is g/(2 omega).
+    By decay, frequency and damping ratio are those of the damped mode. For the other methods, a
+    negative damping g of every coordinate maintains the motion: the frequency is that of this
+    motion, and the damping ratio is g/(2 omega).
+
+    Parameters
+    ----------
+    joint : Joint
+    amplitudes : (k,) array
+        At the output [m].
+    method : str
+        One of METHODS.
     """
     negative_damping = 0.0
     for _ in range(N_STEPS):
@@ -42,7 +50,10 @@ def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
 
 
 def _find_root(joint: Joint, negative_damping: float) -> complex:
-    """Return the root of z'' + (D - g) z' + Omega^2 z = 0 in which the mode moves most."""
+    """Return the root of z'' + (D - g) z' + Omega^2 z = 0 in which the mode moves most.
+
+    negative_damping: g [1/s].
+    """
     modes = joint.modes
     n = modes.omega.size
     damping = negative_damping * np.eye(n) - modes.damping_matrix

@@ -1,4 +1,4 @@
-"""Sentences on the curves of a backbone: what they lack, and where the methods differ."""
+"""Sentences on the curves of a backbone: gaps, and differences of the methods."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from .joint import MIN_AMPLITUDE_FACTOR, Joint
 
 # Amplitude / that at which all of the contact slips, below which it is micro-slip.
 MICRO_SLIP_END = 0.3
-MIN_LOSS_RATIO = 4.0  # Loss / error of the loss, from which a loss counts for an exponent.
+MIN_LOSS_RATIO = 4.0  # Loss / error of the loss, above which a loss counts for an exponent.
 MAX_LISTED = 6  # Amplitudes that a sentence lists one by one.
 REPORT_OTHER_MODES = 1e-3  # Motion of other modes / amplitude, above which a sentence states it.
-MIN_RATIO = 2.0  # Ratio of two values, from which a sentence gives the ratio and not a percentage.
+MIN_RATIO = 2.0  # Ratio of two values, above which a sentence gives the ratio and not a percentage.
 MISSING_ERRORS = (
     "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
 )
@@ -32,7 +32,7 @@ REASONS_OF_DIFFERENCES = {
 
 
 def note_linear_rig(joint: Joint) -> list:
-    """Return a sentence on a rig with a law or interfaces in which no friction acts."""
+    """Return a sentence on a rig that has friction in the scene although no friction acts."""
     has_friction = joint.model.friction is not None or joint.model.rig.friction.interfaces
     if joint.is_linear and has_friction:
         return ["no friction acts, so frequency and damping are the same at all amplitudes"]
@@ -45,7 +45,7 @@ def note_wear(model: Model) -> list:
 
 
 def note_missing_mesh(joint: Joint) -> list:
-    """Return a sentence on a contact that slips in parts and has no coarser mesh."""
+    """Return a sentence on a contact with partial slip that has no coarser mesh."""
     model = joint.model
     if joint.is_linear:
         return []
@@ -77,7 +77,7 @@ def note_micro_slip(joint: Joint, wanted) -> list:
 
 
 def note_gaps(wanted, curves: dict) -> list:
-    """Return sentences on the amplitudes (k,) [m] that a curve does not have."""
+    """Return sentences on the requested amplitudes (k,) [m] at which a curve has no value."""
     out = []
     for method, curve in curves.items():
         lacks = wanted[~np.isin(wanted, curve.amplitude)]
@@ -97,7 +97,7 @@ def note_gaps(wanted, curves: dict) -> list:
 
 
 def note_secant_stiffness(joint: Joint, wanted, curves: dict) -> list:
-    """Return a sentence on a static curve in slip without a balance to compare with."""
+    """Return a sentence on a static curve in slip, if there is no balance to compare with."""
     if joint.is_linear or not joint.friction_limit:
         return []
     slips = wanted[-1] > MICRO_SLIP_END * joint.slip_amplitude
@@ -112,7 +112,7 @@ def note_secant_stiffness(joint: Joint, wanted, curves: dict) -> list:
 
 
 def note_differences(curves: dict) -> list:
-    """Return sentences on where a curve differs from the balance by more than both errors."""
+    """Return sentences on curves that differ from the balance by more than both errors."""
     if "balance" not in curves:
         return []
     balance = curves["balance"]

@@ -1,4 +1,4 @@
-"""Curve of a mode by one static force with the shape of the mode whose contact sticks."""
+"""Curve of a mode by a static force that has the shape of the mode with the contact stuck."""
 
 import numpy as np
 
@@ -15,12 +15,15 @@ from .records import Curve
 ROUND = 1e-9  # Relative error of a value by round-off.
 AMPLITUDE_TOL = 1e-7  # Relative tolerance of an amplitude.
 N_SAMPLES = 4096  # Samples of a cycle of a loop; half as many give the error.
-MAX_STEPS = 60  # Corrections of the displacement until the amplitude is the wanted one.
+MAX_STEPS = 60  # Corrections of the displacement until the amplitude is the requested one.
 MIN_FLOOR = 1e-10  # Least relative error of a loop on a bench.
 
 
 def compute_static_curve(joint: Joint, amplitudes) -> Curve:
-    """Return the curve by a static force; loops without a closed form are run on a bench."""
+    """Return the curve by a static force.
+
+    Laws whose loops have no closed form are run on a bench.
+    """
     joint.require_steady_loops("static curve")
     if joint.is_rigid:
         raise PatchfemError(
@@ -38,6 +41,7 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
         return _by_bench_loops(joint, amplitudes)
 
     def read(group, samples: int) -> np.ndarray:
+        """Return amplitude, frequency, damping and loss (4, k) by the loops of a Group."""
         return decays.static_rows(joint.modes, group, joint.mode, amplitudes, samples)
 
     best = read(laws, N_SAMPLES)
@@ -49,7 +53,9 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
 
 
 def _rising_part(best, error) -> Curve:
-    """Return the curve as far as its force rises: beyond that, no equilibrium is stable.
+    """Return the part of the curve on which the force increases.
+
+    After this part no equilibrium is stable.
 
     Parameters
     ----------
@@ -93,7 +99,7 @@ def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
         is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
         if is_wanted.all():
             break
-        # The shape at the output is another one than that of the sticking mode.
+        # The shape at the output differs from that of the sticking mode.
         slides = slides * amplitudes / best[0]
     is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
     best = np.where(is_wanted, best, np.nan)
@@ -103,7 +109,7 @@ def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
 
 
 def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
-    """Return amplitude, frequency, damping and loss (4, k) by the loops at displacements (k,) [m]."""
+    """Return amplitude, frequency, damping and loss (4, k) by loops at displacements (k,) [m]."""
     modes = joint.modes
     statics = quasi_static.through(modes, modes.interfaces[0], joint.held, slides, loops)
     return decays.rows_of(modes, statics)

@@ -1,4 +1,4 @@
-"""Records of a backbone."""
+"""Records of a backbone: the curves of a mode, its frequencies and exponents of the loss."""
 
 from typing import NamedTuple
 
@@ -13,11 +13,11 @@ class Curve(NamedTuple):
     Attributes
     ----------
     amplitude : (k,) array
-        At the output [m].
+        Amplitude at the output [m].
     frequency, frequency_error : (k,) array
-        [Hz]
+        Frequency and its error [Hz].
     damping, damping_error : (k,) array
-        Damping ratio [1].
+        Damping ratio and its error [1].
     loss : (k,) array
         Energy that the contact dissipates per cycle [J]; NaN if it is not known.
     notes : tuple of str
@@ -36,7 +36,7 @@ class Curve(NamedTuple):
     other_modes: np.ndarray | None = None
 
     def at(self, pick) -> "Curve":
-        """Return some of the points: bools (k,) or a slice."""
+        """Return the curve at some of its points, selected by bools (k,) or by a slice."""
         others = None if self.other_modes is None else self.other_modes[pick]
         return Curve(
             amplitude=self.amplitude[pick],
@@ -60,7 +60,7 @@ class Curve(NamedTuple):
 class ModeFrequencies(NamedTuple):
     """Frequencies [Hz] of a mode without its contact and with a contact that sticks.
 
-    stuck: None if the contact does not move then; stuck_error: None if it is not known.
+    stuck: None if the contact does not move in the mode; stuck_error: None if it is not known.
     """
 
     free: float
@@ -69,9 +69,9 @@ class ModeFrequencies(NamedTuple):
 
 
 class LossExponents(NamedTuple):
-    """Exponents of the contact's loss over the amplitude, None where it is not determined.
+    """Exponents of the loss of the contact as a power of the amplitude; None if not determined.
 
-    micro: in micro-slip; gross: in gross slip; micro_theory: of theory in micro-slip.
+    micro: in micro-slip; gross: in gross slip; micro_theory: theoretical value in micro-slip.
     """
 
     micro: float | None = None

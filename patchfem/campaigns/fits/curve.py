@@ -1,9 +1,10 @@
-"""Fit of a rig to frequency and damping against amplitude: a measured decay, or any backbone.
+"""Fit of a rig to frequency and damping against amplitude, from a decay or any backbone.
 
-The model's curve is that of a periodic motion at the measured amplitudes, by harmonic balance. The
-search uses the curve of one static force, which takes a hundredth of the time, corrected so that it has
-the value and the slopes of the balance (`identify.two_models`). Where this does not settle, the search
-uses the balance itself; where one of the two methods has no result, it uses the other.
+The curve of the model is that of a periodic motion at the measured amplitudes, by harmonic balance.
+The search uses the curve of one static force, which takes a hundredth of the time, corrected so
+that it has the value and the slopes of the balance (`identify.two_models`). If this does not
+converge, the search uses the balance itself; if one of the two methods has no result, it uses the
+other.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,19 +36,31 @@ UNITS = {
     "damping": {"": 1.0, "1": 1.0},
 }
 HEADER = "decay_amplitude [m],decay_frequency [Hz],decay_damping [1]"
-# Of frequency and damping, relative, of rows without errors.
+# Default relative errors of frequency and damping, for rows without errors.
 DEFAULT_ERRORS = np.array([1e-3, 5e-2])
-MIN_SPREAD = 1e-6  # Smallest standard deviation of a value, relative; an error of 0 has no weight.
-METHODS = ("balance", "quasi-static")  # The first is the reference, the last is quick.
-DEFAULT_STARTS = 6  # Starts of a search by the quick method.
-MAX_TRIALS = 8  # Values that are tried besides the scene's own until both methods have a curve.
+# Smallest relative standard deviation of a value, because an error of 0 has no weight.
+MIN_SPREAD = 1e-6
+METHODS = ("balance", "quasi-static")  # The first method is the reference, the last one is fast.
+DEFAULT_STARTS = 6  # Starts of a search by the fast method.
+# Values that are tried in addition to those of the scene until both methods have a curve.
+MAX_TRIALS = 8
 PROGRESS_SECONDS = 10.0  # Time from one line of progress to the next.
-MAX_LISTED = 6  # Amplitudes that a sentence lists.
-N_KEPT_CURVES = 8  # Curves that are remembered: a step of the search asks again for the last ones.
+MAX_LISTED = 6  # Amplitudes that a sentence lists one by one.
+N_KEPT_CURVES = 8  # Cached curves: a step of the search needs the last ones again.
 
 
 class MeasuredCurve(NamedTuple):
-    """Amplitude (k,) [m]; frequency [Hz] and damping (2, k), and their standard deviations (2, k)."""
+    """A measured curve.
+
+    Attributes
+    ----------
+    amplitude : (k,) array
+        [m]
+    value : (2, k) array
+        Frequency [Hz] and damping ratio.
+    error : (2, k) array
+        Their standard deviations.
+    """
 
     amplitude: np.ndarray
     value: np.ndarray
@@ -81,7 +94,7 @@ class FittedCurve:
 
 
 def is_curve(path) -> bool:
-    """Whether a file is a table of damping against amplitude, by its header."""
+    """Return whether the header of a file is that of a table of damping against amplitude."""
     path = Path(path)
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
@@ -133,7 +146,17 @@ def _read_table(path):
 class CurveModel:
     """Frequency [Hz] and damping ratio (2, k) of a rig at measured amplitudes, by free values.
 
-    A method raises PatchfemError for values that have no curve.
+    Methods raise PatchfemError for values without a curve.
+
+    Parameters
+    ----------
+    scene : Scene
+    wanted : list of Range
+        Bounds of the free keys.
+    amplitude : (k,) array
+        Measured amplitudes [m].
+    say : callable, optional
+        Takes a line of progress.
     """
 
     def __init__(self, scene: Scene, wanted: list, amplitude: np.ndarray, say=None):
@@ -171,7 +194,7 @@ class CurveModel:
         return self.curve_of(self.model(values), method)
 
     def choose_methods(self, trials: list) -> None:
-        """Keep the METHODS that have a curve at the first values at which all of them, or most, do."""
+        """Keep the METHODS that have a curve at the first values at which most of them have one."""
         reasons: list = []
         best: list = []
         for values in trials:
@@ -194,11 +217,11 @@ class CurveModel:
         self.methods = best
 
     def reference(self, values) -> np.ndarray:
-        """Return the curve by the best method, NaN where the mode does not oscillate."""
+        """Return the curve by the reference method, NaN if the mode does not oscillate."""
         return self.by(self.methods[0], values)
 
     def quick(self, values) -> np.ndarray:
-        """Return the curve by the quick method; PatchfemError where the mode does not oscillate."""
+        """Return the curve by the fast method; PatchfemError if the mode does not oscillate."""
         curve = self.by(self.methods[-1], values)
         lost = self.amplitude[np.isnan(curve[0])]
         if lost.size:
@@ -209,10 +232,10 @@ class CurveModel:
         return curve
 
     def balanced(self, values) -> np.ndarray:
-        """Return the curve by the best method.
+        """Return the curve by the reference method, without gaps.
 
-        Rows that only this method lacks have the quick value times the ratio of both methods in the
-        row nearest in amplitude.
+        In rows in which only this method has no value, the fast method's value is multiplied by the
+        ratio of both methods in the row that is nearest in amplitude.
         """
         curve = self.reference(values)
         quick = self.by(self.methods[-1], values)
@@ -226,8 +249,8 @@ def fit_curve(
 ) -> FittedCurve:
     """Fit keys of a rig to a curve of frequency and damping against amplitude.
 
-    Each row counts by its error. Values at which the mode does not oscillate are failed evaluations.
-    For a reduced structure the intervals contain the error of the modes that it lacks.
+    Each row is weighted by its error. Values at which the mode does not oscillate are failed
+    evaluations. For a reduced structure the intervals contain the error of the missing modes.
 
     Parameters
     ----------
@@ -239,7 +262,7 @@ def fit_curve(
     say : Callable, optional
         Takes a line of progress.
     starts : int
-        Starts of the search by the quick method.
+        Starts of the search by the fast method.
 
     Returns
     -------
@@ -250,7 +273,7 @@ def fit_curve(
     SceneError, PatchfemError
         For input that cannot be used.
     NotConverged
-        If no search settles.
+        If no search converges.
     """
     begin = perf_counter()
     wanted = parse_ranges(free)
@@ -264,6 +287,7 @@ def fit_curve(
     curves = CurveModel(scene, wanted, measured.amplitude, say)
 
     def misfit(curve) -> np.ndarray:
+        """Return the weighted residual of a curve (2, k)."""
         return ((curve - measured.value) / measured.error).ravel()
 
     problem = Problem(scene, wanted, lambda values: misfit(curves.quick(values)))
@@ -283,7 +307,7 @@ def fit_curve(
     notes = _compare_methods(to, curves.methods[0], measured)
 
     def refit(change) -> np.ndarray:
-        """Return how much the values move if the model's curve changes."""
+        """Return the change of the fitted values if the curve of the model changes."""
         changed = replace(problem, residual=lambda values: misfit(model(values) + change))
         return np.abs(changed.solve(found.values, starts=1, bars="").values - found.values)
 
@@ -298,7 +322,7 @@ def fit_curve(
 
 
 def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tuple:
-    """Return the corrected quick model, or None, and its best values."""
+    """Return the corrected fast model, or None, and its best values."""
     try:
         return models.search(start, starts)
     except NotConverged:
@@ -321,7 +345,7 @@ def _describe_substitutes(lost) -> str:
 
 
 def _compare_methods(path, method: str, measured: MeasuredCurve) -> tuple:
-    """Return a note on what is compared if the file has a curve of another kind than the model."""
+    """Return a note if the measured curve is of another kind than that of the model."""
     label = (*_read_table(path).labels.get("method", ()), "decay")[0]
     if label == method:
         return ()
@@ -397,9 +421,9 @@ def _list_amplitudes(amplitudes) -> str:
 
 
 def _compute_curve(model, amplitudes, method: str) -> np.ndarray:
-    """Compute frequency [Hz] and damping ratio (2, k) at rising amplitudes (k,) [m].
+    """Compute frequency [Hz] and damping ratio (2, k) at increasing amplitudes (k,) [m].
 
-    NaN where the mode does not oscillate; PatchfemError if it oscillates at no amplitude.
+    They are NaN if the mode does not oscillate; PatchfemError if it oscillates at no amplitude.
     """
     with locate_errors(model.source):
         found = backbone(model, "", amplitudes, (method,), errors=False)

@@ -23,11 +23,11 @@ from .loop_model import BenchModel
 from .loop_path import DEFAULT_OPTIONS, LoopOptions, read_offsets
 from .problem import FittedKeys, Problem, parse_ranges
 
-MAX_PIECES = 64  # Time steps between two rows; the steps are not halved beyond this number.
-# A change of the force below this fraction of the tolerance is invisible in a fit.
+MAX_PIECES = 64  # Time steps between two rows, above which the steps are not halved any more.
+# Fraction of the tolerance; a smaller change of the force has no effect on a fit.
 STEP_FRACTION = 0.1
 MIN_INDEPENDENT = 0.6  # Independent rows / rows, below which a warning states the correlation.
-# Residual / peak force, below which rounding and not correlation shapes the residual.
+# Residual / peak force, below which the residual is dominated by rounding, not by correlation.
 MIN_RMS = 1e-6
 MAX_FIRST_FORCE = 0.2  # Force in the first row / peak, above which the record cannot begin at rest.
 LOAD_UNITS = {
@@ -142,6 +142,7 @@ def fit_loop(
     scale = float(np.abs(loop.reading[~held]).max())
 
     def residual(values) -> np.ndarray:
+        """Return the residual / largest force (r,) in the fitted rows."""
         return (bench(values) - loop.reading)[~held] / scale
 
     offset_ranges = [offset.range for offset in offsets]
@@ -161,14 +162,14 @@ def fit_loop(
 
 
 class RefinedFit(NamedTuple):
-    """A fit, and the largest change of its model when the time steps are halved."""
+    """A fit, and the largest change of its model if the time steps are halved."""
 
     fit: Fit
     step_error: float
 
 
 def _solve_with_refined_steps(problem: Problem, bench: BenchModel, say) -> RefinedFit:
-    """Solve with time steps that are halved until they change the force too little to matter."""
+    """Solve with time steps that are halved until the change of the force is negligible."""
     if bench.exact:
         return RefinedFit(problem.solve(problem.own_values()), 0.0)
     found = problem.solve(problem.own_values(), bars="")

@@ -19,7 +19,7 @@ from ...scene.scene import Scene, SceneError
 from .loop_path import count_whole_cycles, prepend_lead_in
 from .problem import press_patch
 
-# Free keys of [contact] from whose ends the shared meshes are chosen: 3**3 models.
+# Number of free keys of [contact] whose bounds and middles choose the shared meshes: 3**3 models.
 MAX_MESH_KEYS = 3
 REST_SPEED_FRACTION = 1e-3  # Speed / largest measured speed, below which bonds are at rest.
 AMPLITUDE_TOL = 0.02  # Relative difference of two amplitudes, above which a note names them.
@@ -71,10 +71,14 @@ class BenchModel:
         self.made = 0
         self.patch = None
         self.moves_contact = any(bound.key.startswith("contact.") for bound in wanted)
-        self.meshes = None  # Shared by all values; chosen when a patch is first pressed.
+        # They are shared by all values, and chosen when a patch is first pressed.
+        self.meshes = None
 
     def _rest_speed_sets(self) -> list:
-        """Return the rest speed of growing bonds by the measured motion, unless the scene has it."""
+        """Return a rest speed for growing bonds from the measured motion.
+
+        [] if the scene sets it, or if the bonds do not grow.
+        """
         law = self.scene.friction
         grows = law_has_trait(law.law, "bonds") and law.rest_growth is not None
         is_free = "friction.rest_speed" in {bound.key for bound in self.wanted}
@@ -85,7 +89,7 @@ class BenchModel:
         return [f"friction.rest_speed={speed!r} m/s"]
 
     def _is_exact(self) -> bool:
-        """Whether the force at the rows does not depend on the time steps."""
+        """Return whether the force at the rows is independent of the time steps."""
         law, contact = self.scene.friction, self.scene.contact
         bonds = law_has_trait(law.law, "bonds")
         is_closed_form = law.rest_growth is None and (law.reading == "report" or law.order == 1)
@@ -106,15 +110,18 @@ class BenchModel:
         return reading + offsets.get("force", 0.0)
 
     def _model(self, scene: Scene) -> Model:
+        """Build the model of a scene, and keep the first error."""
         try:
             with locate_errors(scene):
                 return build(scene)
         except PatchfemError as error:
-            # A file of the scene is read here, and no other value of the free keys mends it.
+            # Building reads files of the scene; other values of the free keys would not avoid such
+            # an error.
             self.refused = self.refused or error
             raise
 
     def _reading(self, model: Model, offset: float) -> np.ndarray:
+        """Return the force or friction ratio (k,) of a model, whose first row is offset [m]."""
         patch = self._patch(model)
         driven = prepend_lead_in(self.time, self.loop.displacement, self.warm, offset)
         corner = np.arange(driven.time.size) * self.pieces
@@ -129,7 +136,8 @@ class BenchModel:
             )
         out = run.force[corner]
         if self.force_jumps:
-            # The force jumps at a row between two straight legs: it is the mean of both sides.
+            # The force jumps at a row between two straight segments; the reading is the mean of
+            # both sides.
             after = run.force[np.minimum(corner + 1, number[-1])]
             out = np.where(corner == 0, after, (out + after) / 2)
         out = out[driven.n_before :]
@@ -145,6 +153,7 @@ class BenchModel:
             raise PatchfemError(error.mistakes[0]) from None
 
     def _patch(self, model: Model):
+        """Return the pressed patch of a model; None for a [normal] contact."""
         if model.patch is None:
             return None
         if self.moves_contact:
@@ -154,7 +163,7 @@ class BenchModel:
         return self.patch
 
     def _shared_meshes(self):
-        """Return the meshes for the ends and the middle of each range of a key of [contact]."""
+        """Return the meshes for the bounds and the middle of each range of a key of [contact]."""
         if self.meshes is not None:
             return self.meshes
         middle = [(bound.low + bound.high) / 2 for bound in self.wanted]
@@ -170,7 +179,7 @@ class BenchModel:
             try:
                 models.append(build(self.scene_at(point)))
             except PatchfemError:
-                continue  # The search meets the same error and counts it.
+                continue  # The search meets the same error and counts it as a failed evaluation.
         self.refused = refused
         self.meshes = meshes.Shared(models, False)
         return self.meshes
@@ -178,7 +187,8 @@ class BenchModel:
     def _row_times(self) -> np.ndarray:
         """Return the times of the rows [s].
 
-        They are measured, or follow from the speed of the slide, or are even if time has no effect.
+        They are measured, or computed from the speed of the slide, or equally spaced if time has no
+        effect.
         """
         loop, scene = self.loop, self.scene
         if loop.time is not None:
@@ -207,7 +217,7 @@ class BenchModel:
         )
 
     def _note_amplitude(self) -> None:
-        """Note an amplitude of the scene that is not that of the record."""
+        """Add a note if the amplitude of the scene differs from that of the record."""
         slide = self.scene.slide
         half = float(np.ptp(self.loop.displacement)) / 2
         if slide.kind not in ("sine", "triangle"):

@@ -1,4 +1,4 @@
-"""Displacement along which a fit to a loop drives its model: the record, and what precedes it."""
+"""Displacement along which a fit to a loop drives its model: a lead-in and the record."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -80,7 +80,10 @@ def count_whole_cycles(loop: Loop) -> int:
 
 
 class DrivenPath(NamedTuple):
-    """Times (n,) [s] and displacements (n,) [m]; the record follows after `n_before` points."""
+    """Path that drives the model.
+
+    time: (n,) [s]; displacement: (n,) [m]; n_before: number of points before the record.
+    """
 
     time: np.ndarray
     displacement: np.ndarray
@@ -88,14 +91,14 @@ class DrivenPath(NamedTuple):
 
 
 def prepend_lead_in(time, place, warm: int, offset: float) -> DrivenPath:
-    """Return the path that begins at displacement 0 and continues as recorded.
+    """Return a path that begins at displacement 0 and continues as recorded.
 
     Parameters
     ----------
     time, place : (r,) array
         Times [s] and displacements [m] of the record; the first displacement is 0.
     warm : int
-        Leading rows that form whole cycles and are driven once beforehand; 0 for none.
+        Leading rows that form whole cycles and are driven once before the record; 0 for none.
     offset : float
         Displacement of the first row [m]; it is reached at the mean speed of the record.
 
@@ -112,8 +115,8 @@ def prepend_lead_in(time, place, warm: int, offset: float) -> DrivenPath:
         begin.append(-abs(offset) / speed)
     start = 0.0
     if warm:
-        # The last of these rows lies behind the first displacement; the record gives the time from
-        # there to the first displacement.
+        # The last of these rows comes before the first displacement is reached again; the record
+        # gives the time from there to the first displacement.
         left, right = place[warm - 1 : warm + 1]
         leg = time[warm] - time[warm - 1]
         turn = time[warm - 1] + leg * (0.0 - left) / (right - left)

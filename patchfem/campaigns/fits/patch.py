@@ -26,26 +26,36 @@ from ...runs.patch import ladder
 from ...runs.patch.jenkins_elements import elements, strip_elements
 from ...scene.scene import Scene
 
-AMPLITUDES_PER_DECADE = 8  # Enough that no regime of a law lies between two amplitudes.
-MIN_AMPLITUDES = 12  # Number of amplitudes of a short range.
+AMPLITUDES_PER_DECADE = 8  # This density resolves every regime of a law.
+MIN_AMPLITUDES = 12  # Smallest number of amplitudes, also of a short range.
 MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude / (slip force / stiffness); below, nothing slips.
 MAX_AMPLITUDE_FACTOR = 2.0  # Largest amplitude / the amplitude at which every element slips.
-MAX_FIRST_FACTOR = 0.2  # A range begins at this multiple of slip force / stiffness at the latest.
-MIN_LOSS = 1e-3  # Loss / (4 x force x slide), above which a patch counts as one that slips.
-MESH_ELEMENTS = 16  # While fewer than 1 of these elements slips, the loss is that of the mesh.
-LOSS_WEIGHT = 0.2  # Weight of the loss beside the force: it is known about so much less well.
+MAX_FIRST_FACTOR = 0.2  # A range begins at most at this multiple of slip force / stiffness.
+MIN_LOSS = 1e-3  # Loss / (4 x force x slide), above which the patch counts as slipping.
+# While fewer than 1 of this many elements slips, the loss is dominated by the mesh.
+MESH_ELEMENTS = 16
+# Weight of the loss compared with the force, because its relative error is larger by this factor.
+LOSS_WEIGHT = 0.2
 # Change of the loss by a coarser mesh (rms), above which the mesh is refined.
 MAX_LOSS_CHANGE = 0.1
 REFINE_FACTOR = 10.0  # Tolerance of the mesh / tolerance of its refinement.
 MIN_TOLERANCE = 9e-5  # Tolerance below which a mesh is not refined, as it takes too long.
-STIFFNESS_RANGE = 20.0  # A law's stiffness is searched from 1/20 to 20 times that of the patch.
+STIFFNESS_RANGE = 20.0  # A law's stiffness is searched for from 1/20 to 20 times that of the patch.
 
 
 class LawKeys(NamedTuple):
-    """Values of a law that are searched beside its stiffness relative to the patch's.
+    """Values of a law that are fitted in addition to its stiffness.
 
-    low, high: bounds (n,); keys: (stiffness [N/m], slip force [N], values) -> keys of [friction]; units:
-    of the keys that have a unit.
+    The stiffness is fitted as a multiple of that of the patch.
+
+    Attributes
+    ----------
+    low, high : tuple
+        Bounds (n,).
+    keys : callable
+        (stiffness [N/m], slip force [N], *values) -> keys of [friction].
+    units : dict
+        Unit by key, for keys that have one.
     """
 
     low: tuple
@@ -55,14 +65,17 @@ class LawKeys(NamedTuple):
 
 
 def _iwan_keys(stiffness: float, slip_force: float, chi: float, fraction: float) -> dict:
+    """Return the keys of law "iwan"."""
     return {"stiffness": stiffness, "chi": chi, "beta": fraction / (1 - fraction)}
 
 
 def _bouc_wen_keys(stiffness: float, slip_force: float, exponent: float, shape: float) -> dict:
+    """Return the keys of law "bouc-wen"."""
     return {"stiffness": stiffness, "exponent": exponent, "shape": shape}
 
 
 def _elastic_plastic_keys(stiffness: float, slip_force: float) -> dict:
+    """Return the keys of law "elastic-plastic"."""
     return {"bond_length": slip_force / stiffness}
 
 
@@ -80,7 +93,7 @@ class Curves(NamedTuple):
     loss: np.ndarray
 
     def deviate_from(self, own: "Curves", slides) -> np.ndarray:
-        """Return the relative differences (2, k) to the patch's own curves at slides (k,) [m]."""
+        """Return the relative differences (2, k) from the curves of the patch at slides (k,) [m]."""
         scale = np.maximum(own.loss, MIN_LOSS * 4 * slides * own.force)
         return np.array([self.force / own.force - 1, (self.loss - own.loss) / scale])
 
@@ -88,8 +101,14 @@ class Curves(NamedTuple):
 class FittedLaw(NamedTuple):
     """A law in place of the patch.
 
-    values: by the keys of [friction]; deviations: relative differences (2, k) of its curves to the
-    patch's; fit: the Fit.
+    Attributes
+    ----------
+    values : dict
+        Values by key of [friction].
+    curves : Curves
+    deviations : (2, k) array
+        Relative differences of the curves from those of the patch.
+    fit : Fit
     """
 
     values: dict
@@ -122,10 +141,22 @@ class Elements(NamedTuple):
 class PatchLoops(NamedTuple):
     """Loops of a patch.
 
-    load, slip_force [N]; stiffness [N/m] while nothing slips, extrapolated over the meshes where the
-    pieces alone give way; stiffness_error [N/m]: None if it is not known; slides (k,) [m]; curves;
-    mesh_change: relative change (2, k) of the curves by a coarser mesh, None without one; nodes: number
-    of nodes of the interface.
+    Attributes
+    ----------
+    load, slip_force : float
+        Normal load and largest friction force [N].
+    stiffness : float
+        Stiffness while nothing slips [N/m], extrapolated over the meshes if the pieces alone are
+        elastic.
+    stiffness_error : float or None
+        Its error [N/m]; None if it is not known.
+    slides : (k,) array
+        Amplitudes of the slide [m].
+    curves : Curves
+    mesh_change : (2, k) array or None
+        Relative change of the curves by a coarser mesh; None if there is none.
+    nodes : int
+        Number of nodes of the interface.
     """
 
     load: float
@@ -140,7 +171,10 @@ class PatchLoops(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedPatch:
-    """Laws by name in place of the patch of a scene; `best` has the least sum of squares."""
+    """Fitted laws by name in place of the patch of a scene.
+
+    best: the law with the smallest sum of squares.
+    """
 
     scene: Scene
     patch: PatchLoops
@@ -157,8 +191,8 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
     ----------
     scene : Scene
     slides : (k,) array, optional
-        Rising amplitudes of the slide [m]; by default from the onset of slip to twice the amplitude at
-        which the whole patch slips.
+        Increasing amplitudes of the slide [m]; by default from the onset of slip to twice the
+        amplitude at which the whole patch slips.
 
     Returns
     -------
@@ -167,7 +201,8 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
     Raises
     ------
     PatchfemError
-        For a patch that is no set of elastic-plastic elements; it says what to change.
+        If the patch cannot be described by elastic-plastic elements; the message says what to
+        change.
     """
     begin = perf_counter()
     model = build(scene)
@@ -212,7 +247,7 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
 
 
 def _default_slides(parts: Elements) -> np.ndarray:
-    """Return amplitudes (k,) [m] from those at which slip begins to those at which all slips."""
+    """Return amplitudes (k,) [m] from the onset of slip to slip of the whole patch."""
     stuck = parts.slip_force / parts.total_stiffness
     low = MIN_AMPLITUDE_FACTOR * stuck
     high = MAX_AMPLITUDE_FACTOR * float(parts.yield_displacement.max())
@@ -227,7 +262,7 @@ def _default_slides(parts: Elements) -> np.ndarray:
 
 
 def _warn_of_mesh(model: Model, patch, loss_change: float) -> tuple:
-    """Return a warning on a mesh that a coarser one changes too much."""
+    """Return a warning if a coarser mesh changes the loss too much."""
     if loss_change <= MAX_LOSS_CHANGE:
         return ()
     if model.patch.mesh.is_automatic:
@@ -274,12 +309,15 @@ def fit_law(
     weights = np.array([[1.0], [LOSS_WEIGHT]])
 
     def keys_at(values) -> dict:
+        """Return the keys of [friction] at values (n,) of the fit."""
         return asked.keys(values[0] * stiffness, static * load, *values[1:])
 
     def curves_at(values) -> Curves:
+        """Return the curves of the law at values (n,) of the fit."""
         return Curves(*steady_loop(_FrictionKeys(law, static, keys_at(values)), load, slides))
 
     def residual(values) -> np.ndarray:
+        """Return the weighted relative differences at values (n,) of the fit."""
         return (weights * curves_at(values).deviate_from(own, slides)).ravel()
 
     low = (1 / STIFFNESS_RANGE, *asked.low)
@@ -292,7 +330,10 @@ def fit_law(
 
 
 class _FrictionKeys:
-    """A table [friction] whose numbers need no check, as they lie within the bounds of the search."""
+    """Stand-in for a table [friction] with values within the bounds of the fit.
+
+    Its values need no check.
+    """
 
     def __init__(self, law: str, static: float, values: dict):
         self.__dict__.update(values, law=law, static=static)
@@ -313,7 +354,7 @@ def _elements(model: Model, patch) -> Elements:
 
 
 def _refuse(model: Model) -> None:
-    """Raise PatchfemError for a patch that is no set of elastic-plastic elements."""
+    """Raise PatchfemError if a patch cannot be described by elastic-plastic elements."""
     friction, rig = model.friction, model.rig
     if model.patch is None or friction is None:
         raise PatchfemError(
@@ -356,7 +397,10 @@ def _refuse(model: Model) -> None:
 
 
 def read_slides(lengths) -> np.ndarray | None:
-    """Return the requested amplitudes (k,) [m]; None for none, PatchfemError for fewer than three."""
+    """Check the requested amplitudes (k,) [m]; PatchfemError if there are fewer than three.
+
+    None if none are given.
+    """
     if lengths is None:
         return None
     if len(lengths) < 3:

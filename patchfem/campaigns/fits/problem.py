@@ -18,7 +18,7 @@ from ...scene.overrides import BaseScene
 from ...scene.ranges import Range, read_ranges
 from ...scene.scene import Scene, SceneError, loads
 
-# high / low of a range above which its middle is the geometric mean, as in `space`
+# high / low of a range above which its middle is the geometric mean, as in `identify.space`
 LOG_RATIO = 10.0
 
 
@@ -50,7 +50,7 @@ class FittedKeys:
 
     @property
     def outcome(self) -> Outcome:
-        """Outcome of the fit: done, or not_converged if the search did not settle."""
+        """Outcome of the fit: done, or not_converged if the search did not converge."""
         return self.fit.outcome
 
     def fitted_scene(self) -> Scene:
@@ -100,7 +100,17 @@ class Problem:
         return [_own_value(self.scene, bound) for bound in self.bounds]
 
     def solve(self, start: Sequence, starts: int = 3, bars: str = "series") -> Fit:
-        """Minimise the sum of squares of the residual; `starts` and `bars` as in `identify.fit`."""
+        """Minimise the sum of squares of the residual.
+
+        Parameters
+        ----------
+        start : sequence of float
+            Values (n,) of the first start.
+        starts : int
+            Number of starts.
+        bars : str
+            Kind of intervals, as in `identify.least_squares.fit`.
+        """
         box = self.box
         return fit(self.residual, box.low, box.high, start=start, starts=starts, bars=bars)
 
@@ -165,7 +175,10 @@ def press_patch(model: Model):
 
 
 def _own_value(scene: Scene, bound: Range) -> float:
-    """Return the value of a key in a scene, or the middle of its range; limited to the range."""
+    """Return the value of a key in a scene, limited to its range.
+
+    If the scene does not set it, it is the middle of the range.
+    """
     value = scene
     for part in split_key(bound.key):
         value = _item(value, part) if isinstance(value, tuple) else getattr(value, part, None)
@@ -177,7 +190,7 @@ def _own_value(scene: Scene, bound: Range) -> float:
 
 
 def _item(items: tuple, word: str):
-    """Find a table of an array by its name or its number from 0; None if there is none."""
+    """Return a table of an array by its name or its number from 0; None if there is none."""
     named = [item for item in items if getattr(item, "name", None) == word]
     if named:
         return named[0]

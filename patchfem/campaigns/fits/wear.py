@@ -1,8 +1,8 @@
-"""Fit of the wear coefficient to a measured worn depth, with the interval of the measurement.
+"""Fit of the wear coefficient to a measured worn depth, with its interval.
 
-Worn depth depends on the coefficient and the cycles by their product alone, so one run with the largest
-coefficient gives the depth for all smaller ones. The coefficient that is read off this curve is then run
-itself and corrected.
+The worn depth depends only on the product of coefficient and cycles, so one run with the largest
+coefficient gives the depth for all smaller ones. A run with the coefficient that is read from this
+curve checks and corrects it.
 """
 
 import json
@@ -24,20 +24,23 @@ from ...scene.keys.quantities import parse_quantity
 from ...scene.ranges import Range
 from .problem import parse_ranges
 
-# As in compare.json, the more accurate one first.
+# Names as in compare.json; the more accurate one comes first.
 QUANTITIES = (
     "worn_depth_mean",
     "worn_depth_max",
 )
-MAX_RUNS = 6  # Runs of wear; the correction converges within two or three of them.
-MAX_FILE_BYTES = 1 << 20  # A file that compare writes is far smaller.
-DEPTH_TOL = 0.1  # The depth is met to this fraction of the scene's tolerance.
+MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three of them.
+MAX_FILE_BYTES = 1 << 20  # Largest file that is read; a file that compare writes is far smaller.
+DEPTH_TOL = 0.1  # Fraction of the scene's tolerance to which the depth is met.
 KEY = "wear.coefficient"
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredDepth:
-    """A measured depth [m], by name, with its interval and its source ("--to" or a file)."""
+    """A measured depth with its interval.
+
+    name: one of QUANTITIES; value, low, high: [m]; source: "--to" or a file.
+    """
 
     name: str
     value: float
@@ -48,10 +51,19 @@ class MeasuredDepth:
 
 @dataclass(frozen=True, slots=True)
 class FittedCoefficient:
-    """A wear coefficient [m2/N] with its interval.
+    """A fitted wear coefficient.
 
-    model: the measured quantity as the scene gives it with this coefficient [m]; bounds: of the search;
-    runs: number of wear runs.
+    Attributes
+    ----------
+    value, low, high : float
+        Coefficient and its interval [m2/N].
+    measured : MeasuredDepth
+    model : float
+        The measured quantity that the scene gives with this coefficient [m].
+    bounds : Range
+        Bounds of the search.
+    runs : int
+        Number of wear runs.
     """
 
     value: float
@@ -104,6 +116,7 @@ def read_depth(text: str) -> MeasuredDepth:
 
 
 def _read_file(path: Path) -> MeasuredDepth:
+    """Read a measured depth from a JSON file that compare writes."""
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise PatchfemError(
@@ -182,6 +195,7 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
     patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]
 
     def compute(coefficient: float) -> WearCurve:
+        """Return the depth over the cycles for a coefficient [m2/N]."""
         return _compute_curve(model, patch, coefficient, target.name, progress)
 
     curve = compute(bounds.high)
@@ -226,6 +240,7 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
 
 
 def _read_bounds(free) -> Range:
+    """Read the range of the coefficient; PatchfemError for any other free key."""
     found = parse_ranges(free)
     if [bound.key for bound in found] != [KEY]:
         raise PatchfemError(

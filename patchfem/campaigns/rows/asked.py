@@ -1,4 +1,4 @@
-"""The models that a scene of a rig stands for: one per measured condition, for any values of the free keys."""
+"""Models of a scene of a rig at each measured condition, for any values of the free keys."""
 
 from __future__ import annotations
 
@@ -11,17 +11,18 @@ from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, loads
 from ..fits.problem import model_without_joint
 
-READINGS = ("measured.acceleration_gain", "measured.displacement_gain")  # never in the model
+# These keys scale the readings; they are not part of the model.
+READINGS = ("measured.acceleration_gain", "measured.displacement_gain")
 
 
 class Question:
-    """What is to be fitted: a scene of a rig, the Ranges `wanted` of its free keys, and the file of measured rows."""
+    """What is fitted: a scene of a rig, Ranges of its free keys, and a file of rows."""
 
     def __init__(self, scene: Scene, wanted, measured):
         self.scene, self.wanted, self.measured = scene, wanted, measured
 
     def asked(self, conditions, *sets: str) -> Asked:
-        """The scene, with more --set strings, asked at conditions (c, 2)."""
+        """Return the models of the scene at conditions (c, 2), with additional --set strings."""
         scene = (
             loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets])
             if sets
@@ -31,11 +32,25 @@ class Question:
 
 
 class Asked:
-    """A scene of a rig under a sine of its base, asked at measured conditions with values of free keys.
+    """A scene of a rig under a sine of its base, at measured conditions and with free keys.
 
-    conditions: (c, 2) frequency [Hz] and input [m s-2]; wanted: Ranges of the free keys; measured: the file of rows.
-    SceneError and PatchfemError name what cannot be fitted. A scene that names no method is asked for its steady
-    motions where 'harmonic' takes it (`notes` says so): a row was read when the rig had settled.
+    If the scene names no method, its steady motions are computed, provided that the method
+    'harmonic' accepts it (`notes` says so): a row was read after the rig had settled.
+
+    Parameters
+    ----------
+    scene : Scene
+    conditions : (c, 2) array
+        Frequency [Hz] and input [m s-2].
+    wanted : list of Range
+        Bounds of the free keys.
+    measured : Path
+        File of the rows.
+
+    Raises
+    ------
+    SceneError, PatchfemError
+        For a scene or a key that cannot be fitted.
     """
 
     def __init__(self, scene: Scene, conditions, wanted, measured):
@@ -51,6 +66,7 @@ class Asked:
         self.rigs = [build(self.base.override(sets_of(*one))).rig for one in conditions]
 
     def _refuse(self, measured) -> None:
+        """Raise PatchfemError for a scene or a key that cannot be fitted to rows."""
         scene, drive = self.scene, self.scene.drive
         where = f"{scene.path}: fit --to {measured.name}: "
         if scene.kind not in ("rig", "linear"):
@@ -78,7 +94,7 @@ class Asked:
                 )
 
     def _settle(self) -> None:
-        """Ask for steady motions where the scene allows them."""
+        """Set the method 'harmonic' if the scene allows it."""
         steady = "accuracy.method=harmonic"
         try:
             loads(self.scene.text, self.scene.path, [*self.scene.sets, *self.sets, steady])
@@ -96,13 +112,13 @@ class Asked:
         return model_without_joint(self.base, sets)
 
     def at(self, model: Model, condition: int) -> Model:
-        """The model under the drive of a condition."""
+        """Return the model with the drive of a condition."""
         drive = self.rigs[condition].drive
         rig = model.rig.with_signal(drive.signal, frequency=drive.frequency, cycles=drive.cycles)
         return replace(model, rig=rig)
 
     def sine(self, condition: int) -> SineDrive:
-        """The drive of a condition."""
+        """Return the drive of a condition."""
         return self.rigs[condition].drive.signal
 
     @property
@@ -112,7 +128,7 @@ class Asked:
 
 
 def sets_of(frequency: float, level: float) -> list:
-    """The --set strings of a condition: frequency [Hz], input [m s-2]."""
+    """Return the --set strings of a condition: frequency [Hz], input [m s-2]."""
     return [
         f"drive.frequency={float(frequency)!r} Hz",
         f"drive.acceleration={float(level)!r} m/s^2",

@@ -1,4 +1,4 @@
-"""What was read in a table of measured responses, cell by cell, and the logarithm of computed over measured."""
+"""Readings of a table of measured responses, and the logarithm of computed over measured."""
 
 from dataclasses import dataclass
 from math import log
@@ -10,21 +10,37 @@ from ...core import PatchfemError, frozen_array
 from ...inputs.measured import read_table
 from ...scene.keys.quantities import parse_quantity
 
-# m, one digit of the printed displacements: what lies below it counts as this in a ratio
+# Smallest displacement [m] in a ratio: one digit of the printed displacements, 0.01 mil.
 FLOOR = 0.01 * 25.4e-6
-MOST = log(1e3)  # largest size of a logarithm: of a motion that runs away, or is none
-ALIKE = 1e-9  # relative difference of two inputs that are one
+# Largest size of a logarithm; it stands for a motion that grows without bound or is zero.
+MOST = log(1e3)
+ALIKE = 1e-9  # relative difference below which two inputs are the same condition
 KINDS = {"frequency": "frequency", "input": "acceleration"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cells:
-    """The n readings of a table, those of a row after another, its acceleration first.
+    """The n readings of a table, row by row; the acceleration of a row comes first.
 
-    path; rows: all of them, as `inputs.measured.MeasuredRow`; row (n,): of each reading; felt (n,): whether it is an
-    acceleration; measured (n,) [m s-2] or [m]; unstable (n,): of a row flagged U; conditions (c, 2): distinct frequency
-    [Hz] and input [m s-2] of rows with a reading, ascending; condition (n,): of each reading; runs: a name per row, of
-    its frequency and whether it is a repeat.
+    Attributes
+    ----------
+    path : Path
+    rows : tuple of MeasuredRow
+        All rows, also those without a reading (`inputs.measured`).
+    row : (n,) array
+        Number of the row of each reading.
+    felt : (n,) array
+        Whether a reading is an acceleration.
+    measured : (n,) array
+        Accelerations [m s-2] and displacements [m].
+    unstable : (n,) array
+        Whether the row of a reading is flagged U.
+    conditions : (c, 2) array
+        Distinct frequencies [Hz] and inputs [m s-2] of rows with a reading, ascending.
+    condition : (n,) array
+        Number of the condition of each reading.
+    runs : tuple of str
+        A name per row, made of its frequency and whether it is a repeat.
     """
 
     path: Path
@@ -39,11 +55,14 @@ class Cells:
 
     @property
     def empty(self) -> list:
-        """Numbers of the rows in which nothing was read."""
+        """Numbers of the rows without any reading."""
         return sorted(set(range(len(self.rows))) - set(self.row.tolist()))
 
     def column(self, name: str) -> list:
-        """Values (n,) of a column at the readings: "frequency", "input", "flag" or "run"."""
+        """Return the values (n,) of a column at the readings.
+
+        PatchfemError for a column other than "frequency", "input", "flag" and "run".
+        """
         if name == "run":
             return [self.runs[k] for k in self.row]
         if name not in ("frequency", "input", "flag"):
@@ -54,9 +73,10 @@ class Cells:
         return [getattr(self.rows[k], name) for k in self.row]
 
     def chosen(self, one: str) -> np.ndarray:
-        """Which readings (n,) a text like "frequency=135 Hz,150 Hz" or "run=143 Hz repeat" names.
+        """Return which readings (n,) are selected by a text.
 
-        PatchfemError for a value without its unit, and for one that no row has.
+        The text is like "frequency=135 Hz,150 Hz" or "run=143 Hz repeat". PatchfemError for a value
+        without its unit, and for a value that no row has.
         """
         name, equals, values = (part.strip() for part in one.partition("="))
         if not equals or not values:
@@ -77,6 +97,7 @@ class Cells:
 
     @staticmethod
     def _is(name: str, value, text: str) -> bool:
+        """Return whether a value of a column equals that of a text."""
         if name not in KINDS:
             return text in value if name == "flag" else text == value
         try:
@@ -86,7 +107,10 @@ class Cells:
         return abs(value - wanted) <= ALIKE * abs(wanted)
 
     def parts(self, name: str, among) -> list:
-        """(name, readings (n,) bool) of every distinct value of a column among readings (n,) bool, in their order."""
+        """Return pairs (name, readings (n,) bool) of every distinct value of a column.
+
+        Only the readings `among` (n,) bool count; the values are in the order of the rows.
+        """
         here = self.column(name)
         found = dict.fromkeys(value for value, there in zip(here, among) if there)
         return [
@@ -95,8 +119,15 @@ class Cells:
         ]
 
     def logs(self, acceleration, displacement) -> np.ndarray:
-        """ln(computed/measured) (n,) of accelerations [m s-2] and displacement amplitudes [m], (c,) each of the
-        conditions; NaN where nothing was computed, MOST where a motion is not finite."""
+        """Return ln(computed/measured) (n,) of all readings.
+
+        It is NaN if nothing was computed, and MOST if a motion is not finite.
+
+        Parameters
+        ----------
+        acceleration, displacement : (c,) array
+            Accelerations [m s-2] and displacement amplitudes [m] at the conditions.
+        """
         both = np.array([displacement, acceleration], float)
         computed = both[self.felt.astype(int), self.condition]
         least = np.where(self.felt, 1e-300, FLOOR)
@@ -106,14 +137,16 @@ class Cells:
 
 
 def _shown(name: str, value) -> str:
+    """Format a value of a column."""
     unit = {"frequency": " Hz", "input": " m/s^2"}.get(name)
     return f"{value:.6g}{unit}" if unit else str(value) or "(none)"
 
 
 def cells_of(path: Path) -> Cells:
-    """The readings of a CSV of measured responses (`inputs.measured.read_table`); PatchfemError names what is wrong.
+    """Read the readings from a CSV file of measured responses (`inputs.measured.read_table`).
 
-    Repeats of one condition stay readings of their own; rows without a reading are kept by their number.
+    Repeats of a condition remain separate readings. PatchfemError names what is wrong with the
+    file.
     """
     rows = tuple(read_table(path))
     row, felt, measured = [], [], []
@@ -137,7 +170,8 @@ def cells_of(path: Path) -> Cells:
     row = np.array(row)
     asked = sorted({(rows[k].frequency, rows[k].input) for k in row})
     conditions = []
-    for one in asked:  # 4 g written in two units is one condition
+    # The same input written in two units differs by round-off, but is one condition.
+    for one in asked:
         if (
             not conditions
             or abs(one[0] - conditions[-1][0]) > ALIKE * one[0]
@@ -165,9 +199,22 @@ def cells_of(path: Path) -> Cells:
 
 
 def scores(cells: Cells, logs, among) -> dict | None:
-    """{"acceleration", "displacement", "all"}: root mean square of logs (n,) over the readings `among` (n,) bool, of
-    each kind and of all, None where there is none or where one is NaN, not predicted; None where there are no readings
-    at all."""
+    """Return the root mean square of logarithms of readings; None if there are no readings.
+
+    Parameters
+    ----------
+    cells : Cells
+    logs : (n,) array
+        ln(computed/measured).
+    among : (n,) bool
+        Readings that count.
+
+    Returns
+    -------
+    dict or None
+        By "acceleration", "displacement" and "all"; None if there is no such reading, or if one of
+        them is NaN because it was not predicted.
+    """
     if not np.any(among):
         return None
     logs, out = np.asarray(logs), {}

@@ -1,4 +1,4 @@
-"""What the instruments of a rig read at the measured conditions, as a function of the free values."""
+"""Readings of the instruments of a rig at the measured conditions, by the free values."""
 
 import numpy as np
 
@@ -10,12 +10,13 @@ from .asked import READINGS, Asked
 
 
 class Computed:
-    """Readings of the models of an Asked; a call with values (n,) and conditions gives (acceleration [m s-2],
-    displacement amplitude [m]), (c,) each, NaN at conditions that were not asked for and infinite where no bounded
-    motion is found.
+    """Readings of the models of an Asked, as a function of values (n,) and conditions.
 
-    Motions start from those of the values before, so that a descent is quick; `forget` makes the next ones start from
-    rest, so that an answer does not depend on what was asked before it.
+    A motion starts from the motion of the values before, so that a descent is fast. After `forget`
+    it starts from rest, so that the result does not depend on earlier evaluations.
+
+    A call returns the acceleration reading [m s-2] and the displacement amplitude [m], (c,) each:
+    NaN at conditions that were not requested, and infinite if no bounded motion is found.
     """
 
     def __init__(self, asked: Asked, say=None):
@@ -36,7 +37,7 @@ class Computed:
         self.warm = True
 
     def forget(self) -> None:
-        """Start the next motions from rest."""
+        """Let the next motions start from rest."""
         self.near, self.last = {}, (None, {})
 
     def __call__(self, values, conditions) -> tuple:
@@ -54,7 +55,7 @@ class Computed:
         return out
 
     def _run(self, values, conditions) -> dict:
-        """Condition -> (reading of the acceleration without its gain, displacement amplitude)."""
+        """Return, by condition, the acceleration reading without its gain and the displacement."""
         model, found = self.asked.model(values), {}
         with locate_errors(model.source):
             patch = self._pressed(model)
@@ -74,13 +75,16 @@ class Computed:
         return found
 
     def _shown(self, seen, drive) -> float:
-        """What the accelerometer shows [m s-2] without its gain."""
+        """Return the reading of the accelerometer [m s-2] without its gain."""
         if self.reading[0] == "fundamental" and seen.fundamental is not None:
             return abs(seen.fundamental)
         return reading(seen.window, drive, seen.acceleration, *self.reading)
 
     def _pressed(self, model):
-        """The pressed patch of a model, made once where no free key moves it; None under [normal]."""
+        """Return the pressed patch of a model; None for a [normal] contact.
+
+        It is pressed only once if no free key changes it.
+        """
         if model.patch is None:
             return None
         if self.patch is None or self.asked.moves_pieces:

@@ -27,7 +27,7 @@ SAME_SCORE = 1.01  # Ratio of two scores, below which two searches found the sam
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fold:
-    """A value of the column that is left out.
+    """The fit without the readings of one value of the column that is left out.
 
     name: the value; readings: (n,) bool, those left out; found: the fit of all others.
     """
@@ -50,7 +50,11 @@ class Placebo:
 
 
 class NullPrediction(NamedTuple):
-    """Logarithms (n,) of a model without mechanics, those of readings left out (n,), its numbers."""
+    """Prediction by a model without mechanics.
+
+    logs: (n,) ln(computed/measured); left: (n,) the same by fits that did not see the reading;
+    numbers: fitted values by kind of reading.
+    """
 
     logs: np.ndarray
     left: np.ndarray
@@ -233,6 +237,7 @@ def fit_rows(
 
 
 def _require_enough_readings(cells: Cells, training, count: int, how: Search) -> None:
+    """Raise PatchfemError if a fit has no more readings than values."""
     used = training & ~cells.unstable if how.unstable == "out" else training
     if used.sum() <= count:
         raise PatchfemError(
@@ -254,6 +259,7 @@ def _count_starts(progress: Callable | None, total: int) -> Callable | None:
     done = [0]
 
     def tell(count: int) -> None:
+        """Add the starts that are done and report their fraction."""
         done[0] += count
         progress(done[0] / total)
 
@@ -284,6 +290,7 @@ def _split_placebo(text: str, wanted) -> list:
 
 
 def _predict_null(cells: Cells, name: str, held, parts) -> NullPrediction:
+    """Return the prediction by a null model, also of the readings that are left out."""
     logs, numbers = predicted(cells, name, ~held)
     left = np.full(held.size, np.nan)
     for _, part in parts:

@@ -1,7 +1,8 @@
-"""Models without mechanics that a fitted rig has to beat: y = C a^p f^q of input a and frequency f, kind by kind.
+"""Models without mechanics that a fitted rig has to beat.
 
-Their logarithm is linear in what is free, so each is an exact least-squares answer. Readings flagged U count as they
-stand, which can only help them.
+They are y = C a^p f^q for each kind of reading; a is the input and f the frequency. The logarithm
+of y is linear in the free values, so each model is an exact linear least-squares solution. Readings
+flagged U count as they are, which can only favour these models.
 """
 
 import numpy as np
@@ -12,12 +13,25 @@ NULLS = ("constant", "power_input", "power_input_frequency")
 
 
 def predicted(cells: Cells, name: str, training) -> tuple:
-    """(ln(computed/measured) (n,), {kind: {"factor", "input", "frequency"}}) of a null model fitted to the readings
-    `training` (n,) bool.
+    """Fit a null model to some readings and predict all of them.
 
-    constant: y = C a; power_input: y = C a^p; power_input_frequency: y = C a^p f^q. What the training readings do not
-    determine, such as q at one frequency, is the least change from C a: p stays 1, or q 0. A kind of which nothing is
-    in training is NaN.
+    The models are y = C a ("constant"), y = C a^p ("power_input") and y = C a^p f^q
+    ("power_input_frequency"). If the training readings do not determine an exponent, such as q at a
+    single frequency, it is that of the smallest change from C a: p = 1 or q = 0.
+
+    Parameters
+    ----------
+    cells : Cells
+    name : str
+        One of NULLS.
+    training : (n,) bool
+        Readings of the fit.
+
+    Returns
+    -------
+    tuple
+        ln(computed/measured) (n,), NaN for a kind without training readings; and by kind the fitted
+        "factor", exponent of "input" and exponent of "frequency".
     """
     out, found = np.full(cells.row.size, np.nan), {}
     at = np.log(cells.conditions[cells.condition])

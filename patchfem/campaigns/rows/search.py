@@ -1,4 +1,7 @@
-"""The best values of a rig for some readings, from random starts that see nothing but these readings."""
+"""Search for the values of a rig that fit some readings best, from random starts.
+
+A search uses nothing but the training readings.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,13 +14,25 @@ from ...identify.space import CubeResidual, space
 from .cells import Cells
 from .computed import Computed
 
-UNSTABLE = ("bound", "out", "read")  # what a reading flagged U counts as in a fit
+# how a reading flagged U counts in a fit: as a lower bound, not at all, or as any other
+UNSTABLE = ("bound", "out", "read")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Found:
-    """The best of some starts. fit: its values with intervals; starts: (s, n) values at which each began; ends: (s, n)
-    at which each ended, NaN where it failed; rms: (s,) root mean square of the training logarithms there."""
+    """The best fit of several starts.
+
+    Attributes
+    ----------
+    fit : Fit
+        Values with intervals.
+    starts : (s, n) array
+        Values at which each start began.
+    ends : (s, n) array
+        Values at which each start ended; NaN if it failed.
+    rms : (s,) array
+        Root mean square of the training logarithms at the ends.
+    """
 
     fit: Fit
     starts: np.ndarray
@@ -27,8 +42,20 @@ class Found:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Search:
-    """How values are looked for: number of random starts, their seed, what readings flagged U count as (UNSTABLE), and
-    what keeps the ends of starts: kept(name) -> a list or None, kept(name, list) keeps it."""
+    """How values are searched for.
+
+    Attributes
+    ----------
+    starts : int
+        Number of random starts.
+    seed : int
+        Seed of the random starts.
+    unstable : str
+        How readings flagged U count, one of UNSTABLE.
+    kept : callable
+        Stores the ends of starts: kept(name) returns a stored list or None, kept(name, list) stores
+        it.
+    """
 
     starts: int = 8
     seed: int = 0
@@ -37,16 +64,24 @@ class Search:
 
 
 def residual_of(cells: Cells, computed: Computed, training, unstable: str) -> Callable:
-    """The residual(values) of the readings `training` (n,) bool: ln(computed/measured).
+    """Return the residual ln(computed/measured) of some readings, as a function of the values.
 
-    unstable: a reading flagged U is a lower bound of a motion that still grew, so that only what lies below it counts
-    ("bound"), is left out ("out"), or is a reading as any other ("read").
+    Parameters
+    ----------
+    cells : Cells
+    computed : Computed
+    training : (n,) bool
+        Readings of the residual.
+    unstable : str
+        How a reading flagged U counts. "bound": it is a lower bound, because the motion still grew,
+        so only a computed value below it counts; "out": not at all; "read": as any other reading.
     """
     used = training & ~cells.unstable if unstable == "out" else training
     conditions = sorted(set(cells.condition[used].tolist()))
     bound = cells.unstable[used] if unstable == "bound" else np.zeros(int(used.sum()), bool)
 
     def residual(values):
+        """Return the residual at values (n,) of the free keys."""
         logs = cells.logs(*computed(values, conditions))[used]
         return np.where(bound, np.minimum(logs, 0.0), logs)
 
@@ -62,11 +97,34 @@ def searched(
     name: str = "",
     tell: Callable | None = None,
 ) -> Found:
-    """The Found of the readings `training` (n,) bool within the ranges that are asked for.
+    """Fit the free values to some readings within their ranges.
 
-    Every start begins with motions from rest, so that nothing but its own place and the training readings matters. The
-    one with the least training residual is followed to its end; bars as in `identify.least_squares.fit`. tell: called
-    after each start. NotConverged where every start fails.
+    Each start begins with motions from rest, so that its result depends only on its starting values
+    and on the training readings. The descent with the smallest training residual is continued until
+    it converges.
+
+    Parameters
+    ----------
+    cells : Cells
+    computed : Computed
+    training : (n,) bool
+        Readings of the fit.
+    how : Search
+    bars : str
+        Kind of intervals, as in `identify.least_squares.fit`.
+    name : str
+        Name under which the ends of the starts are stored.
+    tell : callable, optional
+        Called after each start.
+
+    Returns
+    -------
+    Found
+
+    Raises
+    ------
+    NotConverged
+        If all starts fail.
     """
     wanted = computed.asked.wanted
     box = space([one.low for one in wanted], [one.high for one in wanted])
@@ -75,7 +133,7 @@ def searched(
     begins = np.random.default_rng(how.seed).random((how.starts, n))
 
     def kept(k, *one):
-        """Keep a Descent as a list that a file can hold, or give it back."""
+        """Store a Descent as a list that a file can contain, or return the stored one."""
         if one:
             u, cost, done, rows = one[0]
             how.kept(

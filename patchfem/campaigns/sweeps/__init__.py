@@ -1,6 +1,8 @@
-"""Sweeps: many cases of one scene, each a scene with other values of a few keys, answered here or on many processes.
+"""Sweeps: many cases of one scene, which differ in the values of a few keys.
 
 In: `Asked`, the scene as text, and `Cases`, the values of its keys. Out: `CaseResults` of
-`runs.batch`, chunk by chunk, in any order. `executors/` hold the ways to work on chunks; what is
-kept on disk is the business of `export.sweeps`. Read `cases`, then `sweep`.
+`runs.batch`, chunk by chunk in any order. The modules of `executors/` compute chunks in this
+process, in several processes, or on a cluster. `export.sweeps` stores the results on disk.
+
+Read `cases` first, then `sweep`.
 """

@@ -1,4 +1,8 @@
-"""A scene asked again and again with other values of a few keys: the model of each case, or why there is none."""
+"""Models of the cases of a sweep, or the reason why a case has none.
+
+In: the text of a scene, and the keys of a case as strings. Out: a Model. A case that differs from
+an earlier one only in plain numbers is derived from that one without reading the scene again.
+"""
 
 from __future__ import annotations
 
@@ -24,9 +28,17 @@ from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """The text of a scene, its path, which other files are relative to, and the --set strings that all cases share.
+    """Scene of a sweep as text.
 
-    of: the measure that the sweep is asked about, "" unless named.
+    Attributes
+    ----------
+    path : Path
+        File of the scene; other files are relative to it.
+    text : str
+    sets : tuple of str
+        --set strings that all cases share.
+    of : str
+        Measure that the sweep was requested for; "" if none was named.
     """
 
     path: Path
@@ -35,18 +47,29 @@ class Asked:
     of: str = ""
 
     def scene(self, sets: Sequence[str]) -> Scene:
-        """The scene with `table.key=value` of each changed key; SceneError names every mistake."""
+        """Return the scene with `table.key=value` strings; SceneError names every mistake."""
         base = _base(self)
         return base.override(sets) if base is not None else self._read(sets)
 
     def _read(self, sets: Sequence[str]) -> Scene:
+        """Read the scene with `table.key=value` strings from its text."""
         return replace(require_files(loads(self.text, self.path, (*self.sets, *sets))), sweep=())
 
     def model(self, sets: Sequence[str], values: Sequence[float | str] = ()) -> Model:
-        """The model of a case; PatchfemError, with every mistake of its scene, where there is none.
+        """Build the model of a case.
 
-        values: of the keys that `sets` sets, in SI, where they are known: a case that differs from one before in plain
-        numbers alone is made from that.
+        Parameters
+        ----------
+        sets : sequence of str
+            ``table.key=value`` strings of the case.
+        values : sequence
+            Values of the same keys in SI, if they are known: a case that differs from an earlier
+            one only in plain numbers is then derived from that one.
+
+        Raises
+        ------
+        PatchfemError
+            With every mistake of the scene, if there is no model.
         """
         try:
             return self._like(sets, values) or build(self.scene(sets))
@@ -56,7 +79,7 @@ class Asked:
             raise
         except (
             Exception
-        ) as error:  # a defect of one case must not cost the answers of a thousand others
+        ) as error:  # A defect in one case must not lose the results of a thousand others.
             raise PatchfemError(
                 f"internal fault, please report it: {type(error).__name__}: {error}"
             ) from error
@@ -64,8 +87,20 @@ class Asked:
     def alike(
         self, keys: Sequence[str], values: np.ndarray, sets: Callable, cases: np.ndarray
     ) -> SimilarModels | None:
-        """Models of cases that differ in numbers values (n, k) [SI] of these keys alone; None where the rules of a
-        scene must see one of them. sets: of a case, its `key=value` strings."""
+        """Return models of cases that differ only in the numbers of some keys.
+
+        None if the rules of a scene must check one of the values.
+
+        Parameters
+        ----------
+        keys : sequence of str
+        values : (n, k) array
+            Values of the keys [SI].
+        sets : callable
+            Number of a case -> its ``table.key=value`` strings.
+        cases : (n,) array
+            Numbers of the cases.
+        """
         keys, known = tuple(keys), _first(self)
         if keys not in known:
             base = _base(self)
@@ -77,8 +112,10 @@ class Asked:
         return SimilarModels(*known[keys], values, sets, cases)
 
     def _like(self, sets: Sequence[str], values: Sequence) -> Model | None:
-        """The model of a case made from the first valid one with the same keys; None where the rules of a scene must
-        see it."""
+        """Return the model of a case, derived from the first valid one with the same keys.
+
+        None if the rules of a scene must check it.
+        """
         if not values or not all(isinstance(value, float) for value in values):
             return None
         keys = [one.partition("=")[0] for one in sets]
@@ -86,7 +123,7 @@ class Asked:
         return found and found[0]
 
     def mistakes(self, sets: Sequence[str]) -> list[str]:
-        """Every mistake of the scene of a case; none where it is valid."""
+        """Return every mistake of the scene of a case; [] if it is valid."""
         try:
             self.scene(sets)
         except SceneError as error:
@@ -94,14 +131,14 @@ class Asked:
         return []
 
     def axes(self) -> tuple[list, list[str]]:
-        """(axes, mistakes) of the table [sweep], none of either without it."""
+        """Return the axes of the table [sweep] and its mistakes; both are empty without this table."""
         try:
             return read_sweep_axes(self.text, self.path)
         except SceneError as error:
             return [], error.mistakes
 
     def place(self, key: str) -> str:
-        """A key with a mode's number in place of its name."""
+        """Return a key in which the name of a mode is replaced by its number."""
         pieces, modes = key.split("."), tomllib.loads(self.text).get("structure", {})
         modes = modes.get("mode") if isinstance(modes, dict) else None
         if pieces[:2] == ["structure", "mode"] and len(pieces) > 2 and isinstance(modes, list):
@@ -110,7 +147,11 @@ class Asked:
         return ".".join(pieces)
 
     def digest(self) -> str:
-        """Sign of what all cases share: the version, the tables as written but for [sweep], what is set, the files."""
+        """Return a hash of what all cases share.
+
+        It covers the version, all tables as written except [sweep], the --set strings, and the
+        content of the files.
+        """
         tables = {
             name: value for name, value in tomllib.loads(self.text).items() if name != "sweep"
         }
@@ -122,7 +163,10 @@ class Asked:
         ).hexdigest()
 
     def meshed(self, keys: Sequence[str]) -> bool:
-        """Whether the cases have patches whose mesh is chosen, for all of them together; keys: those that change."""
+        """Return whether the cases have patches whose mesh is chosen for all of them together.
+
+        keys: those that change from case to case.
+        """
         tables = tomllib.loads(self.text)
         given = {
             f"{table}.{key}"
@@ -137,13 +181,16 @@ class Asked:
         )
 
     def content(self, text: str) -> str:
-        """Sign of the content of the files that a value names; "" where it names none."""
+        """Return hashes of the contents of the files that a value names; "" if it names none."""
         return " ".join(sign for _, sign in hash_named_files([text], self.path.parent))
 
 
 @lru_cache(maxsize=2)
 def _base(asked: Asked) -> BaseScene | None:
-    """What the scenes of all cases are made from; None where the text without their values is no valid scene."""
+    """Return the scene from which those of all cases derive.
+
+    None if the text is no valid scene without the values of a case.
+    """
     try:
         return BaseScene(asked._read(()))
     except SceneError:
@@ -152,10 +199,13 @@ def _base(asked: Asked) -> BaseScene | None:
 
 @lru_cache(maxsize=2)
 def _first(asked: Asked) -> dict[tuple, tuple | None]:
-    """What models of cases with the same keys are made from, by these keys; None where none can be."""
+    """Return the cache of what models of similar cases derive from, by the names of their keys.
+
+    An entry is None if no models can be derived.
+    """
     return {}
 
 
 def _of_case(error: SceneError) -> list[str]:
-    """The mistakes of a case; one in a value that was set has no place but its key."""
+    """Return the mistakes of a case without the prefix of values that were set."""
     return [text.removeprefix("--set: ") for text in error.mistakes]

@@ -1,4 +1,4 @@
-"""The cases of a sweep: every combination of the values of its keys, or one row of values each."""
+"""Cases of a sweep: all combinations of the values of its keys, or one row of values each."""
 
 from __future__ import annotations
 
@@ -36,11 +36,19 @@ PIECES = tuple(
 
 @dataclass(frozen=True, slots=True)
 class Cases:
-    """Cases numbered from 0.
+    """Cases of a sweep, numbered from 0.
 
-    axes: the keys with their values. rows: case k has the k-th value of every axis; otherwise the cases are all
-    combinations, the last axis fastest. drawn: the rows are drawn at chance. words: of the command that asks for the
-    same rows, () where these are not known.
+    Attributes
+    ----------
+    axes : tuple of Axis
+        Keys with their values.
+    rows : bool
+        Whether case k has the k-th value of every axis; otherwise the cases are all combinations,
+        the last axis fastest.
+    drawn : bool
+        Whether the rows are random.
+    words : tuple of str
+        Words of the command that gives the same rows; () if they are not known.
     """
 
     axes: tuple[Axis, ...]
@@ -53,11 +61,11 @@ class Cases:
 
     @property
     def shape(self) -> tuple:
-        """Number of values of each axis; of rows the number of cases."""
+        """Number of values of each axis; for rows the number of cases."""
         return (len(self),) if self.rows else tuple(len(axis.texts) for axis in self.axes)
 
     def places(self, number: int) -> tuple:
-        """Place of a case along each axis."""
+        """Return the index of a case along each axis."""
         if self.rows:
             return (number,) * len(self.axes)
         out = []
@@ -67,19 +75,22 @@ class Cases:
         return tuple(reversed(out))
 
     def texts(self, number: int) -> tuple:
-        """Values of a case as written, axis by axis."""
+        """Return the values of a case as written, axis by axis."""
         return tuple(axis.texts[place] for axis, place in zip(self.axes, self.places(number)))
 
     def sets(self, number: int) -> tuple:
-        """The case as `table.key=value` strings."""
+        """Return a case as `table.key=value` strings."""
         return tuple(f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(number)))
 
     def values(self, number: int) -> tuple:
-        """Values of a case, axis by axis: floats in SI, texts where a key has no number."""
+        """Return the values of a case, axis by axis.
+
+        They are floats in SI, or texts if a key has no number.
+        """
         return tuple(axis.values[place] for axis, place in zip(self.axes, self.places(number)))
 
     def columns(self, numbers: Sequence[int]) -> np.ndarray | None:
-        """Values of cases (n, k) in SI; None where a key has no numbers."""
+        """Return the values of cases (n, k) in SI; None if a key has no numbers."""
         if not all(isinstance(axis.values[0], float) for axis in self.axes):
             return None
         places = [numbers] * len(self.axes) if self.rows else np.unravel_index(numbers, self.shape)
@@ -91,8 +102,10 @@ class Cases:
         ).T
 
     def spread(self, most: int) -> list[int]:
-        """Numbers of `most` cases or somewhat fewer, spread over all axes with the ends of each; all where there are no
-        more."""
+        """Return at most `most` case numbers, spread over all axes and including the ends of each.
+
+        All cases, if there are no more than that.
+        """
         if len(self) <= most:
             return list(range(len(self)))
         each = [1] * len(self.shape)
@@ -112,13 +125,18 @@ class Cases:
         return numbers
 
     def looked(self, most: int) -> list[int]:
-        """Numbers of `most` cases or somewhat fewer that stand for all: of drawn ones the first, for every 8th point of
-        Sobol's sequence may lie in the same half of a range, else those of `spread`."""
+        """Return at most `most` case numbers that represent all cases.
+
+        For random cases these are the first ones, because every 8th point of a Sobol sequence may
+        lie in the same half of a range; otherwise those of `spread`.
+        """
         return list(range(min(most, len(self)))) if self.drawn else self.spread(most)
 
     def neighbours(self, numbers: Sequence[int]) -> list[int]:
-        """The cases in an order in which those with the same pieces follow each other, for they share most work, and
-        among these the ones with the same patch."""
+        """Return cases in an order in which those with the same pieces follow one another.
+
+        They share most of the work. Among them, cases with the same patch follow one another.
+        """
         slow = sorted(
             (k for k, axis in enumerate(self.axes) if axis.key.startswith("contact.")),
             key=lambda k: not self.axes[k].key.startswith(PIECES),
@@ -131,17 +149,26 @@ class Cases:
         ]
 
         def patch(number: int) -> list:
+            """Return the indices of the values of a case that change its patch."""
             places = self.places(number)
             return [alike[k][self.axes[k].values[places[k]]] for k in slow]
 
         return sorted(numbers, key=patch)
 
     def names(self, asked: Asked, numbers: Sequence[int] | None = None) -> np.ndarray:
-        """Names of cases, of all where no numbers are given, (n,) uint64, made of what each computes: the same values
-        in other units or another order have the same name, and also as part of another sweep of the same scene, unless
-        all cases of a sweep share a mesh that is chosen for them.
+        """Return names (n,) uint64 of cases, which follow from what each case computes.
+
+        The same values in other units or in another order have the same name, also as part of
+        another sweep of the same scene, unless all cases of a sweep share a mesh that is chosen for
+        them.
+
+        Parameters
+        ----------
+        asked : Asked
+        numbers : sequence of int, optional
+            Numbers of the cases; by default all.
         """
-        # of all cases alike
+        # The order of the keys is the same for all cases.
         order = sorted(range(len(self.axes)), key=lambda k: json.dumps(self.axes[k].key))
         keys = [json.dumps(axis.key) for axis in self.axes]
         mark = lru_cache(0 if self.drawn else None)(
@@ -149,6 +176,7 @@ class Cases:
         )
 
         def signs(shared: str, of: Sequence[int]) -> np.ndarray:
+            """Return a hash (n,) of each case, from what all cases share and from its own values."""
             placed = (self.places(number) for number in of)
             own = ("\n".join([shared, *(mark(k, places[k]) for k in order)]) for places in placed)
             return np.fromiter(
@@ -162,14 +190,17 @@ class Cases:
 
 
 def _mark(key: str, value: float | str, asked: Asked) -> str:
-    """JSON of a key, which is JSON itself, a value of it, and the sign of the file that this names."""
+    """Return a key, given as JSON, and a value as JSON, with the hash of the file that it names."""
     if isinstance(value, float) and isfinite(value):
         return f'[{key}, {value!r}, ""]'
     return f"[{key}, {json.dumps(value)}, {json.dumps(asked.content(value) if isinstance(value, str) else '')}]"
 
 
 def product(parts: Sequence[Cases]) -> Cases:
-    """All combinations of the cases of the parts, the last part fastest; rows where one of the parts has rows."""
+    """Return all combinations of the cases of several parts, the last part fastest.
+
+    The result has rows if one of the parts has rows.
+    """
     if len(parts) == 1:
         return parts[0]
     if not any(part.rows for part in parts):

@@ -1,4 +1,7 @@
-"""What a sweep would take, from the plans of a few of its cases; nothing is run."""
+"""Estimate of the time and disk space of a sweep from the plans of a few of its cases.
+
+Nothing is run.
+"""
 
 from __future__ import annotations
 
@@ -12,24 +15,31 @@ from .case_models import Asked
 from .cases import Cases
 
 LOOKED = 9  # cases that are planned, spread over the sweep
-ONCE = 0.75  # seconds of a plan that a sweep spends once: its start, its files and its page
-ALONE = 8e-3  # seconds of a case that runs by itself, besides what its plan counts
-RANKED = 0.8  # seconds of the ranking of the keys of drawn cases
-# groups among the planned cases, up to which more cases are taken to make no more of them
+ONCE = 0.75  # seconds that a sweep needs in total to start and to write its files and its page
+ALONE = 8e-3  # seconds of a case that runs alone, in addition to those of its plan
+RANKED = 0.8  # seconds of the ranking of the keys of random cases
+# Number of groups among the planned cases up to which all cases are assumed to form no more groups.
 FIXED = 3
-TOGETHER = 1.2e-3  # seconds of a case of a batch from its values to its columns (0.8 to 1.5 ms of 2000 lumped cases)
-FEW = 1000  # cases of a sweep that has the summary of each unless it is asked otherwise
-TABLED = 200_000  # cases of a sweep that has its tables unless they are asked for
-# bytes of a case with its summary, and without: tables, page and columns of 10 000 cases, columns of a million
+# Seconds from the values of a batched case to its columns (0.8 to 1.5 ms of 2000 lumped cases).
+TOGETHER = 1.2e-3
+FEW = 1000  # cases up to which a sweep by default has a summary of each case
+TABLED = 200_000  # cases up to which a sweep by default has its tables
+# Bytes per case with a summary, and without: tables, page and columns (10 000 cases), columns alone
+# (a million).
 DISK, COLUMNS, BARE = 6000, 1600, 400
 
 
 def estimate(asked: Asked, cases: Cases) -> dict:
-    """The plan of a sweep: that of its first valid case, named by `case` {key: value as written}, with seconds of all
-    cases on one core, the bytes that a case needs at most, how many cases there are, how many values of each key, and
-    bytes on disk.
+    """Return the plan of a sweep as a dict that can be written as JSON.
 
-    PatchfemError where none of the planned cases can run.
+    It is the plan of the first valid case, which `case` {key: value as written} names, with seconds
+    for all cases on one core, the largest number of bytes of memory that a case needs, the number
+    of cases, the number of values of each key, and bytes on disk.
+
+    Raises
+    ------
+    PatchfemError
+        If none of the planned cases can run.
     """
     plans, numbers, wrong = [], [], None
     for number in cases.looked(LOOKED):
@@ -53,7 +63,7 @@ def estimate(asked: Asked, cases: Cases) -> dict:
         for batch, key in zip(batches, keys)
         if key is not None
     }
-    if groups:  # the first of each is as a single run
+    if groups:  # The first case of each group takes as long as a single run.
         begun = np.mean(
             [one - other for one, other, key in zip(alone, each, keys) if key is not None]
         )
@@ -83,14 +93,15 @@ def estimate(asked: Asked, cases: Cases) -> dict:
 def _alone(plans: list) -> tuple[float, list]:
     """Return the seconds that all cases share, and the seconds of each planned case by itself.
 
-    A case of a sweep has no start of its own and makes no fields. Pieces that all cases have are condensed once.
+    A case of a sweep needs no start and no fields. Pieces that are the same in all cases are
+    condensed once.
     """
     costs, shared = [each.cost for each in plans], 0.0
     left_out = {"start", "code", "fields"}
     patches = [each.model.patch for each in plans]
     if None not in patches:
         from ...runs.patch.meshes import (
-            geometry_of,  # not for sweeps of a point, which need no mesh
+            geometry_of,  # imported here, because sweeps of a point need no mesh
         )
 
         if len({geometry_of(patch) for patch in patches}) == 1:
@@ -104,5 +115,5 @@ def _alone(plans: list) -> tuple[float, list]:
 
 
 def _values(axis: Axis) -> int:
-    """How many values a key has; those of numbers are counted without their texts."""
+    """Return the number of distinct values of a key; numbers are compared in SI, not as texts."""
     return np.unique(axis.values).size if axis.unit else len(set(axis.texts))

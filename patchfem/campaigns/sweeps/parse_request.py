@@ -1,4 +1,7 @@
-"""From the words of a request to the scene and the cases of a sweep, every mistake named at once."""
+"""Read the request for a sweep: scene and cases, with all mistakes reported at once.
+
+In: a file, --set strings and a `Request`. Out: `Asked` and `Cases`, or a SceneError.
+"""
 
 from __future__ import annotations
 
@@ -21,19 +24,29 @@ from . import samples, table
 from .case_models import Asked
 from .cases import Cases, product
 
-LOOKED = 32  # cases that are read before a sweep starts, to find one that is valid
-SHOWN = 12  # mistakes that are printed
-NEAR = 4  # measures that a mistaken name may mean
-MOST = 3_000_000  # cases of a sweep: their names and columns fill some gigabytes
+LOOKED = 32  # cases that are read before a sweep starts, to find a valid one
+SHOWN = 12  # number of mistakes that are printed
+NEAR = 4  # number of measures that a mistyped name may mean
+MOST = 3_000_000  # cases of a sweep; the names and columns of more would need several gigabytes
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Which cases are asked for.
+    """Which cases a sweep has.
 
-    over: "table.key=values" texts; file: a table with a case per row, or None; count: cases to draw between the ends of
-    the ranges of `over`, 0 for all combinations, from Sobol's sequence or independent ones, by `seed`; of: the measure
-    that the answer begins with, "" for the usual one.
+    Attributes
+    ----------
+    over : sequence of str
+        Texts "table.key=values".
+    file : Path or None
+        Table with a case per row.
+    count : int
+        Number of random cases between the ends of the ranges of `over`; 0 for all combinations.
+    sobol : bool
+        Whether the random cases are points of a Sobol sequence.
+    seed : int
+    of : str
+        Measure that the summary of the sweep begins with; "" for the default one.
     """
 
     over: Sequence[str] = ()
@@ -45,7 +58,25 @@ class Request:
 
 
 def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, Cases]:
-    """The scene in a file and its cases; SceneError as `cases_of`, and where a key is set for all cases and swept."""
+    """Read the scene of a sweep and its cases.
+
+    Parameters
+    ----------
+    path : Path
+        File of the scene.
+    sets : sequence of str
+        ``table.key=value`` strings for all cases.
+    request : Request
+
+    Returns
+    -------
+    tuple of Asked and Cases
+
+    Raises
+    ------
+    SceneError
+        As from `cases_of`, and if a key is both set for all cases and swept.
+    """
     asked = Asked(Path(path), read_text(path), tuple(sets), request.of)
     cases = cases_of(asked, request)
     swept = {asked.place(axis.key): axis.key for axis in cases.axes}
@@ -65,9 +96,14 @@ def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, 
 
 
 def cases_of(asked: Asked, request: Request) -> Cases:
-    """The cases of a request: all combinations of what it names, or of the table [sweep] where it names nothing.
+    """Return the cases of a request: all combinations of the values that it names.
 
-    SceneError names the mistakes of scene and request, also where none of the cases that are looked at is valid.
+    If it names none, the values are those of the table [sweep].
+
+    Raises
+    ------
+    SceneError
+        With the mistakes of scene and request, and if none of the cases that are checked is valid.
     """
     parts, wrong = [], []
     if min(request.count, request.seed) < 0 or (request.sobol and not request.count):
@@ -132,7 +168,10 @@ def cases_of(asked: Asked, request: Request) -> Cases:
 
 
 def _words(request: Request, folder: Path) -> tuple[str, ...]:
-    """What asks for the same cases again in a folder, as words of a command; () where their file is a pipe."""
+    """Return the words of a command that gives the same cases again from a folder.
+
+    They are () if the file of cases is a pipe, which cannot be read again.
+    """
     if request.file is not None and not request.file.is_file():
         return ()
     file = () if request.file is None else ("--cases", os.path.relpath(request.file, folder))
@@ -150,8 +189,10 @@ def _words(request: Request, folder: Path) -> tuple[str, ...]:
 
 
 def _unknown(measure: str) -> list[str]:
-    """A mistake where a measure is named that no run has, with those that it is a word of, or the one that is
-    nearest."""
+    """Return a mistake if no run has a measure, with the measures that may be meant.
+
+    They are those whose name contains the word, or else the one with the most similar name.
+    """
     known = [*rows.TABLE, *patch_rows.TABLE]
     if not measure or rows.of_first(measure) in known:
         return []
@@ -169,8 +210,10 @@ def _unknown(measure: str) -> list[str]:
 
 
 def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
-    """A mistake for each key that stands for the same value as one before it, by the name and by the number of a
-    mode."""
+    """Return a mistake for each key that means the same value as a key before it.
+
+    Two keys do so if they name a mode by its name and by its number.
+    """
     first, wrong = {}, []
     for key in keys:
         place = asked.place(key)
@@ -183,13 +226,14 @@ def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
 
 
 def _refuse_all(asked: Asked, cases: Cases) -> None:
-    """SceneError with the mistakes of cases spread over the sweep where none of these is a valid scene."""
+    """Raise SceneError if none of several cases spread over the sweep is a valid scene."""
     found = {}
     for number in cases.looked(LOOKED):
         mistakes = asked.mistakes(cases.sets(number))
         if not mistakes:
             return
-        for one in mistakes:  # drawn values differ, and what is wrong with them does not
+        # Random values differ from case to case, but the mistake that they cause is the same.
+        for one in mistakes:
             found.setdefault(re.sub(NUMBER_PATTERN, "", one) if cases.drawn else one, one)
     lines = list(found.values())
     raise SceneError(
@@ -198,8 +242,11 @@ def _refuse_all(asked: Asked, cases: Cases) -> None:
 
 
 def contradictions(asked: Asked, cases: Cases) -> str:
-    """That cases of a sweep will fail since a swept key contradicts another key of the scene, and what helps; of LOOKED
-    cases spread over the sweep, "" where each of these is a valid scene."""
+    """Return a warning that cases will fail because a swept key contradicts another key.
+
+    It says how to avoid this. It is "" if each of the LOOKED cases that are checked is a valid
+    scene.
+    """
     numbers = cases.looked(LOOKED)
     found = [one for one in map(asked.mistakes, map(cases.sets, numbers)) if one]
     if not found:

@@ -1,9 +1,11 @@
-"""Which input of a sweep matters how much: shares of the variance of a measure, by Sobol's indices.
+"""Influence of the inputs of a sweep: Sobol indices of the variance of a measure.
 
-The first-order share S_i = V(E(y | x_i))/V(y) is what a key explains alone, the total share T_i = E(V(y | x_~i))/V(y)
-what it takes part in (Sobol 1993, Homma and Saltelli 1996). On a grid both are means over its cases. Of drawn cases
-they are those of a smooth surface through the cases (`scipy.interpolate.RBFInterpolator`), by
-`scipy.stats.sobol_indices`; surfaces through halves of the cases, each held against the other half, give the interval.
+The first-order index S_i = V(E(y | x_i))/V(y) is the fraction of the variance that a key explains
+alone, the total index T_i = E(V(y | x_~i))/V(y) the fraction to which it contributes (Sobol 1993,
+Homma and Saltelli 1996). On a grid both are means over its cases. For random cases they are those
+of a smooth surface through the cases (`scipy.interpolate.RBFInterpolator`), computed by
+`scipy.stats.sobol_indices`; surfaces through halves of the cases, each compared with the other
+half, give the interval.
 """
 
 from __future__ import annotations
@@ -14,17 +16,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-MOST = 640  # cases that a surface is laid through: its equations are dense
-POINTS = 1024  # of a key in Sobol's sequence: shares to some 0.01
-HALVES = 6  # surfaces through half of the cases
-SMOOTH = (1e-8, 1e-4, 1e-2, 1.0)  # of a surface, from through its cases to near a plane
-LEAST = 16  # cases per key, below which halves of them tell nothing
-CLOSE = 0.005  # of a share by POINTS
-TOLD = 0.5  # of the variance, which a surface has to explain in cases that it has not seen
+MOST = 640  # number of cases that a surface interpolates, because its equations are dense
+POINTS = 1024  # points of a Sobol sequence per key, which give an index to about 0.01
+HALVES = 6  # number of surfaces through half of the cases
+SMOOTH = (1e-8, 1e-4, 1e-2, 1.0)  # smoothing of a surface, from interpolation to almost a plane
+LEAST = 16  # cases per key, below which half of the cases say nothing about an index
+CLOSE = 0.005  # error of an index by POINTS
+# fraction of the variance that a surface has to explain in cases that it was not fitted to
+TOLD = 0.5
 
 
 class Share(NamedTuple):
-    """Shares of one key in the variance of a measure: of the first order and total, and the interval of the total."""
+    """Sobol indices of one key for a measure.
+
+    first: first-order index; total: total index; low, high: interval of the total index.
+    """
 
     key: str
     first: float
@@ -34,11 +40,25 @@ class Share(NamedTuple):
 
 
 def ranking(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
-    """{measure: [Share], the largest total first} of the measures that change, where the cases tell it.
+    """Compute the Sobol indices of each measure that changes, if the cases determine them.
 
-    keys: (name, values (n,)); measures: {name: (values (n,), errors (n,))}, NaN where a case has none; shape: numbers
-    of values of the keys where the cases are all their combinations, the last key fastest, None for drawn ones. A
-    measure that a tenth of the cases lacks is left out: those that have it are no fair draw.
+    A measure that a tenth of the cases lack is left out, because the other cases are not a random
+    sample.
+
+    Parameters
+    ----------
+    keys : sequence of tuple
+        (name, values (n,)) of each key.
+    measures : dict
+        By name (values (n,), errors (n,)); NaN if a case has none.
+    shape : tuple or None
+        Numbers of values of the keys if the cases are all their combinations, the last key fastest;
+        None for random cases.
+
+    Returns
+    -------
+    dict
+        By measure a list of Share, the largest total first.
     """
     moving = [(name, np.asarray(values)) for name, values in keys if np.unique(values).size > 1]
     changing = {
@@ -74,7 +94,7 @@ def ranking(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
 
 
 def _changes(values: np.ndarray, errors: np.ndarray) -> bool:
-    """Whether a measure of most cases changes by more than its errors and round-off."""
+    """Return whether a measure of most cases changes by more than its errors and round-off."""
     there = np.isfinite(values)
     if there.mean() < 0.9:
         return False
@@ -85,13 +105,13 @@ def _changes(values: np.ndarray, errors: np.ndarray) -> bool:
 
 
 def _level(values: np.ndarray) -> np.ndarray:
-    """The share of the cases below each value, so that each key is drawn evenly between 0 and 1."""
+    """Return the fraction of the cases below each value, which is uniform between 0 and 1."""
     _, same, counts = np.unique(values, return_inverse=True, return_counts=True)
     return ((np.cumsum(counts) - counts / 2) / values.size)[same]
 
 
 def _of_grid(values: np.ndarray) -> tuple:
-    """(first, total, low, high), each (keys,), of a full grid of values."""
+    """Return first-order and total indices and their interval (4 of (keys,)) on a full grid."""
     axes, whole = range(values.ndim), values.var()
     first = (
         np.array(
@@ -104,8 +124,16 @@ def _of_grid(values: np.ndarray) -> tuple:
 
 
 def _of_draw(levels: np.ndarray, values: np.ndarray) -> list:
-    """(first, total, low, high), each (keys,), of each column of values at `levels` (n, keys); None where a surface
-    does not explain enough of it."""
+    """Return (first, total, low, high), (keys,) each, of each column of values.
+
+    None for a column that a surface does not explain well enough.
+
+    Parameters
+    ----------
+    levels : (n, keys) array
+        Uniform coordinates of the cases.
+    values : (n, columns) array
+    """
     rng = np.random.default_rng(0)
     if len(levels) > MOST:
         some = np.sort(rng.choice(len(levels), MOST, replace=False))
@@ -136,20 +164,25 @@ def _of_draw(levels: np.ndarray, values: np.ndarray) -> list:
 
 
 def _surface(levels: np.ndarray, values: np.ndarray, smooth: float):
+    """Return a smooth surface through values (n, columns) at levels (n, keys)."""
     from scipy.interpolate import RBFInterpolator
 
     return RBFInterpolator(levels, values, kernel="cubic", smoothing=smooth)
 
 
 def _unexplained(levels, values, order, half: int, smooth: float) -> np.ndarray:
-    """Share of the variance (columns,) of half of the cases that a surface through the other half leaves."""
+    """Return the fraction of the variance (columns,) that a surface does not explain.
+
+    The surface goes through the first half of the cases in an order (n,), and is compared with the
+    others.
+    """
     seen, rest = order[:half], order[half:]
     off = _surface(levels[seen], values[seen], smooth)(levels[rest]) - values[rest]
     return np.mean(off**2, axis=0) / np.maximum(values[rest].var(axis=0), 1e-30)
 
 
 def _indices(levels: np.ndarray, values: np.ndarray, smooth: float) -> tuple:
-    """(first, total), each (columns, keys), of a surface through the cases."""
+    """Return first-order and total indices, (columns, keys) each, of a surface through cases."""
     from scipy.stats import sobol_indices, uniform
 
     surface = _surface(levels, values, smooth)
@@ -165,6 +198,7 @@ def _indices(levels: np.ndarray, values: np.ndarray, smooth: float) -> tuple:
 
 
 def _sorted(names: list, shares: Sequence) -> list:
+    """Return the Share of each key, the largest total first."""
     return sorted(
         (Share(name, *map(float, numbers)) for name, *numbers in zip(names, *shares)),
         key=lambda one: -one.total,

@@ -1,4 +1,4 @@
-"""Cases drawn at chance: independent ones, or Sobol's that fill the space evenly."""
+"""Random cases of a sweep: independent ones, or points of a Sobol sequence."""
 
 from __future__ import annotations
 
@@ -12,10 +12,24 @@ from .cases import Cases
 
 
 def drawn(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, seed: int) -> Cases:
-    """`count` cases, the same for the same seed: between the ends of each span, evenly or evenly in its logarithm, and
-    from the values of each list with equal chances.
+    """Draw cases from ranges and lists of values; the same seed gives the same cases.
 
-    sobol: the scrambled sequence of Sobol (Owen 1995), best in powers of two, in place of independent draws.
+    A range is sampled uniformly between its ends, or uniformly in its logarithm; the values of a
+    list are equally likely.
+
+    Parameters
+    ----------
+    parts : sequence of Axis or SampledRange
+    count : int
+        Number of cases.
+    sobol : bool
+        Whether to use the scrambled sequence of Sobol (Owen 1995), which covers the space best if
+        `count` is a power of two, in place of independent samples.
+    seed : int
+
+    Returns
+    -------
+    Cases
     """
     shares = (
         _sobol(len(parts), count, seed)
@@ -30,14 +44,17 @@ def drawn(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, seed: i
 
 
 def _sobol(width: int, count: int, seed: int) -> np.ndarray:
+    """Return `count` points (count, width) of a scrambled Sobol sequence."""
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # on counts that are no power of two
+        # SciPy warns of counts that are no power of two
+        warnings.simplefilter("ignore", UserWarning)
         return qmc.Sobol(width, scramble=True, rng=np.random.default_rng(seed)).random(count)
 
 
 def _picked(axis: Axis | SampledRange, shares: np.ndarray) -> Axis:
+    """Return the values of a key that random numbers (n,) between 0 and 1 select."""
     if isinstance(axis, SampledRange):
         return axis.make_axis(shares.tolist())
     at = np.minimum((shares * len(axis.texts)).astype(int), len(axis.texts) - 1)

@@ -1,4 +1,9 @@
-"""The cases of a sweep answered in chunks by an executor, with what died on the way tried again."""
+"""Computation of the cases of a sweep in chunks by an executor.
+
+A chunk whose worker dies is repeated in halves.
+
+In: `Work`, numbers of cases and an executor of `executors/`. Out: chunk after chunk from `solved`.
+"""
 
 from __future__ import annotations
 
@@ -20,21 +25,36 @@ from ...runs.batch.meshes import Shared
 from .case_models import Asked
 from .cases import Cases
 
-TRIES = 3  # deaths, the last of them alone, after which a case is given up
-SPAN = 1.0  # seconds that a chunk is to take: long beside its way to a worker, short beside a sweep
+TRIES = 3  # deaths of a case after which it is given up, the last of them in a chunk of its own
+# Seconds that a chunk should take: long compared with its transfer to a worker, short compared with
+# a sweep.
+SPAN = 1.0
 MOST = 4096  # cases of a chunk
-LOOKED = 256  # cases that the meshes of a sweep are chosen by
+LOOKED = 256  # cases from which the meshes of a sweep are chosen
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What every worker needs to answer any case; it is sent to each once.
+    """What every worker needs to compute any case; it is sent to each worker once.
 
-    tell(number, model or error, Answers, place in them): what is made of an answer beside its columns; keep(number,
-    Result): called after each run; write(numbers, Answers, told) -> whether they were written where the sweep is kept,
-    so that nobody carries them further. All are functions of a module, or objects that travel. estimate: False leaves
-    out the errors of cases that run one by one. meshes: those that the cases share, made from all of them by
-    `with_meshes`.
+    All functions are functions of a module or objects that can be pickled.
+
+    Attributes
+    ----------
+    asked : Asked
+    cases : Cases
+    tell : callable, optional
+        tell(number, model or error, CaseResults, index in them) returns what is kept of a case
+        besides its columns.
+    keep : callable, optional
+        keep(number, Result) is called after each run.
+    write : callable, optional
+        write(numbers, CaseResults, told) returns whether they were written to the folder of the
+        sweep, so that they need not be sent back.
+    estimate : bool
+        Whether errors are computed for cases that run one by one.
+    meshes : Shared or None
+        Meshes that the cases share, chosen from all of them by `with_meshes`.
     """
 
     asked: Asked
@@ -48,14 +68,16 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Died:
-    """What an executor gives for a chunk that did not come back, with the reason in a few words."""
+    """Returned by an executor for a chunk that did not come back, with a short reason."""
 
     reason: str
 
 
 def warmed(work: Work) -> None:
-    """Bring up what the first case of a work needs, though its meshes are not chosen yet; what is wrong with it is told
-    by its own run."""
+    """Compile and import what the first case needs, although its meshes are not chosen yet.
+
+    Errors are ignored, because the run of the case reports them.
+    """
     try:
         batches.batch_of(
             model := work.asked.model(work.cases.sets(0)), len(work.cases)
@@ -67,8 +89,22 @@ def warmed(work: Work) -> None:
 def answer(
     work: Work, numbers: Sequence[int], say: Callable | None = None
 ) -> tuple[CaseResults | None, list]:
-    """Answers of some cases, and of each what `work.tell` makes of it; None and nothing where `work.write` has written
-    them. This is what a worker does with a chunk."""
+    """Compute a chunk of cases, as a worker does.
+
+    Parameters
+    ----------
+    work : Work
+    numbers : sequence of int
+        Numbers of the cases.
+    say : callable, optional
+        Takes a line of text.
+
+    Returns
+    -------
+    tuple
+        CaseResults and a list of what `work.tell` returns for each case; None and [] if
+        `work.write` has written them.
+    """
     models = _alike(work, numbers) or [_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
     found = batches.answers(models, keep, say, work.estimate, len(work.cases))
@@ -84,7 +120,10 @@ def answer(
 
 
 def timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple:
-    """(seconds, what `answer` gives), without the time in which compiled code was made: no later case takes it."""
+    """Return the seconds of a chunk and what `answer` returns.
+
+    The seconds do not include compilation, which no later case needs.
+    """
     begin, made = perf_counter(), compiled.SPENT[0]
     found = answer(work, numbers, say)
     return perf_counter() - begin - (compiled.SPENT[0] - made), found
@@ -93,14 +132,17 @@ def timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tu
 def handed(
     work: Work, numbers: Sequence[int], found: CaseResults, told: list
 ) -> tuple[CaseResults | None, list]:
-    """What a worker hands on of its answers: nothing of those that `work.write` has written."""
+    """Return the results of a chunk, or (None, []) if `work.write` has written them."""
     return (
         (None, []) if work.write is not None and work.write(numbers, found, told) else (found, told)
     )
 
 
 def _alike(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
-    """The models of cases that differ in plain numbers alone; None of others, and of patches that move."""
+    """Return models of cases that differ only in plain numbers; None if they differ in more.
+
+    None as well for pressed patches in motion, and if `work.keep` needs every single run.
+    """
     cases, values = np.asarray(numbers), work.cases.columns(numbers)
     if work.keep is not None or values is None:
         return None
@@ -108,7 +150,7 @@ def _alike(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
         found = work.asked.alike(
             [axis.key for axis in work.cases.axes], values, work.cases.sets, cases
         )
-    except PatchfemError:  # the first of them has no model
+    except PatchfemError:  # the first case has no model
         return None
     if found is None or found.first.patch is None:
         return found
@@ -118,6 +160,7 @@ def _alike(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
 
 
 def _model(work: Work, number: int):
+    """Return the model of a case with the shared meshes, or the error of its scene."""
     try:
         model = work.asked.model(work.cases.sets(number), work.cases.values(number))
     except PatchfemError as error:
@@ -126,7 +169,7 @@ def _model(work: Work, number: int):
 
 
 def with_meshes(work: Work) -> Work:
-    """The work with the meshes that its cases share, whichever of them are still to be done."""
+    """Return the work with the meshes that all its cases share, also those already computed."""
     if work.meshes is not None:
         return work
     numbers, models = work.cases.spread(LOOKED), []
@@ -138,45 +181,61 @@ def with_meshes(work: Work) -> Work:
 
 
 def _least(work: Work) -> int:
-    """Fewest cases of a chunk: as many as the batch of the first is worth, since a few of them say nothing of how long
-    many take."""
+    """Return the smallest number of cases of a chunk.
+
+    It is the number for which a batch of the first case pays off, because the time of fewer cases
+    does not predict that of many.
+    """
     try:
         batch = batches.batch_of(_model(work, 0), len(work.cases))
-    except Exception:  # what is wrong with the case is told by its own run
+    except Exception:  # The run of the case reports its error.
         return 1
     return batch.together if work.keep is None and batch is not None else 1
 
 
 class Chunks:
-    """The cases that are still to be handed out, neighbours together, in chunks as long as cases have been found to
-    take, and of `least` cases."""
+    """Cases that remain, in chunks of neighbours whose size follows from the measured time.
+
+    Parameters
+    ----------
+    numbers : sequence of int
+        Numbers of the cases.
+    workers : int
+    least : int
+        Smallest number of cases of a chunk, if there is only one worker.
+    """
 
     def __init__(self, numbers: Sequence[int], workers: int, least: int = 1):
         self.least = least
         self.left, self.suspect, self.workers = deque(numbers), deque(), max(workers, 1)
         self.deaths: dict[int, int] = {}
-        self.each = SPAN  # seconds of a case, by the last chunk
+        self.each = SPAN  # seconds per case, from the last chunk
 
     def take(self, idle: bool = True) -> list | None:
-        """The next chunk; None where nothing is left for now.
+        """Return the next chunk; None if there is none for now.
 
-        idle: whether cases that died may be handed out, by themselves and after all others; not while cases are on
-        their way of which nobody could tell which one killed a worker.
+        idle: whether no chunk is being computed. Only then is a case handed out that was in a chunk
+        that died, alone and after all others, because otherwise it would not be known which case
+        killed a worker.
         """
         if not self.left:
             return self.suspect.popleft() if self.suspect and idle else None
-        fair = -(-len(self.left) // (2 * self.workers))  # so that the last chunks end together
+        # At most half of the remaining cases per worker, so that the last chunks end at the same
+        # time.
+        fair = -(-len(self.left) // (2 * self.workers))
         fair = fair if self.workers > 1 else len(self.left)
         count = max(1, min(max(int(SPAN / max(self.each, 1e-9)), self.least), MOST, fair))
         return [self.left.popleft() for _ in range(min(count, len(self.left)))]
 
     def done(self, numbers: Sequence[int], seconds: float) -> None:
-        """Note how long a chunk took."""
+        """Record how long a chunk took."""
         self.each = seconds / len(numbers)
 
     def died(self, numbers: Sequence[int]) -> list:
-        """Hand the cases of a dead chunk out again, half of them at a time; a case that was alone and has been tried
-        often enough comes back."""
+        """Return the cases that are given up; hand out the others of a dead chunk again in halves.
+
+        A case is given up if it was alone in its chunk and has died TRIES times.
+        """
         for number in numbers:
             self.deaths[number] = self.deaths.get(number, 0) + 1
         if len(numbers) == 1 and self.deaths[numbers[0]] >= TRIES:
@@ -189,12 +248,26 @@ class Chunks:
 def solved(
     work: Work, numbers: Sequence[int], executor, say: Callable | None = None
 ) -> Iterator[tuple]:
-    """(numbers, Answers or None, told, seconds) of chunk after chunk as they come in, as `answer` gives them; told is
-    None of cases that died.
+    """Compute cases chunk by chunk and return the results as they come in.
 
-    executor: has `workers` and run(work, take, say), which gives (chunk, seconds, what `answer` gives or Died) of
-    every chunk that `take` hands out until it hands out none; where it has begin(work, count, say), that is told of the
-    work before the meshes of all cases are chosen, and end() after all.
+    Parameters
+    ----------
+    work : Work
+    numbers : sequence of int
+        Numbers of the cases.
+    executor : object
+        Has `workers` and run(work, take, say), which yields (chunk, seconds, result of `answer` or
+        Died) of every chunk that `take` returns until it returns None. If it has begin(work, count,
+        say), this is called before the meshes of all cases are chosen, and end() is called at the
+        end.
+    say : callable, optional
+        Takes a line of text.
+
+    Yields
+    ------
+    tuple
+        (numbers, CaseResults or None, told, seconds) of a chunk; `told` is None for cases that
+        died.
     """
     if not len(numbers):
         return
@@ -202,7 +275,7 @@ def solved(
         if hasattr(executor, "begin"):
             executor.begin(work, len(numbers), say)
         work = with_meshes(work)
-        # others import what runs a case in their workers
+        # Other executors import what runs a case in their workers.
         chunks = Chunks(
             work.cases.neighbours(numbers),
             executor.workers,
@@ -215,7 +288,7 @@ def solved(
 
 
 def _handed(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
-    """What `solved` gives, of the chunks that an executor has done."""
+    """Yield what `solved` yields, for the chunks that an executor has computed."""
     for chunk, seconds, found in done:
         if isinstance(found, Died):
             lost = chunks.died(chunk)
@@ -230,7 +303,10 @@ def _handed(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
 
 
 class Clock:
-    """How long what is left of `total` cases will take, by the work of the chunks before, the last of them first."""
+    """Estimate of the remaining time of a sweep from the chunks so far.
+
+    The weight of a chunk halves with every later chunk. total: number of cases.
+    """
 
     def __init__(self, total: int, workers: int):
         self.left, self.workers, self.chunks, self.work, self.cases = (
@@ -242,15 +318,19 @@ class Clock:
         )
 
     def __call__(self, count: int, seconds: float) -> float | None:
-        """Seconds left after a chunk of `count` cases that took so many; None while nobody knows."""
+        """Return the remaining seconds after a chunk; None if they are not known yet.
+
+        count: cases of the chunk; seconds: time that it took.
+        """
         self.left, self.chunks = self.left - count, self.chunks + 1
-        if self.chunks > self.workers:  # the first chunk of each brings what all of them run by
+        # The first chunk of each worker includes imports and compilation.
+        if self.chunks > self.workers:
             self.work, self.cases = self.work / 2 + seconds, self.cases / 2 + count
         return self.left * self.work / self.cases / self.workers if self.cases else None
 
 
 def lasting(seconds: float) -> str:
-    """A time in the unit that reads best."""
+    """Format a time [s] in seconds, minutes or hours."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -1,6 +1,7 @@
-"""Cases from a comma-separated file: a column per key, with its unit in the header or in the cells, a case per row.
+"""Cases of a sweep from a comma-separated file with a column per key and a case per row.
 
-The tables that a sweep writes can be read, too.
+The unit of a key is in the header or in the cells. The tables that a sweep writes can be read as
+well.
 """
 
 from __future__ import annotations
@@ -16,12 +17,18 @@ from ...scene.axes import Axis, make_axis
 from .cases import Cases
 
 _HEAD = re.compile(r"\s*((?:[^\[\]]|\[[1-9][0-9]*\](?=\.))+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
-OUTCOME = "outcome"  # of a sweep.csv: this column and those behind it are answers
+OUTCOME = "outcome"  # column of a sweep.csv; this column and those after it are results
 HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 
 
 def read(path: Path) -> tuple[Cases | None, list[str]]:
-    """(cases, mistakes) of a file; every mistake names file, line and key."""
+    """Read the cases of a file, and the mistakes in it.
+
+    Returns
+    -------
+    tuple
+        Cases, or None if there are mistakes, and a list of mistakes with file, line and key.
+    """
     try:
         with (
             open_for_reading(path) as raw,
@@ -71,7 +78,7 @@ def read(path: Path) -> tuple[Cases | None, list[str]]:
 
 
 def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
-    """The axis of a column of (line, cell), and its mistakes as (line or 0, text)."""
+    """Return the axis of a column of (line, cell), and its mistakes as (line or 0, text)."""
     known, wrong = {}, []
     for number, cell in cells:
         if cell in known:

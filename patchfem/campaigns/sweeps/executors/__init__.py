@@ -1,7 +1,9 @@
-"""Ways to work on the chunks of a sweep: in this process, in others beside it, on a Dask cluster.
+"""Executors, which compute the chunks of a sweep: in this process, in several, or with Dask.
 
-Each has `workers` and `run(work, take, say)`, which gives (chunk, seconds, answer or Died) of every chunk that `take`
-hands out. `of` finds one by its name; read `LocalExecutor` first.
+Each has `workers` and `run(work, take, say)`, which yields (chunk, seconds, answer or Died) of
+every chunk that `take` returns. `of` returns an executor by its name.
+
+Read `LocalExecutor` first.
 """
 
 from collections.abc import Callable, Iterator
@@ -12,21 +14,34 @@ from . import cluster, pool
 
 
 class LocalExecutor:
-    """The executor of this process: chunks one after the other."""
+    """Executor that computes chunks one after the other in this process."""
 
     workers = 1
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """(chunk, seconds, what `answer` gives) of each chunk that `take` hands out."""
+        """Yield (chunk, seconds, result of `answer`) of each chunk that `take` returns."""
         while (chunk := take()) is not None:
             yield chunk, *timed(work, chunk, say)
 
 
 def of(name: str = "", jobs: int = 1):
-    """The executor of a name: "" for `jobs` processes of this machine, this one alone where it is 1; "dask" for a Dask
-    cluster of `jobs` processes here (one per core where it is 1), "dask:ADDRESS" for that of a scheduler.
+    """Return the executor of a name.
 
-    PatchfemError for another name or less than one process, Missing where Dask is not there.
+    Parameters
+    ----------
+    name : str
+        "" for processes of this machine, "dask" for a Dask cluster that is started here,
+        "dask:ADDRESS" for that of a scheduler.
+    jobs : int
+        Number of processes. For "", 1 means this process alone; for "dask", 1 means one process per
+        core.
+
+    Raises
+    ------
+    PatchfemError
+        For another name, or less than one process.
+    Missing
+        If Dask is not installed or does not answer.
     """
     if jobs < 1:
         raise PatchfemError(f"-j {jobs}: the number of processes must be at least 1")

@@ -1,4 +1,7 @@
-"""Chunks answered by the workers of a Dask cluster: one of this machine, or any whose scheduler has an address."""
+"""Executor for Dask: the workers of a cluster compute the chunks.
+
+The cluster is a local one, or that of a scheduler with an address.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +22,27 @@ from ..sweep import Died, Work, handed, timed
 
 _TLS = "DASK_DISTRIBUTED__COMM__TLS__"
 CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
-AHEAD = 2  # chunks on their way per worker, so that none waits for the next
-PATIENCE = "10s"  # for a scheduler to answer
+AHEAD = 2  # chunks sent ahead per worker, so that no worker waits for the next one
+PATIENCE = "10s"  # time for a scheduler to answer
 
 
 class Cluster:
-    """The executor of a Dask cluster; address: of its scheduler, "" to start one of `workers` processes here."""
+    """Executor of a Dask cluster.
+
+    Parameters
+    ----------
+    address : str
+        Address of the scheduler; "" to start a cluster on this machine.
+    workers : int
+        Number of processes of such a cluster; 0 for one per core.
+
+    Raises
+    ------
+    Missing
+        If Dask is not installed, no scheduler answers, or a worker has another version.
+    PatchfemError
+        If TLS has no certificates.
+    """
 
     def __init__(self, address: str = "", workers: int = 0):
         try:
@@ -38,7 +56,8 @@ class Cluster:
         if not address:
             import dask
 
-            # tries are counted by the sweep; a profile of the workers, which nobody sees, is a third of a chunk's way
+            # The sweep counts repeated attempts itself. The profile of a worker, which nobody
+            # reads, would take a third of the time in which a chunk is sent and received.
             dask.config.set(
                 {
                     "distributed.scheduler.allowed-failures": 0,
@@ -48,7 +67,7 @@ class Cluster:
                     "distributed.nanny.pre-spawn-environ.PYTHONSAFEPATH": 1,
                 }
             )
-            # a port that tells nothing
+            # no dashboard, on a port of this machine
             quiet = {
                 "dashboard": False,
                 "dashboard_address": "127.0.0.1:0",
@@ -62,7 +81,7 @@ class Cluster:
             )
         self.name = f"--executor dask{':' * bool(address)}{address}"
         for one in (*getLogger("distributed").handlers, getLogger("tornado"), getLogger("asyncio")):
-            one.setLevel(CRITICAL)  # what they have to say is said here
+            one.setLevel(CRITICAL)  # their messages are reported by this class
         tls = distributed.Security().get_connection_args("client")["ssl_context"] is not None
         if address.startswith("tls:") and not tls:
             raise PatchfemError(
@@ -83,14 +102,14 @@ class Cluster:
                 raise self._other(own, own_of())
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """(chunk, seconds, answer or Died) of each chunk that `take` hands out, as they come in."""
+        """Yield (chunk, seconds, answer or Died) of each chunk that `take` returns, as they come in."""
         from distributed import as_completed
         from distributed.client import ClosedClientError
 
         path, want = work.asked.path, own_of(work)
         there = replace(work, asked=replace(work.asked, path=Path(os.path.abspath(path))))
         try:
-            # made again where all that hold it have died
+            # Dask repeats this task if all workers that store its result have died.
             shared = self.client.submit(_as_it_is, there, pure=False)
             ready, on_the_way = (
                 as_completed(loop=self.client.loop, with_results=True, raise_errors=False),
@@ -119,10 +138,15 @@ class Cluster:
                 self.own.close()
 
     def _lost(self) -> Missing:
+        """Return the error of a lost connection."""
         return Missing(f"{self.name}: the connection to the scheduler is lost")
 
     def _other(self, found: dict | Exception, want: dict) -> Missing:
-        """Why a worker cannot answer: what it said of itself, or how it failed to, beside what is wanted."""
+        """Return the error of a worker that cannot compute the work.
+
+        found: versions of the worker, or the exception in place of them; want: those of this
+        machine.
+        """
         if isinstance(found, Exception):
             said = f"{type(found).__name__}: {found}"
             return Missing(
@@ -141,8 +165,11 @@ class Cluster:
         )
 
     def _died(self, future) -> tuple:
-        """(0 s, Died) of a chunk whose worker died or failed; Missing where the scheduler did."""
-        if future.status == "cancelled":  # nobody here does that
+        """Return (0 s, Died) for a chunk whose worker died or failed.
+
+        Missing if the connection to the scheduler is lost.
+        """
+        if future.status == "cancelled":  # nothing in this process cancels a chunk
             raise self._lost()
         error = future.exception()
         killed = type(error).__name__ == "KilledWorker"
@@ -155,7 +182,7 @@ class Cluster:
 
 @cache
 def _source() -> str:
-    """Sign of the sources of this package."""
+    """Return a hash of the sources of this package."""
     root = Path(__file__).parents[3]
     texts = sorted(
         (path.relative_to(root).as_posix(), path.read_bytes()) for path in root.rglob("*.py")
@@ -164,8 +191,10 @@ def _source() -> str:
 
 
 def own_of(work: Work | None = None) -> dict:
-    """What whoever answers a work must have as who asks has it: versions by name, and as `files` the sign of the scene
-    with the files that it names."""
+    """Return what a worker must have in common with the process that sends it work.
+
+    These are versions by name and, as `files`, the hash of the scene with the files that it names.
+    """
     own = {
         "patchfem": f"{__version__} (sources {_source()})",
         "numpy": np.__version__,
@@ -175,13 +204,23 @@ def own_of(work: Work | None = None) -> dict:
 
 
 def _as_it_is(work: Work) -> Work:
+    """Return the work unchanged, so that it is stored on the cluster."""
     return work
 
 
 def _answer(work: Work, chunk: list, asked: tuple) -> tuple | dict:
-    """(seconds, answer) of a chunk, in a worker, or `own_of` there where that is not the same.
+    """Compute a chunk in a worker; return (seconds, answer).
 
-    asked: (`own_of` where the sweep runs, the path of the scene as it is named there, which messages name too).
+    If the worker has another version or other files, return what it has (`own_of`) instead.
+
+    Parameters
+    ----------
+    work : Work
+    chunk : list
+        Numbers of cases.
+    asked : tuple
+        `own_of` of the process that runs the sweep, and the path of the scene there, which messages
+        must name.
     """
     want, path = asked
     if (own := own_of(work)) != want:

@@ -1,7 +1,8 @@
-"""Chunks answered by processes of this machine; one that dies takes only its own chunk with it, and is replaced.
+"""Executor with several processes of this machine; one that dies is replaced.
 
-The standard pools give every chunk up when one process dies, and run the caller's own script again where processes are
-started afresh; so each worker is an interpreter of its own, at the other end of one pipe.
+A death loses only the chunk of that process. The standard pools give up all chunks when one process
+dies, and run the script of the caller again if processes are spawned; therefore each worker is a
+new interpreter that is connected by a pipe.
 """
 
 from __future__ import annotations
@@ -22,8 +23,9 @@ ONE_THREAD = {
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 }
 PACKAGE, MODULE = Path(__file__).parents[3], __name__.rpartition(".")[0] + ".worker"
-# this package and no other, and nothing of the current folder; what lies beside the package comes last, as it may be a
-# folder in which all that it needs was installed
+# The worker imports this package from its file, and nothing from the current folder. The folder
+# that contains the package comes last in the path: it may be the folder in which all dependencies
+# were installed.
 START = f"""\
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
@@ -37,7 +39,7 @@ main()
 
 
 class Worker:
-    """A process that answers one chunk after the other."""
+    """A process that computes one chunk after the other."""
 
     def __init__(self, work: Work, silent: bool = False):
         here, there = Pipe()
@@ -54,7 +56,7 @@ class Worker:
         self.process = subprocess.Popen(
             words, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL, env=os.environ | ONE_THREAD
         )
-        there.close()  # so that the death of the process closes the pipe
+        there.close()  # so that the pipe closes when the process dies
         self.pipe: Connection = here
         self.chunk = None
         self.pipe.send(work)
@@ -64,7 +66,7 @@ class Worker:
         try:
             self.pipe.send(work)
         except OSError:
-            pass  # it is dead, which `taken` finds when it has a chunk
+            pass  # The process is dead; `taken` notices this once it has a chunk.
 
     def give(self, chunk: list) -> None:
         """Send a chunk."""
@@ -72,10 +74,10 @@ class Worker:
         try:
             self.pipe.send(chunk)
         except OSError:
-            pass  # it is dead, which `taken` finds next
+            pass  # The process is dead, which `taken` notices next.
 
     def taken(self) -> tuple:
-        """(chunk, seconds, its answer), or Died in place of the answer."""
+        """Return (chunk, seconds, answer), with Died in place of the answer if the process died."""
         try:
             seconds, found = self.pipe.recv()
         except (EOFError, OSError):
@@ -87,34 +89,41 @@ class Worker:
         return chunk, seconds, found
 
     def end(self) -> None:
-        """Stop the process, whatever it does."""
+        """Kill the process."""
         self.pipe.close()
         self.process.kill()
         self.process.wait()
 
 
 class Pool:
-    """The executor of some processes of this machine."""
+    """Executor with several processes of this machine."""
 
     def __init__(self, workers: int):
         self.workers, self.ready = workers, []
 
     def begin(self, work: Work, count: int, say: Callable | None = None) -> None:
-        """Start the processes, which bring up what a case needs while the meshes of all cases are chosen here.
+        """Start the processes, which import what a case needs while the shared meshes are chosen.
 
-        work: without these meshes; count: of cases.
+        Parameters
+        ----------
+        work : Work
+            The work without these meshes.
+        count : int
+            Number of cases.
+        say : callable, optional
+            Takes a line of text.
         """
         self.end()
         for _ in range(min(self.workers, count)):
             self.ready.append(_started(work, say is None))
 
     def end(self) -> None:
-        """Stop the processes that wait for the meshes."""
+        """Kill the processes that wait for the meshes."""
         while self.ready:
             self.ready.pop().end()
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """(chunk, seconds, answer or Died) of each chunk that `take` hands out, as they come in."""
+        """Yield (chunk, seconds, answer or Died) of each chunk that `take` returns, as they come in."""
         workers, self.ready = self.ready, []
         try:
             for one in workers:
@@ -130,9 +139,9 @@ class Pool:
                     if isinstance(taken[2], Died):
                         workers.remove(one)
                         one.end()
-                    elif (
-                        chunk := take()
-                    ) is not None:  # before its answer is written, which takes a while
+                    elif (chunk := take()) is not None:
+                        # The next chunk is sent before this answer is written, which takes some
+                        # time.
                         one.give(chunk)
                     yield taken
         finally:
@@ -140,7 +149,7 @@ class Pool:
                 one.end()
 
     def _hand_out(self, workers: list, start: Callable, take: Callable) -> None:
-        """Give every idle process a chunk; start another while there are chunks and not yet enough processes."""
+        """Give every idle process a chunk, and start processes while there are chunks and too few."""
         for one in [one for one in workers if one.chunk is None] + [None] * (
             self.workers - len(workers)
         ):
@@ -153,6 +162,7 @@ class Pool:
 
 
 def _started(work: Work, silent: bool) -> Worker:
+    """Start a process; Missing if the system refuses."""
     try:
         return Worker(work, silent)
     except OSError as error:
@@ -162,6 +172,7 @@ def _started(work: Work, silent: bool) -> Worker:
 
 
 def _how(status: int) -> str:
+    """Describe the exit status of a process."""
     if status == -9:
         return "killed by a user, or for lack of memory"
     return f"signal {-status}" if status < 0 else f"exit code {status}"

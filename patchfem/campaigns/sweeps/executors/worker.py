@@ -1,4 +1,4 @@
-"""A process of the pool: it answers chunks from a pipe until the pipe is closed."""
+"""A process of the pool, which computes chunks from a pipe until the pipe is closed."""
 
 import signal
 import sys
@@ -8,9 +8,13 @@ from .. import sweep
 
 
 def main() -> None:
-    """Answer the chunks of a work that come through the pipe whose number is the first word of the command line; a
-    second word keeps it silent."""
-    for one in ("SIGINT", "SIGHUP"):  # an interrupt is the business of the process that asks
+    """Compute the chunks that come through a pipe.
+
+    The first word of the command line is the file descriptor of the pipe; a second word that is not
+    empty suppresses messages.
+    """
+    # an interrupt is handled by the process that started the sweep
+    for one in ("SIGINT", "SIGHUP"):
         if hasattr(signal, one):
             signal.signal(getattr(signal, one), signal.SIG_IGN)
     pipe = Connection(int(sys.argv[1]))
@@ -20,13 +24,15 @@ def main() -> None:
         sweep.warmed(work)
         while True:
             asked = pipe.recv()
-            if isinstance(asked, sweep.Work):  # the same with what was made of all cases
+            if isinstance(asked, sweep.Work):  # the same work with the meshes that all cases share
                 work = asked
             else:
                 pipe.send(sweep.timed(work, asked, None if sys.argv[2] else _say))
-    except (EOFError, BrokenPipeError, ConnectionResetError):  # who asked is gone
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        # the process that started the sweep has ended
         return
 
 
 def _say(text: str) -> None:
+    """Print a line at once."""
     print(text, file=sys.stderr, flush=True)
