@@ -1,16 +1,16 @@
 """Protocol of a friction law: NumPy form for benches, and `Element` for compiled engines.
 
 A law under a pressure that changes along the path or in time has these methods. None of them changes the state that it
-is given; no traction outlives the contact, and at rest none exceeds mu sigma.
+is given. No traction remains without pressure, and at rest no traction exceeds mu sigma.
 
 - `start(sigma)`: state before any motion, under a pressure sigma (m,) [Pa]
 - `step(state, increment, s0, s1, dt)`: `Step` for an increment [m] in dt [s] under pressures from s0 to s1
-- `press(state, s0, s1)`: `Step` at rest while the pressure goes from s0 to s1
+- `press(state, s0, s1)`: `Step` at rest while the pressure changes from s0 to s1
 - `traction(state)`, `stored(state)`: traction [Pa] and elastic energy per area [J/m2] of a state
 - `element(load)`: `Element` of a whole contact
 
-Laws of constant load (Iwan, Bouc-Wen, LuGre) have only their element. Its kernels are a module of compiled functions,
-which `ADDING.md` describes; `protocol_kernels` has their results, and the functions that most laws do not need.
+Laws of constant load (Iwan, Bouc-Wen, LuGre) have only `element`. Its kernels are a module of compiled functions, which
+`ADDING.md` describes; `protocol_kernels` has their results, and the functions that most laws do not need.
 """
 
 from typing import NamedTuple
@@ -19,11 +19,11 @@ import numpy as np
 
 
 class Step(NamedTuple):
-    """Result of a law for one increment.
+    """Result of a law for an increment.
 
-    - mean: traction (m,) [Pa] averaged over the path, positive against slip towards +x
-    - dissipated: energy per area (m,) [J/m2], negative only where a law creates energy
-    - state: state after the step
+    - mean: path mean (m,) [Pa] of the traction, positive against slip to +x
+    - dissipated: energy per area (m,) [J/m2], negative only if the law creates energy
+    - state: state after the increment
     """
 
     mean: np.ndarray
@@ -31,14 +31,21 @@ class Step(NamedTuple):
     state: object
 
 
+class SteadyLoop(NamedTuple):
+    """Steady friction loop: force [N] at the reversals, and area [J]."""
+
+    force: float | np.ndarray
+    area: float | np.ndarray
+
+
 class LastTraction:
     """Base of laws without a stretch: the state is the last traction (m,) [Pa].
 
-    A subclass has `limit(sigma, direction)`, `share(increment, dt)` and `step`.
+    A subclass has `limit(sigma, direction)`, `limit_fraction(increment, dt)` and `step`.
     """
 
     __slots__ = ()
-    can_change_load = True  # the load of such a law may change within a step of the motion
+    can_change_load = True  # the load may change within a step of the motion
 
     def start(self, sigma):
         """Return the state before any motion: no traction."""
@@ -76,13 +83,14 @@ class Element(NamedTuple):
     """Law of one contact for compiled engines.
 
     - kernels: module of the compiled functions in this package
-    - numbers, memory: parameters (k,), of which the first is left to the engines, and memory (l,) at the start
-    - limit: largest force [N], or the typical force if there is no largest
+    - numbers, memory: parameters (k,), of which the first is reserved for the engines, and initial memory (l,)
+    - limit: largest force [N], or a typical force if there is no largest
     - length: relative displacement [m] over which the law stretches before it slips; 0 without a stretch
     - is_bounded: whether no force exceeds the limit
-    - form: contents of the memory, for engines that read it: "parallel" elements side by side, "points" of bonds,
-      "places" of bonds under the pressure of the lower piece, "speed" for no memory, "flow" for one number, or ""
-    - state_scales: typical magnitudes of the states of the rate equations, None if the law is not written as such
+    - form: layout of the memory, for engines that read it: "parallel" for parallel elements, "points" for points with
+      bonds, "places" for points with bonds under the pressure of the lower piece, "speed" for no memory, "flow" for a
+      single number, or ""
+    - state_scales: typical magnitudes of the states of the rate equations, None if the law has no rate equations
     """
 
     kernels: str

@@ -4,6 +4,7 @@ from importlib import import_module
 from math import inf
 
 from ..effects import LAWS, law_has_trait
+from .protocol import SteadyLoop
 
 
 def make_law(friction, load: float = 1.0):
@@ -39,7 +40,7 @@ def stick_stiffness(friction, load: float) -> float:
     return element.limit / element.length if element.length else inf
 
 
-def steady_loop(friction, load: float, amplitude: float) -> tuple | None:
+def steady_loop(friction, load: float, amplitude: float) -> SteadyLoop | None:
     """Return the steady loop of a law in closed form, None if the law has no closed form.
 
     Parameters
@@ -51,8 +52,7 @@ def steady_loop(friction, load: float, amplitude: float) -> tuple | None:
 
     Returns
     -------
-    peak, area : float
-        Force at the reversals [N] and area of the loop [J].
+    SteadyLoop or None
     """
     loop_from_keys = getattr(import_module(LAWS[friction.law].module), "loop_from_keys", None)
     return None if loop_from_keys is None else loop_from_keys(friction, load, amplitude)

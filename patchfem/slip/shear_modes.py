@@ -1,15 +1,16 @@
 """Partial slip of a patch under a rigid displacement q of the holders, in two reduced forms.
 
-Point i moves by the local slide q - sum_j C_ij f_j. Both forms hold for one contact set:
+Node i has the relative displacement q - sum_j C_ij f_j, with C the shear compliance of the pieces and f_j the friction
+force of node j. Both forms hold while the contact set does not change:
 
-* Points that yield at a fixed force D_i (Coulomb's law, or the elastic-plastic law at constant load and tilt) are
-  together exactly a set of parallel Jenkins elements (`jenkins_set`). The inverse of C has off-diagonals <= 0 and row
-  sums > 0, so that slip zones only grow within a stroke (Masing). Corner nodes of bilinear cells can have a small
-  negative row sum; such a node is reluctant: it sticks until its neighbours have slipped. That costs 1e-9 of the
-  friction limit at 201 nodes and 4e-8 at 401, while leaving these nodes out would cost 1.4 %.
+* Nodes that yield at a fixed force D_i (Coulomb's law, or the elastic-plastic law at constant load and tilt) are
+  together exactly equivalent to parallel Jenkins elements (`jenkins_set`), springs in series with sliders. The inverse
+  of C has off-diagonal entries <= 0 and row sums > 0, so slip zones only grow within a stroke, and Masing's rule holds.
+  Corner nodes of bilinear cells may have a small negative row sum; such a node sticks until its neighbours have slipped.
+  This costs 1e-9 of the friction limit at 201 nodes and 4e-8 at 401; leaving these nodes out would cost 1.4 %.
 
-* Points with a memory law share the modes of D^1/2 C D^1/2, D = mu sigma_n weight (`shear_modes`). A few modes carry
-  the resultant.
+* Nodes with a memory law share the modes of D^1/2 C D^1/2, D = mu sigma_n weight (`shear_modes`). A few of the most
+  compliant modes determine the resultant.
 """
 
 from collections.abc import Callable
@@ -26,44 +27,48 @@ from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 # relative difference of yield displacements below which nodes yield together, as mirrored nodes do; the rounding
 # errors of a patch with 801 nodes are 7e-13
 SAME_YIELD_TOL = 1e-11
-# number of sorts of the yields before neighbours are exchanged; sorting only moves points that are far off
-MAX_SORTS = 2
-# exchanges of neighbours per point, after which points are eliminated one by one; patches need at most 1
+MAX_SORTS = 2  # number of sorts of the nodes before neighbours are exchanged; sorting corrects large errors only
+# exchanges of neighbours per node, after which nodes are eliminated one by one; patches need at most 1
 MAX_EXCHANGES = 20
 # number of modes with which a reduction starts; without a layer of asperities its error is 1e-6 of the friction limit
 N_SHEAR_MODES = 4
-# smallest number of modes of the reference with which fewer modes are compared
-N_REFERENCE_MODES = 16
-# fraction of the tolerance by which few modes may differ from the reference; higher modes account for the rest
+N_REFERENCE_MODES = 16  # smallest number of modes of the reference for an error
+# error of a reduction / tolerance at which it is accepted; the modes beyond the reference cause the rest of the error
 MODE_ERROR_FRACTION = 0.8
-# number of points from which it is faster to compute the most compliant modes alone
-MIN_LANCZOS_POINTS = 128
+MIN_LANCZOS_POINTS = (
+    128  # number of nodes from which it is faster to compute the most compliant modes alone
+)
 # matrix products of Lanczos' method, with two vectors each; it fails to converge only for a soft layer of asperities
 MAX_PRODUCTS = 24
-# residual of a mode / largest eigenvalue; the error of an eigenvalue is the square of this ratio
+# residual of a mode / largest eigenvalue; the relative error of an eigenvalue is the square of this ratio
 MODE_TOL = 1e-6
-# numbers of Gauss points that may represent a patch
-GAUSS_COUNTS = (16, 32, 64)
-# bond lengths by which a Newton step may move a point back; the law there is exp(2) times as steep as at rest
+GAUSS_COUNTS = (16, 32, 64)  # numbers of Gauss points that may represent the nodes of a patch
+# bond lengths by which a Newton step may move a node back; the law there is exp(2) times as steep as at rest
 MAX_BACKWARD_LENGTHS = 2.0
-# number of relative displacements at which backbones are compared
-N_DISPLACEMENTS = 24
-# bond lengths in the largest of these displacements, at which the force is within exp(-6) of its limit
+N_DISPLACEMENTS = 24  # number of relative displacements at which backbones are compared
+# largest of these displacements in bond lengths, without the displacement of the pieces; the force there is within
+# exp(-6) of its limit
 MAX_BACKBONE_LENGTHS = 6
+N_ERROR_MODES = (
+    64  # smallest number of modes with which the backbone error of a reduction is computed
+)
+MAX_ITERATIONS = 400  # iterations of Newton's method for a backbone
+NEWTON_TOL = 1e-11  # relative step of Newton's method; it converges quadratically, so the next step is round-off
+MAX_DECAY_EXPONENT = 700.0  # exponent that keeps the exponential of the law finite
 
 
 @dataclass(frozen=True, eq=False)
 class JenkinsSet:
-    """Parallel Jenkins elements: springs in series with sliders.
+    """Parallel Jenkins elements, equivalent to nodes that yield at fixed forces.
 
-    - stiffness, yield_displacement (t,): [N/m] and [m]; the sum of their products is the friction limit.
-    - points (a,): Nodes of the contact set.
-    - limit (a,): Yield forces of the points [N].
-    - order (a,): Indices into `points`, the last point to yield first.
-    - low (a, a): Lower Cholesky factor of the compliance in that order; empty for one spring in series with
-      rigid points.
-    - starts (t,): Index of the first yield of each element.
-    - n_reluctant: Number of points whose force at first has the wrong sign.
+    - stiffness, yield_displacement (t,): [N/m] and [m]; the sum of their products is the friction limit
+    - points (a,): nodes of the contact set
+    - limit (a,): yield forces [N] of these nodes
+    - order (a,): indices into `points` in reverse order of yielding
+    - cholesky_factor (a, a): lower Cholesky factor of the compliance in that order; empty for rigid pieces in series
+      with one spring
+    - starts (t,): position of the first node of each element, in the order of yielding
+    - n_reluctant: number of nodes whose force has the wrong sign before any node yields
     """
 
     stiffness: np.ndarray
@@ -71,13 +76,13 @@ class JenkinsSet:
     points: np.ndarray
     limit: np.ndarray
     order: np.ndarray
-    low: np.ndarray
+    cholesky_factor: np.ndarray
     starts: np.ndarray
     n_reluctant: int
 
     @cached_property
     def point_yields(self) -> np.ndarray:
-        """Relative displacement (a,) [m] at which each point yields."""
+        """Relative displacement (a,) [m] of the holders at which each node yields."""
         if not self.order.size:
             return np.full(self.limit.size, self.yield_displacement[0])
         out = np.empty(self.limit.size)
@@ -87,13 +92,13 @@ class JenkinsSet:
 
     @cached_property
     def force_matrix(self) -> np.ndarray:
-        """Matrix (a, t) [N/m] that gives the point forces from the stretches of the elements.
+        """Matrix (a, t) [N/m] that maps the stretches of the elements to the forces of the nodes.
 
         It holds for any history.
         """
-        if not self.low.size:
+        if not self.cholesky_factor.size:
             return self.limit[:, None] / self.yield_displacement
-        inverse, _ = dtrtri(self.low, lower=1)
+        inverse, _ = dtrtri(self.cholesky_factor, lower=1)
         out = np.empty((self.limit.size, self.starts.size))
         out[self.order] = np.add.reduceat(
             (inverse.sum(axis=1)[:, None] * inverse)[::-1], self.starts
@@ -103,27 +108,28 @@ class JenkinsSet:
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Modes of D^1/2 C D^1/2, most compliant first, and backbones of any number of them.
+    """Modes of D^1/2 C D^1/2, most compliant first, and the backbones of any number of modes.
 
-    - points (a,): Indices of the contact set.
-    - limit (a,): Friction limits D [N].
-    - shape (a, n): Slide of a point per unit of a modal coordinate.
-    - values (n,): Compliance of the coordinates [m/N].
-    - length: Bond length [m].
-    - tangential (m, m): Compliance C [m/N] if these are the first modes only; the others are computed on
-      demand.
+    A backbone is the friction force on first loading as a function of the relative displacement.
+
+    - points (a,): nodes of the contact set
+    - limit (a,): friction limits D [N]
+    - shape (a, n): relative displacement of a node per unit of a modal coordinate
+    - compliance (n,): compliance [m/N] of the coordinates
+    - length: bond length [m]
+    - tangential (m, m): compliance C [m/N] if only the most compliant modes are there; the others are computed on demand
     """
 
     points: np.ndarray
     limit: np.ndarray
     shape: np.ndarray
-    values: np.ndarray
+    compliance: np.ndarray
     length: float
     tangential: np.ndarray | None = None
 
     @cached_property
     def complete(self) -> "Spectrum":
-        """The Spectrum with all modes."""
+        """Spectrum with all modes."""
         if self.tangential is None:
             return self
         return _all_modes(self.tangential, self.points, self.limit, self.length)
@@ -132,7 +138,7 @@ class Spectrum:
     def displacements(self) -> np.ndarray:
         """Relative displacements [m] at which backbones are compared, denser at small values."""
         if self.tangential is None:
-            displacement = self.shape @ (self.values * (self.shape.T @ self.limit))
+            displacement = self.shape @ (self.compliance * (self.shape.T @ self.limit))
         else:
             displacement = _block(self.tangential, self.points) @ self.limit
         largest = MAX_BACKBONE_LENGTHS * self.length + 2 * np.abs(displacement).max()
@@ -140,12 +146,12 @@ class Spectrum:
 
     def modes(self, count: int) -> "ShearModes":
         """Return the first `count` modes."""
-        if count > self.values.size and self.tangential is not None:
+        if count > self.compliance.size and self.tangential is not None:
             return self.complete.modes(count)
         return ShearModes(
             self.points,
             frozen_array(self.shape[:, :count]),
-            frozen_array(1 / self.values[:count]),
+            frozen_array(1 / self.compliance[:count]),
             self,
         )
 
@@ -157,19 +163,20 @@ class Spectrum:
     def backbone(self, count: int, shape=None, limit=None) -> np.ndarray:
         """Return the friction force [N] of `count` modes at `displacements`.
 
-        Newton's method starts from the cached backbone of the most modes below `count`.
+        Newton's method starts from the cached backbone with the largest number of modes up to `count`.
 
         Parameters
         ----------
         count : int
+            Number of modes.
         shape : (k, count) ndarray, optional
-            Shapes at other points than those of the modes.
+            Shapes of the modes at other points than the nodes.
         limit : (k,) ndarray, optional
-            Friction limits of these points [N].
+            Friction limits [N] of these points.
         """
-        if count > self.values.size and self.tangential is not None:
+        if count > self.compliance.size and self.tangential is not None:
             return self.complete.backbone(count, shape, limit)
-        count = min(count, self.values.size)
+        count = min(count, self.compliance.size)
         if shape is None and count in self.cache:
             return self.cache[count].force
         n_cached = max((number for number in self.cache if number <= count), default=0)
@@ -181,16 +188,16 @@ class Spectrum:
             shape, limit = self.shape[:, :count], self.limit
         with one_thread(), np.errstate(over="ignore", invalid="ignore"):
             backbone = _solve_backbone(
-                limit, shape, self.values[:count], self.length, self.displacements, start
+                limit, shape, self.compliance[:count], self.length, self.displacements, start
             )
         if is_own and np.isfinite(backbone.force).all():
             self.cache[count] = backbone
         return backbone.force
 
     def relative_difference(self, backbone, other) -> float:
-        """Return the largest difference of two backbones over the friction limit.
+        """Return the largest difference of two backbones / friction limit.
 
-        It is infinite if the bonds are too short for a backbone to be computed.
+        It is infinite if the bonds are too short for Newton's method to converge.
         """
         error = float(np.abs(backbone - other).max() / self.limit.sum())
         return error if np.isfinite(error) else np.inf
@@ -198,12 +205,12 @@ class Spectrum:
 
 @dataclass(frozen=True, eq=False)
 class ShearModes:
-    """The most compliant shear modes of the pieces.
+    """Most compliant shear modes of the pieces.
 
-    - points (a,): Indices of the contact set.
-    - shape (a, r): Slide of a point per unit of a modal coordinate.
-    - stiffness (r,): Stiffness of the coordinates [N/m].
-    - spectrum: All modes.
+    - points (a,): nodes of the contact set
+    - shape (a, r): relative displacement of a node per unit of a modal coordinate
+    - stiffness (r,): stiffness [N/m] of the coordinates
+    - spectrum: modes of which these are the first
     """
 
     points: np.ndarray
@@ -213,24 +220,27 @@ class ShearModes:
 
     @cached_property
     def backbone_error(self) -> float:
-        """Largest error of the force / friction limit, compared with 64 or four times as many modes."""
+        """Largest error of the backbone / friction limit.
+
+        The reference has four times as many modes, and at least N_ERROR_MODES.
+        """
         count = self.stiffness.size
         return self.spectrum.relative_difference(
-            self.spectrum.backbone(max(64, 4 * count)), self.spectrum.backbone(count)
+            self.spectrum.backbone(max(N_ERROR_MODES, 4 * count)), self.spectrum.backbone(count)
         )
 
 
 def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0) -> JenkinsSet:
-    """Return parallel elements equivalent to points that yield in series with a compliance.
+    """Return the parallel elements that are equivalent to nodes on a compliance that yield at fixed forces.
 
     Parameters
     ----------
     tangential : (m, m) ndarray
         Compliance [m/N].
     limit : (m,) ndarray
-        Yield forces of the points [N].
+        Yield forces [N] of the nodes.
     local_length : float
-        Bond length [m] of the elastic-plastic law (3.12), a local stiffness limit/length in series; 0 for Coulomb's law.
+        Length [m] of the elastic-plastic law (eq. 3.12), a spring limit/length in series at each node; 0 for Coulomb's law.
 
     Returns
     -------
@@ -239,14 +249,14 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     Raises
     ------
     PatchfemError
-        If no point carries load.
+        If no node carries load.
     """
     limit = np.asarray(limit, float)
     if not (limit > 0).any():
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     points = np.flatnonzero(limit > 0)
     force, none = limit[points], np.zeros(0, np.int64)
-    # rigid points in series with one spring all slip together
+    # rigid pieces in series with one spring slip at all nodes together
     if local_length == 0 and np.ptp(tangential) == 0:
         stiffness = 1 / tangential[0, 0]
         return JenkinsSet(
@@ -269,54 +279,65 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         np.diff(yield_displacements, prepend=-np.inf) > SAME_YIELD_TOL * yield_displacements
     )
     return JenkinsSet(
-        frozen_array(np.add.reduceat(sequence.root[::-1] ** 2, starts)),
+        frozen_array(np.add.reduceat(sequence.inverse_ones[::-1] ** 2, starts)),
         frozen_array(yield_displacements[starts]),
         frozen_array(points, np.int64),
         frozen_array(force),
         sequence.order,
-        sequence.low,
+        sequence.cholesky_factor,
         starts,
         n_reluctant,
     )
 
 
 class _Sequence(NamedTuple):
-    """Yields of n points in a given order, the last point to yield first.
+    """Yield displacements of n nodes if they yield in a given order.
 
-    - order (n,): Indices of the points.
-    - low (n, n): Lower Cholesky factor L of the compliance in that order.
-    - root, pull (n,): L^-1 1 and L' force.
-    - displacements (n,): Slides of the yields [m], pull/root.
+    - order (n,): indices of the nodes in reverse order of yielding
+    - cholesky_factor (n, n): lower Cholesky factor L of the compliance in that order
+    - inverse_ones, factored_force (n,): L^-1 1 and L' force
+    - displacements (n,): yield displacements [m], factored_force/inverse_ones
     """
 
     order: np.ndarray
-    low: np.ndarray
-    root: np.ndarray
-    pull: np.ndarray
+    cholesky_factor: np.ndarray
+    inverse_ones: np.ndarray
+    factored_force: np.ndarray
     displacements: np.ndarray
 
     @property
     def is_sorted(self) -> bool:
-        """Whether the yield displacements increase from the last point to the first.
+        """Whether the yield displacements increase from the last node to the first.
 
-        This is the condition that the order of the points is right.
+        The order is then right.
         """
         return bool(
             (self.displacements[1:] <= self.displacements[:-1] * (1 + SAME_YIELD_TOL)).all()
         )
 
 
-def _find_order(c: np.ndarray, force: np.ndarray) -> tuple:
-    """Find the order in which the points yield.
+class _YieldOrder(NamedTuple):
+    """Order in which nodes yield.
 
-    Returns the `_Sequence` of this order, its increasing yield displacements, and the number of points whose force at
-    first has the wrong sign.
+    - sequence: yields in this order
+    - displacements (n,): increasing yield displacements [m]
+    - n_reluctant: number of nodes whose force has the wrong sign before any node yields
+    """
 
-    While the first m points of an order stick, their rates solve the leading block of c = L L'. Thus the force that all
-    points lose by the m-th yield is the m-th row of L^-1 times (L^-1 1)_m, and the displacements of the yields are
-    (L' force)/(L^-1 1). An order is right if these increase, as a rate only grows until its point yields. The first
-    order is that of the rates without yields, the next ones are those of the displacements. Remaining errors are mended by
-    exchanging neighbours, and at last by eliminating the points one by one.
+    sequence: _Sequence
+    displacements: np.ndarray
+    n_reluctant: int
+
+
+def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
+    """Find the order in which nodes of the compliance c (n, n) [m/N] yield at forces (n,) [N].
+
+    While the first m nodes of an order stick, the rates of their forces solve the leading block of c = L L'. The force
+    rates that all nodes lose by the yield of the m-th node are thus the m-th row of L^-1 times (L^-1 1)_m, and the yield
+    displacements are (L' force)/(L^-1 1). An order is right if these increase, because the force rate of a node only
+    grows until it yields. The first order is that of the force rates without yields, the next orders are those of the
+    displacements. Remaining errors are corrected by exchanging neighbours, and at last by eliminating the nodes one by
+    one.
     """
     rate = dpotrs(_factorise(c), np.ones(force.size), lower=1)[0]
     order, displacements = np.arange(force.size), _divide_or_inf(force, rate)
@@ -332,31 +353,39 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> tuple:
             exchanged = _yield_sequence(c, force, _eliminate_points(c, force))
         sequence = exchanged
     increasing = np.maximum.accumulate(sequence.displacements[::-1])
-    return sequence, increasing, int((rate <= 0).sum())
+    return _YieldOrder(sequence, increasing, int((rate <= 0).sum()))
 
 
 def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
-    """Return the quotients; they are infinite where the denominator is not positive."""
+    """Return quotients, infinite where the denominator is not positive."""
     infinite = np.full(numerator.size, np.inf)
     return np.divide(numerator, denominator, out=infinite, where=denominator > 0)
 
 
 def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Sequence:
-    """Return the yields of points with the compliance c (n, n) [m/N] in a given order."""
-    low = _factorise(c[np.ix_(order, order)])
-    root = dtrsm(1.0, low, np.ones((force.size, 1)), lower=1)[:, 0]
-    pull = force[order] @ low
-    return _Sequence(order, low, root, pull, _divide_or_inf(pull, root))
+    """Return the yields of nodes with the compliance c (n, n) [m/N] in a given order."""
+    cholesky_factor = _factorise(c[np.ix_(order, order)])
+    inverse_ones = dtrsm(1.0, cholesky_factor, np.ones((force.size, 1)), lower=1)[:, 0]
+    factored_force = force[order] @ cholesky_factor
+    return _Sequence(
+        order,
+        cholesky_factor,
+        inverse_ones,
+        factored_force,
+        _divide_or_inf(factored_force, inverse_ones),
+    )
 
 
 def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
-    """Exchange neighbours until the yield displacements are sorted; None if this takes too long.
+    """Exchange neighbours until the yield displacements are sorted; None after MAX_EXCHANGES per node.
 
-    An exchange changes the yields of these two points alone: L with two rows exchanged becomes lower triangular again by
-    a rotation of two of its columns, which rotates L^-1 1 and L' force with them.
+    An exchange changes the yields of these two nodes alone. L with two rows exchanged becomes lower triangular again by
+    a rotation of two of its columns, which also rotates L^-1 1 and L' force.
     """
-    low = sequence.low
-    order, root, pull = (part.tolist() for part in (sequence.order, sequence.root, sequence.pull))
+    cholesky_factor = sequence.cholesky_factor
+    order, inverse_ones, factored_force = (
+        part.tolist() for part in (sequence.order, sequence.inverse_ones, sequence.factored_force)
+    )
     displacements = sequence.displacements.tolist()
     pending, remaining = list(range(len(order) - 1))[::-1], MAX_EXCHANGES * len(order)
     while pending:
@@ -368,36 +397,37 @@ def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
         if remaining < 0:
             return None
         both = slice(k, k + 2)
-        low[both, : k + 2] = low[[k + 1, k], : k + 2]
-        size = np.hypot(low[k, k], low[k, k + 1])
-        c, s = float(low[k, k] / size), float(low[k, k + 1] / size)
+        cholesky_factor[both, : k + 2] = cholesky_factor[[k + 1, k], : k + 2]
+        size = np.hypot(cholesky_factor[k, k], cholesky_factor[k, k + 1])
+        c, s = float(cholesky_factor[k, k] / size), float(cholesky_factor[k, k + 1] / size)
         # this sign keeps the diagonal positive
         rotation = np.array([[c, s], [s, -c]])
-        low[k:, both] = low[k:, both] @ rotation
-        low[k, k + 1] = 0.0
+        cholesky_factor[k:, both] = cholesky_factor[k:, both] @ rotation
+        cholesky_factor[k, k + 1] = 0.0
         order[both] = order[both][::-1]
-        for part in (root, pull):
+        for part in (inverse_ones, factored_force):
             part[both] = c * part[k] + s * part[k + 1], s * part[k] - c * part[k + 1]
-        displacements[both] = [a / b if b > 0 else np.inf for a, b in zip(pull[both], root[both])]
+        displacements[both] = [
+            a / b if b > 0 else np.inf for a, b in zip(factored_force[both], inverse_ones[both])
+        ]
         pending += [k + 1, k - 1]
-    return _Sequence(*map(np.array, (order, low, root, pull, displacements)))
+    return _Sequence(
+        *map(np.array, (order, cholesky_factor, inverse_ones, factored_force, displacements))
+    )
 
 
 def _factorise(c: np.ndarray) -> np.ndarray:
-    """Return the lower Cholesky factor of c (n, n).
-
-    PatchfemError if c is not positive definite to working precision.
-    """
-    low, fault = dpotrf(c.T, lower=1)
+    """Return the lower Cholesky factor of c (n, n); PatchfemError if c is not positive definite."""
+    cholesky_factor, fault = dpotrf(c.T, lower=1)
     if fault:
         raise PatchfemError(INDEFINITE_MESSAGE)
-    return low
+    return cholesky_factor
 
 
 def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return the order of `_Sequence` by eliminating one point after each yield.
+    """Return the order of `_Sequence` by eliminating each node from the inverse of c when it yields.
 
-    The point is eliminated from the inverse of c, which takes n^3 products in all.
+    This takes n^3 products in all.
     """
     inverse, remaining, yielded = np.linalg.inv(c), force.copy(), []
     rate = inverse.sum(axis=0)
@@ -414,7 +444,7 @@ def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 def scale_limits(elements: JenkinsSet, factor: float) -> JenkinsSet:
-    """Return elements with `factor` > 0 times the yield forces and the same springs."""
+    """Return elements whose yield forces are multiplied by a factor > 0, with the same stiffness."""
     return replace(
         elements,
         yield_displacement=frozen_array(factor * elements.yield_displacement),
@@ -429,24 +459,24 @@ def shear_modes(
     count: int,
     weakening: float = 1.0,
 ) -> ShearModes:
-    """Return the `count` most compliant modes of D^1/2 C D^1/2 for points with bonds.
+    """Return the `count` most compliant modes of D^1/2 C D^1/2 for nodes with bonds.
 
     Parameters
     ----------
     tangential : (m, m) ndarray
         Compliance C [m/N].
     limit : (m,) ndarray
-        Friction limits D [N]; the bonds of a point have the stiffness limit/bond_length.
+        Friction limits D [N]; the bonds of a node have the stiffness limit/bond_length.
     bond_length : float
-        [m]
+        Bond length [m].
     count : int
     weakening : float
-        Static over kinetic friction.
+        Static / kinetic friction coefficient.
 
     Raises
     ------
     PatchfemError
-        If a weakening contact could jump by itself: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
+        If a weakening contact could jump without a change of the displacement: lambda_max(k C)(eps_0/eps_k - 1) >= 1.
     """
     return _make_spectrum(tangential, limit, bond_length, weakening).modes(count)
 
@@ -454,16 +484,16 @@ def shear_modes(
 def _make_spectrum(
     tangential, limit, bond_length: float, weakening: float, *, first_modes_only: bool = False
 ) -> Spectrum:
-    """Return the Spectrum of the points that carry load, as `shear_modes` describes it.
+    """Return the Spectrum of the nodes that carry load; parameters as in `shear_modes`.
 
-    first_modes_only: of many points the N_REFERENCE_MODES most compliant modes are enough.
+    first_modes_only: whether the N_REFERENCE_MODES most compliant modes are enough if there are many nodes.
     """
     index, spectrum = np.flatnonzero(limit > 0), None
     if first_modes_only and index.size >= MIN_LANCZOS_POINTS:
         spectrum = _first_modes(tangential, index, limit[index], bond_length)
     if spectrum is None:
         spectrum = _all_modes(tangential, index, limit[index], bond_length)
-    stability = spectrum.values[0] / bond_length * (weakening - 1)
+    stability = spectrum.compliance[0] / bond_length * (weakening - 1)
     if stability >= 1:
         raise PatchfemError(
             "contact.shear with friction.kinetic below static: the patch may slip suddenly without a "
@@ -474,10 +504,10 @@ def _make_spectrum(
 
 
 def _all_modes(tangential, index, limit, length: float) -> Spectrum:
-    """Return the Spectrum with all modes of the points `index` (a,) with limits (a,) [N]."""
+    """Return the Spectrum with all modes of the nodes `index` (a,) with friction limits (a,) [N]."""
     points = frozen_array(index, np.int64)
     if np.ptp(tangential) == 0:
-        # rigid points in series with one spring have only one mode
+        # rigid pieces in series with one spring have only one mode
         return Spectrum(points, limit, np.ones((index.size, 1)), tangential[:1, 0], length)
     root = np.sqrt(limit)
     with one_thread():
@@ -488,7 +518,8 @@ def _all_modes(tangential, index, limit, length: float) -> Spectrum:
 def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
     """Return the Spectrum with the N_REFERENCE_MODES most compliant modes.
 
-    It is None where Lanczos' method does not find them, as for a soft skin, whose eigenvalues lie close together.
+    It is None if Lanczos' method does not converge, as for a soft layer of asperities, whose eigenvalues lie close
+    together.
     """
     root, c = np.sqrt(limit)[:, None], _block(tangential, index)
 
@@ -506,7 +537,7 @@ def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
 
 
 def _block(tangential, index) -> np.ndarray:
-    """Return the compliance (a, a) between the points `index` (a,), a view if they are adjacent."""
+    """Return the compliance (a, a) between the nodes `index` (a,), a view if they are adjacent."""
     if index[-1] - index[0] >= index.size:
         return tangential[np.ix_(index, index)]
     span = slice(index[0], index[-1] + 1)
@@ -514,7 +545,7 @@ def _block(tangential, index) -> np.ndarray:
 
 
 class EigenPairs(NamedTuple):
-    """Largest eigenvalues (count,), eigenvectors (n, count), and the largest residual."""
+    """Largest eigenvalues (count,), eigenvectors (n, count) and largest norm of a residual."""
 
     values: np.ndarray
     vectors: np.ndarray
@@ -524,18 +555,22 @@ class EigenPairs(NamedTuple):
 def largest_eigenpairs(
     product: Callable, start: np.ndarray, count: int, n_products: int
 ) -> EigenPairs:
-    """Find the largest eigenvalues of a symmetric matrix by block Lanczos with two vectors.
+    """Find the largest eigenvalues of a symmetric matrix by the block Lanczos method with two vectors.
 
-    Each vector is made orthogonal to all before it (Golub, Van Loan, Matrix Computations, section 10.3.6).
+    Each vector is made orthogonal to all previous ones (Golub, Van Loan, Matrix Computations, section 10.3.6).
 
     Parameters
     ----------
     product : callable
         Function (n, 2) -> (n, 2) that multiplies by the matrix.
     start : (n,) ndarray
-        First vector, of one sign.
+        First vector, whose entries have one sign.
     count, n_products : int
-        Number of eigenvalues, and of products.
+        Number of eigenvalues and of matrix products.
+
+    Returns
+    -------
+    EigenPairs
     """
     basis, images = np.empty((2, len(start), 2 * n_products))
     new = np.stack([start, start * np.linspace(-1, 1, len(start))], axis=1)
@@ -566,9 +601,9 @@ def enough_modes(
     weakening: float = 1.0,
     max_modes: int = 64,
 ) -> ShearModes:
-    """Return modes whose backbone error meets a tolerance, their number doubled from `count` on.
+    """Return modes whose backbone error meets a tolerance.
 
-    A soft skin spreads the compliance over many modes; the pieces alone need four.
+    The number of modes is doubled until it does. The pieces alone need four modes, a soft layer of asperities many.
 
     Parameters
     ----------
@@ -577,7 +612,11 @@ def enough_modes(
     count, max_modes : int
         First and largest number of modes.
     tolerance : float
-        Error of the resultant over the friction limit.
+        Largest error of the backbone / friction limit.
+
+    Returns
+    -------
+    ShearModes
     """
     spectrum = _make_spectrum(tangential, limit, bond_length, weakening)
     modes = spectrum.modes(count)
@@ -595,23 +634,27 @@ def fewest_modes(
     weakening: float = 1.0,
     max_modes: int = 64,
 ) -> ShearModes:
-    """Return the fewest modes (at least two) that agree with four times as many.
+    """Return the smallest number of modes, at least two, whose backbone meets a tolerance.
 
-    Their backbones are compared.
-
-    They may differ by MAX_MODE_ERROR of the tolerance; the remainder is left to the modes beyond.
+    The reference has four times as many modes, and at least N_REFERENCE_MODES. The difference may be
+    MODE_ERROR_FRACTION of the tolerance.
 
     Parameters
     ----------
     tangential, limit, bond_length, weakening
         As in `shear_modes`.
     tolerance : float
-        Error of the resultant over the friction limit.
+        Largest error of the backbone / friction limit.
     max_modes : int
+        Largest number of modes.
+
+    Returns
+    -------
+    ShearModes
     """
     spectrum = _make_spectrum(tangential, limit, bond_length, weakening, first_modes_only=True)
     for count in range(2, max_modes):
-        # few modes come first, because their backbone is the starting point for many modes
+        # the backbone of a few modes is the initial guess for that of the reference
         backbone = spectrum.backbone(count)
         reference = spectrum.backbone(max(N_REFERENCE_MODES, 4 * count))
         error = spectrum.relative_difference(reference, backbone)
@@ -621,19 +664,19 @@ def fewest_modes(
 
 
 def comparison_mode_count(count: int) -> int:
-    """Return how many modes a second run needs to show the error of `count` modes.
+    """Return the number of modes of a second run that shows the error of `count` modes.
 
-    It is half as many. Of two or three modes of a symmetric patch only the first acts: there it is four times as many.
+    It is half as many. Of two or three modes of a symmetric patch only the first acts, so it is then four times as many.
     """
     return count // 2 if count >= N_SHEAR_MODES else 4 * count
 
 
 class GaussModes(NamedTuple):
-    """Modes on Gauss points that represent all points.
+    """Modes on Gauss points that represent the nodes.
 
-    - modes: The indices of their points count from 0.
-    - limit (k,): Friction limits of the Gauss points [N].
-    - error: Largest error of the backbone over the friction limit.
+    - modes: shear modes, whose `points` are the indices 0 to k - 1 of the Gauss points
+    - limit (k,): friction limits [N] of the Gauss points
+    - error: largest error of the backbone / friction limit
     """
 
     modes: ShearModes
@@ -642,17 +685,22 @@ class GaussModes(NamedTuple):
 
 
 def fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> GaussModes:
-    """Return the modes on as few Gauss points as the tolerance allows, if no fields are needed.
+    """Return the modes on the smallest Gauss rule that meets a tolerance.
 
-    All points are kept where more than half of them would be needed.
+    All nodes are kept if the rule would need more than half as many points. Traction and slip of the nodes cannot be
+    recovered from Gauss points.
 
     Parameters
     ----------
     modes : ShearModes
     x : (a,) ndarray
-        Positions of the points [m].
+        Positions [m] of the nodes.
     tolerance : float
-        Error of the backbone over the friction limit.
+        Largest error of the backbone / friction limit.
+
+    Returns
+    -------
+    GaussModes
     """
     for count in GAUSS_COUNTS:
         if 2 * count > x.size:
@@ -665,14 +713,19 @@ def fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> G
 
 
 def modes_on_gauss(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
-    """Return the modes on `count` Gauss points of the friction limit along the patch.
+    """Return the modes on the Gauss rule with `count` points whose weight function is the friction limit.
 
     Parameters
     ----------
     modes : ShearModes
     x : (a,) ndarray
-        Positions of the points [m].
+        Positions [m] of the nodes.
     count : int
+        Number of Gauss points.
+
+    Returns
+    -------
+    GaussModes
     """
     spectrum, n_modes = modes.spectrum, modes.stiffness.size
     positions, limit = gauss_rule(x, spectrum.limit, count)
@@ -687,14 +740,19 @@ def modes_on_gauss(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
 def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
     """Return positions and weights (count,) of the Gauss rule for a weighted sum over points.
 
-    The rule is exact for polynomials up to the order 2 count - 1. It is found by Lanczos' method, each vector being
-    made orthogonal to all before it.
+    The rule is exact for polynomials up to the degree 2 count - 1. It follows from Lanczos' method, in which each vector
+    is made orthogonal to all previous ones.
 
     Parameters
     ----------
     x, weight : (a,) ndarray
         Positions and weights > 0 of the points.
     count : int
+        Number of Gauss points.
+
+    Returns
+    -------
+    positions, weights : (count,) ndarray
     """
     scaled, total = 2 * (x - x.mean()) / np.ptp(x), weight.sum()
     basis, diagonal, off_diagonal = [np.sqrt(weight / total)], [], []
@@ -719,21 +777,20 @@ class _Backbone(NamedTuple):
 
 
 def _solve_backbone(limit, shape, values, length, displacements, start) -> _Backbone:
-    """Solve for first loading at all relative displacements (k,) by Newton's method.
+    """Compute the friction force on first loading at relative displacements (k,) by Newton's method.
 
-    The law D (1 - exp(-xi/length)) saturates.
-
-    The coordinates `start` (k, r) are overwritten. No step moves a point back by more than MAX_BACK_STEP lengths,
-    because the law is so steep there that Newton's method does not return.
+    A node with the local displacement xi carries D (1 - exp(-xi/length)). The modal coordinates `start` (k, r) are the
+    initial guess and are overwritten. No step moves a node back by more than MAX_BACKWARD_LENGTHS lengths, because the
+    law is so steep there that Newton's method does not return.
     """
     coordinates, pending, n_modes = start, np.arange(displacements.size), values.size
     first, second = np.tril_indices(n_modes)
     products = (shape.T[first] * shape.T[second]).T
     entries = np.empty((n_modes, n_modes), np.int64)
     entries[first, second] = entries[second, first] = np.arange(first.size)
-    for _ in range(400):
+    for _ in range(MAX_ITERATIONS):
         xi = displacements[pending, None] - coordinates[pending] @ shape.T
-        decay = np.exp(np.minimum(-xi / length, 700.0))
+        decay = np.exp(np.minimum(-xi / length, MAX_DECAY_EXPONENT))
         residual = coordinates[pending] / values - (limit * (1 - decay)) @ shape
         tangent = ((limit * decay / length) @ products)[:, entries] + np.diag(1 / values)
         try:
@@ -748,12 +805,11 @@ def _solve_backbone(limit, shape, values, length, displacements, start) -> _Back
         part = np.where((part > 0) & (part < 1), part, 1.0)
         coordinates[pending] -= part[:, None] * step
         size = np.abs(coordinates[pending]).max(axis=1) + 1e-300
-        # Newton's method converges quadratically, so the omitted step is a rounding error
-        is_converged = (part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size)
+        is_converged = (part == 1.0) & (np.abs(step).max(axis=1) <= NEWTON_TOL * size)
         pending = pending[~is_converged]
         if not pending.size:
             break
     xi = displacements[:, None] - coordinates @ shape.T
-    force = -np.expm1(np.minimum(-xi / length, 700.0)) @ limit
+    force = -np.expm1(np.minimum(-xi / length, MAX_DECAY_EXPONENT)) @ limit
     force[pending] = np.nan
     return _Backbone(force, coordinates)

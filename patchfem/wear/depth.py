@@ -1,18 +1,17 @@
 """Worn depth over one jump of many cycles, solved together with the contact pressure.
 
-Archard's law: a point that slides the path s per cycle under the nodal force f on its area A wears by kappa s f/A per
-cycle. Wear takes pressure away from where it is fast, in a time that falls with the length of a cell, so a long
-explicit step lifts every second node off. An implicit step solves the contact with its compliance C replaced by
-C + diag(rate cycles): the same complementarity problem, better conditioned and stable at any length.
+Archard's law: a node that slips over the path s per cycle under the force f on its area A wears by kappa s f/A per cycle.
+Where a node wears fast it loses pressure, within a time that falls with the length of a cell. A long explicit step would
+therefore lift off every second node. An implicit step solves the contact problem with its compliance C replaced by
+C + diag(rate cycles). This is the same complementarity problem, better conditioned, and stable at any length.
 """
 
 from collections.abc import Callable
 
 import numpy as np
 
-GAMMA = 1 - np.sqrt(
-    0.5
-)  # coefficient of the L-stable two-stage method; both of its weights are positive
+# coefficient of the L-stable method of two stages; both of its weights are positive
+STAGE_COEFFICIENT = 1 - np.sqrt(0.5)
 
 
 def wear_rates(coefficient: float, path, area) -> np.ndarray:
@@ -34,10 +33,11 @@ def wear_rates(coefficient: float, path, area) -> np.ndarray:
 
 
 def solve_jump(press: Callable, depth, rate, cycles: float) -> tuple:
-    """Solve a jump over many cycles by an implicit method of order two.
+    """Return worn depth and contact forces after a jump over many cycles.
 
-    The method is the singly diagonal Runge-Kutta method of two stages (Alexander, SIAM J. Numer. Anal. 14, 1006, 1977).
-    The worn volume is the sum of rate cycles area times the load, to round-off.
+    The method is the singly diagonally implicit Runge-Kutta method of two stages and order two (Alexander, SIAM J.
+    Numer. Anal. 14, 1006, 1977). The worn volume is the sum of rate times cycles times area times force over the nodes,
+    to round-off.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def solve_jump(press: Callable, depth, rate, cycles: float) -> tuple:
     depth, force : (m,) array
         Worn depth [m] and contact forces [N] at the end of the jump.
     """
-    softening = GAMMA * cycles * rate
+    softening = STAGE_COEFFICIENT * cycles * rate
     first = cycles * rate * press(depth, softening)
-    force = press(depth + (1 - GAMMA) * first, softening)
-    return depth + (1 - GAMMA) * first + softening * force, force
+    force = press(depth + (1 - STAGE_COEFFICIENT) * first, softening)
+    return depth + (1 - STAGE_COEFFICIENT) * first + softening * force, force

@@ -1,4 +1,4 @@
-"""Jumps over many cycles of wear: each as long as the tolerance allows, or a given number of equal ones."""
+"""Jumps over many cycles of wear, as long as the tolerance allows or of equal length."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -24,15 +24,15 @@ SHAKEDOWN_WEAR_RATIO = 1e-3
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WearProblem:
-    """How the pieces press and slide, and what they lose.
+    """Contact problem, slip path and wear law of two pieces.
 
-    - press: `press(worn, softening)`, as `depth.solve_jump` takes it
+    - press: `press(worn, softening)`, as in `depth.solve_jump`
     - path: `path(worn)` returns the slip path (m,) [m] of one cycle; the same array object while wear does not change it
     - area: areas (m,) [m2] of the nodes
     - coefficient: wear coefficient [m2/N]
-    - cycles: number of all cycles
+    - cycles: total number of cycles
 
-    In a patch that is divided into strips all (m,) are (s, m).
+    In a patch of s strips, arrays (m,) are (s, m).
     """
 
     press: Callable
@@ -51,9 +51,9 @@ class WearState:
     - path: slip path (m,) [m] of the next cycle
     - trend: change (m,) [m] of the slip path per cycle over the last jump
     - length: length of the next automatic jump in cycles
-    - coarse_depth: worn depth (m,) [m] by the same jumps without halving
-    - path_error: sum [m] of the errors from the change of the slip path within the jumps
-    - jump_path: slip path (m,) [m] that the last jump took
+    - coarse_depth: worn depth (m,) [m] of the same jumps without halving
+    - path_error: sum over the jumps [m] of the error that the change of the slip path within a jump causes
+    - jump_path: slip path (m,) [m] per cycle of the last jump
     """
 
     cycle: float
@@ -68,7 +68,10 @@ class WearState:
 
     @property
     def error(self) -> float:
-        """Error [m] of the depth from the length of the jumps: the change by halving all of them, and `path_error`."""
+        """Error [m] of the worn depth that is due to the length of the jumps.
+
+        It is the change of the depth when all jumps are halved, plus `path_error`.
+        """
         return float(np.abs(self.depth - self.coarse_depth).max()) + self.path_error
 
 
@@ -109,11 +112,11 @@ def take_jump(
 ) -> WearState:
     """Return the state after the next jump.
 
-    The error of a jump is the difference between one jump and two halves of it, over 3: that of the depth relative to
-    the largest depth, and that of the contact forces relative to the load. The two halves are kept. The slip path is
-    extrapolated by its trend to the middle of the jump. Where the path at the end differs, the halves are solved again
-    with the mean of both ends, and a third of the difference counts as error (Milne's device); since this error is not
-    damped, it is compared with the wear of the jump alone.
+    A jump is solved as a whole and in two halves, and the halves are kept. A third of the difference is the error: of
+    the depth relative to the largest depth, and of the contact forces relative to the load. The slip path is
+    extrapolated by its trend to the middle of the jump. Where the path at the end of the jump differs, the halves are
+    solved again with the mean path of both ends, and a third of the difference counts as error (Milne's device). This
+    error is not damped by later jumps, so it is compared with the wear of this jump alone.
 
     Parameters
     ----------
@@ -159,14 +162,14 @@ def _correct_path(
     length: float,
     tolerance: float,
 ) -> tuple:
-    """Repeat a jump with the slip path at its end taken into account; return the state and its error over tolerance."""
+    """Repeat a jump with the mean slip path of both ends; return the state and error / tolerance."""
     path = problem.path(after.depth)
     if path is state.path:
         return after, error
     again, error = _take_halves(problem, state, (state.path + path) / 2, length, tolerance)
-    # With h the length of this jump, k of the one before and f the path: the mean of both ends misses h^3/12 f'', and
-    # the trend misses (h/6 + k/4) h^2 f'' with the other sign. So the error is 1/(3 + 3 k/h) of their difference, and
-    # never more than a third of it.
+    # Let h be the length of this jump, k that of the previous jump, and f the path as a function of the cycles. The
+    # truncation error of the mean of both ends is h^3/12 f'', and that of the trend is -(h/6 + k/4) h^2 f''. So the
+    # error of the mean is 1/(3 + 3 k/h) of the difference of both, which is at most a third.
     path_error = float(np.abs(again.depth - after.depth).max()) / 3
     worn = float((again.depth - state.depth).max())
     scale = max(worn, SHAKEDOWN_WEAR_RATIO * float(again.depth.max()))
@@ -182,12 +185,12 @@ def _correct_path(
 def _take_halves(
     problem: WearProblem, state: WearState, path, length: float, tolerance: float
 ) -> tuple:
-    """Take a jump in two halves along a given slip path; return the state and its error over tolerance."""
+    """Take a jump in two halves at a constant slip path; return the state and error / tolerance."""
     rate = wear_rates(problem.coefficient, path, problem.area)
-    whole, whole_force = solve_jump(problem.press, state.depth, rate, length)
+    coarse, coarse_force = solve_jump(problem.press, state.depth, rate, length)
     half, _ = solve_jump(problem.press, state.depth, rate, length / 2)
     depth, force = solve_jump(problem.press, half, rate, length / 2)
-    coarse_depth = whole
+    coarse_depth = coarse
     if state.coarse_depth is not state.depth:
         coarse_depth, _ = solve_jump(problem.press, state.coarse_depth, rate, length)
     after = replace(
@@ -199,22 +202,24 @@ def _take_halves(
         jump_path=path,
     )
     depth_limit = tolerance * max(float(depth.max()), MIN_DEPTH)
-    depth_error = float(np.abs(depth - whole).max()) / RICHARDSON_DIVISOR / depth_limit
+    depth_error = float(np.abs(depth - coarse).max()) / RICHARDSON_DIVISOR / depth_limit
     load = float(force.sum())
     if load <= 0:
         return after, max(depth_error, 0.0)
-    force_error = float(np.abs(force - whole_force).sum()) / RICHARDSON_DIVISOR / (tolerance * load)
+    force_error = (
+        float(np.abs(force - coarse_force).sum()) / RICHARDSON_DIVISOR / (tolerance * load)
+    )
     return after, max(depth_error, force_error)
 
 
-def replay_jumps(press: Callable, area, coefficient: float, legs, depth) -> np.ndarray:
-    """Return the worn depth on other nodes by the jumps of an earlier run.
+def replay_jumps(press: Callable, area, coefficient: float, jumps, depth) -> np.ndarray:
+    """Return the worn depth on other nodes after the jumps of an earlier run.
 
     Parameters
     ----------
     press, area, coefficient : callable, (m,) array, float
         As in `WearProblem`.
-    legs : sequence of (float, (m,) array)
+    jumps : sequence of (float, (m,) array)
         Cycles, and slip path [m] on these nodes, of every jump.
     depth : (m,) array
         Depth [m] that was worn before.
@@ -223,7 +228,7 @@ def replay_jumps(press: Callable, area, coefficient: float, legs, depth) -> np.n
     -------
     (m,) array
     """
-    for cycles, path in legs:
+    for cycles, path in jumps:
         rate = wear_rates(coefficient, path, area)
         for _ in range(2):
             depth, _ = solve_jump(press, depth, rate, cycles / 2)

@@ -1,321 +1,491 @@
 """Force and stored energy of straight strips of bonds (eq. 2.17), on a line or in a plane.
 
-Along a strip the stretch is u = a + y e, y behind its end, and R = near + y. Strips are integrated
+A step of the path is straight, and the bonds that form on it are a strip. At a distance y from the end of a strip with
+the direction e, a bond has the stretch u = a + y e and the path R = R_end + y since it formed; a and R_end are those of
+a bond at the end of the strip. Per mu_s sigma_n the strip carries the sum over y of
 
-* stretch, p = 1: in closed form, any bond length history;
-* report, constant bond length, u along the strip: in closed form, any p > -1, by the incomplete gamma function;
-* otherwise: by eight Gauss points on pieces of at most a quarter bond length, none across a turn (u = 0) and none
-  longer than its distance from where the integrand is not smooth; where it is steep at an end of a piece, as |u|^p or
-  R^p, with that power as their weight; by three points on strips ten times shorter than that distance and than a bond
-  length.
+    (|u|/eps)^p exp(-D) u/|u| dy/(eps_0 Gamma(p + 1))        reading="stretch", D the damage since the bond formed
+    (R/eps)^p exp(-R/eps) u/|u| dy/(eps_0 Gamma(p + 1))      reading="report", eq. 2.14
 
-Not smooth are: |u|^p for a fractional p (reading="stretch"); the direction u/|u| off the line of the strip; and R^p for
-a fractional p, whether the bonds grow or not (reading="report").
+with the path element dy > 0 in place of the signed dX1 of the report. These integrals are evaluated
+
+- in closed form for reading="stretch" and p = 1, for any history of the bond length;
+- in closed form, by the incomplete gamma function, for reading="report" at a constant bond length if u is along the
+  strip;
+- otherwise by Gauss points on pieces of the strip.
+
+A piece is at most a quarter of a bond length long, and not longer than its distance from any point at which the
+integrand is not smooth: |u|^p for a fractional p (reading="stretch"), the direction u/|u| off the line of the strip, and
+R^p for a fractional p (reading="report"). No piece contains u = 0. Where the integrand grows as |u|^p or R^p from an end
+of a piece, this power is the weight of the Gauss rule.
 """
 
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import gammainc, gammaln, roots_jacobi
 
 from .parameters import Bonds, grown_fraction
 
-_THREE, _EIGHT = (np.polynomial.legendre.leggauss(count) for count in (3, 8))
-PIECE = 0.25  # longest Gauss piece in bond lengths
-SLIGHT = 0.1  # relative length and growth J of a strip below which three Gauss points are accurate enough
-MOST_GROWN = 16  # largest number of pieces of a strip due to growth, one per e-fold
-FULL_GROWN = 36.0  # growth J after which the starting length of a bond no longer matters
-AT_PLACE = 1e-14  # displacement from a cohort / path since it formed; below it, the displacement counts as zero
-COLUMNS = ("q", "path", "damage", "growth", "mature", "way", "length", "eps")
+N_POINTS = 8  # number of Gauss points of a piece
+N_POINTS_SHORT = 3  # number of Gauss points of a piece that is short by MAX_SHORT_RATIO
+MAX_PIECE_LENGTH = 0.25  # longest piece in bond lengths
+# length of a strip / distance of a non-smooth point and / bond length, and growth J in the strip, below which a strip is
+# short
+MAX_SHORT_RATIO = 0.1
+MAX_GROWTH_PIECES = 16  # largest number of pieces of a strip due to growth, one per unit of J
+FULL_GROWTH = 36.0  # growth J after which the starting length of a bond does not matter
+# relative displacement since a cohort formed / path since then; below it, the cohort counts as unstressed
+UNSTRESSED_TOL = 1e-14
+REVERSAL_TOL = (
+    1e-9  # distance of u = 0 from a cut / length of the strip; below it, u = 0 lies at the cut
+)
+MIN_CUT = 1e-15  # length of the shortest piece / length of the part that is cut
+MIN_POSITIVE = 1e-300  # smallest argument of a logarithm and smallest divisor
+
+
+class PathState(NamedTuple):
+    """State of the path at a point: scalars and (d,), or of k points: (k,) and (k, d).
+
+    - displacement: relative displacement [m] along the d = 1 or 2 directions
+    - path: total path [m]
+    - damage: damage D, the integral of dR/eps along the path
+    - growth: growth J, the exponent by which bonds approach their target length (eq. 2.10)
+    - mature_length: length eps [m] of bonds that have grown all along
+    """
+
+    displacement: np.ndarray
+    path: np.ndarray
+    damage: np.ndarray
+    growth: np.ndarray
+    mature_length: np.ndarray
+
+
+class Strip(NamedTuple):
+    """Straight strip of bonds, or k strips with arrays whose first axis is (k,).
+
+    - end: state of the path at the end of the strip
+    - direction, length: unit vector (d,) and length [m]
+    - bond_length: bond length eps [m] when the bonds formed
+    - growth, mature_gain: growth J, and change [m] of the mature length, while the strip formed
+
+    A strip of length 0 is a cohort: unstressed, fully grown bonds that formed at one point.
+    """
+
+    end: PathState
+    direction: np.ndarray
+    length: np.ndarray
+    bond_length: np.ndarray
+    growth: np.ndarray
+    mature_gain: np.ndarray
+
+    def select(self, index) -> "Strip":
+        """Return the strips at an index, mask or slice."""
+        end = PathState(*(column[index] for column in self.end))
+        return Strip(end, *(column[index] for column in self[1:]))
+
+    def append(self, strip: "Strip") -> "Strip":
+        """Return the strips with a further strip at the end."""
+        pairs = zip((*self.end, *self[1:]), (*strip.end, *strip[1:]))
+        columns = [np.concatenate([old, np.asarray(new, float)[None]]) for old, new in pairs]
+        n_end = len(PathState._fields)
+        return Strip(PathState(*columns[:n_end]), *columns[n_end:])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Strips:
-    """Bonds along a path of d = 1 or 2 components, in k straight strips.
+    """Bonds along a path, in k strips.
 
-    - q (k, d): relative displacement at the end of a strip [m]
-    - path, damage, growth, mature (k,): path [m], damage, growth J and mature length eps_p [m] at this end
-    - way (k, d), length (k,): direction and length [m] of a strip
-    - eps (k,): length scale of the bonds when they formed [m]
-    - gain (2, k): growth J and mature length [m] gained while the strip formed
-    - sigma (k, m): pressure at which the bonds formed [Pa]
-
-    An entry of length 0 is a cohort: unstressed, full-grown bonds at q, of density sigma. The first one is that of the
-    initial bonds, of density m_0 sigma.
+    - strips: columns of the strips; the first strip is the cohort of the initial bonds
+    - pressure (k, m): pressure [Pa] at which the bonds of each point formed; of a cohort its density times this pressure
+    - now: present state of the path
+    - first_active (m,): index of the first strip that still acts at each point
+    - n_dropped: number of strips that the cut-off has removed
+    - play: play of the elastic range, as in `parameters.split_elastic`
     """
 
-    q: np.ndarray
-    path: np.ndarray
-    damage: np.ndarray
-    growth: np.ndarray
-    mature: np.ndarray
-    way: np.ndarray
+    strips: Strip
+    pressure: np.ndarray
+    now: PathState
+    first_active: np.ndarray
+    n_dropped: int = 0
+    play: float = 0.0
+
+
+class _Stretch(NamedTuple):
+    """Stretch at the end of strips (k,) [m]: component along the strip, distance from its line."""
+
+    along: np.ndarray
+    across: np.ndarray
+
+
+class _Parts(NamedTuple):
+    """Parts of strips on which u does not change its sign, each (n,).
+
+    - strip: index of the strip
+    - start, length: distance of the part from the end of the strip, and length [m]
+    - is_zero_at_start, is_zero_at_end: whether u = 0 at the start of the part, and at its far end
+    """
+
+    strip: np.ndarray
+    start: np.ndarray
     length: np.ndarray
-    eps: np.ndarray
-    gain: np.ndarray
-    sigma: np.ndarray
-    now: tuple  # present q (d,), path, damage, growth and mature length
-    alive: np.ndarray  # index (m,) of the first strip that still acts at each point
-    dropped: int = 0
-    play: float = 0.0  # play of the play operator in `parameters.split_elastic`
+    is_zero_at_start: np.ndarray
+    is_zero_at_end: np.ndarray
+
+
+class _Distances(NamedTuple):
+    """Distances (n,) [m] of parts from points where the integrand is not smooth, inf without them.
+
+    - nearest: distance of the part from the nearest point of any kind
+    - origin: distance of R = 0 from the end of the strip
+    """
+
+    nearest: np.ndarray
+    origin: np.ndarray
+
+
+class _Pieces(NamedTuple):
+    """Pieces of strips, each with one Gauss rule (n,).
+
+    - strip: index of the strip
+    - start, length: distance of the piece from the end of the strip, and length [m]
+    - steep_end: 1 if the integrand grows as a power from the start of the piece, -1 from its far end, 0 otherwise
+    - is_short: whether N_POINTS_SHORT points are accurate enough
+    """
+
+    strip: np.ndarray
+    start: np.ndarray
+    length: np.ndarray
+    steep_end: np.ndarray
+    is_short: np.ndarray
+
+
+class _GaussRule(NamedTuple):
+    """Gauss points in (0, 1) and their weights, (points,) or (n, points)."""
+
+    points: np.ndarray
+    weights: np.ndarray
 
 
 def surviving_density(state: Strips) -> np.ndarray:
-    """Return the surviving density (k,) / pressure at formation, for reading="stretch".
+    """Return the density of surviving bonds / pressure at formation (k,), for reading="stretch".
 
-    A cohort keeps exp(-damage since it formed), a strip that times 1 - exp(-length/eps).
+    A cohort keeps exp(-D), and a strip this times 1 - exp(-length/eps), with D the damage since its end.
     """
-    left = np.exp(-(state.now[2] - state.damage))
-    return np.where(state.length == 0, left, left * -np.expm1(-state.length / state.eps))
+    strips = state.strips
+    remaining = np.exp(-(state.now.damage - strips.end.damage))
+    formed = -np.expm1(-strips.length / strips.bond_length)
+    return np.where(strips.length == 0, remaining, remaining * formed)
 
 
 def strip_weights(state: Strips, law: Bonds) -> np.ndarray:
-    """Return force and stored energy of each entry per mu_s sigma (eq. 2.17), (k, d + 1).
+    """Return the force and the stored energy of each strip per mu_s sigma_n (eq. 2.17).
 
-    Columns: signed force [1] along each of the d directions, then stored energy [m]. It chooses the closed forms and
-    the Gauss points that the head of the file lists.
+    Parameters
+    ----------
+    state : Strips
+    law : Bonds
+
+    Returns
+    -------
+    (k, d + 1) array
+        Signed force [1] along each of the d directions, then stored energy [m].
     """
-    out = np.empty((len(state.q), state.q.shape[1] + 1))
-    cohorts = state.length == 0
-    out[cohorts] = _cohorts(state, cohorts, law)
-    rest = np.flatnonzero(~cohorts)
+    strips = state.strips
+    weights = np.empty((len(strips.length), strips.direction.shape[1] + 1))
+    is_cohort = strips.length == 0
+    weights[is_cohort] = _cohort_weights(strips.select(is_cohort), state.now, law)
+    index = np.flatnonzero(~is_cohort)
     if law.order == 1 and law.reading == "stretch":
-        out[rest] = _stretch(state, rest, law)
-        return out
+        weights[index] = _linear_weights(strips.select(index), state.now, law)
+        return weights
     if law.reading == "report" and not law.has_growth:
-        straight = _seen(state, rest)[1] == 0
-        out[rest[straight]] = _sum_report_strips(state, rest[straight], law)
-        rest = rest[~straight]
-    if rest.size:
-        out[rest] = _gauss(state, rest, law)
-    return out
+        is_straight = _resolve_stretch(strips.select(index), state.now).across == 0
+        straight = index[is_straight]
+        weights[straight] = _report_weights(strips.select(straight), state.now, law)
+        index = index[~is_straight]
+    if index.size:
+        weights[index] = _gauss_weights(strips.select(index), state.now, law)
+    return weights
 
 
-def _size(u) -> np.ndarray:
+def _norm(vectors) -> np.ndarray:
     """Return the lengths (...) of vectors (..., d)."""
-    return np.abs(u[..., 0]) if u.shape[-1] == 1 else np.sqrt((u * u).sum(axis=-1))
+    if vectors.shape[-1] == 1:
+        return np.abs(vectors[..., 0])
+    return np.sqrt((vectors * vectors).sum(axis=-1))
 
 
-def _seen(state: Strips, rest) -> tuple:
-    """Return u along the strip at its end, and the distance of u = 0 from its line, (k,) [m]."""
-    a = state.now[0] - state.q[rest]
-    along = (a * state.way[rest]).sum(axis=1)
-    return along, _size(a - state.way[rest] * along[:, None])
+def _resolve_stretch(strips: Strip, now: PathState) -> _Stretch:
+    """Resolve the stretch of bonds at the end of strips into the components along and across them."""
+    stretch = now.displacement - strips.end.displacement
+    along = (stretch * strips.direction).sum(axis=1)
+    return _Stretch(along, _norm(stretch - strips.direction * along[:, None]))
 
 
-def _cohorts(state: Strips, which, law: Bonds) -> np.ndarray:
-    """Return force and energy of cohorts: (|u|/eps)^p exp(-damage) or phi_p(R/eps_0), against u."""
-    u, damage = state.now[0] - state.q[which], state.now[2] - state.damage[which]
-    x, far = (state.now[1] - state.path[which]) / law.length, _size(u)
-    stretched = law.reading == "stretch"
-    size, harm = (far / law.length, damage) if stretched else (x, x)
-    # at a jump, the mean of both sides is taken
-    at_place = far <= AT_PLACE * (state.now[1] - state.path[which])
-    force = np.where(
-        at_place,
-        0.0,
-        np.exp(law.order * np.log(np.maximum(size, 1e-300)) - harm - gammaln(law.order + 1)),
-    )
-    unit = u / np.where(far > 0, far, 1.0)[:, None]
-    return np.column_stack(
-        [force[:, None] * unit, force * far / (law.order + 1 if stretched else 1.0)]
-    )
+def _weight_function(law: Bonds, x, damage) -> np.ndarray:
+    """Return x^p exp(-damage)/Gamma(p + 1), the weight phi of eq. 2.14 if damage = x."""
+    log_x = np.log(np.maximum(x, MIN_POSITIVE))
+    return np.exp(law.order * log_x - damage - gammaln(law.order + 1))
 
 
-def _stretch(state: Strips, rest, law: Bonds) -> np.ndarray:
-    """Sum k u dL/eps and k |u|^2 dL/2 eps over a strip, over eps_0, in closed form (p = 1)."""
-    a, e, eps = state.now[0] - state.q[rest], state.way[rest], state.eps[rest]
-    x = state.length[rest] / eps
-    d = np.exp(-x)
-    zero, one, two = -np.expm1(-x), 1 - d * (1 + x), 2 - d * (x * x + 2 * x + 2)
-    left = np.exp(-(state.now[2] - state.damage[rest]))
-    along = (a * e).sum(axis=1)
-    first = left[:, None] * (a * zero[:, None] + e * (eps * one)[:, None])
-    second = left * ((a * a).sum(axis=1) * zero + 2 * along * eps * one + eps**2 * two)
-    return np.column_stack([first / law.length, second / (2 * law.length)])
+def _energy_divisor(law: Bonds) -> float:
+    """Return the force times the stretch of a bond / its stored energy."""
+    return law.order + 1 if law.reading == "stretch" else 1.0
 
 
-def _sum_report_strips(state: Strips, rest, law: Bonds) -> np.ndarray:
-    """Sum strips of reading="report" with u along them at constant eps, exactly.
-
-    The sums are differences of P(p + 1, R/eps) and P(p + 2, R/eps), split where u changes sign.
-    """
-    u, h = _seen(state, rest)[0], state.length[rest]
-    near = state.now[1] - state.path[rest]
-    turn = np.clip(-u, 0.0, h)
-    ends = [np.maximum(near + y, 0) / law.length for y in (0.0, turn, h)]
-    share = [gammainc(law.order + 1, x) for x in ends]
-    reach = [law.length * (law.order + 1) * gammainc(law.order + 2, x) for x in ends]
-    signed = share[0] - share[1] + (share[2] - share[1])  # integral of sgn(u) dL over both parts
-    arm = reach[0] - reach[1] + (reach[2] - reach[1])
-    return np.column_stack([state.way[rest] * signed[:, None], (u - near) * signed + arm])
-
-
-def _gauss(state: Strips, rest, law: Bonds) -> np.ndarray:
-    """Integrate over strips by Gauss points on pieces."""
-    owner, begin, size, bent, slight = _pieces(state, rest, law)
-    out = np.zeros((len(rest), state.q.shape[1] + 1))
-    for few, (points, weight) in ((False, _EIGHT), (True, _THREE)):
-        which = slight == few
-        share, w = np.broadcast_to((1 + points) / 2, (which.sum(), len(points))), weight / 2
-        if not few:
-            share, w = _gauss_points_of_pieces(bent[which], law.order)
-        found = _points(
-            state,
-            rest[owner[which]],
-            begin[which, None] + size[which, None] * share,
-            size[which, None] * w,
-            law,
-        )
-        for c in range(out.shape[1]):
-            out[:, c] += np.bincount(owner[which], found[:, c], len(rest))
-    return out
-
-
-def _points(state: Strips, at, back, weight, law: Bonds) -> np.ndarray:
-    """Sum over points `back` (n, points) [m] behind the ends of strips `at` (n,); (n, d + 1)."""
-    u = (state.now[0] - state.q[at])[:, None] + back[..., None] * state.way[at][:, None]
-    far, stretched = _size(u), law.reading == "stretch"
-    if stretched:
-        x = far / state.eps[at][:, None]
-        harm = state.now[2] - state.damage[at][:, None] + back / state.eps[at][:, None]
+def _cohort_weights(cohorts: Strip, now: PathState, law: Bonds) -> np.ndarray:
+    """Return force and energy of cohorts: (|u|/eps_0)^p exp(-D) or phi(R/eps_0), along u."""
+    stretch = now.displacement - cohorts.end.displacement
+    size = _norm(stretch)
+    path = now.path - cohorts.end.path
+    if law.reading == "stretch":
+        force = _weight_function(law, size / law.length, now.damage - cohorts.end.damage)
     else:
-        x = harm = (state.now[1] - state.path[at][:, None] + back) / _own(state, at, back, law)
-    with np.errstate(under="ignore"):
-        f = (
-            weight
-            / law.length
-            * np.exp(law.order * np.log(np.maximum(x, 1e-300)) - harm - gammaln(law.order + 1))
-        )
-    unit = u / np.maximum(far, 1e-300)[..., None]
+        force = _weight_function(law, path / law.length, path / law.length)
+    # the force jumps where the stretch changes its sign; the mean of both sides is 0
+    force = np.where(size <= UNSTRESSED_TOL * path, 0.0, force)
+    unit = stretch / np.where(size > 0, size, 1.0)[:, None]
+    return np.column_stack([force[:, None] * unit, force * size / _energy_divisor(law)])
+
+
+def _linear_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
+    """Integrate u and |u|^2/2 over strips in closed form, for reading="stretch" and p = 1."""
+    stretch = now.displacement - strips.end.displacement
+    eps = strips.bond_length
+    x = strips.length / eps
+    decay = np.exp(-x)
+    # integrals of exp(-y), y exp(-y) and y^2 exp(-y) from 0 to x
+    zeroth = -np.expm1(-x)
+    first = 1 - decay * (1 + x)
+    second = 2 - decay * (x * x + 2 * x + 2)
+    remaining = np.exp(-(now.damage - strips.end.damage))
+    along = (stretch * strips.direction).sum(axis=1)
+    square = (stretch * stretch).sum(axis=1)
+    force = stretch * zeroth[:, None] + strips.direction * (eps * first)[:, None]
+    energy = square * zeroth + 2 * along * eps * first + eps**2 * second
     return np.column_stack(
-        [
-            (unit * f[..., None]).sum(axis=1),
-            (far * f).sum(axis=1) / (law.order + 1 if stretched else 1.0),
-        ]
+        [remaining[:, None] * force / law.length, remaining * energy / (2 * law.length)]
     )
 
 
-def _own(state: Strips, at, back, law: Bonds):
-    """Return the bond lengths (n, points) for reading="report": constant, or grown from zero."""
+def _report_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
+    """Integrate strips of reading="report" at a constant bond length in closed form.
+
+    The stretch is along the strips. The integrals are differences of P(p + 1, R/eps) and P(p + 2, R/eps), the
+    regularised lower incomplete gamma function, on both sides of u = 0.
+    """
+    along = _resolve_stretch(strips, now).along
+    path = now.path - strips.end.path
+    cut = np.clip(-along, 0.0, strips.length)
+    borders = [np.maximum(path + y, 0) / law.length for y in (0.0, cut, strips.length)]
+    p_end, p_cut, p_start = (gammainc(law.order + 1, x) for x in borders)
+    scale = law.length * (law.order + 1)
+    q_end, q_cut, q_start = (scale * gammainc(law.order + 2, x) for x in borders)
+    # integrals of phi sgn(u) dR/eps and of phi R sgn(u) dR/eps
+    signed = p_end - p_cut + (p_start - p_cut)
+    moment = q_end - q_cut + (q_start - q_cut)
+    energy = (along - path) * signed + moment
+    return np.column_stack([strips.direction * signed[:, None], energy])
+
+
+def _gauss_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
+    """Integrate strips by Gauss points on the pieces of `_divide_strips`."""
+    pieces = _divide_strips(strips, now, law)
+    n_strips, n_directions = strips.direction.shape
+    weights = np.zeros((n_strips, n_directions + 1))
+    for is_short in (False, True):
+        chosen = pieces.is_short == is_short
+        start, length = pieces.start[chosen, None], pieces.length[chosen, None]
+        owner = pieces.strip[chosen]
+        if is_short:
+            rule = _legendre_rule(N_POINTS_SHORT)
+        else:
+            rule = _rules_of_pieces(pieces.steep_end[chosen], law.order)
+        distance = start + length * rule.points
+        found = _sum_points(strips.select(owner), now, distance, length * rule.weights, law)
+        for column in range(n_directions + 1):
+            weights[:, column] += np.bincount(owner, found[:, column], n_strips)
+    return weights
+
+
+def _sum_points(strips: Strip, now: PathState, distance, weight, law: Bonds) -> np.ndarray:
+    """Sum force and energy over weighted points of each strip, (n, d + 1).
+
+    distance: distance (n, points) [m] of the points from the end of their strip; weight (n, points) [m].
+    """
+    at_end = (now.displacement - strips.end.displacement)[:, None]
+    stretch = at_end + distance[..., None] * strips.direction[:, None]
+    size = _norm(stretch)
+    if law.reading == "stretch":
+        eps = strips.bond_length[:, None]
+        x = size / eps
+        damage = now.damage - strips.end.damage[:, None] + distance / eps
+    else:
+        path = now.path - strips.end.path[:, None] + distance
+        x = path / _bond_lengths(strips, now, distance, law)
+        damage = x
+    with np.errstate(under="ignore"):
+        force = weight / law.length * _weight_function(law, x, damage)
+    unit = stretch / np.maximum(size, MIN_POSITIVE)[..., None]
+    energy = (size * force).sum(axis=1) / _energy_divisor(law)
+    return np.column_stack([(unit * force[..., None]).sum(axis=1), energy])
+
+
+def _bond_lengths(strips: Strip, now: PathState, distance, law: Bonds):
+    """Return the bond lengths (n, points) [m] for reading="report", which grow from zero (eq. 2.10)."""
     if not law.has_growth:
         return law.length
-    part, (won, grown) = back / state.length[at][:, None], state.gain[:, at][..., None]
-    age = state.now[3] - state.growth[at][:, None] + part * won
-    born = state.mature[at][:, None] - (1 - grown_fraction(won, part)) * grown
-    return np.maximum(state.now[4] - born * np.exp(-age), 1e-300)
+    fraction = distance / strips.length[:, None]
+    growth = strips.growth[:, None]
+    age = now.growth - strips.end.growth[:, None] + fraction * growth
+    missing = (1 - grown_fraction(growth, fraction)) * strips.mature_gain[:, None]
+    mature_at_start = strips.end.mature_length[:, None] - missing
+    return np.maximum(now.mature_length - mature_at_start * np.exp(-age), MIN_POSITIVE)
 
 
-def _pieces(state: Strips, rest, law: Bonds) -> tuple:
-    """Divide the strips `rest` into pieces for the Gauss rule.
-
-    Returns arrays (n,): index in `rest`, start [m] behind the end of the strip, length [m], end at which the integrand is
-    steep as the power p of the distance (1 start, -1 far end, 0 neither), and whether three Gauss points suffice.
-    """
-    before, aside = _seen(state, rest)
-    h, eps, straight = state.length[rest], state.eps[rest], aside == 0
-    turn = np.where(straight, np.clip(-before, 0.0, h), 0.0)
-    owner = np.tile(np.arange(len(rest)), 2)
-    start, wide = np.concatenate([np.zeros_like(h), turn]), np.concatenate([turn, h - turn])
-    owner, start, wide = owner[wide > 0], start[wide > 0], wide[wide > 0]
-    # u = 0 lies at this cut, which may also be an end of the strip
-    turns = straight & (np.abs(turn + before) <= 1e-9 * h)
-    first = turns[owner] & (start == turn[owner])
-    last = turns[owner] & (start + wide == turn[owner])
-    turned = first | last
-    away, near = _distances(
-        state, rest[owner], law, (before[owner], aside[owner]), start, wide, turned
+def _divide_strips(strips: Strip, now: PathState, law: Bonds) -> _Pieces:
+    """Divide strips into pieces on which a Gauss rule is accurate, by the rules of the module."""
+    stretch = _resolve_stretch(strips, now)
+    parts = _split_at_zero_stretch(strips, stretch)
+    distances = _distances(strips, now, law, stretch, parts)
+    eps = strips.bond_length[parts.strip]
+    growth = _active_growth(strips, now, law, parts)
+    # for reading="report" the integrand only changes its sign at u = 0
+    is_steep = law.reading == "stretch"
+    starts_steep = parts.is_zero_at_start & is_steep
+    ends_steep = parts.is_zero_at_end & is_steep
+    is_short = parts.length <= MAX_SHORT_RATIO * np.minimum(distances.nearest, eps)
+    is_short &= (growth <= MAX_SHORT_RATIO) & ~starts_steep & ~ends_steep
+    count = np.maximum(
+        parts.length / (MAX_PIECE_LENGTH * eps), np.minimum(growth, MAX_GROWTH_PIECES)
     )
-    if law.reading == "report":  # at u = 0 the integrand only changes its sign
-        first, last = first & False, last & False
-    grown = np.zeros(owner.size)
-    if law.reading == "report":
-        left = FULL_GROWN - (state.now[3] - state.growth[rest][owner])
-        grown = np.minimum(state.gain[0, rest][owner] * wide / h[owner], np.maximum(left, 0.0))
-    slight = (wide <= SLIGHT * np.minimum(away, eps[owner])) & (grown <= SLIGHT) & ~first & ~last
-    most = np.maximum(wide / (PIECE * eps[owner]), np.minimum(grown, MOST_GROWN))
-    count = np.where(slight, 1, np.maximum(1, np.ceil(most))).astype(int)
-    odd = (away < wide / count) & ~slight
-    even = np.flatnonzero(~odd)
+    count = np.where(is_short, 1, np.maximum(1, np.ceil(count))).astype(int)
+    is_near_singular = (distances.nearest < parts.length / count) & ~is_short
+
+    even = np.flatnonzero(~is_near_singular)
     part = np.repeat(even, count[even])
     number = np.arange(part.size) - np.repeat(np.cumsum(count[even]) - count[even], count[even])
-    size = wide[part] / count[part]
-    begin = start[part] + number * size
-    bent = np.where(
-        first[part] & (number == 0), 1, np.where(last[part] & (number == count[part] - 1), -1, 0)
+    length = parts.length[part] / count[part]
+    steep_end = np.where(ends_steep[part] & (number == count[part] - 1), -1, 0)
+    steep_end = np.where(starts_steep[part] & (number == 0), 1, steep_end)
+    columns = [[part], [parts.start[part] + number * length], [length], [steep_end]]
+    for k in np.flatnonzero(is_near_singular):
+        strip = parts.strip[k]
+        origin = distances.origin[k]
+        singular_points = []
+        if not (parts.is_zero_at_start[k] or parts.is_zero_at_end[k]):
+            zero = complex(-stretch.along[strip] - parts.start[k], stretch.across[strip])
+            singular_points.append(zero)
+        if np.isfinite(origin):
+            singular_points.append(complex(-origin - parts.start[k], 0.0))
+        cuts = _grade_cuts(parts.length[k], MAX_PIECE_LENGTH * eps[k], singular_points)
+        steep = np.zeros(cuts.size - 1, int)
+        if starts_steep[k] or origin + parts.start[k] == 0:
+            steep[0] = 1
+        elif ends_steep[k]:
+            steep[-1] = -1
+        new = (np.full(steep.size, k), parts.start[k] + cuts[:-1], np.diff(cuts), steep)
+        for column, values in zip(columns, new):
+            column.append(values)
+    part, start, length, steep_end = (np.concatenate(column) for column in columns)
+    return _Pieces(parts.strip[part], start, length, steep_end, is_short[part])
+
+
+def _split_at_zero_stretch(strips: Strip, stretch: _Stretch) -> _Parts:
+    """Split strips where u = 0; strips whose line does not pass through u = 0 stay whole."""
+    is_straight = stretch.across == 0
+    cut = np.where(is_straight, np.clip(-stretch.along, 0.0, strips.length), 0.0)
+    strip = np.tile(np.arange(cut.size), 2)
+    start = np.concatenate([np.zeros_like(cut), cut])
+    length = np.concatenate([cut, strips.length - cut])
+    has_length = length > 0
+    strip, start, length = strip[has_length], start[has_length], length[has_length]
+    # u = 0 lies at this cut, which may also be an end of the strip
+    has_zero = is_straight & (np.abs(cut + stretch.along) <= REVERSAL_TOL * strips.length)
+    return _Parts(
+        strip,
+        start,
+        length,
+        has_zero[strip] & (start == cut[strip]),
+        has_zero[strip] & (start + length == cut[strip]),
     )
-    for k in np.flatnonzero(odd):
-        i = owner[k]
-        poles = [complex(-before[i] - start[k], aside[i]), complex(-near[k] - start[k], 0.0)]
-        poles = [pole for pole, smooth in zip(poles, (turned[k], np.isinf(near[k]))) if not smooth]
-        cuts = start[k] + _graded(wide[k], PIECE * eps[i], poles)
-        ends = np.zeros(cuts.size - 1, int)
-        if first[k] or near[k] + start[k] == 0:
-            ends[0] = 1
-        elif last[k]:
-            ends[-1] = -1
-        part, begin, size = (
-            np.append(part, np.full(ends.size, k)),
-            np.append(begin, cuts[:-1]),
-            np.append(size, np.diff(cuts)),
-        )
-        bent = np.append(bent, ends)
-    return owner[part], begin, size, bent, slight[part]
 
 
-def _distances(state: Strips, at, law: Bonds, seen: tuple, start, wide, touching) -> tuple:
-    """Return distances (n,) [m] of parts of strips from points with a non-smooth integrand.
+def _active_growth(strips: Strip, now: PathState, law: Bonds, parts: _Parts) -> np.ndarray:
+    """Return the growth J (n,) over parts, without that of bonds that are fully grown."""
+    if law.reading != "report":
+        return np.zeros(parts.strip.size)
+    remaining = FULL_GROWTH - (now.growth - strips.end.growth[parts.strip])
+    growth = strips.growth[parts.strip] * parts.length / strips.length[parts.strip]
+    return np.minimum(growth, np.maximum(remaining, 0.0))
 
-    The first is to the nearest point of any kind, the second is R at the end of the strip if R = 0 is such a point. Both
-    are infinite if there is none. A reversal at an end of the part does not count.
+
+def _distances(
+    strips: Strip, now: PathState, law: Bonds, stretch: _Stretch, parts: _Parts
+) -> _Distances:
+    """Return the distances of parts from points where the integrand is not smooth.
+
+    The point u = 0 at an end of a part does not count.
     """
-    (before, aside), fractional = seen, law.order != int(law.order)
-    gap = np.maximum(np.maximum(-before - start - wide, start + before), 0.0)
-    smooth = touching | ((aside == 0) & (law.reading == "report" or not fractional))
-    away = np.where(smooth, np.inf, np.hypot(aside, gap))
-    near = np.full(len(at), np.inf)
-    if law.reading == "report" and fractional:
-        near = state.now[1] - state.path[at]
-    return np.minimum(away, near + start), near
+    is_fractional = law.order != int(law.order)
+    along, across = stretch.along[parts.strip], stretch.across[parts.strip]
+    gap = np.maximum(np.maximum(-along - parts.start - parts.length, parts.start + along), 0.0)
+    is_smooth = (across == 0) & (law.reading == "report" or not is_fractional)
+    is_smooth |= parts.is_zero_at_start | parts.is_zero_at_end
+    nearest = np.where(is_smooth, np.inf, np.hypot(across, gap))
+    origin = np.full(parts.strip.size, np.inf)
+    if law.reading == "report" and is_fractional:
+        origin = now.path - strips.end.path[parts.strip]
+    return _Distances(np.minimum(nearest, origin + parts.start), origin)
 
 
 @cache
-def _weighted_points(order: float) -> tuple:
-    """Return Gauss-Jacobi points (8,) in (0, 1) for the weight t^order, and weights / t^order."""
-    x, w = roots_jacobi(8, 0.0, order)
+def _legendre_rule(n_points: int) -> _GaussRule:
+    """Return the Gauss-Legendre rule on (0, 1)."""
+    x, weights = np.polynomial.legendre.leggauss(n_points)
+    return _GaussRule((1 + x) / 2, weights / 2)
+
+
+@cache
+def _jacobi_rule(order: float) -> _GaussRule:
+    """Return the Gauss-Jacobi rule on (0, 1) for the weight t^order, with weights / t^order."""
+    x, weights = roots_jacobi(N_POINTS, 0.0, order)
     t = (1 + x) / 2
-    return t, w / (2 ** (order + 1) * t**order)
+    return _GaussRule(t, weights / (2 ** (order + 1) * t**order))
 
 
-def _gauss_points_of_pieces(bent, order: float) -> tuple:
-    """Return Gauss points (n, 8) in (0, 1) and weights for pieces that may be steep at an end.
+def _rules_of_pieces(steep_end, order: float) -> _GaussRule:
+    """Return Gauss rules (n, N_POINTS) of pieces; from a steep end the integrand grows as t^order."""
+    legendre, jacobi = _legendre_rule(N_POINTS), _jacobi_rule(order)
+    steep_end = steep_end[:, None]
+    points = np.where(steep_end == -1, 1 - jacobi.points, legendre.points)
+    points = np.where(steep_end == 1, jacobi.points, points)
+    return _GaussRule(points, np.where(steep_end != 0, jacobi.weights, legendre.weights))
 
-    There the integrand grows as a power of the distance from this end, which Gauss-Jacobi points take as their weight.
+
+def _grade_cuts(length: float, max_length: float, singular_points: list[complex]) -> np.ndarray:
+    """Cut [0, length] into pieces not longer than their distance from the singular points.
+
+    The points are complex: position along the interval, and distance from its line. A piece is halved until it is also
+    not longer than `max_length`. Returns the cuts (k,), with both ends.
     """
-    t, w = _weighted_points(order)
-    bent = bent[:, None]
-    share = np.where(bent == 1, t, np.where(bent == -1, 1 - t, (1 + _EIGHT[0]) / 2))
-    return share, np.where(bent != 0, w, _EIGHT[1] / 2)
-
-
-def _graded(h: float, most: float, poles) -> np.ndarray:
-    """Cut [0, h] into pieces no longer than `most` or than their distance from the `poles`.
-
-    The poles are complex. Returns the cuts (k,).
-    """
-    inner = [p.real for p in poles if 0 < p.real < h]
-    least = 1e-15 * h
-    todo = list(pairwise(sorted({0.0, h, *inner})))[::-1]
+    inside = [point.real for point in singular_points if 0 < point.real < length]
+    intervals = list(pairwise(sorted({0.0, length, *inside})))[::-1]
     cuts = [0.0]
-    while todo:
-        a, b = todo.pop()
-        away = min(
-            (abs(complex(max(a - p.real, p.real - b, 0.0), p.imag)) for p in poles), default=np.inf
+    while intervals:
+        low, high = intervals.pop()
+        gaps = (
+            abs(complex(max(low - point.real, point.real - high, 0.0), point.imag))
+            for point in singular_points
         )
-        if b - a > max(min(most, away), least):
-            todo += [((a + b) / 2, b), (a, (a + b) / 2)]
+        if high - low > max(min(max_length, min(gaps, default=np.inf)), MIN_CUT * length):
+            middle = (low + high) / 2
+            intervals += [(middle, high), (low, middle)]
         else:
-            cuts.append(b)
+            cuts.append(high)
     return np.array(cuts)

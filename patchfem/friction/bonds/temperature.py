@@ -1,34 +1,60 @@
-"""Growth of bonds on a warm surface (report, 2.13) and how far friction warms it.
+"""Growth of bonds on a warm surface (eq. 2.13), and the temperature rise by friction.
 
-a_s = a_0 exp(-T_a/T_s), l_k = l_0 exp(T_l/T_s), stated about a reference at which a_s and l_k are known, so that a
-surface at the reference changes nothing:
+The report states a_s = a_0 exp(-T_a/T_s) and l_k = l_0 exp(T_l/T_s). Here both are referred to a temperature T_ref at
+which a_s and l_k are known, so that a surface at this temperature changes nothing:
 
     a_s = a_ref exp(T_a (1/T_ref - 1/T_s)),   l_k = l_ref exp(T_l (1/T_s - 1/T_ref)).
 
-The print is the limit of an infinite reference. Temperatures are absolute, in kelvin. Points of different temperature
-are a law whose two rates are arrays (m,): `recursion.Recursion` then keeps a bond length per point.
+Eq. 2.13 is the limit of an infinite T_ref. Temperatures are absolute, in kelvin. Points of different temperature are a
+law whose two rates are arrays (m,): `recursion.Recursion` then has a bond length per point.
 """
 
 from math import pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core import PatchfemError
 
+MAX_EXP_ARGUMENT = 600.0  # argument up to which exp neither overflows nor underflows
+
+
+class GrowthRates(NamedTuple):
+    """a_s [m s-2] and l_k [m] of eq. 2.10, floats or (m,)."""
+
+    rest_growth: float | np.ndarray
+    slip_growth: float | np.ndarray
+
 
 def growth_at_temperature(
-    rest: float,
-    slip: float,
+    rest_growth: float,
+    slip_growth: float,
     surface,
     reference: float,
     rest_activation: float | None,
     slip_activation: float | None,
-) -> tuple:
-    """Return a_s [m s-2] and l_k [m] at a surface temperature from those at a reference.
+) -> GrowthRates:
+    """Return the growth rates at a surface temperature from those at a reference temperature.
 
-    surface [K]: a number, or one per point (m,); reference [K]: temperature of the values `rest` and `slip`. An
-    activation [K] of None or 0 leaves its rate as it is. PatchfemError for a temperature that is not above 0 K and for
-    a rate that leaves the range of floating-point numbers.
+    Parameters
+    ----------
+    rest_growth, slip_growth : float
+        a_s [m s-2] and l_k [m] at the reference temperature.
+    surface : float or (m,) array
+        Surface temperature T_s [K].
+    reference : float
+        Reference temperature T_ref [K].
+    rest_activation, slip_activation : float or None
+        T_a and T_l [K]; None or 0 for a rate that does not depend on the temperature.
+
+    Returns
+    -------
+    GrowthRates
+
+    Raises
+    ------
+    PatchfemError
+        If a temperature is not above 0 K, or a rate exceeds the range of floating-point numbers.
     """
     surface = np.asarray(surface, float)
     if not (surface > 0).all() or not np.isfinite(surface).all() or not reference > 0:
@@ -36,32 +62,50 @@ def growth_at_temperature(
         raise PatchfemError(
             f"a temperature of {worst:g} K is not possible; temperatures must be above 0 K"
         )
-    cold = 1 / reference - 1 / surface
-    return (
-        _scale_rate("rest_growth", rest, (rest_activation or 0.0) * cold, "rest_activation"),
-        _scale_rate("slip_growth", slip, -(slip_activation or 0.0) * cold, "slip_activation"),
+    difference = 1 / reference - 1 / surface
+    rest_exponent = (rest_activation or 0.0) * difference
+    slip_exponent = -(slip_activation or 0.0) * difference
+    return GrowthRates(
+        _scale_rate("rest_growth", rest_growth, rest_exponent, "rest_activation"),
+        _scale_rate("slip_growth", slip_growth, slip_exponent, "slip_activation"),
     )
 
 
 def _scale_rate(name: str, value: float, exponent, key: str):
+    """Return a rate times exp(exponent); `name` and `key` are keys of the scene for messages."""
     total = np.log(value) + exponent
-    if not ((total < np.log(np.finfo(float).max)) & (total > np.log(np.finfo(float).tiny))).all():
+    limits = np.finfo(float)
+    if not ((total < np.log(limits.max)) & (total > np.log(limits.tiny))).all():
         worst = float(np.asarray(total).flat[np.argmax(np.abs(total))]) / np.log(10)
         raise PatchfemError(
             f"at the surface temperature {name} would be about 1e{worst:.0f}; a computer cannot "
             f"represent such a number; lower temperature.{key}, or bring temperature.surface closer to "
             "temperature.reference"
         )
-    out = value * np.exp(exponent) if (np.abs(exponent) < 600).all() else np.exp(total)
-    return float(out) if np.ndim(out) == 0 else out
+    if (np.abs(exponent) < MAX_EXP_ARGUMENT).all():
+        rate = value * np.exp(exponent)
+    else:
+        rate = np.exp(total)
+    return float(rate) if np.ndim(rate) == 0 else rate
 
 
 def surface_temperature_rise(
-    flux: float, time: float, conductivity: float, capacity: float
+    flux: float, time: float, conductivity: float, heat_capacity: float
 ) -> float:
-    """Return the temperature rise [K] of the surface of a half-space under a constant heat flux.
+    """Return the temperature rise 2 q sqrt(t/(pi k rho c)) [K] of a half-space under a heat flux.
 
-    It is 2 q sqrt(t/(pi k rho c)) for a flux q [W/m2] from time 0 on. conductivity k [W m-1 K-1], capacity rho c [J m-3
-    K-1] (Carslaw and Jaeger, 2.9). One-dimensional: an upper bound for a patch that is small against sqrt(k t/(rho c)).
+    Source: Carslaw and Jaeger, section 2.9. Heat flows in one dimension, so it is an upper bound for a patch that is
+    small compared with sqrt(k t/(rho c)).
+
+    Parameters
+    ----------
+    flux, time : float
+        Constant flux q [W/m2], and time t [s] since it started.
+    conductivity, heat_capacity : float
+        k [W m-1 K-1] and rho c [J m-3 K-1].
+
+    Returns
+    -------
+    float
     """
-    return 2 * flux * sqrt(time / (pi * conductivity * capacity))
+    return 2 * flux * sqrt(time / (pi * conductivity * heat_capacity))

@@ -2,27 +2,48 @@
 
     F = mu N z,    z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)),    eps = mu N/stiffness
 
-n is the sharpness of the knee, s weights the two terms: on unloading the slope over the first one is 1 - (1 - 2 s)
-|z|^n, so it rests on the elastic line for s = 1/2. n = 1, s = 1 is eq. 2.17 with reading="stretch". With the energy of
-the spring, F^2/(2 stiffness), no step creates energy where s >= 1/2; below that unloading gives back more than it.
+n is the sharpness of the knee and s the weight of the two terms. On unloading the slope is 1 - (1 - 2 s) |z|^n of the
+initial slope, so it is the elastic line for s = 1/2. With n = 1 and s = 1 the law is eq. 2.17 with reading="stretch".
+The stored energy is that of the spring, F^2/(2 stiffness). No step creates energy for s >= 1/2; for a smaller s
+unloading gives back more than the stored energy.
 """
 
 from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
-from ..protocol import Element
+from ..protocol import Element, SteadyLoop
 
-GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(20)
-N_PIECES = 10  # number of pieces for the integrals over a stroke
+N_POINTS = 20  # number of Gauss points of a piece
+N_PIECES = 10  # number of pieces for the integrals over a half-loop
+MAX_W = (
+    30.0  # value of w = -ln(1 - y) beyond which 1 - y is below 1e-13 and dw/dx is n to round-off
+)
+MAX_NEWTON = 200  # iterations of Newton's method for the tip of a loop
+NEWTON_TOL = 1e-14  # change of w / (1 + w) at which Newton's method has converged
+
+
+class _HalfLoop(NamedTuple):
+    """Half of a steady loop, from -y to y.
+
+    - displacement: displacement [eps] of the stroke, and its derivative by w
+    - area: area [mu N eps] between loading and unloading
+    """
+
+    displacement: np.ndarray
+    displacement_by_w: np.ndarray
+    area: np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
 class BoucWen:
-    """Bouc-Wen law object: mu [1], eps [m], and n and s of the equation of the module.
+    """Bouc-Wen law under a constant pressure; all points of a contact have the same z.
 
-    All points of a contact have the same z. The pressure must stay constant. `bouc_wen_kernels` steps
-    it.
+    - static: mu [1]
+    - length: eps [m]
+    - exponent, shape: n and s in the equation of the module
     """
 
     static: float
@@ -43,63 +64,82 @@ class BoucWen:
             state_scales=(1.0,),
         )
 
-    def stroke(self, w) -> tuple:
-        """Return displacement [eps], its derivative over w, and area [mu N eps] of a stroke.
+    def _half_loop(self, w) -> _HalfLoop:
+        """Integrate the half-loop from -y to y, with w = -ln(1 - y) of any shape.
 
-        The stroke goes from -y to y, with w = -ln(1 - y) of any shape.
-
-        The area is int v (1/(1 - v^n) - 1/(1 - g v^n)) dv, g = 1 - 2 s: the excess of loading over unloading.
+        The area is the integral of v (1/(1 - v^n) - 1/(1 - (1 - 2 s) v^n)) from 0 to y.
         """
-        edges = np.linspace(0.0, 1.0, N_PIECES + 1)
-        half = np.diff(edges)[:, None] / 2
-        # Gauss rule in the fourth root of v, where powers of v are smooth down to zero
-        root = (edges[:-1, None] + half * (1 + GAUSS_POINTS)).ravel()
-        v = w[..., None] * root**4
-        rule = w[..., None] * (half * GAUSS_WEIGHTS).ravel() * 4 * root**3
-        rise, spent = self._rates(v)
-        return (rule * rise).sum(axis=-1), self._rates(w)[0], (rule * spent).sum(axis=-1)
+        points, weights = _gauss_rule()
+        v = w[..., None] * points
+        displacement_by_w, area_by_w = self._rates(v)
+        weights = w[..., None] * weights
+        displacement = (weights * displacement_by_w).sum(axis=-1)
+        return _HalfLoop(displacement, self._rates(w)[0], (weights * area_by_w).sum(axis=-1))
 
     def _rates(self, w) -> tuple:
-        """Return the derivatives of displacement [eps] and area [mu N eps] of a stroke over w."""
-        pace, y, give = self._pace(w), -np.expm1(-w), 1 - 2 * self.shape
+        """Return the derivatives by w of the displacement [eps] and the area [mu N eps]."""
+        rate = self._loading_rate(w)
+        y = -np.expm1(-w)
+        unloading = 1 - 2 * self.shape
         power = y**self.exponent
-        rest = 1 - give * power
-        return 1 / pace + np.exp(-w) / rest, y / pace * power * (1 - give) / rest
+        slope = 1 - unloading * power
+        return 1 / rate + np.exp(-w) / slope, y / rate * power * (1 - unloading) / slope
 
-    def _pace(self, w):
-        """Return dw/dx of w = -ln(1 - y): (1 - y^n)/(1 - y), between 1 and n."""
+    def _loading_rate(self, w):
+        """Return dw/dx = (1 - y^n)/(1 - y) of w = -ln(1 - y), which is between 1 and n."""
         y = -np.expm1(-w)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            pace = -np.expm1(
-                self.exponent * np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))
-            ) * np.exp(w)
-        # beyond w = 30, 1 - y is below 1e-13 and the rate is n to round-off
-        return np.where(w > 30.0, self.exponent, pace)
+            log_y = np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))
+            rate = -np.expm1(self.exponent * log_y) * np.exp(w)
+        return np.where(w > MAX_W, self.exponent, rate)
 
 
-def loop_from_keys(friction, load: float, slide) -> tuple:
-    """Return force at the reversals [N] and area [J] of steady loops of the Bouc-Wen law.
+@cache
+def _gauss_rule() -> tuple:
+    """Return points and weights on (0, 1), in the fourth root, where fractional powers are smooth."""
+    points, weights = np.polynomial.legendre.leggauss(N_POINTS)
+    edges = np.linspace(0.0, 1.0, N_PIECES + 1)
+    half = np.diff(edges)[:, None] / 2
+    root = (edges[:-1, None] + half * (1 + points)).ravel()
+    return root**4, (half * weights).ravel() * 4 * root**3
 
-    slide: displacement amplitudes [m] of any shape. The tip y is that of a stroke 2 u/eps = int_0^y dv/(1 - (1 - 2 s)
-    v^n) + int_0^y dv/(1 - v^n), which Newton's method finds as w = -ln(1 - y). Errors below 1e-12 of force and area to
-    an exponent of 8, 1e-9 to one of 50.
+
+def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
+    """Return the steady loops of the Bouc-Wen law.
+
+    The tip y is that of the displacement 2 u/eps = int_0^y dv/(1 - (1 - 2 s) v^n) + int_0^y dv/(1 - v^n). Newton's
+    method solves for w = -ln(1 - y). The relative errors are below 1e-12 for an exponent up to 8, and 1e-9 up to 50.
+
+    Parameters
+    ----------
+    friction : table
+        Keys of [friction] in SI units.
+    load : float
+        Load [N].
+    amplitude : float or array
+        Amplitudes u [m] of the relative displacement.
+
+    Returns
+    -------
+    SteadyLoop
     """
-    one, limit = from_keys(friction, load), friction.static * load
-    wanted = 2 * np.asarray(slide, float) / one.length
-    w = np.minimum(wanted / 2, 1.0)
-    for _ in range(200):
-        found, slope, area = one.stroke(w)
-        step = (found - wanted) / slope
-        if np.all(np.abs(step) <= 1e-14 * (1 + w)):
+    law = from_keys(friction, load)
+    limit = friction.static * load
+    target = 2 * np.asarray(amplitude, float) / law.length
+    w = np.minimum(target / 2, 1.0)
+    for _ in range(MAX_NEWTON):
+        half_loop = law._half_loop(w)
+        step = (half_loop.displacement - target) / half_loop.displacement_by_w
+        if np.all(np.abs(step) <= NEWTON_TOL * (1 + w)):
             break
         w = np.maximum(w - step, w / 8)
-    return limit * -np.expm1(-w), 2 * limit * one.length * area
+    return SteadyLoop(limit * -np.expm1(-w), 2 * limit * law.length * half_loop.area)
 
 
 def from_keys(friction, load: float) -> BoucWen:
     """Return the Bouc-Wen law of a [friction] table under a load N [N] of the whole contact.
 
-    eps = mu N/stiffness; a load of 0 counts as 1 N.
+    The bond length is mu N/stiffness; a load of 0 counts as 1 N.
     """
     length = friction.static * (load or 1.0) / friction.stiffness
     return BoucWen(friction.static, length, friction.exponent, friction.shape)

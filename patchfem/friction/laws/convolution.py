@@ -2,15 +2,15 @@
 
 Source: Oden and Pires, J. Appl. Mech. 50, 67, 1983.
 
-    tau(x) = mu_s sgn(v) int_0^inf phi_p(s/eps)/eps sigma_n(x - s sgn v) ds,   phi_p as in 2.14
+    tau(x) = mu_s sgn(v) int_0^inf phi(s/eps)/eps sigma_n(x - s sgn v) ds,   phi as in eq. 2.14
 
-It has no memory but the last sign of the motion: set-valued at rest, where the last traction is kept. On a pressure
-that stays on the lower piece it is what 2.17 settles to in a steady slide longer than some bond lengths; on a pressure
-that rides on the mover 2.17 settles to mu_s sigma_n itself, without this average, and the two laws differ.
+The law is set-valued at rest, where the last traction stays, and its only memory is the sign of the last motion. If the
+pressure stays on the lower piece, eq. 2.17 tends to this law in a steady motion over several bond lengths. If the
+pressure moves with the upper piece, eq. 2.17 tends to mu_s sigma_n, and both laws differ.
 
 sigma_n is linear between its nodes and 0 outside; the integral is exact, by incomplete gamma functions. Bonds are lost
-where no pressure holds them: nothing is carried at bare places, and the average ends at the first bare stretch behind
-a point.
+where the pressure vanishes: such a point carries nothing, and the average ends at the first segment behind a point on
+which the pressure is 0.
 """
 
 from dataclasses import dataclass, field
@@ -21,178 +21,242 @@ from scipy.special import gammainc, gammainccinv
 
 from ..protocol import Step
 
-# number of positions averaged at a time, so that nodes out of their reach can be left out
+# number of positions that are averaged at a time, so that nodes beyond their cut-off can be left out
 N_POSITIONS_PER_BLOCK = 64
-
-
-def _bond_gammainc(order: float, x):
-    """Return P(order + 1, x), in closed form for the first orders."""
-    if order in (0, 1, 2):
-        e = np.exp(-x)
-        return -np.expm1(-x) - (x * e if order else 0.0) - (x * x * e / 2 if order == 2 else 0.0)
-    return gammainc(order + 1, x)
-
-
-def _node_weights(places, nodes, bare, length: float, order: float) -> np.ndarray:
-    """Return the weights (n, m) of the nodes in averages at positions (n,), for motion to +x.
-
-    bare (m - 1,): segments without pressure, beyond which nothing is averaged.
-    """
-    behind = places[:, None] - nodes
-    x = np.maximum(behind, 0.0) / length
-    zero, one = (
-        -np.diff(_bond_gammainc(order, x), axis=1),
-        -np.diff(_bond_gammainc(order + 1, x), axis=1),
-    )
-    near = (behind[:, :-1] * zero - (order + 1) * length * one) / np.diff(nodes)
-    own = np.clip(np.searchsorted(nodes, places) - 1, 0, nodes.size - 2)
-    island = np.concatenate([[0], np.cumsum(bare[1:] != bare[:-1])])
-    beyond = places > nodes[-1]  # no pressure holds a bond beyond the last node
-    held = (island == island[own][:, None]) & ~bare & ~beyond[:, None]
-    out = np.zeros((places.size, nodes.size))
-    out[:, :-1] += np.where(held, zero - near, 0.0)
-    out[:, 1:] += np.where(held, near, 0.0)
-    return out
-
-
-def average_pressure(places, nodes, sigma, way: float, length: float, order: float) -> np.ndarray:
-    """Average the pressure behind the positions (n,) [m], weighted by phi_p; returns (n,) [Pa].
-
-    This is the integral in the docstring of the module.
-
-    nodes (m,) [m] rising, sigma (m,) [Pa] >= 0 linear between them and 0 outside; way: sign of the motion, +1 averages
-    over x below the position; length: eps [m]; order: p > -1. Exact except for positions so far behind that they have
-    less than a fraction 1e-20 of the weight. Source: Oden and Pires, J. Appl. Mech. 50, 67, 1983.
-    """
-    places, nodes, sigma = (np.asarray(part, float) for part in (places, nodes, sigma))
-    if way < 0:
-        return average_pressure(-places, -nodes[::-1], sigma[::-1], 1.0, length, order)
-    bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
-    # further nodes have weights below round-off
-    reach = length * float(gammainccinv(order + 2, 1e-20))
-    out = np.zeros(places.size)
-    for first in range(0, places.size, N_POSITIONS_PER_BLOCK):
-        here = places[first : first + N_POSITIONS_PER_BLOCK]
-        low = max(int(np.searchsorted(nodes, here.min() - reach)) - 1, 0)
-        high = max(int(np.searchsorted(nodes, here.max())) + 1, low + 2)
-        some = slice(low, high) if nodes[low:high].size > 1 else slice(-2, None)
-        weights = _node_weights(
-            here, nodes[some], bare[some.start :][: nodes[some].size - 1], length, order
-        )
-        out[first : first + N_POSITIONS_PER_BLOCK] = weights @ sigma[some]
-    return out
-
-
-def sliding_limits(nodes, sigma, weight, length: float, order: float) -> tuple:
-    """Return friction force / mu_s [N] for rigid sliding towards +x and towards -x, both >= 0.
-
-    nodes (m,) [m]; sigma (m,) [Pa]; weight: nodal areas (m,) [m2]; length: eps [m]; order: p. They differ where the
-    pressure is not symmetric: each loses what its own trailing edge would carry.
-    """
-    on = np.asarray(sigma) > 0
-    return tuple(
-        float(
-            np.asarray(weight)
-            @ np.where(on, average_pressure(nodes, nodes, sigma, way, length, order), 0.0)
-        )
-        for way in (1.0, -1.0)
-    )
+CUTOFF_WEIGHT = (
+    1e-20  # weight in the average that the nodes beyond the cut-off have, below round-off
+)
 
 
 class ConvolutionState(NamedTuple):
-    """State of the averaged law.
+    """State of the law.
 
-    - traction (m,): traction of the last motion [Pa]
-    - slide: relative displacement since the start [m]
-    - way: sign of the last motion; 0 if the traction is no longer at the limit of this motion
+    - traction (m,): traction [Pa] of the last motion
+    - displacement: relative displacement [m] since the start
+    - direction: sign of the last motion; 0 if the traction is no longer at the limit of this motion
     """
 
     traction: np.ndarray
-    slide: float
-    way: float
+    displacement: float
+    direction: float
+
+
+class SlidingLimits(NamedTuple):
+    """Friction force / mu_s [N] of a rigid motion towards +x and towards -x, both >= 0."""
+
+    forward: float
+    backward: float
+
+
+def _bond_gammainc(order: float, x):
+    """Return P(order + 1, x), the regularised lower incomplete gamma function.
+
+    It is elementary for the orders 0, 1 and 2.
+    """
+    if order not in (0, 1, 2):
+        return gammainc(order + 1, x)
+    decay = np.exp(-x)
+    value = -np.expm1(-x)
+    if order >= 1:
+        value = value - x * decay
+    if order == 2:
+        value = value - x * x * decay / 2
+    return value
+
+
+def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.ndarray:
+    """Return the weights (n, m) of the nodes in the averages at positions (n,), for motion to +x.
+
+    is_bare (m - 1,): whether a segment between two nodes has no pressure; nothing is averaged beyond it.
+    """
+    distance = positions[:, None] - nodes
+    x = np.maximum(distance, 0.0) / length
+    # integrals of phi and of phi s over each segment; the pressure is linear between its two nodes
+    zeroth = -np.diff(_bond_gammainc(order, x), axis=1)
+    first = -(order + 1) * length * np.diff(_bond_gammainc(order + 1, x), axis=1)
+    second_node = (distance[:, :-1] * zeroth - first) / np.diff(nodes)
+    segment = np.clip(np.searchsorted(nodes, positions) - 1, 0, nodes.size - 2)
+    # segments between two bare ones are an island; only the island of a position is averaged
+    island = np.concatenate([[0], np.cumsum(is_bare[1:] != is_bare[:-1])])
+    is_beyond = positions > nodes[-1]
+    is_averaged = (island == island[segment][:, None]) & ~is_bare & ~is_beyond[:, None]
+    weights = np.zeros((positions.size, nodes.size))
+    weights[:, :-1] += np.where(is_averaged, zeroth - second_node, 0.0)
+    weights[:, 1:] += np.where(is_averaged, second_node, 0.0)
+    return weights
+
+
+def average_pressure(
+    positions, nodes, sigma, direction: float, length: float, order: float
+) -> np.ndarray:
+    """Average the pressure behind positions with the weight phi, as in the equation of the module.
+
+    Parameters
+    ----------
+    positions : (n,) array
+        Positions [m].
+    nodes : (m,) array
+        Increasing positions [m] of the nodes.
+    sigma : (m,) array
+        Pressure [Pa] >= 0 at the nodes, linear between them and 0 outside.
+    direction : float
+        Sign of the motion; +1 averages over x below the position.
+    length, order : float
+        Bond length eps [m] and exponent p > -1.
+
+    Returns
+    -------
+    (n,) array
+        Average [Pa], exact but for nodes so far behind that their weight is below CUTOFF_WEIGHT.
+    """
+    positions, nodes, sigma = (np.asarray(part, float) for part in (positions, nodes, sigma))
+    if direction < 0:
+        return average_pressure(-positions, -nodes[::-1], sigma[::-1], 1.0, length, order)
+    is_bare = (sigma[1:] <= 0) & (sigma[:-1] <= 0)
+    cutoff = length * float(gammainccinv(order + 2, CUTOFF_WEIGHT))
+    averages = np.zeros(positions.size)
+    for first in range(0, positions.size, N_POSITIONS_PER_BLOCK):
+        block = positions[first : first + N_POSITIONS_PER_BLOCK]
+        low = max(int(np.searchsorted(nodes, block.min() - cutoff)) - 1, 0)
+        high = max(int(np.searchsorted(nodes, block.max())) + 1, low + 2)
+        near = slice(low, high) if nodes[low:high].size > 1 else slice(-2, None)
+        segments = is_bare[near.start :][: nodes[near].size - 1]
+        weights = _node_weights(block, nodes[near], segments, length, order)
+        averages[first : first + N_POSITIONS_PER_BLOCK] = weights @ sigma[near]
+    return averages
+
+
+def sliding_limits(nodes, sigma, weight, length: float, order: float) -> SlidingLimits:
+    """Return the friction forces / mu_s of a rigid motion in both directions.
+
+    They differ where the pressure is not symmetric: each lacks what its own trailing edge would carry.
+
+    Parameters
+    ----------
+    nodes, sigma, length, order
+        As in `average_pressure`.
+    weight : (m,) array
+        Areas [m2] of the nodes.
+
+    Returns
+    -------
+    SlidingLimits
+    """
+    weight = np.where(np.asarray(sigma) > 0, weight, 0.0)
+    forward = weight @ average_pressure(nodes, nodes, sigma, 1.0, length, order)
+    backward = weight @ average_pressure(nodes, nodes, sigma, -1.0, length, order)
+    return SlidingLimits(float(forward), float(backward))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Convolution:
-    """Law object of the averaged pressure.
+    """Law of the averaged pressure, in the protocol of `friction.protocol`.
 
-    - nodes (m,): positions of the points of the mover [m]; None for a uniform pressure, whose average is the pressure
-      itself (Coulomb's law)
-    - pattern (m,): pressure at the same nodes of the lower piece if it stays there [Pa]; None if it moves with the mover
+    - static, length, order: mu_s [1], eps [m] and p
+    - nodes (m,): positions [m] of the points of the upper piece; None for a uniform pressure, whose average is the
+      pressure itself (Coulomb's law)
+    - lower_pressure (m,): pressure [Pa] at these positions of the lower piece if it stays there; None if it moves with
+      the upper piece
+    - cache: last pressure and its average, per direction
     """
 
     static: float
     length: float
     order: float = 1.0
     nodes: np.ndarray | None = None
-    pattern: np.ndarray | None = None
-    kept: dict = field(default_factory=dict)
-    # the law has no stretch, so the load may change within a step of the motion
-    can_change_load: ClassVar[bool] = True
-    has_force_at_rest: ClassVar[bool] = True  # the last traction at rest
+    lower_pressure: np.ndarray | None = None
+    cache: dict = field(default_factory=dict)
+    can_change_load: ClassVar[bool] = True  # the law has no stretch
+    has_force_at_rest: ClassVar[bool] = True  # the last traction stays at rest
 
     def start(self, sigma) -> ConvolutionState:
         """Return the state before any motion: no traction, under a pressure sigma (m,) [Pa]."""
         return ConvolutionState(np.zeros_like(sigma), 0.0, 0.0)
 
     def limit_fraction(self, dq, dt):
-        """Return the fraction of the limit that is carried in increments dq [m]; 0 at rest."""
+        """Return the fraction of the limit that is carried in increments dq [m], 0 at rest."""
         return np.sign(dq)
 
-    def limit(self, sigma, way: float):
-        """Return the traction (m,) [Pa], >= 0, that resists a motion of sign `way`.
+    def limit(self, sigma, direction: float):
+        """Return the traction (m,) [Pa], >= 0, that resists a motion in a direction.
 
-        The pressure sigma (m,) [Pa] moves with the mover.
+        The pressure sigma (m,) [Pa] moves with the upper piece.
         """
-        return self.static * self._averaged(0.0, sigma, way)
+        return self.static * self._average(0.0, sigma, direction)
 
     def step(self, state: ConvolutionState, dq: float, s0, s1, dt: float) -> Step:
-        """Advance by a straight increment dq [m] while the pressure changes from s0 to s1 (m,) [Pa].
+        """Advance by an increment; all work is dissipated.
 
-        dt is not used.
+        The mean traction is that of the two ends of the increment. Without motion the traction stays.
 
-        The mean traction is that of the two ends of the increment. All work is dissipated. At dq = 0 the traction
-        stays.
+        Parameters
+        ----------
+        state : ConvolutionState
+        dq : float
+            Increment [m].
+        s0, s1 : (m,) array
+            Pressures [Pa] at the ends.
+        dt : float
+            Not used.
+
+        Returns
+        -------
+        Step
         """
         if dq == 0:
             return Step(state.traction, np.zeros_like(s0), state)
-        way, slide = float(np.sign(dq)), state.slide + dq
+        direction = float(np.sign(dq))
+        displacement = state.displacement + dq
         start = state.traction
-        if way != state.way:
-            start = self.static * way * self._averaged(state.slide, s0, way)
-        end = self.static * way * self._averaged(slide, s1, way)
+        if direction != state.direction:
+            start = self.static * direction * self._average(state.displacement, s0, direction)
+        end = self.static * direction * self._average(displacement, s1, direction)
         mean = (start + end) / 2
-        return Step(mean, mean * dq, ConvolutionState(end, slide, way))
+        return Step(mean, mean * dq, ConvolutionState(end, displacement, direction))
 
     def press(self, state: ConvolutionState, s0, s1) -> Step:
-        """Change the pressure at rest from s0 to s1 (m,) [Pa]; the traction is cut to its new limit.
+        """Change the pressure at rest; a traction above its new limit falls to this limit.
 
-        The mean of the Step is the traction after it; nothing is dissipated.
+        Parameters
+        ----------
+        state : ConvolutionState
+        s0, s1 : (m,) array
+            Pressures [Pa] before and after.
+
+        Returns
+        -------
+        Step
+            Its mean is the traction after the change; nothing is dissipated.
         """
-        way = float(np.sign(state.traction.sum()))
-        held = state.traction
-        if way != 0:
-            held = way * np.minimum(way * held, self.static * self._averaged(state.slide, s1, way))
-        return Step(held, np.zeros_like(held), ConvolutionState(held, state.slide, 0.0))
+        direction = float(np.sign(state.traction.sum()))
+        traction = state.traction
+        if direction != 0:
+            limit = self.static * self._average(state.displacement, s1, direction)
+            traction = direction * np.minimum(direction * traction, limit)
+        after = ConvolutionState(traction, state.displacement, 0.0)
+        return Step(traction, np.zeros_like(traction), after)
 
-    def _averaged(self, slide: float, sigma, way: float):
+    def _average(self, displacement: float, sigma, direction: float):
+        """Return the average (m,) [Pa] of the pressure behind the points, 0 where sigma is 0."""
         if self.nodes is None:
             return sigma
-        if self.pattern is not None:
-            behind = average_pressure(
-                self.nodes + slide, self.nodes, self.pattern, way, self.length, self.order
-            )
-            return np.where(sigma > 0, behind, 0.0)
-        before, behind = self.kept.get(way, (None, None))
-        if before is None or not np.array_equal(before, sigma):
-            behind = average_pressure(self.nodes, self.nodes, sigma, way, self.length, self.order)
-            self.kept[way] = np.array(sigma), behind
-        return np.where(sigma > 0, behind, 0.0)
+        if self.lower_pressure is not None:
+            positions = self.nodes + displacement
+            average = self._average_at(positions, self.lower_pressure, direction)
+            return np.where(sigma > 0, average, 0.0)
+        pressure, average = self.cache.get(direction, (None, None))
+        if pressure is None or not np.array_equal(pressure, sigma):
+            average = self._average_at(self.nodes, sigma, direction)
+            self.cache[direction] = np.array(sigma), average
+        return np.where(sigma > 0, average, 0.0)
+
+    def _average_at(self, positions, sigma, direction: float) -> np.ndarray:
+        return average_pressure(positions, self.nodes, sigma, direction, self.length, self.order)
 
     def traction(self, state: ConvolutionState):
-        """Return the traction (m,) [Pa] at the end of the last step, > 0 against slip towards +x."""
+        """Return the traction (m,) [Pa] at the end of the last step, positive against slip to +x."""
         return state.traction
 
     def stored(self, state: ConvolutionState):
-        """Return the elastic energy per area (m,) [J/m2]: zero, because the law has no stretch."""
+        """Return the elastic energy per area (m,) [J/m2], which is 0."""
         return np.zeros_like(state.traction)

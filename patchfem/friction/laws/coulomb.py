@@ -1,4 +1,4 @@
-"""Coulomb friction under prescribed motion: the traction has the sign of the slip (2.1)."""
+"""Coulomb friction under prescribed motion: the traction has the sign of the slip (eq. 2.1)."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,39 +10,55 @@ from ..protocol import Element, LastTraction, Step
 
 @dataclass(frozen=True, slots=True)
 class Coulomb(LastTraction):
-    """Set-valued kinetic friction under prescribed motion; at rest the last traction is kept.
+    """Set-valued kinetic friction; at rest the last traction stays.
 
-    `static` is what the contact carries at the instant a rest ends (`breakaway_traction`); it does no work.
+    - kinetic: coefficient mu_k of the motion
+    - static: coefficient mu_s of the traction at the instant at which a rest ends, which does no work; None for mu_k
     """
 
     kinetic: float
     static: float | None = None
-    has_force_at_rest: ClassVar[bool] = True  # the last traction at rest
+    has_force_at_rest: ClassVar[bool] = True  # the last traction stays at rest
+
+    @property
+    def _breakaway(self) -> float:
+        return self.kinetic if self.static is None else self.static
 
     def element(self, load: float) -> Element:
-        """Return the Element of a contact under a constant load [N]: static and kinetic force.
+        """Return the Element under a constant load [N], with the static and the kinetic force.
 
         It has no kernels, because a set-valued law has no slope.
         """
-        static = self.kinetic if self.static is None else self.static
-        return Element(
-            "", np.array([0.0, static * load, self.kinetic * load]), np.zeros(1), static * load
-        )
+        limit = self._breakaway * load
+        return Element("", np.array([0.0, limit, self.kinetic * load]), np.zeros(1), limit)
 
     def limit_fraction(self, dq, dt):
-        """Return the fraction of the limit that is carried in increments dq [m]; 0 at rest."""
+        """Return the fraction of the limit that is carried in increments dq [m], 0 at rest."""
         return np.sign(dq)
 
-    def limit(self, sigma, way: float):
-        """Return the largest traction mu_k sigma (m,) [Pa] of a motion of either sign."""
+    def limit(self, sigma, direction: float):
+        """Return the largest traction mu_k sigma (m,) [Pa] of a motion, equal for both directions."""
         return self.kinetic * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """Advance by a straight increment dq [m] while the pressure changes from s0 to s1 (m,) [Pa].
+        """Advance by an increment with the mean traction mu_k (s0 + s1)/2 sgn dq.
 
-        dt is not used.
+        All work is dissipated. Without motion the last traction stays.
 
-        The mean traction is mu_k (s0 + s1)/2 sgn dq and all work is dissipated. At dq = 0 the last traction is kept.
+        Parameters
+        ----------
+        state : (m,) array
+            Last traction [Pa].
+        dq : float
+            Increment [m].
+        s0, s1 : (m,) array
+            Pressures [Pa] at the ends.
+        dt : float
+            Not used.
+
+        Returns
+        -------
+        Step
         """
         if dq == 0:
             return Step(state, np.zeros_like(s0), state)
@@ -50,11 +66,11 @@ class Coulomb(LastTraction):
         return Step(mean, mean * dq, self.kinetic * s1 * np.sign(dq))
 
     def breakaway_traction(self, sigma, direction: float):
-        """Return the traction mu_s sigma (m,) [Pa] at the instant at which a rest ends.
+        """Return the traction mu_s sigma (m,) [Pa] at the instant at which a motion starts.
 
         direction: sign of the motion.
         """
-        return (self.kinetic if self.static is None else self.static) * sigma * direction
+        return self._breakaway * sigma * direction
 
 
 def from_keys(friction, load: float) -> Coulomb:
@@ -62,6 +78,5 @@ def from_keys(friction, load: float) -> Coulomb:
 
     Without a kinetic coefficient the static one is used.
     """
-    return Coulomb(
-        friction.static if friction.kinetic is None else friction.kinetic, friction.static
-    )
+    kinetic = friction.static if friction.kinetic is None else friction.kinetic
+    return Coulomb(kinetic, friction.static)

@@ -1,23 +1,24 @@
-"""The elastic-plastic law 3.12 with its reversal.
+"""The elastic-plastic law of eq. 3.12 with its reversal.
 
-As printed, 3.12 sets dF/dt = 0 for |F| > mu N and so never unloads; here it is zero only while sliding goes on.
+As printed, eq. 3.12 sets dF/dt = 0 for |F| > mu N and so never unloads; here dF/dt is zero only while slip continues.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..protocol import Element, Step
+from ..protocol import Element, SteadyLoop, Step
 
 
 @dataclass(frozen=True, slots=True)
 class ElasticPlastic:
     """Eq. 3.12 per point: springs of stiffness mu sigma/length that slip at mu sigma.
 
-    They are elastic again on reversal.
+    A rising pressure adds unstretched springs. A falling pressure only lowers the limit; the springs beyond it break
+    within one length of slip. So a change of the pressure creates no energy, and a force below the limit stays.
 
-    Springs come unstressed where the pressure rises and go where slip breaks them, within one length of slip; a falling
-    pressure only lowers the limit. So no pressure creates energy, and a force below the limit holds still.
+    - static: mu [1]
+    - length: relative displacement [m] at which an unstretched spring slips
     """
 
     static: float
@@ -25,103 +26,133 @@ class ElasticPlastic:
 
     def element(self, load: float) -> Element:
         """Return the Element under a constant load [N]: a spring mu N/eps that slips at mu N."""
-        return parallel_element([self.static * load / self.length], [self.length])._replace(
-            length=self.length
-        )
+        stiffness = self.static * load / self.length
+        return parallel_element([stiffness], [self.length])._replace(length=self.length)
 
     def start(self, sigma):
         """Return the initial state: traction/mu and density of springs, (2, m) [Pa].
 
-        The springs are unstressed under a pressure sigma (m,) [Pa].
+        The springs are unstretched, of the density of the pressure sigma (m,) [Pa].
         """
         return np.stack([np.zeros_like(sigma), sigma])
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """Advance by a straight increment dq [m] while the pressure changes from s0 to s1 (m,) [Pa].
+        """Advance by an increment under the mean of the pressures at its ends.
 
-        dt is not used.
+        The traction is a ramp that is cut at mu sigma, whose path mean is exact.
 
-        The pressure of the step is the mean of its ends. The traction is a ramp cut at mu sigma, whose path mean is
-        exact.
+        Parameters
+        ----------
+        state : (2, m) array
+        dq : float
+            Increment [m].
+        s0, s1 : (m,) array
+            Pressures [Pa] at the ends.
+        dt : float
+            Not used.
+
+        Returns
+        -------
+        Step
         """
         sigma = (s0 + s1) / 2
-        y0, springs = self._at(state, sigma)
-        move = springs * dq / self.length
-        y1 = np.clip(y0 + move, -sigma, sigma)
-        ramp = np.divide(y1 - y0, move, out=np.zeros_like(y0), where=move != 0)
-        mean = np.where(move != 0, ramp * (y0 + y1) / 2 + (1 - ramp) * y1, y0)
-        left = np.minimum(sigma, springs)
-        springs = left + (springs - left) * np.exp(-(1 - ramp) * abs(dq) / self.length)
-        bare = s1 <= 0  # bonds are lost where the pressure vanishes
-        after = np.stack([np.where(bare, 0.0, y1), np.where(bare, 0.0, springs)])
-        spent = self.static * mean * dq - (self.stored(after) - self.stored(state))
-        return Step(self.static * mean, spent, after)
+        y0, springs = self._limit_traction(state, sigma)
+        change = springs * dq / self.length
+        y1 = np.clip(y0 + change, -sigma, sigma)
+        elastic = np.divide(y1 - y0, change, out=np.zeros_like(y0), where=change != 0)
+        mean = np.where(change != 0, elastic * (y0 + y1) / 2 + (1 - elastic) * y1, y0)
+        remaining = np.minimum(sigma, springs)
+        decay = np.exp(-(1 - elastic) * abs(dq) / self.length)
+        springs = remaining + (springs - remaining) * decay
+        after = np.where(s1 > 0, np.stack([y1, springs]), 0.0)
+        gain = self.stored(after) - self.stored(state)
+        return Step(self.static * mean, self.static * mean * dq - gain, after)
 
     def press(self, state, s0, s1) -> Step:
-        """Change the pressure at rest from s0 to s1 (m,) [Pa]; stretch beyond the limit is lost.
+        """Change the pressure at rest; the energy of a stretch beyond the new limit is lost.
 
-        The mean of the Step is the traction after it.
+        Parameters
+        ----------
+        state : (2, m) array
+        s0, s1 : (m,) array
+            Pressures [Pa] before and after.
+
+        Returns
+        -------
+        Step
+            Its mean is the traction after the change.
         """
-        after = np.stack(self._at(state, s1))
-        return Step(self.static * after[0], self.stored(state) - self.stored(after), after)
+        after = np.stack(self._limit_traction(state, s1))
+        return Step(self.traction(after), self.stored(state) - self.stored(after), after)
 
-    def _at(self, state, sigma):
-        """Return traction/mu and density of springs under a changed pressure; 0 without pressure."""
+    def _limit_traction(self, state, sigma):
+        """Return traction/mu and density of springs under a changed pressure, 0 without pressure."""
         y, springs = state
         return np.clip(y, -sigma, sigma), np.where(sigma > 0, np.maximum(springs, sigma), 0.0)
 
     def traction(self, state):
-        """Return the traction (m,) [Pa] of a state, > 0 against slip towards +x."""
+        """Return the traction (m,) [Pa] of a state, positive against slip to +x."""
         return self.static * state[0]
 
     def stored(self, state):
-        """Return the elastic energy mu eps y^2/(2 density) (m,) [J/m2] of a state; y = traction/mu."""
+        """Return the elastic energy mu eps y^2/(2 density) (m,) [J/m2] of a state, y = traction/mu."""
         y, springs = state
-        return (
-            self.static
-            * self.length
-            * np.divide(y**2, 2 * springs, out=np.zeros_like(y), where=springs > 0)
-        )
+        energy = np.divide(y**2, 2 * springs, out=np.zeros_like(y), where=springs > 0)
+        return self.static * self.length * energy
 
 
 def parallel_element(stiffness, yield_displacement) -> Element:
     """Return the Element of parallel elastic-plastic elements (eq. 3.12 with reversal).
 
-    stiffness (t,) [N/m]; yield_displacement (t,) [m], the stretch at which each slips. The Element has the sum of their slip
-    forces as its limit. Kernels: `elastic_plastic_kernels`.
+    Parameters
+    ----------
+    stiffness, yield_displacement : (t,) array_like
+        Stiffness [N/m] of each element, and the stretch [m] at which it slips.
+
+    Returns
+    -------
+    Element
+        Its limit is the sum of the slip forces.
     """
-    k, most = (np.asarray(part, float) for part in (stiffness, yield_displacement))
-    limit, total = float(k @ most), float(k.sum())
-    numbers = np.concatenate([[0.0, k.size], k, most])
+    stiffness = np.asarray(stiffness, float)
+    yield_displacement = np.asarray(yield_displacement, float)
+    limit = float(stiffness @ yield_displacement)
+    total = float(stiffness.sum())
     return Element(
         "friction.laws.elastic_plastic_kernels",
-        numbers,
-        np.zeros(3 + k.size),
+        np.concatenate([[0.0, stiffness.size], stiffness, yield_displacement]),
+        np.zeros(3 + stiffness.size),
         limit,
         limit / total if total > 0 else 0.0,
         form="parallel",
     )
 
 
-def masing_loop(stiffness, yield_displacement, slide) -> tuple:
-    """Return the force at the reversals [N] and the area [J] of the steady loops of elements.
+def masing_loop(stiffness, yield_displacement, amplitude) -> SteadyLoop:
+    """Return the steady loops of parallel elements.
 
-    The elements (t,) are in parallel; the displacement amplitudes u [m] have any shape. An element has the force
-    k min(u, w), and the area 4 k w (u - w) where it slips.
+    At an amplitude u, an element has the force k min(u, w), and the area 4 k w (u - w) if it slips.
+
+    Parameters
+    ----------
+    stiffness, yield_displacement : (t,) array
+        Stiffness k [N/m] and yield displacement w [m] of each element.
+    amplitude : float or array
+        Amplitudes u [m] of the relative displacement.
+
+    Returns
+    -------
+    SteadyLoop
     """
-    slips = np.maximum(np.asarray(slide)[..., None] - yield_displacement, 0.0)
-    return slide * np.sum(stiffness) - slips @ stiffness, 4 * slips @ (
-        stiffness * yield_displacement
-    )
+    slips = np.maximum(np.asarray(amplitude)[..., None] - yield_displacement, 0.0)
+    force = amplitude * np.sum(stiffness) - slips @ stiffness
+    return SteadyLoop(force, 4 * slips @ (stiffness * yield_displacement))
 
 
-def loop_from_keys(friction, load: float, slide) -> tuple:
-    """Return `masing_loop` for the law of a [friction] table under a load [N]."""
-    return masing_loop(
-        np.array([friction.static * load / friction.bond_length]),
-        np.array([friction.bond_length]),
-        slide,
-    )
+def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
+    """Return `masing_loop` for a [friction] table, a load [N] and amplitudes [m]."""
+    length = friction.bond_length
+    return masing_loop(np.array([friction.static * load / length]), np.array([length]), amplitude)
 
 
 def from_keys(friction, load: float) -> ElasticPlastic:

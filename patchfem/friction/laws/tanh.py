@@ -1,4 +1,4 @@
-"""The rate law of eq. 2.4: friction depends on the slip speed and holds no load at rest."""
+"""The rate law of eq. 2.4: friction depends on the slip velocity and carries no load at rest."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,9 +10,12 @@ from ..protocol import Element, LastTraction, Step
 
 @dataclass(frozen=True, slots=True)
 class TanhLaw(LastTraction):
-    """Rate law tau = mu sigma tanh(v/v_0) (eq. 2.4) per point, at the mean speed of a step.
+    """Rate law tau = mu sigma tanh(v/v_0) (eq. 2.4) per point, at the mean velocity of a step.
 
     It never sticks: under a constant fraction f of the limit it creeps at v_0 atanh(f).
+
+    - static: mu [1]
+    - speed: v_0 [m/s]
     """
 
     static: float
@@ -33,24 +36,37 @@ class TanhLaw(LastTraction):
     def limit_fraction(self, dq, dt):
         """Return the fraction of the limit that is carried in increments dq [m] over dt [s].
 
-        For dt = 0 it is the sign of dq, because the speed is infinite.
+        For dt = 0 it is the sign of dq, because the velocity is infinite.
         """
         with np.errstate(divide="ignore", invalid="ignore"):
-            part = np.tanh(np.divide(dq, dt) / self.speed)
-        return np.where(np.greater(dt, 0), part, np.sign(dq))[()]
+            fraction = np.tanh(np.divide(dq, dt) / self.speed)
+        return np.where(np.greater(dt, 0), fraction, np.sign(dq))[()]
 
-    def limit(self, sigma, way: float):
-        """Return the largest traction mu sigma (m,) [Pa] of a motion of either sign."""
+    def limit(self, sigma, direction: float):
+        """Return the largest traction mu sigma (m,) [Pa], equal for both directions."""
         return self.static * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """Advance by dq [m] in dt [s] while the pressure changes from s0 to s1 (m,) [Pa] (eq. 2.4).
+        """Advance by an increment at its mean velocity and mean pressure; all work is dissipated.
 
-        The mean traction is that of the mean speed and the mean pressure of the step; all work is dissipated.
+        Parameters
+        ----------
+        state : (m,) array
+            Last traction [Pa].
+        dq : float
+            Increment [m].
+        s0, s1 : (m,) array
+            Pressures [Pa] at the ends.
+        dt : float
+            Duration [s].
+
+        Returns
+        -------
+        Step
         """
-        part = self.limit_fraction(dq, dt)
-        mean = self.static * (s0 + s1) / 2 * part
-        return Step(mean, mean * dq, self.static * s1 * part)
+        fraction = self.limit_fraction(dq, dt)
+        mean = self.static * (s0 + s1) / 2 * fraction
+        return Step(mean, mean * dq, self.static * s1 * fraction)
 
 
 def from_keys(friction, load: float) -> TanhLaw:
