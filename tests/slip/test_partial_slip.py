@@ -43,7 +43,7 @@ def test_exact_another_coefficient_is_the_same_springs(factor):
     assert np.array_equal(mine.points, anew.points) and mine.n_reluctant == anew.n_reluctant
     for name in ("yield_displacement", "limit"):
         assert getattr(mine, name) == pytest.approx(getattr(anew, name), rel=1e-11)
-    for name in ("stiffness", "share"):
+    for name in ("stiffness", "force_matrix"):
         assert (
             np.abs(getattr(mine, name) - getattr(anew, name)).max()
             < 1e-11 * np.abs(anew.stiffness).max()

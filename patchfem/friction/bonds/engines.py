@@ -1,9 +1,9 @@
 """Choice of the engine that sums eq. 2.17, and of its settings, by tolerance and cost.
 
-There are two: the recursion, exact only for reading="stretch" with p = 1, and the list of strips (`list_kernels`)
-for every law. The list has two settings, the fraction of the friction limit that its cut-off may lose and the width up
-to which it merges strips; `direct`, `truncated` and `merged` say which of them are used. Which one is cheapest depends
-on the law, the strokes and the steps.
+The recursion is exact for reading="stretch" with p = 1. The list of strips (`list_kernels`) sums every law. It has two
+settings: the fraction of the friction limit that its cut-off may lose, and the width up to which it merges strips. The
+engines `direct`, `truncated` and `merged` use none, the first, and both. The cheapest one depends on the law, the strokes
+and the steps.
 """
 
 from dataclasses import dataclass
@@ -26,14 +26,15 @@ LIST_SETTINGS = {  # settings of a list: whether it drops old strips, whether it
     "merged": (True, True),
 }
 ENGINES = (*LIST_SETTINGS, "recursion")
-# bounds of the error of merging over the square of its width, which test_merge_bounds measures
+# upper bounds of the error of merging / square of the merge width, which test_merge_bounds measures
 MERGE_ERROR_CONSTANT = 0.25  # for a constant bond length
 MERGE_ERROR_GROWING = 1.0  # for reading="stretch" with growing bonds
-MERGE_ERROR_PRINTED_GROWING = 6.0  # for reading="report" with growing bonds
+MERGE_ERROR_REPORT_GROWING = 6.0  # for reading="report" with growing bonds
 # for reading="report" with a constant bond length and an order below 1
-MERGE_ERROR_PRINTED_FRACTIONAL = 1.0
-NEGATIVE_ORDER_ERROR = 3e-4  # error of merging growing bonds with p < 0 at any width, due to bonds that form at a reversal
-# evaluations of the list per step of a rig: three for each of two or three trial increments
+MERGE_ERROR_REPORT_FRACTIONAL = 1.0
+# error of merging growing bonds with p < 0 at any width, which bonds that form at a reversal cause
+NEGATIVE_ORDER_ERROR = 3e-4
+# number of evaluations of the list per step of a rig: three for each of two or three trial increments
 N_PASSES_PER_STEP = 9
 MAX_TAIL = 1e-6  # largest fraction of the friction limit by which the cut-off may change the force
 MAX_MERGE_WIDTH = 0.02  # largest width of a merged strip in bond lengths
@@ -144,11 +145,11 @@ def _merge_error_factor(law: Bonds) -> float:
     """Return the error bound of merging / square of the merge width."""
     form = sum_form(law)
     if form == FORM_REPORT_GROWING:
-        return MERGE_ERROR_PRINTED_GROWING
+        return MERGE_ERROR_REPORT_GROWING
     if law.has_growth:
         return MERGE_ERROR_GROWING
     if form == FORM_REPORT and law.order < 1:
-        return MERGE_ERROR_PRINTED_FRACTIONAL
+        return MERGE_ERROR_REPORT_FRACTIONAL
     return MERGE_ERROR_CONSTANT
 
 

@@ -1,4 +1,7 @@
-"""Forms of the sum over a list of strips of bonds (eq. 2.17), and their quadrature rules."""
+"""Forms of the sum over a list of strips of bonds (eq. 2.17), and their quadrature rules.
+
+The law determines the form (`list_numbers.sum_form`).
+"""
 
 FORM_MOMENTS = 0.0  # reading="stretch" with p = 1: three moments of the strips, exact
 FORM_POWER = 1.0  # reading="stretch" with any order p: two Gauss points per strip
@@ -11,6 +14,7 @@ GAUSS_POINT_1 = (
     0.21132486540518713  # first of two Gauss points, as a fraction of the strip from its end
 )
 GAUSS_POINT_2 = 0.7886751345948129  # second of two Gauss points
+N_TABLE_STEPS = 32  # number of entries of the table of P(p + 1, x) per unit of x
 MAX_STRIP_LENGTH = 0.25  # longest strip in bond lengths
 
 GAUSS_RULE_5 = (  # five Gauss points in (-1, 1) and their weights

@@ -1,14 +1,14 @@
 """Compiled list of strips of bonds (eq. 2.17): force, mean force and step of an increment.
 
-One list sums eq. 2.17 along a line for every order and reading. Two numbers of `list_numbers.law_numbers` make the
-engines of `accuracy.quadrature` of it: the cut-off that drops old strips (`truncated`), and the width up to which
-`list_merge_kernels` joins neighbours (`merged`); without both the list keeps every bond (`direct`).
+The list sums eq. 2.17 along a line for every order and reading. Two numbers of `list_numbers.law_numbers` distinguish
+the engines of the key accuracy.quadrature: a cut-off beyond which old strips are dropped (`truncated`), and a width up
+to which `list_merge_kernels` joins neighbouring strips (`merged`). Without both the list keeps every bond (`direct`).
 
 `bond_list` is a named tuple with the arrays of a list, such as `dynamics.interfaces.arrays.BondList`: the arrays
-`bondlist` (N_ROWS, capacity), `law` (24,), `now` (6,) and `status` (16,), whose positions `list_rows_kernels` names, the
-`growth` (6,) of eq. 2.10 and the `table` (k,) of `list_numbers.gamma_table`. A force is per friction limit mu_s N, a
-stored energy too. `increment` is a straight increment [m] from the present state, `v0` the velocity [m/s] at its start
-and `dt` its duration [s]; both set the growth of bonds.
+`bondlist` (N_ROWS, capacity), `law` (24,), `now` (6,) and `status` (16,), whose indices `list_rows_kernels` names, the
+`growth` (6,) of eq. 2.10 and the `table` (k,) of `list_numbers.gamma_table`. Forces [1] and stored energies [m] are
+divided by the friction limit mu_s N. `increment` is a straight increment [m] from the present state, `v0` the velocity
+[m/s] at its start and `dt` its duration [s]; both determine the growth of bonds.
 """
 
 from math import exp, expm1
@@ -59,21 +59,21 @@ from .point_kernels import bond_mean, grow
 MAX_STRIP_GROWTH = 0.5  # largest growth J in a strip of growing bonds
 # largest number of strips into which growth alone divides an increment, as J has no bound after a long rest
 MAX_GROWTH_STRIPS = 16
-# fraction of the friction limit; largest error of the bonds that form on an increment, which falls with the fourth power
-# of the number of strips and vanishes once the bonds are grown
+# error / friction limit of growing bonds that form on an increment; it falls with the fourth power of the number of
+# strips
 NEW_BOND_TOL = 1e-9
-# fraction of the increment; if it ends this close to the initial bonds, it touches them
+# distance of an increment from displacement 0 / its length, below which it touches the initial bonds
 TOUCH_TOL = 1e-6
 MIN_ENERGY_STEP = 1e-3  # increment in bond lengths; below it, a difference of energies has more round-off than the force
-# same limit for spread initial bonds, where a solver needs a force without jumps
+# same limit if the initial bonds are distributed, because solvers then rely on a force without jumps
 MIN_ENERGY_STEP_SPREAD = 1e-6
-MAX_SIMPSON_STEP = 0.1  # increment in bond lengths up to which Simpson's rule is exact enough
+MAX_SIMPSON_STEP = 0.1  # increment in bond lengths up to which Simpson's rule is accurate enough
 MAX_SIMPSON_STEP_FRACTIONAL = 0.03  # same limit for an order below 1
 MAX_PANEL_LENGTH = 0.5  # longest first panel of five Gauss points, in bond lengths
 MAX_EXPONENT = 300.0  # exponent beyond which the scaled numbers are rescaled; exp(709) is the largest floating-point number
 # path in bond lengths; below it, the moments of new bonds are computed by power series
 MAX_SERIES_PATH = 1e-2
-# strips by which a list must grow, besides a fifth of its length, before it is merged again
+# number of strips by which a list must grow, besides a fifth of its length, before it is merged again
 MIN_STRIPS_BETWEEN_MERGES = 12
 
 
@@ -89,9 +89,12 @@ class ClockValues(NamedTuple):
 
 
 class Formation(NamedTuple):
-    """Straight increment [m] on which bonds form under a relative pressure.
+    """Straight increment on which bonds form.
 
-    The reference is that of scaled numbers.
+    - increment: [m]
+    - before, after: clocks at its ends
+    - pressure: relative pressure
+    - reference: reference of the scaled numbers
     """
 
     increment: float
@@ -102,7 +105,7 @@ class Formation(NamedTuple):
 
 
 class StripCount(NamedTuple):
-    """Number of strips of equal length in an increment, and of those before the cut-off."""
+    """Number of strips of equal length in an increment, and number of those within the cut-off."""
 
     count: float
     kept: float
@@ -116,10 +119,7 @@ class MeanForce(NamedTuple):
 
 
 class MomentsOfStrip(NamedTuple):
-    """Weight, distance of the centre from the end [bond lengths] and variance [bond lengths^2].
-
-    The weight is in bond lengths, too.
-    """
+    """Moments of the bonds of a strip in bond lengths: weight, distance of the centre from the end, variance."""
 
     weight: float
     distance: float
@@ -162,10 +162,7 @@ def target_length(before, after, exponent):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _count_strips(path, eps, growth, law):
-    """Return the number of strips of an increment.
-
-    It depends on the path [m] in bond lengths eps [m] and on the growth J.
-    """
+    """Return the number of strips of an increment with a path [m], bond length eps [m] and growth J."""
     count = max(1.0, path / (MAX_STRIP_LENGTH * eps))
     if law[LAW.form] == FORM_REPORT_GROWING:
         limit = (path / law[LAW.length]) ** (1 + min(law[LAW.order], 0.0))
@@ -178,10 +175,7 @@ def _count_strips(path, eps, growth, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _formed_growing_force(path, before, after, law):
-    """Return the force of the growing bonds that form on an increment.
-
-    It follows from the clocks before and after the increment.
-    """
+    """Return the force [1] of the growing bonds that form on an increment between two clocks."""
     growth = after.growth - before[CLOCK.growth]
     target = target_length(before[CLOCK.length], after.length, growth)
     pieces = _count_strips(path, after.middle_length, growth, law)
@@ -199,7 +193,8 @@ def _formed_growing_force(path, before, after, law):
 def sum_list(increment, bond_list, v0, dt):
     """Return force and stored energy after an increment.
 
-    The energy is that of the bonds that were there: the force of each over its own stretch at frozen damage.
+    The energy excludes the bonds that form on the increment. Each bond stores the work of its force when its stretch
+    goes to zero at constant damage.
 
     Parameters
     ----------
@@ -285,9 +280,9 @@ def list_force(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_energy(increment, bond_list, v0, dt):
-    """Return the energy [m] of all bonds after an increment, for reading="stretch".
+    """Return stored energy / friction limit [m] after an increment, for reading="stretch".
 
-    Bonds that form on the increment are included.
+    The bonds that form on the increment are included.
 
     Parameters
     ----------
@@ -308,9 +303,9 @@ def list_energy(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrand(is_energy, increment, bond_list, v0, dt):
-    """Return the integrand of the mean over an increment: the energy or the force.
+    """Return energy or force after an increment, the integrand of the mean over the increment.
 
-    The force for reading="report" is without the initial bonds, whose mean has a closed form.
+    For reading="report" the force excludes the initial bonds, whose mean has a closed form.
     """
     if is_energy:
         return list_energy(increment, bond_list, v0, dt)
@@ -324,9 +319,9 @@ def list_mean(increment, bond_list, v0, dt):
     """Return the path-mean force [1] of an increment.
 
     - reading="stretch", p = 1: closed form, `list_slope`.
-    - reading="stretch", other orders: from the energy balance, so that no step creates energy. Damage takes the part
-      dR/eps of the stored energy; the mean is the sum of this loss and of the gain of energy over the increment.
-    - reading="report": mean of the force, to which the initial bonds contribute a closed form.
+    - reading="stretch", other orders: from the energy balance, so that no step creates energy. Damage dissipates the
+      fraction dR/eps of the stored energy; the mean force is this loss plus the gain in stored energy, per increment.
+    - reading="report": mean of the force; the part of the initial bonds has a closed form.
 
     Parameters
     ----------
@@ -361,12 +356,10 @@ def list_mean(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _suits_simpson(increment, bond_list):
-    """Return whether Simpson's rule is exact enough for an increment.
+    """Return whether Simpson's rule is accurate enough for an increment.
 
-    It must be short, its force smooth, and its first value known.
-
-    For reading="stretch", and where the initial bonds are spread, an increment that touches the place of the initial
-    bonds is not: their force may jump there, and its value at the place itself is that of neither side.
+    The increment must be short, with a smooth force and a known first value. At displacement 0 the force of the initial
+    bonds may jump, and its value there is that of neither side.
     """
     status = bond_list.status
     clocks = bond_list.now
@@ -376,16 +369,16 @@ def _suits_simpson(increment, bond_list):
     low = min(start, start + increment)
     high = max(start, start + increment)
     margin = TOUCH_TOL * abs(increment)
-    touches_place = low <= margin and high >= -margin
+    touches_zero = low <= margin and high >= -margin
     has_jump = law[LAW.form] < FORM_REPORT
-    has_turn = law[LAW.half_width] > 0 and p < 1
+    has_steep_range = law[LAW.half_width] > 0 and p < 1
     limit = MAX_SIMPSON_STEP if p >= 1 else MAX_SIMPSON_STEP_FRACTIONAL
     return (
         status[STATUS.end] > status[STATUS.head]
         and abs(increment) / clocks[CLOCK.length] <= limit
         and p >= 0
-        # the choice of the rule must not depend on the position of spread bonds
-        and not ((touches_place and has_jump) or has_turn)
+        # the choice of the rule must not depend on the position of distributed bonds
+        and not ((touches_zero and has_jump) or has_steep_range)
     )
 
 
@@ -393,22 +386,22 @@ def _suits_simpson(increment, bond_list):
 def _needs_energy_balance(increment, bond_list):
     """Return whether the mean force is computed from the energy balance.
 
-    It is, except for a tiny increment that does not cross the initial bonds.
+    Round-off forbids it for a tiny increment, unless the increment crosses a jump of the initial bonds.
     """
     clocks = bond_list.now
     law = bond_list.law
     start = clocks[CLOCK.displacement]
     end = start + increment
-    crosses_place = min(start, end) <= 0.0 <= max(start, end)
+    crosses_zero = min(start, end) <= 0.0 <= max(start, end)
     has_jump = law[LAW.initial] > 0 and law[LAW.order] < 1
     smallest = MIN_ENERGY_STEP if law[LAW.half_width] == 0 else MIN_ENERGY_STEP_SPREAD
     is_large = abs(increment) / clocks[CLOCK.length] > smallest
-    return is_large or (crosses_place and has_jump)
+    return is_large or (crosses_zero and has_jump)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _mean_from_energy(is_short, increment, bond_list, v0, dt):
-    """Return the path-mean force from an energy balance: loss by damage plus stored energy."""
+    """Return the path-mean force from the energy balance: loss by damage plus gain in stored energy."""
     last = list_energy(increment, bond_list, v0, dt)
     gain = last - bond_list.status[STATUS.energy]
     eps = _advance(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
@@ -429,10 +422,7 @@ def _average_by_simpson(is_energy, last, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _average_by_gauss(is_energy, increment, bond_list, v0, dt):
-    """Average energy or force over an increment by panels of five Gauss points.
-
-    The panels double in length.
-    """
+    """Average energy or force over an increment by panels of five Gauss points; each is twice as long as the last."""
     path = abs(increment) / bond_list.now[CLOCK.length]
     if path <= MAX_PANEL_LENGTH:
         return _integrate_panel(is_energy, (0.0, 1.0), increment, bond_list, v0, dt)
@@ -477,7 +467,7 @@ def _integrate_panel(is_energy, span, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_slope(increment, bond_list, v0, dt):
-    """Return path-mean force and derivative for reading="stretch" and p = 1, in closed form.
+    """Return path-mean force and its derivative by the increment, for reading="stretch" and p = 1.
 
     Parameters
     ----------
@@ -572,7 +562,7 @@ def list_step(increment, bond_list, v0, v1, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _rescale(bonds, status, clocks, law):
-    """Change the reference of the scaled numbers before they overflow."""
+    """Move the reference of the scaled numbers to the present clock before the numbers overflow."""
     form = law[LAW.form]
     if form == FORM_REPORT:
         return
@@ -641,9 +631,7 @@ def _append(formation, bond_list):
 def _extend_last_strip(formation, bonds, status):
     """Extend the last strip by an increment; return whether this was possible.
 
-    The direction and the pressure of both must agree.
-
-    The sum in the form PRINTED is exact for strips of any length.
+    Direction and pressure of both must agree. In the form FORM_REPORT the sum is exact for strips of any length.
     """
     increment, before, after, pressure, _ = formation
     k = int(status[STATUS.end]) - 1
@@ -664,7 +652,7 @@ def _extend_last_strip(formation, bonds, status):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _write_powers(near, count, formation, p, bonds, k):
-    """Write the damage and the scaled weights of a strip in the form POWER.
+    """Write the damage and the scaled weights of a strip in the form FORM_POWER.
 
     near: fraction of the increment at which the strip ends.
     """
@@ -684,8 +672,8 @@ def _write_powers(near, count, formation, p, bonds, k):
 def _write_start_lengths(piece, count, formation, bonds, k):
     """Write the scaled starting lengths of a strip of growing bonds.
 
-    They are the mature length at the Gauss points, times exp(J there - reference): a bond there later has the length
-    of mature bonds less exp(reference - J) times this number.
+    At a Gauss point it is the mature length when its bonds formed, times exp(J - reference) at that time. Later, the
+    length of these bonds is that of mature bonds less exp(reference - J) times this number.
     """
     before = formation.before
     after = formation.after
@@ -713,10 +701,7 @@ def _write_moments(formation, bonds, k):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _surviving_moments(x):
-    """Return the moments of bonds of constant length that survive a path x.
-
-    They form on this path and decay by exp(-x) over it.
-    """
+    """Return the moments of the bonds that form on a path of x bond lengths and survive it."""
     if x < MAX_SERIES_PATH:
         return MomentsOfStrip(
             x * (1 - x / 2 * (1 - x / 3 * (1 - x / 4 * (1 - x / 5)))),

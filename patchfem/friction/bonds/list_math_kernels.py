@@ -1,4 +1,4 @@
-"""Functions of a number for the compiled sums over bonds, written for vector registers.
+"""Exponential, logarithm and incomplete gamma function for the compiled sums over bonds.
 
 `fast_exp` and `fast_log` have no branches: a loop that calls them takes 0.5 ns per exponential and
 1 ns per power.
@@ -10,8 +10,9 @@ import numpy as np
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
+from .list_forms_kernels import N_TABLE_STEPS
 
-FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
+MAX_TABLE_ARGUMENT = 1e6  # argument x beyond which P(p + 1, x) is 1 for every order
 
 
 @njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)
@@ -40,7 +41,7 @@ def fast_exp(x):
 
 @njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)
 def fast_log(x):
-    """Natural logarithm of a normal number x > 0 to 2.3e-16; -709.09 at zero."""
+    """Return the natural logarithm of a normal number x > 0 to 2.3e-16; -709.09 at zero."""
     bits = np.float64(x).view(np.int64)
     e = (bits - np.int64(0x3FE6A09E667F3BCD)) >> np.int64(52)
     m = np.int64(bits - (e << np.int64(52))).view(np.float64)
@@ -96,9 +97,9 @@ def gammainc(a, x):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def bond_gammainc(p, x):
-    """P(p + 1, x) [1] to 1e-15: fraction of the limit in bonds from the last x bond lengths.
+    """Return P(p + 1, x) to 1e-15, the fraction of the limit that the last x bond lengths carry.
 
-    It has a closed form for p = 0, 1 and 2. Twin: scipy.special.gammainc.
+    It has a closed form for p = 0, 1 and 2. NumPy form: `scipy.special.gammainc(p + 1, x)`.
     """
     if x <= 0:
         return 0.0
@@ -108,23 +109,36 @@ def bond_gammainc(p, x):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def interpolate_gammainc(p, x, table, norm):
-    """Return P(p + 1, x) by interpolation in a table (k,) at multiples of 1/32, to 1e-10.
+def interpolate_gammainc(p, x, table, inverse_gamma):
+    """Return P(p + 1, x) to 1e-10 by a cubic between two entries of a table; exact for x < 1.
 
-    It is exact where x < 1.
+    The slopes of the cubic are x^p exp(-x)/Gamma(p + 1). It takes 4 ns.
 
-    norm = 1/Gamma(p + 1). The cubic between two nodes has the slopes x^p exp(-x)/Gamma(p + 1); 4 ns.
+    Parameters
+    ----------
+    p, x : float
+        Order and argument.
+    table : (k,) array
+        P(p + 1, x) at multiples of 1/32 (`list_numbers.gamma_table`).
+    inverse_gamma : float
+        1/Gamma(p + 1).
+
+    Returns
+    -------
+    float
     """
-    at = int(x * 32) if x < 1e6 else 1 << 25
     if x < 1 or p == 1.0 or p == 2.0 or p == 0.0:
         return bond_gammainc(p, x)
-    if at + 1 >= table.size:
+    index = int(x * N_TABLE_STEPS) if x < MAX_TABLE_ARGUMENT else table.size
+    if index + 1 >= table.size:
         return 1.0
-    t = x * 32 - at
-    a, b = at * 0.03125, (at + 1) * 0.03125
-    da, db = (
-        norm * fast_exp(p * fast_log(a) - a) * 0.03125,
-        norm * fast_exp(p * fast_log(b) - b) * 0.03125,
-    )
-    fa, fb = table[at], table[at + 1]
-    return fa + t * (da + t * (3 * (fb - fa) - 2 * da - db + t * (2 * (fa - fb) + da + db)))
+    width = 1.0 / N_TABLE_STEPS
+    low = index * width
+    high = (index + 1) * width
+    slope_low = inverse_gamma * fast_exp(p * fast_log(low) - low) * width
+    slope_high = inverse_gamma * fast_exp(p * fast_log(high) - high) * width
+    start = table[index]
+    change = table[index + 1] - start
+    t = x * N_TABLE_STEPS - index
+    cubic = slope_low + slope_high - 2 * change
+    return start + t * (slope_low + t * (3 * change - 2 * slope_low - slope_high + t * cubic))

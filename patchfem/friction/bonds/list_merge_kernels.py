@@ -1,7 +1,7 @@
-"""Merging of neighbouring strips of bonds as long as they are narrow for their age.
+"""Merging of neighbouring strips of bonds that are narrow for their age.
 
-The list then stays short however long the run, however small the strokes and however fine the steps. First moments are
-kept, so the error falls with the square of the width.
+It bounds the length of the list for runs, strokes and steps of any size. First moments are conserved, so the error falls
+with the square of the width.
 """
 
 from math import exp
@@ -29,7 +29,7 @@ from .list_rows_kernels import (
 )
 from .list_sum_kernels import interpolate_start_length
 
-# starting length / bond length; below it, the starting length no longer matters
+# starting length / bond length of growing bonds; below it, the bonds count as fully grown
 MAX_START_LENGTH_RATIO = 1e-8
 MAX_GROWTH_SPAN = 0.1  # largest range of the growth J of a merged strip of growing bonds
 # largest fraction by which the last bond of a merged strip is shorter than its first
@@ -42,10 +42,8 @@ MAX_AGE = 200.0  # age in bond lengths beyond which the permitted width no longe
 def merge(bonds, status, clocks, law):
     """Merge neighbouring strips that together are narrow for their age.
 
-    The largest width is merge_width eps_0 exp(R/3 eps_0).
-
-    Two strips of one pass join end to end. Strips of several passes over the same range become one spread strip, the
-    oldest first.
+    The largest width is merge_width eps_0 exp(R/(3 eps_0)) at the path R since the bonds formed. Two strips of one pass
+    are joined end to end. Strips of several passes over the same range become a spread strip, the oldest first.
 
     Parameters
     ----------
@@ -75,8 +73,8 @@ def merge(bonds, status, clocks, law):
             if can_join_ends and _are_end_to_end(bonds, last, k, width, law):
                 _join_ends(bonds, last, k, clocks, law)
                 continue
-            is_even = _is_evenly_weighted(bonds, last, k, clocks, law)
-            can_spread = is_narrow and is_even and (is_last_spread or is_first_unspread)
+            is_uniform = _is_uniformly_weighted(bonds, last, k, clocks, law)
+            can_spread = is_narrow and is_uniform and (is_last_spread or is_first_unspread)
             if can_spread and _have_same_range(bonds, last, k, clocks, law, status):
                 if is_first_unspread:
                     _spread_strip(bonds, last, law)
@@ -85,7 +83,7 @@ def merge(bonds, status, clocks, law):
                 continue
             if (
                 is_first_unspread
-                and is_even
+                and is_uniform
                 and _is_narrow_before_reversal(bonds, last, k, width, law)
             ):
                 _spread_strip(bonds, last, law)
@@ -116,7 +114,7 @@ def _signed_width(bonds, k):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _are_end_to_end(bonds, i, k, width, law):
-    """Return whether two strips lie end to end in one direction and can be joined by density."""
+    """Return whether two strips are adjacent, of one direction, and similar enough to be joined."""
     form = law[LAW.form]
     if (
         bonds[STRIP.end, i] != bonds[STRIP.start, k]
@@ -132,10 +130,7 @@ def _are_end_to_end(bonds, i, k, width, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _is_narrow_before_reversal(bonds, i, k, width, law):
-    """Return whether strip i is narrow and the direction reverses after it.
-
-    A pass over the strip will then follow.
-    """
+    """Return whether strip i is narrow and the motion reverses after it, so that a pass over it follows."""
     is_narrow = bonds[STRIP.covered, i] <= 0.5 * width
     return (
         is_narrow
@@ -145,7 +140,7 @@ def _is_narrow_before_reversal(bonds, i, k, width, law):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _is_full_grown(bonds, k, clocks):
+def _is_fully_grown(bonds, k, clocks):
     """Return whether the starting lengths of the bonds of a strip no longer matter."""
     start = interpolate_start_length(
         0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k]
@@ -155,15 +150,16 @@ def _is_full_grown(bonds, k, clocks):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _is_evenly_weighted(bonds, i, k, clocks, law):
-    """Return whether the weight of two strips is even over them, or too small to matter.
+def _is_uniformly_weighted(bonds, i, k, clocks, law):
+    """Return whether the weight of two strips is uniform over them, or too small to matter.
 
-    With a fractional order the weight R^p of young bonds is far from even: taken as even, it moves the fraction
-    joint/(near + joint) of their part ((near + joint)^(p + 1) - near^(p + 1))/Gamma(p + 1) of the friction limit.
+    With a fractional order the weight R^p of young bonds is not uniform. Two strips cover the paths from R = near to
+    far and carry (far^(p + 1) - near^(p + 1))/Gamma(p + 1) of the friction limit; if their weight is taken as uniform,
+    the fraction (far - near)/far of this force moves.
     """
     p = law[LAW.order]
     form = law[LAW.form]
-    if form == FORM_REPORT_GROWING and not _is_full_grown(bonds, k, clocks):
+    if form == FORM_REPORT_GROWING and not _is_fully_grown(bonds, k, clocks):
         return False
     depends_on_path = form == FORM_REPORT or (form == FORM_REPORT_GROWING and p < 1)
     if not depends_on_path or p == 0.0:
@@ -179,10 +175,11 @@ def _is_evenly_weighted(bonds, i, k, clocks, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _have_similar_density(bonds, i, k, width, eps0):
-    """Return whether two strips that lie end to end have nearly the same weight per path.
+    """Return whether two adjacent strips have nearly the same weight per path.
 
-    Where the bond length changes they differ by 1/eps^p. When they join, a quarter of the relative difference of their
-    weights moves; with an order below 1 this counts in full once the displacement is back among them, at u = 0.
+    Where the bond length changes their weights differ by 1/eps^p. Joining them moves a quarter of the relative
+    difference of their weights. With an order below 1 the whole of it acts once the displacement returns to them, where
+    u = 0.
     """
     left = bonds[STRIP.weight, i] * bonds[STRIP.covered, k]
     right = bonds[STRIP.weight, k] * bonds[STRIP.covered, i]
@@ -192,8 +189,8 @@ def _have_similar_density(bonds, i, k, width, eps0):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _have_similar_lengths(bonds, i, k, clocks):
-    """Return whether the growing bonds of two strips have similar lengths, or are fully grown."""
-    if _is_full_grown(bonds, k, clocks):
+    """Return whether the growing bonds of two strips have similar lengths or are fully grown."""
+    if _is_fully_grown(bonds, k, clocks):
         return True
     young = interpolate_start_length(
         0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k]
@@ -209,10 +206,7 @@ def _have_similar_lengths(bonds, i, k, clocks):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _have_same_range(bonds, i, k, clocks, law, status):
-    """Return whether two strips cover nearly the same range.
-
-    Both can then be spread over their mean range.
-    """
+    """Return whether two strips cover nearly the same range, so that both can be spread over its mean."""
     low_i = min(bonds[STRIP.start, i], bonds[STRIP.end, i])
     high_i = max(bonds[STRIP.start, i], bonds[STRIP.end, i])
     low_k = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
@@ -260,7 +254,7 @@ def _join_clocks(bonds, i, k):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_ends(bonds, i, k, clocks, law):
-    """Join two strips of one pass that lie end to end; their first moments are kept."""
+    """Join two adjacent strips of a single pass; their first moments are conserved."""
     form = law[LAW.form]
     if form == FORM_REPORT_GROWING:
         length_1 = _joint_start_length(GAUSS_POINT_1, bonds, i, k, clocks)
@@ -283,14 +277,14 @@ def _join_ends(bonds, i, k, clocks, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _joint_start_length(gauss, bonds, i, k, clocks):
-    """Return the scaled starting length at a Gauss point of two joined strips; 0 if full-grown."""
-    if _is_full_grown(bonds, k, clocks):
+    """Return the scaled starting length at a Gauss point of two joined strips; 0 if fully grown."""
+    if _is_fully_grown(bonds, k, clocks):
         return 0.0
     width_i = bonds[STRIP.clock_width, i]
     width_k = bonds[STRIP.clock_width, k]
-    place = gauss * (width_i + width_k)
-    j = k if place <= width_k else i
-    fraction = place / width_k if place <= width_k else (place - width_k) / width_i
+    position = gauss * (width_i + width_k)
+    j = k if position <= width_k else i
+    fraction = position / width_k if position <= width_k else (position - width_k) / width_i
     return interpolate_start_length(
         fraction, bonds[GROWING_ROW.length_1, j], bonds[GROWING_ROW.length_2, j]
     )
@@ -298,7 +292,7 @@ def _joint_start_length(gauss, bonds, i, k, clocks):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _spread_strip(bonds, k, law):
-    """Turn a strip of one pass into one that is spread evenly over its range."""
+    """Turn a strip of a single pass into a spread strip over its range."""
     low = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
     high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
     bonds[STRIP.start, k] = low
@@ -310,7 +304,10 @@ def _spread_strip(bonds, k, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_to_spread_strip(bonds, i, k, was_spread, clocks, law):
-    """Add strip k to the spread strip i, over their mean range weighted with the path covered."""
+    """Add strip k to the spread strip i.
+
+    The range of the sum is the mean of both ranges, weighted by the paths that both cover.
+    """
     form = law[LAW.form]
     path_i = bonds[STRIP.covered, i]
     path_k = bonds[STRIP.covered, k]

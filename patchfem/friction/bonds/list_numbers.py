@@ -4,13 +4,18 @@ from math import ceil, gamma
 
 import numpy as np
 
-from .list_forms_kernels import FORM_MOMENTS, FORM_POWER, FORM_REPORT, FORM_REPORT_GROWING
+from .list_forms_kernels import (
+    FORM_MOMENTS,
+    FORM_POWER,
+    FORM_REPORT,
+    FORM_REPORT_GROWING,
+    N_TABLE_STEPS,
+)
 from .list_rows_kernels import LAW, STATUS, ListStatus
 from .parameters import Bonds
 
 MAX_DAMAGE = 745.0  # damage beyond which exp(-damage) is zero
 MAX_STRIPS_PER_LENGTH = 4  # largest number of strips of an increment per bond length
-N_TABLE_STEPS = 32  # nodes of the table of P(p + 1, x) per unit of x
 N_JACOBI_POINTS = 4  # Gauss-Jacobi points of the form POWER
 N_LAW_NUMBERS = 24  # numbers of a law, with the points and weights of two powers
 N_WORK_STRIPS = 64  # additional strips for work space, besides those of an increment

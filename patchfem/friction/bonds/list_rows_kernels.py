@@ -1,13 +1,13 @@
-"""Named positions in the arrays of a list of strips of bonds (eq. 2.17).
+"""Named indices of the arrays of a list of strips of bonds (eq. 2.17).
 
 A strip holds the bonds that formed on one straight increment, or on several increments that were merged. Some rows of
 the array of strips depend on the form of the sum (`list_forms_kernels`): `MOMENT` names the rows of a strip that is
 known by its moments; `POWER_ROW`, `REPORT_ROW` and `GROWING_ROW` name what the other forms keep beside the rows of
 `STRIP`.
 
-The clock of a form is the quantity that ages a bond: the damage int dR/eps for reading="stretch", and the path R [m]
-for reading="report". A scaled number is multiplied by exp(clock - reference), so that ageing multiplies the whole sum by
-one number. A relative pressure is divided by the pressure of the friction limit.
+The clock of a form is the quantity by which a bond ages: the damage int dR/eps for reading="stretch", and the path R [m]
+for reading="report". A scaled number contains the factor exp(clock - reference), so that ageing multiplies the sum over
+all strips by a single number. A relative pressure is a pressure / pressure of the friction limit.
 """
 
 from typing import NamedTuple
@@ -16,10 +16,10 @@ from typing import NamedTuple
 class StripRows(NamedTuple):
     """Rows of the array of strips.
 
-    - start, end: relative displacement [m] at the start and at the end of the strip; of a spread strip, which stands
-      for several passes over the same range, the lower and the upper end of this range
+    - start, end: relative displacement [m] at the start and at the end of the strip; of a spread strip, which
+      represents several passes over the same range, the lower and the upper end of this range
     - clock, clock_width: clock at the end of the strip, and the part of it that the strip covers
-    - weight: path/eps^p in the form POWER, else the path [m]; times the relative pressure
+    - weight: path/eps^p in the form FORM_POWER, else the path [m]; times the relative pressure
     - covered, path: path [m] that the strip covers, and the path at its end
     """
 
@@ -33,7 +33,7 @@ class StripRows(NamedTuple):
 
 
 class MomentRows(NamedTuple):
-    """Rows of a strip in the form MOMENTS: centre [m], variance [m2] and scaled weight [m]."""
+    """Rows of a strip in the form FORM_MOMENTS: centre [m], variance [m2] and scaled weight [m]."""
 
     centre: int = 0
     variance: int = 1
@@ -41,7 +41,7 @@ class MomentRows(NamedTuple):
 
 
 class PowerRows(NamedTuple):
-    """Rows of a strip in the form POWER: scaled weights at both Gauss points.
+    """Rows of a strip in the form FORM_POWER: scaled weights at both Gauss points.
 
     A spread strip has its whole weight in the first row.
     """
@@ -51,13 +51,13 @@ class PowerRows(NamedTuple):
 
 
 class ReportRows(NamedTuple):
-    """Row of a strip in the form PRINTED: relative pressure at which its bonds formed."""
+    """Row of a strip in the form FORM_REPORT: relative pressure at which its bonds formed."""
 
     pressure: int = 5
 
 
 class GrowingRows(NamedTuple):
-    """Rows of a strip in the form PRINTED_GROWING.
+    """Rows of a strip in the form FORM_REPORT_GROWING.
 
     They are the scaled starting lengths [m] of the bonds at both Gauss points.
     """
@@ -67,14 +67,14 @@ class GrowingRows(NamedTuple):
 
 
 class LawNumbers(NamedTuple):
-    """Positions in the numbers of a law, see `list_numbers.law_numbers`.
+    """Indices of the parameters of a law in the array of `list_numbers.law_numbers`.
 
     - order, form: exponent p, and the form of the sum
     - length, initial: bond length eps_0 [m], density m_0 of the initial bonds [1]
     - inverse_gamma: 1/Gamma(p + 1)
     - merge_width: largest width of a merged strip of age 0 [bond lengths]; 0 merges nothing
     - cutoff: age on the clock beyond which strips are dropped
-    - half_width: half the width [m] over which the initial bonds are spread; 0 puts all at one place
+    - half_width: half the width [m] over which the initial bonds are distributed; 0 puts all at one displacement
     - nodes: first of 16 numbers: four Gauss-Jacobi points and weights for |u|^p, and four for |u|^(p + 1)
     """
 
@@ -90,7 +90,7 @@ class LawNumbers(NamedTuple):
 
 
 class Clocks(NamedTuple):
-    """Positions in the clocks of a list.
+    """Indices of the clocks of a list.
 
     - displacement, path: relative displacement and path [m] since the start
     - damage: int dR/eps, with the bond length of each step
@@ -108,15 +108,15 @@ class Clocks(NamedTuple):
 
 
 class ListStatus(NamedTuple):
-    """Positions in the status of a list.
+    """Indices of the status of a list.
 
     - head, end: first strip, and last strip + 1
-    - n_spread: number of spread strips, which stand at the head
+    - n_spread: number of spread strips, which are the first ones of the list
     - n_after_merge: number of strips after the last merge
     - energy, force: stored energy [m] and force [1] of the bonds, per friction limit mu_s N
     - created, dissipated: energies [m] since the start, per friction limit
-    - n_extra: strips beyond one per step
-    - n_unlike: merged strips whose ranges differ
+    - n_extra: number of strips in excess of one per step
+    - n_unlike: number of merged strips whose ranges differ
     - max_strips: largest number of strips
     - owed: energy [m] that the next dissipation repays, see `dynamics.interfaces.list_kernels`
     - room_start, room_end: columns of the array that belong to this list

@@ -12,10 +12,9 @@ import numpy as np
 from numba import uint64
 
 from ...compiled.jit import njit
-from ..flags_kernels import NJIT_NO_REFCOUNT
+from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .list_forms_kernels import FORM_POWER, GAUSS_POINT_1, GAUSS_POINT_2
 from .list_math_kernels import (
-    FASTMATH_FLAGS,
     bond_gammainc,
     fast_exp,
     fast_log,
@@ -34,7 +33,7 @@ MIN_SPREAD_RATIO = 1e-4
 
 
 class BondSum(NamedTuple):
-    """Sums over bonds of force and of stored energy; the units depend on the form of the sum."""
+    """Sums of force and stored energy over bonds; the units depend on the form of the sum."""
 
     force: float
     energy: float
@@ -49,14 +48,17 @@ class Moments(NamedTuple):
 
 
 class MatureBonds(NamedTuple):
-    """Length [m] of mature bonds now, and exp(reference - J), which rescales starting lengths."""
+    """Present length [m] of mature bonds, and factor exp(reference - J) of scaled starting lengths."""
 
     length: float
     scale: float
 
 
 class StripRange(NamedTuple):
-    """Strips of a list: spread ones from `head` to `first`, then single passes up to `end`."""
+    """Indices of the strips of a list.
+
+    Spread strips are those from `head` to `first`, and strips of a single pass those from `first` to `end`.
+    """
 
     head: int
     first: int
@@ -65,7 +67,7 @@ class StripRange(NamedTuple):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def sum_moments(displacement, scale, bonds, strips):
-    """Sum the moments of strips in the form MOMENTS; 0.3 ns per strip.
+    """Sum the moments of strips in the form FORM_MOMENTS; 0.3 ns per strip.
 
     Parameters
     ----------
@@ -95,6 +97,15 @@ def sum_moments(displacement, scale, bonds, strips):
     return Moments(m * scale, z * scale, s2 * scale)
 
 
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
+def _gauss_stretches(displacement, bonds, k):
+    """Return the stretch u [m] of the bonds at both Gauss points of a strip."""
+    end = bonds[STRIP.end, k]
+    step = end - bonds[STRIP.start, k]
+    at_end = displacement - end
+    return at_end + GAUSS_POINT_1 * step, at_end + GAUSS_POINT_2 * step
+
+
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _sum_gauss_powers(displacement, bonds, first, end, p):
     """Sum w |u|^p sgn u and w |u|^(p + 1) over both Gauss points of strips of one pass."""
@@ -102,30 +113,21 @@ def _sum_gauss_powers(displacement, bonds, first, end, p):
     energy = 0.0
     if p == 0.0:
         for k in range(uint64(first), uint64(end)):
-            place = bonds[STRIP.end, k]
-            step = place - bonds[STRIP.start, k]
-            u_1 = displacement - place + GAUSS_POINT_1 * step
-            u_2 = displacement - place + GAUSS_POINT_2 * step
+            u_1, u_2 = _gauss_stretches(displacement, bonds, k)
             weight_1 = bonds[POWER_ROW.weight_1, k]
             weight_2 = bonds[POWER_ROW.weight_2, k]
             force += np.copysign(weight_1, u_1) + np.copysign(weight_2, u_2)
             energy += weight_1 * abs(u_1) + weight_2 * abs(u_2)
     elif p == 2.0:
         for k in range(uint64(first), uint64(end)):
-            place = bonds[STRIP.end, k]
-            step = place - bonds[STRIP.start, k]
-            u_1 = displacement - place + GAUSS_POINT_1 * step
-            u_2 = displacement - place + GAUSS_POINT_2 * step
+            u_1, u_2 = _gauss_stretches(displacement, bonds, k)
             force_1 = bonds[POWER_ROW.weight_1, k] * u_1 * u_1
             force_2 = bonds[POWER_ROW.weight_2, k] * u_2 * u_2
             force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
             energy += force_1 * abs(u_1) + force_2 * abs(u_2)
     else:
         for k in range(uint64(first), uint64(end)):
-            place = bonds[STRIP.end, k]
-            step = place - bonds[STRIP.start, k]
-            u_1 = displacement - place + GAUSS_POINT_1 * step
-            u_2 = displacement - place + GAUSS_POINT_2 * step
+            u_1, u_2 = _gauss_stretches(displacement, bonds, k)
             force_1 = bonds[POWER_ROW.weight_1, k] * fast_exp(p * fast_log(abs(u_1)))
             force_2 = bonds[POWER_ROW.weight_2, k] * fast_exp(p * fast_log(abs(u_2)))
             force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
@@ -167,7 +169,7 @@ def _integrate_power_strip(displacement, bonds, k, p, nodes, is_force):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def average_spread(displacement, low, high, p):
-    """Average |u|^p sgn u and |u|^(p + 1) over bonds that are spread evenly over a range.
+    """Average |u|^p sgn u and |u|^(p + 1) over bonds that are distributed uniformly over a range.
 
     Parameters
     ----------
@@ -235,7 +237,7 @@ def sum_linear_density(displacement, start, end, weights, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_powers(displacement, damage, bonds, strips, law):
-    """Sum |u|^p over strips in the form POWER (eq. 2.17 with reading="stretch").
+    """Sum |u|^p over strips in the form FORM_POWER (eq. 2.17 with reading="stretch").
 
     Two Gauss points per strip are exact enough away from u = 0. A strip near u = 0 is integrated from there; if it is
     as narrow for its age as a merged strip, its density is taken as linear.
@@ -309,12 +311,12 @@ def _sum_report_closed(displacement, path, bonds, strips, law):
     phi_1 = linear * (1.0 if p == 1.0 else 0.0)
     phi_2 = quadratic
     for k in range(uint64(strips.first), uint64(strips.end)):
-        place = bonds[STRIP.end, k]
-        step = place - bonds[STRIP.start, k]
+        end = bonds[STRIP.end, k]
+        step = end - bonds[STRIP.start, k]
         direction = np.copysign(1.0, step)
         near = path - bonds[STRIP.clock, k]
-        turn = min(max(direction * (place - displacement), 0.0), abs(step))
-        # path since the bonds at the end, at u = 0 and at the start of the strip formed
+        turn = min(max(direction * (end - displacement), 0.0), abs(step))
+        # path / eps_0 since bonds formed: at the end of the strip, at u = 0 and at its start
         x = near / eps0
         y = (near + turn) / eps0
         z = (near + abs(step)) / eps0
@@ -330,7 +332,7 @@ def _sum_report_closed(displacement, path, bonds, strips, law):
         density_y = exp_y * y * (phi_0 + y * (phi_1 + y * phi_2))
         density_z = exp_z * z * (phi_0 + z * (phi_1 + z * phi_2))
         lever = (p + 1) * signed + 2 * density_y - density_x - density_z
-        offset = direction * (displacement - place - direction * near)
+        offset = direction * (displacement - end - direction * near)
         force += pressure * (direction * signed)
         energy += pressure * (offset * signed + eps0 * lever)
     return BondSum(force, energy)
@@ -351,11 +353,11 @@ def _sum_report_table(displacement, path, bonds, strips, law, table):
     last = -1.0
     last_lever = 0.0
     for k in range(strips.end - 1, strips.first - 1, -1):
-        place = bonds[STRIP.end, k]
-        step = place - bonds[STRIP.start, k]
+        end = bonds[STRIP.end, k]
+        step = end - bonds[STRIP.start, k]
         direction = np.copysign(1.0, step)
         near = path - bonds[STRIP.clock, k]
-        turn = min(max(direction * (place - displacement), 0.0), abs(step))
+        turn = min(max(direction * (end - displacement), 0.0), abs(step))
         x = near / eps0
         z = (near + abs(step)) / eps0
         if last < 0:
@@ -374,7 +376,7 @@ def _sum_report_table(displacement, path, bonds, strips, law, table):
         signed = last - 2 * p_y + p_x
         lever = last_lever - 2 * lever_y + lever_x
         pressure = bonds[REPORT_ROW.pressure, k]
-        offset = direction * (displacement - place - direction * near)
+        offset = direction * (displacement - end - direction * near)
         force += pressure * (direction * signed)
         energy += pressure * (offset * signed + eps0 * lever)
     return BondSum(force, energy)
@@ -435,51 +437,36 @@ def _integrate_lever(p, x, gamma_p, inverse_gamma):
     return (p + 1) * gamma_p - inverse_gamma * fast_exp((p + 1) * fast_log(x) - x)
 
 
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
+def _gauss_path_ratios(path, mature, bonds, k):
+    """Return the path / bond length R/eps of growing bonds at both Gauss points of a strip."""
+    near = path - bonds[STRIP.clock, k]
+    width = bonds[STRIP.clock_width, k]
+    min_length = MIN_LENGTH * mature.length
+    length_1 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length)
+    length_2 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length)
+    path_1 = max(near + GAUSS_POINT_1 * width, MIN_PATH)
+    path_2 = max(near + GAUSS_POINT_2 * width, MIN_PATH)
+    return path_1 / length_1, path_2 / length_2
+
+
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _sum_gauss_growing(displacement, path, mature, bonds, first, end, p):
-    """Sum W/2 f(R/length) sgn u, and this times |u|, over strips of growing bonds.
-
-    Each strip has two Gauss points.
-    """
+    """Sum W/2 f(R/eps) sgn u, and this times |u|, over both Gauss points of growing strips."""
     force = 0.0
     energy = 0.0
-    min_length = MIN_LENGTH * mature.length
     if p == 1.0:
         for k in range(uint64(first), uint64(end)):
-            place = bonds[STRIP.end, k]
-            width = bonds[STRIP.clock_width, k]
-            near = path - bonds[STRIP.clock, k]
-            step = place - bonds[STRIP.start, k]
-            u_1 = displacement - place + GAUSS_POINT_1 * step
-            u_2 = displacement - place + GAUSS_POINT_2 * step
-            length_1 = max(
-                mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length
-            )
-            length_2 = max(
-                mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length
-            )
-            x_1 = (near + GAUSS_POINT_1 * width) / length_1
-            x_2 = (near + GAUSS_POINT_2 * width) / length_2
+            u_1, u_2 = _gauss_stretches(displacement, bonds, k)
+            x_1, x_2 = _gauss_path_ratios(path, mature, bonds, k)
             force_1 = bonds[STRIP.weight, k] * x_1 * fast_exp(-x_1)
             force_2 = bonds[STRIP.weight, k] * x_2 * fast_exp(-x_2)
             force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
             energy += force_1 * abs(u_1) + force_2 * abs(u_2)
     else:
         for k in range(uint64(first), uint64(end)):
-            place = bonds[STRIP.end, k]
-            width = bonds[STRIP.clock_width, k]
-            near = path - bonds[STRIP.clock, k]
-            step = place - bonds[STRIP.start, k]
-            u_1 = displacement - place + GAUSS_POINT_1 * step
-            u_2 = displacement - place + GAUSS_POINT_2 * step
-            length_1 = max(
-                mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length
-            )
-            length_2 = max(
-                mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length
-            )
-            x_1 = max(near + GAUSS_POINT_1 * width, MIN_PATH) / length_1
-            x_2 = max(near + GAUSS_POINT_2 * width, MIN_PATH) / length_2
+            u_1, u_2 = _gauss_stretches(displacement, bonds, k)
+            x_1, x_2 = _gauss_path_ratios(path, mature, bonds, k)
             force_1 = bonds[STRIP.weight, k] * fast_exp(p * fast_log(x_1) - x_1)
             force_2 = bonds[STRIP.weight, k] * fast_exp(p * fast_log(x_2) - x_2)
             force += np.copysign(force_1, u_1) + np.copysign(force_2, u_2)
@@ -494,7 +481,7 @@ def interpolate_start_length(fraction, length_1, length_2):
     Parameters
     ----------
     fraction : float
-        Place as a fraction of the strip from its end.
+        Position as a fraction of the strip, measured from its end.
     length_1, length_2 : float
         Values at the Gauss points, 0 once nothing is left of them.
 
@@ -570,7 +557,7 @@ def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _spread_growing_strip(displacement, path, mature, bonds, k, p):
-    """Treat a strip of growing bonds as spread evenly over its range; each bond keeps its age."""
+    """Sum a strip of growing bonds as if spread uniformly over its range; each bond keeps its age."""
     low = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
     high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
     average = average_spread(displacement, low, high, 0.0)
@@ -621,14 +608,8 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
             exact = _integrate_growing_strip(displacement, path, mature, bonds, k, p)
         force += exact.force - gauss.force
         energy += exact.energy - gauss.energy
-    min_length = MIN_LENGTH * mature.length
     for k in range(strips.head, strips.first):
-        near = path - bonds[STRIP.clock, k]
-        width = bonds[STRIP.clock_width, k]
-        length_1 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length)
-        length_2 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length)
-        x_1 = max(near + GAUSS_POINT_1 * width, MIN_PATH) / length_1
-        x_2 = max(near + GAUSS_POINT_2 * width, MIN_PATH) / length_2
+        x_1, x_2 = _gauss_path_ratios(path, mature, bonds, k)
         carried = fast_exp(p * fast_log(x_1) - x_1) + fast_exp(p * fast_log(x_2) - x_2)
         carried *= 0.5 * bonds[STRIP.weight, k]
         average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], 0.0)
@@ -641,8 +622,8 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
 def sum_initial(displacement, path, damage, law):
     """Return force and energy of the initial bonds: density m_0, unstressed at displacement 0.
 
-    Their force may jump there: at the place itself, to the round-off of the path, it is 0, the mean of both sides. If
-    the law spreads them over a width, they store nothing at displacement 0.
+    Their force may jump at displacement 0, to the round-off of the path; there it is 0, the mean of both sides. If the
+    law distributes them over a width, they store nothing at displacement 0.
 
     Parameters
     ----------
@@ -685,7 +666,7 @@ def sum_initial(displacement, path, damage, law):
 def average_initial(increment, displacement, path, law):
     """Average the force of the initial bonds of reading="report" over an increment, exactly.
 
-    The force jumps at the place of the bonds, or turns over the width that they are spread over.
+    The force jumps at displacement 0, or changes its sign over the width over which the bonds are distributed.
 
     Parameters
     ----------
@@ -706,7 +687,7 @@ def average_initial(increment, displacement, path, law):
     if law[LAW.initial] == 0:
         return 0.0
     direction = np.copysign(1.0, increment)
-    # lengths of the increment before, inside and behind the range of the bonds
+    # lengths of the increment before it enters and before it leaves the range of the bonds
     enter = min(max(-direction * displacement - half_width, 0.0), size)
     leave = min(max(-direction * displacement + half_width, 0.0), size)
     p_start = bond_gammainc(p, path / eps0)

@@ -6,10 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAX_EXPONENT = 1e100  # exponents of growth beyond which the bond length no longer changes
-MAX_LIST_SECONDS = 600.0  # largest estimated CPU seconds of a run with a list of bonds
-SAME_SPEED_TOL = 1e-6  # relative difference of two speeds; below it their mean is accurate and avoids cancellation
-MAX_LINEAR_GROWTH = 1e-9  # growth J of a step below which the growth along it is linear
+MAX_EXPONENT = 1e100  # exponent of growth beyond which the bond length no longer changes
+MAX_LIST_SECONDS = 600.0  # largest estimated CPU time [s] of a run with a list of bonds
+SAME_SPEED_TOL = (
+    1e-6  # relative difference of two speeds below which their mean is used, to avoid cancellation
+)
+MAX_LINEAR_GROWTH = 1e-9  # growth J of a step up to which the growth along it counts as linear
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,7 @@ def grown_fraction(growth, back):
     growth : array
         Growth J of the step, which multiplies the distance to the target length by exp(-J).
     back : array
-        Place as a fraction of the step from its end.
+        Position as a fraction of the step, measured from its end.
 
     Returns
     -------
@@ -94,10 +96,9 @@ def split_elastic(law: Bonds, play, increment, eps) -> ElasticSplit:
 
     Source: Visintin, Differential Models of Hysteresis, 1994.
 
-    The play says where the displacement stands in its elastic range, of half width breakaway eps: -1 and 1 at the ends.
-    Inside, bonds stretch, and none breaks or forms; the play keeps its value if the width changes with eps. At an end
-    an outward displacement moves the range along and damages bonds. A motion to and fro within the range leaves no
-    trace, and the statements about energy hold with the damaging path.
+    The play is the position in the elastic range, of half width breakaway eps, from -1 to 1 at its ends. Within the
+    range, bonds stretch, and none breaks or forms. At an end, an outward displacement moves the range and damages bonds.
+    The play does not change when eps changes the width of the range. A motion within the range leaves no trace.
 
     Parameters
     ----------

@@ -2,8 +2,8 @@
 
 m [Pa], z [Pa m] and s2 [Pa m2] are the sums over the bonds of a point: density, stretch and stretch squared. sigma [Pa]
 is the pressure under which new bonds form, eps [m] the bond length of the step. The traction is mu_s/eps_0 z.
-Functions named short_* hold for increments up to MAX_SHORT bond lengths and have no branch, so that loops over points
-vectorise. All arrays are C-ordered float64.
+Functions named short_* hold for increments up to MAX_SHORT_PATH bond lengths and have no branch, so that loops over
+points vectorise. All arrays are C-ordered float64.
 """
 
 from math import exp, factorial, log
@@ -14,15 +14,17 @@ import numpy as np
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
-MAX_SHORT_PATH = 0.5  # path in bond lengths; below it, the power series are exact to round-off
+MAX_SHORT_PATH = 0.5  # path in bond lengths up to which the power series are exact to round-off
 MAX_SERIES_PATH = (
     0.03  # path in bond lengths; below it, half of the terms of the first series suffice
 )
 # coefficients of (exp(-x) - 1 + x)/x^2 and of the integral of y^3 exp(-y) over x^4, both as series in -x
 SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(13)])
 MOMENT_SERIES = np.array([1 / (factorial(k) * (k + 4)) for k in range(13)])
-N_SHORT_TERMS = 7  # number of terms of the series that suffice up to MAX_SERIES
-MAX_EXPONENT = 1e100  # exponents of growth beyond which the bond length no longer changes
+N_SHORT_TERMS = 7  # number of terms of SHAPE_SERIES for paths up to MAX_SERIES_PATH
+MAX_EXPONENT = 1e100  # exponent of growth beyond which the bond length no longer changes
+# relative difference of two speeds below which their mean is used, to avoid cancellation
+SAME_SPEED_TOL = 1e-6
 
 
 class ShapeFunctions(NamedTuple):
@@ -113,7 +115,7 @@ def bond_mean(m, z, increment, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short_bond_mean(m, z, increment, sigma, eps):
-    """Return `bond_mean` of an increment up to MAX_SHORT eps.
+    """Return `bond_mean` of an increment up to MAX_SHORT_PATH eps.
 
     Parameters
     ----------
@@ -161,7 +163,7 @@ def bond_step(m, z, s2, increment, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short_bond_step(m, z, s2, increment, sigma, eps):
-    """Return `bond_step` of an increment up to MAX_SHORT eps.
+    """Return `bond_step` of an increment up to MAX_SHORT_PATH eps.
 
     Parameters
     ----------
@@ -220,7 +222,7 @@ def elastic_bond_mean(m, z, play, half, increment, sigma, eps):
     m, z, increment, sigma, eps : float
         As in `bond_mean`.
     play, half : float
-        Place in the elastic range, -1 to 1, and half its width [m].
+        Position in the elastic range, -1 to 1, and half its width [m].
 
     Returns
     -------
@@ -228,14 +230,16 @@ def elastic_bond_mean(m, z, play, half, increment, sigma, eps):
         As in `bond_mean`.
     """
     elastic = _split_elastic(play, increment, half)[0]
-    rest = increment - elastic
-    if rest == 0.0 or abs(increment) < 1e-280:  # a quotient by a smaller increment would overflow
+    damaging = increment - elastic
+    if (
+        damaging == 0.0 or abs(increment) < 1e-280
+    ):  # a quotient by a smaller increment would overflow
         return z + 0.5 * m * increment, 0.5 * m
     if elastic == 0.0:
         return bond_mean(m, z, increment, sigma, eps)
-    mean, slope = bond_mean(m, z + m * elastic, rest, sigma, eps)
-    total = (elastic * (z + 0.5 * m * elastic) + rest * mean) / increment
-    return total, (mean + slope * rest - total) / increment
+    mean, slope = bond_mean(m, z + m * elastic, damaging, sigma, eps)
+    total = (elastic * (z + 0.5 * m * elastic) + damaging * mean) / increment
+    return total, (mean + slope * damaging - total) / increment
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -252,7 +256,7 @@ def elastic_bond_step(m, z, s2, play, half, increment, sigma, eps):
     Returns
     -------
     step, play : BondStep, float
-        Bonds after the increment, and their place in the elastic range.
+        Bonds after the increment, and their position in the elastic range.
     """
     elastic, play = _split_elastic(play, increment, half)
     s2 += elastic * (2 * z + m * elastic)
@@ -278,31 +282,31 @@ def grow(eps, v0, v1, path, dt, growth):
     eps, exponent : float
         Bond length after [m]; the distance to its target has decayed by exp(-exponent).
     """
-    a_s, l_k, floor, eps0, epsk = growth[0], growth[1], growth[2], growth[3], growth[4]
+    a_s, l_k, min_speed, eps_0, eps_k = growth[0], growth[1], growth[2], growth[3], growth[4]
     if a_s < 0:
         return eps, 0.0
-    if max(abs(v0), abs(v1)) < floor:
-        rest = a_s * dt / floor
-    elif abs(v1 - v0) > 1e-6 * (abs(v0) + abs(v1)):
-        rest = a_s * dt * (_integrate_slowness(v1, floor) - _integrate_slowness(v0, floor))
-        rest /= v1 - v0
+    if max(abs(v0), abs(v1)) < min_speed:
+        healing = a_s * dt / min_speed
+    elif abs(v1 - v0) > SAME_SPEED_TOL * (abs(v0) + abs(v1)):
+        healing = _integrate_slowness(v1, min_speed) - _integrate_slowness(v0, min_speed)
+        healing = a_s * dt * healing / (v1 - v0)
     else:
-        rest = a_s * dt / max(abs(v0 + v1) / 2, floor)
-    rest = min(rest, MAX_EXPONENT)
-    slide = min(path / l_k, MAX_EXPONENT)
-    total = rest + slide
+        healing = a_s * dt / max(abs(v0 + v1) / 2, min_speed)
+    healing = min(healing, MAX_EXPONENT)
+    weakening = min(path / l_k, MAX_EXPONENT)
+    total = healing + weakening
     if total == 0:
         return eps, 0.0
-    target = (rest * eps0 + slide * epsk) / total
+    target = (healing * eps_0 + weakening * eps_k) / total
     return target + (eps - target) * exp(-total), total
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_slowness(v, floor):
-    """Return the integral of 1/max(|v|, floor) from 0 to v."""
-    if abs(v) < floor:
-        return v / floor
-    return (1 + log(abs(v) / floor)) * (1.0 if v > 0 else -1.0)
+def _integrate_slowness(v, min_speed):
+    """Return the integral of 1/max(|v|, min_speed) from 0 to v."""
+    if abs(v) < min_speed:
+        return v / min_speed
+    return (1 + log(abs(v) / min_speed)) * (1.0 if v > 0 else -1.0)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)

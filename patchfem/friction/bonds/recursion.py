@@ -1,6 +1,4 @@
-"""Bond law for reading="stretch" and p = 1, summed exactly, on a line or in a plane.
-
-The state has a constant size.
+"""Bond law for reading="stretch" and p = 1, summed exactly by moments, on a line or in a plane.
 
 With k = exp(-int dR/eps) the surviving fraction of a bond, u its stretch and 1/eps frozen when it forms, the sums over
 all bonds
@@ -50,7 +48,7 @@ class BondState(NamedTuple):
 
     - bonds: m [Pa], the components of z [Pa m] and s2 [Pa m2], (d + 2, m)
     - eps: bond length [m], common or per point (m,)
-    - play: place in the elastic range [1], see `parameters.split_elastic`
+    - play: position in the elastic range [1], see `parameters.split_elastic`
     """
 
     bonds: np.ndarray

@@ -31,11 +31,7 @@ from scipy.special import gammainc, gammaln, roots_jacobi
 from .parameters import Bonds, grown_fraction
 
 N_POINTS = 8  # number of Gauss points of a piece
-N_POINTS_SHORT = 3  # number of Gauss points of a piece that is short by MAX_SHORT_RATIO
 MAX_PIECE_LENGTH = 0.25  # longest piece in bond lengths
-# length of a strip / distance of a non-smooth point and / bond length, and growth J in the strip, below which a strip is
-# short
-MAX_SHORT_RATIO = 0.1
 MAX_GROWTH_PIECES = 16  # largest number of pieces of a strip due to growth, one per unit of J
 FULL_GROWTH = 36.0  # growth J after which the starting length of a bond does not matter
 # relative displacement since a cohort formed / path since then; below it, the cohort counts as unstressed
@@ -154,14 +150,12 @@ class _Pieces(NamedTuple):
     - strip: index of the strip
     - start, length: distance of the piece from the end of the strip, and length [m]
     - steep_end: 1 if the integrand grows as a power from the start of the piece, -1 from its far end, 0 otherwise
-    - is_short: whether N_POINTS_SHORT points are accurate enough
     """
 
     strip: np.ndarray
     start: np.ndarray
     length: np.ndarray
     steep_end: np.ndarray
-    is_short: np.ndarray
 
 
 class _GaussRule(NamedTuple):
@@ -296,21 +290,13 @@ def _report_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
 def _gauss_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
     """Integrate strips by Gauss points on the pieces of `_divide_strips`."""
     pieces = _divide_strips(strips, now, law)
-    n_strips, n_directions = strips.direction.shape
-    weights = np.zeros((n_strips, n_directions + 1))
-    for is_short in (False, True):
-        chosen = pieces.is_short == is_short
-        start, length = pieces.start[chosen, None], pieces.length[chosen, None]
-        owner = pieces.strip[chosen]
-        if is_short:
-            rule = _legendre_rule(N_POINTS_SHORT)
-        else:
-            rule = _rules_of_pieces(pieces.steep_end[chosen], law.order)
-        distance = start + length * rule.points
-        found = _sum_points(strips.select(owner), now, distance, length * rule.weights, law)
-        for column in range(n_directions + 1):
-            weights[:, column] += np.bincount(owner, found[:, column], n_strips)
-    return weights
+    n_strips = len(strips.length)
+    rule = _rules_of_pieces(pieces.steep_end, law.order)
+    start, length = pieces.start[:, None], pieces.length[:, None]
+    distance = start + length * rule.points
+    sums = _sum_points(strips.select(pieces.strip), now, distance, length * rule.weights, law)
+    weights = [np.bincount(pieces.strip, column, n_strips) for column in sums.T]
+    return np.stack(weights, axis=1)
 
 
 def _sum_points(strips: Strip, now: PathState, distance, weight, law: Bonds) -> np.ndarray:
@@ -359,13 +345,11 @@ def _divide_strips(strips: Strip, now: PathState, law: Bonds) -> _Pieces:
     is_steep = law.reading == "stretch"
     starts_steep = parts.is_zero_at_start & is_steep
     ends_steep = parts.is_zero_at_end & is_steep
-    is_short = parts.length <= MAX_SHORT_RATIO * np.minimum(distances.nearest, eps)
-    is_short &= (growth <= MAX_SHORT_RATIO) & ~starts_steep & ~ends_steep
     count = np.maximum(
         parts.length / (MAX_PIECE_LENGTH * eps), np.minimum(growth, MAX_GROWTH_PIECES)
     )
-    count = np.where(is_short, 1, np.maximum(1, np.ceil(count))).astype(int)
-    is_near_singular = (distances.nearest < parts.length / count) & ~is_short
+    count = np.maximum(1, np.ceil(count)).astype(int)
+    is_near_singular = distances.nearest < parts.length / count
 
     even = np.flatnonzero(~is_near_singular)
     part = np.repeat(even, count[even])
@@ -393,7 +377,7 @@ def _divide_strips(strips: Strip, now: PathState, law: Bonds) -> _Pieces:
         for column, values in zip(columns, new):
             column.append(values)
     part, start, length, steep_end = (np.concatenate(column) for column in columns)
-    return _Pieces(parts.strip[part], start, length, steep_end, is_short[part])
+    return _Pieces(parts.strip[part], start, length, steep_end)
 
 
 def _split_at_zero_stretch(strips: Strip, stretch: _Stretch) -> _Parts:
@@ -445,9 +429,9 @@ def _distances(
 
 
 @cache
-def _legendre_rule(n_points: int) -> _GaussRule:
+def _legendre_rule() -> _GaussRule:
     """Return the Gauss-Legendre rule on (0, 1)."""
-    x, weights = np.polynomial.legendre.leggauss(n_points)
+    x, weights = np.polynomial.legendre.leggauss(N_POINTS)
     return _GaussRule((1 + x) / 2, weights / 2)
 
 
@@ -461,7 +445,7 @@ def _jacobi_rule(order: float) -> _GaussRule:
 
 def _rules_of_pieces(steep_end, order: float) -> _GaussRule:
     """Return Gauss rules (n, N_POINTS) of pieces; from a steep end the integrand grows as t^order."""
-    legendre, jacobi = _legendre_rule(N_POINTS), _jacobi_rule(order)
+    legendre, jacobi = _legendre_rule(), _jacobi_rule(order)
     steep_end = steep_end[:, None]
     points = np.where(steep_end == -1, 1 - jacobi.points, legendre.points)
     points = np.where(steep_end == 1, jacobi.points, points)

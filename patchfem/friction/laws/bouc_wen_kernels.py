@@ -1,9 +1,9 @@
 """Bouc-Wen law, compiled. Equations: `bouc_wen`.
 
 numbers: limit mu N [N], length eps [m], exponent n, shape s; memory: z. Over the path x = |dq|/eps, y = z sgn(dq)
-follows dy/dx = 1 - y^n on loading, y > 0, and dy/dx = 1 - g |y|^n with g = 1 - 2 s on unloading. On loading, the
-variable w = -ln(1 - y) removes the knee: dw/dx = (1 - y^n)/(1 - y) lies between 1 and n. The path is an integral over
-w on loading and over |y| on unloading, by a Gauss rule on short pieces. Newton's method inverts it.
+follows dy/dx = 1 - y^n on loading, y > 0, and dy/dx = 1 - g |y|^n on unloading, with g = 1 - 2 s (`unloading`). On
+loading, the variable w = -ln(1 - y) removes the knee: dw/dx = (1 - y^n)/(1 - y) lies between 1 and n. The path is an
+integral over w on loading and over |y| on unloading, by a Gauss rule on short pieces. Newton's method inverts it.
 """
 
 from math import exp, expm1, inf, log, log1p, nan
@@ -25,9 +25,11 @@ IS_RATE_INDEPENDENT = True  # z depends on the path alone
 
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
 MAX_PIECE = 0.25  # longest interval of the Gauss rule in |y| or w
-FIRST_PIECE = 0.05  # longest interval next to zero, where a fractional power is not smooth
+FIRST_PIECE = 0.05  # longest interval at zero, where a fractional power is not smooth
 MAX_W = 36.0  # value of w beyond which y rounds to 1
-NEWTON_TOL = 1e-8  # residual over the path; the omitted step is its square
+NEWTON_TOL = (
+    1e-8  # residual / path at which Newton's method stops; the error is then the square of it
+)
 MAX_NEWTON = 40  # iterations of Newton's method
 
 
@@ -52,41 +54,41 @@ def _loading_rate(w, n):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrand(u, n, give, is_loading):
+def _integrand(u, n, unloading, is_loading):
     """Return dx/du and |y| of the variable u: w on loading, |y| on unloading."""
     if is_loading:
         return 1 / _loading_rate(u, n), -expm1(-u)
-    return 1 / (1 - give * u**n), u
+    return 1 / (1 - unloading * u**n), u
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_piece(low, size, n, give, is_loading):
+def _integrate_piece(low, size, n, unloading, is_loading):
     """Integrate dx and |y| dx over an interval of the integration variable u by the Gauss rule."""
     path = 0.0
     area = 0.0
     for k in range(GAUSS_POINTS.size):
-        rate, y = _integrand(low + size * 0.5 * (1 + GAUSS_POINTS[k]), n, give, is_loading)
+        rate, y = _integrand(low + size * 0.5 * (1 + GAUSS_POINTS[k]), n, unloading, is_loading)
         path += 0.5 * size * GAUSS_WEIGHTS[k] * rate
         area += 0.5 * size * GAUSS_WEIGHTS[k] * rate * y
     return path, area
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_from_zero(size, n, give, is_loading):
-    """Integrate dx and |y| dx from u = 0 over sqrt(u), in which fractional powers are smooth."""
+def _integrate_from_zero(size, n, unloading, is_loading):
+    """Integrate dx and |y| dx from u = 0 in the variable sqrt(u), where fractional powers are smooth."""
     path = 0.0
     area = 0.0
     for k in range(GAUSS_POINTS.size):
         root = 0.5 * (1 + GAUSS_POINTS[k])
         weight = size * GAUSS_WEIGHTS[k] * root
-        rate, y = _integrand(size * root * root, n, give, is_loading)
+        rate, y = _integrand(size * root * root, n, unloading, is_loading)
         path += weight * rate
         area += weight * rate * y
     return path, area
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _integrate_path(low, high, n, give, is_loading):
+def _integrate_path(low, high, n, unloading, is_loading):
     """Integrate dx and |y| dx between two values of u, low < high."""
     path = 0.0
     area = 0.0
@@ -98,18 +100,18 @@ def _integrate_path(low, high, n, give, is_loading):
     is_whole = n % 1 == 0
     if high > 2 * low and low < FIRST_PIECE and not is_whole:
         end = min(high, FIRST_PIECE)
-        part, part_area = _integrate_from_zero(end, n, give, is_loading)
+        part, part_area = _integrate_from_zero(end, n, unloading, is_loading)
         path += part
         area += part_area
         if low > 0:
-            part, part_area = _integrate_from_zero(low, n, give, is_loading)
+            part, part_area = _integrate_from_zero(low, n, unloading, is_loading)
             path -= part
             area -= part_area
         low = end
     while low < high:
         longest = MAX_PIECE if is_whole else min(MAX_PIECE, max(low, FIRST_PIECE))
         size = min(longest, high - low)
-        part, part_area = _integrate_piece(low, size, n, give, is_loading)
+        part, part_area = _integrate_piece(low, size, n, unloading, is_loading)
         path += part
         area += part_area
         low = low + size if size == longest else high
@@ -118,26 +120,26 @@ def _integrate_path(low, high, n, give, is_loading):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _scale_area(area, path, wanted):
-    """Scale an area to the requested path, which Newton's method missed by round-off."""
+    """Scale an area from the path that Newton's method reached to the requested path."""
     return area * (wanted / path) if path > 0 else 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _unload(y, x, n, give):
+def _unload(y, x, n, unloading):
     """Unload from y < 0 over a path x, at most to y = 0.
 
     Returns y, the remaining path and the integral of y.
     """
-    whole, area = _integrate_path(0.0, -y, n, give, False)
-    if whole <= x:
-        return 0.0, x - whole, -area
-    u = max(-y - x * (1 - give * (-y) ** n), 0.0)
+    path_to_zero, area = _integrate_path(0.0, -y, n, unloading, False)
+    if path_to_zero <= x:
+        return 0.0, x - path_to_zero, -area
+    u = max(-y - x * (1 - unloading * (-y) ** n), 0.0)
     for _ in range(MAX_NEWTON):
-        residual = _integrate_path(u, -y, n, give, False)[0] - x
-        u = min(max(u + residual * (1 - give * u**n), 0.0), -y)
+        residual = _integrate_path(u, -y, n, unloading, False)[0] - x
+        u = min(max(u + residual * (1 - unloading * u**n), 0.0), -y)
         if abs(residual) <= NEWTON_TOL * x:
             break
-    path, area = _integrate_path(u, -y, n, give, False)
+    path, area = _integrate_path(u, -y, n, unloading, False)
     return -u, 0.0, -_scale_area(area, path, x)
 
 
@@ -192,9 +194,8 @@ def _knee_rate(u, n, s):
 def _follow_knee(u, x, n, s):
     """Return u = 1 - y after a path x, and the integral of u, near the limit.
 
-    A Runge-Kutta step of order 4 in w gives u, and Simpson's rule the integral.
-
-    The integral over u is that of one over the rate of w.
+    A Runge-Kutta step of order 4 in w gives u. The integral of u over the path is that of 1/(dw/dx) over u, which
+    Simpson's rule gives.
     """
     k0 = _knee_rate(u, n, s)
     k1 = _knee_rate(u * exp_minus(0.5 * x * k0), n, s)
@@ -317,7 +318,7 @@ def start_motion(numbers, memory, direction, states):
 def state_rates(numbers, memory, motion, increment, velocity, states, rates):
     """Write dz/dt [1/s] and return the force [N].
 
-    The side of the kink is that of the motion, not that of a Runge-Kutta stage.
+    The branch is that of the motion before its kink, also for a Runge-Kutta stage beyond the kink.
 
     Returns
     -------
@@ -334,7 +335,7 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Keep z, 0 at the kink, and return nan: the dissipated energy follows from the work.
+    """Set the memory to the final z, 0 at the kink; return nan, because the engine takes the loss from the work.
 
     Returns
     -------

@@ -106,7 +106,7 @@ def _relax(numbers, stretch, increment, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
-    """Return the path-mean force over an increment; without time, no damping acts.
+    """Return the path-mean force over an increment; for dt = 0 it excludes the damping forces.
 
     Returns
     -------
@@ -167,7 +167,7 @@ def relax_stretch(numbers, stretch, increment, dt):
 def start_motion(numbers, memory, direction, states):
     """Set the state z, and return where the rates have a kink.
 
-    Below STRIBECK_END v_s the limit rises, and no step from beyond sees this rise.
+    The limit increases below MAX_STRIBECK_RATIO v_s; a step that starts above would not resolve this increase.
 
     Returns
     -------
@@ -193,7 +193,7 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Keep z and return nan: the dissipated energy follows from the work.
+    """Set the memory to the final stretch; return nan, because the engine takes the loss from the work.
 
     Returns
     -------

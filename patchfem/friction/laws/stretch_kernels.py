@@ -223,13 +223,12 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Advance the memory by the increment of a motion; return the dissipated energy [J].
-
-    The energy is nan if it has to be computed from the work.
+    """Advance the memory by the increment of a motion.
 
     Returns
     -------
     float
+        Dissipated energy [J]; nan if the engine has to take it from the work.
     """
     memory[4] += increment
     if states.size > 0:

@@ -126,7 +126,7 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Return nan: the dissipated energy follows from the work; there is no memory.
+    """Return nan, because the engine takes the dissipated energy from the work; there is no memory.
 
     Returns
     -------
