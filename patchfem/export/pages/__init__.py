@@ -1,8 +1,10 @@
-"""Pages whose pictures the reader's browser draws from the data they hold: one file each, nothing is fetched.
+"""HTML pages of one file each, whose figures the browser draws from data in the page.
 
-In: plain data of a run, of several runs or of a sweep. Out: HTML text. `document` makes the page around its sections,
-`library` packs the drawing library BokehJS of `bokehjs`, and `unpack.js` unpacks it with the data. `curves.js` draws
-the figures of `drawing.charts`; `player` makes the frames of the fields (`thinned` the cells), which `player.js`
-plays on the canvases of `stage.js`; `explorer.js` draws a sweep. Read
-`document` first.
+In: plain data of a run, of several runs or of a sweep. Out: HTML text. A page loads nothing from
+the network: `library` packs the drawing library BokehJS of `bokehjs`, and `unpack.js` unpacks it
+with the data. `document` builds the page around its sections. `curves.js` draws the figures of
+`drawing.charts`. `player` prepares the frames of the fields (`thinned` reduces their cells), which
+`player.js` plays on the canvases of `stage.js`. `explorer.js` draws a sweep.
+
+Read `document` first.
 """

@@ -1,4 +1,4 @@
-"""A page that stands alone: title, verdict, contents, sections, the data and what draws them."""
+"""A self-contained HTML page: title, verdict, contents, sections, data and scripts."""
 
 import json
 import math
@@ -11,16 +11,17 @@ import numpy as np
 
 from . import library
 
-DIGITS = 9  # of the numbers in a page: a picture shows four, a hovered value seven
+DIGITS = 9  # digits of the numbers in a page: a figure shows four, a value under the pointer seven
 NUMBER = f"%.{DIGITS}g,"
 OLD = (
     "The pictures of this page are packed, and this browser cannot unpack them: it has no DecompressionStream, "
     "which browsers have had since 2023. Texts and tables are complete."
 )
 NOT_FINITE = re.compile("nan|-?inf")
-# a word of a scene or a command inside a sentence
+# A word of a scene or of a command inside a sentence stands between two backquotes.
 QUOTED = re.compile(r"`([^`\s](?:[^`\n]*[^`\s])?)`")
-# colours of `drawing.pictures`, and those of the page that stand for them in either theme
+# Colours of `drawing.pictures`, and the colours of the page that replace them in the light and the
+# dark theme.
 INKS = {
     "#ffffff": "paper",
     "#000000": "ink",
@@ -33,7 +34,7 @@ INKS = {
 
 
 class Section(NamedTuple):
-    """A part of a page: its anchor, its heading and its HTML; every text from outside is escaped by who made it."""
+    """A part of a page: its anchor, heading and HTML, in which texts are already escaped."""
 
     anchor: str
     heading: str
@@ -43,11 +44,26 @@ class Section(NamedTuple):
 def document(
     title: str, lead: str, sections: list, data: dict | None = None, scripts: tuple = ()
 ) -> str:
-    """The whole HTML page; what draws it and its data are packed and unpacked by the browser (`unpack.js`).
+    """Build the HTML of a page.
 
-    title: plain text; lead: HTML under it; sections: of Section, one alone has no contents before it; data: what the
-    scripts draw, plain lists and numbers; scripts: names of JavaScript files of this folder, without which no drawing
-    library is put in.
+    The drawing library and the data are packed; the browser unpacks them (`unpack.js`).
+
+    Parameters
+    ----------
+    title : str
+        Plain text.
+    lead : str
+        HTML below the title.
+    sections : list of Section
+        If there is only one, the page has no table of contents.
+    data : dict, optional
+        Data for the scripts: plain lists and numbers.
+    scripts : tuple of str
+        Names of JavaScript files of this folder; without them the page has no drawing library.
+
+    Returns
+    -------
+    str
     """
     contents = "".join(f'<a href="#{one.anchor}">{escape(one.heading)}</a>' for one in sections)
     contents = f"<nav aria-label=Contents>{contents}</nav>\n" if len(sections) > 1 else ""
@@ -76,12 +92,24 @@ def document(
 
 
 def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = "") -> str:
-    """HTML of a table in a frame that scrolls sideways.
+    """Build the HTML of a table in a frame that scrolls sideways.
 
-    heads: HTML of the columns' heads, ">" before that of a column of numbers, all "" for a table whose rows have their
-    heads in the first cell; rows: lists of the HTML of their cells, or pairs of attributes and such a list; a cell that
-    begins with "<td" brings its own tag; frame: class of the frame, "wide" for one whose head stays in sight; kind:
-    class of the table.
+    Parameters
+    ----------
+    heads : sequence of str
+        HTML of the column heads; a leading ">" marks a column of numbers. If all are "", the first
+        cell of each row is its head.
+    rows : iterable
+        Lists of the HTML of the cells, or pairs (attributes, list). A cell that begins with "<td"
+        has its own tag.
+    frame : str
+        Class of the frame; with "wide" the head stays visible.
+    kind : str
+        Class of the table.
+
+    Returns
+    -------
+    str
     """
     numbers = [" class=n" * head.startswith(">") for head in heads]
     top = "".join(
@@ -108,24 +136,37 @@ def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = ""
 
 
 def prose(text: str) -> str:
-    """A sentence as HTML: escaped, and what stands between two back-quotes as code."""
+    """Return a sentence as HTML, in which text between two backquotes is marked as code."""
     return QUOTED.sub(r"<code>\1</code>", escape(text))
 
 
 def breakable(text: str) -> str:
-    """A text as HTML whose names of keys may break behind a dot: structure.mode.axial.damping."""
+    """Return a text as HTML in which the names of keys may break after a dot."""
     return re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z])", ".<wbr>", escape(text))
 
 
 def warned(texts: Sequence, heading: str = "") -> str:
-    """A box of warnings under a heading, "" without one."""
+    """Return warnings as an HTML box under a heading; "" if there are none."""
     told = "".join(f"<p>{prose(text)}</p>" for text in texts)
     return told and f"<div class='verdict warn'>{heading and f'<b>{heading}</b>'}{told}</div>"
 
 
 def figure(number: int | str, svg: str, caption: str, alternative: str) -> str:
-    """A picture drawn beforehand, in the colours of the page, with its caption and the text in its place; one page
-    holds many, so their ids are told apart by the number."""
+    """Build the HTML of a figure from SVG, in the colours of the page.
+
+    Parameters
+    ----------
+    number : int or str
+        Prefix of the ids in the SVG, which must differ from those of other figures on the page.
+    svg : str
+    caption : str
+    alternative : str
+        Text for readers who cannot see the figure.
+
+    Returns
+    -------
+    str
+    """
     svg = svg.replace("<svg", f'<svg role="img" aria-label="{escape(alternative, quote=True)}"', 1)
     svg = re.sub(r'\bid="([^"]+)"', rf'id="f{number}\1"', svg)
     svg = re.sub(r'(url\(|href=")#', rf"\1#f{number}", svg)
@@ -138,7 +179,10 @@ def figure(number: int | str, svg: str, caption: str, alternative: str) -> str:
 
 
 def encoded(value) -> str:
-    """JSON of arrays, numbers, texts and containers of them: numbers to DIGITS digits, null where not finite."""
+    """Return JSON of arrays, numbers, texts and containers of them.
+
+    Numbers have DIGITS digits, and null stands for those that are not finite.
+    """
     if isinstance(value, dict):
         return (
             "{"
@@ -148,7 +192,8 @@ def encoded(value) -> str:
     if isinstance(value, np.ndarray):
         value = list(value) if value.ndim > 1 else value.tolist()
     if isinstance(value, list | tuple):
-        kinds = set(map(type, value))  # one by one: six times as long
+        # To encode the elements one by one would take six times as long.
+        kinds = set(map(type, value))
         if kinds == {float}:
             text = NUMBER * len(value) % tuple(value)
             return f"[{(text if all(map(math.isfinite, value)) else NOT_FINITE.sub('null', text))[:-1]}]"

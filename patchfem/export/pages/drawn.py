@@ -1,5 +1,8 @@
-"""Which cases of a sweep its page draws: all where there is room for them, else evenly spread cases and those at which
-a measure or a key is largest or smallest."""
+"""Selection of the cases that the page of a sweep draws.
+
+All cases are drawn if they fit; otherwise evenly spaced cases, and those at which a measure or a
+key is largest or smallest.
+"""
 
 from typing import NamedTuple
 
@@ -7,9 +10,11 @@ import numpy as np
 
 from .document import encoded
 
-ROOM = 1_200_000  # bytes of what is drawn; packed, with its library, a page stays below 1.5 MB
-FEWEST, LOOKED = 64, 32  # cases that are drawn at least; of which the bytes are looked at
-# digits of a value and of an error in the page of a sweep that is not drawn whole
+# Bytes of the data that are drawn; packed with the library, a page then stays below 1.5 MB.
+ROOM = 1_200_000
+# cases that are always drawn; cases from which the bytes per case are measured
+FEWEST, LOOKED = 64, 32
+# Digits of a value and of an error in a page that does not draw all cases.
 SHORT, BAR = (
     7,
     3,
@@ -17,7 +22,10 @@ SHORT, BAR = (
 
 
 class Drawn(NamedTuple):
-    """cases: numbers of those that are drawn; said: which, in a sentence, "" for all."""
+    """Cases that a page draws.
+
+    cases: their numbers; said: a sentence that says which they are, "" for all.
+    """
 
     cases: np.ndarray
     said: str = ""
@@ -44,6 +52,7 @@ def drawn(table: dict, data) -> Drawn:
 
 
 def _of_rows(table: dict, most: int) -> Drawn:
+    """Select evenly spaced cases, the extremes of measures and keys, and one of each outcome."""
     number = len(table["outcome"])
     ends = {
         case
@@ -62,7 +71,7 @@ def _of_rows(table: dict, most: int) -> Drawn:
 
 
 def _evenly(number: int, most: int) -> np.ndarray:
-    """At most `most` of so many, evenly spread, with both ends."""
+    """Return at most `most` of `number` indices, evenly spaced and including both ends."""
     return (
         np.arange(number)
         if number <= most
@@ -71,7 +80,7 @@ def _evenly(number: int, most: int) -> np.ndarray:
 
 
 def _ends(values) -> list:
-    """Cases with the smallest and the largest of values (n,); none where there is no value."""
+    """Return the indices of the smallest and largest of values (n,); [] if none is finite."""
     values = np.asarray(values, float)
     return (
         []
@@ -84,7 +93,7 @@ def _ends(values) -> list:
 
 
 def digits(values: np.ndarray, count: int) -> np.ndarray:
-    """Values to so many digits."""
+    """Round values to `count` significant digits."""
     with np.errstate(all="ignore"):
         unit = 10.0 ** (np.floor(np.log10(np.abs(values))) - count + 1)
         short = np.round(values / unit) * unit

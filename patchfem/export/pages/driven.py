@@ -1,4 +1,4 @@
-"""What drives a run, in words: level and frequency of its drive or slide, and the command that runs it again."""
+"""Description of what drives a run, and the command that repeats the run."""
 
 import shlex
 from pathlib import Path
@@ -17,7 +17,7 @@ PLAIN = {
 
 
 def size(text) -> str:
-    """A quantity of a resolved scene, such as `49.03325 m/s^2`, in the unit of people: `5 g`."""
+    """Write a quantity of a resolved scene, such as `49.03325 m/s^2`, in a usual unit: `5 g`."""
     value, _, unit = str(text).partition(" ")
     name, scale = (
         PLAIN[unit]
@@ -30,9 +30,9 @@ def size(text) -> str:
 
 
 def driven(resolved: dict) -> str:
-    """What moves a run, as a part of a sentence; "" where nothing does.
+    """Describe what moves a run, as a part of a sentence; "" if nothing does.
 
-    resolved: the scene with every default, as nested tables.
+    resolved: the scene with all defaults, as nested tables.
     """
     if "drive" in resolved:
         return _drive(resolved["drive"])
@@ -50,7 +50,7 @@ def _drive(keys: dict) -> str:
     values = _drive_values(keys)
     try:
         return waveform.phrase.format_map(values) or _in_general(waveform.name, values)
-    except KeyError:  # the scene leaves out a key that the phrase names
+    except KeyError:  # the scene does not set a key that the phrase needs
         return _in_general(waveform.name, values)
 
 
@@ -83,7 +83,7 @@ def _drive_values(keys: dict) -> dict:
 
 
 def _text_of(key: str, value) -> str:
-    """Return the value of a key of [drive] as people read it."""
+    """Return the value of a key of [drive] in a usual unit."""
     if key == "file":
         return Path(value).name
     if isinstance(value, (list, tuple)):
@@ -92,13 +92,14 @@ def _text_of(key: str, value) -> str:
 
 
 def _in_general(name: str, values: dict) -> str:
-    """Describe a drive by its size and frequency, as far as the scene has them, and the name of its waveform."""
+    """Describe a drive by its size and frequency, if the scene sets them, and by its waveform."""
     level = f" of {values['level']}" if "level" in values else ""
     frequency = f" at {values['frequency']}" if "frequency" in values else ""
     return f"{values['what']}{level}{frequency}{values['place']} (waveform '{name}')"
 
 
 def _slide(keys: dict) -> str:
+    """Describe the prescribed slide."""
     kind = keys["kind"]
     if kind == "file":
         return f"the slide of {Path(keys['file']).name}"
@@ -111,14 +112,17 @@ def _slide(keys: dict) -> str:
 
 
 def changed(sets: tuple) -> str:
-    """The keys that were changed beside the scene, as people read them; sets: `key=value` as given."""
+    """List the keys that were changed with --set; sets: `key=value` strings as given."""
     return shorten(
         ", ".join(f"{key} = {value}" for key, _, value in (one.partition("=") for one in sets)), 160
     )
 
 
 def command(path: Path, sets: tuple) -> str:
-    """The command that runs a scene again in its own folder; sets: `key=value` as given, files by their names."""
+    """Return the command that repeats a run in the folder of its scene.
+
+    sets: `key=value` strings as given; files are named without their folder.
+    """
     short = [
         f"{key}={Path(value).name if value.startswith('/') else value}"
         for key, _, value in (one.partition("=") for one in sets)

@@ -1,4 +1,4 @@
-"""What a sweep says first: how far its key may go, where its main measure runs, how many cases miss the tolerance."""
+"""Summary of a sweep: limits of its key, range of its main measure, missed tolerances."""
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
@@ -16,11 +16,12 @@ from .key_lines import varies
 from .limits import Limits
 from .sentences import both, joined, zero_below
 
-EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
-AT = 1e-9  # of a frequency, within which two are one
+# relative error up to which no error is stated, because values are shown with four digits
+EXACT = 1e-6
+AT = 1e-9  # relative difference up to which two frequencies are equal
 NONE = MappingProxyType({})
 SETTLED = ranked.SETTLES
-# outcomes of cases that move on when their run ends
+# Outcomes of cases that still change when their run ends.
 MOVING = (
     Outcome.TRANSIENT.value,
     Outcome.GROWS.value,
@@ -35,7 +36,7 @@ FIRST = (
 
 
 class Sentences(NamedTuple):
-    """What a sweep says, a sentence each; "" where there is nothing to say.
+    """Sentences of the summary of a sweep; "" if there is nothing to say.
 
     Attributes
     ----------
@@ -46,17 +47,17 @@ class Sentences(NamedTuple):
     rank : str
         Which keys matter most.
     scatter : str
-        How far the results of random cases scatter.
+        Scatter of the results of random cases.
     span : str
         Range of the main measure.
     misses : str
-        How many cases miss the tolerance.
+        Number of cases that miss the tolerance.
     left : str
-        How many cases have no result yet, and whether none has settled.
+        Number of cases without a result, and whether none has settled.
     ends : str
-        How many curves over frequency are largest at an end.
+        Number of curves over frequency that are largest at an end.
     unsettled : str
-        How far unsettled cases move, where that is farther than the settled ones.
+        How far unsettled cases move, if that is farther than the settled ones.
     """
 
     limit: str = ""
@@ -71,15 +72,15 @@ class Sentences(NamedTuple):
 
 
 class SweepHeadline(NamedTuple):
-    """What a sweep says first, with the tables behind it.
+    """Summary of a sweep with the tables that it is based on.
 
     Attributes
     ----------
     said : Sentences
     missed : dict
-        Cases over the tolerance, from `missed.counted`.
+        Cases over the tolerance, from `tolerance_misses.counted`.
     limits : limits.Limits
-        How far a key may go.
+        Limits of the key.
     ranks, spread : dict
         From `ranked.ranks_of` and `ranked.quantiles`.
     peaks : Sequence
@@ -97,9 +98,12 @@ class SweepHeadline(NamedTuple):
     asked: str
 
     def sentences(self) -> list:
-        """Return the sentences that people read: the answer, whether all cases meet the tolerance, and the others."""
+        """Return the sentences for the reader.
+
+        They are the answer, whether all cases meet the tolerance, and all others.
+        """
         said = self.said
-        # the limits of a grid say more
+        # The limits of a grid give more information than the ranking.
         rank = said.rank if said.scatter or not (said.limit or said.peak) else ""
         others = [said.limit, said.peak, rank, said.scatter, said.span]
         if self.asked:
@@ -115,8 +119,9 @@ class SweepHeadline(NamedTuple):
     def answer(self) -> str:
         """Return the answer in one sentence.
 
-        How far the key may go, where the peak is, what matters most and how far the results scatter, or the range of
-        the main measure; in brackets, what qualifies it: cases without a result, unsettled or over the tolerance.
+        It states how far the key may go, where the peak is, what matters most and how far the
+        results scatter, or the range of the main measure. Brackets contain what qualifies it: cases
+        without a result, unsettled or over the tolerance.
         """
         text = joined(self._answer_parts())
         misses = self.said.misses if self.missed else ""
@@ -143,7 +148,7 @@ class SweepHeadline(NamedTuple):
 
 
 def lead_of(table: dict) -> SweepHeadline:
-    """Find what a sweep says first; table: as `sweep.page` takes it."""
+    """Summarise a sweep; table: as for `sweep.page`."""
     measures, tolerance = table["measures"], table.get("tolerance", np.nan)
     values = columns(table)
     outcome = np.asarray(table["outcome"], str)
@@ -158,10 +163,11 @@ def lead_of(table: dict) -> SweepHeadline:
         key_limits = limits.limits_of_sweep(
             keys, values, trusted, table["grid"], table.get("patch")
         )
-    if key_limits.key is not None:  # one unit for its values in all sentences
+    if key_limits.key is not None:  # All sentences show values of the key in the same unit.
         keys = [key_limits.key if key["name"] == key_limits.key["name"] else key for key in keys]
 
     def where(case: int) -> str:
+        """Return the values of the keys in a case as text."""
         return ", ".join(
             f"{key['name']} {brief(str(key['texts'][case]))}"
             for key in keys
@@ -197,7 +203,11 @@ def lead_of(table: dict) -> SweepHeadline:
 
 
 def _trusted(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.ndarray:
-    """Check whether each case meets the tolerance and settled, where any settled case has the measure."""
+    """Return whether each case meets the tolerance and has settled.
+
+    It need not have settled if no settled case has the measure, or if the measure is a steady
+    estimate.
+    """
     needs_no_settling = (
         name.endswith("_steady") or not np.isfinite(measure["values"])[settled].any()
     )
@@ -205,7 +215,10 @@ def _trusted(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.nda
 
 
 def _floors(measures: dict, tolerance) -> dict:
-    """Return {measure: (cases that meet the tolerance by its floor alone, the floor as people read it)}."""
+    """Return, by measure, the cases that meet the tolerance only by its floor, and this floor.
+
+    The floor is given as text.
+    """
     by_floor = {name: tolerance_misses.by_floor(one, tolerance) for name, one in measures.items()}
     return {
         name: (cases, tolerance_misses.floor_of(measures[name], cases))
@@ -215,12 +228,12 @@ def _floors(measures: dict, tolerance) -> dict:
 
 
 def _unsettled(measures: dict, outcome: np.ndarray) -> str:
-    """State how far unsettled cases move, where that is farther than any settled case; else "".
+    """State how far unsettled cases move, if that is farther than any settled case; else "".
 
     Parameters
     ----------
     measures : dict
-        {name: (values (n,), errors (n,), SI unit)}, NaN where a case has no value.
+        {name: (values (n,), errors (n,), SI unit)}, NaN if a case has no value.
     outcome : (n,) ndarray
     """
     name = FIRST[0]
@@ -260,8 +273,19 @@ def _peaks_at_ends(table: dict) -> str:
 
 
 def _left(table: dict, outcome: np.ndarray, known: bool) -> str:
-    """What holds of all that is said: how many cases of an interrupted sweep have no answer, and that of those that run
-    none has settled, unless that is known; "" where neither is so."""
+    """State what qualifies the whole summary; "" if nothing does.
+
+    This is how many cases of an interrupted sweep have no result, that no case has settled, and
+    that no case has a value of the requested measure.
+
+    Parameters
+    ----------
+    table : dict
+        As for `sweep.page`.
+    outcome : (n,) ndarray
+    known : bool
+        Whether another sentence already says that no case has settled.
+    """
     count, ran, said = (
         int(np.sum(outcome == "")),
         outcome[(outcome != "") & (outcome != FAILED)],
@@ -289,12 +313,25 @@ def span(
     names: Sequence = FIRST,
     least: Mapping = NONE,
 ) -> str:
-    """From where to where the first measure of interest runs, and how well its values are known; "" where none has a
-    value that counts.
+    """State the range of the first measure that any case has, and the errors of its values.
 
-    measures: {name: (values (n,), errors (n,), SI unit)}, NaN where a case has none; trusted: {name: (n,) whether the
-    value of a case counts}; settled: (n,) whether a case did; names: of the measures, the first of interest first;
-    least: {name: (`missed.by_floor`, the floor as people read it)} of those that meet the tolerance by their floor.
+    Parameters
+    ----------
+    measures : dict
+        {name: (values (n,), errors (n,), SI unit)}, NaN if a case has none.
+    trusted : dict
+        {name: (n,) whether the value of a case counts}.
+    settled : (n,) ndarray of bool
+    names : sequence of str
+        Measures, the most important first.
+    least : mapping
+        {name: (`tolerance_misses.by_floor`, the floor as text)} of measures that meet the tolerance
+        by their floor.
+
+    Returns
+    -------
+    str
+        "" if the first measure has no value that counts.
     """
     for name in names:
         every = np.isfinite(measures[name][0]) if name in measures else np.zeros(1, bool)
@@ -308,7 +345,7 @@ def span(
             for part in measures[name]
         )
         low, high = both(name, values.min(), values.max(), unit, 4)
-        alike = there.sum() > 1  # of one case nothing runs
+        alike = there.sum() > 1  # a single case has no range
         ran = (
             f"ranges from {low} to {high}"
             if low != high
@@ -316,7 +353,7 @@ def span(
             if alike
             else f"is {high}"
         )
-        # 0 is known absolutely
+        # A value of 0 is known absolutely.
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))
         known &= ~least[name][0][there] if name in least else True
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
@@ -337,7 +374,7 @@ def span(
 
 
 def columns(table: dict) -> dict:
-    """The measures of a table as (values, errors, unit)."""
+    """Return the measures of a table as (values, errors, unit)."""
     return {
         name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()
     }

@@ -1,4 +1,4 @@
-"""Swept keys as people read them, and the cases of a sweep ordered along one key."""
+"""Values of swept keys as text, and the cases of a sweep ordered along one key."""
 
 from collections.abc import Callable
 
@@ -14,12 +14,16 @@ def varies(key: dict) -> bool:
 
 
 def shown_of(key: dict) -> Callable[[int], str]:
-    """Return a function from a case to the value of a key in it, as people read it."""
+    """Return a function that gives the value of a key in a case as text.
+
+    It shows enough digits to distinguish neighbouring values.
+    """
     values = np.asarray(key["values"], float)
     sizes = np.unique(values)
     apart = np.minimum(np.diff(sizes, prepend=-np.inf), np.diff(sizes, append=np.inf))
 
     def shown(case: int) -> str:
+        """Return the value of the key in a case."""
         spacing = apart[np.searchsorted(sizes, values[case])]
         return resolved(str(key["texts"][case]), values[case], spacing)
 
@@ -27,7 +31,7 @@ def shown_of(key: dict) -> Callable[[int], str]:
 
 
 def lines_of(key: dict, others: list) -> list:
-    """Collect the cases of each combination of the other keys, ordered by the size of the key."""
+    """Return the cases of each combination of the other keys, ordered by the value of the key."""
     lines = {}
     for case in np.argsort(np.asarray(key["values"], float), kind="stable").tolist():
         lines.setdefault(tuple(other["texts"][case] for other in others), []).append(case)

@@ -1,4 +1,4 @@
-"""The drawing library that a page carries: BokehJS 3.9.2, which lies in `bokehjs` with its licence (BSD)."""
+"""The drawing library in a page: BokehJS 3.9.2, stored in `bokehjs` with its BSD licence."""
 
 import re
 from base64 import b64encode
@@ -12,24 +12,25 @@ HERE = Path(__file__).parent
 
 @cache
 def bokeh() -> str:
-    """BokehJS as one text of JavaScript, packed."""
+    """Return BokehJS as one packed text of JavaScript."""
     return packed("\n".join(own(f"bokehjs/{name}") for name in FILES))
 
 
 def packed(text: str) -> str:
-    """A text as gzip in base64, the same for the same text, which `unpack.js` reads."""
+    """Return a text as gzip in base64, which `unpack.js` reads; equal texts give equal results."""
     return b64encode(compress(text.encode(), 6, mtime=0)).decode()
 
 
 @cache
 def own(name: str) -> str:
-    """A file of this folder as text."""
+    """Return a file of this folder as text."""
     return (HERE / name).read_text(encoding="utf-8")
 
 
 def inert(text: str) -> str:
-    """A text of JavaScript in which nothing ends the script element around it or hides its end.
+    """Return JavaScript in which no text ends the script element around it or hides its end.
 
-    `</script` and `<!--` stand only in strings and regular expressions, where a backslash changes nothing.
+    `</script` and `<!--` occur only in strings and regular expressions, in which a backslash has no
+    effect.
     """
     return re.sub("<(?=/script|!--)", r"<\\", text, flags=re.IGNORECASE)

@@ -1,10 +1,11 @@
-"""How far a swept key may go before the measures of the motion and of the patch change.
+"""Limits of a swept key, up to which measures of the motion and of the patch stay the same.
 
-The first case is the reference. A measure reaches its limit where it differs from this case by 5 %; the peak pressure,
-where it has doubled. The limit lies between the last case that is surely within it and the first case that is surely
-beyond it, with the numerical errors of the measure added to its change. Between these two cases the limit is
-interpolated linearly; where the values of the key grow by factors, over the logarithm of the key. A case that did not
-settle, or whose measure misses its tolerance, counts neither as within nor as beyond.
+The first case is the reference. A measure reaches its limit if it differs from this case by 5 %;
+the peak pressure, if it has doubled. The limit lies between the last case that is surely within it
+and the first case that is surely beyond it, where the numerical errors of the measure are added to
+its change. Between these two cases the limit is interpolated linearly, or over the logarithm of the
+key if its values are spaced by factors. A case that did not settle, or whose measure misses its
+tolerance, counts neither as within nor as beyond.
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ from . import document
 from .key_lines import lines_of, shown_of
 from .sentences import linked, short, zero_below
 
-# relative change at which a measure reaches its limit; engineers call 5 % unchanged
+# Relative change at which a measure reaches its limit; engineers call a change of 5 % negligible.
 LARGEST_CHANGE = 0.05
 DOUBLING = 1.0  # relative change of the peak pressure at its limit
 MOTION_MEASURES = (
@@ -37,7 +38,7 @@ CHANGE_AT_LIMIT = {
     **dict.fromkeys((*MOTION_MEASURES, *STIFFNESS_MEASURES, "contact_fraction"), LARGEST_CHANGE),
     "pressure_peak": DOUBLING,
 }
-# they drive the motion, or change no answer
+# Keys that drive the motion, or that change no result.
 KEYS_WITHOUT_LIMIT = (
     "drive.",
     "slide.",
@@ -46,21 +47,22 @@ KEYS_WITHOUT_LIMIT = (
 )
 GAP_OF_ANGLE = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll": ("Roll", "width")}
 ANGLE_UNITS = [name for name, _ in UNIT_LADDERS["rad"]]
-MIN_NUMBER = 0.0101  # a smaller number of a key takes a smaller unit: 0.011 mrad, but 10 urad
-MAX_NUMBER = 1e4  # a larger number of a key takes a larger unit
-# relative change of a measure below which it shows the last digits of both values
+# A smaller number of a key is written in a smaller unit: 0.011 mrad, but 10 urad.
+MIN_NUMBER = 0.0101
+MAX_NUMBER = 1e4  # a larger number of a key is written in a larger unit
+# Relative change of a measure below which it is round-off.
 ROUND_OFF_CHANGE = 1e-8
 
 
 class KeyLimit(NamedTuple):
-    """How far the key may go for one measure, along the line of cases that allows least.
+    """Limit of the key for one measure, along the line of cases with the smallest limit.
 
     Attributes
     ----------
     name : str
         The measure.
     change : float
-        Relative change at the limit, negative where the measure falls.
+        Relative change at the limit, negative if the measure decreases.
     reference : float
         Value of the measure in the first case [SI].
     last_change : float
@@ -91,17 +93,19 @@ class Limits(NamedTuple):
     Attributes
     ----------
     key : dict or None
-        The key, with the texts of its values in `unit`; None where no key of numbers grows alone.
+        The key, with the texts of its values in `unit`; None if no numerical key varies along lines
+        of cases.
     found : sequence of KeyLimit
         One for each measure of CHANGE_AT_LIMIT that the cases have.
     lost : sequence of str
-        Measures of the motion without a limit, because their first case did not settle or misses its tolerance.
+        Measures of the motion without a limit, because their first case did not settle or misses
+        its tolerance.
     unit : str
         Unit in which values of the key are shown.
     scale : float
         Value in `unit` per value in SI.
     patch : dict
-        `length` and `width` of the patch [m], where known.
+        `length` and `width` of the patch [m], if they are known.
     """
 
     key: dict | None = None
@@ -124,25 +128,26 @@ class Limits(NamedTuple):
 def limits_of_sweep(
     keys: list, measures: dict, trusted: dict, grid: bool = True, patch: dict | None = None
 ) -> Limits:
-    """Find how far the key with most values may go.
+    """Find the limits of the key with the most values.
 
     Parameters
     ----------
     keys : list of dict
-        `name`, `unit`, `values` (n,) [SI], `texts` (n,), `log` and `words` (whether its values are words) of each.
+        `name`, `unit`, `values` (n,) [SI], `texts` (n,), `log` and `words` (whether its values are
+        words) of each.
     measures : dict
-        {name: (values (n,), errors (n,), ...)}, NaN where a case has no value.
+        {name: (values (n,), errors (n,), ...)}, NaN if a case has no value.
     trusted : dict
         {name: (n,) whether a case settled and meets its tolerance}.
     grid : bool
         Whether the cases are all combinations of the values of the keys.
     patch : dict
-        `length` and `width` of the patch [m], where known.
+        `length` and `width` of the patch [m], if they are known.
 
     Returns
     -------
     Limits
-        Without a key where no key of numbers grows alone.
+        Without a key if no numerical key varies along lines of cases.
     """
     numbers = [key for key in keys if not key["words"]]
     if not numbers or (len(keys) > 1 and not grid):
@@ -177,14 +182,27 @@ def limits_of_sweep(
 def _limit_along_line(
     name: str, key: dict, line: np.ndarray, values: np.ndarray, errors: np.ndarray
 ) -> KeyLimit | None:
-    """Find the limit of a measure along one line of cases; None if its first case or all others have no value."""
+    """Find the limit of a measure along one line of cases.
+
+    None if the first case has no value, or all others have none.
+
+    Parameters
+    ----------
+    name : str
+        The measure.
+    key : dict
+    line : (m,) array
+        Cases in the order of the key.
+    values, errors : (m,) array
+        The measure in these cases; NaN if a case does not count.
+    """
     known = np.flatnonzero(np.isfinite(values))
     if known.size < 2 or known[0] != 0 or values[0] == 0:
         return None
     largest = CHANGE_AT_LIMIT[name]
     change = (values[known] - values[0]) / abs(values[0])
     error = (errors[known] + errors[0]) / abs(values[0])
-    # a pressure doubles only where it rises
+    # Only an increase can double a pressure.
     size = np.abs(change) if largest < DOUBLING else change
     open_or_beyond = np.flatnonzero(size[1:] + error[1:] > largest)
     inside = int(open_or_beyond[0]) if open_or_beyond.size else known.size - 1
@@ -209,7 +227,8 @@ def _limit_along_line(
     grown_by_factors = bool(key["log"] and sizes[case] > 0)
     values_along = np.array([change[inside], wanted, change[beyond]])
     if grown_by_factors and largest >= DOUBLING:
-        values_along = np.log1p(values_along)  # a power of the key is straight in both logarithms
+        # A power of the key is a straight line in both logarithms.
+        values_along = np.log1p(values_along)
     part = (values_along[1] - values_along[0]) / (values_along[2] - values_along[0])
     value = _interpolate(
         float(sizes[case]), float(sizes[case_beyond]), float(part), grown_by_factors
@@ -218,22 +237,28 @@ def _limit_along_line(
 
 
 def _interpolate(low: float, high: float, part: float, by_factors: bool) -> float:
-    """Return the value of a key at a fraction of the way between two cases."""
+    """Interpolate a key between two cases, linearly or in its logarithm.
+
+    part: fraction of the distance from `low` to `high`.
+    """
     if by_factors:
         return exp(log(low) + part * log(high / low))
     return low + part * (high - low)
 
 
 def _reach(limit: KeyLimit) -> tuple:
-    """Return the sort key of a limit: the smallest value first, a limit among the cases before an open one."""
+    """Return the sort key of a limit: the smallest value first.
+
+    At equal values a limit between two cases comes before an open one.
+    """
     return limit.beyond is None and limit.covers_line, limit.value, limit.beyond is None
 
 
 def as_json(limits: Limits) -> list:
-    """Return the limits as sweep.json has them, in SI.
+    """Return the limits as stored in sweep.json, in SI.
 
-    `value` of the key, interpolated between the cases `low` and `high`, at which a measure differs by `change` from
-    its value in the first case.
+    `value` of the key, interpolated between the cases `low` and `high`, is the one at which a
+    measure differs by `change` from its value in the first case.
     """
     return [
         {
@@ -251,7 +276,7 @@ def as_json(limits: Limits) -> list:
 
 
 def sentence(limits: Limits) -> str:
-    """State in one sentence how far the key may go; "" where the cases do not show it."""
+    """State in one sentence how far the key may go; "" if the cases do not show it."""
     if limits.key is None:
         return ""
     motion = _motion_sentence(limits)
@@ -279,7 +304,10 @@ def sentence(limits: Limits) -> str:
 
 
 def _motion_sentence(limits: Limits) -> str:
-    """State how far the key may go before a measure of the motion changes; "" where the cases do not show it."""
+    """State how far the key may go before a measure of the motion changes, or "".
+
+    It is "" if the cases do not show it.
+    """
     moving = [limit for limit in limits.found if limit.name in MOTION_MEASURES]
     if not moving or not all(limits.is_resolved(limit) for limit in moving):
         return ""
@@ -312,7 +340,7 @@ def _motion_sentence(limits: Limits) -> str:
 
 
 def _reached(limits: Limits, ends: list) -> str:
-    """State which measure surely leaves its limit, and in which case."""
+    """State which measure surely exceeds its limit, and in which case."""
     beyond = [limit for limit in ends if limit.beyond is not None]
     if not beyond:
         return "the cases with larger values do not show where this limit lies"
@@ -324,7 +352,10 @@ def _reached(limits: Limits, ends: list) -> str:
 
 
 def _first_to_change(limits: Limits, ends: list) -> str:
-    """Name the measures that may be the first to change, and the one that changes last if it is none of them."""
+    """Name the measures that may change first, and the one that changes last.
+
+    The last one is left out if it is among the first.
+    """
     sizes = limits.sizes()
     reached = [limit for limit in ends if limit.beyond is not None]
     soonest = min(sizes[limit.beyond] for limit in reached)
@@ -337,7 +368,7 @@ def _first_to_change(limits: Limits, ends: list) -> str:
 
 
 def _value_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:
-    """Write a limit, and in brackets the gap that an angle opens over the patch and what else qualifies it."""
+    """Write a limit with notes in brackets, such as the gap that an angle opens over the patch."""
     notes = [note for note in (_gap(limits, limit), *notes) if note]
     return f"{_value(limits, limit)} ({'; '.join(notes)})" if notes else _value(limits, limit)
 
@@ -377,7 +408,7 @@ def _gap(limits: Limits, limit: KeyLimit) -> str:
 
 
 def _place(limits: Limits, limit: KeyLimit, *notes: str) -> str:
-    """Write where a limit lies, and between which cases."""
+    """Write the position of a limit, and between which cases it lies."""
     return f"at about {_value(limits, limit)} ({'; '.join([*notes, f'between {_cases(limits, limit)}'])})"
 
 
@@ -391,8 +422,9 @@ def _cases(limits: Limits, limit: KeyLimit) -> str:
 def _unit(limits: Limits) -> tuple:
     """Choose the (unit, scale from SI) in which all values of the key are shown.
 
-    The unit in which the cases are written, unless the smallest limit would be a number below MIN_NUMBER or above
-    MAX_NUMBER; for an angle, the largest unit in which the smallest limit is above MIN_NUMBER.
+    It is the unit in which the cases are written, unless the smallest limit would be a number below
+    MIN_NUMBER or above MAX_NUMBER; for an angle it is the largest unit in which the smallest limit
+    is above MIN_NUMBER.
     """
     key = limits.key
     resolved = [limit for limit in limits.found if limits.is_resolved(limit)]
@@ -430,7 +462,7 @@ def _in_unit(key: dict, unit: str, scale: float) -> dict:
 
 
 def table(limits: Limits, measures: dict) -> str:
-    """Return the limits of all measures as an HTML table; "" where there is none.
+    """Return the limits of all measures as an HTML table; "" if there are none.
 
     Parameters
     ----------
@@ -488,7 +520,7 @@ def table(limits: Limits, measures: dict) -> str:
 
 
 def _percent(change: float) -> str:
-    """Write a relative change in percent, from ten times on as a factor; 0 for round-off."""
+    """Write a relative change in percent; from ten times on as a factor; 0 for round-off."""
     if abs(change) < ROUND_OFF_CHANGE:
         return "0 %"
     return f"{100 * change:+.3g} %" if change < 9 else f"&times; {format_number(1 + change, 3)}"

@@ -1,4 +1,7 @@
-"""Where a swept frequency has its peak: its place, height and half-power width for each value of the other keys."""
+"""Peaks over a swept frequency: frequency, height and half-power width.
+
+There is one peak for each combination of the values of the other keys.
+"""
 
 from html import escape
 from typing import NamedTuple
@@ -13,21 +16,22 @@ from .sentences import linked, zero_below
 
 KEYS = ("drive.frequency",)
 HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")
-LEAST = 5  # frequencies that show a peak
-SURE = 3.0  # times what polynomials differ by
-NEWTON = 30  # steps from a vertex, or a straight line's crossing
+LEAST = 5  # smallest number of frequencies that show a peak
+SURE = 3.0  # factor on the differences between polynomials, which gives the error
+NEWTON = 30  # Newton steps from the vertex of a parabola, or from the crossing of a straight line
 OPEN = "not resolved by these cases"
-KNOWN = 0.01  # of a steady estimate, up to which it tells the height of a peak
+# Error / value of a steady estimate, up to which the estimate is used as the height in a case.
+KNOWN = 0.01
 
 
 class Estimate(NamedTuple):
-    """A value and its error, NaN where it is not known."""
+    """A value and its error, NaN if it is not known."""
 
     value: float
     error: float
 
     def is_known(self) -> bool:
-        """Check whether there is a value."""
+        """Return whether there is a value."""
         return bool(np.isfinite(self.value))
 
 
@@ -42,13 +46,15 @@ class SweptPeak(NamedTuple):
     frequency : Estimate
         [Hz]; unknown if the cases next to the largest value do not count.
     case_spacing : float
-        Distance to the next cases [Hz].
+        Mean distance to the two neighbouring cases [Hz].
     height : Estimate
         In SI.
     half_power_width : Estimate
-        [Hz]; unknown if a side stays above peak/sqrt(2), or falls too fast for these cases.
+        [Hz]; unknown if the curve stays above peak/sqrt(2) on one side, or falls too fast for these
+        cases.
     falls_unresolved : bool
-        Whether the curve falls to peak/sqrt(2) on both sides, but so fast that the cases do not show its width.
+        Whether the curve falls to peak/sqrt(2) on both sides, but so fast that the cases do not
+        show its width.
     """
 
     frequency: Estimate
@@ -59,7 +65,7 @@ class SweptPeak(NamedTuple):
 
 
 class Peak(NamedTuple):
-    """A peak with the name and the SI unit of its measure, and the values of the other keys as text."""
+    """A peak, with the name and SI unit of its measure and the values of the other keys as text."""
 
     name: str
     held: str
@@ -68,7 +74,20 @@ class Peak(NamedTuple):
 
 
 def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
-    """Find the peak of each line of cases over a swept frequency; arguments as of `limits.limits_of_sweep`."""
+    """Find the peak of each line of cases over a swept frequency.
+
+    Parameters
+    ----------
+    keys : list of dict
+    measures : dict
+    trusted : dict
+    grid : bool
+        All as for `limits.limits_of_sweep`.
+
+    Returns
+    -------
+    list of Peak
+    """
     key = next((one for one in keys if one["name"] in KEYS and not one["words"]), None)
     name = next((one for one in HEIGHTS if one in measures), None)
     if key is None or name is None or (len(keys) > 1 and not grid):
@@ -89,8 +108,11 @@ def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
 
 
 def _heights(name: str, measures: dict, trusted: dict) -> tuple:
-    """The measure of every case that settled, the steady estimate of one that has not where it is KNOWN, else NaN; its
-    error."""
+    """Return the heights (n,) of a measure in the cases and their errors.
+
+    For a case that did not settle it is the steady estimate, if its relative error is at most
+    KNOWN; else NaN.
+    """
     (value, error, _), steady = measures[name], measures.get(f"{name}_steady")
     value, error = np.asarray(value, float), np.nan_to_num(np.asarray(error, float))
     if steady is None:
@@ -103,10 +125,18 @@ def _heights(name: str, measures: dict, trusted: dict) -> tuple:
 
 
 def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) -> SweptPeak | None:
-    """Locate the peak of a response curve; None if its largest value stands at an end of the range.
+    """Locate the peak of a response curve; None if its largest value is at an end of the range.
 
-    The peak is that of the parabola of 1/y^2 over f^2, exact for a single mode, through the largest value and its
-    neighbours. Its error combines those of the cases with the differences from polynomials through more cases.
+    The peak is that of the parabola of 1/y^2 over f^2, which is exact for a single mode, through
+    the largest value and its neighbours. Its error combines those of the cases with the differences
+    from polynomials through more cases.
+
+    Parameters
+    ----------
+    frequency : (m,) array
+        Increasing [Hz].
+    height, error : (m,) array
+        In SI; NaN if a case does not count.
     """
     known = np.isfinite(height) & (height > 0)
     x, y = frequency[known], height[known]
@@ -127,7 +157,7 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     agreeing = [one for one in others if one]
     places = np.sqrt(x[top] ** 2 + np.array([at, *(place for place, _ in agreeing)]))
     heights = y[top] * np.array([least, *(value for _, value in agreeing)]) ** -0.5
-    # a polynomial through more cases has no peak here
+    # A polynomial through more cases has no peak here.
     unchecked = len(agreeing) < len(others) or not others
     peak = float(heights[0])
     height_error = SURE * float(np.ptp(heights))
@@ -141,7 +171,7 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     width = float(above.value - below.value)
     fallen = frequency[height <= peak / 2**0.5]
     falls = bool(np.isnan(width) and fallen.size and fallen.min() < x[top] < fallen.max())
-    # a crossing moves by this fraction of the width on each side
+    # A crossing moves by this fraction of the width on each side.
     slack = case_error + height_error / peak
     frequency_error += slack * (width if np.isfinite(width) else spacing)
     return SweptPeak(
@@ -154,8 +184,25 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
 
 
 def _lowest(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) -> tuple | None:
-    """(place, value) of the least of the polynomial through g at the cases from low to high over the squares of their
-    frequencies less that of `top`, between the neighbours of that; None where it has none above 0 there."""
+    """Find the minimum of the polynomial through 1/y^2 over f^2 in some cases.
+
+    Parameters
+    ----------
+    square : (m,) array
+        Squares of the frequencies minus that of the case `top` [Hz2].
+    g : (m,) array
+        (y_top / y)^2.
+    top : int
+        Index of the largest value.
+    low, high : int
+        The polynomial goes through the cases from `low` to `high` - 1.
+
+    Returns
+    -------
+    tuple or None
+        Position and value of the minimum; None if there is no minimum above 0 between the
+        neighbours of `top`.
+    """
     line = np.polynomial.Polynomial.fit(square[low:high], g[low:high], high - low - 1)
     slope, bend, at = line.deriv(), line.deriv(2), 0.0
     for _ in range(NEWTON):
@@ -169,9 +216,21 @@ def _lowest(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) ->
 
 
 def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> Estimate:
-    """Find the frequency at which 1/y^2 first rises to twice its least; unknown where it stays below.
+    """Find the frequency at which 1/y^2 first reaches twice its minimum.
 
-    By parabolas through the interval and a case on either side of it, which differ by the error.
+    It comes from parabolas through the interval and a case on either side, whose difference gives
+    the error. Unknown if 1/y^2 stays below.
+
+    Parameters
+    ----------
+    square : (m,) array
+        Squares of the frequencies minus that of the peak case [Hz2], from the peak outwards.
+    g : (m,) array
+        (y_top / y)^2.
+    top : float
+        Frequency of the peak case [Hz].
+    least : float
+        Minimum of g.
     """
     above = np.flatnonzero(g >= 2 * least)
     if not above.size or above[0] == 0:
@@ -189,7 +248,7 @@ def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> Es
 
 
 def sentence(peaks: list) -> str:
-    """Where the peak is, or from where to where it moves; "" without one."""
+    """State where the peak is, or from where to where it moves; "" if there is none."""
     known, lost = (
         [one for one in peaks if one.swept.height.is_known() == there] for there in (True, False)
     )
@@ -201,7 +260,10 @@ def sentence(peaks: list) -> str:
 
 
 def _lost(peaks: list, others: bool) -> str:
-    """For which lines the peak is not known; others: whether it is for some."""
+    """State for which lines of cases the peak is not known.
+
+    others: whether it is known for some.
+    """
     if not peaks:
         return ""
     more = f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
@@ -214,6 +276,7 @@ def _lost(peaks: list, others: bool) -> str:
 
 
 def _known(peaks: list) -> str:
+    """State where the first and the last known peaks are."""
     if not peaks:
         return ""
     first, last = peaks[0], peaks[-1]
@@ -227,21 +290,24 @@ def _known(peaks: list) -> str:
 
 
 def _at(one: Peak) -> str:
+    """Write the frequency of a peak."""
     return f"{format_value(*one.swept.frequency, unit='Hz')} (cases lie {format_number(one.swept.case_spacing, 2)} Hz apart)"
 
 
 def _high(one: Peak) -> str:
+    """Write the height of a peak."""
     return format_value(*one.swept.height, zero_below(one.name), one.unit)
 
 
 def _width(one: Peak) -> str:
+    """Write the half-power width of a peak, as the end of a clause."""
     if one.swept.half_power_width.is_known():
         return f", half-power width {format_value(*one.swept.half_power_width, unit='Hz')}"
     return f", half-power width {OPEN}" if one.swept.falls_unresolved else ""
 
 
 def table(peaks: list) -> str:
-    """The peaks as a table; "" without any."""
+    """Return the peaks as an HTML table; "" if there are none."""
     if not peaks:
         return ""
     rows = [[escape(one.held), *_cells(one)] for one in peaks]

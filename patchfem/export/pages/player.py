@@ -1,7 +1,8 @@
-"""The pressed and sliding pieces through the last cycle, as data that `player.js` plays in a page.
+"""Motion of the pressed and sliding pieces in the last cycle, as data for `player.js`.
 
-The slide of the upper piece as a whole is kept apart from the rest of its motion, which contains the gap: each is drawn
-with a factor of its own. What a page can hold is a sample: some frames, and fewer cells than fields.vtkhdf has.
+The slide of the upper piece as a whole is separated from the rest of its motion, which contains the
+gap, because each is drawn with its own factor. A page contains a sample of the data: some frames,
+and fewer cells than fields.vtkhdf.
 """
 
 from base64 import b64encode
@@ -18,14 +19,14 @@ from .document import Section, document
 from .library import own
 from .thinned import spread, thinned
 
-# at most: frames, cells of a piece, places along the interface
+# Largest numbers of frames, of cells of a piece, and of positions along the interface.
 FRAMES, CELLS, PLACES = (
     24,
     5000,
     400,
 )
-BYTES = 520_000  # of all frames together, before they are written as text
-# of a cell; whether it has a sign
+BYTES = 520_000  # bytes of all frames before they are encoded as text
+# Quantities of a cell, and whether they have a sign.
 COLOURS = (
     ("von Mises stress", False),
     ("stress along x", True),
@@ -38,14 +39,15 @@ CURVES = (
     ("gap", "gap"),
     ("slip", "slide"),
 )
-NARROW = 0.25  # share of the length below which the contact gets half of what is shown
+NARROW = 0.25  # fraction of the length below which the contact fills half of what is shown
 MM = 1e3
 
 
 def packed(values) -> dict:
-    """An array as {low, step, shape, data}: value = low + step * number, numbers of 16 bits in base 64.
+    """Return an array as {low, step, shape, data}: value = low + step * number.
 
-    65535 stands for a value that is not finite; rounding takes at most 1e-5 of the range.
+    The numbers have 16 bits and are written in base64; 65535 stands for a value that is not finite.
+    Rounding changes a value by at most 1e-5 of the range.
     """
     values = np.asarray(values, float)
     there = np.isfinite(values)
@@ -65,17 +67,24 @@ def packed(values) -> dict:
 
 
 def reel(folder: Path) -> dict | None:
-    """What the player shows of the results in a folder, lengths in mm; None where they have no fields.
+    """Return what the player shows of the results in a folder; None if they have no fields.
 
-    times: [s] of the frames; of: how many the file has there; pieces: lower and upper, each with points (p, 2), cells
-    (c, 4), coated (c,), moves (f, p, 2) and colours, one (f, c) for each of COLOURS; slide: (f,); curves: of the
-    interface, (f, n) over the places x (n,); status: (f, n), 0 open, 1 sticks, 2 slips, where it is known.
+    Returns
+    -------
+    dict or None
+        Lengths in mm. times: (f,) [s]; of: number of frames in the file; pieces: lower and upper
+        piece, each with points (p, 2), cells (c, 4), coated (c,), moves (f, p, 2) and colours, (f,
+        c) for each of COLOURS; slide: (f,); x: (n,); curves: of the interface, (f, n) at the
+        positions x; status: (f, n), 0 open, 1 sticks, 2 slips, if it is known.
     """
     return _reel(folder) if (Path(folder) / NAME).is_file() else None
 
 
 def write_page(folder: Path, out: Path) -> str:
-    """Write a page with the player of the results in a folder; one line on it. Missing without fields."""
+    """Write a page with the player of the results in a folder, and return a line about it.
+
+    Missing if the results have no fields.
+    """
     film = _reel(folder)
     write_text(
         out,
@@ -91,6 +100,7 @@ def write_page(folder: Path, out: Path) -> str:
 
 
 def _reel(folder: Path) -> dict:
+    """Read the sampled frames of a results folder."""
     with Series(folder) as series:
         cycle = np.array(moving(series.times))
         numbers = cycle[
@@ -138,7 +148,11 @@ def _reel(folder: Path) -> dict:
 
 
 def _contact(x, sigma) -> tuple | None:
-    """Twice the part of x (n,) that touches in some frame of sigma (f, n), where that is short; None elsewhere."""
+    """Return the range of x (n,) [m] in which some frame of sigma (f, n) has contact, widened.
+
+    The range is twice as long as the contact. None if the contact is longer than NARROW times the
+    length.
+    """
     touching = x[np.any(sigma > 0, axis=0)]
     if not touching.size or np.ptp(touching) > NARROW * np.ptp(x):
         return None
@@ -147,7 +161,24 @@ def _contact(x, sigma) -> tuple | None:
 
 
 def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | None) -> dict:
-    """A piece thinned to `most` cells: its mesh, all its points [m], its moves (f, n, 2) [m] and colours [Pa]."""
+    """Read a piece and reduce it to about `most` cells.
+
+    Parameters
+    ----------
+    series : Series
+    side : {"lower", "upper"}
+    numbers : list of int
+        Numbers of the frames.
+    most : int
+    near : tuple or None
+        Range of x [m] in which the mesh stays fine.
+
+    Returns
+    -------
+    dict
+        mesh: Thinned; points: all points [m]; coated: (c,); moves: (f, n, 2) [m]; colours: (4, f,
+        c) [Pa].
+    """
     points = series.points(side)[:, :2]
     cells = corners(*series.cells(side))
     coated = series.stack(side, "CellData", "material", [0])[0] > 0
@@ -157,7 +188,7 @@ def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | No
     rows = np.stack(
         [series.stack(side, "CellData", "von_mises", numbers), *(stress[..., k] for k in (0, 1, 3))]
     )
-    means = mesh.means(np.nan_to_num(rows).reshape(-1, len(cells)).T).T  # all frames in one sum
+    means = mesh.means(np.nan_to_num(rows).reshape(-1, len(cells)).T).T  # one sum for all frames
     colours = means.reshape(*rows.shape[:2], -1)
     return {
         "points": points,
@@ -169,7 +200,7 @@ def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | No
 
 
 def _open(upper: dict, x, line: dict) -> np.ndarray:
-    """Take the slide as a whole (f,) [m] out of the moves of the upper piece and put the gap into them."""
+    """Separate the slide (f,) [m] of the upper piece from its moves, and add the gap to them."""
     points, moves = upper["points"], upper["moves"]
     slide = slides(points, moves)
     moves[:, :, 0] -= slide[:, None]
@@ -178,6 +209,7 @@ def _open(upper: dict, x, line: dict) -> np.ndarray:
 
 
 def _told(piece: dict, scale: float) -> dict:
+    """Return a piece as packed data, with lengths in mm and stresses times `scale`."""
     mesh = piece["mesh"]
     return {
         "points": packed(piece["points"][mesh.nodes] * MM),
@@ -189,12 +221,13 @@ def _told(piece: dict, scale: float) -> dict:
 
 
 def _curve(values, label: str, unit: str) -> dict:
+    """Return a curve as packed data in a suitable unit."""
     name, scale = axis_unit(values, unit)
     return {"label": label, "unit": name, "values": packed(values * scale)}
 
 
 def section(film: dict) -> Section:
-    """The part of a page in which the player stands."""
+    """Return the section of a page that contains the player."""
     frames, (cells, fine) = len(film["times"]), film["cells"]
     label, scale = axis_unit(film["times"], "s")
     still = f"The pressed state, {cells} cells"

@@ -1,4 +1,4 @@
-"""What matters most in a sweep and how far its answers scatter: sentences, a picture of the shares, a table."""
+"""Ranking of the keys of a sweep and scatter of its results: sentences, bars and a table."""
 
 from html import escape
 from typing import NamedTuple
@@ -28,25 +28,27 @@ RANKED = (
 )
 SPREAD = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "pressure_peak")
 ENDS = 0.05, 0.5, 0.95
-FEW = 20  # drawn cases, below which nine in ten of them are no share
-SETTLED = 0.95  # of the drawn cases, below which those left out may be one of its ends
-SETTLES = "steady", "stuck", "done", "no_contact"  # outcomes
-NAMED = 3  # keys in the sentence
-# a measure whose label does not say that it is a ratio
+FEW = 20  # random cases, below which a statement on 90 % of them is not possible
+# Fraction of the random cases; with fewer values, those that are missing may be the largest.
+SETTLED = 0.95
+SETTLES = "steady", "stuck", "done", "no_contact"  # outcomes of cases whose result is final
+NAMED = 3  # number of keys in the sentence
+# Text for a measure whose label does not say that it is a ratio.
 CALLED = {"equivalent_damping": "equivalent damping ratio"}
-PARTS = 5  # of the drawn cases by the size of a key, in which a measure rises or falls
-SURE = 2.5  # standard errors of a median (1.25 of those of a mean) by which two parts differ
+PARTS = 5  # groups of the random cases by the value of a key, between which a trend is determined
+# Number of standard errors of a median (1.25 times that of a mean) by which two groups must differ.
+SURE = 2.5
 
 
 class RankedKeys(NamedTuple):
-    """Which keys matter most, and how far the results of random cases scatter.
+    """Ranking of the keys, and scatter of the results of random cases.
 
     Attributes
     ----------
     shares : dict
-        Shares of the keys in the variance of each measure, from `ranks_of`.
+        Sobol indices of the keys for each measure, from `ranks_of`.
     rank : str
-        The sentence on them; "" where there is nothing to say.
+        The sentence on them; "" if there is nothing to say.
     quantiles : dict
         From `quantiles`.
     scatter : str
@@ -93,7 +95,10 @@ def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
 
 
 def too_few(table: dict, settled: np.ndarray) -> str:
-    """That too few of the drawn cases have settled for a ranking, and what helps; "" where enough have."""
+    """State that too few of the random cases have settled, and what helps; "" if enough have.
+
+    The consequence is that no ranking is possible, or that the scatter is not known.
+    """
     outcome, count = [str(one) for one in table["outcome"]], int(settled.sum())
     if not table.get("drawn") or len(outcome) < FEW or count >= min(FEW, 0.9 * len(outcome)):
         return ""
@@ -123,13 +128,24 @@ def too_few(table: dict, settled: np.ndarray) -> str:
 
 
 def called(name: str) -> str:
-    """A measure as people read it in a sentence."""
+    """Return the name of a measure in a sentence."""
     return CALLED.get(name, label(name))
 
 
 def trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
-    """In which direction the strongest key moves the first measure of drawn cases, or where along that key its largest
-    or least value lies; "" where the cases do not tell it. ranks: as `ranks_of`; settled: (n,) whether a case has."""
+    """State how the first measure of random cases depends on the strongest key.
+
+    It states the direction, or where along this key the largest or smallest value lies; "" if the
+    cases do not determine it.
+
+    Parameters
+    ----------
+    table : dict
+        As for `sweep.page`.
+    ranks : dict
+        From `ranks_of`.
+    settled : (n,) ndarray of bool
+    """
     moving, first = [one for one in table["keys"] if varies(one)], table.get("first", "")
     name = first if first in table["measures"] else next(iter(ranks), SPREAD[0])
     strongest = ranks[name][0].key if name in ranks else ""
@@ -164,7 +180,7 @@ def trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
 
 
 def one_word(key: dict) -> bool:
-    """Whether the values of a key are words."""
+    """Return whether the values of a key are words."""
     return not any(NUMBER.match(str(text)) for text in key["texts"])
 
 
@@ -178,8 +194,25 @@ def _trend(
     values: np.ndarray,
     unit: str,
 ) -> str:
-    """The sentence of `trend`; middle, off: medians of the measure in PARTS of the cases by the size of the key, and by
-    how much each is uncertain; parts: the cases of each, None where nothing but the key varies; cases: by its size."""
+    """Return the sentence of `trend`.
+
+    Parameters
+    ----------
+    name : str
+        The measure.
+    key : dict
+    middle, off : (PARTS,) array
+        Medians of the measure in groups of the cases by the value of the key, and their
+        uncertainties.
+    parts : list or None
+        Cases of each group; None if only this key varies.
+    cases : (m,) array
+        Cases in the order of the key.
+    values : (n,) array
+        The measure in all cases.
+    unit : str
+        SI unit.
+    """
     shown, what = shown_of(key), called(name).capitalize()
     for word, sign in (("largest", 1), ("least", -1)):
         top = int(np.argmax(sign * middle))
@@ -198,13 +231,16 @@ def _trend(
 
 
 def asked_first(names: tuple, table: dict) -> tuple:
-    """Names of measures, before them that which the sweep was asked about."""
+    """Return names of measures, preceded by the measure that the sweep was requested for."""
     first = table.get("first", "")
     return (first, *(name for name in names if name != first)) if first else names
 
 
 def ranks_of(table: dict) -> dict:
-    """{measure: [Share]} of a grid or of drawn cases, {} of others; found once for a table, which then has it."""
+    """Return the Sobol indices by measure, [Share], of a grid or of random cases; {} for others.
+
+    They are computed once for a table and stored in it.
+    """
     if "ranks" not in table:
         keys = [(one["name"], one["values"]) for one in table["keys"]]
         shape = tuple(len(set(one["texts"])) for one in table["keys"]) if table["grid"] else None
@@ -219,9 +255,26 @@ def ranks_of(table: dict) -> dict:
 
 
 def sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str:
-    """Which keys matter how much for the first measure that is ranked, "" where none is; left: of `of` cases those that
-    miss the tolerance, or whose motion has not settled, where any `moves` on: they count as they ended. Keys whose
-    intervals overlap stand in no order."""
+    """State how much each key matters for the first measure that is ranked; "" if there is none.
+
+    Keys whose intervals overlap are named together.
+
+    Parameters
+    ----------
+    ranks : dict
+        From `ranks_of`.
+    left : int
+        Number of cases that miss the tolerance or have not settled; they count with their last
+        values.
+    moves : bool
+        Whether such cases have not settled, rather than miss the tolerance.
+    of : int
+        Number of all cases.
+
+    Returns
+    -------
+    str
+    """
     name = next(iter(ranks), None)
     if name is None:
         return ""
@@ -256,7 +309,10 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str
 
 
 def _alike(shares: list) -> list:
-    """The shares in groups, the largest first: of the keys of one the intervals overlap that of its first."""
+    """Return the shares in groups, the largest first.
+
+    The interval of each share overlaps that of the first share of its group.
+    """
     out = []
     for one in shares:
         if out and one.high > out[-1][0].low and one.low != one.high:
@@ -267,12 +323,12 @@ def _alike(shares: list) -> list:
 
 
 def _equal(group: list) -> bool:
-    """Whether no share of a group lies outside the interval of another."""
+    """Return whether no share of a group lies outside the interval of another."""
     return all(one.low <= other.total <= one.high for one in group for other in group)
 
 
 def _listed(group: list) -> str:
-    """The keys of a group, of many the first."""
+    """List the keys of a group; of many keys only the first."""
     names = [one.key for one in group]
     if len(names) > NAMED + 1:
         names[NAMED:] = [f"{len(names) - NAMED} other keys"]
@@ -280,7 +336,7 @@ def _listed(group: list) -> str:
 
 
 def _shares(group: list) -> str:
-    """The shares of a group as people read them."""
+    """Write the shares of a group."""
     if len(group) == 1:
         return percent(group[0])
     if all(map(_small, group)):
@@ -296,31 +352,48 @@ def _shares(group: list) -> str:
 
 
 def percent(one) -> str:
-    """The total share of a key as people read it, the end of its interval where this begins at 0."""
+    """Write the total share of a key; if its interval includes 0, the upper end of the interval."""
     if not _small(one):
         return f"{100 * one.total:.0f} %"
     return f"at most {_most(one)} %" if _most(one) else "below 1 %"
 
 
 def _small(one) -> bool:
-    """Whether a share may be nothing."""
+    """Return whether a share may be 0."""
     return one.total < 0.01 or (one.low < 0.005 and one.total < 0.1)
 
 
 def _most(one) -> int:
-    """The upper end [%] of the interval of a share, rounded upwards; 0 up to 1 %."""
+    """Return the upper end [%] of the interval of a share, rounded up; 0 up to 1 %."""
     most = int(np.ceil(100 * one.high - 1e-9))
     return most if most > 1 else 0
 
 
 def _between(one) -> str:
+    """Write the interval of a share in brackets; "" if it has none."""
     low, high = round(100 * one.low), round(100 * one.high)
     return f" ({low} to {high} %)" if low != high and not _small(one) else ""
 
 
 def quantiles(table: dict, trusted: dict) -> dict:
-    """{measure: (unit, quantiles of ENDS, number of cases, how many of these miss the tolerance)} of the drawn cases
-    that have a value and have settled, of all that have one where none has; trusted: as `lead` makes it."""
+    """Return the quantiles of the measures of random cases.
+
+    Cases count if they have a value and have settled; if no case with a value has settled, all
+    cases with a value count.
+
+    Parameters
+    ----------
+    table : dict
+        As for `sweep.page`.
+    trusted : dict
+        {measure: (n,) whether a case settled and meets its tolerance}.
+
+    Returns
+    -------
+    dict
+        By measure: unit, quantiles of ENDS [SI], number of cases, and how many of these miss the
+        tolerance.
+    """
     out, settled = {}, np.isin(np.asarray(table["outcome"], str), SETTLES)
     for name in (
         asked_first(RANKED, table) if table.get("drawn") and len(table["outcome"]) >= FEW else ()
@@ -339,9 +412,24 @@ def quantiles(table: dict, trusted: dict) -> dict:
 
 
 def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -> str:
-    """Where nine in ten of `of` drawn cases lie, and how many of them miss the tolerance; found: as `quantiles` gives
-    them; settled: whether cases without a value may not have settled; names: of the measures, in their order; "" where
-    there are none."""
+    """State the range in which 90 % of the random cases lie, and how many miss the tolerance.
+
+    Parameters
+    ----------
+    found : dict
+        From `quantiles`.
+    of : int
+        Number of random cases.
+    settled : bool
+        Whether cases without a value may not have settled.
+    names : tuple of str
+        Measures in the order of the sentence.
+
+    Returns
+    -------
+    str
+        "" if there are no such measures.
+    """
     said, most = [], max((found[name][2] for name in names if name in found), default=0)
     if most and most < SETTLED * of:
         why = "not settled within the tolerance" if settled else "no value"
@@ -368,7 +456,7 @@ def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -
 
 
 def picture(ranks: dict) -> str:
-    """Bars of the shares of the keys for each measure, in HTML: no scripts; "" without any."""
+    """Return bars of the shares of the keys for each measure as HTML; "" if there are none."""
     if not ranks:
         return ""
     parts = []
@@ -397,6 +485,7 @@ def picture(ranks: dict) -> str:
 
 
 def _bar(one) -> str:
+    """Return the bar of a share as SVG."""
     first, total, low, high = (f"{100 * part:.1f}" for part in one[1:])
     return (
         f"<svg viewBox='0 0 100 8' preserveAspectRatio=none role=img aria-label='{percent(one)}'>"
@@ -406,12 +495,27 @@ def _bar(one) -> str:
 
 
 def _range(one) -> str:
+    """Write the interval of a share."""
     return "&ndash;" if one.low == one.high else f"{100 * one.low:.0f} to {100 * one.high:.0f} %"
 
 
 def spread(found: dict, of: int) -> str:
-    """Quantiles of `of` drawn cases, as `quantiles` gives them, as a table; "" where there are none. Where those that
-    are left out may be its ends none is told: a measure that only some motions have is told of these."""
+    """Return the quantiles of random cases as an HTML table; "" if there are none.
+
+    If the cases that are left out may be the extreme ones, no quantiles are given. For a measure
+    that only some motions have, the quantiles are those of these motions.
+
+    Parameters
+    ----------
+    found : dict
+        From `quantiles`.
+    of : int
+        Number of random cases.
+
+    Returns
+    -------
+    str
+    """
     rows, most = [], max((one[2] for one in found.values()), default=0)
     for name, (unit, values, count, misses) in found.items():
         in_unit, scale = (

@@ -1,18 +1,24 @@
-"""The swing of an output that is released: how far it goes first, and how long until it has come to rest."""
+"""Motion of an output after a release: its first swing, and the time until it is at rest."""
 
 import numpy as np
 
 from ...formatting import format_length, format_quantity, format_value
 from ...runs.results.result import Result
 
-RESTS = 5e-3  # of the place where it ends, which is told to three digits: what moves by less has come to rest
-FEWEST = 5  # amplitudes of a decay whose frequency and damping are told in the sentence
-ROUND = 1e-13  # of the largest output, by which no sample moves
-NOTHING = 1e-9  # of the largest output: an end so near 0 is what is left of a decay to 0
+# Fraction of the final position, which is printed with three digits; an output that moves by less
+# is at rest.
+RESTS = 5e-3
+FEWEST = 5  # smallest number of amplitudes of a decay for which frequency and damping are printed
+ROUND = 1e-13  # fraction of the largest output; a smaller change between samples is round-off
+# Fraction of the largest output; a final position closer to 0 is the remainder of a decay to 0.
+NOTHING = 1e-9
 
 
 def released(result: Result) -> str:
-    """What a run with drive.kind = "free" did before its last cycles, without a stop; "" for any other run."""
+    """Describe the motion of a run with drive.kind = "free"; "" for any other run.
+
+    The text has no full stop at the end.
+    """
     rig, r = result.plan.model.rig, result.response
     if rig is None or rig.drive.kind != "free" or r is None or r.time.size < 2:
         return ""
@@ -22,7 +28,7 @@ def released(result: Result) -> str:
 
 
 def _told(decay) -> str:
-    """Frequency and damping of the first swings whose errors are known and of the last, as words behind a sentence."""
+    """Return a clause on frequency and damping of the second and the last known swing."""
     known = (
         []
         if decay is None
@@ -39,10 +45,23 @@ def _told(decay) -> str:
 
 
 def swung(time, output, error: float = 0.0, amplitude: float | None = None) -> str:
-    """The sentence of `released` from the kept samples (k,) of a motion, turns among them: times [s], output [m].
+    """Describe a released motion from its stored samples, which include the reversals.
 
-    error [m]: of the amplitude; an output that moves by no more than that, or by what the printed digits of its end
-    leave open, is at rest; amplitude [m]: of its last whole cycle, None for that of the last tenth of the samples.
+    Parameters
+    ----------
+    time : (k,) array
+        [s]
+    output : (k,) array
+        [m]
+    error : float
+        Error of the amplitude [m]. An output that moves by no more than this, or than the digits of
+        its final position show, is at rest.
+    amplitude : float, optional
+        Amplitude of the last whole cycle [m]; by default that of the last tenth of the samples.
+
+    Returns
+    -------
+    str
     """
     end, begin = float(output[-1]), float(output[0])
     end = 0.0 if abs(end) < NOTHING * np.abs(output).max() else end

@@ -1,4 +1,8 @@
-"""The answer of a run in words and in the units that people read: its headline, its measures in groups."""
+"""Results of a run as sentences, and its measures in groups, in the units that people use.
+
+In: the summary of a run, as in summary.json. Out: texts, among them the verdict (`verdict`), the
+headline (`headline`) and the table of measures (`table_of`).
+"""
 
 import re
 from collections.abc import Callable, Sequence
@@ -20,7 +24,7 @@ from .document import prose
 
 G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
 DEG = ("deg", 180 / pi)
-WORKSHOP = {  # as formatting.UNIT_LADDERS
+WORKSHOP = {  # imperial units in the form of formatting.UNIT_LADDERS
     "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)),
     "m3": (("in^3", INCH**-3),),
     "rad": (DEG,),
@@ -31,14 +35,16 @@ WORKSHOP = {  # as formatting.UNIT_LADDERS
     "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF)),
 }
 GROUPS = ("motion", "friction", "energy", "patch", "wear")
-SAME = 2e-3  # of the fraction in contact, by which it and the places of the contact may differ without a word
-FEW = 3  # interfaces that are all told of first
-NO_SLIP = 1e-15  # m, the last digits of a slide
+# Relative difference of the fraction in contact and the positions of the contact up to which they
+# agree.
+SAME = 2e-3
+FEW = 3  # number of interfaces or stretches up to which each is listed
+NO_SLIP = 1e-15  # [m], the last digits of a slide
 WHOLE_RUN = "over the whole run"
 LOOPS = "over the two stored cycles of the steady motion"
-OVER = {"harmonic": LOOPS}  # what energies are told over, by engine
+OVER = {"harmonic": LOOPS}  # period to which energies refer, by engine
 MARCHED = "over the cycles of the motion, not those of wear"
-OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
+OF_WHAT = {  # Added to a value that would otherwise be mistaken for another quantity.
     "loop_area": "per cycle",
     "friction_work": WHOLE_RUN,
     "energy_dissipated": WHOLE_RUN,
@@ -46,14 +52,15 @@ OF_WHAT = {  # said behind a value that would otherwise be taken for another, or
     "stick_fraction": "of the interface as a whole",
     "equivalent_damping": "a damping ratio of mode 1",
 }
-SCATTER = "_scatter"  # behind the name of what a record of a random drive shows: how far other records differ
+# Suffix of the measure that says how much a result of a random drive differs between records.
+SCATTER = "_scatter"
 SHAKEN = {
     "relative_displacement_rms": "the displacement of the output is {} rms",
     "absolute_acceleration_rms": "the acceleration of the output is {} rms",
     "response_frequency": "the frequency response H1 peaks at {}",
     "response_damping": "the damping ratio of that peak is {}",
 }
-POWER = "friction_power"  # of a random drive, which has no cycle
+POWER = "friction_power"  # Measure of a random drive, which has no cycle.
 RELEASED = (
     "The run ended before the motion came to rest; raise drive.cycles to see more of the decay."
 )
@@ -64,7 +71,7 @@ GROWN = (
 CHANGES = ("transient", "grows")  # outcomes of a motion whose last cycles differ
 STEPPED = ("jump_level",)  # lies between two drive levels of the scene, whatever the tolerance
 RANGES = {"fraction": 1.0, "phase": pi}  # range of a measure [SI], by the end of its name
-ROUND = 1e-12  # of the friction force times the motion: work that is round-off
+ROUND = 1e-12  # Fraction of the friction force times the motion; a smaller work is round-off.
 NONE = MappingProxyType({})
 UNKNOWN = " (error unknown)"
 SHARP = "values without ± are exact to the last digit shown"
@@ -72,14 +79,29 @@ SHARP_BUT_UNKNOWN = f"{SHARP}, except where the error is unknown"
 
 
 def units(name: str, value: float, unit: str, error: float | None = None) -> list:
-    """Units [(unit, scale)] in which a person reads the measure `name`, by its size or that of its error; the metric
-    one first.
+    """Return the units [(unit, scale)] in which a measure is shown, the metric one first.
 
-    value, error and unit: in SI; value times scale is in the unit.
+    The size of the value, or of its error, chooses them.
+
+    Parameters
+    ----------
+    name : str
+        The measure.
+    value : float
+        In SI; times scale it is in the unit.
+    unit : str
+        SI unit.
+    error : float, optional
+        In SI.
+
+    Returns
+    -------
+    list
     """
     if is_share(name):
         return [("%", 100.0)]
-    if re.sub(r"_\d+$", "", name).endswith("phase"):  # of an interface after the first too
+    # the phase of an interface after the first has a number in its name
+    if re.sub(r"_\d+$", "", name).endswith("phase"):
         return [DEG]
     if unit == "m s-2":
         return [("g", 1 / G)]
@@ -91,7 +113,10 @@ def units(name: str, value: float, unit: str, error: float | None = None) -> lis
 
 
 def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
-    """Value and error of a measure as texts, in the first of its units or with a scale of one's own."""
+    """Return value and error of a measure as texts.
+
+    They are in the first unit of the measure, or in SI times `scale`.
+    """
     value, error, unit = measure["value"], measure["error"], measure["unit"]
     if value is None:
         return "-", ""
@@ -105,18 +130,48 @@ def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
 
 
 def is_share(name: str) -> bool:
-    """Whether a measure is a fraction, which people read in %."""
+    """Return whether a measure is a fraction, which is shown in %."""
     return re.sub(r"_\d+$", "", name).endswith("fraction")
 
 
 def short(name: str, value: float, unit: str, digits: int) -> str:
-    """The value [SI] of a measure with so many digits in the unit that people read, 0 below its floor: `46.68 mJ`."""
+    """Write the value of a measure with a number of digits in a suitable unit: `46.68 mJ`.
+
+    Parameters
+    ----------
+    name : str
+        The measure; a value below its floor is written as 0.
+    value : float
+        In SI.
+    unit : str
+        SI unit.
+    digits : int
+
+    Returns
+    -------
+    str
+    """
     value, unit = (100 * value, "%") if is_share(name) else (value, unit)
     return formatting.format_quantity(value, unit, digits, zero_below(name))
 
 
 def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
-    """Two values [SI] as `short` writes them, in one unit unless one of them is a thousand times the other."""
+    """Write two values of a measure in one unit, or in two if their ratio exceeds 1000.
+
+    Parameters
+    ----------
+    name : str
+        The measure.
+    low, high : float
+        In SI.
+    unit : str
+        SI unit.
+    digits : int
+
+    Returns
+    -------
+    tuple of str
+    """
     texts = tuple(short(name, one, unit, digits) for one in (low, high))
     if (
         is_share(name)
@@ -131,7 +186,7 @@ def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
 
 
 def pair(name: str, measure: dict) -> str:
-    """A measure with its error in the first of its units, such as `14.808 ± 0.041 um`; a dash without a value."""
+    """Write a measure with its error in its first unit, `14.808 ± 0.041 um`; "-" if unknown."""
     value, error = texts(name, measure)
     if value == "-":
         return value
@@ -142,22 +197,26 @@ def pair(name: str, measure: dict) -> str:
 
 
 def below_minimum(name: str, measure: dict) -> bool:
-    """Whether the error of a measure reaches below the smallest value that it can have, 0."""
+    """Return whether value minus error is below the smallest possible value, 0."""
     value, error = measure["value"], measure["error"]
     return minimum_of(name) == 0 and value is not None and bool(error) and error >= value > 0
 
 
 def zero_below(name: str, measure: dict = NONE) -> float:
-    """Floor of a measure in its row, or the smaller one of its run [SI]: below it, it is 0 for a reader.
+    """Return the value of a measure below which it is shown as 0 [SI].
 
-    A floor that the run has raised to the tolerance times larger terms is what is asked of it, not what is known.
+    It is the floor of its definition, or the floor in the run if this is smaller: a floor that the
+    run has raised to the tolerance times larger terms is what is required of it, not what is known.
     """
     row, own = row_of(name), measure.get("floor") or inf
     return 0.0 if row is None else min(row.floor, own)
 
 
 def others(name: str, measure: dict) -> str:
-    """The value in the units of a workshop, to the digits its error allows; nothing for one that is 0 within it."""
+    """Write the value in imperial units with the digits that its error allows; "" if it is 0.
+
+    A value within its error counts as 0.
+    """
     value, error = measure["value"], measure["error"]
     if (
         value is None
@@ -175,7 +234,7 @@ def others(name: str, measure: dict) -> str:
 
 
 def _unknown(measures: dict) -> str:
-    """Names of the static measures that are not known within their own size; "" without any."""
+    """Return the names of the static measures whose error is as large as the value; "" if none."""
     found = {
         name: Measure(**{key: one[key] for key in ("value", "unit", "error")})
         for name, one in measures.items()
@@ -184,10 +243,11 @@ def _unknown(measures: dict) -> str:
 
 
 def verdict(summary: dict) -> str:
-    """The sentence on how a run ended, from its summary as summary.json holds it; of a bench also whether it slipped.
+    """Return the sentence on how a run ended, from its summary.
 
-    `stuck` speaks of the interface as a whole. Where its last cycles dissipate, or slip, more than their error, part of
-    it slips, and the sentence says how much.
+    `stuck` refers to the interface as a whole. If the last cycles dissipate or slip more than their
+    error, part of it slips, and the sentence says how much. For a bench the sentence also says
+    whether it slipped.
     """
     outcome, measures = Outcome(summary["outcome"]), summary["measures"]
     if outcome is Outcome.NOT_CONVERGED and (unknown := _unknown(measures)):
@@ -236,8 +296,11 @@ def verdict(summary: dict) -> str:
 
 
 def _holds(patch: bool, cycles: str) -> str:
-    """The sentence where no slip is found. On a patch an edge where the pressure ends slips under any force: on a mesh
-    that does not show it, nothing is said of what lies within an element."""
+    """Return the sentence for an interface on which no slip is found.
+
+    On a patch, an edge at which the pressure ends slips under any force; if a mesh does not show
+    this, nothing is claimed about the interior of an element.
+    """
     return f"The interface sticks: no slip in the last {cycles}" + (
         " beyond the error of this mesh; a slip zone smaller than an element cannot be detected."
         if patch
@@ -246,7 +309,17 @@ def _holds(patch: bool, cycles: str) -> str:
 
 
 def _slid(slip: dict | None, done: str, patch: bool) -> str:
-    """The sentence of a bench: its slip, the mean weighted by the pressure, where that is more than what is open."""
+    """Return the sentence of a bench with its slip, if it exceeds its error.
+
+    Parameters
+    ----------
+    slip : dict or None
+        Slip amplitude, the mean weighted by the pressure.
+    done : str
+        Sentence that comes first.
+    patch : bool
+        Whether the contact is a patch.
+    """
     if slip is None or slip["value"] is None:
         return done
     if slip["value"] <= max(_open(slip), NO_SLIP):
@@ -258,10 +331,11 @@ def _slid(slip: dict | None, done: str, patch: bool) -> str:
 
 
 def _looped(loop: dict, stiffness: dict) -> str:
-    """The sentence on stiffness and damping of a bench; loop: as `summary.loop_of` has it."""
+    """Return the sentence on stiffness and damping of a bench; loop: from `summary.loop_of`."""
     factor, error = loop["loss_factor"], loop["error"]
 
     def number(scale: float) -> str:
+        """Write the loss factor times `scale` with its error."""
         if error is not None and factor <= error:
             return f"at most {formatting.format_number((factor + error) * scale, 2)}"
         value, off = formatting.round_to_error(
@@ -278,12 +352,12 @@ def _looped(loop: dict, stiffness: dict) -> str:
 
 
 def _open(one: dict) -> float:
-    """What a measure leaves open, in its unit: its error, or its floor where none was estimated."""
+    """Return the error of a measure in its unit, or its floor if no error was estimated."""
     return one["floor"] if one["error"] is None else one["error"]
 
 
 class Statement(NamedTuple):
-    """A part of the headline: a measure ("" for none), and a text with {} for its value and error."""
+    """A part of the headline: a measure, or "", and a text with {} for its value and error."""
 
     measure: str
     text: str
@@ -295,18 +369,22 @@ def headline(
     number: Callable[[str, str], str] | None = None,
     released: str = "",
 ) -> str:
-    """State the measures that answer first in one sentence; "" where there is none.
+    """State the most important measures in one sentence; "" if there are none.
 
     Parameters
     ----------
     summary : dict
-        As summary.json holds it.
+        As in summary.json.
     cycles : float or None
         Cycles of the drive in the run; None for a run without cycles.
-    number : callable
-        Returns what stands in the sentence for the text of a value and the name of its measure.
+    number : callable, optional
+        Takes the text of a value and the name of its measure, and returns the text in the sentence.
     released : str
-        How a released output swung; it replaces the measures of the last cycles.
+        Motion of a released output; it replaces the measures of the last cycles.
+
+    Returns
+    -------
+    str
     """
     measures = summary["measures"]
     covers_cycle = cycles is None or cycles >= 1 - 1e-6
@@ -338,6 +416,7 @@ def _filled(statement: Statement, measures: dict, number: Callable[[str, str], s
 
 
 def _wear_statements(measures: dict) -> list:
+    """Return the statement on the worn depth or, if there is none, on the worn volume."""
     texts_by_measure = {
         "worn_depth_max": "{} worn off at the deepest place",
         "worn_volume": "{} worn off",
@@ -346,6 +425,7 @@ def _wear_statements(measures: dict) -> list:
 
 
 def _motion_statements(measures: dict, released: str) -> list:
+    """Return the statements on the motion."""
     if released:
         rows = [("", released), ("friction_work", "friction dissipates {} during the whole run")]
     else:
@@ -367,7 +447,10 @@ def _motion_statements(measures: dict, released: str) -> list:
 
 
 def _energy_statements(summary: dict) -> list:
-    """Return what friction dissipates: as a power under a random drive, else per cycle at each interface."""
+    """Return the statements on the energy that friction dissipates.
+
+    It is a power under a random drive, else an energy per cycle at each interface.
+    """
     if POWER in summary["measures"]:
         return [Statement(POWER, "friction dissipates {}")]
     text = "{} dissipated per cycle"
@@ -379,6 +462,7 @@ def _energy_statements(summary: dict) -> list:
 
 
 def _patch_statements(summary: dict) -> list:
+    """Return the statements on the pressed patch."""
     fraction = summary["measures"].get("contact_fraction", {}).get("value")
     where = placed(summary.get("contact"), fraction)
     statements = _at_each_interface(
@@ -390,7 +474,10 @@ def _patch_statements(summary: dict) -> list:
 
 
 def _at_each_interface(summary: dict, name: str, text: str) -> list:
-    """Return the statement of each interface, of the first alone where they are many; strips are no interfaces."""
+    """Return the statement of each interface, or only of the first if there are more than FEW.
+
+    Strips do not count as interfaces.
+    """
     count = sum(of_first(measure) == name for measure in summary["measures"])
     if count < 2 or any(effect["effect"] == "contact.strips" for effect in summary["effects"]):
         return [Statement(name, text)]
@@ -400,9 +487,21 @@ def _at_each_interface(summary: dict, name: str, text: str) -> list:
 
 
 def placed(contact: dict | None, fraction: float | None = None) -> str:
-    """Where along x the contact is, as words behind its share of the length, such as `, from x = -6.35 to -3.56 mm
-    (left end)`; "" where all of the length is in contact or this is not known. contact: as `summary.contact_of` has
-    it. fraction: in contact, which may be extrapolated to finer meshes where the places are those of the finest one."""
+    """Describe where the contact is along x, such as `, from x = -6.35 to -3.56 mm (left end)`.
+
+    Parameters
+    ----------
+    contact : dict or None
+        From `summary.contact_of`.
+    fraction : float, optional
+        Fraction in contact, which may be extrapolated to finer meshes, whereas the positions are
+        those of the finest mesh.
+
+    Returns
+    -------
+    str
+        "" if all of the length is in contact, or if this is not known.
+    """
     if not contact or not contact["stretches"]:
         return ""
     first, last, stretches = contact["from"], contact["to"], contact["stretches"]
@@ -413,9 +512,11 @@ def placed(contact: dict | None, fraction: float | None = None) -> str:
     least = min(
         [1e-3 * (last - first), *(1e-2 * (end - begin) for begin, end in stretches if end > begin)]
     )
-    digits = max(0, -floor(log10(least * scale)))  # what tells apart both ends of the shortest part
+    # This many digits distinguish both ends of the shortest stretch.
+    digits = max(0, -floor(log10(least * scale)))
 
     def number(place: float) -> str:
+        """Write a position [m] in the unit of the sentence."""
         return (
             f"{round(place * scale, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".")
             if digits
@@ -449,7 +550,7 @@ def placed(contact: dict | None, fraction: float | None = None) -> str:
 
 
 def tolerance_sentence(result: Result) -> str:
-    """Say that all measures meet the tolerance, by which limits, and which error is the largest.
+    """State that all measures meet the tolerance, by which limits, and the largest error.
 
     Parameters
     ----------
@@ -497,7 +598,7 @@ def tolerance_sentence(result: Result) -> str:
 
 
 def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
-    """Say what the tolerance allows measures whose error is a larger part of their value."""
+    """State the limits of measures whose error exceeds the tolerance times their value."""
     parts = []
     for name in names:
         one = known[name]
@@ -515,20 +616,20 @@ def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
 
 
 def _plain_value(name: str, value: float, unit: str) -> str:
-    """Format a value [SI] of a measure with three digits in the unit that people read."""
+    """Write a value [SI] of a measure with three digits in a suitable unit."""
     shown, scale = units(name, value, unit)[0]
     return f"{formatting.format_number(value * scale, 3)} {shown}".rstrip()
 
 
 def linked(text: str, name: str, more: str = "") -> str:
-    """A text as a link to the definition of a measure on the same page."""
+    """Return a text as a link to the definition of a measure on the same page."""
     return f"<a{more} href='#measure-{escape(name)}'>{escape(text)}</a>"
 
 
 def row_of(name: str, pressed: bool = False):
-    """The Row of a measure by its name, that of one of several interfaces ends in its number; None without one.
+    """Return the definition of a measure, also of one that ends in the number of an interface.
 
-    pressed: a patch was pressed, so that what it shares with a point, the load, is its own.
+    None if there is none. pressed: whether a patch was pressed, which has a load of its own.
     """
     for table in (STATIC, MOTION) if pressed else (MOTION, STATIC):
         for known in (name, re.sub(r"_\d+$", "", name)):
@@ -538,20 +639,23 @@ def row_of(name: str, pressed: bool = False):
 
 
 def meaning(name: str) -> str:
-    """What a measure is, in a sentence; "" for one that no table has."""
+    """Return the definition of a measure as a sentence; "" if no table has it."""
     row = row_of(name)
     return "" if row is None else row.text
 
 
 def group_of(name: str, pressed: bool = True) -> str:
-    """The group, one of GROUPS, of a measure by its name; pressed: as `row_of` takes it."""
+    """Return the group of a measure, one of GROUPS; pressed: as for `row_of`."""
     row = row_of(name, pressed)
     return GROUPS[0] if row is None else row.group
 
 
 def in_order(measures: dict) -> dict:
-    """The measures as people read them: under a random drive first those of the record, each with its scatter in its
-    own row, which then has none itself."""
+    """Return the measures in the order in which they are shown.
+
+    Under a random drive those that a record determines come first; their scatter is shown with them
+    and is left out.
+    """
     shaken = [name for name in measures if f"{name}{SCATTER}" in measures]
     return {
         name: measures[name]
@@ -561,8 +665,10 @@ def in_order(measures: dict) -> dict:
 
 
 def of_records(name: str, measures: dict) -> tuple:
-    """(value, interval of 95 %) of what a finite record of a random drive shows, as texts to the digits that the
-    scatter of records leaves; ("", "") of any other measure."""
+    """Return a measure of a random drive and its 95 % interval over records, as texts.
+
+    They have the digits that the scatter of records allows; ("", "") for any other measure.
+    """
     one, spread = measures.get(name, NONE), measures.get(f"{name}{SCATTER}", NONE)
     if one.get("value") is None or spread.get("value") is None:
         return "", ""
@@ -577,8 +683,21 @@ def of_records(name: str, measures: dict) -> tuple:
 
 
 def table_of(measures: dict, engine: str = "") -> list[str]:
-    """Lines of all measures in their groups, each with its error in people's units, or why it has no value; under a
-    random drive with the interval of other records. engine: as the summary names it."""
+    """Return the lines of all measures in their groups, each with its error or its reason.
+
+    Under a random drive a line also has the interval over other records.
+
+    Parameters
+    ----------
+    measures : dict
+        As in summary.json.
+    engine : str
+        Name of the engine, as in the summary.
+
+    Returns
+    -------
+    list of str
+    """
     every, measures = measures, in_order(measures)
     width = max(map(len, measures), default=0)
     out, pressed = [], "contact_fraction" in measures
@@ -594,7 +713,21 @@ def table_of(measures: dict, engine: str = "") -> list[str]:
 
 
 def fragment(summary: dict, sentence: str, cycles: float | None, released: str = "") -> str:
-    """The answer as HTML without styles of its own, for a notebook; cycles and released as `headline` takes them."""
+    """Return the results as HTML without styles, for a notebook.
+
+    Parameters
+    ----------
+    summary : dict
+        As in summary.json.
+    sentence : str
+        How the run ended.
+    cycles, released
+        As for `headline`.
+
+    Returns
+    -------
+    str
+    """
     rows, measures = [], summary["measures"]
     for line in table_of(measures, summary.get("numerics", {}).get("engine", "")):
         name, _, value = line.strip().partition(" ")
@@ -609,13 +742,14 @@ def fragment(summary: dict, sentence: str, cycles: float | None, released: str =
 
 
 def _records(name: str, measures: dict) -> str:
-    """`of_records` behind a value, whose ± is then said to be that of the numerics alone."""
+    """Write the interval over other records in brackets; it says that ± is the numerical error."""
     text = of_records(name, measures)[1]
     numerics = "± is the numerical error; " if "±" in pair(name, measures[name]) else ""
     return f" ({numerics}{text} for other records)" if text else ""
 
 
 def _value(name: str, one: dict, over: str, shaken: bool) -> str:
+    """Write a measure with its error and what it refers to, or the reason why it has no value."""
     if one.get("reason"):
         return f"- ({one['reason']})"
     of_what = OF_WHAT.get(re.sub(r"_\d+$", "", name))
@@ -626,7 +760,7 @@ def _value(name: str, one: dict, over: str, shaken: bool) -> str:
 
 
 def joined(sentences: Sequence) -> str:
-    """Sentences as one, with semicolons between them; "" without any."""
+    """Join sentences with semicolons; "" if there are none."""
     first, *others = sentences or [""]
     said = [
         first,

@@ -1,4 +1,4 @@
-"""Several runs on one page: what differs in their scenes, their measures side by side, their curves in one picture."""
+"""Page with several runs: differences of the scenes, measures side by side, and curves."""
 
 import math
 import tomllib
@@ -18,11 +18,12 @@ from .document import Section, document, prose, table
 from .sentences import linked, meaning, pair
 from .sweep import label
 
-TALL = 410  # pixels of a picture
-POINTS = 4000  # of one line in a picture
-MANY = 10.0  # times the first value, from which a change is told as a factor
-CYCLES = 2.0  # of the last motion that are shown: result.nc keeps so many whole
-CHARTS = (  # title, x: (variable, label), y: (variable, label); only the last cycles of what stands on time
+TALL = 410  # height of a figure [px]
+POINTS = 4000  # points of a line in a figure
+MANY = 10.0  # ratio to the first value from which a change is given as a factor
+CYCLES = 2.0  # last cycles that are shown; result.nc stores this many completely
+# title, x: (variable, label), y: (variable, label); of variables over time only the last cycles
+CHARTS = (
     ("Pressure", ("x", "place"), ("normal_stress", "normal stress")),
     (
         "Friction loop",
@@ -45,10 +46,18 @@ CHARTS = (  # title, x: (variable, label), y: (variable, label); only the last c
 
 
 class FinishedRun(NamedTuple):
-    """A finished run as its folder holds it.
+    """A finished run as stored in its folder.
 
-    name: of the folder; summary: of summary.json; resolved: the scene with every default, as nested tables; arrays:
-    variable -> (values, unit), the first frame of what has frames.
+    Attributes
+    ----------
+    name : str
+        Name of the folder.
+    summary : dict
+        Content of summary.json.
+    resolved : dict
+        The scene with all defaults, as nested tables.
+    arrays : dict
+        Variable -> (values, unit); of variables with frames only the first.
     """
 
     name: str
@@ -58,7 +67,7 @@ class FinishedRun(NamedTuple):
 
 
 def read(folder: Path) -> FinishedRun:
-    """The run in a results folder; PatchfemError where there is none."""
+    """Read the run in a results folder; PatchfemError if there is none."""
     folder = Path(folder)
     try:
         summary = read_summary(folder / "summary.json")
@@ -75,6 +84,7 @@ def read(folder: Path) -> FinishedRun:
 
 
 def _arrays(path: Path) -> dict:
+    """Read the variables of CHARTS that have finite values."""
     if not path.is_file():
         return {}
     shown, out = {name for _, *axes in CHARTS for name, _ in axes}, {}
@@ -91,7 +101,7 @@ def _arrays(path: Path) -> dict:
 
 
 def page(runs: list) -> str:
-    """Make the whole HTML page of several `FinishedRun`s, in their order; differences are from the first."""
+    """Return the HTML page of several `FinishedRun`s; differences are relative to the first."""
     names = distinct([run.name for run in runs])
     charts = [
         one
@@ -131,7 +141,7 @@ def page(runs: list) -> str:
 
 
 def distinct(names: list) -> list:
-    """The names, numbered where several are the same."""
+    """Return the names, with a number added to those that occur more than once."""
     return [
         name if names.count(name) == 1 else f"{name} ({number})"
         for number, name in enumerate(names, 1)
@@ -139,7 +149,18 @@ def distinct(names: list) -> list:
 
 
 def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list) -> dict | None:
-    """One picture of all runs that have both variables, in units that suit the largest values."""
+    """Return the figure of all runs that have both variables; None if no run has them.
+
+    Parameters
+    ----------
+    number : int
+        Number of the figure.
+    title : str
+    x, y : tuple
+        (variable, label).
+    runs : list of FinishedRun
+    names : list of str
+    """
     lines = []
     for run, name in zip(runs, names):
         if x[0] not in run.arrays or y[0] not in run.arrays:
@@ -186,13 +207,16 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
 
 
 def period_of(run: FinishedRun) -> float | None:
-    """Period [s] of the sine that drives a run; None where none does."""
+    """Return the period [s] of the sine that drives a run; None if there is none."""
     written = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
     return 1 / float(written[1]) if written and float(written[1]) > 0 else None
 
 
 def _late(run: FinishedRun) -> np.ndarray:
-    """Which samples lie in the last CYCLES cycles of a sine, or in the last tenth of a run without one."""
+    """Return which samples lie in the last CYCLES cycles of a sine.
+
+    Without a sine it is the last tenth of the run; on a bench all samples.
+    """
     time, period = run.arrays["time"][0], period_of(run)
     span = CYCLES * period if period else np.ptp(time) / 10
     if run.summary["kind"] == "bench":
@@ -201,7 +225,10 @@ def _late(run: FinishedRun) -> np.ndarray:
 
 
 def _flat(table, at: str = "") -> dict:
-    """Nested tables as one: "contact.tilt.angle" -> value; entries of lists by their name or number."""
+    """Flatten nested tables: "contact.tilt.angle" -> value.
+
+    Entries of lists are named by their name or number.
+    """
     if isinstance(table, dict):
         pairs = table.items()
     elif isinstance(table, list) and table and isinstance(table[0], dict):
@@ -216,7 +243,7 @@ def _flat(table, at: str = "") -> dict:
 
 
 def _differences(runs: list, names: list) -> str:
-    """A table of the keys of the resolved scenes that are not the same in all of them."""
+    """Return a table of the keys whose values differ between the resolved scenes."""
     flat = [_flat(run.resolved) for run in runs]
     keys = [
         key
@@ -233,6 +260,7 @@ def _differences(runs: list, names: list) -> str:
 
 
 def _written(value) -> str:
+    """Write a value of a resolved scene as HTML; long texts are cut."""
     text = (
         "&ndash;"
         if value is None
@@ -244,7 +272,10 @@ def _written(value) -> str:
 
 
 def _measures(runs: list, names: list) -> str:
-    """A table of the measures of all runs; what differs from the first by more than both errors is marked."""
+    """Return a table of the measures of all runs.
+
+    Values that differ from those of the first run by more than both errors are marked.
+    """
     rows = []
     for name in dict.fromkeys(name for run in runs for name in run.summary["measures"]):
         found = [run.summary["measures"].get(name) for run in runs]
@@ -267,6 +298,7 @@ def _measures(runs: list, names: list) -> str:
 
 
 def _cell(name: str, one: dict | None, first: dict | None) -> str:
+    """Write a measure as a cell, with its change from the first run."""
     if one is None or one["value"] is None or not math.isfinite(one["value"]):
         return "&ndash;"
     text = escape(pair(name, one))
@@ -279,11 +311,14 @@ def _cell(name: str, one: dict | None, first: dict | None) -> str:
 
 
 def _share(value: float, first: dict) -> str:
-    """The change from the first value: in per cent, as a factor where it is many times as large, a dash where the first
-    is 0 within its error, so that any number would tell of that error."""
+    """Write the change from the first value in per cent, or as a factor if it is large.
+
+    It is a dash if the first value is 0 within its error, because any ratio would then only depend
+    on this error.
+    """
     if abs(first["value"]) <= (first["error"] or 0.0):
         return "&ndash;"
     factor = value / first["value"]
     if abs(factor) < MANY:
         return f"{(value - first['value']) / abs(first['value']):+.2%}"
-    return f"&times; {float(f'{factor:.2g}'):.7g}"  # two digits, and 150 as it is
+    return f"&times; {float(f'{factor:.2g}'):.7g}"  # two digits, and without an exponent: 150

@@ -1,4 +1,4 @@
-"""The page of a sweep: what came out over the swept keys, explored in the browser, and a table of the cases."""
+"""Page of a sweep: its results over the swept keys, explored in the browser, and its cases."""
 
 from collections import Counter
 from html import escape
@@ -17,13 +17,15 @@ from .drawn import BAR, SHORT, digits, drawn
 from .headline import FIRST, SETTLED, SweepHeadline, columns, lead_of
 from .sentences import is_share, linked, zero_below
 
-# measures in the table of cases, and keys with measures: more do not fit a wide screen
+# Numbers of measures, and of keys and measures together, in the table of cases: more do not fit a
+# wide screen.
 MOST, COLUMNS = (
     6,
     8,
 )
-PAGE, SUMMARY = "report.html", "summary.json"  # of a case
-# cases in the table, sweep.csv has them all; rows from which on it scrolls within its frame
+PAGE, SUMMARY = "report.html", "summary.json"  # files of a case
+# Cases in the table, whereas sweep.csv has all of them; rows above which the table scrolls in its
+# frame.
 LISTED, TALL = (
     400,
     24,
@@ -31,15 +33,25 @@ LISTED, TALL = (
 
 
 def page(table: dict, told: SweepHeadline | None = None) -> str:
-    """The whole HTML page of a sweep; told: the `lead_of` its table, where it is known.
+    """Return the HTML page of a sweep.
 
-    table: `title`, `of` (the scene's own title; may be missing), `version`, `command` (the line that made it),
-    `scene` (its text); `grid`: whether the cases are all combinations of the keys'
-    values; `keys`: [{`name`, `unit`, `values` (n,) in SI, `texts` (n,) as written, `log`}];
-    `measures`: {name: {`unit`, `means`, `values` (n,), `errors` (n,), `floors` (n,)}}, NaN where a case has none;
-    `tolerance` of all cases or (n,) and `patch` {`length`, `width`} [m], where they are known; `outcome` (n,);
-    `messages`: {case: why it has no answer}; `folders` (n,): where the cases lie beside the page, or None; `own`: False
-    where sweep.csv does not lie beside the page.
+    Parameters
+    ----------
+    table : dict
+        `title`, `of` (title of the scene; may be missing), `version`, `command` (the command line
+        of the sweep), `scene` (its text); `grid`: whether the cases are all combinations of the
+        values of the keys; `keys`: [{`name`, `unit`, `values` (n,) in SI, `texts` (n,) as written,
+        `log`}]; `measures`: {name: {`unit`, `means`, `values` (n,), `errors` (n,), `floors` (n,)}},
+        NaN if a case has none; `tolerance` of all cases or (n,), and `patch` {`length`, `width`}
+        [m], if they are known; `outcome` (n,); `messages`: {case: why it has no result}; `folders`
+        (n,): paths of the cases relative to the page, or None; `own`: False if the folder of the
+        page has no sweep.csv.
+    told : SweepHeadline, optional
+        The `lead_of` the table, if it is known.
+
+    Returns
+    -------
+    str
     """
     first = next(
         (
@@ -89,7 +101,7 @@ def page(table: dict, told: SweepHeadline | None = None) -> str:
 
 
 def _data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dict:
-    """What the scripts draw of some cases; whole: with all digits, as where these are all."""
+    """Return the data of some cases for the scripts; whole: with all digits."""
     keys = [_key(one, cases) for one in table["keys"]]
     measures = [
         _measure(name, one, cases, table.get("tolerance", np.nan))
@@ -113,8 +125,10 @@ def _data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dic
 
 
 def _key(one: dict, cases) -> dict:
-    """A swept key in the unit in which it was written, where all its values are; `words`: (number, text) of its values
-    where they are words."""
+    """Return a swept key in the unit in which it was written, if all values have the same unit.
+
+    `words`: (number, text) of its values if they are words.
+    """
     texts = [str(one["texts"][i]) for i in cases]
     written = [NUMBER.match(text) for text in texts]
     units = {(match[2] or "").strip() if match else None for match in written}
@@ -135,7 +149,18 @@ def _key(one: dict, cases) -> dict:
 
 
 def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
-    """A measure in the unit that suits its largest value; `over`: whether a case misses its tolerance."""
+    """Return a measure in a unit that suits its largest value, for the scripts.
+
+    `over`: whether a case misses its tolerance.
+
+    Parameters
+    ----------
+    name : str
+    one : dict
+        The measure, as in the table of `page`.
+    cases : (m,) array or slice
+    tolerance : float or (n,) array
+    """
     unit, scale = (
         ("%", 100.0)
         if is_share(name)
@@ -163,13 +188,20 @@ def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
 
 
 def _along(keys: list) -> str:
-    """The key with most values: the one along the axis."""
+    """Return the name of the key with the most values, which is along the axis."""
     return max(keys, key=lambda one: np.unique(one["values"]).size)["name"] if keys else ""
 
 
 def _explorer(said: str, folders: list | None) -> str:
-    """The choices and the place of the picture; `explorer.js` fills both; said: which cases are drawn, "" for all;
-    folders: where the cases lie, None where nothing is kept of them."""
+    """Return the controls and the empty figure, which `explorer.js` fills.
+
+    Parameters
+    ----------
+    said : str
+        Sentence that says which cases are drawn; "" for all.
+    folders : list or None
+        Paths of the cases; None if nothing is stored of them.
+    """
     kept = {Path(one).name for one in folders or ()}
     opens = (
         " Click on a case to open its page."
@@ -197,13 +229,16 @@ def _explorer(said: str, folders: list | None) -> str:
 
 
 def _change(table: dict, found: limits.Limits) -> list:
-    """The section on what each main measure has changed by since the first case; none where no key grows alone."""
+    """Return the section on the change of each main measure since the first case.
+
+    [] if the sweep has no limits.
+    """
     text = limits.table(found, columns(table))
     return [Section("change", "Change relative to the first case", text)] if text else []
 
 
 def _lead(table: dict, said: SweepHeadline) -> str:
-    """The verdict: the answer, how many cases, over what, how they ended, and what else the sweep says."""
+    """Return the verdict as HTML: the answer, number of cases, keys, outcomes, other sentences."""
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(
         f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common()
@@ -234,7 +269,7 @@ def _lead(table: dict, said: SweepHeadline) -> str:
 
 
 def _cases(table: dict) -> str:
-    """The first cases as a table with their keys, outcome and the measures that change from case to case."""
+    """Return the first cases as a table with keys, outcome and the measures that vary."""
     shown = [
         name
         for name in ranked.asked_first((FIRST[0], "peak_frequency", *FIRST[1:]), table)
@@ -303,18 +338,19 @@ def _cases(table: dict) -> str:
 
 
 def _unbroken(text: str) -> str:
-    """A value of a key as HTML, its unit on the line of its number."""
+    """Return a value of a key as HTML without a line break before its unit."""
     return escape(text).replace(" ", "&nbsp;") if NUMBER.match(text) else escape(text)
 
 
 def _changes(values) -> bool:
+    """Return whether values (n,) differ by more than round-off."""
     found = np.asarray(values, float)
     found = found[np.isfinite(found)]
     return found.size > 0 and np.ptp(found) > 1e-9 * np.abs(found).max()
 
 
 def _number(value: float, error: float, least: float) -> str:
-    """A value rounded by its error and with it; least: its floor in the unit of both."""
+    """Write a value with its error, rounded by this error; least: its floor in the same unit."""
     if not np.isfinite(value):
         return "&ndash;"
     return " ± ".join(
@@ -323,6 +359,7 @@ def _number(value: float, error: float, least: float) -> str:
 
 
 def _meanings(table: dict) -> str:
+    """Return a table of the definitions of the measures."""
     rows = [
         (
             f" id='measure-{escape(name)}'",
@@ -334,6 +371,7 @@ def _meanings(table: dict) -> str:
 
 
 def _again(table: dict) -> str:
+    """Return the command and the scene of the sweep as HTML."""
     return (
         "<p>The sweep was run with this command in the folder of its scene:</p>"
         f"<pre>{escape(table['command'])}</pre><details><summary>Scene</summary><pre>{escape(table['scene'])}</pre></details>"

@@ -1,4 +1,4 @@
-"""A mesh of fewer cells for a page: some of its lines stay, every cell between them has the mean of those it covers."""
+"""Coarser meshes for a page: some lines are kept; a cell has the mean of those it covers."""
 
 from dataclasses import dataclass
 
@@ -6,16 +6,27 @@ import numpy as np
 
 from ..drawing.panels import sizes
 
-WIDE = 3.0  # as many times more columns than rows, where neither has too few lines for it
+WIDE = 3.0  # ratio of columns to rows, if there are enough lines of both
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Thinned:
-    """A coarser mesh and what it has of the finer one.
+    """A coarser mesh, and how it derives from the finer one.
 
-    nodes: (p,) numbers of the points that stay; cells: (c, 4) their corners among `nodes`, the last one twice in a
-    triangle; order: (m,) cells of the finer mesh, group by group; starts: (g,) where each group begins in `order`;
-    groups: (c,) the group of each cell; areas: (m,) [m2] in the order of `order`.
+    Attributes
+    ----------
+    nodes : (p,) array
+        Numbers of the points that are kept.
+    cells : (c, 4) array
+        Corners among `nodes`; a triangle has the last one twice.
+    order : (m,) array
+        Cells of the finer mesh, group by group.
+    starts : (g,) array
+        Start of each group in `order`.
+    groups : (c,) array
+        Group of each cell.
+    areas : (m,) array
+        Areas of the cells in the order of `order` [m2].
     """
 
     nodes: np.ndarray
@@ -26,17 +37,32 @@ class Thinned:
     areas: np.ndarray
 
     def means(self, values) -> np.ndarray:
-        """Means (c, k) over the area of each cell of values (m, k) on the cells of the finer mesh."""
+        """Return the area-weighted means (c, k) of values (m, k) on the cells of the finer mesh."""
         sums = np.add.reduceat(values[self.order] * self.areas[:, None], self.starts)
         return (sums / np.add.reduceat(self.areas, self.starts)[:, None])[self.groups]
 
 
 def thinned(points, cells, material, most: int, near: tuple | None = None) -> Thinned:
-    """The mesh of points (n, 2) [m], cells (m, 4) and material (m,) with about `most` cells at most.
+    """Reduce a mesh to about `most` cells.
 
-    near: x (left, right) [m] where half of the columns stand, if there are as many.
-    Of a grid one line in several stays, the outer ones and those between two materials among them; so stays the
-    outline. In any other mesh all points of a box between such lines become one of them. Without need nothing changes.
+    In a grid, every so many lines are kept, including the outer lines and those between two
+    materials, so that the outline stays the same. In any other mesh all points of a box between
+    such lines become one point. A mesh with few enough cells is not changed.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        [m]
+    cells : (m, 4) array
+        Corners.
+    material : (m,) array
+    most : int
+    near : tuple, optional
+        Range of x [m] in which half of the columns are kept, if there are so many.
+
+    Returns
+    -------
+    Thinned
     """
     count, size = len(cells), sizes(points, cells)
     if count <= most:
@@ -45,7 +71,7 @@ def thinned(points, cells, material, most: int, near: tuple | None = None) -> Th
     bins, heights = _bins(points, cells, material, most, near)
     key = bins[0] * heights + bins[1]
     away = np.abs(points[:, 0] - points[:, 0].min()) + np.abs(points[:, 1])
-    # the first of a box lies nearest to its corner; of a grid it is that corner
+    # The first point of a box is the one nearest to its corner; in a grid it is this corner.
     by_key = np.lexsort((away, key))
     _, first, number = np.unique(key[by_key], return_index=True, return_inverse=True)
     stand_in = np.empty(len(points), int)
@@ -63,10 +89,14 @@ def thinned(points, cells, material, most: int, near: tuple | None = None) -> Th
 
 
 def _bins(points, cells, material, most: int, near: tuple | None) -> tuple:
-    """Number of the kept line at or before each point, (along x, in depth), and how many lines there are in depth."""
+    """Return the indices of the kept lines at or before each point, and the number of rows.
+
+    The indices count columns along x and rows in depth.
+    """
     x, depth = points[:, 0], np.abs(points[:, 1])
     columns, rows = (np.unique(one) for one in (x, depth))
-    if columns.size * rows.size > len(points):  # no grid: a box between lines takes two triangles
+    # not a grid: a box between lines needs two triangles
+    if columns.size * rows.size > len(points):
         most //= 2
     down = min(rows.size - 1, max(int((most / WIDE) ** 0.5), most // (columns.size - 1)))
     coat = np.zeros((2, len(points)), bool)
@@ -82,14 +112,15 @@ def _bins(points, cells, material, most: int, near: tuple | None) -> tuple:
 
 
 def spread(lines, count: int, near: tuple | None = None) -> np.ndarray:
-    """Numbers of at most `count` + 1 of the sorted lines (n,), the first and the last among them, evenly many of them.
+    """Return the indices of at most `count` + 1 sorted lines (n,), evenly spaced.
 
-    near: (left, right) between which half of them lie, if there are as many.
+    The first and the last line are included. near: (left, right) between which half of the lines
+    are taken, if there are so many.
     """
     weight = np.ones(lines.size - 1)
     if near is not None:
         inside = (lines[1:] > near[0]) & (lines[:-1] < near[1])
-        share = min(inside.sum() / count, 0.5)  # of all that are kept
+        share = min(inside.sum() / count, 0.5)  # fraction of all lines that are kept
         if 0 < share < 1 and inside.sum() < share * inside.size:
             weight[inside] = share * (~inside).sum() / ((1 - share) * inside.sum())
     place = np.concatenate([[0.0], np.cumsum(weight)])
