@@ -163,7 +163,7 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
     above = not probe and any(
         not isinstance(link, str)
         for name, link in answer["stiffness_chain"].items()
-        if rows.of_first(name) == "pieces_shear"
+        if rows.remove_interface_number(name) == "pieces_shear"
     )
     if above:
         print(

@@ -3,8 +3,8 @@
 import numpy as np
 
 from ..model import structure
-from ..response.events import MEANINGS
-from ..response.levels import KEPT
+from ..response.events import KIND_NAMES
+from ..response.levels import LEVEL_MEASURES
 from ..response.rows import TABLE
 from ..runs.results.result import Result, surface_of
 from . import netcdf
@@ -36,7 +36,7 @@ def contents(result: Result) -> netcdf.Contents:
     if "events" in extra:
         e = extra["events"]
         data = netcdf.with_events(
-            data, e.time, e.interface, e.kind, e.slide, e.count, MEANINGS, e.source
+            data, e.time, e.interface, e.kind, e.slide, e.count, KIND_NAMES, e.source
         )
     if "curve" in extra:
         data = netcdf.with_curve(data, extra["curve"])
@@ -149,7 +149,7 @@ def _levels(levels) -> dict:
     }
     if any(one.outcome for one in levels):
         out["level_outcome"] = ("", np.array([one.outcome for one in levels]))
-    for name in KEPT:
+    for name in LEVEL_MEASURES:
         if any(name in one.values for one in levels):
             out[f"level_{name}"] = (
                 TABLE[name].unit,

@@ -343,5 +343,5 @@ def _measured(result: Result) -> Measured | None:
     return replace(
         found,
         reading=kind,
-        share=spectrum.reading(result.window, rig.drive.signal, peak, kind, cutoff) / peak,
+        share=spectrum.read_instrument(result.window, rig.drive.signal, peak, kind, cutoff) / peak,
     )

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..response.decay_curve import curve_of
+from ..response.decay_curve import compute_swing_curve
 from ..structure import places as structure_places
 from ..structure.places import Shapes
 from .decay import fit_decay
@@ -271,7 +271,7 @@ def decay_curve(values: dict, begin: float | None = None) -> tuple:
     """
     time, value = _decay_part(values, begin)
     swings = half_swings(time, value)
-    curve = curve_of(swings)
+    curve = compute_swing_curve(swings)
     notes = []
     is_certain = curve.damping_error <= MAX_ERROR_RATIO * np.abs(curve.damping)
     if curve.time.size and not is_certain.all():

@@ -11,7 +11,7 @@ from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
-from .errors import coarser_errors, orders
+from .errors import coarser_errors, observed_orders
 
 
 class CoarserRuns(NamedTuple):
@@ -31,7 +31,7 @@ class CoarserRuns(NamedTuple):
     of: str = "own"
 
 
-def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
+def estimate_errors(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
     """Return errors by measure name, one dict per `CoarserRuns`, and the CPU time [s] they took.
 
     Parameters
@@ -59,7 +59,7 @@ def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> t
     return errors, perf_counter() - begin
 
 
-def left_open(kinds, errors, runs) -> dict:
+def find_open_kinds(kinds, errors, runs) -> dict:
     """Return the errors by kind and measure name, and the observed `orders` of the time step.
 
     Parameters
@@ -83,10 +83,10 @@ def left_open(kinds, errors, runs) -> dict:
         mine = out.setdefault(kind, {})
         for name, error in part.items():
             mine[name] = mine.get(name, 0.0) + error
-    return {"parts": out, "orders": orders(*runs) if len(runs) == 3 else {}}
+    return {"parts": out, "orders": observed_orders(*runs) if len(runs) == 3 else {}}
 
 
-def coarser_space(coarser, beside=None, of: str = "mesh") -> CoarserRuns:
+def make_coarser_space(coarser, beside=None, of: str = "mesh") -> CoarserRuns:
     """Return a `CoarserRuns` of second order with one run that has wider cells or fewer modes.
 
     The parameters are fields of `CoarserRuns`.

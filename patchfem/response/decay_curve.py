@@ -1,7 +1,7 @@
 """Frequency and damping ratio of a decay against its amplitude, with 95 % intervals.
 
 In: the half swings of a decay, i.e. the motion from one turning point to the next. The turning
-points of a computed motion come from the cubic between samples (`turns`), the half swings of a
+points of a computed motion come from the cubic between samples (`find_turning_points`), the half swings of a
 measured one from a sine fitted to each (`identify.swings`). Out: a `DecayCurve`.
 
 Half swing k has a middle t_k and a size S_k. Over 2 m + 1 half swings, the slope of ln S_k is
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 # numbers m of half swings on both sides of a point that are tried as spans
-SPANS = (
+SPAN_LENGTHS = (
     1,
     2,
     3,
@@ -35,18 +35,22 @@ SPANS = (
     192,
     256,
 )
-APART = 2.0  # standard deviations by which the slopes of two spans may differ
-SURE = 2.5  # standard deviations of a 95 % interval, widened because the span is chosen by the data
-BESIDE = 8  # half swings on both sides whose third differences estimate the noise
-NEAR = 4  # points on both sides over which the largest sampling error is taken
-NEWTON = 3  # Newton steps to a turning point
-ROUND = 1e-12  # round-off of a value, relative
-REST = 1e-12  # relative to the largest speed; a slower sample is a turning point itself
-FAINT = 1e-9  # relative to the largest half swing; a smaller one is round-off
-EDGE = 1e-9  # fraction of a step by which round-off may move a turning point outside the step
+MAX_SLOPE_DIFFERENCE = 2.0  # standard deviations by which the slopes of two spans may differ
+INTERVAL_DEVIATIONS = (
+    2.5  # standard deviations of a 95 % interval, widened because the span is chosen by the data
+)
+NOISE_HALF_WIDTH = 8  # half swings on both sides whose third differences estimate the noise
+SAMPLING_HALF_WIDTH = 4  # points on both sides over which the largest sampling error is taken
+N_NEWTON_STEPS = 3  # Newton steps to a turning point
+VALUE_ROUND_OFF = 1e-12  # round-off of a value, relative
+REST_SPEED_TOL = 1e-12  # relative to the largest speed; a slower sample is a turning point itself
+MIN_HALF_SWING = 1e-9  # relative to the largest half swing; a smaller one is round-off
+STEP_END_TOL = (
+    1e-9  # fraction of a step by which round-off may move a turning point outside the step
+)
 # relative to the range in one period; a smaller reversal is attributed to a faster mode
-WIGGLE = 0.25
-CLOSE = 1e-6  # relative; a curve is evaluated this far beyond its end points
+MAX_WIGGLE = 0.25
+RANGE_TOL = 1e-6  # relative; a curve is evaluated this far beyond its end points
 
 
 class HalfSwings(NamedTuple):
@@ -98,32 +102,34 @@ class DecayCurve(NamedTuple):
         own, first = np.unique(np.log(self.amplitude), return_index=True)
         x = np.log(amplitudes)
         found = self.at(first)
-        inside = (x > own[0] - CLOSE) & (x < own[-1] + CLOSE)
+        inside = (x > own[0] - RANGE_TOL) & (x < own[-1] + RANGE_TOL)
         out = {name: np.interp(x, own, getattr(found, name)) for name in DecayCurve._fields}
         for name in ("frequency", "damping"):
-            straight, out[name] = out[name], _by_cubics(x, own, getattr(found, name))
+            straight, out[name] = out[name], _interpolate_monotone(x, own, getattr(found, name))
             out[f"{name}_error"] = out[f"{name}_error"] + np.abs(out[name] - straight)
         return DecayCurve(
             **{name: np.where(inside, part, np.nan) for name, part in out.items()}
         )._replace(amplitude=np.asarray(amplitudes))
 
-    def unsampled(self, other: "DecayCurve") -> "DecayCurve":
+    def add_sampling_error(self, other: "DecayCurve") -> "DecayCurve":
         """Return the curve with the error of sampling added.
 
-        The error is the largest difference from the curve of `turns_from_outside` at the points
+        The error is the largest difference from the curve of `find_turning_points_outside` at the points
         around.
         """
         beside, out = other.over(self.amplitude), {}
         for name in ("frequency", "damping"):
             change = np.nan_to_num(np.abs(getattr(self, name) - getattr(beside, name)))
             out[f"{name}_error"] = getattr(self, f"{name}_error") + (
-                sliding_window_view(np.pad(change, NEAR), 2 * NEAR + 1).max(axis=1)
+                sliding_window_view(
+                    np.pad(change, SAMPLING_HALF_WIDTH), 2 * SAMPLING_HALF_WIDTH + 1
+                ).max(axis=1)
                 if change.size
                 else 0.0
             )
         return self._replace(**out)
 
-    def widened(self, one: "DecayCurve", other: "DecayCurve") -> "DecayCurve":
+    def add_difference(self, one: "DecayCurve", other: "DecayCurve") -> "DecayCurve":
         """Return the curve with the difference of two other curves added to its errors.
 
         An error is infinite where one of both curves has no value.
@@ -137,7 +143,7 @@ class DecayCurve(NamedTuple):
         return self._replace(frequency_error=wider("frequency"), damping_error=wider("damping"))
 
 
-def turns(time, place, speed) -> tuple:
+def find_turning_points(time, place, speed) -> tuple:
     """Return the times (k,) [s] and positions (k,) [m] of the turning points of a motion.
 
     The cubic through the samples on both sides is used.
@@ -148,30 +154,30 @@ def turns(time, place, speed) -> tuple:
         Samples of time [s], position [m] and speed [m/s] at any spacing, with every turning point
         at a sample or alone between two of them.
     """
-    speed = np.where(np.abs(speed) <= REST * np.abs(speed).max(initial=0.0), 0.0, speed)
+    speed = np.where(np.abs(speed) <= REST_SPEED_TOL * np.abs(speed).max(initial=0.0), 0.0, speed)
     still, k = np.flatnonzero(speed == 0), np.flatnonzero(speed[:-1] * speed[1:] < 0)
     span, places = time[k + 1] - time[k], (place[k], place[k + 1])
     speeds = speed[k] * span, speed[k + 1] * span
-    share = _zero(places, speeds)
+    share = _find_turning_fraction(places, speeds)
     times = np.concatenate([time[still], time[k] + share * span])
-    found = np.concatenate([place[still], _cubic(places, speeds, share)])
+    found = np.concatenate([place[still], _evaluate_cubic(places, speeds, share)])
     order = np.lexsort((found, times))
     # the samples before and after a jump of the force at a turning point have the same time
-    apart = ROUND * float(np.ptp(time))
+    apart = VALUE_ROUND_OFF * float(np.ptp(time))
     order = order[np.diff(times[order], prepend=-np.inf) > apart]
     return times[order], found[order]
 
 
-def last_swing(time, place, speed, period: float) -> float | None:
+def measure_last_swing(time, place, speed, period: float) -> float | None:
     """Return half the peak-to-peak value [m] of the last whole cycle of a motion.
 
-    The cycle reaches from a turning point to the next but one. A smaller reversal than WIGGLE of
+    The cycle reaches from a turning point to the next but one. A smaller reversal than MAX_WIGGLE of
     the range in the last period is that of a faster mode and is ignored.
 
     Parameters
     ----------
     time, place, speed : (n,)
-        Samples, as in `turns`.
+        Samples, as in `find_turning_points`.
     period : float
         Period [s].
 
@@ -181,8 +187,8 @@ def last_swing(time, place, speed, period: float) -> float | None:
         Half the range in the last period if the motion is at rest there; None if it has fewer than
         three turning points.
     """
-    late = float(np.ptp(place[time >= time[-1] - period * (1 + EDGE)]))
-    if late <= FAINT * np.ptp(place):
+    late = float(np.ptp(place[time >= time[-1] - period * (1 + STEP_END_TOL)]))
+    if late <= MIN_HALF_SWING * np.ptp(place):
         return late / 2
     # turning points, from the end; direction; farthest position since the last turning point
     found, way, far = (
@@ -190,13 +196,13 @@ def last_swing(time, place, speed, period: float) -> float | None:
         0,
         float(place[-1]),
     )
-    for at in turns(time, place, speed)[1][::-1].tolist():
+    for at in find_turning_points(time, place, speed)[1][::-1].tolist():
         if way == 0:
-            way = int(np.sign(at - far)) if abs(at - far) > WIGGLE * late else 0
+            way = int(np.sign(at - far)) if abs(at - far) > MAX_WIGGLE * late else 0
             far = at if way else far
         elif way * (at - far) > 0:
             far = at
-        elif way * (far - at) > WIGGLE * late:
+        elif way * (far - at) > MAX_WIGGLE * late:
             found.append(far)
             far, way = at, -way
         if len(found) == 3:
@@ -204,8 +210,8 @@ def last_swing(time, place, speed, period: float) -> float | None:
     return None
 
 
-def turns_from_outside(time, place, speed) -> tuple:
-    """Return the turning points as `turns` does, from the cubics of the neighbouring steps.
+def find_turning_points_outside(time, place, speed) -> tuple:
+    """Return the turning points as `find_turning_points` does, from the cubics of the neighbouring steps.
 
     The times between two samples are the means of the zeros of the speed on the continued cubics of
     the steps before and after. If the force of a law reverses with the speed within less than a
@@ -215,9 +221,9 @@ def turns_from_outside(time, place, speed) -> tuple:
     Parameters
     ----------
     time, place, speed : (n,)
-        Samples, as in `turns`.
+        Samples, as in `find_turning_points`.
     """
-    times, places = turns(time, place, speed)
+    times, places = find_turning_points(time, place, speed)
     k = np.flatnonzero(speed[1:-2] * speed[2:-1] < 0) + 1
     share = speed[k] / (speed[k] - speed[k + 1])
 
@@ -229,7 +235,7 @@ def turns_from_outside(time, place, speed) -> tuple:
         span = time[step + 1] - time[step]
         a, b, c, d = place[step], place[step + 1], speed[step] * span, speed[step + 1] * span
         two, three = 2 * (3 * (b - a) - 2 * c - d), 3 * (2 * (a - b) + c + d)
-        for _ in range(NEWTON):
+        for _ in range(N_NEWTON_STEPS):
             near = near - (c + near * (two + near * three)) / (two + 2 * near * three)
         return time[step] + near * span
 
@@ -240,7 +246,7 @@ def turns_from_outside(time, place, speed) -> tuple:
     return times, places
 
 
-def of_turns(times, places, size=None) -> HalfSwings:
+def half_swings_between(times, places, size=None) -> HalfSwings:
     """Return the half swings between the turning points of a computed motion.
 
     They end before the first one that is not smaller than its predecessor or that is round-off of
@@ -255,7 +261,7 @@ def of_turns(times, places, size=None) -> HalfSwings:
     """
     own = np.abs(np.diff(places))
     ends = np.flatnonzero(
-        (np.diff(own, prepend=np.inf) >= 0) | (own <= FAINT * own.max(initial=0.0))
+        (np.diff(own, prepend=np.inf) >= 0) | (own <= MIN_HALF_SWING * own.max(initial=0.0))
     )
     count = int(ends[0]) if ends.size else own.size
     still = np.zeros(count)
@@ -264,7 +270,7 @@ def of_turns(times, places, size=None) -> HalfSwings:
     )
 
 
-def curve_of(swings: HalfSwings) -> DecayCurve:
+def compute_swing_curve(swings: HalfSwings) -> DecayCurve:
     """Return frequency and damping ratio against amplitude from the half swings of a decay.
 
     A computed decay has a point at each inner half swing, a measured one at half swings whose spans
@@ -273,26 +279,26 @@ def curve_of(swings: HalfSwings) -> DecayCurve:
     if swings.size.size < 3:
         return DecayCurve(*np.empty((6, 0)))
     log = np.log(swings.size)
-    fall = fit_slopes(log, _at_least(swings.size_noise / swings.size, log))
-    noise = _at_least(swings.middle_noise, swings.middle)
+    fall = fit_slopes(log, _limit_noise(swings.size_noise / swings.size, log))
+    noise = _limit_noise(swings.middle_noise, swings.middle)
     half = fit_slopes(swings.middle, noise)
     at = np.arange(half.span.size)
     if noise.any():
-        at = _overlap_by_half(np.minimum(half.span, fall.span))
+        at = _overlap_spans(np.minimum(half.span, fall.span))
     half, fall = half.at(at), fall.at(at)
     tilt = np.hypot(np.pi, fall.slope)
     found = DecayCurve(
         time=swings.middle[1 + at],
-        amplitude=np.exp(_smooth_levels(log, 1 + at, fall.span)) / 2,
+        amplitude=np.exp(_smooth_values(log, 1 + at, fall.span)) / 2,
         frequency=0.5 / half.slope,
         frequency_error=0.5 * half.error / half.slope**2,
         damping=-fall.slope / tilt,
         damping_error=fall.error * np.pi**2 / tilt**3,
     )
-    return _between_turns(found) if found.time.size > 1 else found
+    return _add_sampling_error(found) if found.time.size > 1 else found
 
 
-def _overlap_by_half(span) -> np.ndarray:
+def _overlap_spans(span) -> np.ndarray:
     """Choose inner half swings so that the spans (n,) around them overlap by half."""
     out = [0]
     while (place := out[-1] + max(1, int(span[out[-1]]))) < span.size:
@@ -300,12 +306,12 @@ def _overlap_by_half(span) -> np.ndarray:
     return np.array(out)
 
 
-def _smooth_levels(values, places, span) -> np.ndarray:
+def _smooth_values(values, places, span) -> np.ndarray:
     """Evaluate at each index the least-squares parabola over the span around it."""
     out = np.empty(places.size)
     for m in np.unique(span):
         here = span == m
-        out[here] = sliding_window_view(values, 2 * m + 1)[places[here] - m] @ _parabola(m)
+        out[here] = sliding_window_view(values, 2 * m + 1)[places[here] - m] @ _parabola_weights(m)
     return out
 
 
@@ -349,7 +355,7 @@ def fit_slopes(values, noise) -> Slopes:
     span = np.zeros(count, int)
     grows = np.ones(count, bool)
     tried: list = []
-    for m in SPANS:
+    for m in SPAN_LENGTHS:
         if 2 * m >= values.size or not grows.any():
             break
         weight = np.arange(-m, m + 1) / np.sum(np.arange(-m, m + 1) ** 2)
@@ -361,7 +367,7 @@ def fit_slopes(values, noise) -> Slopes:
         agrees = reached.copy()
         for other, other_spread in tried:
             excess = np.sqrt(np.maximum(other_spread**2 - wide_spread**2, 0.0))
-            limit = APART * excess + ROUND * np.abs(other)
+            limit = MAX_SLOPE_DIFFERENCE * excess + VALUE_ROUND_OFF * np.abs(other)
             agrees &= ~(np.abs(wide - other) > limit)
         change = np.abs(wide - slope)
         ends = reached & ~agrees
@@ -379,20 +385,24 @@ def fit_slopes(values, noise) -> Slopes:
     only = np.isnan(bias)
     bend = np.abs(np.diff(values, 2)) / 2
     bias[only] = np.where(spread > 0, 0.0, bend)[only]
-    return Slopes(slope, SURE * spread + bias + ROUND * np.abs(slope), span)
+    return Slopes(
+        slope, INTERVAL_DEVIATIONS * spread + bias + VALUE_ROUND_OFF * np.abs(slope), span
+    )
 
 
-def _between_turns(found: DecayCurve) -> DecayCurve:
+def _add_sampling_error(found: DecayCurve) -> DecayCurve:
     """Widen the errors by the change of the curve over delta^2/8 of its amplitude.
 
     Half of a half swing is cosh(delta/2) times the amplitude at its middle, where delta is the
     decrement of half a cycle.
     """
-    delta = np.pi * found.damping / np.sqrt(np.maximum(1 - found.damping**2, ROUND))
+    delta = np.pi * found.damping / np.sqrt(np.maximum(1 - found.damping**2, VALUE_ROUND_OFF))
     share = (
         delta**2
         / 8
-        / np.maximum(np.abs(np.gradient(np.log(found.amplitude))), np.maximum(np.abs(delta), ROUND))
+        / np.maximum(
+            np.abs(np.gradient(np.log(found.amplitude))), np.maximum(np.abs(delta), VALUE_ROUND_OFF)
+        )
     )
     return found._replace(
         **{
@@ -409,7 +419,7 @@ def smooth_slopes(values, noise) -> np.ndarray:
     return np.concatenate([slope[:1], slope, slope[-1:]])
 
 
-def _at_least(noise, values) -> np.ndarray:
+def _limit_noise(noise, values) -> np.ndarray:
     """Return standard deviations (n,) that are not below those estimated from third differences.
 
     Third differences of a parabola vanish, those of white noise have 20 times its variance. Values
@@ -419,13 +429,14 @@ def _at_least(noise, values) -> np.ndarray:
         return noise
     seen = np.diff(values, 3) ** 2 / 20
     low, high = (
-        np.clip(np.arange(values.size) - 1 + side, 0, seen.size) for side in (-BESIDE, BESIDE)
+        np.clip(np.arange(values.size) - 1 + side, 0, seen.size)
+        for side in (-NOISE_HALF_WIDTH, NOISE_HALF_WIDTH)
     )
     whole = np.concatenate([[0.0], np.cumsum(seen)])
     return np.sqrt(np.maximum(noise**2, (whole[high] - whole[low]) / np.maximum(high - low, 1)))
 
 
-def _parabola(m: int) -> np.ndarray:
+def _parabola_weights(m: int) -> np.ndarray:
     """Return the weights (2 m + 1,) that give the middle of the least-squares parabola."""
     x = np.arange(-m, m + 1)
     x2, n = x**2, x.size
@@ -436,7 +447,7 @@ def _parabola(m: int) -> np.ndarray:
     )
 
 
-def _by_cubics(x, own, values) -> np.ndarray:
+def _interpolate_monotone(x, own, values) -> np.ndarray:
     """Interpolate values (n,) at increasing positions own (n,) to x (k,) by monotone cubics.
 
     Fritsch and Butland (1984); x is clipped to the range of `own`.
@@ -447,13 +458,13 @@ def _by_cubics(x, own, values) -> np.ndarray:
     return PchipInterpolator(own, values)(x) if own.size > 1 else np.interp(x, own, values)
 
 
-def _cubic(place, speed, share):
+def _evaluate_cubic(place, speed, share):
     """Return positions (k,) at fractions (k,) of a step on the cubics; speed is times the step."""
     (a, b), (c, d), s = place, speed, share
     return a + s * (c + s * (3 * (b - a) - 2 * c - d + s * (2 * (a - b) + c + d)))
 
 
-def _zero(place, speed) -> np.ndarray:
+def _find_turning_fraction(place, speed) -> np.ndarray:
     """Return the fraction (k,) of the step at which the cubics have a turning point.
 
     The speeds at both ends have opposite signs.
@@ -463,4 +474,4 @@ def _zero(place, speed) -> np.ndarray:
     both = -(two + np.copysign(np.sqrt(np.maximum(two**2 - 4 * three * c, 0.0)), two)) / 2
     with np.errstate(divide="ignore", invalid="ignore"):
         near, far = c / both, both / three
-    return np.clip(np.where(np.abs(near - 0.5) <= 0.5 + EDGE, near, far), 0.0, 1.0)
+    return np.clip(np.where(np.abs(near - 0.5) <= 0.5 + STEP_END_TOL, near, far), 0.0, 1.0)

@@ -8,10 +8,10 @@ whole step. All coarse runs end at the same sample, so that they do not show thi
 import numpy as np
 
 from ..core import Response
-from .run_events import slips_of
+from .run_events import slips_and_slides
 
 
-def end_error(window: Response, period: float, offset: float) -> dict:
+def estimate_window_error(window: Response, period: float, offset: float) -> dict:
     """Return the change of each measure, by name, if the window lies `offset` steps elsewhere.
 
     An extreme value changes only if it lies at an end of the window.
@@ -28,7 +28,7 @@ def end_error(window: Response, period: float, offset: float) -> dict:
     if abs(offset) < 1e-9 or window.time.size < 4:
         return {}
     offset, span = abs(offset), window.time[-1] - window.time[0]
-    cycles, (slips, slides) = span / period, slips_of(window)
+    cycles, (slips, slides) = span / period, slips_and_slides(window)
     forces = window.extra.get("forces", window.force[:, None])
     parts = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
     if "lateral_slides" in window.extra:
@@ -36,9 +36,10 @@ def end_error(window: Response, period: float, offset: float) -> dict:
         parts = parts + (pull[1:] + pull[:-1]) / 2 * np.diff(place, axis=0)
         forces = np.hypot(forces, pull)
     out = {
-        "relative_displacement_amplitude": _edge(window.output) / 2 + _edge(-window.output) / 2,
-        "absolute_acceleration_peak": _edge(np.abs(window.acceleration)),
-        "drift_per_cycle": _of_drift(slides[:, 0], cycles),
+        "relative_displacement_amplitude": _change_of_end_maximum(window.output) / 2
+        + _change_of_end_maximum(-window.output) / 2,
+        "absolute_acceleration_peak": _change_of_end_maximum(np.abs(window.acceleration)),
+        "drift_per_cycle": _change_of_drift(slides[:, 0], cycles),
         "friction_work": abs(float(parts[-1].sum())),
     }
     out["energy_dissipated"] = out["friction_work"]
@@ -46,14 +47,15 @@ def end_error(window: Response, period: float, offset: float) -> dict:
         tail = f"_{k + 1}" if k else ""
         out |= {
             f"loop_area{tail}": abs(float(parts[-1, k] - parts[0, k])) / cycles,
-            f"friction_force_peak{tail}": _edge(np.abs(forces[:, k])),
-            f"slip_amplitude{tail}": _edge(slips[:, k]) / 2 + _edge(-slips[:, k]) / 2,
+            f"friction_force_peak{tail}": _change_of_end_maximum(np.abs(forces[:, k])),
+            f"slip_amplitude{tail}": _change_of_end_maximum(slips[:, k]) / 2
+            + _change_of_end_maximum(-slips[:, k]) / 2,
             f"stick_fraction{tail}": 1 / (window.time.size - 1),
         }
     return {name: offset * change for name, change in out.items()}
 
 
-def _edge(values) -> float:
+def _change_of_end_maximum(values) -> float:
     """Return the change of the largest value (k,) over one step if it lies at an end; else 0."""
     top = int(np.argmax(values))
     return (
@@ -65,7 +67,7 @@ def _edge(values) -> float:
     )
 
 
-def _of_drift(slide, cycles: float) -> float:
+def _change_of_drift(slide, cycles: float) -> float:
     """Return the change of the drift per cycle [m] if the window moves by one step.
 
     As in `loops.drift`, below 1.5 cycles the drift is the motion between the ends of the window,

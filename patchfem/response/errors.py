@@ -2,7 +2,7 @@
 
 A run that is `ratio` times as coarse in one way (steps, elements, cells of a density, harmonics,
 modes, tolerance of a step) changes a measure by ratio**p - 1 times its error, where p is the order
-of the error. So the error is SAFETY times the change over ratio**p - 1 (Roache, J. Fluids Eng. 116,
+of the error. So the error is SAFETY_FACTOR times the change over ratio**p - 1 (Roache, J. Fluids Eng. 116,
 405, 1994; ASME V&V 20). Three runs, each twice as coarse as the one before, show p where a measure
 changes monotonically. The error from two runs takes the order that this way of being coarser
 declares. No factor belongs to a single measure, law or scene. tests/README.md states which share of
@@ -15,19 +15,23 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Measure
-from .rows import floor_of, row_of
+from .rows import error_floor, find_row
 
-SAFETY = 3.0  # Roache's factor for two runs; it covers runs that are too coarse to show the order
+SAFETY_FACTOR = (
+    3.0  # Roache's factor for two runs; it covers runs that are too coarse to show the order
+)
 MIN_ORDER = 1.0  # lowest order that is believed
 MAX_ORDER = 2.0  # highest order that is believed, that of the methods
-MAX_FALL = 16.0  # ratio of two changes, of order 4; above it the last is small by chance
-MIN_FALL = 0.5  # lowest observed order at which an error counts as decreasing with the step
-ROUND = 1e-12  # relative round-off of a long sum
-MEAN_ROUND = 1e-13  # round-off of a mean over the motion, relative to the amplitude
-GAPS = ("energy_balance", "work_check")  # measures that are errors themselves
+MAX_CHANGE_RATIO = 16.0  # ratio of two changes, of order 4; above it the last is small by chance
+MIN_OBSERVED_ORDER = (
+    0.5  # lowest observed order at which an error counts as decreasing with the step
+)
+SUM_ROUND_OFF = 1e-12  # relative round-off of a long sum
+MEAN_ROUND_OFF = 1e-13  # round-off of a mean over the motion, relative to the amplitude
+ERROR_MEASURES = ("energy_balance", "work_check")  # measures that are errors themselves
 
 
-def signed(fine: dict, coarse: dict) -> dict:
+def signed_change(fine: dict, coarse: dict) -> dict:
     """Return fine - coarse by name of the measures of both runs; that of a phase lies in +-pi/2."""
     out = {name: fine[name] - coarse[name] for name in fine.keys() & coarse.keys()}
     if "slip_start_phase" in out:
@@ -35,9 +39,9 @@ def signed(fine: dict, coarse: dict) -> dict:
     return out
 
 
-def change(fine: dict, coarse: dict) -> dict:
+def absolute_change(fine: dict, coarse: dict) -> dict:
     """Return |fine - coarse| by name of the measures of both runs; a phase is taken modulo pi."""
-    return {name: abs(gap) for name, gap in signed(fine, coarse).items()}
+    return {name: abs(gap) for name, gap in signed_change(fine, coarse).items()}
 
 
 def error_of_change(difference, ratio: float = 2.0, order: float = MIN_ORDER):
@@ -45,7 +49,7 @@ def error_of_change(difference, ratio: float = 2.0, order: float = MIN_ORDER):
 
     A ratio below 1 is that of a finer run: of 1/2, a run that is twice as fine.
     """
-    return SAFETY * np.abs(difference) / abs(ratio**order - 1)
+    return SAFETY_FACTOR * np.abs(difference) / abs(ratio**order - 1)
 
 
 def convergence_error(last, before=None):
@@ -63,10 +67,10 @@ def convergence_error(last, before=None):
     if before is not None:
         with np.errstate(divide="ignore", invalid="ignore"):
             fall = np.divide(before, last)
-        shown = (fall > growth) & (fall <= MAX_FALL)
+        shown = (fall > growth) & (fall <= MAX_CHANGE_RATIO)
         growth = np.where(shown, np.minimum(fall, 2.0**MAX_ORDER), growth)
         larger = np.fmax(larger, np.abs(before) / 2.0**MAX_ORDER)
-    return (SAFETY * larger / (growth - 1))[()]
+    return (SAFETY_FACTOR * larger / (growth - 1))[()]
 
 
 def convergence_errors(*values: dict) -> dict:
@@ -80,7 +84,7 @@ def convergence_errors(*values: dict) -> dict:
     values : dict
         Measures by name of each run, fine to coarse; two runs or more.
     """
-    changes = [signed(fine, coarse) for fine, coarse in pairwise(values)]
+    changes = [signed_change(fine, coarse) for fine, coarse in pairwise(values)]
     return {
         name: _ladder_error([gaps[name] for gaps in changes if name in gaps]) for name in changes[0]
     }
@@ -111,7 +115,7 @@ def step_errors(*values: dict, steps: int) -> dict:
         Steps per cycle of the finest run.
     """
     out = {
-        name: error + row_of(name).sample_error / steps
+        name: error + find_row(name).sample_error / steps
         for name, error in convergence_errors(*values).items()
     }
     load = values[0].get("normal_load_least", 0.0)
@@ -132,7 +136,7 @@ def coarser_errors(fine: dict, *coarse: dict, ratio: float = 2.0, order: float =
     ratio, order : float
         How much coarser these runs are, and the order at which their error falls.
     """
-    changes = [change(fine, one) for one in coarse]
+    changes = [absolute_change(fine, one) for one in coarse]
     shared = [name for name in fine if all(name in gaps for gaps in changes)]
     largest = {name: np.maximum.reduce([gaps[name] for gaps in changes]) for name in shared}
     return {name: error_of_change(gap, ratio, order) for name, gap in largest.items()}
@@ -169,7 +173,7 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     """
     errors = coarser_errors(fine, *coarse, ratio=4.0, order=2.0)
     at_instants = coarser_errors(fine, *coarse, ratio=4.0, order=1.0)
-    return errors | {name: at_instants[name] for name in errors if row_of(name).sample_error}
+    return errors | {name: at_instants[name] for name in errors if find_row(name).sample_error}
 
 
 class FrictionScale(NamedTuple):
@@ -221,7 +225,7 @@ def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict
     return {name: direct.get(name, fraction * abs(value)) for name, value in values.items()}
 
 
-def orders(fine: dict, half: dict, quarter: dict) -> dict:
+def observed_orders(fine: dict, half: dict, quarter: dict) -> dict:
     """Return the observed order [1] at which each measure changes with the time step, at most 2.
 
     Parameters
@@ -233,19 +237,21 @@ def orders(fine: dict, half: dict, quarter: dict) -> dict:
     Returns
     -------
     dict
-        Orders by name. A measure whose change falls with an order below MIN_FALL, or that a run
+        Orders by name. A measure whose change falls with an order below MIN_OBSERVED_ORDER, or that a run
         does not have, is left out: more steps are not known to make it more accurate.
     """
-    last, before = change(fine, half), change(half, quarter)
+    last, before = absolute_change(fine, half), absolute_change(half, quarter)
     found = {
         name: float(np.log2(before[name] / last[name]))
         for name in last
         if last[name] > 0 and before.get(name, 0.0) > 0
     }
-    return {name: min(order, MAX_ORDER) for name, order in found.items() if order >= MIN_FALL}
+    return {
+        name: min(order, MAX_ORDER) for name, order in found.items() if order >= MIN_OBSERVED_ORDER
+    }
 
 
-def with_errors(values: dict, *errors: dict, least: float = 0.0, size: float = np.inf) -> dict:
+def add_errors(values: dict, *errors: dict, least: float = 0.0, size: float = np.inf) -> dict:
     """Return measures by name with the sum of the given errors, plus `least` of the value.
 
     The error of a measure that a coarse run does not have is its absolute value.
@@ -266,7 +272,7 @@ def with_errors(values: dict, *errors: dict, least: float = 0.0, size: float = n
         parts = [part.get(name, abs(value)) for part in errors]
         error = total_error(name, value, parts, least, amplitude)
         out[name] = Measure(
-            float(value), row_of(name).unit, float(error), float(floor_of(name, size))
+            float(value), find_row(name).unit, float(error), float(error_floor(name, size))
         )
     return out
 
@@ -289,8 +295,8 @@ def total_error(name: str, value, parts, least: float, size):
     error = sum(parts) + np.abs(value) * least
     if name == "slip_start_phase":  # the error of a phase modulo pi is at most pi/2
         return np.minimum(error, np.pi / 2)
-    if name in GAPS:  # the value itself is an error
+    if name in ERROR_MEASURES:  # the value itself is an error
         return np.maximum(error, np.abs(value))
     if name == "drift_per_cycle":  # a difference of means, which has their round-off
-        return error + max(MEAN_ROUND, least) * np.abs(size)
+        return error + max(MEAN_ROUND_OFF, least) * np.abs(size)
     return error

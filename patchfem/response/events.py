@@ -12,18 +12,18 @@ import numpy as np
 from ..core import STICK_SPEED_RATIO
 
 STOP, RELEASE_UP, RELEASE_DOWN, REVERSAL_UP, REVERSAL_DOWN, BORDER = range(6)
-MEANINGS = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
-MOST = 100_000
+KIND_NAMES = ("stop", "release_up", "release_down", "reversal_up", "reversal_down", "border")
+MAX_EVENTS = 100_000
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Events:
-    """Last events of a run in order of time, at most MOST of them.
+    """Last events of a run in order of time, at most MAX_EVENTS of them.
 
     - time (k,): [s].
     - interface (k,): number of the interface from 1; 0 for the border between two segments of the
       drive.
-    - kind (k,): index of MEANINGS; "up" means towards positive slip.
+    - kind (k,): index of KIND_NAMES; "up" means towards positive slip.
     - slide (k,): relative displacement [m].
     - count: number of all events of the run.
     - source: sentence on how the events were found.
@@ -37,13 +37,13 @@ class Events:
     source: str = ""
 
 
-def table(rows, count: int | None = None, source: str = "") -> Events:
+def sort_events(rows, count: int | None = None, source: str = "") -> Events:
     """Return the Events of rows (time [s], interface, kind, slide [m]) in any order.
 
     Parameters
     ----------
     rows : sequence
-        Rows; the last MOST of them in time are kept.
+        Rows; the last MAX_EVENTS of them in time are kept.
     count : int, optional
         Number of all events of the run; None: that of the rows.
     source : str
@@ -51,7 +51,7 @@ def table(rows, count: int | None = None, source: str = "") -> Events:
     """
     rows = np.array(rows, float).reshape(-1, 4)
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
-    count, rows = len(rows) if count is None else count, rows[-MOST:]
+    count, rows = len(rows) if count is None else count, rows[-MAX_EVENTS:]
     return Events(
         rows[:, 0].copy(),
         rows[:, 1].astype(np.int32),
@@ -62,7 +62,7 @@ def table(rows, count: int | None = None, source: str = "") -> Events:
     )
 
 
-def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) -> Events:
+def detect_events(time, slips, slides, period: float, held: float = 0.0, borders=()) -> Events:
     """Return the events in samples: stops, releases and reversals, and the borders of the drive.
 
     A stop or a release is where the slip speed passes 1e-2 of its peak in the cycle, a reversal
@@ -83,15 +83,17 @@ def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) 
     """
     rows = [(at, 0, BORDER, np.nan) for at in borders if time[0] < at < time[-1]]
     for number in range(slips.shape[1]):
-        rows += _one(time, slips[:, number], slides[:, number], period, held, number + 1)
-    return table(
+        rows += _detect_interface_events(
+            time, slips[:, number], slides[:, number], period, held, number + 1
+        )
+    return sort_events(
         rows,
         source="stick and slip are detected in the samples of the last cycles: the interface sticks "
         "while the slip speed is below 1e-2 of the peak slip speed of the cycle",
     )
 
 
-def states(time, slip, period: float, held: float = 0.0) -> tuple:
+def compute_slip_states(time, slip, period: float, held: float = 0.0) -> tuple:
     """Return the relative slip speed (k - 1,) [1] and the state (k - 1,) between the samples.
 
     Parameters
@@ -125,9 +127,9 @@ def states(time, slip, period: float, held: float = 0.0) -> tuple:
     return share, np.where(np.abs(share) >= STICK_SPEED_RATIO, np.sign(share), 0).astype(int)
 
 
-def _one(time, slip, slide, period: float, held: float, number: int) -> list:
+def _detect_interface_events(time, slip, slide, period: float, held: float, number: int) -> list:
     """Return the event rows of one interface from its samples; `number` is its number from 1."""
-    share, state = states(time, slip, period, held)
+    share, state = compute_slip_states(time, slip, period, held)
     k, at = np.flatnonzero(state[1:] != state[:-1]), (time[1:] + time[:-1]) / 2
     before, after, low, rise = state[k], state[k + 1], share[k], share[k + 1] - share[k]
     turns, way = (before != 0) & (after != 0), np.where(before != 0, before, after)
@@ -144,7 +146,7 @@ def _one(time, slip, slide, period: float, held: float, number: int) -> list:
     return [*zip(when, [number] * k.size, kind, np.interp(when, time, slide))]
 
 
-def sticks(events: Events, begin: float, end: float, moves) -> list:
+def find_sticks(events: Events, begin: float, end: float, moves) -> list:
     """Return the stick intervals [(start, end)] [s] of the first interface, bounded by events.
 
     If other interfaces stick during some of them only, the intervals with the combination of states

@@ -4,7 +4,7 @@ In: samples at the ends of steps, and the LuGre law. Out: the window with sample
 steps. The force of the LuGre law exceeds its kinetic limit while the slide reverses. If the
 slide is many times the length over which the stretch relaxes, this takes less than a step and
 is not visible at the ends of the steps. Here the law is integrated along the cubic through
-slides and rates: every step is divided into PARTS parts, and a reversal of the slide is the end
+slides and rates: every step is divided into N_STEP_PARTS parts, and a reversal of the slide is the end
 of a part.
 """
 
@@ -15,14 +15,14 @@ import numpy as np
 
 from ..core import Response
 from ..friction.laws.lugre import LuGre
-from .measures import turn_shares
+from .measures import find_turning_steps
 
 # Parts of a step: with 16, the peaks of 60 rigs change by less than they change with the step.
-PARTS = 16
+N_STEP_PARTS = 16
 
 
 class Steps(NamedTuple):
-    """Ends of the parts of every step: times [s], slides [m] and speeds [m/s], (k, PARTS) each."""
+    """Ends of the parts of every step: times [s], slides [m] and speeds [m/s], (k, N_STEP_PARTS) each."""
 
     time: np.ndarray
     slide: np.ndarray
@@ -43,7 +43,7 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
     Returns
     -------
     Response
-        time, slide, slide_rate, force and slip have (k - 1) PARTS + 1 samples; all other fields are
+        time, slide, slide_rate, force and slip have (k - 1) N_STEP_PARTS + 1 samples; all other fields are
         those of the window.
     """
     parts = divide_steps(window.time, window.slide, window.slide_rate)
@@ -55,10 +55,10 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
     mean_speed = np.divide(increment, duration, out=np.zeros_like(increment), where=duration > 0)
     length = law.limit(mean_speed) / law.stiffness
     kept = np.exp(-np.abs(increment) / length)
-    stretch = relax(
+    stretch = evaluate_recursion(
         window.slide[0] - window.slip[0],
-        kept.reshape(-1, PARTS),
-        ((1 - kept) * np.sign(increment) * length).reshape(-1, PARTS),
+        kept.reshape(-1, N_STEP_PARTS),
+        ((1 - kept) * np.sign(increment) * length).reshape(-1, N_STEP_PARTS),
     )
     rate = speed - law.stiffness * np.abs(speed) * stretch / law.limit(speed)
     force = load * (law.stiffness * stretch + law.micro_damping * rate + law.viscous * speed)
@@ -84,10 +84,10 @@ def divide_steps(time, slide, speed) -> Steps:
     Steps
     """
     step = np.diff(time)
-    share = np.tile(np.arange(1, PARTS + 1) / PARTS, (step.size, 1))
-    turns, at = turn_shares(time, slide, speed)
-    middle = np.clip(at, 1 / PARTS, 1 - 1 / PARTS)[:, None]
-    half = np.arange(1, PARTS // 2 + 1) / (PARTS // 2)
+    share = np.tile(np.arange(1, N_STEP_PARTS + 1) / N_STEP_PARTS, (step.size, 1))
+    turns, at = find_turning_steps(time, slide, speed)
+    middle = np.clip(at, 1 / N_STEP_PARTS, 1 - 1 / N_STEP_PARTS)[:, None]
+    half = np.arange(1, N_STEP_PARTS // 2 + 1) / (N_STEP_PARTS // 2)
     share[turns] = np.column_stack([middle * half, middle + (1 - middle) * half])
     begin, end = speed[:-1] * step, speed[1:] * step
     rise = np.diff(slide)
@@ -102,7 +102,7 @@ def divide_steps(time, slide, speed) -> Steps:
     return inside
 
 
-def relax(start: float, kept, gained) -> np.ndarray:
+def evaluate_recursion(start: float, kept, gained) -> np.ndarray:
     """Return the values (k p + 1,) of the recursion x -> kept x + gained from part to part.
 
     Parameters

@@ -14,7 +14,7 @@ import numpy as np
 from ..core import Outcome
 from ..formatting import format_length
 
-KEPT = (
+LEVEL_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
     "absolute_acceleration_fundamental",
@@ -27,12 +27,12 @@ KEPT = (
     "secant_stiffness",
     "equivalent_damping",
 )
-AMPLITUDE = KEPT[0]
+AMPLITUDE = LEVEL_MEASURES[0]
 # third over first harmonic of the acceleration [1], above which the distortion is visible in the
 # curve
-DISTORTED = 0.03
+MIN_DISTORTION = 0.03
 # smallest factor of a jump between neighbouring levels, divided by the factor of the drive [1]
-JUMP = 1.5
+MIN_JUMP_FACTOR = 1.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -55,7 +55,7 @@ class Level:
     outcome: str = ""
 
 
-def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool]:
+def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level], bool]:
     """Return a function that decides whether a level lies above the onset.
 
     A motion that grows without bound lies above every onset.
@@ -63,7 +63,7 @@ def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool
     Parameters
     ----------
     kind : str
-        "slip": some slip occurs; "distortion": H3/H1 of the acceleration exceeds DISTORTED;
+        "slip": some slip occurs; "distortion": H3/H1 of the acceleration exceeds MIN_DISTORTION;
         "gauge": half peak-to-peak at the output exceeds `length`.
     length : float, optional
         Amplitude for "gauge" [m].
@@ -71,21 +71,21 @@ def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool
     beyond = {
         "slip": lambda level: not level.stuck,
         "gauge": lambda level: level.values[AMPLITUDE] > length,
-    }.get(kind, lambda level: level.values.get("acceleration_distortion", 0.0) > DISTORTED)
+    }.get(kind, lambda level: level.values.get("acceleration_distortion", 0.0) > MIN_DISTORTION)
     return lambda level: level.outcome == Outcome.GROWS or beyond(level)
 
 
-def no_onset(kind: str, length: float | None = None) -> str:
-    """Return the reason why a sequence of levels has no onset; parameters as in `past_onset`."""
+def make_no_onset_reason(kind: str, length: float | None = None) -> str:
+    """Return the reason why a sequence of levels has no onset; parameters as in `make_onset_test`."""
     far = f"has an amplitude of more than {format_length(length)} at the output" if length else ""
     what = {"slip": "slips", "gauge": far}.get(
         kind,
-        f"has an acceleration whose third harmonic is more than {DISTORTED:g} of its first harmonic",
+        f"has an acceleration whose third harmonic is more than {MIN_DISTORTION:g} of its first harmonic",
     )
     return f"no level of the rising sequence {what}"
 
 
-def bracket(levels, past: Callable[[Level], bool]) -> tuple | None:
+def bracket_onset(levels, past: Callable[[Level], bool]) -> tuple | None:
     """Return the indices of the last level below the onset and of the first one above it.
 
     Only the levels before the first decrease count.
@@ -94,7 +94,7 @@ def bracket(levels, past: Callable[[Level], bool]) -> tuple | None:
     ----------
     levels : sequence of Level
     past : callable
-        Decides whether a level lies above the onset (see `past_onset`).
+        Decides whether a level lies above the onset (see `make_onset_test`).
 
     Returns
     -------
@@ -110,7 +110,7 @@ def bracket(levels, past: Callable[[Level], bool]) -> tuple | None:
     return None
 
 
-def jump(levels, name: str = AMPLITUDE) -> tuple | None:
+def largest_jump(levels, name: str = AMPLITUDE) -> tuple | None:
     """Return the largest relative change of a measure between neighbouring levels.
 
     The factor of the measure is divided by the factor of the drive.
@@ -125,7 +125,7 @@ def jump(levels, name: str = AMPLITUDE) -> tuple | None:
     -------
     tuple or None
         Drive of the level after the jump, factor [1], and distance between the two levels in the
-        unit of the drive; None if no factor reaches JUMP, up or down.
+        unit of the drive; None if no factor reaches MIN_JUMP_FACTOR, up or down.
     """
     found = []
     for a, b in pairwise(levels):
@@ -133,10 +133,10 @@ def jump(levels, name: str = AMPLITUDE) -> tuple | None:
         if all(0 < size < np.inf for size in sizes) and not (a.stuck or b.stuck):
             factor = (b.values[name] / a.values[name]) / (b.drive / a.drive)
             found.append((abs(np.log(factor)), b.drive, factor, abs(b.drive - a.drive)))
-    return max(found)[1:] if found and max(found)[0] >= np.log(JUMP) else None
+    return max(found)[1:] if found and max(found)[0] >= np.log(MIN_JUMP_FACTOR) else None
 
 
-def hysteresis(levels, name: str = AMPLITUDE) -> tuple | None:
+def largest_hysteresis(levels, name: str = AMPLITUDE) -> tuple | None:
     """Return the largest difference of a measure between increasing and decreasing levels.
 
     Parameters

@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ..effects import law_has_trait
-from .measures import ROUND
+from .measures import COORDINATE_ROUND_OFF
 
-CLOSE = 1e-9  # fraction of a period; samples that are closer are the two sides of an event
-RESTS = 1e-9  # relative to the largest rate; a slower slide is at rest
+EVENT_TIME_TOL = 1e-9  # fraction of a period; samples that are closer are the two sides of an event
+REST_RATE_TOL = 1e-9  # relative to the largest rate; a slower slide is at rest
 # relative to the largest step of the slide; a larger step ends a rest, round-off does not
-MOVES = 1e-3
+MIN_REST_END_STEP = 1e-3
 
 
 class Reversal(NamedTuple):
@@ -42,8 +42,8 @@ def cycle_spans(time, period: float) -> list:
     ]
 
 
-def at_turns(model) -> str:
-    """Return how the force at a reversal of the slide of a Model is evaluated, for `turns_of`."""
+def reversal_evaluation(model) -> str:
+    """Return how the force at a reversal of the slide of a Model is evaluated, for `find_reversals`."""
     law, soft = (
         model.friction.law,
         model.partial_slip
@@ -56,7 +56,7 @@ def at_turns(model) -> str:
     )
 
 
-def turns_of(time, slide, rate, force, period: float, by: str = "rate") -> list:
+def find_reversals(time, slide, rate, force, period: float, by: str = "rate") -> list:
     """Return the (smallest, largest) `Reversal` of the slide in every whole cycle, oldest first.
 
     Parameters
@@ -71,26 +71,28 @@ def turns_of(time, slide, rate, force, period: float, by: str = "rate") -> list:
         linearly in time. It is None if the slide is largest at an end of the cycle and the reversal
         is more than one sample away, because the force there is not that of a reversal.
     """
-    out, near = [], CLOSE * period
+    out, near = [], EVENT_TIME_TOL * period
     for begin, end in cycle_spans(time, period):
         part = slice(*np.searchsorted(time, [begin - near, end + near]))
         pair = []
         for way in (-1, 1):
-            at, value, share = _turn(time[part], way * slide[part], way * rate[part], near)
+            at, value, share = _find_largest(time[part], way * slide[part], way * rate[part], near)
             at += part.start
             if by != "jumps" and share == 0.0 and at in (part.start, part.stop - 1):
-                at, share = _crossed(way * rate, at, at == part.start)
+                at, share = _find_rate_zero(way * rate, at, at == part.start)
             pair.append(
                 Reversal(
                     way * value,
-                    None if at is None else _pull(way * slide, force, at, share, value, by),
+                    None
+                    if at is None
+                    else _force_at_reversal(way * slide, force, at, share, value, by),
                 )
             )
         out.append(tuple(pair))
     return out
 
 
-def _turn(time, y, v, near: float) -> tuple:
+def _find_largest(time, y, v, near: float) -> tuple:
     """Find the largest y of the cubics through samples with rates v.
 
     Returns the index of the sample before it, its value, and the fraction of the step to the next
@@ -111,7 +113,7 @@ def _turn(time, y, v, near: float) -> tuple:
     return best
 
 
-def _crossed(v, at: int, first: bool) -> tuple:
+def _find_rate_zero(v, at: int, first: bool) -> tuple:
     """Find where the rate v (k,) decreases through 0 next to a sample.
 
     The step before the sample `at` is used if `first`, else the step after it.
@@ -120,24 +122,24 @@ def _crossed(v, at: int, first: bool) -> tuple:
     is no such point.
     """
     k = at - 1 if first else at
-    if abs(v[at]) <= RESTS * np.abs(v).max(initial=0.0):
+    if abs(v[at]) <= REST_RATE_TOL * np.abs(v).max(initial=0.0):
         return at, 0.0
     if 0 <= k < v.size - 1 and v[k] > 0 >= v[k + 1]:
         return k, float(v[k] / (v[k] - v[k + 1]))
     return None, 0.0
 
 
-def _pull(slide, force, at: int, share: float, value: float, by: str) -> float | None:
+def _force_at_reversal(slide, force, at: int, share: float, value: float, by: str) -> float | None:
     """Return the force [N] at the largest slide `value`; None if it is not known.
 
     The largest slide lies at the fraction `share` of the step after sample `at`; `by` as in
-    `turns_of`.
+    `find_reversals`.
     """
     if by == "rate":
         return float(force[at] + share * (force[min(at + 1, len(force) - 1)] - force[at]))
     top = at + int(share > 0 and slide[at + 1] > slide[at])
     if by == "jumps":
-        return _beside(slide, force, top, value)
+        return _force_beside_rest(slide, force, top, value)
     rise = slide[top] - slide[at - 1] if share > 0 and at > 0 else 0.0
     return float(
         force[top] + (force[top] - force[at - 1]) * (value - slide[top]) / rise
@@ -146,13 +148,13 @@ def _pull(slide, force, at: int, share: float, value: float, by: str) -> float |
     )
 
 
-def _beside(slide, force, at: int, value: float) -> float | None:
+def _force_beside_rest(slide, force, at: int, value: float) -> float | None:
     """Return the mean force [N] before and after a rest at the slide `value`, or None."""
     step = np.abs(np.diff(slide))
-    moves = step > MOVES * step.max(initial=0.0)
-    moves &= np.maximum(np.abs(slide[1:] - value), np.abs(slide[:-1] - value)) > ROUND * np.abs(
-        slide
-    ).max(initial=0.0)
+    moves = step > MIN_REST_END_STEP * step.max(initial=0.0)
+    moves &= np.maximum(
+        np.abs(slide[1:] - value), np.abs(slide[:-1] - value)
+    ) > COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
     before, after = np.flatnonzero(moves[:at]), np.flatnonzero(moves[at:])
     return (
         float(force[before[-1]] + force[at + after[0] + 1]) / 2
@@ -161,7 +163,7 @@ def _beside(slide, force, at: int, value: float) -> float | None:
     )
 
 
-def half_range(turns) -> float:
+def mean_half_range(turns) -> float:
     """Return half the range of the slide [m], averaged over the cycles; 0 without a cycle."""
     return float(np.mean([high.slide - low.slide for low, high in turns])) / 2 if turns else 0.0
 
@@ -257,7 +259,7 @@ def time_mean(time, value, rate, begin: float, end: float) -> float:
     begin, end : float
         Time span [s].
     """
-    near = CLOSE * (end - begin)
+    near = EVENT_TIME_TOL * (end - begin)
     part = slice(
         np.searchsorted(time, begin - near), np.searchsorted(time, end + near, side="right")
     )

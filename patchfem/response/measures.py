@@ -10,19 +10,23 @@ from ..core import Response
 from ..dynamics import integrated
 from ..friction import path_work
 
-SHARE = 0.5  # irreversible fraction of the change of the slide above which an interface slips [1]
-ROUND = 1e-13  # round-off, relative to the largest coordinate
-NOTHING = 1e-18  # smallest gap of an energy balance that counts [J]
+SLIP_FRACTION = (
+    0.5  # irreversible fraction of the change of the slide above which an interface slips [1]
+)
+COORDINATE_ROUND_OFF = 1e-13  # round-off, relative to the largest coordinate
+MIN_ENERGY_GAP = 1e-18  # smallest gap of an energy balance that counts [J]
 # relative to the energy that passes through a run; less friction work than this is round-off
 ROUND_OFF_WORK = 1e-10
-REST = 1e-15  # range of a slide [m] below which nothing moves
-SMOOTH = 4.0  # largest ratio of second differences at neighbouring samples of one smooth curve
+MIN_SLIDE_RANGE = 1e-15  # range of a slide [m] below which nothing moves
+MAX_SMOOTH_RATIO = (
+    4.0  # largest ratio of second differences at neighbouring samples of one smooth curve
+)
 
 
 def energy_balance(book: dict):
     """Return the relative gap of the energy balance [1] of a run, or (n,) of many.
 
-    |work in - stored - dissipated| / (integral |power in| + peak stored). A gap of NOTHING is the
+    |work in - stored - dissipated| / (integral |power in| + peak stored). A gap of MIN_ENERGY_GAP is the
     round-off of a system at rest; without energy the result is 0.
 
     Parameters
@@ -31,7 +35,7 @@ def energy_balance(book: dict):
         Energies by name [J].
     """
     miss = np.abs(book["work_in"] - book["stored"] - book["friction"] - book["viscous"])
-    return ratio_or_zero(miss * (miss > NOTHING), book["power"] + book["peak_stored"])
+    return ratio_or_zero(miss * (miss > MIN_ENERGY_GAP), book["power"] + book["peak_stored"])
 
 
 def relative_gap(sampled, balanced, passed, energy=0.0):
@@ -53,7 +57,9 @@ def relative_gap(sampled, balanced, passed, energy=0.0):
         Difference of the two works over the exchanged work [1]; 0 if there is none.
     """
     difference = np.abs(sampled - balanced)
-    return ratio_or_zero(difference * (difference > NOTHING), passed + ROUND_OFF_WORK * energy)
+    return ratio_or_zero(
+        difference * (difference > MIN_ENERGY_GAP), passed + ROUND_OFF_WORK * energy
+    )
 
 
 def ratio_or_zero(part, whole):
@@ -62,7 +68,7 @@ def ratio_or_zero(part, whole):
     return (part / np.where(is_positive, whole, 1.0) * is_positive)[()]
 
 
-def harmonic(time, weight, values, omega) -> complex:
+def compute_harmonic(time, weight, values, omega) -> complex:
     """Return the first Fourier coefficient 2/T int values exp(-i omega t) dt of samples.
 
     Parameters
@@ -79,7 +85,7 @@ def harmonic(time, weight, values, omega) -> complex:
     return 2 * np.sum(weight * values * np.exp(-1j * omega * time)) / np.sum(weight)
 
 
-def step_harmonic(time, means, omega) -> complex:
+def compute_step_harmonic(time, means, omega) -> complex:
     """Return the first Fourier coefficient of a force from its mean in each step.
 
     It is exact for a force that is constant in each step, even if it jumps at a sample.
@@ -97,7 +103,7 @@ def step_harmonic(time, means, omega) -> complex:
     return complex(2 / (time[-1] - time[0]) * np.sum(means * np.diff(turn)) / (-1j * omega))
 
 
-def lateral(window: Response, name: str, number: int = 0):
+def lateral_history(window: Response, name: str, number: int = 0):
     """Return a history (k,) of an interface in the second direction of its plane.
 
     Parameters
@@ -117,7 +123,7 @@ def lateral(window: Response, name: str, number: int = 0):
     return None if found is None or not found[:, number].any() else found[:, number]
 
 
-def widest(x, y=None) -> float:
+def largest_distance(x, y=None) -> float:
     """Return the largest distance [m] between two points x (k,), or (x, y) of a path in a plane."""
     if y is None:
         return float(x.max() - x.min())
@@ -137,16 +143,18 @@ def widest(x, y=None) -> float:
     return best
 
 
-def moved(x, y=None) -> np.ndarray:
-    """Return the distances (k - 1,) [m] between successive points; parameters as in `widest`."""
+def distances_moved(x, y=None) -> np.ndarray:
+    """Return the distances (k - 1,) [m] between successive points; parameters as in `largest_distance`."""
     return np.abs(np.diff(x)) if y is None else np.hypot(np.diff(x), np.diff(y))
 
 
-def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, None)) -> dict:
+def compute_slip_measures(
+    window: Response, drive, steps_per_cycle: int, second=(None, None)
+) -> dict:
     """Return slip amplitude [m], stick fraction [1] and phase of the start of slip [rad].
 
-    The interface sticks while less than SHARE of the change of its slide is irreversible, or while
-    it does not slide at all; the instant at which this fraction passes SHARE is interpolated
+    The interface sticks while less than SLIP_FRACTION of the change of its slide is irreversible, or while
+    it does not slide at all; the instant at which this fraction passes SLIP_FRACTION is interpolated
     linearly between the midpoints of the steps. The phase is that of the first slip after stick,
     modulo pi.
 
@@ -161,13 +169,13 @@ def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, N
         Slide and slip (k,) [m] in a second direction; None without it.
     """
     across, beside = second
-    if widest(window.slide, across) <= REST:
+    if largest_distance(window.slide, across) <= MIN_SLIDE_RANGE:
         # a law without a stiffness changes its traction, and so its slip, while nothing moves
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     slip = window.slip
-    out = {"slip_amplitude": widest(slip, beside) / 2}
+    out = {"slip_amplitude": largest_distance(slip, beside) / 2}
     # a single sample, or no slip above round-off
-    if slip.size < 2 or 2 * out["slip_amplitude"] <= slip_noise(window):
+    if slip.size < 2 or 2 * out["slip_amplitude"] <= slip_round_off(window):
         return out | {"stick_fraction": 1.0}
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
     kept = (
@@ -175,12 +183,12 @@ def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, N
     )
     across, beside = (None if one is None else one[kept] for one in second)
     slid, slide, time = (
-        moved(slip[kept], beside),
-        moved(window.slide[kept], across),
+        distances_moved(slip[kept], beside),
+        distances_moved(window.slide[kept], across),
         window.time[kept],
     )
-    still = slide <= ROUND * np.abs(window.slide).max(initial=0.0)
-    above = np.where(still, 0.0, slid / np.where(still, 1.0, slide)) - SHARE
+    still = slide <= COORDINATE_ROUND_OFF * np.abs(window.slide).max(initial=0.0)
+    above = np.where(still, 0.0, slid / np.where(still, 1.0, slide)) - SLIP_FRACTION
     before, after = above[:-1], above[1:]
     rise = np.abs(after - before)
     # fraction of the time between two midpoints in which the linear interpolant is below 0
@@ -193,16 +201,16 @@ def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, N
     rises = np.flatnonzero((before < 0) & (after >= 0))
     if rises.size:
         at = middles[rises] - before[rises] / rise[rises] * np.diff(middles)[rises]
-        out |= slip_start(2 * np.pi / drive.period * at)
+        out |= slip_start_measure(2 * np.pi / drive.period * at)
     return out
 
 
-def slip_noise(window: Response) -> float:
+def slip_round_off(window: Response) -> float:
     """Return the round-off of the slip [m]: 1e-13 of the largest modal coordinate."""
-    return ROUND * float(np.abs(window.modal).max(initial=0.0))
+    return COORDINATE_ROUND_OFF * float(np.abs(window.modal).max(initial=0.0))
 
 
-def slip_start(phases) -> dict:
+def slip_start_measure(phases) -> dict:
     """Return slip_start_phase [rad] by name from the phases (k,) [rad] of starts of slip.
 
     Empty if the starts have no phase in common.
@@ -211,13 +219,13 @@ def slip_start(phases) -> dict:
     return {} if np.isnan(found) else {"slip_start_phase": float(found)}
 
 
-def ledger_measures(ledger) -> dict:
+def compute_ledger_measures(ledger) -> dict:
     """Return friction work and energies [J] by name at the end of a ledger (4, k) [J]."""
     names = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
 
 
-def work_check(work, pairs, jumps: bool = False) -> float:
+def work_difference(work, pairs, jumps: bool = False) -> float:
     """Return the relative gap [1] of the friction work between energy balance and samples.
 
     It is |trapezoidal rule of the forces over the slides - work| over the sum of |work| of all
@@ -243,7 +251,7 @@ def work_check(work, pairs, jumps: bool = False) -> float:
     return relative_gap(total, float(work[-1]), float(np.abs(parts).sum()))
 
 
-def acceleration_peak(window: Response) -> float:
+def compute_acceleration_peak(window: Response) -> float:
     """Return the largest |absolute acceleration| [m s-2] at the accelerometer in a window.
 
     The samples are equally spaced. The vertex of the parabola through the largest inner sample and
@@ -251,7 +259,7 @@ def acceleration_peak(window: Response) -> float:
     """
     size = np.abs(window.acceleration)
     top = int(np.argmax(size))
-    if not 0 < top < len(size) - 1 or not _smooth_at(size, top):
+    if not 0 < top < len(size) - 1 or not _is_smooth_at(size, top):
         return float(size[top])
     left, mid, right = size[top - 1 : top + 2]
     bend = left - 2 * mid + right
@@ -260,17 +268,17 @@ def acceleration_peak(window: Response) -> float:
     return float(mid + (gain if gain < 0.01 * mid else 0.0))
 
 
-def _smooth_at(size, top: int) -> bool:
+def _is_smooth_at(size, top: int) -> bool:
     """Return whether samples (k,) are smooth at the largest one.
 
-    The second difference there is at most SMOOTH times that at the samples on both sides. Next to a
+    The second difference there is at most MAX_SMOOTH_RATIO times that at the samples on both sides. Next to a
     jump, one of these has the opposite sign.
     """
     bends = -np.diff(size[max(top - 2, 0) : top + 3], 2)
-    return bool(bends.min() * SMOOTH >= bends.max())
+    return bool(bends.min() * MAX_SMOOTH_RATIO >= bends.max())
 
 
-def peaks_between(window: Response, climbs: bool = False) -> dict:
+def peak_sampling_errors(window: Response, climbs: bool = False) -> dict:
     """Return by how much peaks may exceed their samples, by name, as an additional error.
 
     - Acceleration: if it jumps at its largest sample, its change over a step on the smooth side.
@@ -288,7 +296,7 @@ def peaks_between(window: Response, climbs: bool = False) -> dict:
     size, out = np.abs(window.acceleration), {}
     top = int(np.argmax(size))
     if 0 < top < len(size) - 1:
-        if not _smooth_at(size, top):
+        if not _is_smooth_at(size, top):
             out["absolute_acceleration_peak"] = float(size[top] - max(size[top - 1], size[top + 1]))
     if climbs and len(window.force) > 2:
         force = np.abs(window.force)
@@ -305,7 +313,7 @@ def peaks_between(window: Response, climbs: bool = False) -> dict:
     return out
 
 
-def turn_shares(time, place, rate) -> tuple:
+def find_turning_steps(time, place, rate) -> tuple:
     """Return the steps in which the rate changes sign, and the fractions of the step there.
 
     Parameters
@@ -328,7 +336,7 @@ def turn_shares(time, place, rate) -> tuple:
     return k, np.clip(-p / (two - np.sign(p) * root), 0.0, 1.0)
 
 
-def half_swing(time, place, rate) -> float:
+def measure_half_swing(time, place, rate) -> float:
     """Return half the peak-to-peak value [m] of the cubics through samples and their rates.
 
     Parameters
@@ -337,7 +345,7 @@ def half_swing(time, place, rate) -> float:
         Samples of time [s], position [m] and rate [m/s].
     """
     h = np.diff(time)
-    k, s = turn_shares(time, place, rate)
+    k, s = find_turning_steps(time, place, rate)
     p, q, rise = rate[k] * h[k], rate[k + 1] * h[k], place[k + 1] - place[k]
     two, three = 3 * rise - 2 * p - q, p + q - 2 * rise
     every = np.concatenate([place, place[k] + s * (p + s * (two + s * three))])
@@ -361,7 +369,7 @@ def window_amplitudes(extremes, window: int) -> np.ndarray:
     return (tail[:, :, 1].max(axis=1) - tail[:, :, 0].min(axis=1)) / 2
 
 
-def window_ends(extremes, phasors, window: int) -> tuple:
+def window_end_values(extremes, phasors, window: int) -> tuple:
     """Return amplitudes [m] and phasors [m] of the last cycle of each window, oldest first.
 
     Parameters

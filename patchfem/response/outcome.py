@@ -1,7 +1,7 @@
 """Outcome of a coupled run, and the estimate of its steady amplitude.
 
 In: a Solution with the amplitudes and extremes of its cycles, its measures, the tolerance and
-the drive. Out: the outcome (`settle`), the steady amplitude with its error as a measure, and
+the drive. Out: the outcome (`judge_outcome`), the steady amplitude with its error as a measure, and
 warnings. The kind of drive decides what steady means; `settling` has the criteria for many
 motions at once.
 """
@@ -15,37 +15,37 @@ from ..structure import drive_sizes
 from . import stationary
 from .settling import (
     CLASSES,
-    GROWS,
-    STEADY,
-    classes,
+    GROWS_CLASS,
+    STEADY_CLASS,
+    beat_mean_amplitudes,
     classify,
-    left_over,
-    mean_amplitudes,
-    steady_amplitude,
-    windows_of,
+    classify_motions,
+    extrapolate_steady_amplitude,
+    remaining_free_motion,
+    window_amplitude_means,
 )
 
 # fraction of the tolerance; if the amplitude will still change by more, the page states the steady
 # estimate
-TELLS = 0.02
+ESTIMATE_TOL = 0.02
 UNSETTLED = "the interface sticks, but the amplitude has not settled"
 OPEN_LOOP = "the friction loop of the last cycle does not close"
 # factor on the cycles that the decay needs, because the amplitude of the last windows may beat
-SAFE = 1.5
-MOST_MORE = 1e6  # largest number of cycles that a message proposes
+CYCLES_SAFETY_FACTOR = 1.5
+MAX_PROPOSED_CYCLES = 1e6  # largest number of cycles that a message proposes
 # relative to the displacement a/omega^2 of the drive; a smaller change of the amplitude is
 # round-off
-SMALL = 1e-12
+AMPLITUDE_ROUND_OFF = 1e-12
 
 
-def settle(
+def judge_outcome(
     raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0, slowest: float = 0.0
 ) -> tuple:
     """Return the outcome of a run, and its measures with the steady estimate if there is one.
 
     - Periodic drive, and the last level of a drive in levels: the amplitudes of successive windows
       decide (`classify`), and the free motion that remains in them (`left_over`). A motion that is
-      steady to the tolerance, but will still change by more than TELLS of it, has a steady estimate
+      steady to the tolerance, but will still change by more than ESTIMATE_TOL of it, has a steady estimate
       as well. If a bounded motion is known to exist (`raw.bounded`), an increasing amplitude is not
       GROWS.
     - Release or step: steady once it is at rest, to the floor of its amplitude; else the same
@@ -54,7 +54,7 @@ def settle(
       steady estimate, unless the interface sticks.
     - Random drive: DONE if both halves of the record have the same mean square.
 
-    A motion whose midpoint drifts is not steady (`moves_on`), nor is a stuck interface whose
+    A motion whose midpoint drifts is not steady (`is_drifting`), nor is a stuck interface whose
     friction force still increases.
 
     Parameters
@@ -73,13 +73,15 @@ def settle(
     if (
         raw.outcome is Outcome.STUCK
         and not hasattr(drive, "band")
-        and still_loads(raw.window, drive.period, tolerance)
+        and is_still_loading(raw.window, drive.period, tolerance)
     ):
         return Outcome.TRANSIENT, measures
     if raw.outcome is not None:
         return raw.outcome, measures
     if hasattr(drive, "band"):
-        return Outcome.DONE if stationary.steady(raw.window, drive) else Outcome.TRANSIENT, measures
+        return Outcome.DONE if stationary.is_steady(
+            raw.window, drive
+        ) else Outcome.TRANSIENT, measures
     if not drive.segments and drive_sizes.repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, measures
     # several tones, of which each window contains whole beats
@@ -87,12 +89,18 @@ def settle(
         found = classify(
             raw.amplitudes,
             tolerance,
-            SMALL * drive_sizes.max_acceleration(drive) / drive_sizes.drive_omega(drive) ** 2,
+            AMPLITUDE_ROUND_OFF
+            * drive_sizes.max_acceleration(drive)
+            / drive_sizes.drive_omega(drive) ** 2,
         )
-        return found, without_bars(measures) if found is Outcome.GROWS else measures
+        return found, remove_errors(measures) if found is Outcome.GROWS else measures
     amplitudes, extremes = raw.amplitudes, raw.extremes
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
-    floor = SMALL * drive_sizes.max_acceleration(drive) / drive_sizes.drive_omega(drive) ** 2
+    floor = (
+        AMPLITUDE_ROUND_OFF
+        * drive_sizes.max_acceleration(drive)
+        / drive_sizes.drive_omega(drive) ** 2
+    )
     if level_cycles:
         amplitudes = amplitudes[-max(1, int(level_cycles / window)) :]
         extremes = None if extremes is None else extremes[-int(level_cycles) :]
@@ -101,19 +109,19 @@ def settle(
         outcome = (
             Outcome.STEADY
             if rests
-            else _held(
+            else _reject_drifting(
                 classify(amplitudes, tolerance, floor),
                 measures,
                 tolerance,
-                _middle(extremes, window),
+                _midpoint_drift(extremes, window),
             )
         )
         if outcome is Outcome.GROWS and not drive.segments[-1].constant and slowest >= 0:
             outcome = Outcome.TRANSIENT
-        return outcome, without_bars(measures) if outcome is Outcome.GROWS else measures
+        return outcome, remove_errors(measures) if outcome is Outcome.GROWS else measures
     number, steady, error = (
         one[0]
-        for one in settled(
+        for one in classify_periodic(
             np.asarray(amplitudes, float)[None],
             None if extremes is None else np.asarray(extremes)[None],
             window,
@@ -122,14 +130,14 @@ def settle(
             raw.bounded,
         )
     )
-    outcome = _held(CLASSES[number], measures, tolerance)
+    outcome = _reject_drifting(CLASSES[number], measures, tolerance)
     if outcome is Outcome.GROWS:
-        return outcome, without_bars(measures)
+        return outcome, remove_errors(measures)
     base = measures["relative_displacement_amplitude"]
     if not np.isnan(steady) and (
-        outcome is Outcome.TRANSIENT or goes_on(steady, error, base.value, tolerance)
+        outcome is Outcome.TRANSIENT or is_still_changing(steady, error, base.value, tolerance)
     ):
-        total = steady_error(steady, error, base.value, base.error or 0.0)
+        total = error_of_steady(steady, error, base.value, base.error or 0.0)
         measures = measures | {
             "relative_displacement_amplitude_steady": Measure(
                 float(steady), "m", float(total), base.floor
@@ -138,7 +146,7 @@ def settle(
     return outcome, measures
 
 
-def moves_on(drift, error, amplitude, tolerance, floor) -> np.ndarray:
+def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
     """Return whether the midpoint of a motion moves by more than the tolerance in a cycle.
 
     Parameters
@@ -154,7 +162,7 @@ def moves_on(drift, error, amplitude, tolerance, floor) -> np.ndarray:
     return np.abs(drift) > tolerance * np.abs(amplitude) + error + floor
 
 
-def _middle(extremes, window: int) -> float:
+def _midpoint_drift(extremes, window: int) -> float:
     """Return the motion per cycle [m] of the midpoint of the output over the last two windows.
 
     It is inf if they are not known. For a belt, a window contains whole stick-slip cycles, whereas
@@ -167,7 +175,9 @@ def _middle(extremes, window: int) -> float:
     return float(middle[1] - middle[0]) / window
 
 
-def _held(outcome: Outcome, measures: dict, tolerance: float, middle: float = np.inf) -> Outcome:
+def _reject_drifting(
+    outcome: Outcome, measures: dict, tolerance: float, middle: float = np.inf
+) -> Outcome:
     """Return TRANSIENT instead of STEADY if the midpoint of the motion drifts.
 
     It must move both from cycle to cycle (`drift_per_cycle`) and from window to window (`middle`
@@ -176,7 +186,7 @@ def _held(outcome: Outcome, measures: dict, tolerance: float, middle: float = np
     drift, amplitude = measures.get("drift_per_cycle"), measures["relative_displacement_amplitude"]
     if outcome is not Outcome.STEADY or drift is None or drift.value is None:
         return outcome
-    moves = moves_on(
+    moves = is_drifting(
         min(abs(drift.value), abs(middle)),
         drift.error or 0.0,
         amplitude.value,
@@ -186,12 +196,14 @@ def _held(outcome: Outcome, measures: dict, tolerance: float, middle: float = np
     return Outcome.TRANSIENT if moves else outcome
 
 
-def without_bars(measures: dict) -> dict:
+def remove_errors(measures: dict) -> dict:
     """Return the measures of a growing motion without errors: later values are different."""
     return {name: replace(one, error=None) for name, one in measures.items()}
 
 
-def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=False) -> tuple:
+def classify_periodic(
+    amplitudes, extremes, window: int, steady, limits: tuple, bounded=False
+) -> tuple:
     """Classify motions under periodic drives and estimate their steady amplitudes.
 
     A motion is steady only if the change to its steady estimate and the free motion that remains in
@@ -219,35 +231,37 @@ def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=Fa
         Indices of CLASSES, steady amplitudes [m] and their errors [m], (n,) each.
     """
     (tolerance, floor, decay), (value, error) = limits, steady
-    found = classes(amplitudes, tolerance, floor)
-    found = np.where((found == GROWS) & bounded, 0, found)
+    found = classify_motions(amplitudes, tolerance, floor)
+    found = np.where((found == GROWS_CLASS) & bounded, 0, found)
     away = np.abs(np.where(np.isnan(value), amplitudes[:, -1], value) - amplitudes[:, -1])
-    found = np.where((found == STEADY) & (away > tolerance * amplitudes[:, -1] + floor), 0, found)
+    found = np.where(
+        (found == STEADY_CLASS) & (away > tolerance * amplitudes[:, -1] + floor), 0, found
+    )
     if extremes is not None:
-        left = left_over(extremes, window, decay)
+        left = remaining_free_motion(extremes, window, decay)
         found = np.where(
-            (found != GROWS) & (left > tolerance * amplitudes[:, -1] + floor), 0, found
+            (found != GROWS_CLASS) & (left > tolerance * amplitudes[:, -1] + floor), 0, found
         )
-        none, (mean, about) = np.isnan(value), mean_amplitudes(extremes, window)
+        none, (mean, about) = np.isnan(value), beat_mean_amplitudes(extremes, window)
         value, error = np.where(none, mean, value), np.where(none, about, error)
         # without a visible tail, the steady amplitude is the mean over the cycles of the last
         # window
-        none = np.isnan(value) & (found == STEADY)
-        value = np.where(none, windows_of(extremes, window)[1][:, -1], value)
+        none = np.isnan(value) & (found == STEADY_CLASS)
+        value = np.where(none, window_amplitude_means(extremes, window)[1][:, -1], value)
         error = np.where(none, left + np.abs(amplitudes[:, -1] - value), error)
     return found, value, error
 
 
-def goes_on(steady, error, amplitude, tolerance) -> np.ndarray:
+def is_still_changing(steady, error, amplitude, tolerance) -> np.ndarray:
     """Return whether a motion that is steady to the tolerance will still change noticeably.
 
-    The limit is the fraction TELLS of the tolerance, against the steady estimate [m] and its error
+    The limit is the fraction ESTIMATE_TOL of the tolerance, against the steady estimate [m] and its error
     [m]; numbers or (n,).
     """
-    return np.abs(steady - amplitude) + error > TELLS * tolerance * np.abs(amplitude)
+    return np.abs(steady - amplitude) + error > ESTIMATE_TOL * tolerance * np.abs(amplitude)
 
 
-def steady_error(steady, error, amplitude, own):
+def error_of_steady(steady, error, amplitude, own):
     """Return the error of a steady estimate [m], including the numerical error of the amplitude.
 
     Parameters
@@ -261,7 +275,7 @@ def steady_error(steady, error, amplitude, own):
     return error + own * steady / np.maximum(np.abs(amplitude), 1e-300)
 
 
-def still_loads(window, period: float, tolerance: float) -> bool:
+def is_still_loading(window, period: float, tolerance: float) -> bool:
     """Return whether the force on a stuck interface still increases, as in a stick of a belt.
 
     The mean of the last cycle must exceed that of the first by more than the tolerance times the
@@ -297,7 +311,7 @@ def still_loads(window, period: float, tolerance: float) -> bool:
     return bool(np.any(means[1] - means[0] > tolerance * largest_force))
 
 
-def off_the_piece(outcome: Outcome | None, reach: float, length: float) -> Outcome | None:
+def check_piece_length(outcome: Outcome | None, reach: float, length: float) -> Outcome | None:
     """Return the outcome, or LEAVES_CONTACT if the slide exceeded the length of the piece.
 
     From that instant on nothing overlaps, so this outcome replaces any later one: steady, growing,
@@ -320,7 +334,7 @@ def off_the_piece(outcome: Outcome | None, reach: float, length: float) -> Outco
     )
 
 
-def unsettled(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
+def warn_if_ringing(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
     """Return a warning, as a list, if the interface sticks but the amplitude still decays.
 
     The warning states by how much the amplitude of the last window will change, and after how many
@@ -346,11 +360,11 @@ def unsettled(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
         return []
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
     decay = slowest * drive.period
-    left = float(ringing_left(np.asarray(raw.extremes), window, decay))
-    return rings_on(left, (main.value, main.floor), (tolerance, decay), cycles)
+    left = float(remaining_ringing(np.asarray(raw.extremes), window, decay))
+    return warn_of_ringing(left, (main.value, main.floor), (tolerance, decay), cycles)
 
 
-def ringing_left(extremes, window: int, decay):
+def remaining_ringing(extremes, window: int, decay):
     """Return how much of the amplitude of stuck motions is free vibration [m], (...).
 
     It is `left_over`, but not less than the change of the last window.
@@ -364,18 +378,18 @@ def ringing_left(extremes, window: int, decay):
     decay : (...)
         Decay of the slowest mode over a cycle [1].
     """
-    ends = windows_of(extremes, window)[0]
-    left = left_over(extremes, window, np.maximum(decay, 0.0) * window)
+    ends = window_amplitude_means(extremes, window)[0]
+    left = remaining_free_motion(extremes, window, np.maximum(decay, 0.0) * window)
     return np.maximum(left, np.abs(ends[..., -1] - ends[..., -2])) if ends.shape[-1] > 1 else left
 
 
-def rings_on(left: float, sizes: tuple, limits: tuple, cycles: float) -> list:
-    """Return the warning of `unsettled`, as a list, for a known amount of free vibration.
+def warn_of_ringing(left: float, sizes: tuple, limits: tuple, cycles: float) -> list:
+    """Return the warning of `warn_if_ringing`, as a list, for a known amount of free vibration.
 
     Parameters
     ----------
     left : float
-        Free vibration in the amplitude [m] (see `ringing_left`).
+        Free vibration in the amplitude [m] (see `remaining_ringing`).
     sizes : tuple
         Amplitude and its floor [m].
     limits : tuple
@@ -388,8 +402,8 @@ def rings_on(left: float, sizes: tuple, limits: tuple, cycles: float) -> list:
         return []
     more = np.log(left / amplitude / tolerance) / decay if decay > 0 else np.inf
     remedy = (
-        f"set drive.cycles = {float(f'{cycles + SAFE * more:.2g}'):g}"
-        if more < MOST_MORE
+        f"set drive.cycles = {float(f'{cycles + CYCLES_SAFETY_FACTOR * more:.2g}'):g}"
+        if more < MAX_PROPOSED_CYCLES
         else 'set accuracy.method = "harmonic" for the steady motion'
     )
     return [
@@ -415,7 +429,7 @@ def changing_note(outcome: Outcome, drive) -> list:
     ]
 
 
-def steady_of(drive, amplitudes, phasors) -> tuple:
+def estimate_steady(drive, amplitudes, phasors) -> tuple:
     """Return the steady amplitude and its error [m] under a periodic drive, else (None, None).
 
     A released or struck rig comes to rest, so its amplitudes are not extrapolated. Under a drive
@@ -424,4 +438,6 @@ def steady_of(drive, amplitudes, phasors) -> tuple:
     """
     if not drive_sizes.is_periodic(drive):
         return None, None
-    return steady_amplitude(amplitudes, phasors if drive_sizes.is_sinusoidal(drive) else amplitudes)
+    return extrapolate_steady_amplitude(
+        amplitudes, phasors if drive_sizes.is_sinusoidal(drive) else amplitudes
+    )

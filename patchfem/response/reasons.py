@@ -11,35 +11,38 @@ import numpy as np
 from ..core import Measure, Outcome
 from ..formatting import format_number
 from ..structure.drive_sizes import has_full_cycle, is_periodic, is_sinusoidal
-from .measures import lateral
+from .measures import lateral_history
 from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
 # fraction of the slide that other modes carry [1]; above it the damping ratio is not that of mode 1
-SHARED = 0.05
+MAX_OTHER_MODES_FRACTION = 0.05
 IN_PLANE = "the interface slides in a plane, but this measure is defined only for one direction"
-CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
-HOLDS = "the whole interface sticks throughout the last cycles"
+CYCLE_MEASURES = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
+ALWAYS_STICKS = "the whole interface sticks throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
-STILL = "the output does not move: the first harmonic of its acceleration is 0 within the accuracy of the computation"
+OUTPUT_AT_REST = (
+    "the output does not move: "
+    "the first harmonic of its acceleration is 0 within the accuracy of the computation"
+)
 APERIODIC = "the drive is not periodic at the end of the run, so no period is known over which to take the mean slide"
 BEATS = (
     "under tones the mean slide over one cycle changes within their beat without any drift; this measure exists "
     "only for a drive that repeats in every cycle"
 )
-STOPS = (
+STICKS_AT_REVERSAL = (
     "the interface sticks where its slide is largest: during this stick the friction force takes different values "
     "at the same slide"
 )
-UNSEEN = "the motion changes in such a way that the run does not show what it settles to: a longer run does"
-SETTLES = "relative_displacement_amplitude_steady"
+CHANGE_NOT_RESOLVED = "the motion changes in such a way that the run does not show what it settles to: a longer run does"
+STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
 UNCLOSED = (
     "the friction loop does not close: during the last cycles the stored energy changes by more than friction "
     "dissipates; the energy dissipated in the whole run is given by energy_dissipated"
 )
 
 
-def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dict:
+def find_missing(values, window, drive, rubs: bool, beside: float = 0.0) -> dict:
     """Return the measures that a coupled run could have but has not, by name, with the reasons.
 
     Parameters
@@ -55,8 +58,8 @@ def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dic
         Fraction of the slide that modes other than the first carry [1].
     """
     lacking = {
-        name: _of_cycles(name, values, window, drive, beside)
-        for name in CYCLIC
+        name: _why_no_cycle_value(name, values, window, drive, beside)
+        for name in CYCLE_MEASURES
         if rubs or name in ACCELERATIONS
     }
     if hasattr(drive, "band"):
@@ -65,7 +68,7 @@ def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dic
             "the frequency response (H1) has no peak within the frequency band of the drive",
         )
     if rubs:
-        lacking["slip_start_phase"] = _of_phase(values, drive)
+        lacking["slip_start_phase"] = _why_no_phase(values, drive)
     return {
         name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)
         for name, reason in lacking.items()
@@ -73,7 +76,7 @@ def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dic
     }
 
 
-def stopping(values) -> dict:
+def find_missing_secant(values) -> dict:
     """Return the secant stiffness without a value if rigid friction sticks at the largest slide.
 
     The force there has no single value. values: Measure by name; the result is a dict, {}
@@ -86,22 +89,34 @@ def stopping(values) -> dict:
         and stuck.value is not None
         and stuck.value > TABLE["stick_fraction"].floor + (stuck.error or 0.0)
     )
-    return {"secant_stiffness": replace(one, value=None, error=None, reason=STOPS)} if holds else {}
+    return (
+        {"secant_stiffness": replace(one, value=None, error=None, reason=STICKS_AT_REVERSAL)}
+        if holds
+        else {}
+    )
 
 
-def unsettled(values, outcome: Outcome, drive) -> dict:
+def find_missing_steady(values, outcome: Outcome, drive) -> dict:
     """Return the steady amplitude without a value, by name, if a transient hides its limit.
 
     Only under a periodic drive; {} otherwise.
     """
     return (
-        {SETTLES: Measure(None, TABLE[SETTLES].unit, None, TABLE[SETTLES].floor, reason=UNSEEN)}
-        if outcome is Outcome.TRANSIENT and is_periodic(drive) and SETTLES not in values
+        {
+            STEADY_AMPLITUDE: Measure(
+                None,
+                TABLE[STEADY_AMPLITUDE].unit,
+                None,
+                TABLE[STEADY_AMPLITUDE].floor,
+                reason=CHANGE_NOT_RESOLVED,
+            )
+        }
+        if outcome is Outcome.TRANSIENT and is_periodic(drive) and STEADY_AMPLITUDE not in values
         else {}
     )
 
 
-def undrifting(values, drive) -> dict:
+def find_missing_drift(values, drive) -> dict:
     """Return the drift without a value, by name, if no period of the mean slide is known.
 
     Means over other time spans differ without any drift. values: Measure by name.
@@ -118,7 +133,7 @@ def undrifting(values, drive) -> dict:
     )
 
 
-def unbounded(values) -> dict:
+def find_missing_unbounded(values) -> dict:
     """Return the measures of a steady motion that does not exist: all but the load lack a value."""
     return {
         name: replace(
@@ -130,7 +145,7 @@ def unbounded(values) -> dict:
     }
 
 
-def unclosed(values, window, drive) -> dict:
+def find_missing_loops(values, window, drive) -> dict:
     """Return the loop areas without a value, by name, of loops that do not close; {} if all do.
 
     The work per cycle is reported as a loss. If nothing forces the motion to repeat, as after a
@@ -162,36 +177,36 @@ def unclosed(values, window, drive) -> dict:
     return {name: replace(loops[name], value=None, error=None, reason=UNCLOSED) for name in opened}
 
 
-def _of_phase(values, drive) -> str:
+def _why_no_phase(values, drive) -> str:
     """Return the reason why the start of slip has no phase."""
     if not is_sinusoidal(drive):
         return "the drive is not a sine at the end of the run, so the start of slip has no phase"
     stuck = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
     if stuck == 1.0:
-        return f"{HOLDS}, so no slip starts"
+        return f"{ALWAYS_STICKS}, so no slip starts"
     if stuck:
         return "slip does not start at one phase of the half cycles: it starts several times, or not in all of them"
     return "the interface never sticks in the last cycles, so slip never starts after stick"
 
 
-def _of_cycles(name: str, values, window, drive, beside: float) -> str:
+def _why_no_cycle_value(name: str, values, window, drive, beside: float) -> str:
     """Return the reason why a measure of the cycles under a sine has no value."""
     if not is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
     if not has_full_cycle(window.time[-1] - window.time[0], drive):
         return "the run contains no whole cycle of the drive"
     if name in ACCELERATIONS and ACCELERATIONS[0] in values:
-        return STILL
+        return OUTPUT_AT_REST
     if name in ACCELERATIONS:
         return "the output has no acceleration"
-    if lateral(window, "slides") is not None:
+    if lateral_history(window, "slides") is not None:
         return IN_PLANE
     if "equivalent_stiffness" not in values:
-        return f"{HOLDS}, so the slide does not change and the loop has no width"
+        return f"{ALWAYS_STICKS}, so the slide does not change and the loop has no width"
     if name == "equivalent_damping":
         return (
             f"this measure is that of mode 1, but another mode contributes {format_number(100 * beside, 2)} % of the slide"
-            if beside > SHARED
+            if beside > MAX_OTHER_MODES_FRACTION
             else "mode 1 is a rigid-body mode, or does not move the interface"
         )
     return "none of the last cycles contains samples of the force both just before and just after the largest slide"

@@ -16,26 +16,23 @@ import numpy as np
 from .. import compiled
 
 # periods of the ringing in a stick; with fewer, frequency and decay are not independent
-LEAST_PERIODS = 1.5
-LEAST_SAMPLES = 16
-MOST_SAMPLES, MOST_STICKS, MOST_TERMS = 600, 20, 3
-PER_PERIOD = 24  # samples per period of the ringing that are sufficient
-FAINT = 1e-6  # relative to the largest value of the signal; a smaller sinusoid is no ringing
-MISSED = 0.1  # largest root mean square of the residual over that of the ringing [1]
-WIDEST = 0.5  # largest damping ratio that counts as ringing [1]
+MIN_PERIODS = 1.5
+MIN_SAMPLES = 16
+MAX_SAMPLES, MAX_STICKS, MAX_SINUSOIDS = 600, 20, 3
+SAMPLES_PER_PERIOD = 24  # samples per period of the ringing that are sufficient
+MIN_SINUSOID = 1e-6  # relative to the largest value of the signal; a smaller sinusoid is no ringing
+MAX_RESIDUAL = 0.1  # largest root mean square of the residual over that of the ringing [1]
+MAX_DAMPING_RATIO = 0.5  # largest damping ratio that counts as ringing [1]
 # residual of a fit relative to the signal without the forced sine; below it no other start is tried
-WHOLE = 1e-9
+EXACT_RESIDUAL = 1e-9
 ROUNDING = float(np.finfo(float).eps)
-# CPU seconds of an evaluation of a fit in Python, per sample and squared number of columns; and
-# evaluations of a fit, for the estimate of the cost
-LOOK, LOOKS = (
-    8e-7,
-    2.0,
-)
-KERNELS = "response.ringing_kernels"
-STEPS = 60  # largest number of steps of a fit
-# fraction of LEAST_PERIODS; a fit below it with a WHOLE residual is refused, so it is not refined
-SHORT = 0.9
+# CPU seconds of an evaluation of a fit in Python, per sample and squared number of columns
+SECONDS_PER_TERM = 8e-7
+EVALUATIONS_PER_FIT = 2.0  # evaluations of a fit, for the estimate of its cost
+KERNELS_MODULE = "response.ringing_kernels"
+MAX_STEPS = 60  # largest number of steps of a fit
+# fraction of MIN_PERIODS; a fit below it with a residual below EXACT_RESIDUAL is refused, so it is not refined
+MIN_REFINED_FRACTION = 0.9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -54,7 +51,7 @@ class Ring:
     errors: tuple
 
 
-def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | None:
+def fit_ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | None:
     """Return the ringing in a signal during one stick; None if there is none.
 
     A line at a harmonic of the drive that does not decay is forced motion and no ringing.
@@ -68,33 +65,35 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     size : float, optional
         Largest value of the signal in the rest of the window.
     """
-    if np.size(time) < LEAST_SAMPLES:
+    if np.size(time) < MIN_SAMPLES:
         return None
-    time, value = _even(np.asarray(time, float), np.asarray(value, float))
+    time, value = _resample(np.asarray(time, float), np.asarray(value, float))
     size = max(size or 0.0, float(np.abs(value).max(initial=0.0)))
-    if time.size < LEAST_SAMPLES or size == 0:
+    if time.size < MIN_SAMPLES or size == 0:
         return None
-    columns = _forced(time, omega)
+    columns = _forced_columns(time, omega)
     rest = value - columns @ np.linalg.lstsq(columns, value, rcond=1e-12)[0]
-    if np.abs(rest).max() <= FAINT * size:
+    if np.abs(rest).max() <= MIN_SINUSOID * size:
         return None
     # the first part of a long stick is used, because the ringing decays
-    if time.size > MOST_SAMPLES:
+    if time.size > MAX_SAMPLES:
         # a stride keeps no more samples per period than the ringing needs
-        stride = max(1, int(2 * np.pi / _highest(time, rest) / (time[1] - time[0]) / PER_PERIOD))
+        stride = max(
+            1, int(2 * np.pi / _largest_line(time, rest) / (time[1] - time[0]) / SAMPLES_PER_PERIOD)
+        )
         time, value, columns, rest = (
-            part[::stride][:MOST_SAMPLES].copy() for part in (time, value, columns, rest)
+            part[::stride][:MAX_SAMPLES].copy() for part in (time, value, columns, rest)
         )
     span = time[-1]
-    found = _grown(time, value, columns, rest)
+    found = _fit_all_sinusoids(time, value, columns, rest)
     if found is None:
         return None
     poles, sigma, _ = found
-    left, shares = _share(time, value, columns, poles)
+    left, shares = _subtract_sinusoids(time, value, columns, poles)
     k = int(np.argmax([np.sum(part**2) for part in shares]))
     own, rate = poles[2 * k : 2 * k + 2]
     amplitude, damping = float(np.abs(shares[k]).max()), float(rate / np.hypot(rate, own))
-    seen = span * own >= 2 * np.pi * LEAST_PERIODS and own * np.diff(time).max() < np.pi / 2
+    seen = span * own >= 2 * np.pi * MIN_PERIODS and own * np.diff(time).max() < np.pi / 2
     steady = (
         omega > 0
         and span * omega > 3 * np.pi
@@ -104,14 +103,14 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     if (
         not seen
         or steady
-        or amplitude <= FAINT * size
-        or not -0.02 < damping < WIDEST
-        or np.sqrt(np.mean(left**2)) > MISSED * np.sqrt(np.mean(shares[k] ** 2))
+        or amplitude <= MIN_SINUSOID * size
+        or not -0.02 < damping < MAX_DAMPING_RATIO
+        or np.sqrt(np.mean(left**2)) > MAX_RESIDUAL * np.sqrt(np.mean(shares[k] ** 2))
     ):
         return None
     few = poles
-    if time.size >= 2 * LEAST_SAMPLES:
-        few = _refined(time[::2].copy(), value[::2].copy(), columns[::2], poles).poles
+    if time.size >= 2 * MIN_SAMPLES:
+        few = _refine_poles(time[::2].copy(), value[::2].copy(), columns[::2], poles).poles
     apart = np.abs(few - poles)[2 * k : 2 * k + 2] + 2 * sigma[2 * k : 2 * k + 2]
     return Ring(
         float(own / (2 * np.pi)),
@@ -121,7 +120,7 @@ def ring(time, value, omega: float = 0.0, size: float | None = None) -> Ring | N
     )
 
 
-def held_ring(amplitude: float, own: float, damping: float, size: float) -> dict:
+def make_ring(amplitude: float, own: float, damping: float, size: float) -> dict:
     """Return ring_frequency [Hz] and ring_damping [1] of a sinusoid known in closed form.
 
     Parameters
@@ -138,9 +137,9 @@ def held_ring(amplitude: float, own: float, damping: float, size: float) -> dict
     Returns
     -------
     dict
-        {} if the amplitude is below FAINT of the size.
+        {} if the amplitude is below MIN_SINUSOID of the size.
     """
-    if not amplitude > FAINT * size:
+    if not amplitude > MIN_SINUSOID * size:
         return {}
     return {"ring_frequency": float(own / (2 * np.pi)), "ring_damping": float(damping)}
 
@@ -184,7 +183,7 @@ def held_modes(modes, stiffness, motion) -> list:
     values, shapes = np.linalg.eig(matrix)
     state = np.concatenate([motion.modal[:2], motion.modal_rate[:2]], axis=1)
     turned = np.expm1(values * (motion.time[1] - motion.time[0]))
-    told = (values.imag > 0) & (np.abs(turned) > FAINT)
+    told = (values.imag > 0) & (np.abs(turned) > MIN_SINUSOID)
     sizes = np.linalg.solve(shapes, (state[1] - state[0]).astype(complex))[told] / turned[told]
     # a pair of conjugate eigenvalues gives one real sinusoid
     out = 2 * np.abs(modes.output @ shapes[:n, told] * sizes)
@@ -201,7 +200,7 @@ def held_modes(modes, stiffness, motion) -> list:
     ]
 
 
-def strongest(held: list, kind: str) -> HeldMode:
+def select_strongest(held: list, kind: str) -> HeldMode:
     """Return the HeldMode with the most energy over the stick.
 
     Energy is the time integral of the square of its "displacement" or "acceleration", as `kind`
@@ -219,7 +218,7 @@ def strongest(held: list, kind: str) -> HeldMode:
     return max(held, key=energy)
 
 
-def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
+def measure_ringing(time, value, sticks, omega: float = 0.0) -> tuple:
     """Return frequency and damping ratio of the ringing in a signal: medians over the sticks.
 
     Parameters
@@ -240,11 +239,11 @@ def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
     """
     size = float(np.abs(value).max(initial=0.0))
     found = []
-    for begin, end in sticks[-MOST_STICKS:]:
+    for begin, end in sticks[-MAX_STICKS:]:
         part = slice(
             np.searchsorted(time, begin, side="left"), np.searchsorted(time, end, side="right")
         )
-        one = ring(time[part], value[part], omega, size)
+        one = fit_ring(time[part], value[part], omega, size)
         if one is not None:
             found.append(one)
     if not found:
@@ -261,7 +260,7 @@ def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
     return values, errors
 
 
-def _even(time, value) -> tuple:
+def _resample(time, value) -> tuple:
     """Return the samples at equal steps, with times from 0.
 
     Other samples, such as the second one on an event, are left out.
@@ -272,13 +271,13 @@ def _even(time, value) -> tuple:
     number = np.round((time - time[np.argmin(np.abs(np.diff(time) - step))]) / step)
     offset = time - number * step
     on = np.abs(offset - np.median(offset)) < 1e-6 * step
-    if on.sum() < LEAST_SAMPLES:
+    if on.sum() < MIN_SAMPLES:
         return np.empty(0), np.empty(0)
     time, value = time[on], value[on]
     return time - time[0], value
 
 
-def _forced(time, omega: float) -> np.ndarray:
+def _forced_columns(time, omega: float) -> np.ndarray:
     """Return the columns (k, 1 or 3) of a constant and the forced sine."""
     parts = [np.ones(time.size)]
     if omega > 0:
@@ -299,24 +298,26 @@ class _Fit(NamedTuple):
     rms: float
 
 
-def _fitted(time, value, forced, poles, *ends) -> tuple:
+def _fit_poles(time, value, forced, poles, *ends) -> tuple:
     """Fit the poles (2 r,) to a signal, or evaluate the residual at them if there are no `ends`.
 
     The poles are overwritten by the best ones.
 
     Returns the number of evaluations, the sum of squares of the best residual, and the workspace of
-    `ringing_kernels.fitted`, which is valid until the next call.
+    `ringing_kernels.fit_sinusoids`, which is valid until the next call.
     """
-    room = _room(forced.shape[1] + poles.size, poles.size, time.size)
+    room = _fit_workspace(forced.shape[1] + poles.size, poles.size, time.size)
     room[0][0, : forced.shape[1]] = forced.T
-    fit = compiled.kernels(KERNELS).fitted
-    fit.expect(LOOKS * LOOK * time.size * (forced.shape[1] + poles.size) ** 2)
-    ends = np.array([*ends, STEPS] if ends else [0.0] * 4)
+    fit = compiled.kernels(KERNELS_MODULE).fit_sinusoids
+    fit.expect(
+        EVALUATIONS_PER_FIT * SECONDS_PER_TERM * time.size * (forced.shape[1] + poles.size) ** 2
+    )
+    ends = np.array([*ends, MAX_STEPS] if ends else [0.0] * 4)
     return *fit(time, value, poles, np.abs(poles) + 1 / time[-1], ends, room), room
 
 
 @lru_cache(maxsize=16)
-def _room(count: int, many: int, samples: int) -> tuple:
+def _fit_workspace(count: int, many: int, samples: int) -> tuple:
     """Return the workspace of a fit of `many` poles; cached, because making it takes time."""
     return (
         np.empty((3, count, samples)),
@@ -327,27 +328,29 @@ def _room(count: int, many: int, samples: int) -> tuple:
     )
 
 
-def _share(time, value, forced, poles) -> tuple:
+def _subtract_sinusoids(time, value, forced, poles) -> tuple:
     """Return the residual (k,) and a list of the sinusoids (k,) of the poles."""
-    n, (columns, few, *_) = forced.shape[1], _fitted(time, value, forced, poles)[2]
+    n, (columns, few, *_) = forced.shape[1], _fit_poles(time, value, forced, poles)[2]
     return columns[2, 0].copy(), [
         few[-1, at : at + 2] @ columns[0, at : at + 2] for at in range(n, n + poles.size, 2)
     ]
 
 
-def _grown(time, value, forced, rest) -> _Fit | None:
+def _fit_all_sinusoids(time, value, forced, rest) -> _Fit | None:
     """Return the fit with as many sinusoids as the signal contains.
 
     One sinusoid is added after the other while each one at least halves the residual.
     """
     scale = last = np.sqrt(np.mean(rest**2))
     best = None
-    for _ in range(MOST_TERMS):
+    for _ in range(MAX_SINUSOIDS):
         poles = best.poles if best is not None else np.empty(0)
         tries = []
-        for start in _starts(time, value, forced, poles, rest):
-            tries.append(_refined(time, value, forced, np.append(poles, start), WHOLE * scale))
-            if tries[-1].rms < WHOLE * scale:
+        for start in _initial_guesses(time, value, forced, poles, rest):
+            tries.append(
+                _refine_poles(time, value, forced, np.append(poles, start), EXACT_RESIDUAL * scale)
+            )
+            if tries[-1].rms < EXACT_RESIDUAL * scale:
                 break
         new = min(tries, key=lambda one: one.rms)
         # a smaller reduction of the residual is noise
@@ -356,11 +359,11 @@ def _grown(time, value, forced, rest) -> _Fit | None:
         best, last = new, new.rms
         if last < 1e-6 * scale or time.size < 8 * (len(best.poles) + 2):
             break
-        rest = _share(time, value, forced, best.poles)[0]
+        rest = _subtract_sinusoids(time, value, forced, best.poles)[0]
     return best
 
 
-def _highest(time, rest) -> float:
+def _largest_line(time, rest) -> float:
     """Return the angular frequency [rad/s] of the highest line in the spectrum of `rest` (k,)."""
     window, size = np.hanning(time.size + 2)[1:-1], 4 * time.size
     lines = np.abs(np.fft.rfft(rest * window, size))
@@ -368,19 +371,21 @@ def _highest(time, rest) -> float:
     return 2 * np.pi * int(np.argmax(lines)) / (size * (time[1] - time[0]))
 
 
-def _starts(time, value, forced, poles, rest) -> list:
+def _initial_guesses(time, value, forced, poles, rest) -> list:
     """Return two initial guesses of the next sinusoid, with different decay.
 
     The frequency is the best one, by projection, around the highest line of the residual.
     """
-    span, top = time[-1], _highest(time, rest)
+    span, top = time[-1], _largest_line(time, rest)
     near = [own for own in top + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if own > np.pi / span]
-    sizes = [_fitted(time, value, forced, np.append(poles, (own, 0.5 / span)))[1] for own in near]
+    sizes = [
+        _fit_poles(time, value, forced, np.append(poles, (own, 0.5 / span)))[1] for own in near
+    ]
     own = near[int(np.argmin(sizes))] if near else top
     return [np.array([own, decay / span]) for decay in (0.1, 2.0)]
 
 
-def _refined(time, value, forced, poles, whole: float = 0.0) -> _Fit:
+def _refine_poles(time, value, forced, poles, whole: float = 0.0) -> _Fit:
     """Return the fit that starts from `poles`, by Levenberg-Marquardt on the projected residual.
 
     It ends when the residual is round-off of the signal, when a step reduces the sum of squares by
@@ -390,9 +395,9 @@ def _refined(time, value, forced, poles, whole: float = 0.0) -> _Fit:
     poles, scale, short = (
         poles.copy(),
         np.abs(poles) + 1 / time[-1],
-        SHORT * 2 * np.pi * LEAST_PERIODS / time[-1],
+        MIN_REFINED_FRACTION * 2 * np.pi * MIN_PERIODS / time[-1],
     )
-    _, size, (*_, normal, _) = _fitted(
+    _, size, (*_, normal, _) = _fit_poles(
         time,
         value,
         forced,

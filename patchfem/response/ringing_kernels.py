@@ -14,15 +14,15 @@ from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 EPS = 2.0**-52
 # norm of a column after projection over its norm; below it the column depends on the others
-ALIKE = 1e-12
+MIN_INDEPENDENT_NORM = 1e-12
 # Levenberg-Marquardt damping at the start (times 10), and above which a fit ends
-FIRST, MOST = 1e-3, 1e9
+INITIAL_DAMPING, MAX_DAMPING = 1e-3, 1e9
 # steps over the scales of the poles that end a fit after a success and after a failure
-CLOSE, STILL = 1e-13, 1e-15
+SUCCESS_STEP_TOL, FAILURE_STEP_TOL = 1e-13, 1e-15
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def waves(time, poles, columns, first):
+def fill_sinusoids(time, poles, columns, first):
     """Fill columns (c, k) from row `first` with the sinusoids of poles (2 r,) at times (k,) [s]."""
     for r in range(poles.size // 2):
         own, rate = poles[2 * r], poles[2 * r + 1]
@@ -44,14 +44,14 @@ def dot(a, b):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def less(a, share, b):
+def subtract_multiple(a, share, b):
     """Subtract share times b (k,) from a (k,) in place."""
     for j in range(a.size):
         a[j] -= share * b[j]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def orthonormal(columns, count, basis, corner):
+def factor_qr(columns, count, basis, corner):
     """Compute the QR factorization of the columns by Gram-Schmidt, twice for each column.
 
     Fills the rows of `basis` and the upper triangle `corner` (count, count) with column j = sum
@@ -68,15 +68,15 @@ def orthonormal(columns, count, basis, corner):
             for i in range(j):
                 share = dot(basis[i], own)
                 corner[i, j] += share
-                less(own, share, basis[i])
+                subtract_multiple(own, share, basis[i])
         left = sqrt(dot(own, own))
-        corner[j, j] = left if left > ALIKE * whole else 0.0
+        corner[j, j] = left if left > MIN_INDEPENDENT_NORM * whole else 0.0
         for at in range(own.size):
             own[at] = own[at] / left if corner[j, j] > 0 else 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def projected(value, count, basis, inside, left):
+def project(value, count, basis, inside, left):
     """Project a value (k,) onto a basis of `count` rows.
 
     Fills `left` (k,) with the residual and `inside` (count,) with the coefficients.
@@ -85,15 +85,15 @@ def projected(value, count, basis, inside, left):
         left[at] = value[at]
     for i in range(count):
         inside[i] = dot(basis[i], left)
-        less(left, inside[i], basis[i])
+        subtract_multiple(left, inside[i], basis[i])
     for i in range(count):  # the second pass removes the round-off of the first
         share = dot(basis[i], left)
         inside[i] += share
-        less(left, share, basis[i])
+        subtract_multiple(left, share, basis[i])
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def numbers_of(count, corner, inside, numbers):
+def solve_upper_triangle(count, corner, inside, numbers):
     """Solve for the coefficients (count,) of the columns by back substitution."""
     for i in range(count - 1, -1, -1):
         part = inside[i]
@@ -103,21 +103,21 @@ def numbers_of(count, corner, inside, numbers):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def left_over(time, value, poles, columns, few):
+def compute_residual(time, value, poles, columns, few):
     """Compute the residual of the sinusoids of poles for value (k,) at times (k,) [s].
 
     Fills the workspace and returns the sum of squares of the residual.
     """
     count = few.shape[1]
-    waves(time, poles, columns[0], count - poles.size)
-    orthonormal(columns[0], count, columns[1], few)
-    projected(value, count, columns[1], few[count], columns[2, 0])
-    numbers_of(count, few, few[count], few[count + 1])
+    fill_sinusoids(time, poles, columns[0], count - poles.size)
+    factor_qr(columns[0], count, columns[1], few)
+    project(value, count, columns[1], few[count], columns[2, 0])
+    solve_upper_triangle(count, few, few[count], few[count + 1])
     return dot(columns[2, 0], columns[2, 0])
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def derived(time, poles, scale, columns, few, slopes, normal):
+def compute_jacobian(time, poles, scale, columns, few, slopes, normal):
     """Compute the Jacobian of the residual with respect to poles over scale (Kaufman, 1975).
 
     Fills `slopes` (2 r, k) with the Jacobian, and `normal` (2 r, 2 r + 1) with the normal matrix
@@ -134,7 +134,7 @@ def derived(time, poles, scale, columns, few, slopes, normal):
     for r in range(many):
         for _ in range(2):
             for i in range(count):
-                less(slopes[r], dot(columns[1, i], slopes[r]), columns[1, i])
+                subtract_multiple(slopes[r], dot(columns[1, i], slopes[r]), columns[1, i])
         for at in range(time.size):
             slopes[r, at] = -slopes[r, at]
     for r in range(many):
@@ -144,7 +144,7 @@ def derived(time, poles, scale, columns, few, slopes, normal):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def stepped(normal, damping, step, lower):
+def solve_step(normal, damping, step, lower):
     """Fill step (m,) with the Levenberg-Marquardt step of normal (m, m + 1).
 
     The step is -(N + damping diag N)^-1 g, by Cholesky factorization; a dependent direction is left
@@ -181,7 +181,7 @@ def stepped(normal, damping, step, lower):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def fitted(time, value, poles, scale, ends, room):
+def fit_sinusoids(time, value, poles, scale, ends, room):
     """Fit sinusoids to value (k,) at times (k,) [s] by the Levenberg-Marquardt method.
 
     Parameters
@@ -198,7 +198,7 @@ def fitted(time, value, poles, scale, ends, room):
         Workspace: columns (3, c, k) with the columns (of which the first c - 2 r are given), their
         basis, and the residual in the first row of the last; few (c + 2, c) with the triangle of
         the basis, then coefficients in the basis and of the columns; slopes (2 r, k); normal (2 r,
-        2 r + 1) as in `derived` at the best poles; more (2 r + 2, 2 r). Columns and few are those
+        2 r + 1) as in `compute_jacobian` at the best poles; more (2 r + 2, 2 r). Columns and few are those
         of the last evaluation.
 
     Returns
@@ -207,12 +207,12 @@ def fitted(time, value, poles, scale, ends, room):
         Number of evaluations, and sum of squares of the best residual.
     """
     columns, few, slopes, normal, more = room
-    many, damping, looked, largest, size = poles.size, 10 * FIRST, 0, 1.0, inf
+    many, damping, looked, largest, size = poles.size, 10 * INITIAL_DAMPING, 0, 1.0, inf
     lower, step, tried = more[:many], more[many], more[many + 1]
     for r in range(many):
         tried[r] = poles[r]
     while True:
-        new = left_over(time, value, tried, columns, few)
+        new = compute_residual(time, value, tried, columns, few)
         looked += 1
         if new <= size:
             size, damping, highest = new, damping / 10, 0.0
@@ -221,14 +221,18 @@ def fitted(time, value, poles, scale, ends, room):
                 highest = max(highest, poles[r] if r % 2 == 0 else 0.0)
             if ends[3] == 0:
                 break
-            derived(time, poles, scale, columns, few, slopes, normal)
-            if largest < CLOSE or size <= ends[0] or (size < ends[1] and highest < ends[2]):
+            compute_jacobian(time, poles, scale, columns, few, slopes, normal)
+            if (
+                largest < SUCCESS_STEP_TOL
+                or size <= ends[0]
+                or (size < ends[1] and highest < ends[2])
+            ):
                 break
-        elif damping > MOST or largest < STILL:
+        elif damping > MAX_DAMPING or largest < FAILURE_STEP_TOL:
             break
         else:
             damping *= 10
-        gain = -stepped(normal, damping, step, lower)
+        gain = -solve_step(normal, damping, step, lower)
         # round-off would decide whether a step with less gain is taken
         if looked > ends[3] or gain <= EPS * size:
             break

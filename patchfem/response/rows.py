@@ -1,9 +1,9 @@
 """Table of the measures of a motion, applied to the solutions of all engines alike.
 
-In: a `Seen`, i.e. the last cycles of a run with the values that its engine integrated. Out:
+In: a `LastCycles`, i.e. the last cycles of a run with the values that its engine integrated. Out:
 values by name, and for any name its definition, floor and larger term. A row has a name, a
 unit, the absolute floor of its error, a definition in one sentence, and the function that
-computes it from a `Seen`. A new measure is a new row of SINGLE_RUN_ROWS.
+computes it from a `LastCycles`. A new measure is a new row of SINGLE_RUN_ROWS.
 """
 
 from collections.abc import Callable
@@ -15,24 +15,33 @@ import numpy as np
 from ..core import IntegratedMeasures, MeasureDefinition, Response
 from ..structure import drive_sizes
 from . import stationary
-from .loops import Reversal, drift, half_range, interface_loop, secant_stiffness, turns_of
-from .measures import (
-    REST,
-    acceleration_peak,
-    energy_balance,
-    lateral,
-    ledger_measures,
-    relative_gap,
-    slip_measures,
-    slip_start,
+from .loops import (
+    Reversal,
+    drift,
+    find_reversals,
+    interface_loop,
+    mean_half_range,
+    secant_stiffness,
 )
-from .spectrum import FLOOR, odd_harmonics, wave_measures
+from .measures import (
+    MIN_SLIDE_RANGE,
+    compute_acceleration_peak,
+    compute_ledger_measures,
+    compute_slip_measures,
+    energy_balance,
+    lateral_history,
+    relative_gap,
+    slip_start_measure,
+)
+from .spectrum import MIN_HARMONIC, odd_harmonics, wave_measures
 
-SAMPLED = IntegratedMeasures()  # for an engine that integrates no measures besides its samples
+NO_INTEGRATED_MEASURES = (
+    IntegratedMeasures()
+)  # for an engine that integrates no measures besides its samples
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class LastCycles:
     """Last cycles of a run, with the values that its engine knows better than its samples.
 
     - window: histories.
@@ -48,7 +57,7 @@ class Seen:
       from `own`; None if the window contains no whole cycle.
     - ledger (4, k): friction work and energies [J], or None.
     - known: values by name that the engine has itself; None if it has no value of a measure.
-    - by: how the force at a reversal of the slide is evaluated (see `loops.turns_of`).
+    - by: how the force at a reversal of the slide is evaluated (see `loops.find_reversals`).
     - still: half range of the slide [m] up to which it is round-off.
     - even: equally spaced samples of the window; None if its own samples are.
     - inside: function (window, number) that returns the window of an interface with samples inside
@@ -66,7 +75,7 @@ class Seen:
     load: float | None
     stiffness: float
     sine: bool
-    own: IntegratedMeasures = SAMPLED
+    own: IntegratedMeasures = NO_INTEGRATED_MEASURES
     loop: tuple | None = None
     ledger: np.ndarray | None = None
     known: dict = field(default_factory=dict)
@@ -102,16 +111,16 @@ class Seen:
         if first is None or first.stuck_time is None:
             window = self.even or self.samples
             steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
-            found = slip_measures(
+            found = compute_slip_measures(
                 window,
                 self.drive,
                 steps,
-                [lateral(window, one, self.number) for one in ("slides", "slips")],
+                [lateral_history(window, one, self.number) for one in ("slides", "slips")],
             )
         else:
             starts = self.own.slip_start_phases
-            found = {"stick_fraction": stuck_share(first.stuck_time, self.span)} | (
-                {} if starts is None else slip_start(np.asarray(starts))
+            found = {"stick_fraction": stick_fraction(first.stuck_time, self.span)} | (
+                {} if starts is None else slip_start_measure(np.asarray(starts))
             )
         found |= {} if first is None else {"slip_amplitude": first.slip_range / 2}
         return found if self.sine else {k: v for k, v in found.items() if k != "slip_start_phase"}
@@ -122,7 +131,7 @@ class Seen:
         if self.own.reversals:
             return [tuple(Reversal(*one) for one in pair) for pair in self.own.reversals]
         w = self.samples
-        return turns_of(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.by)
+        return find_reversals(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.by)
 
     @cached_property
     def harmonics(self) -> tuple | None:
@@ -148,10 +157,10 @@ class Seen:
         moves = (
             self.sine
             and self.lateral("slides") is None
-            and np.ptp(self.window.slide) > max(2 * self.still, REST)
+            and np.ptp(self.window.slide) > max(2 * self.still, MIN_SLIDE_RANGE)
         )
         found = interface_loop(
-            half_range(self.turns) if moves else 0.0, *self.harmonics, self.stiffness
+            mean_half_range(self.turns) if moves else 0.0, *self.harmonics, self.stiffness
         )
         return found | {"secant_stiffness": secant_stiffness(self.turns)} if moves else found
 
@@ -173,12 +182,16 @@ class Seen:
     @cached_property
     def energies(self) -> dict:
         """Work and energies [J] by name at the end of the ledger; empty without a ledger."""
-        return {} if self.ledger is None else ledger_measures(self.ledger)
+        return {} if self.ledger is None else compute_ledger_measures(self.ledger)
 
     @cached_property
-    def shaken(self) -> dict:
-        """Measures of a stationary random drive by name (`stationary.measures`); {} under others."""
-        found = stationary.measures(self.window, self.drive) if hasattr(self.drive, "band") else {}
+    def random_measures(self) -> dict:
+        """Measures of a stationary random drive by name (`stationary.random_measures`); {} under others."""
+        found = (
+            stationary.random_measures(self.window, self.drive)
+            if hasattr(self.drive, "band")
+            else {}
+        )
         return (
             found
             if self.load is not None
@@ -197,7 +210,7 @@ class Seen:
         return relative_gap(*self.own.friction_works, self.book["power"] + self.book["peak_stored"])
 
     def others(self) -> list:
-        """Return a Seen for each interface after the first one.
+        """Return the LastCycles of each interface after the first one.
 
         The work of an interface comes from `own.loops` or, without them, from the samples.
         """
@@ -231,10 +244,10 @@ class Seen:
         return out
 
     def lateral(self, name: str):
-        """Return a history of the interface in its second direction (see `measures.lateral`)."""
-        return lateral(self.window, name, self.number)
+        """Return a history of the interface in its second direction (see `measures.lateral_history`)."""
+        return lateral_history(self.window, name, self.number)
 
-    def of_load(self, value: Callable) -> float | None:
+    def evaluate_load(self, value: Callable) -> float | None:
         """Return a number computed from the load history (k,) [N]; None if the load is constant.
 
         value: function of the load history in the window.
@@ -248,7 +261,7 @@ def lateral_work(window, number: int) -> float:
 
     By the trapezoidal rule; 0 without a second direction.
     """
-    force, slide = (lateral(window, name, number) for name in ("forces", "slides"))
+    force, slide = (lateral_history(window, name, number) for name in ("forces", "slides"))
     return 0.0 if force is None or slide is None else float(np.trapezoid(force, slide))
 
 
@@ -257,7 +270,7 @@ def resultant_peak(force, across) -> float:
     return float((np.abs(force) if across is None else np.hypot(force, across)).max())
 
 
-def drift_of(s: Seen) -> float:
+def compute_drift(s: LastCycles) -> float:
     """Return the drift of the slide of an interface per cycle [m].
 
     If the interface slides in a plane, it is the magnitude of the drift vector.
@@ -288,7 +301,7 @@ def first_harmonic(values: dict):
     return np.hypot(part, np.nan_to_num(other))
 
 
-def _moved(values: dict):
+def _drift_scale(values: dict):
     """Return the amplitude [m] that a drift is compared with.
 
     It is the amplitude of the slip; without slip, that of the motion. values: as in
@@ -298,18 +311,20 @@ def _moved(values: dict):
     return np.where(slip > 0, slip, np.abs(values.get("relative_displacement_amplitude", 0.0)))
 
 
-def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion") -> tuple:
+def _random_rows(name: str, unit: str, floor: float, words: str, group: str = "motion") -> tuple:
     """Return the rows of a measure of a random drive, and of its scatter between records."""
     scatter = f"{name}_scatter"
     return (
-        MeasureDefinition(name, unit, floor, words, lambda s: s.shaken.get(name), group=group),
+        MeasureDefinition(
+            name, unit, floor, words, lambda s: s.random_measures.get(name), group=group
+        ),
         MeasureDefinition(
             scatter,
             unit,
             floor,
             f"half-width of the 95 % interval of {name}: the scatter between "
             "random drives of the same length with different seeds",
-            lambda s: s.shaken.get(scatter),
+            lambda s: s.random_measures.get(scatter),
             group=group,
             larger_term=(name, lambda values: np.abs(values.get(name, 0.0))),
         ),
@@ -319,7 +334,7 @@ def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion
 # Measures that only single runs compute. If there are any, a sweep runs each case of a rig by
 # itself, because its batches compute only the shipped measures.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
-CUBIC = 4.0  # order of a value on cubics between the samples
+CUBIC_ORDER = 4.0  # order of a value on cubics between the samples
 ROWS = (
     MeasureDefinition(
         "relative_displacement_amplitude",
@@ -340,7 +355,7 @@ ROWS = (
         1e-4,
         "largest acceleration at the output, base motion included",
         lambda s: (
-            acceleration_peak(s.window)
+            compute_acceleration_peak(s.window)
             if s.own.acceleration_peak is None
             else s.own.acceleration_peak
         ),
@@ -373,7 +388,7 @@ ROWS = (
     MeasureDefinition(
         "absolute_acceleration_fundamental",
         "m s-2",
-        FLOOR,
+        MIN_HARMONIC,
         "first harmonic of the acceleration at the output, base motion included",
         lambda s: s.waves.get("absolute_acceleration_fundamental"),
     ),
@@ -392,9 +407,9 @@ ROWS = (
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
         "first cycle of the window)/(number of cycles between these two cycles); if the interface slides in a plane, "
         "the length of this vector; null if the drive is not periodic at the end of the run",
-        lambda s: drift_of(s) if s.own.drift is None else s.own.drift,
-        larger_term=("slip amplitude (without slip: amplitude of the motion)", _moved),
-        order=CUBIC,
+        lambda s: compute_drift(s) if s.own.drift is None else s.own.drift,
+        larger_term=("slip amplitude (without slip: amplitude of the motion)", _drift_scale),
+        order=CUBIC_ORDER,
     ),
     MeasureDefinition(
         "slip_amplitude",
@@ -468,7 +483,7 @@ ROWS = (
         "before and after the jump is used; null if rigid friction sticks there, where the force takes many values",
         lambda s: s.cycle.get("secant_stiffness"),
         group="friction",
-        order=CUBIC,
+        order=CUBIC_ORDER,
     ),
     MeasureDefinition(
         "equivalent_damping",
@@ -479,7 +494,7 @@ ROWS = (
         "cycle)/(value of the key `slide` of this mode); null if other modes contribute more than 5 % of the slide",
         lambda s: s.cycle.get("equivalent_damping"),
         group="friction",
-        order=CUBIC,
+        order=CUBIC_ORDER,
     ),
     MeasureDefinition(
         "friction_work",
@@ -521,7 +536,7 @@ ROWS = (
         "N",
         1e-6,
         "smallest normal load in the last cycles",
-        lambda s: s.of_load(np.min),
+        lambda s: s.evaluate_load(np.min),
         group="friction",
     ),
     MeasureDefinition(
@@ -529,7 +544,7 @@ ROWS = (
         "N",
         1e-6,
         "largest normal load in the last cycles",
-        lambda s: s.of_load(np.max),
+        lambda s: s.evaluate_load(np.max),
         group="friction",
     ),
     MeasureDefinition(
@@ -537,7 +552,7 @@ ROWS = (
         "1",
         1e-3,
         "fraction of the time of the last cycles in which the surfaces are not in contact",
-        lambda s: s.of_load(lambda load: np.mean(load <= 0)),
+        lambda s: s.evaluate_load(lambda load: np.mean(load <= 0)),
         4.0,
         group="friction",
         larger_term=("1", lambda _: 1.0),
@@ -587,33 +602,33 @@ ROWS = (
         lambda s: s.work_check,
         group="energy",
     ),
-    *_shaken(
+    *_random_rows(
         "relative_displacement_rms",
         "m",
         1e-10,
         "root mean square displacement at the output about its mean, under a random drive",
     ),
-    *_shaken(
+    *_random_rows(
         "absolute_acceleration_rms",
         "m s-2",
         1e-4,
         "root mean square acceleration at the output, base motion included, under a random drive",
     ),
-    *_shaken(
+    *_random_rows(
         "response_frequency",
         "Hz",
         1e-3,
         "frequency of the largest peak of the frequency response (H1 estimate) "
         "under a random drive",
     ),
-    *_shaken(
+    *_random_rows(
         "response_damping",
         "1",
         1e-5,
         "damping ratio of the largest peak of the frequency response (H1 "
         "estimate), structure and friction together",
     ),
-    *_shaken(
+    *_random_rows(
         "friction_power",
         "W",
         1e-9,
@@ -654,34 +669,39 @@ ROWS = (
 NEEDS_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in ROWS}
 # measures that every interface has
-OF_EACH = (
+INTERFACE_MEASURES = (
     "slip_amplitude",
     "stick_fraction",
     "friction_force_peak",
     "loop_area",
 )
-MOVED = (
+DISPLACEMENT_MEASURES = (
     "relative_displacement_amplitude",
     "relative_displacement_amplitude_steady",
     "slip_amplitude",
     "drift_per_cycle",
 )
-LEAST_MOVED = 1e-5  # largest floor of a displacement relative to the displacement of the drive
+MAX_DISPLACEMENT_FLOOR = (
+    1e-5  # largest floor of a displacement relative to the displacement of the drive
+)
 
 
-def measures_of(seen: Seen) -> dict:
+def compute_measures(seen: LastCycles) -> dict:
     """Return the value by name of every row that the run has, in SI units.
 
-    The measures OF_EACH are repeated for every further interface, with its number after the name. A
+    The measures INTERFACE_MEASURES are repeated for every further interface, with its number after the name. A
     value of the engine is used before the one computed from samples.
     """
-    out = {row.name: _value_of(row, seen) for row in ROWS}
+    out = {row.name: _compute_value(row, seen) for row in ROWS}
     for number, other in enumerate(seen.others(), 1):
-        out |= {of_number(name, number): TABLE[name].function(other) for name in OF_EACH}
+        out |= {
+            add_interface_number(name, number): TABLE[name].function(other)
+            for name in INTERFACE_MEASURES
+        }
     return {name: value for name, value in (out | seen.known).items() if value is not None}
 
 
-def _value_of(row: MeasureDefinition, seen: Seen) -> float | None:
+def _compute_value(row: MeasureDefinition, seen: LastCycles) -> float | None:
     """Return the value of a row; None if the run does not have it or lacks its histories."""
     if row.name in seen.known:
         return seen.known[row.name]
@@ -690,7 +710,7 @@ def _value_of(row: MeasureDefinition, seen: Seen) -> float | None:
     return row.function(seen)
 
 
-def stuck_share(stuck, span):
+def stick_fraction(stuck, span):
     """Return the fraction of a time span [s] that is stuck [s]; numbers or (n,).
 
     A fraction that differs from 1 only by the round-off of the sum of its parts is set to 1.
@@ -698,21 +718,21 @@ def stuck_share(stuck, span):
     return np.where(stuck >= span * (1 - 1e-12), 1.0, stuck / span)[()]
 
 
-def of_first(name: str) -> str:
+def remove_interface_number(name: str) -> str:
     """Return the name of a measure without interface number: slip_amplitude_2 -> slip_amplitude."""
     head, _, number = name.rpartition("_")
     return head if number.isdigit() else name
 
 
-def of_number(name: str, number: int) -> str:
+def add_interface_number(name: str, number: int) -> str:
     """Return the name of a measure of the interface of this index; the first has no suffix."""
     return f"{name}_{number + 1}" if number else name
 
 
-def floor_of(name: str, size=np.inf):
+def error_floor(name: str, size=np.inf):
     """Return the floor of the error of a measure of any interface, in its unit.
 
-    The floor of a displacement is at most the fraction LEAST_MOVED of `size`.
+    The floor of a displacement is at most the fraction MAX_DISPLACEMENT_FLOOR of `size`.
 
     Parameters
     ----------
@@ -720,10 +740,12 @@ def floor_of(name: str, size=np.inf):
     size : float or (n,)
         Displacement that the drive alone causes [m]; 0 or inf if no drive moves anything.
     """
-    floor = row_of(name).floor
-    if of_first(name) not in MOVED:
+    floor = find_row(name).floor
+    if remove_interface_number(name) not in DISPLACEMENT_MEASURES:
         return floor
-    return np.where(np.greater(size, 0), np.minimum(floor, LEAST_MOVED * np.asarray(size)), floor)
+    return np.where(
+        np.greater(size, 0), np.minimum(floor, MAX_DISPLACEMENT_FLOOR * np.asarray(size)), floor
+    )
 
 
 def larger_term(name: str, values: dict):
@@ -740,21 +762,26 @@ def larger_term(name: str, values: dict):
     float or (n,)
         0 if the measure is not a difference.
     """
-    row, number = row_of(name), name[len(of_first(name)) :]
+    row, number = find_row(name), name[len(remove_interface_number(name)) :]
     if row.larger_term is None:
         return 0.0
     return row.larger_term[1](
-        {of_first(one): values.get(of_first(one) + number, values[one]) for one in values}
+        {
+            remove_interface_number(one): values.get(
+                remove_interface_number(one) + number, values[one]
+            )
+            for one in values
+        }
     )
 
 
-def judged(found: dict, tolerance: float) -> dict:
+def set_final_floors(found: dict, tolerance: float) -> dict:
     """Return measures with their final floors: tolerance times the larger term for differences."""
     values = {name: one.value for name, one in found.items() if one.value is not None}
     raised = {
         name: tolerance * float(larger_term(name, values))
         for name in values
-        if of_first(name) in TABLE
+        if remove_interface_number(name) in TABLE
     }
     return found | {
         name: replace(found[name], floor=floor)
@@ -763,6 +790,6 @@ def judged(found: dict, tolerance: float) -> dict:
     }
 
 
-def row_of(name: str) -> MeasureDefinition:
+def find_row(name: str) -> MeasureDefinition:
     """Return the row of a measure of any interface; KeyError for an unknown name."""
-    return TABLE[of_first(name)]
+    return TABLE[remove_interface_number(name)]

@@ -12,19 +12,19 @@ from ..dynamics.events import event_list as listed
 from . import ringing
 from .events import (
     BORDER,
-    MOST,
+    MAX_EVENTS,
     RELEASE_UP,
     REVERSAL_UP,
     STOP,
     Events,
-    detected,
-    states,
-    sticks,
-    table,
+    compute_slip_states,
+    detect_events,
+    find_sticks,
+    sort_events,
 )
-from .measures import lateral, moved, slip_noise
+from .measures import distances_moved, lateral_history, slip_round_off
 
-OF_LOG = {
+KIND_OF_LOG = {
     0: STOP,
     1: RELEASE_UP,
     -1: RELEASE_UP + 1,
@@ -32,13 +32,15 @@ OF_LOG = {
     -2: REVERSAL_UP + 1,
     9: BORDER,
 }
-LEAST = -min(OF_LOG)
-KINDS = np.full(LEAST + max(OF_LOG) + 1, np.nan)  # kind of an event by its number in a log
-KINDS[np.array(list(OF_LOG)) + LEAST] = list(OF_LOG.values())
-SOURCE = "the times of stick and slip are those of the exact solution"
+LOG_OFFSET = -min(KIND_OF_LOG)
+KIND_TABLE = np.full(
+    LOG_OFFSET + max(KIND_OF_LOG) + 1, np.nan
+)  # kind of an event by its number in a log
+KIND_TABLE[np.array(list(KIND_OF_LOG)) + LOG_OFFSET] = list(KIND_OF_LOG.values())
+EXACT_SOURCE = "the times of stick and slip are those of the exact solution"
 
 
-def slips_of(response) -> tuple:
+def slips_and_slides(response) -> tuple:
     """Return slip and slide (k, i) [m] of every interface at the samples of a Response.
 
     For an interface that slides in a plane, the slip is the path length, which only grows, and the
@@ -48,32 +50,32 @@ def slips_of(response) -> tuple:
     if "lateral_slips" in extra:
         slips = extra["slips"].copy()
         for k in range(slips.shape[1]):
-            if (second := lateral(response, "slips", k)) is not None:
-                slips[1:, k] = slips[0, k] + np.cumsum(moved(slips[:, k], second))
+            if (second := lateral_history(response, "slips", k)) is not None:
+                slips[1:, k] = slips[0, k] + np.cumsum(distances_moved(slips[:, k], second))
         return slips, extra["slides"]
     if "slides" in extra:
         return extra.get("slips", extra["slides"]), extra["slides"]
     return response.slip[:, None], response.slide[:, None]
 
 
-def borders_of(drive) -> list:
+def segment_borders(drive) -> list:
     """Return the times [s] at which a drive changes from one of its segments to the next."""
     return [segment.start for segment in drive.segments[1:]]
 
 
-def of_log(log) -> Events:
+def events_of_log(log) -> Events:
     """Return the Events of an EventLog of the exact engine."""
-    part = slice(-MOST, None)
-    kind = KINDS[log.what[part] + LEAST]
+    part = slice(-MAX_EVENTS, None)
+    kind = KIND_TABLE[log.what[part] + LOG_OFFSET]
     slide = np.where(kind == BORDER, np.nan, log.slide[part])
-    return table(
+    return sort_events(
         np.stack([log.time[part], log.interface[part] + 1.0, kind, slide], axis=1),
         log.count,
-        SOURCE,
+        EXACT_SOURCE,
     )
 
 
-def events_of(window, drive, log=None, held: float = 0.0) -> Events:
+def list_events(window, drive, log=None, held: float = 0.0) -> Events:
     """Return the Events of a run: those of its log, else those detected in the last cycles.
 
     Parameters
@@ -85,35 +87,43 @@ def events_of(window, drive, log=None, held: float = 0.0) -> Events:
         Slip in a cycle [m] below which the interface sticks in it.
     """
     if log is not None:
-        return of_log(log)
-    slips, slides = slips_of(window)
-    return detected(
-        window.time, slips, slides, drive.period, max(held, slip_noise(window)), borders_of(drive)
+        return events_of_log(log)
+    slips, slides = slips_and_slides(window)
+    return detect_events(
+        window.time,
+        slips,
+        slides,
+        drive.period,
+        max(held, slip_round_off(window)),
+        segment_borders(drive),
     )
 
 
-def moving(window, drive, log=None, held: float = 0.0) -> list:
+def find_slipping(window, drive, log=None, held: float = 0.0) -> list:
     """Return whether each interface slips at some time in the window, as a list of bool (i).
 
-    Parameters as in `events_of`.
+    Parameters as in `list_events`.
     """
-    slips, held = slips_of(window)[0], max(held, slip_noise(window))
+    slips, held = slips_and_slides(window)[0], max(held, slip_round_off(window))
     if log is not None:
         return [bool(np.ptp(column) > 0) for column in slips.T]
-    return [bool(states(window.time, column, drive.period, held)[1].any()) for column in slips.T]
+    return [
+        bool(compute_slip_states(window.time, column, drive.period, held)[1].any())
+        for column in slips.T
+    ]
 
 
-def spans_of(window, drive, log=None, held: float = 0.0) -> list:
-    """Return the stick intervals [(start, end)] [s] of a window; parameters as in `events_of`."""
-    return sticks(
-        events_of(window, drive, log, held),
+def find_stick_intervals(window, drive, log=None, held: float = 0.0) -> list:
+    """Return the stick intervals [(start, end)] [s] of a window; parameters as in `list_events`."""
+    return find_sticks(
+        list_events(window, drive, log, held),
         window.time[0],
         window.time[-1],
-        moving(window, drive, log, held),
+        find_slipping(window, drive, log, held),
     )
 
 
-def of_a_cycle(spans, end: float, period: float) -> list:
+def select_last_cycle(spans, end: float, period: float) -> list:
     """Return the sticks that begin in the last cycle but one before `end` and end before it.
 
     These are all sticks of a periodic motion; there are none if the interface sticks forever.
@@ -121,7 +131,9 @@ def of_a_cycle(spans, end: float, period: float) -> list:
     return [(a, b) for a, b in spans if end - 2 * period <= a < end - period and b < end]
 
 
-def rings(window, modes, drive, log=None, held: float = 0.0, repeats: bool = False) -> tuple:
+def measure_rings(
+    window, modes, drive, log=None, held: float = 0.0, repeats: bool = False
+) -> tuple:
     """Return ring_frequency [Hz] and ring_damping [1] during stick by name, and their errors.
 
     They are computed from the acceleration at the output. The result is ({}, {}) if nothing rings,
@@ -145,17 +157,17 @@ def rings(window, modes, drive, log=None, held: float = 0.0, repeats: bool = Fal
     if modes.omega.max() * float(np.median(np.diff(window.time))) > np.pi:
         return {}, {}
     last = drive.segments[-1]
-    spans = spans_of(window, drive, log, held)
+    spans = find_stick_intervals(window, drive, log, held)
     if repeats:
-        spans = of_a_cycle(spans, window.time[-1], drive.period)
+        spans = select_last_cycle(spans, window.time[-1], drive.period)
     if not spans:
         return {}, {}
-    return ringing.ringing(
+    return ringing.measure_ringing(
         window.time, window.acceleration, spans, last.omega if last.amplitude else 0.0
     )
 
 
-def with_own(measures: dict, own: dict | None) -> dict:
+def add_uncertainty(measures: dict, own: dict | None) -> dict:
     """Return measures whose errors include the uncertainty `own` by name of the run itself."""
     return {
         name: replace(m, error=m.error + (own or {}).get(name, 0.0)) if m.error is not None else m
@@ -163,17 +175,17 @@ def with_own(measures: dict, own: dict | None) -> dict:
     }
 
 
-def all_stick(window, held: float) -> bool:
+def is_all_stuck(window, held: float) -> bool:
     """Return whether no interface or strip slips in the window by more than `held` [m].
 
     The limit applies to half the range of the slip and is not below its round-off.
     """
-    slips = slips_of(window)[0]
+    slips = slips_and_slides(window)[0]
     slips = np.column_stack([*([] if "lateral_slips" in window.extra else [window.slip]), slips])
-    return bool(np.ptp(slips, axis=0).max() / 2 <= max(held, slip_noise(window)))
+    return bool(np.ptp(slips, axis=0).max() / 2 <= max(held, slip_round_off(window)))
 
 
-def joined_logs(logs, shifts) -> object:
+def join_logs(logs, shifts) -> object:
     """Return one EventLog of runs in sequence, with a border between them.
 
     shifts: times [s] by which the runs start later than the first one.

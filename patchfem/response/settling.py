@@ -10,26 +10,27 @@ import numpy as np
 from ..core import Outcome
 
 CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
-STEADY, GROWS = 1, 2  # indices of CLASSES
-LEAST = 3  # smallest number of windows from which free motion is estimated
-MOVES = 1e-3  # relative to the largest speed in a run; above it an interface slips
+STEADY_CLASS = 1  # index of Outcome.STEADY in CLASSES
+GROWS_CLASS = 2  # index of Outcome.GROWS in CLASSES
+MIN_WINDOWS = 3  # smallest number of windows from which free motion is estimated
+SLIP_SPEED_TOL = 1e-3  # relative to the largest speed in a run; above it an interface slips
 # sine of the angle between differences of phasors; below it they lie along one line
-TURNS = 0.02
+COLLINEAR_SINE = 0.02
 # fraction that the slowest mode must lose over a third of the run, before a beat that remains
 # counts as periodic
-TELLS = 0.1
+PERIODIC_TOL = 0.1
 
 
 def classify(amplitudes, tolerance: float, floor: float = 0.0) -> Outcome:
-    """Return the class of a motion by the amplitudes (w,) of successive windows (see `classes`)."""
-    return CLASSES[classes(np.asarray(amplitudes, float)[None], tolerance, floor)[0]]
+    """Return the class of a motion by the amplitudes (w,) of successive windows (see `classify_motions`)."""
+    return CLASSES[classify_motions(np.asarray(amplitudes, float)[None], tolerance, floor)[0]]
 
 
-def classes(a, tolerance: float, floor=0.0) -> np.ndarray:
+def classify_motions(a, tolerance: float, floor=0.0) -> np.ndarray:
     """Classify motions by the amplitudes of successive windows.
 
-    STEADY: the last change and the remaining sum of a geometric series are both below the
-    tolerance. GROWS: the changes do not shrink and the amplitude still increases. Anything else is
+    STEADY_CLASS: the last change and the remaining sum of a geometric series are both below the
+    tolerance. GROWS_CLASS: the changes do not shrink and the amplitude still increases. Anything else is
     transient.
 
     Parameters
@@ -50,26 +51,26 @@ def classes(a, tolerance: float, floor=0.0) -> np.ndarray:
         return out
     change, scale = np.abs(a[:, -1] - a[:, -2]), tolerance * np.abs(a[:, -1]) + floor
     if a.shape[1] == 2:
-        out[change <= scale] = STEADY
+        out[change <= scale] = STEADY_CLASS
         return out
-    rest = np.abs(tails(a[:, -3:]))
-    ends, rises = np.isfinite(rest), _rises(a)
+    rest = np.abs(geometric_remainders(a[:, -3:]))
+    ends, rises = np.isfinite(rest), _increases_steadily(a)
     endless = rises & (change > 0.05 * scale)  # 0.05 of the limit: slower growth is steady
-    out[rises & ~ends] = GROWS
-    out[(change <= scale) & np.where(ends, rest <= scale, ~endless)] = STEADY
+    out[rises & ~ends] = GROWS_CLASS
+    out[(change <= scale) & np.where(ends, rest <= scale, ~endless)] = STEADY_CLASS
     return out
 
 
-def tail(three) -> complex | None:
+def geometric_remainder(three) -> complex | None:
     """Return the remaining sum of a geometric series through three values, or None.
 
-    See `tails`.
+    See `geometric_remainders`.
     """
-    rest = tails(np.asarray(three) + 0.0)
+    rest = geometric_remainders(np.asarray(three) + 0.0)
     return None if np.isnan(rest) else rest
 
 
-def tails(three):
+def geometric_remainders(three):
     """Return the remaining sum of geometric series through three values (Aitken extrapolation).
 
     It is what the series still adds to the last of three equally spaced values (..., 3), and NaN if
@@ -81,23 +82,25 @@ def tails(three):
     return np.where(shrinks, change * ratio / np.where(shrinks, 1 - ratio, 1.0), np.nan)[()]
 
 
-def steady_amplitude(amplitudes, phasors) -> tuple:
-    """Return the steady amplitude of a motion [m] and its error [m]; see `steady_amplitudes`.
+def extrapolate_steady_amplitude(amplitudes, phasors) -> tuple:
+    """Return the steady amplitude of a motion [m] and its error [m]; see `extrapolate_steady_amplitudes`.
 
     (None, None) if no bounded limit can be estimated.
     """
-    return _one(
-        steady_amplitudes(np.asarray(amplitudes, float)[None], np.asarray(phasors, complex)[None])
+    return _unpack_single(
+        extrapolate_steady_amplitudes(
+            np.asarray(amplitudes, float)[None], np.asarray(phasors, complex)[None]
+        )
     )
 
 
-def steady_amplitudes(a, p) -> tuple:
+def extrapolate_steady_amplitudes(a, p) -> tuple:
     """Extrapolate the steady amplitudes of motions, and estimate their errors.
 
     In a linear rig the remaining free motion is multiplied by one complex factor per window, so
     that Aitken's method extrapolates the phasors. Friction acts differently on changes of the
     amplitude and of the phase, so that the remaining motion follows a linear map of the plane
-    (`plane_tails`). The limit by the map is used if it exists, and its distance from Aitken's limit
+    (`plane_map_remainders`). The limit by the map is used if it exists, and its distance from Aitken's limit
     is part of the error. The waveform, amplitude over |phasor|, converges with the magnitude of the
     factor.
 
@@ -123,13 +126,15 @@ def steady_amplitudes(a, p) -> tuple:
     moves = np.all(size[:, -5:] > 0, axis=1)
     shape = a[:, -2:] / np.where(size[:, -2:] > 0, size[:, -2:], 1.0)
     ends = np.stack(
-        [np.abs(p[:, w - 1 - k] + tails(p[:, w - 3 - k : w - k])) for k in range(3)], axis=1
+        [np.abs(p[:, w - 1 - k] + geometric_remainders(p[:, w - 3 - k : w - k])) for k in range(3)],
+        axis=1,
     )
     before, change = np.abs(p[:, -2] - p[:, -3]), np.abs(p[:, -1] - p[:, -2])
     shrink = np.minimum(np.divide(change, before, out=1.0 * (change > 0), where=before > 0), 0.9995)
     settle = (shape[:, -1] - shape[:, -2]) * shrink / (1 - shrink)
     plane = np.stack(
-        [np.abs(p[:, w - 1 - k] + plane_tails(p[:, w - 4 - k : w - k])) for k in range(2)], axis=1
+        [np.abs(p[:, w - 1 - k] + plane_map_remainders(p[:, w - 4 - k : w - k])) for k in range(2)],
+        axis=1,
     )
     turns = ~np.isnan(plane).any(axis=1)
     end = np.where(turns, plane[:, 0], ends[:, 0])
@@ -145,7 +150,7 @@ def steady_amplitudes(a, p) -> tuple:
     return np.where(known, value, np.nan), np.where(known, error, np.nan)
 
 
-def plane_tails(p) -> np.ndarray:
+def plane_map_remainders(p) -> np.ndarray:
     """Return the remaining sums (n,) of differences that one linear map of the plane generates.
 
     By the Cayley-Hamilton theorem d3 = t d2 - q d1, with the trace t and the determinant q of the
@@ -155,7 +160,7 @@ def plane_tails(p) -> np.ndarray:
     """
     d1, d2, d3 = np.diff(np.asarray(p, complex), axis=1).T
     area = (d1.conj() * d2).imag
-    known = np.abs(area) > TURNS * np.abs(d1) * np.abs(d2)
+    known = np.abs(area) > COLLINEAR_SINE * np.abs(d1) * np.abs(d2)
     area = np.where(known, area, 1.0)
     t, q = (d1.conj() * d3).imag / area, (d2.conj() * d3).imag / area
     # both eigenvalues of the map lie inside the unit circle
@@ -163,12 +168,12 @@ def plane_tails(p) -> np.ndarray:
     return np.where(known, ((t - q) * d3 - q * d2) / np.where(known, 1 - t + q, 1.0), np.nan)
 
 
-def _one(found: tuple) -> tuple:
+def _unpack_single(found: tuple) -> tuple:
     """Return value and error (1,) of one motion as floats; None for NaN."""
     return tuple(None if np.isnan(one[0]) else float(one[0]) for one in found)
 
 
-def windows_of(extremes, window: int) -> tuple:
+def window_amplitude_means(extremes, window: int) -> tuple:
     """Return half the peak-to-peak value of windows, and the mean of that of their cycles [m].
 
     Parameters
@@ -192,7 +197,7 @@ def windows_of(extremes, window: int) -> tuple:
     return (high.max(axis=-1) - low.min(axis=-1)) / 2, (high.mean(axis=-1) - low.mean(axis=-1)) / 2
 
 
-def left_over(extremes, window: int, decay=0.0):
+def remaining_free_motion(extremes, window: int, decay=0.0):
     """Return how much of the amplitude of the last window [m] is free motion that will decay.
 
     A free motion at a frequency near that of the drive beats. If the beat is short, the cycles of
@@ -212,15 +217,15 @@ def left_over(extremes, window: int, decay=0.0):
     decay : (...)
         Decay of the slowest mode over a window [1].
     """
-    amplitude, mean = windows_of(extremes, window)
+    amplitude, mean = window_amplitude_means(extremes, window)
     count = amplitude.shape[-1]
-    if count < LEAST:
+    if count < MIN_WINDOWS:
         return np.zeros(amplitude.shape[:-1])[()]
     third = max(1, count // 3)
     spread = amplitude - mean
     before, last = spread[..., -2 * third : -third].max(axis=-1), spread[..., -third:].max(axis=-1)
     lost = 1 - np.exp(-np.asarray(decay) * third)
-    stays = (lost > TELLS) & (last > (1 - lost / 2) * before)
+    stays = (lost > PERIODIC_TOL) & (last > (1 - lost / 2) * before)
     away = np.abs(amplitude[..., :-1] - amplitude[..., -1:])
     far, near = (
         away[..., -2 * third : -third].max(axis=-1, initial=0.0),
@@ -231,7 +236,7 @@ def left_over(extremes, window: int, decay=0.0):
     return (near * share + np.where(stays, 0.0, spread[..., -1]))[()]
 
 
-def mean_amplitudes(extremes, window: int) -> tuple:
+def beat_mean_amplitudes(extremes, window: int) -> tuple:
     """Return the steady amplitudes around which a short beat oscillates, and their errors [m].
 
     The amplitude is the mean over the cycles of the last third of the windows. The error is the sum
@@ -250,7 +255,7 @@ def mean_amplitudes(extremes, window: int) -> tuple:
     tuple
         Two arrays (n,); NaN if there is no estimate.
     """
-    amplitude, mean = windows_of(extremes, window)
+    amplitude, mean = window_amplitude_means(extremes, window)
     third = amplitude.shape[1] // 3
     if third < 2:
         return np.full(len(mean), np.nan), np.full(len(mean), np.nan)
@@ -268,7 +273,7 @@ def slip_period(time, rate) -> float:
     """Return the longest time [s] between the starts of successive slips, of the last three.
 
     It is 0 if there are fewer than two slips, or if the last one is more than 1.5 times this long
-    ago, because the interface then sticks. The interface slips while its rate exceeds MOVES of the
+    ago, because the interface then sticks. The interface slips while its rate exceeds SLIP_SPEED_TOL of the
     largest. A motion without stick has two slips per cycle, from one reversal to the next.
 
     Parameters
@@ -277,7 +282,7 @@ def slip_period(time, rate) -> float:
         Times [s] and rates of the slide [m/s].
     """
     rate = np.asarray(rate, float)
-    way = np.sign(rate) * (np.abs(rate) > MOVES * np.abs(rate).max(initial=0.0))
+    way = np.sign(rate) * (np.abs(rate) > SLIP_SPEED_TOL * np.abs(rate).max(initial=0.0))
     time = np.asarray(time, float)
     begins = np.flatnonzero((way[1:] != 0) & (way[1:] != way[:-1]))
     # after a stick, the slip starts at the last sample of the stick
@@ -286,7 +291,7 @@ def slip_period(time, rate) -> float:
     return longest if starts.size and time[-1] - starts[-1] <= 1.5 * longest else 0.0
 
 
-def _rises(a) -> np.ndarray:
+def _increases_steadily(a) -> np.ndarray:
     """Return whether the last windows (n, w) increase by similar steps, which noise does not do."""
     steps = np.diff(a[:, -6:], axis=1)
     if a.shape[1] < 4:

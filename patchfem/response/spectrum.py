@@ -7,16 +7,19 @@ which acts on the computed motion and never on the model.
 
 import numpy as np
 
-ROUND = 1e-12  # round-off relative to the largest acceleration of the drive
-FLOOR = 1e-4  # smallest first harmonic [m s-2]; below it the output is at rest
+ACCELERATION_ROUND_OFF = 1e-12  # round-off relative to the largest acceleration of the drive
+MIN_HARMONIC = 1e-4  # smallest first harmonic [m s-2]; below it the output is at rest
 READINGS = ("peak", "fundamental", "rms", "lowpass")
-HARMONICS = 64  # number of harmonics that pass through the low-pass filter
-SAMPLES = 1024  # number of samples of a cycle after the filter
-PLACES, WEIGHTS = np.polynomial.legendre.leggauss(4)
-PLACES, WEIGHTS = (1 + PLACES) / 2, WEIGHTS / 2  # Gauss points and weights of a step of length 1
+N_FILTER_HARMONICS = 64  # number of harmonics that pass through the low-pass filter
+N_FILTER_SAMPLES = 1024  # number of samples of a cycle after the filter
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(4)
+GAUSS_POINTS, GAUSS_WEIGHTS = (
+    (1 + GAUSS_POINTS) / 2,
+    GAUSS_WEIGHTS / 2,
+)  # Gauss points and weights of a step of length 1
 
 
-def waves(time, omega: float) -> list:
+def harmonic_weights(time, omega: float) -> list:
     """Return the factors by which `motion_harmonic` weights the motion at the Gauss points.
 
     They take most of its time, so that several motions share them.
@@ -37,8 +40,8 @@ def waves(time, omega: float) -> list:
     waves = np.exp(-1j * omega * time[:-1])
     # at equal steps, one wave times a constant phase serves all four points
     even = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
-    turns = [np.exp(-1j * omega * s * (step.mean() if even else step)) for s in PLACES]
-    return [(weight * step, waves * turn) for turn, weight in zip(turns, WEIGHTS)]
+    turns = [np.exp(-1j * omega * s * (step.mean() if even else step)) for s in GAUSS_POINTS]
+    return [(weight * step, waves * turn) for turn, weight in zip(turns, GAUSS_WEIGHTS)]
 
 
 def motion_harmonic(time, value, rate, omega: float, known: list | None = None) -> complex:
@@ -56,12 +59,14 @@ def motion_harmonic(time, value, rate, omega: float, known: list | None = None) 
     omega : float
         Angular frequency [rad/s].
     known : list, optional
-        `waves` of the same times and frequency.
+        `harmonic_weights` of the same times and frequency.
     """
     step, rise = np.diff(time), np.diff(value)
     p, q = rate[:-1] * step, rate[1:] * step
     mid, big, total = 3 * rise - 2 * p - q, p + q - 2 * rise, 0j
-    for s, (weight, wave) in zip(PLACES, waves(time, omega) if known is None else known):
+    for s, (weight, wave) in zip(
+        GAUSS_POINTS, harmonic_weights(time, omega) if known is None else known
+    ):
         y = value[:-1] + s * (p + s * (mid + s * big))
         total += np.sum(weight * y * wave)
     return complex(2 / (time[-1] - time[0]) * total)
@@ -73,10 +78,10 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
     The acceleration of a rig with friction jumps, but its motion does not, so that a jump causes no
     error. Parameters as in `motion_harmonic`, over whole cycles.
     """
-    return _by_parts(time, value, rate, omega, motion_harmonic(time, value, rate, omega))
+    return _integrate_by_parts(time, value, rate, omega, motion_harmonic(time, value, rate, omega))
 
 
-def _by_parts(time, value, rate, omega: float, first: complex) -> complex:
+def _integrate_by_parts(time, value, rate, omega: float, first: complex) -> complex:
     """Return `acceleration_harmonic` for a known Fourier coefficient `first` of the motion."""
     span, wave = time[-1] - time[0], np.exp(-1j * omega * time[[0, -1]])
     border = (rate[-1] + 1j * omega * value[-1]) * wave[1] - (
@@ -110,16 +115,16 @@ def wave_measures(first: float, third: float, size: float = 0.0) -> dict:
     first, third : float
         Magnitudes of the first and the third harmonic [m s-2].
     size : float
-        Acceleration of the drive [m s-2]; the distortion is None if `distorted` has no value.
+        Acceleration of the drive [m s-2]; the distortion is None if `distortion_ratio` has no value.
     """
-    ratio = distorted(first, third, size)
+    ratio = distortion_ratio(first, third, size)
     return {
         "absolute_acceleration_fundamental": float(first),
         "acceleration_distortion": None if np.isnan(ratio) else float(ratio),
     }
 
 
-def distorted(first, third, size):
+def distortion_ratio(first, third, size):
     """Return the ratio of third to first harmonic of an acceleration (3.4); NaN for 0/0.
 
     It is NaN if the first harmonic is below its floor or the round-off of the drive.
@@ -131,7 +136,7 @@ def distorted(first, third, size):
     size : float or (n,)
         Acceleration of the drive [m s-2].
     """
-    there = np.asarray(first) > np.maximum(ROUND * np.asarray(size), FLOOR)
+    there = np.asarray(first) > np.maximum(ACCELERATION_ROUND_OFF * np.asarray(size), MIN_HARMONIC)
     return np.where(there, third / np.where(there, first, 1.0), np.nan)[()]
 
 
@@ -152,18 +157,22 @@ def friction_harmonic(window, modes, drive) -> complex:
     """
     last = [part for part in drive.segments if part.start < window.time[-1]][-1]
     time, omega = window.time, last.omega
-    known, motions = waves(time, omega), list(zip(window.modal.T, window.modal_rate.T))
+    known, motions = harmonic_weights(time, omega), list(zip(window.modal.T, window.modal_rate.T))
     wave = np.exp(-1j * omega * time[[0, -1]])
     first = np.array([motion_harmonic(time, z, v, omega, known) for z, v in motions])
     ends = 2 / (time[-1] - time[0]) * (window.modal[-1] * wave[1] - window.modal[0] * wave[0])
     rates = ends + 1j * omega * first
-    gains = np.array([_by_parts(time, z, v, omega, one) for (z, v), one in zip(motions, first)])
+    gains = np.array(
+        [_integrate_by_parts(time, z, v, omega, one) for (z, v), one in zip(motions, first)]
+    )
     push = -1j * last.amplitude * np.exp(1j * (last.phase - omega * last.start))
     rest = -modes.base * push - gains - modes.damping_matrix @ rates - modes.omega**2 * first
     return complex(modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide))
 
 
-def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None = None) -> float:
+def read_instrument(
+    window, drive, peak: float, kind: str = "peak", cutoff: float | None = None
+) -> float:
     """Return the absolute acceleration [m s-2] of a window as an instrument displays it.
 
     Parameters
@@ -176,7 +185,7 @@ def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None
     kind : str
         "peak": `peak`; "fundamental": |a_1|, the amplitude at the drive frequency; "rms": sqrt(mean
         a^2); "lowpass": largest acceleration after a Butterworth low-pass filter of second order,
-        1/(1 + sqrt2 s + s^2) with s = i f/cutoff, for HARMONICS harmonics.
+        1/(1 + sqrt2 s + s^2) with s = i f/cutoff, for N_FILTER_HARMONICS harmonics.
     cutoff : float, optional
         Cutoff frequency of the filter [Hz].
 
@@ -195,18 +204,20 @@ def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None
             )
         )
     if kind == "fundamental":
-        return abs(_harmonic(window, drive, 1))
+        return abs(_acceleration_harmonic_n(window, drive, 1))
     if kind != "lowpass":
         raise ValueError(f"reading '{kind}' is not possible; use one of {', '.join(READINGS)}")
-    n = np.arange(1, HARMONICS + 1)
+    n = np.arange(1, N_FILTER_HARMONICS + 1)
     s = 1j * n * drive.omega / (2 * np.pi * cutoff)
-    passed = np.array([_harmonic(window, drive, k) for k in n]) / (1 + np.sqrt(2) * s + s**2)
-    spectrum = np.zeros(SAMPLES // 2 + 1, complex)
-    spectrum[1 : HARMONICS + 1] = passed * SAMPLES / 2
-    return float(np.abs(np.fft.irfft(spectrum, SAMPLES)).max())
+    passed = np.array([_acceleration_harmonic_n(window, drive, k) for k in n]) / (
+        1 + np.sqrt(2) * s + s**2
+    )
+    spectrum = np.zeros(N_FILTER_SAMPLES // 2 + 1, complex)
+    spectrum[1 : N_FILTER_HARMONICS + 1] = passed * N_FILTER_SAMPLES / 2
+    return float(np.abs(np.fft.irfft(spectrum, N_FILTER_SAMPLES)).max())
 
 
-def _harmonic(window, drive, n: int) -> complex:
+def _acceleration_harmonic_n(window, drive, n: int) -> complex:
     """Return the complex harmonic n [m s-2] of the absolute acceleration, from the motion.
 
     By integration by parts, so that a jump of the acceleration causes no error.

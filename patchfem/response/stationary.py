@@ -20,14 +20,14 @@ from scipy.special import stdtrit
 
 from .welch import CrossDensities, Segments, average_segments, transform_segments
 
-PARTS = 16  # length of the record over that of a segment
+SEGMENTS_PER_RECORD = 16  # length of the record over that of a segment
 # number of parts of the record from which the scatter is estimated; groups of segments, each left
 # out once
-GROUPS = 10
-WIDE = 6.0, 8.0  # half-width of the band of a fit, in half-power widths and in spectral lines
+N_GROUPS = 10
+FIT_BAND = 6.0, 8.0  # half-width of the band of a fit, in half-power widths and in spectral lines
 # length of a record in decay times of the mode; in a shorter one the parts are correlated
-ENOUGH = 50.0
-LEAST = 64  # smallest number of samples of a segment
+MIN_DECAY_TIMES = 50.0
+MIN_SEGMENT_SAMPLES = 64  # smallest number of samples of a segment
 
 
 class Record(NamedTuple):
@@ -64,7 +64,7 @@ class Spectra(NamedTuple):
     coherence: np.ndarray
 
 
-def record_of(window, drive) -> Record:
+def make_record(window, drive) -> Record:
     """Return the Record of a window at the sampling rate of its drive.
 
     The displacement comes from cubics through positions and rates.
@@ -76,26 +76,26 @@ def record_of(window, drive) -> Record:
     return Record(step, drive.values(grid), place, np.interp(grid, time, window.acceleration[kept]))
 
 
-def measures(window, drive) -> dict:
+def random_measures(window, drive) -> dict:
     """Return the measures of a stationary random drive by name, as far as the record has them."""
-    record, out = record_of(window, drive), {}
+    record, out = make_record(window, drive), {}
     for name, values, even in (
         ("relative_displacement_rms", window.output, record.place),
         ("absolute_acceleration_rms", window.acceleration, record.acceleration),
     ):
-        out[name], out[f"{name}_scatter"] = rms(window.time, values), rms_scatter(even)
-    found = peak(record, drive.band)
+        out[name], out[f"{name}_scatter"] = compute_rms(window.time, values), rms_scatter(even)
+    found = fit_peak(record, drive.band)
     if found is not None:
         for name, value, scatter in zip(("response_frequency", "response_damping"), *found):
             out |= {name: value, f"{name}_scatter": scatter}
     if "ledger" in window.extra:
-        out["friction_power"], out["friction_power_scatter"] = power(
+        out["friction_power"], out["friction_power_scatter"] = mean_power(
             window.time, window.extra["ledger"][0]
         )
     return {name: float(value) for name, value in out.items() if np.isfinite(value)}
 
 
-def short(found: dict, window) -> list:
+def warn_if_short(found: dict, window) -> list:
     """Return a warning, as a list, if a record is short compared with the decay of its mode.
 
     Parameters
@@ -109,15 +109,15 @@ def short(found: dict, window) -> list:
         return []
     at, zeta = (found[name].value for name in names)
     span, decay = float(window.time[-1] - window.time[0]), 1 / (2 * np.pi * at * zeta)
-    if span >= ENOUGH * decay:
+    if span >= MIN_DECAY_TIMES * decay:
         return []
     return [
         f"the response lasts only {span / decay:.2g} decay times of the mode at {at:.4g} Hz, too short for a "
-        f"reliable scatter between random drives; set drive.duration = '{1.5 * ENOUGH * decay:.2g} s'"
+        f"reliable scatter between random drives; set drive.duration = '{1.5 * MIN_DECAY_TIMES * decay:.2g} s'"
     ]
 
 
-def rms(time, values) -> float:
+def compute_rms(time, values) -> float:
     """Return the root mean square about the mean of samples (k,) at times (k,) [s].
 
     By the trapezoidal rule.
@@ -128,28 +128,28 @@ def rms(time, values) -> float:
 
 
 def rms_scatter(values) -> float:
-    """Return the half-width of the interval of `rms` of equally spaced samples (k,).
+    """Return the half-width of the interval of `compute_rms` of equally spaced samples (k,).
 
-    It comes from the mean squares of GROUPS parts. The interval is one of the logarithm of the mean
+    It comes from the mean squares of N_GROUPS parts. The interval is one of the logarithm of the mean
     square, because few oscillations have a skewed distribution; its upper half counts.
     """
-    if values.size < GROUPS:
+    if values.size < N_GROUPS:
         return np.nan
     square = (values - values.mean()) ** 2
     parts, mean = (
-        square[: square.size // GROUPS * GROUPS].reshape(GROUPS, -1).mean(axis=1),
+        square[: square.size // N_GROUPS * N_GROUPS].reshape(N_GROUPS, -1).mean(axis=1),
         square.mean(),
     )
     if not mean > 0:
         return 0.0
-    share = stdtrit(GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(GROUPS) / mean
+    share = stdtrit(N_GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(N_GROUPS) / mean
     return float(np.sqrt(mean) * np.expm1(share / 2))
 
 
-def power(time, work) -> tuple:
+def mean_power(time, work) -> tuple:
     """Return the mean power [W] and the half-width of its interval [W] from cumulative work.
 
-    The half-width comes from the means over GROUPS parts of equal length.
+    The half-width comes from the means over N_GROUPS parts of equal length.
 
     Parameters
     ----------
@@ -158,14 +158,14 @@ def power(time, work) -> tuple:
     work : (k,)
         Work done since the start [J].
     """
-    edges = np.linspace(time[0], time[-1], GROUPS + 1)
+    edges = np.linspace(time[0], time[-1], N_GROUPS + 1)
     parts = np.diff(np.interp(edges, time, work)) / np.diff(edges)
-    return parts.mean(), stdtrit(GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(GROUPS)
+    return parts.mean(), stdtrit(N_GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(N_GROUPS)
 
 
-def steady(window, drive) -> bool:
+def is_steady(window, drive) -> bool:
     """Return whether the rms of both halves of a window agree within their scatter."""
-    place = record_of(window, drive).place
+    place = make_record(window, drive).place
     half = place.size // 2
     first, last = place[:half], place[half:]
     # the half-widths are 2 standard errors, so a difference of up to 4 of its standard errors
@@ -175,15 +175,18 @@ def steady(window, drive) -> bool:
     )
 
 
-def segments(record: Record) -> Segments:
+def transform_record(record: Record) -> Segments:
     """Transform drive, displacement and acceleration over segments of 1/16 of a record."""
-    size = max(min(LEAST, record.place.size), 2 * (record.place.size // (2 * PARTS)))
+    size = max(
+        min(MIN_SEGMENT_SAMPLES, record.place.size),
+        2 * (record.place.size // (2 * SEGMENTS_PER_RECORD)),
+    )
     return transform_segments(record.step, record[1:], size)
 
 
-def spectra(window, drive) -> Spectra:
+def compute_spectra(window, drive) -> Spectra:
     """Return the Spectra of a window, up to twice the highest frequency of the drive."""
-    frequency, (push, place, acceleration) = segments(record_of(window, drive))
+    frequency, (push, place, acceleration) = transform_record(make_record(window, drive))
     low, high = drive.band
     shown = (frequency > 0) & (frequency <= 2 * high)
     found = CrossDensities(*(part[shown] for part in average_segments(push, place)))
@@ -195,7 +198,7 @@ def spectra(window, drive) -> Spectra:
     return Spectra(frequency, found.input, found.output, far, gain, coherence)
 
 
-def peak(record: Record, band: tuple) -> tuple | None:
+def fit_peak(record: Record, band: tuple) -> tuple | None:
     """Return frequency [Hz] and damping ratio of the largest peak of H1, and their half-widths.
 
     Parameters
@@ -210,12 +213,12 @@ def peak(record: Record, band: tuple) -> tuple | None:
         (frequency, damping ratio) and the half-widths of both. None if the band contains no peak:
         the largest value is at an end of the band, no mode fits, or the record is too short.
     """
-    if record.place.size < 2 * LEAST:
+    if record.place.size < 2 * MIN_SEGMENT_SAMPLES:
         return None
-    frequency, (push, place, _) = segments(record)
+    frequency, (push, place, _) = transform_record(record)
     span, line = 1 / (frequency[1]), frequency[1]
     inside = np.flatnonzero((frequency >= band[0] + 2 * line) & (frequency <= band[1] - 2 * line))
-    if inside.size < 5 or len(push) < GROUPS:
+    if inside.size < 5 or len(push) < N_GROUPS:
         return None
     own, cross = (np.abs(push) ** 2)[:, inside], (push.conj() * place)[:, inside]
     f, gain = frequency[inside], cross.sum(axis=0) / own.sum(axis=0)
@@ -228,26 +231,26 @@ def peak(record: Record, band: tuple) -> tuple | None:
     theta = np.log([2 * np.pi * f[top], max(0.3 * width, 0.05 * line) / (2 * f[top])])
     for _ in range(3):  # the band of the fit follows the width of the peak
         at, half = np.exp(theta[0]) / (2 * np.pi), np.exp(theta.sum()) / (2 * np.pi)
-        near = np.abs(f - at) <= max(WIDE[0] * half, WIDE[1] * line)
-        theta = _fitted(f[near], gain[near], span, theta)
+        near = np.abs(f - at) <= max(FIT_BAND[0] * half, FIT_BAND[1] * line)
+        theta = _fit_mode(f[near], gain[near], span, theta)
     if (
         near.sum() < 5
         or not abs(f[top] - np.exp(theta[0]) / (2 * np.pi)) < max(width, 2 * line)
         or theta[1] > 0
     ):
         return None
-    which, others = np.arange(len(push)) * GROUPS // len(push), []
-    for group in range(GROUPS):
+    which, others = np.arange(len(push)) * N_GROUPS // len(push), []
+    for group in range(N_GROUPS):
         left_in = which != group
         part = cross[left_in][:, near].sum(axis=0) / own[left_in][:, near].sum(axis=0)
-        others.append(np.exp(_fitted(f[near], part, span, theta)))
+        others.append(np.exp(_fit_mode(f[near], part, span, theta)))
     scale = np.array([1 / (2 * np.pi), 1.0])
-    spread = np.sqrt((GROUPS - 1) * np.var(others, axis=0)) * stdtrit(GROUPS - 1, 0.975)
+    spread = np.sqrt((N_GROUPS - 1) * np.var(others, axis=0)) * stdtrit(N_GROUPS - 1, 0.975)
     return np.exp(theta) * scale, spread * scale
 
 
-def _fitted(f, gain, span: float, theta) -> np.ndarray:
-    """Return ln of (omega [rad/s], damping ratio) of the mode whose `blurred` response fits H1.
+def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
+    """Return ln of (omega [rad/s], damping ratio) of the mode whose `expected_response` response fits H1.
 
     A complex constant is fitted as well, for the other modes.
 
@@ -264,7 +267,7 @@ def _fitted(f, gain, span: float, theta) -> np.ndarray:
 
     def left(theta):
         """Return the residual of H1 after a linear fit of the columns, over its largest value."""
-        column = blurred(f, *np.exp(theta), span)
+        column = expected_response(f, *np.exp(theta), span)
         design = np.stack(
             [
                 np.concatenate([one.real, one.imag])
@@ -282,7 +285,7 @@ def _fitted(f, gain, span: float, theta) -> np.ndarray:
     ).x
 
 
-def blurred(f, omega: float, zeta: float, span: float) -> np.ndarray:
+def expected_response(f, omega: float, zeta: float, span: float) -> np.ndarray:
     """Return the expected H1 [s2] of a mode from segments with Hann's window, in closed form.
 
     int_0^span h(t) r(t) exp(-2 pi i f t) dt, where h is the response of x'' + 2 zeta omega x' +

@@ -124,7 +124,8 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
 def _finding_of(found: Finding, face) -> Finding:
     """Return the static measures of the patch of an interface, without numbers in their names."""
     numbered = {
-        name: found.measures.get(rows.of_number(name, face.number)) for name in patch_rows.TABLE
+        name: found.measures.get(rows.add_interface_number(name, face.number))
+        for name in patch_rows.TABLE
     }
     own = {name: measure for name, measure in numbered.items() if measure is not None}
     return Finding(face.model, own, face.patch)
@@ -295,7 +296,7 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
 
 
 def _main_cause(found: Finding, name: str) -> str:
-    """Return the largest part of the error of a measure, a kind of `response.coarser.left_open`."""
+    """Return the largest part of the error of a measure, a kind of `response.coarser.find_open_kinds`."""
     parts = found.extra.get("left_open")
     if parts is not None:
         return max(

@@ -204,7 +204,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
     for number, one in enumerate(model.rig.friction.interfaces if model.rig is not None else ()):
         if one.patch is not None:
             chain |= {
-                rows.of_number(name, number): link
+                rows.add_interface_number(name, number): link
                 for name, link in patch_plan.chain(one.patch).items()
                 if link != "rigid"
             }

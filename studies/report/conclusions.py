@@ -27,7 +27,7 @@ from figures_2_3 import STICK_SPEED, exact_cycle, newmark_run
 from told import told
 
 import patchfem as pf
-from patchfem.response.measures import harmonic
+from patchfem.response.measures import compute_harmonic
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
@@ -193,7 +193,7 @@ def eighth() -> Conclusion:
     window = block(5.0)[0].window
     weight = np.gradient(window.time)
     block_of, base = (
-        harmonic(window.time, weight, one, 2 * np.pi * 143)
+        compute_harmonic(window.time, weight, one, 2 * np.pi * 143)
         for one in (window.acceleration, window.base_acceleration)
     )
     lag = -np.degrees(np.angle(block_of / base))

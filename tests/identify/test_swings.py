@@ -6,7 +6,7 @@ import pytest
 from patchfem.core import PatchfemError
 from patchfem.identify.measured_modes import decay_curve
 from patchfem.identify.swings import half_swings
-from patchfem.response.decay_curve import curve_of
+from patchfem.response.decay_curve import compute_swing_curve
 
 
 def viscous(rng):
@@ -41,7 +41,9 @@ def covered(kind, seeds) -> np.ndarray:
     for seed in seeds:
         rng = np.random.default_rng(seed)
         t, y, frequency, ratio = kind(rng)
-        found = curve_of(half_swings(t, y + 10 ** rng.uniform(-4, -1.5) * rng.normal(size=t.size)))
+        found = compute_swing_curve(
+            half_swings(t, y + 10 ** rng.uniform(-4, -1.5) * rng.normal(size=t.size))
+        )
         out += zip(
             np.abs(found.frequency - frequency(found.amplitude)) <= found.frequency_error,
             np.abs(found.damping - ratio(found.amplitude)) <= found.damping_error,

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from patchfem.core import Response
-from patchfem.response.ends import end_error
+from patchfem.response.ends import estimate_window_error
 from patchfem.response.loops import drift
-from patchfem.response.run_events import slips_of
+from patchfem.response.run_events import slips_and_slides
 
 PERIOD, STEPS = 1.0, 4000
 
@@ -30,7 +30,7 @@ def read(w, cycles):
         "absolute_acceleration_peak": w.acceleration.max(),
         "friction_force_peak": np.abs(w.force).max(),
         "relative_displacement_amplitude": np.ptp(w.output) / 2,
-        "slip_amplitude": np.ptp(slips_of(w)[0]) / 2,
+        "slip_amplitude": np.ptp(slips_and_slides(w)[0]) / 2,
         "friction_work": float(np.trapezoid(w.force * w.slide_rate, w.time)),
     }
 
@@ -43,11 +43,11 @@ def test_exact_to_first_order_a_window_elsewhere(cycles, end):
     # the run begins where it began
     last = read(window(end + offset / STEPS, offset / STEPS), 1.0)["friction_work"]
     there["friction_work"] = here["friction_work"] + last
-    found = end_error(window(end, cycles), PERIOD, offset)
+    found = estimate_window_error(window(end, cycles), PERIOD, offset)
     for name, value in here.items():
         assert abs(there[name] - value) == pytest.approx(found[name], rel=0.05, abs=3e-7), name
     assert found["stick_fraction"] == pytest.approx(offset / (cycles * STEPS))
 
 
 def test_always_an_end_at_a_sample_leaves_nothing_open():
-    assert end_error(window(3.7, 3.0), PERIOD, 0.0) == {}
+    assert estimate_window_error(window(3.7, 3.0), PERIOD, 0.0) == {}

@@ -7,17 +7,17 @@ import pytest
 
 from patchfem import build, run
 from patchfem.response.errors import (
-    SAFETY,
-    change,
+    SAFETY_FACTOR,
+    absolute_change,
+    add_errors,
     coarser_errors,
     convergence_error,
     convergence_errors,
     merged_cell_errors,
-    orders,
+    observed_orders,
     step_errors,
-    with_errors,
 )
-from patchfem.response.rows import floor_of
+from patchfem.response.rows import error_floor
 from patchfem.runs.rig import march as rig_march
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
@@ -79,8 +79,8 @@ def coverage(count, seed, finest=12800):
             for n in (400, 200, 100, finest)
         }
         errors = step_errors(runs[400], runs[200], runs[100], steps=400)
-        truth = change(runs[400], runs[finest])
-        for name, measure in with_errors(runs[400], errors).items():
+        truth = absolute_change(runs[400], runs[finest])
+        for name, measure in add_errors(runs[400], errors).items():
             if name in truth and name != "energy_balance":
                 held.append(truth[name] <= measure.error + measure.floor)
     return float(np.mean(held))
@@ -101,7 +101,7 @@ def values_at(*steps, order, size=1e-3):
 def test_exact_a_sequence_of_known_order_has_its_error(order, size, count):
     """Three runs or more show the order, whatever the sign: the stated error is SAFETY times the true one."""
     runs = values_at(*2.0 ** np.arange(count), order=order, size=size)
-    assert convergence_errors(*runs)[NAME] == pytest.approx(SAFETY * abs(size), rel=1e-9)
+    assert convergence_errors(*runs)[NAME] == pytest.approx(SAFETY_FACTOR * abs(size), rel=1e-9)
 
 
 @pytest.mark.parametrize("order", [0.5, 0.8, 3.0, 4.0])
@@ -128,7 +128,7 @@ def test_exact_two_runs_take_the_order_that_is_declared(ratio, order):
     """The largest of several changes counts; a measure that a coarser run does not have gets no error."""
     fine, coarse = values_at(1.0, ratio, order=order)
     found = coarser_errors(fine | {"loop_area": 1.0}, coarse, fine, ratio=ratio, order=order)
-    assert found == {NAME: pytest.approx(SAFETY * 1e-3)}
+    assert found == {NAME: pytest.approx(SAFETY_FACTOR * 1e-3)}
 
 
 def test_exact_instants_of_events_are_of_first_order_in_the_cells_and_other_measures_of_second():
@@ -141,7 +141,7 @@ def test_exact_instants_of_events_are_of_first_order_in_the_cells_and_other_meas
 
 
 def test_exact_a_phase_is_compared_modulo_pi():
-    found = change({"slip_start_phase": 0.01}, {"slip_start_phase": np.pi - 0.01})
+    found = absolute_change({"slip_start_phase": 0.01}, {"slip_start_phase": np.pi - 0.01})
     assert found["slip_start_phase"] == pytest.approx(0.02)
 
 
@@ -193,7 +193,10 @@ def test_exact_a_small_drive_is_met_as_a_large_one():
     assert other.floor == 1e-10 and one.floor == pytest.approx(
         1e-5 * 5e-9 * 9.80665 / (2 * np.pi * 120) ** 2, rel=1e-12
     )
-    assert floor_of(NAME, 0.0) == floor_of(NAME) == 1e-10 and floor_of("loop_area", 1e-12) == 1e-10
+    assert (
+        error_floor(NAME, 0.0) == error_floor(NAME) == 1e-10
+        and error_floor("loop_area", 1e-12) == 1e-10
+    )
 
 
 def test_exact_errors_depend_on_the_kind_of_measure():
@@ -201,14 +204,14 @@ def test_exact_errors_depend_on_the_kind_of_measure():
     for its error; a drift is a difference of means with digits of the amplitude."""
     values = {NAME: 2e-3, "slip_start_phase": 3.0, "energy_balance": 4e-9, "drift_per_cycle": 1e-12}
     parts = {NAME: 1e-6, "slip_start_phase": 1.8, "energy_balance": 1e-10, "drift_per_cycle": 1e-15}
-    found = {name: one.error for name, one in with_errors(values, parts, least=1e-9).items()}
+    found = {name: one.error for name, one in add_errors(values, parts, least=1e-9).items()}
     assert found == {
         NAME: pytest.approx(1e-6 + 2e-12, rel=1e-12),
         "slip_start_phase": np.pi / 2,
         "energy_balance": 4e-9,
         "drift_per_cycle": pytest.approx(1e-15 + 1e-9 * 2e-3 + 1e-21, rel=1e-9),
     }
-    least = with_errors(values, parts)["drift_per_cycle"].error
+    least = add_errors(values, parts)["drift_per_cycle"].error
     assert least == pytest.approx(1e-15 + 1e-13 * 2e-3, rel=1e-9)
 
 
@@ -225,7 +228,7 @@ def test_exact_orders_are_those_that_the_changes_show():
             "slow": h**0.3,
         }
 
-    found = orders(at(1.0), at(2.0), at(4.0))
+    found = observed_orders(at(1.0), at(2.0), at(4.0))
     assert found == {
         "one": pytest.approx(1.0),
         "two": pytest.approx(2.0),

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.response import events
-from patchfem.response.events import Events, detected, states, sticks
-from patchfem.response.run_events import of_a_cycle
+from patchfem.response.events import Events, compute_slip_states, detect_events, find_sticks
+from patchfem.response.run_events import select_last_cycle
 
 
 def stick_slip(period=1.0, cycles=3, steps=800, rest=0.25):
@@ -22,7 +22,7 @@ def stick_slip(period=1.0, cycles=3, steps=800, rest=0.25):
 def test_exact_stops_and_releases_of_a_known_motion():
     """Speed sin(pi t/half): it passes 1e-2 of its peak asin(0.01)/pi of the stroke from either end."""
     time, slip = stick_slip()
-    found = detected(time, slip[:, None], 2 * slip[:, None], 1.0)
+    found = detect_events(time, slip[:, None], 2 * slip[:, None], 1.0)
     early = 0.25 * np.arcsin(0.01) / np.pi
     wanted = [
         t
@@ -40,7 +40,7 @@ def test_exact_stops_and_releases_of_a_known_motion():
 def test_exact_reversals_without_a_stop():
     """A sine sampled so coarsely that no sample falls into its slow parts."""
     time = np.linspace(0, 4, 4 * 20 + 1) + 0.01
-    found = detected(
+    found = detect_events(
         time, np.sin(2 * np.pi * time)[:, None], np.sin(2 * np.pi * time)[:, None], 1.0
     )
     assert found.kind.tolist() == [events.REVERSAL_DOWN, events.REVERSAL_UP] * 4
@@ -49,19 +49,19 @@ def test_exact_reversals_without_a_stop():
 
 def test_exact_a_slip_below_the_bound_is_no_event():
     time, slip = stick_slip()
-    assert detected(time, 1e-9 * slip[:, None], slip[:, None], 1.0, held=1e-8).time.size == 0
-    assert detected(time, 0 * slip[:, None], slip[:, None], 1.0).time.size == 0
+    assert detect_events(time, 1e-9 * slip[:, None], slip[:, None], 1.0, held=1e-8).time.size == 0
+    assert detect_events(time, 0 * slip[:, None], slip[:, None], 1.0).time.size == 0
 
 
 @given(st.floats(0.05, 0.4), st.floats(0, 1.3), st.floats(1.6, 3))
 def test_always_the_sticks_and_the_time_of_slip_fill_the_window(rest, begin, end):
     time, slip = stick_slip(rest=rest)
-    found = detected(time, slip[:, None], slip[:, None], 1.0)
-    spans = sticks(found, begin, end, [True])
+    found = detect_events(time, slip[:, None], slip[:, None], 1.0)
+    spans = find_sticks(found, begin, end, [True])
     held = sum(b - a for a, b in spans)
     middle = (time[1:] + time[:-1]) / 2
     inside = np.clip(np.minimum(time[1:], end) - np.maximum(time[:-1], begin), 0, None)
-    plain = inside[(states(time, slip, 1.0)[1] == 0) & (middle > 0)].sum()
+    plain = inside[(compute_slip_states(time, slip, 1.0)[1] == 0) & (middle > 0)].sum()
     assert held == pytest.approx(plain, abs=8 / 800)
     assert all(b > a for a, b in spans)
 
@@ -77,7 +77,7 @@ def test_exact_sticks_are_cut_where_another_interface_changes():
         (9.5, 1, events.STOP),
     ]
     found = Events(*(np.array(column) for column in zip(*rows)), np.zeros(6), 6)
-    assert sticks(found, 0.0, 9.2, [True, True]) == [(2.0, 6.0), (7.0, 9.0)]
+    assert find_sticks(found, 0.0, 9.2, [True, True]) == [(2.0, 6.0), (7.0, 9.0)]
 
 
 def test_exact_sticks_of_one_cycle_are_whole():
@@ -92,5 +92,7 @@ def test_exact_sticks_of_one_cycle_are_whole():
         (2.4, 2.7),
         (2.9, 3.0),
     ]
-    assert of_a_cycle(sticks_of_all, 3.0, 1.0) == [(1.4, 1.7), (1.9, 2.2)]
-    assert of_a_cycle([(0.0, 3.0)], 3.0, 1.0) == of_a_cycle([(1.5, 3.0)], 3.0, 1.0) == []
+    assert select_last_cycle(sticks_of_all, 3.0, 1.0) == [(1.4, 1.7), (1.9, 2.2)]
+    assert (
+        select_last_cycle([(0.0, 3.0)], 3.0, 1.0) == select_last_cycle([(1.5, 3.0)], 3.0, 1.0) == []
+    )

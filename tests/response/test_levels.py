@@ -5,7 +5,14 @@ import pytest
 from scene_texts import MODE, POINT
 
 from patchfem.core import G_N
-from patchfem.response.levels import JUMP, Level, bracket, hysteresis, jump, past_onset
+from patchfem.response.levels import (
+    MIN_JUMP_FACTOR,
+    Level,
+    bracket_onset,
+    largest_hysteresis,
+    largest_jump,
+    make_onset_test,
+)
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -47,17 +54,17 @@ def test_exact_bracket_jump_and_hysteresis_of_a_table():
         level(5, 1.5, error=0.2),
         level(4, 0.4),
     ]
-    slips = past_onset("slip")
-    assert bracket(table, slips) == (1, 2)
-    assert bracket(table[2:], slips) == (-1, 0)
-    assert bracket(table[:2], slips) is None
-    assert bracket([level(4, 0, True), level(3, 0, True), level(3, 1.0)], slips) is None
-    assert bracket(table, past_onset("gauge", 2.0)) == (2, 3)
-    assert jump(table) == (6, pytest.approx(6 * 5 / 6), 1)
+    slips = make_onset_test("slip")
+    assert bracket_onset(table, slips) == (1, 2)
+    assert bracket_onset(table[2:], slips) == (-1, 0)
+    assert bracket_onset(table[:2], slips) is None
+    assert bracket_onset([level(4, 0, True), level(3, 0, True), level(3, 1.0)], slips) is None
+    assert bracket_onset(table, make_onset_test("gauge", 2.0)) == (2, 3)
+    assert largest_jump(table) == (6, pytest.approx(6 * 5 / 6), 1)
     # not the widest of the table
-    assert jump([level(1, 1.0), level(4, 4.1), level(4.5, 9.0)])[2] == 0.5
-    assert hysteresis(table) == (pytest.approx(0.5), pytest.approx(0.2))
-    assert hysteresis(table[:4]) is None and jump(table[:2]) is None
+    assert largest_jump([level(1, 1.0), level(4, 4.1), level(4.5, 9.0)])[2] == 0.5
+    assert largest_hysteresis(table) == (pytest.approx(0.5), pytest.approx(0.2))
+    assert largest_hysteresis(table[:4]) is None and largest_jump(table[:2]) is None
 
 
 def measured(law, levels, method="", cycles=30):
@@ -87,7 +94,8 @@ def test_exact_no_onset_where_every_level_holds():
         and found["onset_level"].reason == "no level of the rising sequence slips"
     )
     assert (
-        found["jump_level"].value is None and f"below {JUMP:g} times" in found["jump_level"].reason
+        found["jump_level"].value is None
+        and f"below {MIN_JUMP_FACTOR:g} times" in found["jump_level"].reason
     )
 
 

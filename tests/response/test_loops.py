@@ -11,7 +11,7 @@ from scene_texts import COULOMB, DRIVE, MODE, POINT
 
 from patchfem import run
 from patchfem.response import loops
-from patchfem.response.measures import harmonic
+from patchfem.response.measures import compute_harmonic
 
 OMEGA = 2 * pi * 143
 PERIOD = 2 * pi / OMEGA
@@ -43,7 +43,9 @@ def coefficients(time, slide, force):
     """First Fourier coefficients of slide and force by the trapezium rule."""
     weight = np.full(time.size, 1.0)
     weight[[0, -1]] = 0.5
-    return harmonic(time, weight, slide - slide.mean(), OMEGA), harmonic(time, weight, force, OMEGA)
+    return compute_harmonic(time, weight, slide - slide.mean(), OMEGA), compute_harmonic(
+        time, weight, force, OMEGA
+    )
 
 
 # stiffness and damping
@@ -67,10 +69,10 @@ def test_exact_loop_of_a_jenkins_element(amplitude, length):
     work = np.sum((f[1:] + f[:-1]) / 2 * np.diff(q))
     area, _ = friction_forms.jenkins_loop(amplitude, length)
     assert work == pytest.approx(float(area), rel=1e-6, abs=1e-12)
-    turns = loops.turns_of(t, q, v, f, PERIOD)
-    assert loops.half_range(turns) == pytest.approx(amplitude, rel=1e-12)
+    turns = loops.find_reversals(t, q, v, f, PERIOD)
+    assert loops.mean_half_range(turns) == pytest.approx(amplitude, rel=1e-12)
     assert loops.secant_stiffness(turns) == pytest.approx(1 / max(amplitude, length), rel=1e-9)
-    found = loops.interface_loop(loops.half_range(turns), *coefficients(t, q, f), work, 0.5)
+    found = loops.interface_loop(loops.mean_half_range(turns), *coefficients(t, q, f), work, 0.5)
     turn = acos(1 - 2 * length / amplitude) if amplitude > length else pi
     stiffness = (turn - sin(2 * turn) / 2) / (pi * length)
     assert found["loop_area"] == work
@@ -87,10 +89,10 @@ def test_always_loop_stiffness_ignores_offset_and_phase(amplitude, offset, slope
     force = slope * (slide - offset) + 0.3 * np.cos(phase + shift) + 0.1 * np.cos(3 * phase)
     found = loops.interface_loop(np.ptp(slide) / 2, *coefficients(time, slide, force), 1.0, 0.0)
     assert found["equivalent_stiffness"] == pytest.approx(slope, abs=1e-10)
-    turns = loops.turns_of(
+    turns = loops.find_reversals(
         time, slide, amplitude * OMEGA * np.cos(phase + shift), slope * (slide - offset), PERIOD
     )
-    assert loops.half_range(turns) == pytest.approx(amplitude, rel=1e-7)
+    assert loops.mean_half_range(turns) == pytest.approx(amplitude, rel=1e-7)
     # the force is straight between samples: (pi/128)^2/2 of it at the top
     assert loops.secant_stiffness(turns) == pytest.approx(slope, abs=1e-3)
 
@@ -100,9 +102,11 @@ def test_order_range_between_the_samples():
     errors = []
     for steps in (20, 40, 80):
         phase = 2 * pi * (np.arange(3 * steps + 1) + 0.35) / steps
-        turns = loops.turns_of(phase / OMEGA, np.sin(phase), OMEGA * np.cos(phase), phase, PERIOD)
+        turns = loops.find_reversals(
+            phase / OMEGA, np.sin(phase), OMEGA * np.cos(phase), phase, PERIOD
+        )
         assert len(turns) == 3
-        errors.append(abs(loops.half_range(turns) - 1))
+        errors.append(abs(loops.mean_half_range(turns) - 1))
     assert (
         np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.1)
         and errors[-1] < 1e-7
@@ -119,11 +123,13 @@ def test_exact_secant_where_the_force_jumps(rest, fall):
     way = 1 - 2 * (turn % 2)
     slide = -way * np.cos(np.clip(part * pi / (pi - rest), 0, pi))
     force = np.where(part < pi - rest, way * np.where(part < pi / 2, 1.0, 1 - fall), way * 0.123)
-    turns = loops.turns_of(phase / OMEGA, slide, np.zeros(phase.size), force, PERIOD, "jumps")
-    assert loops.secant_stiffness(turns) * loops.half_range(turns) == pytest.approx(
+    turns = loops.find_reversals(phase / OMEGA, slide, np.zeros(phase.size), force, PERIOD, "jumps")
+    assert loops.secant_stiffness(turns) * loops.mean_half_range(turns) == pytest.approx(
         -fall / 2, abs=1e-12
     )
-    assert loops.half_range(turns) == pytest.approx(1.0, abs=2e-4)  # samples alone, without rates
+    assert loops.mean_half_range(turns) == pytest.approx(
+        1.0, abs=2e-4
+    )  # samples alone, without rates
 
 
 @pytest.mark.parametrize("early", [0.05, 0.3, 0.5, 0.8])
@@ -135,20 +141,25 @@ def test_exact_secant_of_a_reversal_that_no_step_resolves(length, early):
     slide, force = np.sin(phase), np.zeros(phase.size)
     for k in range(1, phase.size):
         force[k] = np.clip(force[k - 1] + (slide[k] - slide[k - 1]) / length, -1, 1)
-    turns = loops.turns_of(phase / OMEGA, slide, OMEGA * np.cos(phase), force, PERIOD, "slide")
+    turns = loops.find_reversals(
+        phase / OMEGA, slide, OMEGA * np.cos(phase), force, PERIOD, "slide"
+    )
     assert loops.secant_stiffness(turns) == pytest.approx(1 / max(1.0, length), rel=1e-6)
 
 
 def test_always_no_secant_without_slide_or_sides():
     time = np.linspace(0, PERIOD, 9)
     zero, force = np.zeros(9), np.arange(9.0)
-    assert loops.secant_stiffness(loops.turns_of(time, zero, zero, force, PERIOD, "jumps")) is None
+    assert (
+        loops.secant_stiffness(loops.find_reversals(time, zero, zero, force, PERIOD, "jumps"))
+        is None
+    )
     # both ends of the window are its turns
-    up = loops.turns_of(time, time, 1 + zero, force, PERIOD, "jumps")
+    up = loops.find_reversals(time, time, 1 + zero, force, PERIOD, "jumps")
     assert up[0][1].force is None and loops.secant_stiffness(up) is None
     assert (
-        loops.turns_of(time[:5], zero[:5], zero[:5], force[:5], PERIOD) == []
-        and loops.half_range([]) == 0.0
+        loops.find_reversals(time[:5], zero[:5], zero[:5], force[:5], PERIOD) == []
+        and loops.mean_half_range([]) == 0.0
     )
 
 
@@ -219,7 +230,7 @@ def test_exact_no_secant_of_a_force_that_is_zero_where_the_slide_turns(border, s
     wave = np.exp(-decay * time)
     slide = 1e-5 * wave * np.cos(OMEGA * time)
     rate = -1e-5 * wave * (decay * np.cos(OMEGA * time) + OMEGA * np.sin(OMEGA * time))
-    turns = loops.turns_of(time, slide, rate, np.tanh(rate / 1e-4), PERIOD)
+    turns = loops.find_reversals(time, slide, rate, np.tanh(rate / 1e-4), PERIOD)
     # the range is that of the cycle all the same
     assert turns[0][1].slide == pytest.approx(slide[0], rel=1e-12)
     found = loops.secant_stiffness(turns)
@@ -236,15 +247,15 @@ def test_exact_force_of_a_turn_between_a_border_and_the_sample_beyond_it(decay, 
     wave = np.exp(-decay * time)
     slide = wave * np.cos(angle)
     rate = -wave * (decay * np.cos(angle) + 2 * pi * np.sin(angle))
-    middle = loops.turns_of(time, slide, rate, 3 * rate, 1.0)[1][1]
+    middle = loops.find_reversals(time, slide, rate, 3 * rate, 1.0)[1][1]
     border = 100 if decay > 0 else 200
     assert middle.slide == pytest.approx(slide[border], rel=1e-12)
     assert abs(3 * rate[border]) > 0.1 and abs(middle.force) < 1e-12
     # the turn is the border itself, and its rate all but 0
     rests = np.where(np.arange(401) == border, 0.0, rate)
     assert (
-        loops.turns_of(time, slide, rests + 1e-11 * (np.arange(401) == border), 7 + 0 * rate, 1.0)[
-            1
-        ][1].force
+        loops.find_reversals(
+            time, slide, rests + 1e-11 * (np.arange(401) == border), 7 + 0 * rate, 1.0
+        )[1][1].force
         == 7
     )

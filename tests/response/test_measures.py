@@ -59,7 +59,7 @@ def test_exact_slip_with_pauses(floor):
         full = 2 * cos(start) - floor * (pi - 2 * start)
         return np.where(turn % 2 == 0, one, full - one)
 
-    found = measures.slip_measures(
+    found = measures.compute_slip_measures(
         response(time, slip=stroke(OMEGA * time), slide=-np.cos(OMEGA * time)), DRIVE, steps
     )
     level = asin(2 * floor)
@@ -70,15 +70,17 @@ def test_exact_slip_with_pauses(floor):
 
 def test_exact_slip_of_a_resting_and_of_a_sliding_interface():
     time, _ = cycles_of(2, 100)
-    still = measures.slip_measures(response(time), DRIVE, 100)
+    still = measures.compute_slip_measures(response(time), DRIVE, 100)
     assert still == {"slip_amplitude": 0.0, "stick_fraction": 1.0}
-    steady = measures.slip_measures(response(time, slip=1e-3 * time, slide=2e-3 * time), DRIVE, 100)
+    steady = measures.compute_slip_measures(
+        response(time, slip=1e-3 * time, slide=2e-3 * time), DRIVE, 100
+    )
     assert steady["stick_fraction"] == 0.0 and "slip_start_phase" not in steady
 
 
 @given(st.floats(0, pi), st.floats(0, 0.22))
 def test_always_one_phase_of_starts_that_agree(middle, spread):
-    found = measures.slip_start(
+    found = measures.slip_start_measure(
         np.array([middle - spread, middle + spread, middle + pi, middle - 3 * pi])
     )
     found = found["slip_start_phase"]
@@ -88,7 +90,7 @@ def test_always_one_phase_of_starts_that_agree(middle, spread):
 
 @pytest.mark.parametrize("degrees", [[18, 51, 141, 170], [10, 60], []])
 def test_refuses_the_mean_of_several_slips_per_half_cycle(degrees):
-    assert measures.slip_start(np.radians(np.array(degrees, float))) == {}
+    assert measures.slip_start_measure(np.radians(np.array(degrees, float))) == {}
 
 
 # peaks
@@ -101,7 +103,9 @@ def test_order_acceleration_peak_between_samples(shift):
     for count in steps:
         time, phase = cycles_of(2, count)
         top = (7 + shift) * 2 * pi / count
-        found = measures.acceleration_peak(response(time, acceleration=-7 * np.cos(phase - top)))
+        found = measures.compute_acceleration_peak(
+            response(time, acceleration=-7 * np.cos(phase - top))
+        )
         errors.append(abs(found / 7 - 1))
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.1)
     assert errors[-1] < (2 * pi / steps[-1]) ** 4 / 30
@@ -110,17 +114,17 @@ def test_order_acceleration_peak_between_samples(shift):
 def test_exact_acceleration_peak_of_a_parabola_and_of_a_jump():
     time = np.linspace(0, 1, 21)
     round_top = response(time, acceleration=40 - 3 * (time - 0.513) ** 2)
-    assert measures.acceleration_peak(round_top) == pytest.approx(40.0, rel=1e-14)
+    assert measures.compute_acceleration_peak(round_top) == pytest.approx(40.0, rel=1e-14)
     jump = response(time, acceleration=np.where(time < 0.5, time, -0.2))
-    assert measures.acceleration_peak(jump) == pytest.approx(0.45, rel=0.01)
+    assert measures.compute_acceleration_peak(jump) == pytest.approx(0.45, rel=0.01)
     # its parabola rises by .07
     small = response(time, acceleration=40 + np.where(time < 0.52, time, time - 0.9))
-    assert measures.acceleration_peak(small) == 40.5
+    assert measures.compute_acceleration_peak(small) == 40.5
     # a step on the slope
-    assert measures.peaks_between(small)["absolute_acceleration_peak"] == pytest.approx(0.05)
-    assert measures.peaks_between(round_top) == {}
+    assert measures.peak_sampling_errors(small)["absolute_acceleration_peak"] == pytest.approx(0.05)
+    assert measures.peak_sampling_errors(round_top) == {}
     edge = response(time, acceleration=time)
-    assert measures.acceleration_peak(edge) == 1.0
+    assert measures.compute_acceleration_peak(edge) == 1.0
 
 
 def test_exact_window_amplitudes():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import Response, SineDrive
-from patchfem.response.spectrum import READINGS, reading
+from patchfem.response.spectrum import READINGS, read_instrument
 
 OMEGA = 2 * np.pi * 143
 
@@ -30,10 +30,12 @@ def test_exact_readings_of_known_harmonics(moving):
     drive = SineDrive(30.0, OMEGA, moving)
     window, total = motion(drive)
     peak = float(np.abs(window.acceleration).max())
-    assert reading(window, drive, peak) == peak
-    assert reading(window, drive, peak, "fundamental") == pytest.approx(abs(total[1]), rel=1e-9)
+    assert read_instrument(window, drive, peak) == peak
+    assert read_instrument(window, drive, peak, "fundamental") == pytest.approx(
+        abs(total[1]), rel=1e-9
+    )
     effective = np.sqrt(sum(abs(c) ** 2 for c in total.values()) / 2)
-    assert reading(window, drive, peak, "rms") == pytest.approx(effective, rel=1e-9)
+    assert read_instrument(window, drive, peak, "rms") == pytest.approx(effective, rel=1e-9)
     fine = np.linspace(0, 2 * np.pi / OMEGA, 100001)
     for cutoff in (200.0, 600.0):
         passed = 0
@@ -42,7 +44,7 @@ def test_exact_readings_of_known_harmonics(moving):
             passed = (
                 passed + (c / (1 + np.sqrt(2) * s + s * s) * np.exp(1j * n * OMEGA * fine)).real
             )
-        assert reading(window, drive, peak, "lowpass", cutoff) == pytest.approx(
+        assert read_instrument(window, drive, peak, "lowpass", cutoff) == pytest.approx(
             np.abs(passed).max(), rel=2e-5
         )
 
@@ -51,10 +53,10 @@ def test_always_a_high_cutoff_passes_everything():
     drive = SineDrive(30.0, OMEGA)
     window, _ = motion(drive)
     peak = float(np.abs(window.acceleration).max())
-    assert reading(window, drive, peak, "lowpass", 1e6) == pytest.approx(peak, rel=1e-3)
+    assert read_instrument(window, drive, peak, "lowpass", 1e6) == pytest.approx(peak, rel=1e-3)
 
 
 def test_refuses_a_reading_that_is_none():
     drive = SineDrive(30.0, OMEGA)
     with pytest.raises(ValueError, match=", ".join(READINGS)):
-        reading(motion(drive)[0], drive, 1.0, "mean")
+        read_instrument(motion(drive)[0], drive, 1.0, "mean")

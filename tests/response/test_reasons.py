@@ -8,7 +8,13 @@ import pytest
 from patchfem import run
 from patchfem.core import DriveSegment, Measure
 from patchfem.response.events import RELEASE_UP
-from patchfem.response.reasons import APERIODIC, STILL, STOPS, UNCLOSED, unclosed
+from patchfem.response.reasons import (
+    APERIODIC,
+    OUTPUT_AT_REST,
+    STICKS_AT_REVERSAL,
+    UNCLOSED,
+    find_missing_loops,
+)
 
 FREE = SimpleNamespace(segments=(DriveSegment(0.0),), period=0.1)
 RELEASED = """[normal]
@@ -52,7 +58,7 @@ def seen(stored: float, lost: float) -> SimpleNamespace:
 )  # the floor is 1e-10 J a cycle
 def test_exact_a_loop_closes_that_stores_no_more_than_it_dissipates(stored, lost, open_):
     area = Measure((stored + lost) / 2, "J", 0.0, 1e-10)
-    found = unclosed({"loop_area": area}, seen(stored, lost), FREE)
+    found = find_missing_loops({"loop_area": area}, seen(stored, lost), FREE)
     assert set(found) == ({"loop_area"} if open_ else set())
     if open_:
         one = found["loop_area"]
@@ -78,7 +84,7 @@ def test_exact_one_of_several_loops_does_not_close_where_it_gives_back_more_than
         "loop_area": Measure(2e-6, "J", 0.0, 1e-10),
         "loop_area_2": Measure(second, "J", 2e-8, 1e-10),
     }
-    assert set(unclosed(loops, window, FREE)) == ({"loop_area_2"} if opened else set())
+    assert set(find_missing_loops(loops, window, FREE)) == ({"loop_area_2"} if opened else set())
 
 
 def measures(text: str):
@@ -108,7 +114,7 @@ def test_exact_no_distortion_of_an_output_that_stands_still(force, there):
         found[name] for name in ("absolute_acceleration_fundamental", "acceleration_distortion")
     )
     assert (ratio.value is not None) == there == (first.value > first.floor)
-    assert ratio.reason == ("" if there else STILL)
+    assert ratio.reason == ("" if there else OUTPUT_AT_REST)
 
 
 @pytest.mark.parametrize(("start", "cycles"), [("20 um", 15), ("20 um", 15.3)])
@@ -164,4 +170,8 @@ def test_exact_no_secant_where_rigid_friction_sticks_at_the_largest_slide(kineti
     found = run(text).measures
     secant = found["secant_stiffness"]
     assert (found["stick_fraction"].value == 0) == there == (secant.value is not None)
-    assert secant.value == pytest.approx(0.0, abs=1e-3) if there else secant.reason == STOPS
+    assert (
+        secant.value == pytest.approx(0.0, abs=1e-3)
+        if there
+        else secant.reason == STICKS_AT_REVERSAL
+    )

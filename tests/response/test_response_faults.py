@@ -6,8 +6,8 @@ import pytest
 from patchfem.core import Outcome, Response
 from patchfem.friction.laws.lugre import LuGre
 from patchfem.response import settling
-from patchfem.response.inside_steps import PARTS, divide_steps, motion_inside_steps
-from patchfem.response.measures import step_harmonic
+from patchfem.response.inside_steps import N_STEP_PARTS, divide_steps, motion_inside_steps
+from patchfem.response.measures import compute_step_harmonic
 
 
 @pytest.mark.parametrize(
@@ -20,7 +20,7 @@ def test_exact_even_growth_counts_from_a_twentieth_of_the_tolerance(change, outc
 
 def test_exact_first_harmonic_of_a_square_wave_with_uneven_samples():
     time = np.array([0.0, 0.1, 0.5, 0.8, 1.0])
-    force = step_harmonic(time, np.array([3.0, 3.0, -3.0, -3.0]), 2 * np.pi)
+    force = compute_step_harmonic(time, np.array([3.0, 3.0, -3.0, -3.0]), 2 * np.pi)
     assert force == pytest.approx(-12j / np.pi, rel=1e-14)
 
 
@@ -28,7 +28,7 @@ def test_exact_a_cubic_motion_is_followed_inside_its_steps():
     motion = np.polynomial.Polynomial([0.2, 1.5, 0.7, 0.3])
     time = np.array([0.0, 0.4, 1.1, 1.3])
     steps = divide_steps(time, motion(time), motion.deriv()(time))
-    assert steps.time.shape == (3, PARTS)
+    assert steps.time.shape == (3, N_STEP_PARTS)
     np.testing.assert_allclose(steps.slide, motion(steps.time), rtol=1e-14)
     np.testing.assert_allclose(steps.speed, motion.deriv()(steps.time), rtol=1e-13)
 
@@ -46,7 +46,7 @@ def test_exact_force_of_lugre_inside_a_step_at_constant_speed():
         slip=none,
     )  # fmt: skip
     inside = motion_inside_steps(window, law, load)
-    assert inside.time.size == 2 * PARTS + 1
+    assert inside.time.size == 2 * N_STEP_PARTS + 1
     limit = 0.4 + 0.2 * np.exp(-0.25)
     fraction = np.exp(-speed * inside.time * law.stiffness / limit)
     np.testing.assert_allclose(inside.slide - inside.slip, limit / 2e5 * (1 - fraction), rtol=1e-9)

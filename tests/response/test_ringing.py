@@ -8,7 +8,7 @@ from scene_texts import KILOGRAM
 
 from patchfem import load
 from patchfem.compiled.no_jit import plain
-from patchfem.response.ringing import ring, ringing
+from patchfem.response.ringing import fit_ring, measure_ringing
 from patchfem.runs.run import run
 
 RELEASE = (
@@ -68,15 +68,15 @@ def test_exact_the_basis_of_nearly_equal_sinusoids_is_orthonormal():
     kernels = plain("patchfem.response.ringing_kernels")
     columns, basis, corner = np.zeros((6, 200)), np.zeros((6, 200)), np.zeros((6, 6))
     poles = 50.0 * np.array([1, 0.02, 1 + 1e-5, 0.02, 1 + 2e-5, 0.02])
-    kernels.waves(np.linspace(0, 1, 200), poles, columns, 0)
-    kernels.orthonormal(columns, 6, basis, corner)
+    kernels.fill_sinusoids(np.linspace(0, 1, 200), poles, columns, 0)
+    kernels.factor_qr(columns, 6, basis, corner)
     np.testing.assert_allclose(basis @ basis.T, np.eye(6), rtol=0, atol=1e-14)
     np.testing.assert_allclose(corner.T @ basis, columns, rtol=0, atol=1e-14)
 
 
 def test_exact_a_ring_beside_a_forced_sine():
     t = np.linspace(0, 0.6, 241)
-    found = ring(t + 5.0, signal(t, 3.0, 2 * np.pi * 9, 0.02), 3.0)
+    found = fit_ring(t + 5.0, signal(t, 3.0, 2 * np.pi * 9, 0.02), 3.0)
     assert found.frequency == pytest.approx(9, rel=1e-9) and found.damping == pytest.approx(
         0.02, rel=1e-7
     )
@@ -91,7 +91,7 @@ def test_always_a_ring_of_more_than_one_and_a_half_periods_is_found(
 ):
     t = np.linspace(0, 1.0, 301)
     own = 2 * np.pi * periods
-    found = ring(t, signal(t, omega, own, zeta, size, phase), omega)
+    found = fit_ring(t, signal(t, omega, own, zeta, size, phase), omega)
     assert found.frequency == pytest.approx(periods, rel=1e-6) and found.damping == pytest.approx(
         zeta, abs=1e-6
     )
@@ -100,14 +100,14 @@ def test_always_a_ring_of_more_than_one_and_a_half_periods_is_found(
 def test_exact_the_stronger_of_two_rings():
     t = np.linspace(0, 1.0, 501)
     both = signal(t, 3.0, 2 * np.pi * 12, 0.02) + signal(t, 3.0, 2 * np.pi * 31, 0.01, 0.3)
-    assert ring(t, both, 3.0).frequency == pytest.approx(12, rel=1e-6)
+    assert fit_ring(t, both, 3.0).frequency == pytest.approx(12, rel=1e-6)
 
 
 def test_exact_the_error_holds_under_noise():
     """Forty rings in noise of 1 %: the error bars hold the truth in 19 of 20, and are not idle."""
     source, t, held, wide = np.random.default_rng(7), np.linspace(0, 1.0, 301), 0, []
     for _ in range(40):
-        found = ring(
+        found = fit_ring(
             t, signal(t, 3.0, 2 * np.pi * 7, 0.01) + 0.01 * source.normal(size=t.size), 3.0
         )
         held += abs(found.frequency - 7) <= found.errors[0]
@@ -128,7 +128,7 @@ def test_exact_the_error_holds_under_noise():
 def test_exact_nothing_rings(own, zeta, size):
     """A forced sine alone, too few periods, a decay that hardly swings, a last digit, too few samples."""
     t = np.linspace(0, 1.0, 301)
-    assert ring(t, signal(t, 2 * np.pi * 3, own, zeta, size), 2 * np.pi * 3) is None
+    assert fit_ring(t, signal(t, 2 * np.pi * 3, own, zeta, size), 2 * np.pi * 3) is None
 
 
 def test_exact_the_median_over_sticks_outvotes_a_stray_one():
@@ -137,12 +137,12 @@ def test_exact_the_median_over_sticks_outvotes_a_stray_one():
         parts.append(signal(t, 3.0, 2 * np.pi * own, 0.02))
         spans.append((2.0 * k, 2.0 * k + 1))
     time = np.concatenate([t + 2.0 * k for k in range(5)])
-    values, errors = ringing(time, np.concatenate(parts), spans, 3.0)
+    values, errors = measure_ringing(time, np.concatenate(parts), spans, 3.0)
     assert (
         values["ring_frequency"] == pytest.approx(9.0, abs=1e-6)
         and 1e-4 < errors["ring_frequency"] < 0.1
     )
-    assert ringing(time, np.concatenate(parts), [], 3.0) == ({}, {})
+    assert measure_ringing(time, np.concatenate(parts), [], 3.0) == ({}, {})
 
 
 @pytest.mark.share(0, 3)

@@ -9,7 +9,7 @@ import patchfem as pf
 from patchfem.core import Outcome
 from patchfem.response import settling
 from patchfem.response.outcome import UNSETTLED
-from patchfem.response.reasons import UNSEEN
+from patchfem.response.reasons import CHANGE_NOT_RESOLVED
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -18,8 +18,8 @@ from patchfem.scene.scene import loads
 def test_exact_geometric_tail_is_extrapolated(ratio):
     a = 2.0 - 0.9 * ratio ** np.arange(6)
     assert settling.classify(a, 1e-6) is Outcome.TRANSIENT
-    assert a[-1] + settling.tail(a[-3:]) == pytest.approx(2.0, rel=1e-9)
-    steady, error = settling.steady_amplitude(a, a * np.exp(0.7j))
+    assert a[-1] + settling.geometric_remainder(a[-3:]) == pytest.approx(2.0, rel=1e-9)
+    steady, error = settling.extrapolate_steady_amplitude(a, a * np.exp(0.7j))
     assert steady == pytest.approx(2.0, rel=1e-9) and error < 1e-6
 
 
@@ -27,17 +27,17 @@ def test_exact_geometric_tail_is_extrapolated(ratio):
 def test_exact_a_beat_is_extrapolated_by_its_complex_factor(turn):
     """A free motion beside the drive: the amplitudes swing about the steady one, the phasors close in on it."""
     p = 2.0 - 1.1 * (0.9 * np.exp(1j * turn)) ** np.arange(9)
-    steady, error = settling.steady_amplitude(np.abs(p), p)
+    steady, error = settling.extrapolate_steady_amplitude(np.abs(p), p)
     assert steady == pytest.approx(2.0, rel=1e-9) and error < 1e-6
 
 
 def test_exact_two_decays_are_bracketed_by_the_error():
     n = np.arange(12)
     a = 1.0 + 0.3 * 0.8**n + 0.1 * 0.4**n
-    steady, error = settling.steady_amplitude(a, a)
+    steady, error = settling.extrapolate_steady_amplitude(a, a)
     assert 0 < abs(steady - 1.0) < error
     # too early to tell the decays apart
-    assert settling.steady_amplitude(a[:6], a[:6]) == (
+    assert settling.extrapolate_steady_amplitude(a[:6], a[:6]) == (
         None,
         None,
     )
@@ -45,8 +45,8 @@ def test_exact_two_decays_are_bracketed_by_the_error():
 
 def test_always_no_estimate_without_a_shrinking_change():
     a = 1 + 0.1 * np.arange(8)
-    assert settling.steady_amplitude(a, a) == (None, None)
-    assert settling.steady_amplitude(a[:3], a[:3]) == (None, None)
+    assert settling.extrapolate_steady_amplitude(a, a) == (None, None)
+    assert settling.extrapolate_steady_amplitude(a[:3], a[:3]) == (None, None)
 
 
 @pytest.mark.parametrize("map_", [[[0.7, 0.3], [-0.4, 0.6]], [[0.9, 0.2], [0.0, 0.5]]])
@@ -58,8 +58,8 @@ def test_exact_a_map_of_the_plane_is_summed(map_):
     p = (np.array(away) + end) @ [1, 1j]
     difference = away[-1] - away[-2]
     rest = np.linalg.solve(np.eye(2) - map_, map_ @ difference) @ [1, 1j]
-    assert settling.plane_tails(p[None, -4:])[0] == pytest.approx(rest, rel=1e-9)
-    value, error = settling.steady_amplitude(np.abs(p), p)
+    assert settling.plane_map_remainders(p[None, -4:])[0] == pytest.approx(rest, rel=1e-9)
+    value, error = settling.extrapolate_steady_amplitude(np.abs(p), p)
     assert abs(value - np.hypot(*end)) < error + 1e-12
 
 
@@ -108,10 +108,10 @@ def swinging(beat: float, decay: float, count: int = 120, size: float = 0.3) -> 
 def test_exact_what_is_left_of_a_short_beat(beat, decay):
     """The amplitude of the last window less that of the settled motion, to a factor of three."""
     extremes = swinging(beat, decay)
-    amplitude = settling.windows_of(extremes, 10)[0]
-    left = settling.left_over(extremes, 10, 10 * decay)
+    amplitude = settling.window_amplitude_means(extremes, 10)[0]
+    left = settling.remaining_free_motion(extremes, 10, 10 * decay)
     assert 0.4 * (amplitude[-1] - 1) < left < 3 * (amplitude[-1] - 1)
-    value, error = (one.item() for one in settling.mean_amplitudes(extremes[None], 10))
+    value, error = (one.item() for one in settling.beat_mean_amplitudes(extremes[None], 10))
     # NaN: the last window is nearer
     assert abs(value - 1) < error < 0.3 if value == value else decay == 0.06
 
@@ -119,7 +119,7 @@ def test_exact_what_is_left_of_a_short_beat(beat, decay):
 @given(st.floats(0.1, 3.0), st.floats(0.05, 0.5), st.integers(1, 10))
 def test_always_less_is_left_of_a_longer_run(beat, decay, window):
     short, long = (
-        settling.left_over(swinging(beat, decay, count), window, decay * window)
+        settling.remaining_free_motion(swinging(beat, decay, count), window, decay * window)
         for count in (60, 120)
     )
     assert long <= short + 1e-12 and long < 3 * np.exp(-decay * (110 - 2 * window))
@@ -246,7 +246,11 @@ def test_exact_a_rig_at_the_crest_of_its_ring_up_is_not_steady(cycles):
 def test_exact_a_transient_that_shows_no_end_has_the_reason_in_place_of_its_steady_amplitude():
     done = pf.run(CREST | {"drive": CREST["drive"] | {"cycles": 8.0}})
     steady = done.measures["relative_displacement_amplitude_steady"]
-    assert done.outcome == "transient" and steady.value is None and steady.reason == UNSEEN
+    assert (
+        done.outcome == "transient"
+        and steady.value is None
+        and steady.reason == CHANGE_NOT_RESOLVED
+    )
     later = pf.run(CREST | {"drive": CREST["drive"] | {"cycles": 200.0}})
     assert (
         later.outcome == "steady" and "relative_displacement_amplitude_steady" not in later.measures

@@ -14,8 +14,8 @@ from patchfem.structure.noise import random_record
 
 def test_exact_spectra_are_those_of_scipy():
     window, drive = shaken(100.0, 0.02, 4.0, 3)
-    record, found = stationary.record_of(window, drive), stationary.spectra(window, drive)
-    size = 2 * (record.place.size // (2 * stationary.PARTS))
+    record, found = stationary.make_record(window, drive), stationary.compute_spectra(window, drive)
+    size = 2 * (record.place.size // (2 * stationary.SEGMENTS_PER_RECORD))
     asked = {"fs": 1 / record.step, "nperseg": size, "noverlap": size // 2, "detrend": "constant"}
     f, push = welch(record.drive, **asked)
     kept = (f > 0) & (f <= 2 * drive.band[1])

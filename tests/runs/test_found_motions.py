@@ -11,7 +11,7 @@ import patchfem as pf
 from patchfem import load
 from patchfem.core import Measure, Outcome, SineDrive
 from patchfem.response import settling
-from patchfem.response.outcome import settle
+from patchfem.response.outcome import judge_outcome
 
 FOUND = Path(__file__).parent / "found"
 TRUE = (  # scene, measure, truth: DOP853 from reversal to reversal at 3e-14, or a march of 4000 steps a cycle
@@ -126,7 +126,7 @@ def test_always_a_motion_that_drifts_is_not_steady(drift, outcome, sine):
                 )
             )
         ).rig.drive.signal
-    assert settle(raw, measures, 1e-3, drive)[0] is outcome
+    assert judge_outcome(raw, measures, 1e-3, drive)[0] is outcome
 
 
 @pytest.mark.parametrize(("level", "said"), [("0.2 g", True), ("40 g", False)])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem import SceneError, run
-from patchfem.response.measures import half_swing
-from patchfem.response.spectrum import reading
+from patchfem.response.measures import measure_half_swing
+from patchfem.response.spectrum import read_instrument
 from patchfem.scene.scene import loads
 
 MODES = """
@@ -109,7 +109,7 @@ def test_exact_a_linear_rig_in_closed_form():
     assert acceleration.value == pytest.approx(felt, rel=1e-6)
     assert displacement.value == pytest.approx(abs(z @ [0.9, 0.2]), rel=1e-8)
     drive = found.plan.model.rig.drive.signal
-    assert reading(found.window, drive, acceleration.value, "fundamental") == pytest.approx(
+    assert read_instrument(found.window, drive, acceleration.value, "fundamental") == pytest.approx(
         felt, rel=1e-8
     )
 
@@ -134,4 +134,4 @@ def test_exact_half_a_swing_of_cubics():
         (lambda x: x**3 - 4 * x**2 + 2 * x)((8 - np.sqrt(40)) / 6),
         (lambda x: x**3 - 4 * x**2 + 2 * x)((8 + np.sqrt(40)) / 6),
     )
-    assert half_swing(t, y, v) == pytest.approx((peak - valley) / 2, rel=1e-14)
+    assert measure_half_swing(t, y, v) == pytest.approx((peak - valley) / 2, rel=1e-14)

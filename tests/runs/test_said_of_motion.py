@@ -10,7 +10,7 @@ from patchfem import load
 from patchfem.core import Measure, Outcome
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.response.measures import relative_gap
-from patchfem.response.rows import Seen
+from patchfem.response.rows import LastCycles
 from patchfem.runs.results.notes import creeping
 
 BONDS = 'law = "nonlocal"\nbond_length = "{} m"\n'
@@ -102,7 +102,7 @@ def test_exact_an_output_that_stands_still_has_no_stiffness_nor_slip():
         time=np.arange(145.0),
         extra={},
     )
-    still = Seen(
+    still = LastCycles(
         window, SimpleNamespace(period=72.0), None, {}, 12.9, 2e5, True, loop=(1e-22, 3.9, 0.0)
     )
     assert still.slip == {"slip_amplitude": 0.0, "stick_fraction": 1.0} and still.cycle == {

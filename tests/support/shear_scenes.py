@@ -12,7 +12,7 @@ import numpy as np
 from campaigns import measure_rows
 
 import patchfem as pf
-from patchfem.response.rows import OF_EACH
+from patchfem.response.rows import INTERFACE_MEASURES
 from patchfem.scene.scene import Scene, loads
 
 JOINT_TOLERANCE = 1e-6  # of the reference of a joint
@@ -182,4 +182,6 @@ def compare_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict:
 
 def compare_chain(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the chain of a seed; see `campaigns`."""
-    return compare_scene(*chain(seed), RIG_TOLERANCE, (*MOTION, *(f"{name}_2" for name in OF_EACH)))
+    return compare_scene(
+        *chain(seed), RIG_TOLERANCE, (*MOTION, *(f"{name}_2" for name in INTERFACE_MEASURES))
+    )

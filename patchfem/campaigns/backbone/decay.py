@@ -14,7 +14,13 @@ from ...effects import NO_WAVEFORM
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.rig import DriveLevels
-from ...response.decay_curve import DecayCurve, curve_of, of_turns, turns, turns_from_outside
+from ...response.decay_curve import (
+    DecayCurve,
+    compute_swing_curve,
+    find_turning_points,
+    find_turning_points_outside,
+    half_swings_between,
+)
 from ...runs.rig import decays, numerics
 from ...runs.rig.engines import ENGINES, PIECES, SMOOTH
 from ...structure import drives
@@ -200,7 +206,7 @@ def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReadin
     engine = ENGINES[how.engine]
     read = _read(joint, found)
     if how.engine == SMOOTH.name:
-        read = read.unsampled(_read(joint, found, turns_from_outside))
+        read = read.add_sampling_error(_read(joint, found, find_turning_points_outside))
     read = read.over(amplitudes)
     value = np.array([read.frequency, read.damping])
     reading_error = np.array([read.frequency_error, read.damping_error])
@@ -256,7 +262,7 @@ def _measure_other_modes(joint: Joint, found, amplitudes) -> np.ndarray:
     ]
     max_stuck = np.max(stuck or [np.zeros(len(group.rows))], axis=0)
     read = _read(joint, found)
-    times, _ = turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    times, _ = find_turning_points(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     for column, one in zip(asked, free):
         if one is None:
             continue
@@ -329,7 +335,7 @@ def _release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> t
 def _grows(joint: Joint, found) -> bool:
     """Return whether the swings of a Solution grow along the shape of the sticking mode."""
     motion, shape = found.response, joint.shape
-    _, places = turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    _, places = find_turning_points(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     swings = np.abs(np.diff(places))
     return decay_rate(joint.modes) < 0 and swings.size > 2 and swings[-1] > swings[0]
 
@@ -464,7 +470,7 @@ def _start(joint: Joint, amplitude: float) -> InitialState:
     return InitialState(joint.shape * amplitude / joint.reach, at_rest)
 
 
-def _read(joint: Joint, found, turns=turns) -> DecayCurve:
+def _read(joint: Joint, found, turns=find_turning_points) -> DecayCurve:
     """Read a Solution from reversal to reversal.
 
     With several modes, the reversals are those of the motion along the shape of the sticking mode, in
@@ -480,18 +486,20 @@ def _read(joint: Joint, found, turns=turns) -> DecayCurve:
     """
     motion, shape = found.response, joint.shape
     if shape.size == 1:
-        return curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
+        return compute_swing_curve(
+            half_swings_between(*turns(motion.time, motion.output, motion.output_rate))
+        )
     times, places = turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     if times.size < 3:
-        return curve_of(of_turns(times, places))
+        return compute_swing_curve(half_swings_between(times, places))
     output = CubicHermiteSpline(motion.time, motion.output, motion.output_rate)(times)
     sizes = np.abs(np.diff(output))
     lengths = np.diff(times)
     equal = np.abs(np.diff(lengths)) <= EQUAL_SWINGS_TOL * lengths[1:]
     sticks = np.append(True, equal) & np.append(equal, True)
-    at_output = curve_of(of_turns(times, places, sizes))
+    at_output = compute_swing_curve(half_swings_between(times, places, sizes))
     own = joint.reach / (shape @ shape) * np.abs(np.diff(places))
-    curve = curve_of(of_turns(times, places, np.where(sticks, own, sizes)))
+    curve = compute_swing_curve(half_swings_between(times, places, np.where(sticks, own, sizes)))
     change = _coupling(joint) * np.abs(curve.damping - at_output.damping)
     if change.size:
         padded = np.pad(change, N_BEAT_SWINGS)

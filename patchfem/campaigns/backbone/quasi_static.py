@@ -5,7 +5,7 @@ import numpy as np
 from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import quasi_static
 from ...friction.record import steady_loop
-from ...response.errors import with_errors
+from ...response.errors import add_errors
 from ...runs.bench.errors import errors_of
 from ...runs.rig import decays
 from .bench_loops import LOOP_MEASURES, settle_loop
@@ -127,7 +127,7 @@ def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
         frequency = joint.held[0] / (2 * np.pi)
         settled = settle_loop(joint.model, joint.patch, float(slide), frequency)
         changes = errors_of(settled.model, patches, settled.run, settled.steps)[0]
-        measures = with_errors(settled.run.values, *changes, least=MIN_FLOOR)
+        measures = add_errors(settled.run.values, *changes, least=MIN_FLOOR)
         stiffness, area = (settled.run.values[name] for name in LOOP_MEASURES)
         stiffness_error, area_error = (
             measures[name].error + change for name, change in zip(LOOP_MEASURES, settled.change)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...model.source import locate_errors
-from ...response.spectrum import reading
+from ...response.spectrum import read_instrument
 from ...runs.batch.watched import Watcher
 from ..fits.problem import press_patch
 from .asked import READINGS, Asked
@@ -78,7 +78,7 @@ class Computed:
         """Return the reading of the accelerometer [m s-2] without its gain."""
         if self.reading[0] == "fundamental" and seen.fundamental is not None:
             return abs(seen.fundamental)
-        return reading(seen.window, drive, seen.acceleration, *self.reading)
+        return read_instrument(seen.window, drive, seen.acceleration, *self.reading)
 
     def _pressed(self, model):
         """Return the pressed patch of a model; None for a [normal] contact.

@@ -194,7 +194,7 @@ def _unknown(measure: str) -> list[str]:
     They are those whose name contains the word, or else the one with the most similar name.
     """
     known = [*rows.TABLE, *patch_rows.TABLE]
-    if not measure or rows.of_first(measure) in known:
+    if not measure or rows.remove_interface_number(measure) in known:
         return []
     parts = [name for name in known if measure in name.split("_") and not name.endswith("_scatter")]
     near = parts if 0 < len(parts) <= NEAR else get_close_matches(measure, known, 1, 0.5)

@@ -51,7 +51,7 @@ STEPS = 1024  # steps of the last cycles kept in one call
 MOST_KEPT = 400_000  # reversals kept outside the last cycles
 # of the tolerance, that of the last cycles, which are read between the ends of the steps
 CLOSER = 0.01
-TAIL = 8  # windows whose phasors are kept: a steady amplitude takes five (`response.settling.steady_amplitudes`)
+TAIL = 8  # windows whose phasors are kept: a steady amplitude takes five (`response.settling.extrapolate_steady_amplitudes`)
 FIRST = 1e-3  # length of the first step over the shortest time of the rig
 REPEATS = 10.0  # tolerances of a step by which a motion that repeats may still change in all that is left of it
 ALIKE = 10.0  # times as much, by which cycles differ whose steps stand elsewhere

@@ -15,7 +15,7 @@ from ... import formatting
 from ...core import Measure, Outcome, allowed_error
 from ...response.outcome import OPEN_LOOP, UNSETTLED
 from ...response.rows import TABLE as MOTION
-from ...response.rows import of_first, of_number
+from ...response.rows import add_interface_number, remove_interface_number
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.patch_rows import minimum_of, unknown_measures
 from ...runs.results.result import Result
@@ -478,12 +478,15 @@ def _at_each_interface(summary: dict, name: str, text: str) -> list:
 
     Strips do not count as interfaces.
     """
-    count = sum(of_first(measure) == name for measure in summary["measures"])
+    count = sum(remove_interface_number(measure) == name for measure in summary["measures"])
     if count < 2 or any(effect["effect"] == "contact.strips" for effect in summary["effects"]):
         return [Statement(name, text)]
     if count > FEW:
         return [Statement(name, f"{text} at interface 1 of {count}")]
-    return [Statement(of_number(name, k), f"{text} at interface {k + 1}") for k in range(count)]
+    return [
+        Statement(add_interface_number(name, k), f"{text} at interface {k + 1}")
+        for k in range(count)
+    ]
 
 
 def placed(contact: dict | None, fraction: float | None = None) -> str:
@@ -602,7 +605,10 @@ def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
     parts = []
     for name in names:
         one = known[name]
-        full = next((size for kind, size in RANGES.items() if of_first(name).endswith(kind)), 0.0)
+        full = next(
+            (size for kind, size in RANGES.items() if remove_interface_number(name).endswith(kind)),
+            0.0,
+        )
         limit = allowed_error(tolerance, one.value, one.floor)
         if name in STEPPED:
             parts.append(f"{name}: one step between the drive levels of the scene")

@@ -49,7 +49,10 @@ class Column(NamedTuple):
 
 def names_of(found: CaseResults) -> list[str]:
     """Sort the measures of the cases in the order of the reference, whatever order the cases came in."""
-    return sorted(found.values, key=lambda name: (ORDER.get(rows.of_first(name), len(ORDER)), name))
+    return sorted(
+        found.values,
+        key=lambda name: (ORDER.get(rows.remove_interface_number(name), len(ORDER)), name),
+    )
 
 
 def columns_of(found: CaseResults, name: str) -> list[Column]:

@@ -26,11 +26,11 @@ from ...effects import is_bond_list, law_has_trait
 from ...model.model import Model
 from ...model.source import locate_errors
 from ...response import run_events
-from ...response.coarser import left_open
+from ...response.coarser import find_open_kinds
 from ...response.errors import FrictionScale, coarser_errors, friction_errors, step_errors
 from ...response.measures import energy_balance
-from ...response.reasons import SHARED
-from ...response.ringing import LEAST_PERIODS, SHORT
+from ...response.reasons import MAX_OTHER_MODES_FRACTION
+from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
 from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as of_patch
 from ..results.result import without_folders
@@ -344,7 +344,10 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
             / modes.mass
             * np.array([one.fine.limit.sum() / one.fine.length for one in held])
         )
-        may = seen.longest_stick(STICK_SPEED_RATIO) * fastest >= 2 * np.pi * SHORT * LEAST_PERIODS
+        may = (
+            seen.longest_stick(STICK_SPEED_RATIO) * fastest
+            >= 2 * np.pi * MIN_REFINED_FRACTION * MIN_PERIODS
+        )
         accelerations = seen.acceleration()
         if asked is not None:
             may &= asked
@@ -356,7 +359,7 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
         rings = [
             ({}, {})
             if one is None
-            else run_events.rings(one, modes, drive, held=HELD * held[case].fine.length)
+            else run_events.measure_rings(one, modes, drive, held=HELD * held[case].fine.length)
             for case, one in enumerate(rings)
         ]
         values |= {name: np.array([one[0].get(name, np.nan) for one in rings]) for name in RINGS}
@@ -373,7 +376,7 @@ def _beside(model: Model, done: lanes.Marched) -> np.ndarray:
     """Return whether modes other than the first carry part of the slide (n,)."""
     return np.array(
         [
-            model.rig.first_mode.fraction_of_other_modes(done.z[:, :, k]) > SHARED
+            model.rig.first_mode.fraction_of_other_modes(done.z[:, :, k]) > MAX_OTHER_MODES_FRACTION
             for k in range(done.z.shape[2])
         ]
     )
@@ -476,7 +479,7 @@ def _tell(
         ]
         extra = found.numerics[case] | {
             "cycles": model.rig.drive.cycles,
-            "left_open": left_open(("steps", "mesh", "modes", "own"), parts, runs),
+            "left_open": find_open_kinds(("steps", "mesh", "modes", "own"), parts, runs),
         }
         warned = tolerance_warnings(Finding(model, measures, one.patch, extra))
     drift = {name: m for name, m in known.items() if name == "drift_per_cycle"}

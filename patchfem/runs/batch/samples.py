@@ -10,9 +10,15 @@ import numpy as np
 
 from ...core import Response
 from ...dynamics.integrated import start_phase
-from ...response.loops import half_range, interface_loops, secant_stiffness, turns_of
-from ...response.measures import REST, ROUND, SHARE, SMOOTH, relative_gap
-from ...response.spectrum import PLACES, WEIGHTS, distorted
+from ...response.loops import find_reversals, interface_loops, mean_half_range, secant_stiffness
+from ...response.measures import (
+    COORDINATE_ROUND_OFF,
+    MAX_SMOOTH_RATIO,
+    MIN_SLIDE_RANGE,
+    SLIP_FRACTION,
+    relative_gap,
+)
+from ...response.spectrum import GAUSS_POINTS, GAUSS_WEIGHTS, distortion_ratio
 
 
 class Samples:
@@ -90,7 +96,7 @@ class Samples:
         ]
         out |= {
             "absolute_acceleration_fundamental": waves[0],
-            "acceleration_distortion": distorted(*waves, 0.0),
+            "acceleration_distortion": distortion_ratio(*waves, 0.0),
         }
         return out | self.slips() | self.loops(first, stiffness)
 
@@ -99,10 +105,10 @@ class Samples:
 
         They are those of cubics, as in `spectrum.motion_harmonic`.
         """
-        h, n, s, found = self.dt, number, PLACES, self.found
+        h, n, s, found = self.dt, number, GAUSS_POINTS, self.found
         wave, part = (
             np.exp(-1j * n * self.angle[:-1]),
-            WEIGHTS * h * np.exp(-1j * n * self.omega * h * s),
+            GAUSS_WEIGHTS * h * np.exp(-1j * n * self.omega * h * s),
         )
         left, right = part @ (1 - 3 * s**2 + 2 * s**3), part @ (3 * s**2 - 2 * s**3)
         leaves, comes = h * (part @ (s - 2 * s**2 + s**3)), h * (part @ (s**3 - s**2))
@@ -160,8 +166,8 @@ class Samples:
         )
         rest -= (2 * modes.zeta * modes.omega)[:, None] * rates + (modes.omega**2)[:, None] * first
         pull = modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide)
-        turns, moves = self.turns(), np.ptp(self.slide, axis=0) > REST
-        half = np.array([half_range(one) for one in turns]) * moves
+        turns, moves = self.turns(), np.ptp(self.slide, axis=0) > MIN_SLIDE_RANGE
+        half = np.array([mean_half_range(one) for one in turns]) * moves
         secants = [secant_stiffness(one) for one in turns]
         secant = np.where(moves, [np.nan if one is None else one for one in secants], np.nan)
         return interface_loops(
@@ -169,7 +175,7 @@ class Samples:
         ) | {"secant_stiffness": secant}
 
     def turns(self) -> list:
-        """Return the result of `loops.turns_of` for each run."""
+        """Return the result of `loops.find_reversals` for each run."""
         steps, size = self.steps, self.slide.shape[1]
         rows, out = np.arange(size), np.empty((2, 2, self.window, size))
         for number in range(self.window):
@@ -193,7 +199,7 @@ class Samples:
         for run in np.flatnonzero(
             np.isnan(out[:, 1]).any(axis=(0, 1))
         ):  # these runs have a reversal at an end of a cycle
-            turn[run] = turns_of(
+            turn[run] = find_reversals(
                 time,
                 self.slide[:, run],
                 self.speed[:, run],
@@ -213,12 +219,12 @@ class Samples:
         return (means[1] - means[0]) / max(self.window - 1, 1)
 
     def slips(self) -> dict:
-        """Return the measures of the slip as `measures.slip_measures` does for runs that slide."""
+        """Return the measures of the slip as `measures.compute_slip_measures` does for runs that slide."""
         slip, steps = self.found.slip, np.abs(np.diff(self.slide, axis=0))
-        still = steps <= ROUND * np.abs(self.slide).max(axis=0)
+        still = steps <= COORDINATE_ROUND_OFF * np.abs(self.slide).max(axis=0)
         above = (
             np.where(still, 0.0, np.abs(np.diff(slip, axis=0)) / np.where(still, 1.0, steps))
-            - SHARE
+            - SLIP_FRACTION
         )
         before, after = above[:-1], above[1:]
         rise, low, high = (
@@ -286,7 +292,7 @@ def _along(row, motion) -> np.ndarray:
 def _turned(slide, speed, force, rows, h: float) -> np.ndarray:
     """Return the largest slide [m] and the force there [N] (2, n) of a cycle.
 
-    As in `loops.turns_of` with "slide"; the force is NaN if the slide is largest at an end of the
+    As in `loops.find_reversals` with "slide"; the force is NaN if the slide is largest at an end of the
     cycle.
     """
     top = slide.argmax(axis=0)
@@ -319,7 +325,7 @@ def _turned(slide, speed, force, rows, h: float) -> np.ndarray:
 def peaks(size) -> tuple:
     """Return the largest values (n,) of samples (s, n), and by how much they may be too small.
 
-    As in `measures.acceleration_peak` and `measures.peaks_between`.
+    As in `measures.compute_acceleration_peak` and `measures.peak_sampling_errors`.
     """
     rows, top = np.arange(size.shape[1]), size.argmax(axis=0)
     inside = (top > 0) & (top < len(size) - 1)
@@ -330,7 +336,7 @@ def peaks(size) -> tuple:
         np.where(top >= 2, bends[0], bends[1]),
         np.where(top <= len(size) - 3, bends[2], bends[1]),
     )
-    smooth = bends.min(axis=0) * SMOOTH >= bends.max(axis=0)
+    smooth = bends.min(axis=0) * MAX_SMOOTH_RATIO >= bends.max(axis=0)
     left, mid, right = five[1:4]
     bend = -bends[1]
     with np.errstate(all="ignore"):

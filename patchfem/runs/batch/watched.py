@@ -18,7 +18,7 @@ from ...dynamics.events import orbits as event_orbits
 from ...dynamics.harmonic import balance as point_balance
 from ...dynamics.harmonic import harmonic, point
 from ...response import measures
-from ...response.measures import half_swing
+from ...response.measures import measure_half_swing
 from ..rig import march, pieces
 from ..rig.engines import ENGINES, MARCH, steady_by
 from ..rig.numerics import choose
@@ -100,7 +100,9 @@ class Watcher:
             return seen
         window = seen.window
         return seen._replace(
-            displacement=half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
+            displacement=measure_half_swing(
+                window.time, window.modal @ gauge, window.modal_rate @ gauge
+            )
         )
 
     def _once(self, name: str, make):
@@ -174,7 +176,10 @@ class Watcher:
         found = point.point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
         window = point_balance.periodic_response(found, one.modes, drive, rig_balance.SAMPLES)
         return Watched(
-            window, measures.acceleration_peak(window), found.amplitude(one.modes.output), found
+            window,
+            measures.compute_acceleration_peak(window),
+            found.amplitude(one.modes.output),
+            found,
         )
 
     def _events(self, drive, near) -> Watched | None:

@@ -9,8 +9,19 @@ from time import perf_counter
 
 import numpy as np
 
-from ...response.loops import at_turns, half_range, interface_loop, secant_stiffness, turns_of
-from ...response.measures import harmonic, ledger_measures, step_harmonic, work_check
+from ...response.loops import (
+    find_reversals,
+    interface_loop,
+    mean_half_range,
+    reversal_evaluation,
+    secant_stiffness,
+)
+from ...response.measures import (
+    compute_harmonic,
+    compute_ledger_measures,
+    compute_step_harmonic,
+    work_difference,
+)
 from . import rigid, shear
 from . import stepped as stepping
 from .closed import closed_form
@@ -85,8 +96,10 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
     engine = bench_engine(model, slide, 1 if patch is None else patch.x.size, watch.choice)
     out, more = _slid(model, patch, (time, slide), frames, engine, watch)
     values = _values(model, time, slide, out, first, omega) | {
-        "work_check": work_check(
-            out.ledger[0], [(slide, out.force), *more.pop("pairs", ())], at_turns(model) == "jumps"
+        "work_check": work_difference(
+            out.ledger[0],
+            [(slide, out.force), *more.pop("pairs", ())],
+            reversal_evaluation(model) == "jumps",
         )
     }
     span = time[-1]  # the division by the span avoids overflow for an extremely slow slide
@@ -128,7 +141,7 @@ def _values(model, time, slide, out, first, omega) -> dict:
         "friction_ratio_peak": float(np.abs(ratio).max()),
         "slip_amplitude": float(out.slip[first:].max() - out.slip[first:].min()) / 2,
         "energy_balance": float(miss / (power + np.abs(stored).max())) if power > 0 else 0.0,
-        **ledger_measures(out.ledger),
+        **compute_ledger_measures(out.ledger),
     }
     if omega:
         t, q, f = time[first:], slide[first:], out.force[first:]
@@ -138,11 +151,11 @@ def _values(model, time, slide, out, first, omega) -> dict:
         means = np.divide(
             np.diff(work[first:]), np.diff(q), out=(f[1:] + f[:-1]) / 2, where=np.diff(q) != 0
         )
-        turns = turns_of(t, q, np.zeros(t.size), f, t[-1] - t[0], at_turns(model))
+        turns = find_reversals(t, q, np.zeros(t.size), f, t[-1] - t[0], reversal_evaluation(model))
         found |= interface_loop(
-            half_range(turns),
-            harmonic(t, weight, q - q.mean(), omega),
-            step_harmonic(t, means, omega),
+            mean_half_range(turns),
+            compute_harmonic(t, weight, q - q.mean(), omega),
+            compute_step_harmonic(t, means, omega),
             work[-1] - work[first],
             0.0,
         )

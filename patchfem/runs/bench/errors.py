@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects import is_bond_list, law_has_trait
-from ...response.coarser import CoarserRuns, coarser_space, estimate, left_open
+from ...response.coarser import CoarserRuns, estimate_errors, find_open_kinds, make_coarser_space
 from ...response.errors import (
     FrictionScale,
     convergence_errors,
@@ -64,7 +64,7 @@ def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
     Returns
     -------
     tuple
-        Errors by measure name, one dict per kind; CPU seconds; and `coarser.left_open`.
+        Errors by measure name, one dict per kind; CPU seconds; and `coarser.find_open_kinds`.
     """
 
     def solve(variant: Pass):
@@ -74,12 +74,12 @@ def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
         return bench.run(model, on, variant.steps, watch=watch)
 
     ladder, made = ladder_of(model, patches, fine, steps), {}
-    errors, seconds = estimate(solve, fine.values, ladder, made)
+    errors, seconds = estimate_errors(solve, fine.values, ladder, made)
     kinds = [one.of for one in ladder]
     if sum_error(model, fine.engine):
         errors, kinds = [*errors, _sum_errors(model, fine)], [*kinds, "bonds"]
     runs = [fine.values, *(made[one].values for one in ladder[0].runs)]
-    return errors, seconds, left_open(kinds, errors, runs)
+    return errors, seconds, find_open_kinds(kinds, errors, runs)
 
 
 def ladder_of(model, patches: list, fine, steps: int) -> list:
@@ -110,10 +110,10 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
     elif meshed:
         # the number of modes is fixed, so that only the mesh changes
         count = shear.modes_of(model, patch) if model.partial_slip else None
-        out.append(coarser_space(few._replace(level=1, modes=count), few))
+        out.append(make_coarser_space(few._replace(level=1, modes=count), few))
         if count:
             out.append(
-                coarser_space(
+                make_coarser_space(
                     few._replace(modes=shear_modes.comparison_mode_count(count)), few, "modes"
                 )
             )

@@ -10,9 +10,9 @@ import numpy as np
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_quantity
-from ...response.errors import with_errors
+from ...response.errors import add_errors
 from ...response.outcome import OPEN_LOOP
-from ...response.rows import judged
+from ...response.rows import set_final_floors
 from ..results.notes import (
     climbing_as_one,
     of_growth,
@@ -58,7 +58,7 @@ def prescribed(
     if estimate:
         patches = [patch, *(one for one in coarse if one is not None)]
         others, seconds["error"], left = errors_of(model, patches, fine, steps, say)
-    found = with_errors(fine.values, *others, least=1e-10)
+    found = add_errors(fine.values, *others, least=1e-10)
     fields, created, power = (
         {},
         fine.values["energy_created"],
@@ -96,7 +96,7 @@ def prescribed(
     notes = [*notes, *climbing_as_one(model, patch)]
     known = estimate and on_a_mesh_of_known_error(model, patch, coarse)
     found = without_errors(found, known)
-    found = judged(found, model.accuracy.tolerance)
+    found = set_final_floors(found, model.accuracy.tolerance)
     count = shear.modes_of(model, patch) if model.partial_slip else None
     return Result(
         what,

@@ -11,7 +11,7 @@ from ...dynamics.march.models import jenkins_model, lists_model, points_model, u
 from ...effects import law_has_trait
 from ...friction.record import make_law
 from ...response.coarser import CoarserRuns
-from ...response.errors import GAPS, change, convergence_errors
+from ...response.errors import ERROR_MEASURES, absolute_change, convergence_errors
 from ...slip.fields import bond_shear_modes, element_fields, point_fields
 from ..patch.jenkins_elements import elements
 from .follow import follow_path
@@ -241,5 +241,7 @@ def mesh_errors(*values: dict) -> dict:
 
     The residual of a balance is an error itself; its change is used.
     """
-    missed = change(values[0], values[1])
-    return convergence_errors(*values) | {name: missed[name] for name in GAPS if name in missed}
+    missed = absolute_change(values[0], values[1])
+    return convergence_errors(*values) | {
+        name: missed[name] for name in ERROR_MEASURES if name in missed
+    }

@@ -184,7 +184,7 @@ def probed(model) -> dict:
         return result.probed(model)
     with locate_errors(model.source):
         return {
-            rows.of_number(name, face.number): found
+            rows.add_interface_number(name, face.number): found
             for face in faces_of(model)
             for name, found in values(face.patch).items()
         }
@@ -196,7 +196,7 @@ def measured(model) -> dict:
     Those of an interface after the first have its number after the name.
     """
     return {
-        rows.of_number(name, face.number): found
+        rows.add_interface_number(name, face.number): found
         for face in faces_of(model)
         for name, found in result.measured(face.model, face.patch, face.patches[1:]).items()
     }

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import Measure
 from ...response.errors import convergence_errors
-from ...response.rows import floor_of
+from ...response.rows import error_floor
 from ...slip.shear_modes import JenkinsSet
 from .jenkins_elements import elements
 
@@ -101,6 +101,6 @@ def slip_missed(patches, slip, tolerance: float) -> float:
         )
     errors = convergence_errors(*values)
     return max(
-        Measure(value, "", errors[name], float(floor_of(name))).error_ratio(tolerance)
+        Measure(value, "", errors[name], float(error_floor(name))).error_ratio(tolerance)
         for name, value in values[0].items()
     )

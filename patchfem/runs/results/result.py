@@ -74,8 +74,8 @@ def meaning(name: str, apart: str = "interface") -> str:
     if name in patch_rows.TABLE:
         return patch_rows.TABLE[name].text
 
-    first = rows.of_first(name)
-    row = patch_rows.TABLE.get(first) or rows.row_of(name)
+    first = rows.remove_interface_number(name)
+    row = patch_rows.TABLE.get(first) or rows.find_row(name)
     return row.text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
 
 
@@ -191,7 +191,7 @@ def choices(result) -> dict:
     if (window := extra.get("window")) is not None:
         out["window_cycles"] = int(window)
     for face in extra.get("faces", ()):
-        out[rows.of_number("interface_nodes", face.number)] = int(face.patch.x.size)
+        out[rows.add_interface_number("interface_nodes", face.number)] = int(face.patch.x.size)
     if patch is not None:
         out["interface_nodes"] = int(patch.x.size)
         if patch.averaging is not None:

@@ -7,7 +7,7 @@ that leaves the contact.
 import numpy as np
 
 from ...formatting import format_length
-from ...response.outcome import off_the_piece
+from ...response.outcome import check_piece_length
 
 FAR = 0.1  # fraction of the contact length above which an unchanged pressure is inaccurate
 
@@ -44,7 +44,7 @@ def travelled(patch, slide) -> list:
 def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
     """Return the outcome of a run, or LEAVES_CONTACT if the slide exceeded the piece.
 
-    See `response.outcome.off_the_piece`.
+    See `response.outcome.check_piece_length`.
 
     Parameters
     ----------
@@ -61,5 +61,9 @@ def outcome_on_piece(outcome, asked, patch, slide, lateral=None):
         return outcome
     pieces = asked.pieces
     mean_length = (pieces.lower.length + pieces.upper.length) / 2
-    found = off_the_piece(outcome, largest_slide(slide), mean_length)
-    return found if lateral is None else off_the_piece(found, largest_slide(lateral), pieces.width)
+    found = check_piece_length(outcome, largest_slide(slide), mean_length)
+    return (
+        found
+        if lateral is None
+        else check_piece_length(found, largest_slide(lateral), pieces.width)
+    )

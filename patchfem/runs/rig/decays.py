@@ -14,7 +14,13 @@ from ...compiled import load
 from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import forces, quasi_static
 from ...dynamics.march import models
-from ...response.decay_curve import FAINT, DecayCurve, curve_of, of_turns, turns
+from ...response.decay_curve import (
+    MIN_HALF_SWING,
+    DecayCurve,
+    compute_swing_curve,
+    find_turning_points,
+    half_swings_between,
+)
 from ...response.errors import MAX_ORDER, error_of_change
 from ...slip.mesh_correction import SPREAD_FACTOR, spread_elements
 from ..patch import faces
@@ -57,7 +63,7 @@ def _compared(found: DecayCurve, raw: Solution) -> DecayCurve:
             _read(run).over(found.amplitude),
             found if beside is None else _read(beside).over(found.amplitude),
         )
-        found = found.widened(one, other)
+        found = found.add_difference(one, other)
     return found
 
 
@@ -69,13 +75,15 @@ def _read(run: Solution) -> DecayCurve:
     none of them.
     """
     motion, held = run.response, run.extra.get("tail")
-    found = curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
+    found = compute_swing_curve(
+        half_swings_between(*find_turning_points(motion.time, motion.output, motion.output_rate))
+    )
     if held is None:
         return found
     time = np.arange(held.begin, held.end, 0.5 / held.frequency)
     rate = 2 * np.pi * held.frequency * held.damping / np.sqrt(1 - held.damping**2)
     size, still = held.displacement * np.exp(-rate * (time - held.begin)), np.zeros(time.size)
-    kept = size > FAINT * np.abs(motion.output).max()
+    kept = size > MIN_HALF_SWING * np.abs(motion.output).max()
     rings = DecayCurve(time, size, still + held.frequency, still, still + held.damping, still).at(
         kept
     )

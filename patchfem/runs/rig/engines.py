@@ -17,7 +17,7 @@ import numpy as np
 from ...dynamics.events.elements import JOINED
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
-from ...response.coarser import CoarserRuns, coarser_space
+from ...response.coarser import CoarserRuns, make_coarser_space
 from ...response.errors import (
     FrictionScale,
     coarser_errors,
@@ -258,7 +258,7 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
     meshed = coarse is not None and (model.rig.friction.strips_slide_apart or averaged)
     samples = [CoarserRuns((), sampling_errors)] if model.rig.friction.strips_slide_apart else []
-    return [*samples, coarser_space(Variant(numerics, coarse))] if meshed else samples
+    return [*samples, make_coarser_space(Variant(numerics, coarse))] if meshed else samples
 
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
@@ -311,8 +311,8 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     if coarse is not None and (varies or model.partial_slip):
         # the number of shear modes is fixed, so that only the mesh changes
         fixed = few if shape is None else replace(few, shear_modes=shape.size)
-        out.append(coarser_space(Variant(fixed, coarse), quarter))
-    out += [coarser_space(Variant(one, patch), quarter) for one in _meshed(model, few)]
+        out.append(make_coarser_space(Variant(fixed, coarse), quarter))
+    out += [make_coarser_space(Variant(one, patch), quarter) for one in _meshed(model, few)]
     climbs, gathers = (
         model.grooves is not None,
         model.patch is not None and model.patch.mesh.can_gather_points,
@@ -323,7 +323,7 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
         varies or climbs or (pointed and law_has_trait(model.friction.law, "bonds"))
     ):
         other = replace(few, shear_modes=shear_modes.comparison_mode_count(shape.size))
-        out.append(coarser_space(Variant(other, patch), quarter, "modes"))
+        out.append(make_coarser_space(Variant(other, patch), quarter, "modes"))
     return [*out, *_summed(model, few, patch, solution)]
 
 

@@ -10,7 +10,15 @@ import numpy as np
 
 from ...core import Measure, SineDrive
 from ...response import run_events
-from ...response.levels import JUMP, Level, bracket, hysteresis, jump, no_onset, past_onset
+from ...response.levels import (
+    MIN_JUMP_FACTOR,
+    Level,
+    bracket_onset,
+    largest_hysteresis,
+    largest_jump,
+    make_no_onset_reason,
+    make_onset_test,
+)
 from ...response.rows import TABLE
 from ...structure.drive_sizes import drive_omega
 
@@ -83,8 +91,8 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
     tuple or None
         None if no level is above the onset.
     """
-    past = past_onset("slip") if past is None else past
-    found = bracket(levels, past)
+    past = make_onset_test("slip") if past is None else past
+    found = bracket_onset(levels, past)
     if found is None:
         return None
     before, first = found
@@ -127,7 +135,7 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
         See `Solution`; the distance between the onsets of each pair is added to the error.
     """
     unit, size, out = _unit(rig), _size(rig), {}
-    past = past_onset(*rig.drive.levels.onset)
+    past = make_onset_test(*rig.drive.levels.onset)
     lowest = onset(levels, probe, tolerance, past) if rubs else None
     if lowest is not None:
         apart = 0.0
@@ -140,9 +148,13 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
         out["onset_level"] = Measure(size * lowest[0], unit, size * (lowest[1] + apart), 1e-9)
     elif rubs:
         out["onset_level"] = Measure(
-            None, unit, None, TABLE["onset_level"].floor, reason=no_onset(*rig.drive.levels.onset)
+            None,
+            unit,
+            None,
+            TABLE["onset_level"].floor,
+            reason=make_no_onset_reason(*rig.drive.levels.onset),
         )
-    if (leap := jump(levels)) is not None:
+    if (leap := largest_jump(levels)) is not None:
         width = size * float(leap[2])  # the jump lies between two levels
         out["jump_level"] = Measure(size * leap[0], unit, width, width)
     else:
@@ -152,9 +164,9 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
             None,
             TABLE["jump_level"].floor,
             reason="the amplitude does not jump: between neighbouring drive levels the ratio of the "
-            f"amplitudes is always below {JUMP:g} times the ratio of the levels",
+            f"amplitudes is always below {MIN_JUMP_FACTOR:g} times the ratio of the levels",
         )
-    if (loop := hysteresis(levels)) is not None:
+    if (loop := largest_hysteresis(levels)) is not None:
         out["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
     return out
 
@@ -267,7 +279,7 @@ def joined_runs(parts, each: float):
         response=response,
         window=window,
         ledger=ledger,
-        log=run_events.joined_logs([p.log for p in parts], shift),
+        log=run_events.join_logs([p.log for p in parts], shift),
         amplitudes=np.concatenate([p.amplitudes for p in parts]),
         phasors=np.concatenate([p.phasors for p in parts]),
         events=sum(p.events for p in parts),

@@ -12,9 +12,9 @@ from ...core import IntegratedMeasures
 from ...dynamics.march import march as engine
 from ...effects import law_has_trait
 from ...friction.record import make_law
-from ...response.ends import end_error
+from ...response.ends import estimate_window_error
 from ...response.inside_steps import motion_inside_steps
-from ...response.measures import peaks_between, step_harmonic
+from ...response.measures import compute_step_harmonic, peak_sampling_errors
 from ...response.rows import NEEDS_RUN, lateral_work
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import drive_omega, has_full_cycle, is_sinusoidal, peak_speed
@@ -127,12 +127,14 @@ class MarchReader(Reader):
 
     def between(self, window) -> dict:
         """Return by how much the peaks of a run may exceed its samples, by measure name."""
-        return peaks_between(window, self.model.grooves is not None)
+        return peak_sampling_errors(window, self.model.grooves is not None)
 
     def late(self, window) -> dict:
         """Return the errors by an end at a sample next to the requested end, by measure name."""
         steps = self.numerics.cycles * self.numerics.steps
-        found = end_error(window, self.model.rig.drive.signal.period, steps - round(steps))
+        found = estimate_window_error(
+            window, self.model.rig.drive.signal.period, steps - round(steps)
+        )
         return {name: LATE * error for name, error in found.items()}
 
     def summed(self):
@@ -224,7 +226,7 @@ class MarchReader(Reader):
             w,
             drive,
             work,
-            step_harmonic(w.time, part.step_force, drive_omega(drive)) if span > 0 else 0j,
+            compute_step_harmonic(w.time, part.step_force, drive_omega(drive)) if span > 0 else 0j,
         )
 
     def _levels(self, done) -> tuple:

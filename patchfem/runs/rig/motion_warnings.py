@@ -8,7 +8,7 @@ import numpy as np
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length, format_number, format_quantity
-from ...response.outcome import changing_note, unsettled
+from ...response.outcome import changing_note, warn_if_ringing
 from ...structure.drive_sizes import min_decay_rate
 from ..patch import faces
 from ..results.notes import (
@@ -69,7 +69,7 @@ def warnings_of(run) -> list:
         *raw.notes,
     ]
     if not model.rig.drive.levels.amplitudes:
-        out += unsettled(
+        out += warn_if_ringing(
             raw,
             found,
             (model.accuracy.tolerance, min_decay_rate(model.rig.modes)),

@@ -17,10 +17,10 @@ from ...dynamics.events.reading import Reading
 from ...effects import law_has_trait
 from ...response import run_events
 from ...response.loops import interface_loops
-from ...response.measures import REST, harmonic, relative_gap
-from ...response.ringing import held_modes, held_ring, strongest
-from ...response.rows import NEEDS_RUN, stuck_share
-from ...response.spectrum import distorted
+from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
+from ...response.ringing import held_modes, make_ring, select_strongest
+from ...response.rows import NEEDS_RUN, stick_fraction
+from ...response.spectrum import distortion_ratio
 from ...structure.drive_sizes import (
     drive_omega,
     has_full_cycle,
@@ -152,7 +152,7 @@ class Pieces(Reader):
     def sticks(self, run) -> bool:
         """Return whether the interface sticks; of independent strips, all have to stick."""
         return (
-            run_events.all_stick(run.window, self.held)
+            run_events.is_all_stuck(run.window, self.held)
             if self.apart and self.rubs
             else super().sticks(run)
         )
@@ -197,13 +197,13 @@ class Pieces(Reader):
         if not self.rubs:
             return {}, {}
         if run.ring is not None:
-            return held_ring(*run.ring, run.acceleration), {}
+            return make_ring(*run.ring, run.acceleration), {}
         if held := self.held_modes(run, run.window, drive):
-            one = strongest(held, "acceleration")
-            return held_ring(
+            one = select_strongest(held, "acceleration")
+            return make_ring(
                 one.acceleration, 2 * np.pi * one.frequency, one.damping, run.acceleration
             ), {}
-        return run_events.rings(
+        return run_events.measure_rings(
             run.window, self.model.rig.modes, drive, run.log, repeats=run.repeats
         )
 
@@ -236,7 +236,7 @@ class Pieces(Reader):
             return {}
         after = run.response.select(run.response.time > run.log.time[-1])
         held = self.held_modes(run, after, drive)
-        return {"tail": strongest(held, "displacement")} if held else {}
+        return {"tail": select_strongest(held, "displacement")} if held else {}
 
     def own(self, run, drive, values: dict) -> dict:
         """Return the errors of measures that come from samples, and of the drift of rigid elements.
@@ -292,7 +292,7 @@ def _of_strips(run, drive) -> InterfaceLoop:
     power = (window.extra["forces"] * window.extra["slide_rates"]).sum(axis=1)
     slide = window.slide - weight @ window.slide / weight.sum()
     first, pull = (
-        complex(harmonic(window.time, weight, one, omega)) for one in (slide, window.force)
+        complex(compute_harmonic(window.time, weight, one, omega)) for one in (slide, window.force)
     )
     return InterfaceLoop(
         first,
@@ -483,7 +483,7 @@ def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, s
         "relative_displacement_amplitude": reading.swing,
         "absolute_acceleration_peak": reading.acceleration,
         "absolute_acceleration_fundamental": first if sine and whole else none,
-        "acceleration_distortion": distorted(first, third, size) if sine and whole else none,
+        "acceleration_distortion": distortion_ratio(first, third, size) if sine and whole else none,
         "drift_per_cycle": reading.drift,
         "slip_start_phase": reading.start if sine else none,
         "work_check": _work_check(reading, book),
@@ -492,7 +492,7 @@ def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, s
     out |= {
         "slip_amplitude": one.slip_range / 2,
         "friction_force_peak": one.max_force,
-        "stick_fraction": stuck_share(one.stuck_time, reading.span),
+        "stick_fraction": stick_fraction(one.stuck_time, reading.span),
     }
     return out | (_loop(reading, sine, stiffness) if whole else {})
 
@@ -500,7 +500,7 @@ def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, s
 def _loop(reading: Reading, sine: bool, stiffness) -> dict:
     """Return the measures of the loop of the first interface by name."""
     one = reading.loop()
-    moves = (reading.of(at.HIGH) - reading.of(at.LOW) > REST) & sine
+    moves = (reading.of(at.HIGH) - reading.of(at.LOW) > MIN_SLIDE_RANGE) & sine
     half = np.where(moves, reading.of(at.RANGE) / 2, 0.0)[()]
     work = one.work * reading.period / reading.span
     secant = np.where(moves, reading.of(at.SECANT), np.nan)[()]

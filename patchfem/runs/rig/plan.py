@@ -15,7 +15,7 @@ from ...dynamics.march import capacity
 from ...effects import LAWS, law_has_trait
 from ...friction.bonds import parameters
 from ...model.model import Model
-from ...response.rows import of_first, of_number
+from ...response.rows import add_interface_number, remove_interface_number
 from ...slip import shear_modes
 from ...structure.drive_sizes import drive_omega, max_acceleration
 from ..cost import (
@@ -82,9 +82,10 @@ def held_stiffness(chain: dict, number: int = 0) -> float:
         Index of the interface.
     """
     links = {
-        of_first(name): link
+        remove_interface_number(name): link
         for name, link in chain.items()
-        if name not in ("mode", "bonded", "grooves") and name == of_number(of_first(name), number)
+        if name not in ("mode", "bonded", "grooves")
+        and name == add_interface_number(remove_interface_number(name), number)
     }
     if str(links.get("bonds", "")).startswith("none"):
         return 0.0

@@ -12,12 +12,12 @@ from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...friction import path_work
 from ...response import run_events
-from ...response.errors import GAPS, change, error_of_change
-from ...response.levels import KEPT, Level
-from ...response.loops import at_turns
-from ...response.measures import slip_noise, window_amplitudes, window_ends
-from ...response.outcome import steady_of
-from ...response.rows import NEEDS_RUN, measures_of, row_of
+from ...response.errors import ERROR_MEASURES, absolute_change, error_of_change
+from ...response.levels import LEVEL_MEASURES, Level
+from ...response.loops import reversal_evaluation
+from ...response.measures import slip_round_off, window_amplitudes, window_end_values
+from ...response.outcome import estimate_steady
+from ...response.rows import NEEDS_RUN, compute_measures, find_row
 from ...structure.drive_sizes import stored_samples_per_cycle
 from .solution import Solution, decaying, last_cycles
 
@@ -55,7 +55,7 @@ class Reader:
         return IntegratedMeasures()
 
     def more(self, run, drive, stuck: bool) -> dict:
-        """Return other fields of `response.rows.Seen`."""
+        """Return other fields of `response.rows.LastCycles`."""
         return {}
 
     def values(self, run, drive=None, stuck: bool = False, ledger=None) -> dict:
@@ -77,10 +77,10 @@ class Reader:
             run, drive, stuck
         )
         if self.rubs:
-            given = {"by": at_turns(self.model), "ledger": ledger} | given
+            given = {"by": reversal_evaluation(self.model), "ledger": ledger} | given
         window, book = given.pop("window", run.window), given.pop("book", run.ledger)
         last = run.amplitudes[-min(self.numerics.window, len(run.amplitudes)) :]
-        found = measures_of(
+        found = compute_measures(
             last_cycles(self.model, self.patch, window, last, book, drive=drive, **given)
         )
         if self.model.rig.drive.kind == "free":
@@ -96,15 +96,15 @@ class Reader:
             return False
         if loops:
             return all(
-                one.slip_range / 2 <= max(self.held, slip_noise(run.window)) for one in loops
+                one.slip_range / 2 <= max(self.held, slip_round_off(run.window)) for one in loops
             )
-        return run_events.all_stick(run.window, self.held)
+        return run_events.is_all_stuck(run.window, self.held)
 
     def rings(self, run, drive) -> tuple:
         """Return the measures of the ringing during stick by name, and their errors."""
         if not self.rubs or self.creeps:
             return {}, {}
-        return run_events.rings(
+        return run_events.measure_rings(
             run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.held
         )
 
@@ -124,12 +124,14 @@ class Reader:
         fewer = self.values(self.fewer(run), drive, ledger=run.response.extra.get("ledger"))
         own = self.integrated(run, drive)
         apart = {
-            name: gap for name, gap in change(values, fewer).items() if gap > 0 and name not in GAPS
+            name: gap
+            for name, gap in absolute_change(values, fewer).items()
+            if gap > 0 and name not in ERROR_MEASURES
         }
         return (
             {
-                name: error_of_change(gap, order=row_of(name).order)
-                + row_of(name).sample_error / self.steps
+                name: error_of_change(gap, order=find_row(name).order)
+                + find_row(name).sample_error / self.steps
                 for name, gap in apart.items()
             }
             if own.loops or hasattr(drive, "band")
@@ -189,7 +191,11 @@ class Reader:
         kept = {"message": "", "log": None, "snapshots": []}
         more = (
             {name: getattr(run, name, none) for name, none in kept.items()}
-            | {"steady": steady_of(drive, *window_ends(run.amplitudes, run.phasors, window))}
+            | {
+                "steady": estimate_steady(
+                    drive, *window_end_values(run.amplitudes, run.phasors, window)
+                )
+            }
             | more
         )
         return Solution(
@@ -222,7 +228,7 @@ class Reader:
             Relative error of the measures.
         """
         found = self.values(run, drive)
-        kept = {name: found[name] for name in KEPT if name in found}
+        kept = {name: found[name] for name in LEVEL_MEASURES if name in found}
         return Level(
             size,
             self.sticks(run),

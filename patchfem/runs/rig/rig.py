@@ -14,10 +14,10 @@ from ...core import NotConverged, Outcome, PatchfemError
 from ...effects import law_has_trait
 from ...model.rig import MAX_TRAVEL
 from ...response import reasons, run_events, stationary
-from ...response.coarser import estimate, left_open
-from ...response.errors import with_errors
-from ...response.outcome import settle, without_bars
-from ...response.rows import NEEDS_RUN, judged
+from ...response.coarser import estimate_errors, find_open_kinds
+from ...response.errors import add_errors
+from ...response.outcome import judge_outcome, remove_errors
+from ...response.rows import NEEDS_RUN, set_final_floors
 from ...response.settling import slip_period
 from ...structure.drive_sizes import decay_rate, is_periodic
 from ..patch import faces
@@ -137,9 +137,9 @@ def _levelled(run: Coupled) -> Coupled:
 
 def _settled(run: Coupled) -> Coupled:
     """Return the run with its outcome, and errors that include those the run itself states."""
-    found = without_errors(run_events.with_own(run.measures, run.raw.own), run.estimated)
+    found = without_errors(run_events.add_uncertainty(run.measures, run.raw.own), run.estimated)
     rig = run.model.rig
-    outcome, found = settle(
+    outcome, found = judge_outcome(
         run.raw,
         found,
         run.model.accuracy.tolerance,
@@ -150,7 +150,7 @@ def _settled(run: Coupled) -> Coupled:
     if (
         outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL
     ):  # the limit is not a stop of the scene: nothing bounds the motion
-        outcome, found = Outcome.GROWS, without_bars(found)
+        outcome, found = Outcome.GROWS, remove_errors(found)
     return replace(run, outcome=outcome, measures=found)
 
 
@@ -162,15 +162,15 @@ def _reasoned(run: Coupled) -> Coupled:
         and law_has_trait(run.model.friction.law, "set-valued")
         and not (run.model.partial_slip or rig.friction.has_partial_slip)
     )
-    stops = reasons.stopping(found) if rigid else {}
+    stops = reasons.find_missing_secant(found) if rigid else {}
     return replace(
         run,
         measures=found
         | stops
-        | reasons.unclosed(found, window, run.drive)
-        | reasons.undrifting(found, run.drive)
-        | reasons.unsettled(found, run.outcome, run.drive)
-        | reasons.without_value(
+        | reasons.find_missing_loops(found, window, run.drive)
+        | reasons.find_missing_drift(found, run.drive)
+        | reasons.find_missing_steady(found, run.outcome, run.drive)
+        | reasons.find_missing(
             found, window, run.drive, run.rubs, rig.first_mode.fraction_of_other_modes(window.modal)
         ),
     )
@@ -194,7 +194,7 @@ def _decayed(run: Coupled, coarse) -> tuple:
     ):
         return run, found, []
     ring, own, whys = run.measures.get("ring_frequency"), (run.model, run.patch, coarse), {}
-    sticks = run_events.spans_of(raw.window, run.drive, raw.log, raw.held)
+    sticks = run_events.find_stick_intervals(raw.window, run.drive, raw.log, raw.held)
     if ring is not None and ring.value and ring.error is not None and sticks:
         swing = np.ptp(raw.window.output[raw.window.time >= sticks[-1][0]]) / 2
         if swing > 0:
@@ -228,9 +228,9 @@ def _decayed(run: Coupled, coarse) -> tuple:
 
 def _judged(run: Coupled) -> Coupled:
     """Return the run with the final floors of its measures, without values if no motion exists."""
-    found = judged(run.measures, run.model.accuracy.tolerance)
+    found = set_final_floors(run.measures, run.model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].steady and run.outcome is Outcome.GROWS:
-        found = reasons.unbounded(found)
+        found = reasons.find_missing_unbounded(found)
     return replace(run, measures=found)
 
 
@@ -252,7 +252,7 @@ def _extra(run: Coupled, notes: list) -> dict:
     if rig.friction.has_partial_slip and raw.snapshots and "faces" in raw.snapshots[0]:
         out["shots"] = raw.snapshots
     if run.rubs:
-        out["events"] = run_events.events_of(raw.window, run.drive, raw.log, raw.held)
+        out["events"] = run_events.list_events(raw.window, run.drive, raw.log, raw.held)
     reduced = getattr(raw.contact, "reduction", None)
     if reduced is not None:
         out["elements" if hasattr(reduced, "yield_displacement") else "shear_modes"] = int(
@@ -261,8 +261,8 @@ def _extra(run: Coupled, notes: list) -> dict:
     if raw.summed is not None:
         out["quadrature"] = raw.summed.engine
     if rig.drive.waveform.is_random:
-        out["spectra"] = stationary.spectra(raw.window, rig.drive.signal)
-        notes = [*notes, *stationary.short(run.measures, raw.window)]
+        out["spectra"] = stationary.compute_spectra(raw.window, rig.drive.signal)
+        notes = [*notes, *stationary.warn_if_short(run.measures, raw.window)]
     return out | {"book": raw.book, "period": run.drive.period, "notes": notes}
 
 
@@ -292,7 +292,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         numerics = replace(numerics, window=wide)
         found = go(model, numerics, patch, frames, say)
     if not estimated or found.outcome is Outcome.NOT_CONVERGED:
-        return found, numerics, with_errors(found.values, size=size) | curve_measures(found.extra)
+        return found, numerics, add_errors(found.values, size=size) | curve_measures(found.extra)
 
     def solve(variant):
         """Return the Solution of a Variant; for a curve, only around its peak if that suffices."""
@@ -308,13 +308,13 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         *engine.in_space(model, numerics, patch, coarse, found),
         *engine.in_modes(model, numerics, patch),
     ]
-    space, spent = estimate(solve, found.values, meshed, made)
+    space, spent = estimate_errors(solve, found.values, meshed, made)
     bars = []  # errors of the displacement [m] after each doubling of the steps
     while True:
         ways = engine.in_time(model, numerics, patch)
-        time, more = estimate(solve, found.values, ways, made)
+        time, more = estimate_errors(solve, found.values, ways, made)
         spent += more
-        measures = with_errors(found.values, *time, *space, least=engine.least, size=size)
+        measures = add_errors(found.values, *time, *space, least=engine.least, size=size)
         if numerics.pairs and not errors_met(measures, model.accuracy.tolerance):
             return _solved(
                 model, numerics.finer(), patch, coarse, seconds, say, progress, estimated
@@ -343,7 +343,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
             ]
             late = [one for one in (found.extra.get("late"),) if one]
             kinds = [*(one.of for one in (*ways, *meshed)), *["end"] * len(late)]
-            left = left_open(kinds, [*time, *space, *late], runs)
+            left = find_open_kinds(kinds, [*time, *space, *late], runs)
             found = replace(found, extra=found.extra | {"left_open": left})
             return found, numerics, measures | curve_measures(found.extra, made.values())
         made[Variant(numerics, patch)] = found

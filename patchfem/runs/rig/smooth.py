@@ -9,8 +9,8 @@ from time import perf_counter
 
 from ...core import IntegratedMeasures
 from ...dynamics.smooth import run as engine
-from ...response.measures import slip_noise
-from ...response.rows import NEEDS_RUN, row_of
+from ...response.measures import slip_round_off
+from ...response.rows import NEEDS_RUN, find_row
 from .interface import contact_of
 from .reading import Reader, every_second
 from .solution import Solution
@@ -108,7 +108,9 @@ class SmoothReader(Reader):
         size = values.get("relative_displacement_amplitude", 0.0)
         for name in ("stick_fraction", "slip_start_phase"):
             found[name] = (
-                LOCATED if _clear(run) else found.get(name, row_of(name).sample_error / self.steps)
+                LOCATED
+                if _clear(run)
+                else found.get(name, find_row(name).sample_error / self.steps)
             )
         return {
             name: found.get(name, 0.0)
@@ -120,4 +122,4 @@ class SmoothReader(Reader):
 
 def _clear(run) -> bool:
     """Return whether the slip of a SmoothResult exceeds round-off."""
-    return run.fine.loops[0].slip_range > CLEAR * slip_noise(run.window)
+    return run.fine.loops[0].slip_range > CLEAR * slip_round_off(run.window)

@@ -1,6 +1,6 @@
 """Solution that an engine returns, and the last cycles as input of the measures.
 
-In: a run of an engine. Out: `Solution`, and `Seen` for the rows of `response.rows`.
+In: a run of an engine. Out: `Solution`, and `LastCycles` for the rows of `response.rows`.
 """
 
 from dataclasses import dataclass, field, replace
@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...core import Measure, Outcome, Response
-from ...response.decay_curve import last_swing
-from ...response.measures import half_swing, harmonic
-from ...response.reasons import SHARED
-from ...response.rows import Seen
+from ...response.decay_curve import measure_last_swing
+from ...response.measures import compute_harmonic, measure_half_swing
+from ...response.reasons import MAX_OTHER_MODES_FRACTION
+from ...response.rows import LastCycles
 from ...structure.drive_sizes import drive_omega, has_full_cycle, is_sinusoidal
 
 NO_PEAK = "the output does not move at any of the swept frequencies, so there is no peak"
@@ -93,7 +93,7 @@ def gauged(model, raw: Solution) -> Solution:
                 extra=one.extra | felt,
             )
         )
-    seen = half_swing(raw.window.time, moved[1].output, moved[1].output_rate)
+    seen = measure_half_swing(raw.window.time, moved[1].output, moved[1].output_rate)
     if model.rig.drive.kind == "free":
         seen = decaying(moved[1], model.rig.drive.signal.period, seen)
     share = max(1.0, seen / max(raw.values[name], 1e-300))
@@ -114,7 +114,7 @@ def decaying(window, period: float, whole: float) -> float:
 
     `whole` is the amplitude of the window, returned if it contains no whole cycle.
     """
-    found = last_swing(window.time, window.output, window.output_rate, period)
+    found = measure_last_swing(window.time, window.output, window.output_rate, period)
     return whole if found is None else found
 
 
@@ -125,8 +125,8 @@ def borne(model, patch) -> float | None:
     return patch.pressure.load if patch is not None else model.point.load
 
 
-def last_cycles(model, patch, window, extremes, book: dict, **more) -> Seen:
-    """Return the last cycles of a run as input of the measures (`response.rows.Seen`).
+def last_cycles(model, patch, window, extremes, book: dict, **more) -> LastCycles:
+    """Return the last cycles of a run as input of the measures (`response.rows.LastCycles`).
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def last_cycles(model, patch, window, extremes, book: dict, **more) -> Seen:
         Other fields of Seen, with `drive` if it is not that of the model.
     """
     drive = more.pop("drive", model.rig.drive.signal)
-    return Seen(
+    return LastCycles(
         window,
         drive,
         extremes,
@@ -159,7 +159,7 @@ def mode_stiffness(model, window) -> float:
     It is 0 if other modes carry more than SHARED of the slide.
     """
     first_mode = model.rig.first_mode
-    if first_mode.fraction_of_other_modes(window.modal) > SHARED:
+    if first_mode.fraction_of_other_modes(window.modal) > MAX_OTHER_MODES_FRACTION:
         return 0.0
     return first_mode.stiffness
 
@@ -185,8 +185,8 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
         return None
     weight, omega = np.full(window.time.size, 1.0), drive_omega(drive)
     weight[[0, -1]] = 0.5
-    slide = harmonic(window.time, weight, window.slide - window.slide.mean(), omega)
-    pull = harmonic(window.time, weight, window.force, omega) if force is None else force
+    slide = compute_harmonic(window.time, weight, window.slide - window.slide.mean(), omega)
+    pull = compute_harmonic(window.time, weight, window.force, omega) if force is None else force
     return slide, pull, work
 
 

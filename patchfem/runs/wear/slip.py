@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Measure, Outcome
-from ...response.outcome import settle
+from ...response.outcome import judge_outcome
 from ..bench import bench
 from ..bench.closed import integrate_steps
 from ..bench.engine import steps_of
@@ -103,7 +103,7 @@ def _rig(model, patch, frames: int) -> Rubbed:
     )
     amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
     wanted = {"relative_displacement_amplitude": amplitude}
-    settled, _ = settle(found, wanted, model.accuracy.tolerance, model.rig.drive.signal)
+    settled, _ = judge_outcome(found, wanted, model.accuracy.tolerance, model.rig.drive.signal)
     last = _last_cycle(model, found.window, patch.pressure.load)
     beat = _beat(found.values, last[1])
     outcome = outcome_on_piece(

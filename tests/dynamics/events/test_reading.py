@@ -8,8 +8,8 @@ from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events import names_kernels as at
 from patchfem.dynamics.events.elements import elements_of
-from patchfem.response.loops import half_range, secant_stiffness, turns_of
-from patchfem.response.run_events import rings
+from patchfem.response.loops import find_reversals, mean_half_range, secant_stiffness
+from patchfem.response.run_events import measure_rings
 
 read = plain("patchfem.dynamics.events.read_kernels")
 PLACE, WEIGHT = np.polynomial.legendre.leggauss(16)
@@ -54,7 +54,9 @@ def test_exact_secant_stiffness_where_the_slide_turns_at_the_border_of_a_cycle(o
     ends = done.window
     phase = ends.time[np.argmax(ends.slide[:-1])] / drive.period
     assert abs(phase - round(phase)) < 2e-3
-    turns = turns_of(ends.time, ends.slide, ends.slide_rate, ends.force, drive.period, "slide")
+    turns = find_reversals(
+        ends.time, ends.slide, ends.slide_rate, ends.force, drive.period, "slide"
+    )
     assert done.reading.of(at.SECANT, 0) == pytest.approx(secant_stiffness(turns), rel=1e-9)
 
 
@@ -104,8 +106,8 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
             (places.min(), places.max()), rel=1e-12
         )
         assert one.max_force == pytest.approx(np.abs(forces).max(), rel=1e-12)
-        turns = turns_of(ends.time, places, rates, forces, drive.period, "slide")
-        assert x.of(at.RANGE, f) / 2 == pytest.approx(half_range(turns), rel=1e-9)
+        turns = find_reversals(ends.time, places, rates, forces, drive.period, "slide")
+        assert x.of(at.RANGE, f) / 2 == pytest.approx(mean_half_range(turns), rel=1e-9)
         assert x.of(at.SECANT, f) == pytest.approx(secant_stiffness(turns), rel=1e-9)
     slide, end = out[:, 2 * n + 1], rows[-1, 0] + rows[-1, 1]
     means = [
@@ -162,7 +164,7 @@ def test_exact_ring_of_an_element_that_holds():
         0.02 / np.sqrt(61.0)
     )
     assert amplitude > 1e-5
-    fitted, errors = rings(done.window, modes, drive, done.log)
+    fitted, errors = measure_rings(done.window, modes, drive, done.log)
     assert fitted["ring_frequency"] == pytest.approx(
         own / (2 * np.pi), abs=errors["ring_frequency"] + 1e-9
     )

@@ -12,7 +12,11 @@ from patchfem.dynamics.harmonic.branch import response
 from patchfem.dynamics.harmonic.laws import Jenkins, Spring, synthesis
 from patchfem.dynamics.harmonic.point import group_of, point
 from patchfem.response.loops import interface_loop
-from patchfem.response.measures import acceleration_peak, harmonic, slip_measures
+from patchfem.response.measures import (
+    compute_acceleration_peak,
+    compute_harmonic,
+    compute_slip_measures,
+)
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -46,13 +50,13 @@ def test_exact_measures_of_a_run_of_a_scene(law):
     r = periodic_response(p, modes, drive, 1000)
     dt = np.full(1001, drive.period / 1000)
     dt[[0, -1]] /= 2
-    q, f = (harmonic(r.time, dt, v, drive.omega) for v in (r.slide, r.force))
+    q, f = (compute_harmonic(r.time, dt, v, drive.omega) for v in (r.slide, r.force))
     work = float(dt @ (r.force * r.slide_rate))
     mine = {
         "relative_displacement_amplitude": p.amplitude(modes.output),
-        "absolute_acceleration_peak": acceleration_peak(r),
+        "absolute_acceleration_peak": compute_acceleration_peak(r),
         "friction_force_peak": np.abs(r.force).max(),
-        **slip_measures(r, drive, 1000),
+        **compute_slip_measures(r, drive, 1000),
         **interface_loop(np.ptp(r.slide) / 2, q, f, work, modes.mass * modes.omega[0] ** 2),
     }
     for name, near in (

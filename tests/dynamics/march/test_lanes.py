@@ -133,11 +133,11 @@ def test_exact_what_is_read_off_samples_side_by_side(pairs):
             found.slip[:, k],
         )
         near(here.acceleration, w.acceleration, 1e-7)
-        turns = loops.turns_of(
+        turns = loops.find_reversals(
             w.time, here.slide, here.slide_rate, here.force, drive.period, "slide"
         )
         loop = loops.interface_loop(
-            loops.half_range(turns),
+            loops.mean_half_range(turns),
             spectrum.motion_harmonic(w.time, here.slide, here.slide_rate, OMEGA),
             spectrum.friction_harmonic(here, TWO, drive),
             found.worked[k] / WINDOW,
@@ -145,11 +145,11 @@ def test_exact_what_is_read_off_samples_side_by_side(pairs):
         )
         expected = (
             {
-                "absolute_acceleration_peak": measures.acceleration_peak(here),
+                "absolute_acceleration_peak": measures.compute_acceleration_peak(here),
                 "drift_per_cycle": loops.drift(w.time, here.slide, here.slide_rate, drive.period),
                 "secant_stiffness": loops.secant_stiffness(turns),
             }
-            | measures.slip_measures(here, drive, STEPS)
+            | measures.compute_slip_measures(here, drive, STEPS)
             | spectrum.wave_measures(*spectrum.odd_harmonics(here, drive))
             | loop
         )

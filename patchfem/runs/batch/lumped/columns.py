@@ -17,17 +17,28 @@ from ....model.similar_models import SimilarModels, collect_columns
 from ....response.errors import total_error
 from ....response.measures import energy_balance
 from ....response.outcome import (
-    SMALL,
-    goes_on,
-    moves_on,
-    ringing_left,
-    rings_on,
-    settled,
-    steady_error,
+    AMPLITUDE_ROUND_OFF,
+    classify_periodic,
+    error_of_steady,
+    is_drifting,
+    is_still_changing,
+    remaining_ringing,
+    warn_of_ringing,
 )
-from ....response.reasons import CYCLIC, SETTLES, STOPS, UNSEEN, without_value
-from ....response.rows import TABLE, floor_of, larger_term
-from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
+from ....response.reasons import (
+    CHANGE_NOT_RESOLVED,
+    CYCLE_MEASURES,
+    STEADY_AMPLITUDE,
+    STICKS_AT_REVERSAL,
+    find_missing,
+)
+from ....response.rows import TABLE, error_floor, larger_term
+from ....response.settling import (
+    CLASSES,
+    STEADY_CLASS,
+    extrapolate_steady_amplitudes,
+    window_amplitude_means,
+)
 from ....structure.drive_sizes import max_acceleration, min_decay_rate
 from ...accuracy_warnings import Finding, tolerance_warnings
 from ...results.notes import BOOKS
@@ -151,12 +162,12 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     outcome, (steady, error) = _outcome(
         sizes,
         runs,
-        moves_on(
+        is_drifting(
             values["drift_per_cycle"],
             errors["drift_per_cycle"],
             values[MAIN],
             tolerance,
-            floor_of("drift_per_cycle", moved),
+            error_floor("drift_per_cycle", moved),
         ),
     )
     found = CaseResults.blank(n)
@@ -164,7 +175,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     alone = runs.lost | (values["energy_balance"] > runs.closes) | (values["work_check"] > BOOKS)
     grows = np.array([one is Outcome.GROWS for one in outcome])
     with np.errstate(invalid="ignore"):
-        on = goes_on(steady, error, values[MAIN], tolerance) & np.array(
+        on = is_still_changing(steady, error, values[MAIN], tolerance) & np.array(
             [one is Outcome.STEADY for one in outcome]
         )
     still = (
@@ -172,14 +183,14 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         & ~np.isnan(steady)
         & ~runs.stuck
     )
-    values[SETTLES] = np.where(still, steady, np.nan)
-    errors[SETTLES] = steady_error(steady, error, values[MAIN], errors[MAIN])
+    values[STEADY_AMPLITUDE] = np.where(still, steady, np.nan)
+    errors[STEADY_AMPLITUDE] = error_of_steady(steady, error, values[MAIN], errors[MAIN])
     resolved, wide_of = np.ones(n, bool), np.zeros(n, bool)
     for name, value in values.items():
         there = ~np.isnan(value)
         if not there.any():
             continue
-        row, floor = TABLE[name], floor_of(name, moved)
+        row, floor = TABLE[name], error_floor(name, moved)
         wide = there & (errors[name] > tolerance * np.abs(value) + floor)
         floor = np.fmax(floor, tolerance * larger_term(name, values))
         wide_of |= wide & (errors[name] > tolerance * np.abs(value) + floor) & ~grows
@@ -191,12 +202,14 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
         found.floors[name] = np.where(there, floor, np.nan)
     _reasons(models, sizes, runs, found)
-    unseen = np.isnan(values[SETTLES]) & np.array([one is Outcome.TRANSIENT for one in outcome])
+    unseen = np.isnan(values[STEADY_AMPLITUDE]) & np.array(
+        [one is Outcome.TRANSIENT for one in outcome]
+    )
     if unseen.any():
-        found.measure(SETTLES, TABLE[SETTLES].unit)
-        found.floors[SETTLES][unseen] = TABLE[SETTLES].floor
-        found.reasons.setdefault(SETTLES, {}).update(
-            dict.fromkeys(np.flatnonzero(unseen).tolist(), UNSEEN)
+        found.measure(STEADY_AMPLITUDE, TABLE[STEADY_AMPLITUDE].unit)
+        found.floors[STEADY_AMPLITUDE][unseen] = TABLE[STEADY_AMPLITUDE].floor
+        found.reasons.setdefault(STEADY_AMPLITUDE, {}).update(
+            dict.fromkeys(np.flatnonzero(unseen).tolist(), CHANGE_NOT_RESOLVED)
         )
     if law_has_trait(models[0].friction.law, "set-valued") and not (
         models[0].partial_slip or models[0].rig.friction.has_partial_slip
@@ -236,22 +249,25 @@ def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
     """
     pick = np.arange(runs.cycles - 1, -1, -runs.window)[::-1]
     ends = (runs.extremes[:, pick, 1] - runs.extremes[:, pick, 0]) / 2
-    floor = SMALL * (sizes.largest / (2 * np.pi / sizes.period) ** 2)
+    floor = AMPLITUDE_ROUND_OFF * (sizes.largest / (2 * np.pi / sizes.period) ** 2)
     decay = sizes.decay * runs.window * sizes.period
     with np.errstate(all="ignore"):
-        steady, bounded = steady_amplitudes(ends[:, -ENDS:], runs.phasors[:, -ENDS:]), False
+        steady, bounded = (
+            extrapolate_steady_amplitudes(ends[:, -ENDS:], runs.phasors[:, -ENDS:]),
+            False,
+        )
         if runs.steady is not None:
             bounded = ~np.isnan(runs.steady[0])
             steady = [np.where(bounded, known, seen) for known, seen in zip(runs.steady, steady)]
-        number, *steady = settled(
-            windows_of(runs.extremes, runs.window)[0],
+        number, *steady = classify_periodic(
+            window_amplitude_means(runs.extremes, runs.window)[0],
             runs.extremes,
             runs.window,
             steady,
             (sizes.tolerance, floor, decay),
             bounded,
         )
-    number = np.where((number == STEADY) & moves, 0, number)
+    number = np.where((number == STEADY_CLASS) & moves, 0, number)
     ends = [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)]
     return [
         Outcome.TRANSIENT if loads else one
@@ -267,9 +283,9 @@ def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
     )
     tolerance, decay, floor = (
         np.broadcast_to(one, n)[cases]
-        for one in (sizes.tolerance, sizes.decay * sizes.period, floor_of(MAIN, sizes.moved))
+        for one in (sizes.tolerance, sizes.decay * sizes.period, error_floor(MAIN, sizes.moved))
     )
-    left = ringing_left(runs.extremes[cases], runs.window, decay)
+    left = remaining_ringing(runs.extremes[cases], runs.window, decay)
     columns = zip(
         cases.tolist(),
         left.tolist(),
@@ -279,7 +295,7 @@ def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
         decay.tolist(),
     )
     found = {
-        case: rings_on(one, (size, least), limits, runs.cycles)
+        case: warn_of_ringing(one, (size, least), limits, runs.cycles)
         for case, one, size, least, *limits in columns
     }
     return {case: one for case, one in found.items() if one}
@@ -288,7 +304,7 @@ def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
 def _stops(found: CaseResults) -> None:
     """Remove the secant stiffness of rigid friction that sticks at the largest slide.
 
-    See `response.reasons.stopping`.
+    See `response.reasons.find_missing_secant`.
     """
     stuck, secant = (found.values.get(name) for name in ("stick_fraction", "secant_stiffness"))
     if stuck is None or secant is None:
@@ -302,13 +318,13 @@ def _stops(found: CaseResults) -> None:
     found.values["secant_stiffness"] = np.where(holds, np.nan, secant)
     found.errors["secant_stiffness"] = np.where(holds, np.nan, found.errors["secant_stiffness"])
     found.reasons.setdefault("secant_stiffness", {}).update(
-        dict.fromkeys(np.flatnonzero(holds).tolist(), STOPS)
+        dict.fromkeys(np.flatnonzero(holds).tolist(), STICKS_AT_REVERSAL)
     )
 
 
 def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
     """Add the reasons why cases have no value of measures that they could have."""
-    names = [*CYCLIC, PHASE]
+    names = [*CYCLE_MEASURES, PHASE]
     for name in names:
         found.measure(name, TABLE[name].unit)
     lacking = np.array([np.isnan(found.values[name]) for name in names])
@@ -334,7 +350,7 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
             if not np.isnan(values[cases[0]])
         }
         window = SimpleNamespace(time=np.array([0.0, runs.window * drive.period]), extra={})
-        for name, measure in without_value(here, window, drive, True).items():
+        for name, measure in find_missing(here, window, drive, True).items():
             found.reasons.setdefault(name, {}).update(dict.fromkeys(cases, measure.reason))
             found.floors[name][cases] = measure.floor
 

@@ -30,11 +30,16 @@ from ....effects import is_bond_list, law_has_trait
 from ....friction.laws.iwan import max_yield_displacement as largest_slide
 from ....model.model import Model
 from ....model.similar_models import SimilarModels, collect_columns, select_models
-from ....response.errors import ROUND, coarser_errors, convergence_error, signed
+from ....response.errors import SUM_ROUND_OFF, coarser_errors, convergence_error, signed_change
 from ....response.measures import energy_balance
-from ....response.ringing import FAINT, PER_PERIOD, WIDEST, ringing
+from ....response.ringing import (
+    MAX_DAMPING_RATIO,
+    MIN_SINUSOID,
+    SAMPLES_PER_PERIOD,
+    measure_ringing,
+)
 from ....response.rows import larger_term
-from ....response.settling import steady_amplitudes, windows_of
+from ....response.settling import extrapolate_steady_amplitudes, window_amplitude_means
 from ....scene.rules.accuracy import list_fixed_settings
 from ....structure.drive_sizes import max_acceleration
 from ...rig.motion_warnings import creeping_note
@@ -670,7 +675,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
     }
     slips = found.reading("MAX_SLIP") - found.reading("MIN_SLIP")
     stuck = slips / 2 <= np.maximum(
-        c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2))
+        c["held"], SUM_ROUND_OFF * np.abs(found.history[:, :, :2]).max(axis=(1, 2))
     )
     stuck &= (cases.spring > 0) | (law == "rigid")
     exact = np.any(
@@ -680,7 +685,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
     errors, exact, steady = errors | told, exact | untold, None
     if law in MARCH_ON:
         steady, open_ones = _settled(
-            law, cases, found, steps, windows_of(extremes, window)[0], ~stuck
+            law, cases, found, steps, window_amplitude_means(extremes, window)[0], ~stuck
         )
         steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | open_ones
     if law in march.MASING:
@@ -725,7 +730,7 @@ def stays(cases, found) -> np.ndarray:
         -np.expm1(-np.pi * cases.damping), 1e-300
     )
     gain = np.abs(cases.output_gain) * (cases.stiffness + cases.spring) * change
-    return gain > FAINT / 3 * found.reading("MAX_ACCELERATION")
+    return gain > MIN_SINUSOID / 3 * found.reading("MAX_ACCELERATION")
 
 
 def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
@@ -771,7 +776,9 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
         else stays(cases, found) & (stuck | rings)
     )
     untold, told = may & ~held, may & held
-    strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.stiffness + cases.spring, 1.0)))
+    strides = steps / (
+        SAMPLES_PER_PERIOD * np.sqrt(np.maximum(cases.stiffness + cases.spring, 1.0))
+    )
     # the stride of a case does not depend on other cases
     strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(int)
     where = np.flatnonzero(told)
@@ -785,7 +792,7 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     for case, signal in zip(where.tolist(), every):
         omega, signal = float(c["omega"][case]), signal[:: strides[case]]
         time = np.linspace(0, 2 * np.pi * window / omega, len(signal))
-        values, apart = ringing(time, signal, [(0.0, time[-1])], omega)
+        values, apart = measure_ringing(time, signal, [(0.0, time[-1])], omega)
         # with so few steps, a ringing may be missed
         faint[case] = not values and march.has_one_stretch(law) and steps < RINGING
         for name, value in values.items():
@@ -818,10 +825,10 @@ def _of_springs(cases, c: dict, found, held, out: tuple) -> None:
         told = (
             held
             & (angle * own >= 3 * np.pi)
-            & (damping < WIDEST)
+            & (damping < MAX_DAMPING_RATIO)
             & ~forced
             & (whole > 1e-18 * beta**2)
-            & (size > FAINT * found.reading("MAX_ACCELERATION"))
+            & (size > MIN_SINUSOID * found.reading("MAX_ACCELERATION"))
         )
     for name, value in zip(RING, (own * c["omega"] / (2 * np.pi), damping)):
         out[0][name][told], out[1][name][told] = value[told], 0.0
@@ -942,7 +949,9 @@ def _known(history, part: int, least, near: float) -> tuple:
     closes = (np.maximum(left, least) < near * last) & (left <= np.maximum(before, 1e-9 * last))
     ends = np.arange(count - 1, 0, -(part if count > MORE * part else window_of(part)))[::-1]
     with np.errstate(all="ignore"):
-        value, error = steady_amplitudes(ranges[:, ends], history[:, ends, 2:] @ [1, 1j])
+        value, error = extrapolate_steady_amplitudes(
+            ranges[:, ends], history[:, ends, 2:] @ [1, 1j]
+        )
     tail = np.maximum(OF_STATED * error, OF_TAIL * value)
     return np.where(closes, last, value), np.where(
         closes, np.maximum(left, least) + 1e-9 * last, tail
@@ -1080,7 +1089,7 @@ def bars(values: dict, coarser: list) -> dict:
         The same at half the steps and, if it is known, at a quarter of them.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # a march with half the steps may diverge
-        changes = [signed(fine, coarse) for fine, coarse in pairwise([values, *coarser])]
+        changes = [signed_change(fine, coarse) for fine, coarse in pairwise([values, *coarser])]
         return {
             name: np.nan_to_num(convergence_error(*(gaps[name] for gaps in changes)), posinf=np.inf)
             for name in values

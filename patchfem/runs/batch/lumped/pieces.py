@@ -16,8 +16,8 @@ from ....effects import law_has_trait
 from ....friction.record import make_law
 from ....response import run_events
 from ....response.errors import merged_cell_errors
-from ....response.measures import ROUND, energy_balance
-from ....response.ringing import held_ring
+from ....response.measures import COORDINATE_ROUND_OFF, energy_balance
+from ....response.ringing import make_ring
 from ....structure.drive_sizes import max_acceleration, min_decay_rate
 from ...rig.costs import pairs_of
 from ...rig.engines import EXACT, PIECES, engine_of
@@ -182,7 +182,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         )
     )
     loop, rigid = reading.loop(), cases[0].groups[0].static > 0
-    stuck = loop.slip_range / 2 <= np.maximum(held, ROUND * reading.run[:, REACH])
+    stuck = loop.slip_range / 2 <= np.maximum(held, COORDINATE_ROUND_OFF * reading.run[:, REACH])
     lost, rings = (
         np.zeros(len(done), bool),
         {name: np.full(len(done), np.nan) for name in ("ring_frequency", "ring_damping")},
@@ -192,7 +192,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         ring = (
             {}
             if rigid
-            else held_ring(*one.ring, one.acceleration)
+            else make_ring(*one.ring, one.acceleration)
             if one.ring is not None
             else _rings(cases[k], one)
             if steady
@@ -259,7 +259,7 @@ def _rings(case: Case, one) -> dict | None:
     more = histories.simulate(modes, drive, case.groups, CYCLES, CYCLES, start=start, memory=memory)
     return (
         None
-        if run_events.rings(more.window, modes, drive, more.log, repeats=True) != ({}, {})
+        if run_events.measure_rings(more.window, modes, drive, more.log, repeats=True) != ({}, {})
         else {}
     )
 

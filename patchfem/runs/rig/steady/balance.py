@@ -22,7 +22,7 @@ from ....dynamics.harmonic.stability import with_stability
 from ....dynamics.integrated import Run
 from ....formatting import format_length
 from ....response.errors import finer_errors
-from ....response.measures import acceleration_peak
+from ....response.measures import compute_acceleration_peak
 from ....response.spectrum import odd_harmonics, wave_measures
 from ..interface import contact_model
 from ..reading import Reader, friction_works
@@ -224,7 +224,7 @@ class BalanceFinder:
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
             SHOWN["amplitude"]: found.amplitude(row),
-            SHOWN["acceleration_peak"]: acceleration_peak(response),
+            SHOWN["acceleration_peak"]: compute_acceleration_peak(response),
             **wave_measures(*odd_harmonics(response, drive)),
         }
         return {name: value for name, value in values.items() if value is not None}

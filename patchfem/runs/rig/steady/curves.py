@@ -11,7 +11,7 @@ import numpy as np
 
 from ....core import NotConverged, Outcome, SineDrive
 from ....dynamics.curve_points import adapted
-from ....response.levels import KEPT, Level
+from ....response.levels import LEVEL_MEASURES, Level
 from ..solution import gauged
 
 # measure of each column of a curve
@@ -61,7 +61,7 @@ class Shown(NamedTuple):
     def level(self) -> Level:
         """The point as a Level of the drive; its amplitude is NaN without a bounded motion."""
         values = (
-            {name: self.values.get(name) for name in KEPT}
+            {name: self.values.get(name) for name in LEVEL_MEASURES}
             if self.values
             else {SHOWN["amplitude"]: np.nan}
         )

@@ -17,7 +17,7 @@ from ....core import InitialState, Outcome, PatchfemError
 from ....dynamics.events import elements as event_elements
 from ....dynamics.events import histories, steady, stick_steady
 from ....dynamics.periodic import is_stable
-from ....response.measures import half_swing
+from ....response.measures import measure_half_swing
 from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import max_acceleration
 from ....structure.response import receptance
@@ -149,7 +149,7 @@ class Maps(Followed):
         amplitude = (
             float(extremes[:, 1].max() - extremes[:, 0].min()) / 2
             if gauge is None
-            else half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
+            else measure_half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
         )
         values = _of_curve(
             amplitude,

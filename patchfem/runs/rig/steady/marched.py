@@ -14,7 +14,7 @@ from ....dynamics.harmonic import orbits
 from ....dynamics.march import march as engine
 from ....effects import SINE_WAVEFORM
 from ....model.rig import DriveLevels
-from ....response.measures import peaks_between
+from ....response.measures import peak_sampling_errors
 from ..interface import contact_of
 from ..march import MarchReader
 from ..solution import Solution
@@ -137,7 +137,7 @@ class MarchFinder(Followed):
             run, left = self._run(drive, run, steps)
             read = self._read(run, steps, self.frames)
         values, mark, snapshots, stuck = read
-        between = peaks_between(mark.window, True)
+        between = peak_sampling_errors(mark.window, True)
         found = orbits.multipliers(run) if run.outcome is None else np.zeros(0)
         regime = "stuck" if stuck else "stick-slip" if values.get("stick_fraction") else "sliding"
         outcome, message = run.outcome or (Outcome.STUCK if stuck else Outcome.STEADY), run.message

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core import NotConverged
-from ....response.errors import change
+from ....response.errors import absolute_change
 from ..solution import Solution, gauged
 from .curves import SHOWN, curve_columns, largest_of
 
@@ -210,4 +210,4 @@ def _gaps(finder, beside, raw: Solution) -> dict:
         other = finder.point(beside.drive, beside.near)[0]
     except NotConverged:
         return {}
-    return change(raw.values, other.values)
+    return absolute_change(raw.values, other.values)
