@@ -47,6 +47,7 @@ HERE = Path(__file__).parents[1]  # the package
 # tuples that kernels take: numba's cache would not notice two of their fields that change places
 TUPLES = (
     "contact/batch/arrays.py",
+    "contact/set_arrays.py",
     "dynamics/interfaces/arrays.py",
     "dynamics/smooth/arrays.py",
     "dynamics/events/modal_system.py",

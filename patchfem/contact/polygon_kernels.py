@@ -1,18 +1,18 @@
 """Compiled polygons of contact sets: the motions (d, t) of the holder at which a set holds.
 
-Each node of a set limits these motions to one side of a line. The lines enclose a convex polygon, of which only a few
-are sides, so comparing a motion with the sides is faster than checking all nodes. `sets` is a
-`press_kernels.SetArrays`.
+Each node of a set limits these motions to one side of a line. The lines enclose a convex polygon, of
+which only a few are sides, so comparing a motion with the sides is faster than checking all nodes.
+`sets` is a `set_arrays.SetArrays`; motions are d [m] and t [rad].
 """
 
 import numpy as np
 from numba.core.options import DefaultOptions
 
 from ..compiled.jit import njit
+from .set_arrays import MAX_POLYGON_SIDES, REFERENCE_OPENING
 
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 ROUND_OFF = 1e-13  # rounding error of a force or gap over the largest of its terms
-MAX_SIDES = 16  # sides of a polygon; sets with more are checked node by node
 # half width of the box in which polygons are computed, over the openings of the reference state
 BOX_HALF_WIDTH = 100.0
 
@@ -23,123 +23,168 @@ def polygon_units(sets):
 
     They are the size of the openings of the reference state, and this size over the largest |x|.
     """
+    size = sets.reference[REFERENCE_OPENING]
     arm = max(abs(sets.x[0]), abs(sets.x[-1]))
-    return sets.base[3], sets.base[3] / arm if arm > 0 else 1.0
+    return size, size / arm if arm > 0 else 1.0
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def write_limits(sets, slot):
+    """Write the force and the gap below which a node fails inside the polygon of a set."""
+    unit_d, unit_t = polygon_units(sets)
+    constant = sets.stored.unknowns[slot, 0]
+    by_d = sets.stored.unknowns[slot, 1]
+    by_t = sets.stored.unknowns[slot, 2]
+    in_contact = sets.stored.in_contact[slot]
+    largest = 0.0
+    for i in range(in_contact.size):
+        if in_contact[i]:
+            term = abs(constant[i]) + abs(by_d[i]) * unit_d + abs(by_t[i]) * unit_t
+            largest = max(largest, term)
+    sets.polygons.limits[slot, 0] = -4 * ROUND_OFF * largest
+    sets.polygons.limits[slot, 1] = -4 * ROUND_OFF * unit_d
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def clip_polygon(old, new, n_corners, c0, c1, c2, node):
+    """Clip a polygon by the half plane c0 + c1 d + c2 t >= 0; return its number of corners, -1 if too many.
+
+    old, new: (3, k) corners before and after. A corner has two coordinates and the node whose line
+    leads to the next corner, -1 for the box. The method is that of Sutherland and Hodgman (Comm. ACM
+    17, 32, 1974).
+    """
+    n_new = 0
+    for k in range(n_corners):
+        follower = k + 1 if k + 1 < n_corners else 0
+        a = c0 + c1 * old[0, k] + c2 * old[1, k]
+        b = c0 + c1 * old[0, follower] + c2 * old[1, follower]
+        if n_new + 2 > new.shape[1]:
+            return -1
+        if a >= 0:
+            for r in range(3):
+                new[r, n_new] = old[r, k]
+            n_new += 1
+        if (a >= 0) != (b >= 0):
+            fraction = a / (a - b)
+            new[0, n_new] = old[0, k] + fraction * (old[0, follower] - old[0, k])
+            new[1, n_new] = old[1, k] + fraction * (old[1, follower] - old[1, k])
+            new[2, n_new] = node if a >= 0 else old[2, k]
+            n_new += 1
+    return n_new
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_polygon(sets, slot):
     """Compute the polygon of motions at which the contact set in a storage slot holds.
 
-    It is a box of motions, clipped by one line for each node: that of the motions at which the node would enter or
-    leave the contact. Clipping is that of Sutherland and Hodgman (Comm. ACM 17, 32, 1974). Nodes at the ends of the
-    contact come first, because they cut off most. A set with too many sides gets no polygon.
+    It is a box of motions, clipped by one line for each node: that of the motions at which the node
+    would enter or leave the contact. Nodes at the ends of the contact come first, because they cut off
+    most. A set with too many sides gets no polygon.
     """
+    polygons = sets.polygons
     unit_d, unit_t = polygon_units(sets)
-    r0, r1, r2, on = sets.rows[slot, 0], sets.rows[slot, 1], sets.rows[slot, 2], sets.on[slot]
-    top = 0.0
-    for i in range(on.size):
-        if on[i]:
-            top = max(top, abs(r0[i]) + abs(r1[i]) * unit_d + abs(r2[i]) * unit_t)
-    sets.limit[slot, 0], sets.limit[slot, 1] = -4 * ROUND_OFF * top, -4 * ROUND_OFF * unit_d
-    old, new = sets.corner[0], sets.corner[1]
-    count = 4
-    # a corner has two coordinates and the node whose line leads to the next corner, -1 for the box
+    unknowns = sets.stored.unknowns[slot]
+    in_contact = sets.stored.in_contact[slot]
+    n_nodes = in_contact.size
+    write_limits(sets, slot)
+    polygons.n_sides[slot] = 0
+    old = polygons.corners[0]
+    new = polygons.corners[1]
+    n_corners = 4
     for k in range(4):
-        old[0, k], old[1, k], old[2, k] = (
-            BOX_HALF_WIDTH * (-1 if k in (0, 3) else 1),
-            BOX_HALF_WIDTH * (-1 if k < 2 else 1),
-            -1.0,
-        )
-    sets.sides[slot] = 0
-    for turn in range(2 * on.size):
-        i = turn % on.size
-        edge = i == 0 or i == on.size - 1 or on[i] != on[i - 1] or on[i] != on[i + 1]
-        if edge != (turn < on.size):
+        old[0, k] = BOX_HALF_WIDTH * (-1 if k in (0, 3) else 1)
+        old[1, k] = BOX_HALF_WIDTH * (-1 if k < 2 else 1)
+        old[2, k] = -1.0
+    for step in range(2 * n_nodes):
+        i = step % n_nodes
+        is_end = i == 0 or i == n_nodes - 1
+        is_end = is_end or in_contact[i] != in_contact[i - 1] or in_contact[i] != in_contact[i + 1]
+        if is_end != (step < n_nodes):
             continue
-        c0 = r0[i] - (sets.limit[slot, 0] if on[i] else sets.limit[slot, 1])
-        c1, c2 = r1[i] * unit_d, r2[i] * unit_t
-        least = np.inf
-        for k in range(count):
-            least = min(least, c0 + c1 * old[0, k] + c2 * old[1, k])
-        if least >= 0:
+        c0 = unknowns[0, i] - polygons.limits[slot, 0 if in_contact[i] else 1]
+        c1 = unknowns[1, i] * unit_d
+        c2 = unknowns[2, i] * unit_t
+        smallest = np.inf
+        for k in range(n_corners):
+            smallest = min(smallest, c0 + c1 * old[0, k] + c2 * old[1, k])
+        if smallest >= 0:
             continue
-        many = 0
-        for k in range(count):
-            follower = k + 1 if k + 1 < count else 0
-            a = c0 + c1 * old[0, k] + c2 * old[1, k]
-            b = c0 + c1 * old[0, follower] + c2 * old[1, follower]
-            if many + 2 > new.shape[1]:
-                return
-            if a >= 0:
-                new[0, many], new[1, many], new[2, many] = old[0, k], old[1, k], old[2, k]
-                many += 1
-            if (a >= 0) != (b >= 0):
-                part = a / (a - b)
-                new[0, many] = old[0, k] + part * (old[0, follower] - old[0, k])
-                new[1, many] = old[1, k] + part * (old[1, follower] - old[1, k])
-                new[2, many] = i if a >= 0 else old[2, k]
-                many += 1
-        old, new, count = new, old, many
-        if count == 0:
+        n_corners = clip_polygon(old, new, n_corners, c0, c1, c2, i)
+        if n_corners <= 0:
             return
-    sides = 0
-    for k in range(count):
+        old, new = new, old
+    n_sides = 0
+    for k in range(n_corners):
         if old[2, k] >= 0:
-            if sides == MAX_SIDES:
+            if n_sides == MAX_POLYGON_SIDES:
                 return
-            sets.edge[slot, sides], sets.beside[slot, sides] = int(old[2, k]), -1
-            sides += 1
-    sets.sides[slot] = sides
+            polygons.nodes[slot, n_sides] = int(old[2, k])
+            polygons.neighbours[slot, n_sides] = -1
+            n_sides += 1
+    polygons.n_sides[slot] = n_sides
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def is_in_box(sets, d, t):
-    """Return whether a motion (d [m], t [rad]) lies in the box in which polygons are computed."""
+    """Return whether a motion lies in the box in which polygons are computed."""
     unit_d, unit_t = polygon_units(sets)
     return abs(d) <= BOX_HALF_WIDTH * unit_d and abs(t) <= BOX_HALF_WIDTH * unit_t
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def side_margin(sets, k, side, d, t):
-    """Return how far the force [N] or gap [m] of the node of a side is above its limit.
-
-    k: slot of the set; d [m], t [rad]: motion of the holder.
-    """
-    i = sets.edge[k, side]
-    least = sets.limit[k, 0] if sets.on[k, i] else sets.limit[k, 1]
-    return sets.rows[k, 0, i] + sets.rows[k, 1, i] * d + sets.rows[k, 2, i] * t - least
+def side_margin(sets, slot, side, d, t):
+    """Return how far the force [N] or gap [m] of the node of a side is above its limit."""
+    i = sets.polygons.nodes[slot, side]
+    limit = sets.polygons.limits[slot, 0 if sets.stored.in_contact[slot, i] else 1]
+    unknowns = sets.stored.unknowns
+    return unknowns[slot, 0, i] + unknowns[slot, 1, i] * d + unknowns[slot, 2, i] * t - limit
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def is_inside(sets, k, d, t):
-    """Return whether a motion (d [m], t [rad]) lies in the polygon of set k.
-
-    A set without polygon contains no motion.
+def is_inside(sets, slot, d, t):
+    """Return whether a motion lies in the polygon of a set; False for a set without polygon.
 
     Cost: a few multiplications per side, instead of one pass over the nodes.
     """
-    if sets.sides[k] == 0 or not is_in_box(sets, d, t):
+    n_sides = sets.polygons.n_sides[slot]
+    if n_sides == 0 or not is_in_box(sets, d, t):
         return False
-    for side in range(sets.sides[k]):
-        if side_margin(sets, k, side, d, t) < 0:
+    for side in range(n_sides):
+        if side_margin(sets, slot, side, d, t) < 0:
             return False
     return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_exit(sets, k, d, t, dd, dt):
-    """Return the fraction of an increment of motion at which it leaves set k, and the side.
+def find_exit(sets, slot, d, t, dd, dt):
+    """Find where an increment of motion leaves the polygon of a set.
 
-    The increment (dd, dt) begins at (d, t). d, dd [m]; t, dt [rad]. The fraction is inf and the side -1 if the
-    increment stays inside or the set has no polygon.
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+    slot : int
+        Slot of the set.
+    d, t : float
+        Motion [m] and [rad] at which the increment begins.
+    dd, dt : float
+        The increment.
+
+    Returns
+    -------
+    fraction : float
+        Fraction of the increment; inf if it stays inside or the set has no polygon.
+    side : int
+        Side of the polygon; -1 if there is none.
     """
-    out, found = np.inf, -1
-    if sets.sides[k] == 0 or not (is_in_box(sets, d, t) and is_in_box(sets, d + dd, t + dt)):
-        return out, found
-    for side in range(sets.sides[k]):
-        here = side_margin(sets, k, side, d, t)
-        rate = side_margin(sets, k, side, d + dd, t + dt) - here
-        if rate < 0 and max(here, 0.0) < -rate * out:
-            out, found = max(here, 0.0) / -rate, side
-    return out, found
+    first_fraction = np.inf
+    first_side = -1
+    has_polygon = sets.polygons.n_sides[slot] > 0
+    if not (has_polygon and is_in_box(sets, d, t) and is_in_box(sets, d + dd, t + dt)):
+        return first_fraction, first_side
+    for side in range(sets.polygons.n_sides[slot]):
+        margin = side_margin(sets, slot, side, d, t)
+        rate = side_margin(sets, slot, side, d + dd, t + dt) - margin
+        if rate < 0 and max(margin, 0.0) < -rate * first_fraction:
+            first_fraction = max(margin, 0.0) / -rate
+            first_side = side
+    return first_fraction, first_side

@@ -1,85 +1,40 @@
 """Compiled search for the contact set at a motion of the holder.
 
-On each set forces and gaps are affine in the motion. The motion is measured from a reference state: closing d [m] and
-rotation t [rad]. The unknowns y of a set are the forces of its nodes in contact and the gaps of the others. The linear
-complementarity problem w = b + t x - d + C f then reads y = R (1, d, t). A node that enters or leaves the set is a
-principal pivot of the tableau [T | R].
+On each set forces and gaps are affine in the motion. The motion is measured from a reference state:
+closing d [m] and rotation t [rad]. The unknowns y of a set are the forces of its nodes in contact and
+the gaps of the others. The linear complementarity problem w = b + t x - d + C f then reads
+y = R (1, d, t). A node that enters or leaves the set is a principal pivot of the tableau [T | R].
 
-A set is stored under a 64-bit name, the exclusive or of the names of its nodes, so a state on a stored set costs one
-pass over the nodes. The search exchanges all nodes of a wrong sign at once (block pivoting), and after
-`N_BLOCK_EXCHANGES` sets only the first of them, which ends for every positive definite C (Murty, Opsearch 11, 1974).
-`contact_sets.ContactSets` is the NumPy twin.
+A set is stored under a 64-bit name, the exclusive or of the names of its nodes, so a state on a stored
+set costs one pass over the nodes. The search exchanges all nodes of a wrong sign at once (block
+pivoting), and after `N_BLOCK_EXCHANGES` sets only the first of them, which ends for every positive
+definite C (Murty, Opsearch 11, 1974). `sets` is a `set_arrays.SetArrays`, `slot` the slot of a stored
+set. `contact_sets.ContactSets` is the NumPy twin.
 """
-
-from typing import NamedTuple
-
-import numpy as np
 
 from ..compiled.jit import njit
 from .polygon_kernels import NJIT_NO_REFCOUNT, ROUND_OFF, is_inside, write_polygon
+from .set_arrays import (
+    N_BUILT,
+    N_PIVOTS,
+    N_RESETS,
+    N_STORED,
+    NEXT_SLOT,
+    REFERENCE_ENERGY,
+    REFERENCE_LOAD,
+    REFERENCE_MOMENT,
+    REFERENCE_OPENING,
+)
 
 FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 # the compiler vectorises loops that search for a minimum only with these flags
 FASTMATH_MINIMUM = FASTMATH_FLAGS | {"nnan", "nsz"}
-N_BLOCK_EXCHANGES = 12  # sets that are tried with all failing nodes exchanged; more may cycle
-# relative residual above which the tableau is computed anew; below it one refinement reaches rounding errors
+# number of sets that are tried with all failing nodes exchanged; longer searches may cycle
+N_BLOCK_EXCHANGES = 12
+# relative residual above which the tableau is computed anew; below it one refinement reaches
+# rounding errors
 MAX_TABLEAU_RESIDUAL = 1e-8
-# indices into `SetArrays.meta`
-COUNT = 0  # number of sets that are stored
-SLOT = 1  # slot of the next set
-BUILT = 2  # number of sets computed so far
-PIVOTS = 3  # number of pivots so far
-RENEWED = 4  # number of times that the tableau was computed anew
-
-
-class SetArrays(NamedTuple):
-    """Contact sets of m nodes, with slots for k sets.
-
-    Interface:
-
-    - c (m, m) [m/N]; x (m,) [m]; b (m,) openings of the reference state without forces [m].
-    - base (5,): load, moment and energy of the reference state, the size of its openings, and its
-      dN/d(delta).
-    - node (m,): 64-bit names of the nodes.
-
-    Tableau: tableau (m, m + 3), here (m,) the set to which it is pivoted, wanted (m,) the set that is
-    searched for, side (2, 3, m) and row (m + 3,) workspaces.
-
-    Stored sets:
-
-    - on (k, m): nodes in contact; rows (k, 3, m): force or gap of the nodes per (1, d, t).
-    - energy (k, 6): coefficients of 1, d, t, d^2/2, d t, t^2/2 of the energy of the preloaded contact.
-    - names (k,), heads, link: names of the sets and their hash chains; meta (5,): `COUNT` to `RENEWED`.
-
-    Polygons of motions on which a set holds:
-
-    - sides (k,): number of sides; 0 if there is no polygon, and all nodes have to be checked.
-    - edge (k, MAX_SIDES): node of each side; beside (k, MAX_SIDES): slot of the set beyond it, or -1.
-    - limit (k, 2): force [N] and gap [m] below which a node fails; corner (2, 3, 4 MAX_SIDES): workspace.
-    """
-
-    c: np.ndarray
-    x: np.ndarray
-    b: np.ndarray
-    tableau: np.ndarray
-    here: np.ndarray
-    rows: np.ndarray
-    on: np.ndarray
-    energy: np.ndarray
-    names: np.ndarray
-    heads: np.ndarray
-    link: np.ndarray
-    node: np.ndarray
-    base: np.ndarray
-    wanted: np.ndarray
-    side: np.ndarray
-    row: np.ndarray
-    meta: np.ndarray
-    sides: np.ndarray
-    edge: np.ndarray
-    beside: np.ndarray
-    limit: np.ndarray
-    corner: np.ndarray
+MIN_TABLEAU_RESIDUAL = 1e-15  # relative residual at round-off, which cannot be refined
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -88,237 +43,309 @@ def pivot(sets, k):
 
     Cost: m^2 multiplications.
     """
-    tableau, row = sets.tableau, sets.row
-    m, wide = tableau.shape
-    p = tableau[k, k]
-    if not p > 0:
+    values = sets.tableau.values
+    row = sets.tableau.row
+    n_nodes, width = values.shape
+    diagonal = values[k, k]
+    if not diagonal > 0:
         return False
-    for j in range(wide):
-        row[j] = tableau[k, j] / p
-    for i in range(m):
-        share = tableau[i, k]
-        if i == k or share == 0.0:
+    for j in range(width):
+        row[j] = values[k, j] / diagonal
+    for i in range(n_nodes):
+        factor = values[i, k]
+        if i == k or factor == 0.0:
             continue
-        line = tableau[i]
-        for j in range(wide):
-            line[j] -= share * row[j]
-        line[k] = share / p
-    for j in range(wide):
-        tableau[k, j] = -row[j]
-    tableau[k, k] = 1 / p
-    sets.here[k] = not sets.here[k]
-    sets.meta[PIVOTS] += 1
+        line = values[i]
+        for j in range(width):
+            line[j] -= factor * row[j]
+        line[k] = factor / diagonal
+    for j in range(width):
+        values[k, j] = -row[j]
+    values[k, k] = 1 / diagonal
+    sets.tableau.in_contact[k] = not sets.tableau.in_contact[k]
+    sets.counters[N_PIVOTS] += 1
     return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def reset_tableau(sets):
     """Write the tableau of the empty contact set."""
-    m = sets.x.size
-    for i in range(m):
-        for j in range(m):
-            sets.tableau[i, j] = sets.c[i, j]
-        sets.tableau[i, m] = sets.b[i]
-        sets.tableau[i, m + 1] = -1.0
-        sets.tableau[i, m + 2] = sets.x[i]
-        sets.here[i] = False
-    sets.meta[RENEWED] += 1
+    values = sets.tableau.values
+    n_nodes = sets.x.size
+    for i in range(n_nodes):
+        for j in range(n_nodes):
+            values[i, j] = sets.compliance[i, j]
+        values[i, n_nodes] = sets.opening[i]
+        values[i, n_nodes + 1] = -1.0
+        values[i, n_nodes + 2] = sets.x[i]
+        sets.tableau.in_contact[i] = False
+    sets.counters[N_RESETS] += 1
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def multiply_three(line, columns):
+    """Return the products of a row (m,) with three vectors (3, m)."""
+    s0 = 0.0
+    s1 = 0.0
+    s2 = 0.0
+    for j in range(columns.shape[1]):
+        s0 += line[j] * columns[0, j]
+        s1 += line[j] * columns[1, j]
+        s2 += line[j] * columns[2, j]
+    return s0, s1, s2
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def refine_rows(sets):
-    """Refine the tableau by one iterative step with C; return the relative residual before."""
-    m, c, tableau = sets.x.size, sets.c, sets.tableau
-    force, left = sets.side[0], sets.side[1]
-    for i in range(m):
-        share = 1.0 if sets.here[i] else 0.0
+    """Refine the last three columns of the tableau by one iterative step with C.
+
+    Returns the largest relative residual of a column before the step.
+    """
+    n_nodes = sets.x.size
+    values = sets.tableau.values
+    in_contact = sets.tableau.in_contact
+    forces = sets.tableau.forces
+    residuals = sets.tableau.residuals
+    for i in range(n_nodes):
         for r in range(3):
-            force[r, i] = share * tableau[i, m + r]
-    top0, top1, top2, off0, off1, off2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(m):
-        s0, s1, s2 = 0.0, 0.0, 0.0
-        line = c[i]
-        for j in range(m):
-            s0 += line[j] * force[0, j]
-            s1 += line[j] * force[1, j]
-            s2 += line[j] * force[2, j]
-        top0, top1, top2 = (
-            max(top0, abs(s0), abs(sets.b[i])),
-            max(top1, abs(s1), 1.0),
-            max(top2, abs(s2), abs(sets.x[i])),
-        )
-        s0 += sets.b[i]
+            forces[r, i] = values[i, n_nodes + r] if in_contact[i] else 0.0
+            residuals[r, i] = 0.0
+    scale0 = 0.0
+    scale1 = 1.0
+    scale2 = 0.0
+    error0 = 0.0
+    error1 = 0.0
+    error2 = 0.0
+    for i in range(n_nodes):
+        s0, s1, s2 = multiply_three(sets.compliance[i], forces)
+        scale0 = max(scale0, abs(s0), abs(sets.opening[i]))
+        scale1 = max(scale1, abs(s1))
+        scale2 = max(scale2, abs(s2), abs(sets.x[i]))
+        s0 += sets.opening[i]
         s1 -= 1.0
         s2 += sets.x[i]
-        if sets.here[i]:
-            off0, off1, off2 = max(off0, abs(s0)), max(off1, abs(s1)), max(off2, abs(s2))
-            left[0, i], left[1, i], left[2, i] = s0, s1, s2
+        if in_contact[i]:
+            error0 = max(error0, abs(s0))
+            error1 = max(error1, abs(s1))
+            error2 = max(error2, abs(s2))
+            residuals[0, i] = s0
+            residuals[1, i] = s1
+            residuals[2, i] = s2
         else:
-            tableau[i, m], tableau[i, m + 1], tableau[i, m + 2] = s0, s1, s2
-            left[0, i], left[1, i], left[2, i] = 0.0, 0.0, 0.0
-    worst = max(off0 / top0 if top0 > 0 else 0.0, off1 / top1, off2 / top2 if top2 > 0 else 0.0)
-    for i in range(m if worst > 1e-15 else 0):  # a residual at round-off cannot be refined
-        s0, s1, s2 = 0.0, 0.0, 0.0
-        line = tableau[i]
-        for j in range(m):
-            s0 += line[j] * left[0, j]
-            s1 += line[j] * left[1, j]
-            s2 += line[j] * left[2, j]
-        tableau[i, m] -= s0
-        tableau[i, m + 1] -= s1
-        tableau[i, m + 2] -= s2
-    return worst
+            values[i, n_nodes] = s0
+            values[i, n_nodes + 1] = s1
+            values[i, n_nodes + 2] = s2
+    error0 = error0 / scale0 if scale0 > 0 else 0.0
+    error2 = error2 / scale2 if scale2 > 0 else 0.0
+    largest = max(error0, error1 / scale1, error2)
+    if largest > MIN_TABLEAU_RESIDUAL:
+        for i in range(n_nodes):
+            s0, s1, s2 = multiply_three(values[i], residuals)
+            values[i, n_nodes] -= s0
+            values[i, n_nodes + 1] -= s1
+            values[i, n_nodes + 2] -= s2
+    return largest
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def take_slot(sets):
+    """Return the slot for the next set; without a free slot the oldest set is dropped."""
+    stored = sets.stored
+    slot = sets.counters[NEXT_SLOT]
+    sets.counters[NEXT_SLOT] = (slot + 1) % stored.names.size
+    sets.counters[N_BUILT] += 1
+    if sets.counters[N_STORED] < stored.names.size:
+        sets.counters[N_STORED] += 1
+        return slot
+    chain = stored.names[slot] & (stored.heads.size - 1)
+    k = stored.heads[chain]
+    if k == slot:
+        stored.heads[chain] = stored.links[slot]
+        return slot
+    while stored.links[k] != slot:
+        k = stored.links[k]
+    stored.links[k] = stored.links[slot]
+    return slot
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def store_set(sets, name):
-    """Store the set of the tableau in the next slot and return the slot.
-
-    Without a free slot the oldest set is dropped.
-    """
-    m, meta = sets.x.size, sets.meta
-    slot, bucket = meta[SLOT], sets.heads.size - 1
-    meta[SLOT] = (slot + 1) % sets.names.size
-    meta[BUILT] += 1
-    if meta[COUNT] < sets.names.size:
-        meta[COUNT] += 1
-    else:
-        at = sets.names[slot] & bucket
-        k = sets.heads[at]
-        if k == slot:
-            sets.heads[at] = sets.link[slot]
-        else:
-            while sets.link[k] != slot:
-                k = sets.link[k]
-            sets.link[k] = sets.link[slot]
-    q = sets.energy[slot]
-    q[:] = 0.0
-    q[0], q[1], q[2] = -sets.base[2], -sets.base[0], sets.base[1]
-    for i in range(m):
-        f0, f1, f2 = sets.tableau[i, m], sets.tableau[i, m + 1], sets.tableau[i, m + 2]
-        sets.rows[slot, 0, i], sets.rows[slot, 1, i], sets.rows[slot, 2, i] = f0, f1, f2
-        sets.on[slot, i] = sets.here[i]
-        if sets.here[i]:
-            q[0] -= 0.5 * f0 * sets.b[i]
-            q[1] += f0
-            q[2] -= f0 * sets.x[i]
-            q[3] += f1
-            q[4] += 0.5 * (f2 - f1 * sets.x[i])
-            q[5] -= f2 * sets.x[i]
-    sets.names[slot] = name
-    at = name & bucket
-    sets.link[slot] = sets.heads[at]
-    sets.heads[at] = slot
+    """Store the set of the tableau with its energy and polygon, and return its slot."""
+    stored = sets.stored
+    values = sets.tableau.values
+    n_nodes = sets.x.size
+    slot = take_slot(sets)
+    energy = stored.energy[slot]
+    energy[:] = 0.0
+    energy[0] = -sets.reference[REFERENCE_ENERGY]
+    energy[1] = -sets.reference[REFERENCE_LOAD]
+    energy[2] = sets.reference[REFERENCE_MOMENT]
+    for i in range(n_nodes):
+        constant = values[i, n_nodes]
+        by_d = values[i, n_nodes + 1]
+        by_t = values[i, n_nodes + 2]
+        stored.unknowns[slot, 0, i] = constant
+        stored.unknowns[slot, 1, i] = by_d
+        stored.unknowns[slot, 2, i] = by_t
+        stored.in_contact[slot, i] = sets.tableau.in_contact[i]
+        if sets.tableau.in_contact[i]:
+            energy[0] -= 0.5 * constant * sets.opening[i]
+            energy[1] += constant
+            energy[2] -= constant * sets.x[i]
+            energy[3] += by_d
+            energy[4] += 0.5 * (by_t - by_d * sets.x[i])
+            energy[5] -= by_t * sets.x[i]
+    stored.names[slot] = name
+    chain = name & (stored.heads.size - 1)
+    stored.links[slot] = stored.heads[chain]
+    stored.heads[chain] = slot
     write_polygon(sets, slot)
     return slot
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pivot_to_target_set(sets):
-    """Pivot the tableau to the contact set `sets.wanted`; False if a pivot is not positive."""
+def pivot_to_target(sets):
+    """Pivot the tableau to its target set; False if a pivot is not positive."""
+    tableau = sets.tableau
     for i in range(sets.x.size):
-        if sets.here[i] != sets.wanted[i] and not pivot(sets, i):
+        if tableau.in_contact[i] != tableau.target[i] and not pivot(sets, i):
             return False
     return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def build_set(sets, name):
-    """Compute the contact set `sets.wanted` and return its slot.
+    """Compute the target set of the tableau and return its slot.
 
     The slot is -1 if the compliance is not positive definite on the set.
 
-    name: name of the set. The tableau is pivoted to it. If it has lost its digits, it is computed anew and
-    pivoted once more. Cost: m^2 multiplications for each node that is exchanged.
+    name: name of the set. The tableau is pivoted to it. If it has lost its digits, it is computed anew
+    and pivoted once more. Cost: m^2 multiplications for each node that is exchanged.
     """
-    if not pivot_to_target_set(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
+    if not pivot_to_target(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
         reset_tableau(sets)
-        if not pivot_to_target_set(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
+        if not pivot_to_target(sets) or refine_rows(sets) > MAX_TABLEAU_RESIDUAL:
             return -1
     return store_set(sets, name)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_stored(sets, name):
-    """Return the slot of the set `wanted`, or -1 if it is not stored.
+    """Return the slot of the target set of the tableau, or -1 if it is not stored.
 
     name: name of the set; sets of equal names are compared node by node.
     """
-    k = sets.heads[name & (sets.heads.size - 1)]
-    while k >= 0:
-        if sets.names[k] == name:
-            same = True
+    stored = sets.stored
+    slot = stored.heads[name & (stored.heads.size - 1)]
+    while slot >= 0:
+        if stored.names[slot] == name:
+            is_equal = True
             for i in range(sets.x.size):
-                if sets.on[k, i] != sets.wanted[i]:
-                    same = False
+                if stored.in_contact[slot, i] != sets.tableau.target[i]:
+                    is_equal = False
                     break
-            if same:
-                return k
-        k = sets.link[k]
-    return k
+            if is_equal:
+                return slot
+        slot = stored.links[slot]
+    return slot
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
-def check_set(sets, k, d, t):
-    """Return whether set k holds at a motion, and the force and gap below which nodes fail.
+def check_set(sets, slot, d, t):
+    """Check whether a set holds at a motion (d [m], t [rad]).
 
-    d [m], t [rad]: motion of the holder. Both bounds [N] and [m] are <= 0, by the rounding error of a force and of a
-    gap.
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+    slot : int
+    d, t : float
+
+    Returns
+    -------
+    holds : bool
+    min_force, min_gap : float
+        Force [N] and gap [m] below which a node fails; both are <= 0, by the rounding error of a force
+        and of a gap.
     """
-    r0, r1, r2, on = sets.rows[k, 0], sets.rows[k, 1], sets.rows[k, 2], sets.on[k]
-    top, compute_energy, deep = 0.0, 0.0, 0.0
-    for i in range(on.size):
-        y = r0[i] + r1[i] * d + r2[i] * t
-        term = abs(r0[i]) + abs(r1[i] * d) + abs(r2[i] * t)
-        top = max(top, term if on[i] else 0.0)
-        compute_energy = min(compute_energy, y if on[i] else 0.0)
-        deep = min(deep, 0.0 if on[i] else y)
-    force = -ROUND_OFF * top
-    gap = -ROUND_OFF * (sets.base[3] + abs(d) + abs(t) * max(abs(sets.x[0]), abs(sets.x[-1])))
-    return compute_energy >= force and deep >= gap, force, gap
+    constant = sets.stored.unknowns[slot, 0]
+    by_d = sets.stored.unknowns[slot, 1]
+    by_t = sets.stored.unknowns[slot, 2]
+    in_contact = sets.stored.in_contact[slot]
+    scale = 0.0
+    smallest_force = 0.0
+    smallest_gap = 0.0
+    for i in range(in_contact.size):
+        value = constant[i] + by_d[i] * d + by_t[i] * t
+        term = abs(constant[i]) + abs(by_d[i] * d) + abs(by_t[i] * t)
+        scale = max(scale, term if in_contact[i] else 0.0)
+        smallest_force = min(smallest_force, value if in_contact[i] else 0.0)
+        smallest_gap = min(smallest_gap, 0.0 if in_contact[i] else value)
+    min_force = -ROUND_OFF * scale
+    arm = max(abs(sets.x[0]), abs(sets.x[-1]))
+    min_gap = -ROUND_OFF * (sets.reference[REFERENCE_OPENING] + abs(d) + abs(t) * arm)
+    return smallest_force >= min_force and smallest_gap >= min_gap, min_force, min_gap
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def exchange_failing(sets, k, d, t, force, gap, is_single):
-    """Write set k with its failing nodes exchanged to `wanted`, and return its name.
+def exchange_failing(sets, slot, d, t, min_force, min_gap, is_single):
+    """Write a set with its failing nodes exchanged to the target of the tableau.
 
-    force [N], gap [m]: bounds from `check_set`; is_single: only the first failing node is exchanged.
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+    slot : int
+    d, t : float
+        Motion [m] and [rad].
+    min_force, min_gap : float
+        Bounds from `check_set`.
+    is_single : bool
+        Whether only the first failing node is exchanged.
+
+    Returns
+    -------
+    int
+        Name of the new set.
     """
-    name, searching = sets.names[k], True
+    stored = sets.stored
+    name = stored.names[slot]
+    is_searching = True
     for i in range(sets.x.size):
-        on = sets.on[k, i]
-        y = sets.rows[k, 0, i] + sets.rows[k, 1, i] * d + sets.rows[k, 2, i] * t
-        fails = searching and y < (force if on else gap)
+        in_contact = stored.in_contact[slot, i]
+        value = stored.unknowns[slot, 0, i] + stored.unknowns[slot, 1, i] * d
+        value += stored.unknowns[slot, 2, i] * t
+        fails = is_searching and value < (min_force if in_contact else min_gap)
         if fails:
-            name ^= sets.node[i]
-            searching = not is_single
-        sets.wanted[i] = on != fails
+            name ^= stored.node_names[i]
+            is_searching = not is_single
+        sets.tableau.target[i] = in_contact != fails
     return name
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def find_set(sets, k, d, t):
-    """Find the contact set at a motion (d [m], t [rad]) from set k; return its slot or -1.
+def find_set(sets, slot, d, t):
+    """Find the contact set at a motion (d [m], t [rad]) from that in a slot; return its slot or -1.
 
     Cost: 0.5 us for 400 nodes on a known set, 0.3 ms for a new one that differs by one node.
     """
     for count in range(N_BLOCK_EXCHANGES + 10 * sets.x.size):
-        if is_inside(sets, k, d, t):
-            return k
-        good, force, gap = check_set(sets, k, d, t)
-        if good:
-            return k
-        name = exchange_failing(sets, k, d, t, force, gap, count >= N_BLOCK_EXCHANGES)
-        found = find_stored(sets, name)
-        k = found if found >= 0 else build_set(sets, name)
-        if k < 0:
-            return k
+        if is_inside(sets, slot, d, t):
+            return slot
+        holds, min_force, min_gap = check_set(sets, slot, d, t)
+        if holds:
+            return slot
+        is_single = count >= N_BLOCK_EXCHANGES
+        name = exchange_failing(sets, slot, d, t, min_force, min_gap, is_single)
+        slot = find_stored(sets, name)
+        if slot < 0:
+            slot = build_set(sets, name)
+        if slot < 0:
+            return slot
     return -1
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def build_first_set(sets, name):
-    """Compute the contact set `sets.wanted` from an empty tableau and return its slot.
+    """Compute the target set of the tableau from an empty tableau and return its slot.
 
     name: name of the set. The slot is -1 if the compliance is not positive definite on the set.
     """
@@ -327,25 +354,41 @@ def build_first_set(sets, name):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def compute_energy(sets, k, h, turn):
-    """Return the energy [J] of the preloaded contact on set k, and the slopes of the energy.
+def compute_energy(sets, slot, heave, rotation):
+    """Compute the energy [J] of the preloaded contact on a set, and its slopes.
 
-    The slopes are those in heave h = -d and in rotation. The load is N0 less the slope in heave, the moment M0 less
-    that in rotation.
+    The slopes are those in heave = -d and in rotation. The load is N0 less the slope in heave, the
+    moment M0 less that in rotation.
     """
-    q, d = sets.energy[k], -h
-    by_d, by_t = q[3] * d + q[4] * turn, q[4] * d + q[5] * turn
-    return q[0] + d * (q[1] + 0.5 * by_d) + turn * (q[2] + 0.5 * by_t), -(q[1] + by_d), q[2] + by_t
+    energy = sets.stored.energy[slot]
+    d = -heave
+    by_d = energy[3] * d + energy[4] * rotation
+    by_t = energy[4] * d + energy[5] * rotation
+    value = energy[0] + d * (energy[1] + 0.5 * by_d) + rotation * (energy[2] + 0.5 * by_t)
+    return value, -(energy[1] + by_d), energy[2] + by_t
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def press_state(sets, k, d, t, force):
-    """Return load [N], moment [N m] and energy [J] of set k, and write the nodal forces.
+def press_state(sets, slot, d, t, force):
+    """Compute load [N], moment [N m] and energy [J] of a set at a motion, and write the forces.
 
-    d [m], t [rad]: motion of the holder. force: (m,) array [N] for the forces, which are >= 0.
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+    slot : int
+    d, t : float
+        Motion [m] and [rad].
+    force : (m,) ndarray
+        Nodal forces [N] >= 0, written.
+
+    Returns
+    -------
+    load, moment, energy : float
     """
-    energy, slope, turn = compute_energy(sets, k, -d, t)
+    energy, heave_slope, rotation_slope = compute_energy(sets, slot, -d, t)
+    unknowns = sets.stored.unknowns
     for i in range(force.size):
-        y = sets.rows[k, 0, i] + sets.rows[k, 1, i] * d + sets.rows[k, 2, i] * t
-        force[i] = max(y, 0.0) if sets.on[k, i] else 0.0
-    return sets.base[0] - slope, sets.base[1] - turn, energy
+        value = unknowns[slot, 0, i] + unknowns[slot, 1, i] * d + unknowns[slot, 2, i] * t
+        force[i] = max(value, 0.0) if sets.stored.in_contact[slot, i] else 0.0
+    load = sets.reference[REFERENCE_LOAD] - heave_slope
+    return load, sets.reference[REFERENCE_MOMENT] - rotation_slope, energy

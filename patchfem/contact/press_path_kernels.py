@@ -1,4 +1,7 @@
-"""Compiled mean of the contact forces along a straight increment of the holder's motion."""
+"""Compiled mean of the contact forces along a straight increment of the holder's motion.
+
+`sets` is a `set_arrays.SetArrays`, `slot` the slot of a stored set; motions are d [m] and t [rad].
+"""
 
 import numpy as np
 
@@ -6,60 +9,126 @@ from ..compiled.jit import njit
 from .polygon_kernels import NJIT_NO_REFCOUNT, find_exit, is_inside
 from .press_kernels import FASTMATH_MINIMUM, check_set, compute_energy, find_set
 
+# fraction of the increment beyond a border at which the next set is determined; it is larger than
+# rounding errors
+BORDER_STEP = 1e-10
+
 
 @njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
-def find_first_failure(sets, k, d, t, dd, dt, force, gap):
-    """Return the fraction of an increment of motion at which a node of set k fails first.
-
-    The increment (dd [m], dt [rad]) begins at (d, t).
-
-    force [N], gap [m]: bounds of nodes in contact and of open nodes, from `press_kernels.check_set`.
-    """
-    r0, r1, r2, on = sets.rows[k, 0], sets.rows[k, 1], sets.rows[k, 2], sets.on[k]
-    out = np.inf
-    for i in range(on.size):
-        rate = r1[i] * dd + r2[i] * dt
-        here = r0[i] + r1[i] * d + r2[i] * t - (force if on[i] else gap)
-        if rate < 0:
-            out = min(out, max(here, 0.0) / -rate)
-    return out
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def cross_side(sets, k, side, d, t):
-    """Return the slot of the contact set beyond a side of set k; -1 if none is found.
-
-    d [m], t [rad]: motion just beyond the side. side: -1 if the side is not known. The set is stored with the side, so
-    the next crossing needs no search.
-    """
-    if side >= 0:
-        following = sets.beside[k, side]
-        name = sets.names[k] ^ sets.node[sets.edge[k, side]]
-        if following >= 0 and sets.names[following] == name and is_inside(sets, following, d, t):
-            return following
-        following = find_set(sets, k, d, t)
-        if following >= 0 and sets.names[following] == name and following != k:
-            sets.beside[k, side] = following
-        return following
-    return find_set(sets, k, d, t)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def path_mean(sets, k, h, turn, dh, dt, out):
-    """Average the slopes of the energy of the preloaded contact along an increment of motion.
-
-    The mean times the increment is the difference of the energies (a discrete gradient), and the mean is
-    itself the gradient of a convex function.
+def find_first_failure(sets, slot, d, t, dd, dt, min_force, min_gap):
+    """Return the fraction of an increment of motion at which a node of a set fails first.
 
     Parameters
     ----------
-    sets : press_kernels.SetArrays
-    k : int
+    sets : set_arrays.SetArrays
+    slot : int
+    d, t : float
+        Motion at which the increment begins.
+    dd, dt : float
+        The increment.
+    min_force, min_gap : float
+        Bounds of nodes in contact and of open nodes, from `press_kernels.check_set`.
+
+    Returns
+    -------
+    float
+        inf if no node fails.
+    """
+    constant = sets.stored.unknowns[slot, 0]
+    by_d = sets.stored.unknowns[slot, 1]
+    by_t = sets.stored.unknowns[slot, 2]
+    in_contact = sets.stored.in_contact[slot]
+    fraction = np.inf
+    for i in range(in_contact.size):
+        rate = by_d[i] * dd + by_t[i] * dt
+        value = constant[i] + by_d[i] * d + by_t[i] * t
+        margin = value - (min_force if in_contact[i] else min_gap)
+        if rate < 0:
+            fraction = min(fraction, max(margin, 0.0) / -rate)
+    return fraction
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def cross_side(sets, slot, side, d, t):
+    """Return the slot of the contact set beyond a side of a set; -1 if none is found.
+
+    d, t: motion just beyond the side. side: -1 if the side is not known. The set is stored with the
+    side, so the next crossing needs no search.
+    """
+    if side < 0:
+        return find_set(sets, slot, d, t)
+    stored = sets.stored
+    polygons = sets.polygons
+    following = polygons.neighbours[slot, side]
+    name = stored.names[slot] ^ stored.node_names[polygons.nodes[slot, side]]
+    if following >= 0 and stored.names[following] == name and is_inside(sets, following, d, t):
+        return following
+    following = find_set(sets, slot, d, t)
+    if following >= 0 and stored.names[following] == name and following != slot:
+        polygons.neighbours[slot, side] = following
+    return following
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def find_border(sets, slot, start, heave, rotation, heave_change, rotation_change):
+    """Find where an increment of motion leaves a set, from the fraction `start` of the increment on.
+
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+    slot : int
+    start : float
+    heave, rotation, heave_change, rotation_change : float
+        Motion at the beginning of the increment, and the increment.
+
+    Returns
+    -------
+    end : float
+        Fraction of the increment, 1 if the set holds up to its end.
+    side : int
+        Side of the polygon of the set, -1 if it is not known.
+    """
+    end_d = -(heave + heave_change)
+    end_t = rotation + rotation_change
+    if is_inside(sets, slot, end_d, end_t):
+        return 1.0, -1
+    d = -(heave + start * heave_change)
+    t = rotation + start * rotation_change
+    remainder = 1 - start
+    fraction, side = find_exit(
+        sets, slot, d, t, -remainder * heave_change, remainder * rotation_change
+    )
+    if side >= 0:
+        return min(start + max(fraction, 0.0) * remainder, 1.0), side
+    holds, min_force, min_gap = check_set(sets, slot, end_d, end_t)
+    if holds:
+        return 1.0, -1
+    _, start_force, start_gap = check_set(sets, slot, d, t)
+    min_force = min(min_force, start_force)
+    min_gap = min(min_gap, start_gap)
+    fraction = find_first_failure(
+        sets, slot, d, t, -heave_change, rotation_change, min_force, min_gap
+    )
+    return min(start + max(fraction, 0.0), 1.0), -1
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
+    """Average the slopes of the energy of the preloaded contact along an increment of motion.
+
+    The mean times the increment is the difference of the energies (a discrete gradient), and the mean
+    is itself the gradient of a convex function.
+
+    Parameters
+    ----------
+    sets : set_arrays.SetArrays
+    slot : int
         Slot of the set at the beginning.
-    h, turn, dh, dt : float
+    heave, rotation, heave_change, rotation_change : float
         Heave [m] and rotation [rad] at the beginning, and their increments.
     out : (9,) ndarray
-        Written: mean slopes (2,), energy, slopes at the end (2,), derivatives of the mean by (dh, dt) (2, 2).
+        Written: mean slopes (2,), energy, slopes at the end (2,), derivatives of the mean by the
+        increment (2, 2).
 
     Returns
     -------
@@ -67,42 +136,42 @@ def path_mean(sets, k, h, turn, dh, dt, out):
         Slot of the set at the end, -1 if none is found.
     """
     out[:] = 0.0
-    at = 0.0
-    # fraction of the increment beyond a border at which the next set is determined; it is larger
-    # than rounding errors
-    small = 1e-10
+    start = 0.0
+    border_step = BORDER_STEP
     # the number of sets is limited, because rounding errors may make a path return to the same sets
     for _ in range(20 * sets.x.size + 100):
-        end, side = 1.0, -1
-        if not is_inside(sets, k, -(h + dh), turn + dt):
-            d, t = -(h + at * dh), turn + at * dt
-            share, side = find_exit(sets, k, d, t, -(1 - at) * dh, (1 - at) * dt)
-            end = min(at + max(share, 0.0) * (1 - at), 1.0)
-            if side < 0:
-                good, force, gap = check_set(sets, k, -(h + dh), turn + dt)
-                if not good:
-                    _, f, g = check_set(sets, k, d, t)
-                    share = find_first_failure(sets, k, d, t, -dh, dt, min(force, f), min(gap, g))
-                    end = min(at + max(share, 0.0), 1.0)
-        _, a1, a2 = compute_energy(sets, k, h + at * dh, turn + at * dt)
-        energy, b1, b2 = compute_energy(sets, k, h + end * dh, turn + end * dt)
-        q, part, bend = sets.energy[k], 0.5 * (end - at), 0.5 * (end * end - at * at)
-        out[0] += part * (a1 + b1)
-        out[1] += part * (a2 + b2)
-        out[5] += bend * q[3]
-        out[6] -= bend * q[4]
-        out[8] += bend * q[5]
-        at = end
-        if at >= 1.0:
-            out[2], out[3], out[4], out[7] = energy, b1, b2, out[6]
-            return k
-        beyond = min(at + small, 1.0)
-        following = cross_side(sets, k, side, -(h + beyond * dh), turn + beyond * dt)
+        end, side = find_border(sets, slot, start, heave, rotation, heave_change, rotation_change)
+        _, heave_slope, rotation_slope = compute_energy(
+            sets, slot, heave + start * heave_change, rotation + start * rotation_change
+        )
+        energy, end_heave_slope, end_rotation_slope = compute_energy(
+            sets, slot, heave + end * heave_change, rotation + end * rotation_change
+        )
+        coefficients = sets.stored.energy[slot]
+        half_length = 0.5 * (end - start)
+        first_moment = 0.5 * (end * end - start * start)
+        out[0] += half_length * (heave_slope + end_heave_slope)
+        out[1] += half_length * (rotation_slope + end_rotation_slope)
+        out[5] += first_moment * coefficients[3]
+        out[6] -= first_moment * coefficients[4]
+        out[8] += first_moment * coefficients[5]
+        start = end
+        if start >= 1.0:
+            out[2] = energy
+            out[3] = end_heave_slope
+            out[4] = end_rotation_slope
+            out[7] = out[6]
+            return slot
+        beyond = min(start + border_step, 1.0)
+        d = -(heave + beyond * heave_change)
+        following = cross_side(sets, slot, side, d, rotation + beyond * rotation_change)
         if following < 0:
             return following
         # a search that returns the same set is repeated farther on
-        small = 10 * small if following == k else 1e-10
-        if following == k:
-            at = beyond
-        k = following
+        if following == slot:
+            border_step *= 10
+            start = beyond
+        else:
+            border_step = BORDER_STEP
+        slot = following
     return -1

@@ -10,6 +10,7 @@ from pieces import LOAD, coated_pair, rough
 
 from patchfem.compiled import load
 from patchfem.contact.contact_sets import ContactSets
+from patchfem.contact.set_arrays import N_BUILT, N_PIVOTS, N_STORED, name_set
 from patchfem.contact.unilateral import press, solve_forces
 from patchfem.core import PatchfemError
 
@@ -29,9 +30,8 @@ def crowned(cells: int = 40, radius: float = 50.0) -> tuple:
 
 def compiled_sets(sets, room: float = 64e6) -> tuple:
     """(arrays of the search, slot of the reference set)."""
-    arrays = sets.arrays(room)
-    kept = PRESS.SetArrays(**arrays)
-    return kept, PRESS.build_first_set(kept, sets.name(arrays))
+    kept = sets.make_arrays(room)
+    return kept, PRESS.build_first_set(kept, name_set(kept, sets.reference.in_contact))
 
 
 def solved_at(sets, d: float, t: float) -> np.ndarray:
@@ -75,8 +75,8 @@ def test_exact_forces_are_those_of_the_solver(room):
         slot = PRESS.find_set(kept, slot, d, t)
         check_state(sets, PRESS.press_state(kept, slot, d, t, force), force, d, t, 1e-12)
         apart += not force.any()
-    assert apart >= 5 and kept.meta[2] > 16
-    assert room or kept.names.size == kept.meta[0] == 16
+    assert apart >= 5 and kept.counters[N_BUILT] > 16
+    assert room or kept.stored.names.size == kept.counters[N_STORED] == 16
 
 
 def test_exact_many_pivots_do_not_wear_the_tableau():
@@ -86,7 +86,7 @@ def test_exact_many_pivots_do_not_wear_the_tableau():
     force = np.zeros(sets.x.size)
     for d, t in path(sets, state, 400):
         slot = PRESS.find_set(kept, slot, d, t)
-    assert kept.meta[3] > 3000
+    assert kept.counters[N_PIVOTS] > 3000
     check_state(sets, PRESS.press_state(kept, slot, d, t, force), force, d, t, 1e-12)
 
 

@@ -216,7 +216,7 @@ class Faces(NamedTuple):
 class Pressing(NamedTuple):
     """A load that changes, `march.pressing_kernels`.
 
-    sets: `contact.press_kernels.SetArrays`; rows (3, n): slide, heave and pitch per coordinate; beta (3, 3): what
+    sets: `contact.set_arrays.SetArrays`; rows (3, n): slide, heave and pitch per coordinate; beta (3, 3): what
     constant forces in a step take from them; arm (1,) [m]: half the length of the patch; force (2,): mu_s, mu_k of a
     law on the resultant load; now (m,): nodal forces [N]; loads (steps + 1,) [N]: prescribed load at the steps, empty
     where the contact says it; slot (1,): of the present contact set, below 0 where none fits; mean (1,): friction

@@ -9,6 +9,7 @@ and what a rig does not have is not compiled.
 """
 
 from ...compiled.jit import njit
+from ...contact.set_arrays import REFERENCE_LOAD
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..interfaces import element_kernels as contact
 from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
@@ -74,7 +75,7 @@ def march(first, steps, motion, modal_system, table, c, j, n, travel, ledger, ro
     beta = modal_system.beta
     if PRESSED:
         n.few[:] = 0.0
-        n.few[0] = n.sets.base[0]
+        n.few[0] = n.sets.reference[REFERENCE_LOAD]
     for i in range(steps + 1):
         drive = table[(first + i - 1) % around, 4 * size + 2] if STOPS else 0.0
         q, v, out, force, energy, slip, beside = seen(

@@ -13,6 +13,7 @@ import numpy as np
 from ...compiled.jit import njit
 from ...contact.press_kernels import compute_energy, find_set, press_state
 from ...contact.press_path_kernels import path_mean
+from ...contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT, REFERENCE_STIFFNESS
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ..interfaces import element_kernels as contact
 from ..modal_kernels import free_rate, free_slide
@@ -48,6 +49,7 @@ def press_step(n, k0, begin, f1, f2, turn, out):
     b12 = beta[1, 2]
     b21 = beta[2, 1]
     b22 = beta[2, 2]
+    softness = b11 + b22 / (arm * arm) + 2 / sets.reference[REFERENCE_STIFFNESS]
     dh = turn[0]
     dt = turn[1]
     old_h = dh
@@ -89,10 +91,10 @@ def press_step(n, k0, begin, f1, f2, turn, out):
                 turn[0] = old_h
                 turn[1] = old_t
                 k = path_mean(sets, k0, begin[0], begin[1], old_h, old_t, out)
-                return k, count, best / (b11 + b22 / (arm * arm) + 2 / sets.base[4])
+                return k, count, best / softness
         dh = old_h - part * step_h
         dt = old_t - part * step_t
-    return k, 100, best / (b11 + b22 / (arm * arm) + 2 / sets.base[4])
+    return k, 100, best / softness
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -101,7 +103,7 @@ def pressed(i, last, motion, mass, c, j, n, row):
     its row; what rubs knows its load. The energy [J]; n.slot < 0 where no contact set fits."""
     begin = n.few[17:22]
     load = n.few[0]
-    moment = n.sets.base[1]
+    moment = n.sets.reference[REFERENCE_MOMENT]
     m = row.size - 5
     begin[0], begin[1] = place_of(motion, n.rows, 1), place_of(motion, n.rows, 2)
     begin[2] = 0.0
@@ -115,7 +117,7 @@ def pressed(i, last, motion, mass, c, j, n, row):
         if n.slot[0] < 0:
             return 0.0
         begin[2], begin[3], begin[4] = compute_energy(n.sets, n.slot[0], begin[0], begin[1])
-        load = max(n.sets.base[0] - begin[3], 0.0)
+        load = max(n.sets.reference[REFERENCE_LOAD] - begin[3], 0.0)
         moment = moment - begin[4]
         if POINTED or last:
             press_state(n.sets, n.slot[0], -begin[0], begin[1], n.now)
@@ -248,7 +250,7 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
             force[0] = out[0]
             force[1] = out[1]
             count += its
-            after = 2 * max(n.sets.base[0] - out[0], 0.0) - load
+            after = 2 * max(n.sets.reference[REFERENCE_LOAD] - out[0], 0.0) - load
             if POINTED:
                 press_state(n.sets, end, -(begin[0] + turn[0]), begin[1] + turn[1], n.now)
         weigh(load, after, c, j, n)
@@ -291,5 +293,5 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
     n.mean[0] = used
     n.slot[0] = end
     if moves:
-        few[0] = max(n.sets.base[0] - out[3], 0.0)
+        few[0] = max(n.sets.reference[REFERENCE_LOAD] - out[3], 0.0)
     return dq, used, -count if bad else count

@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...compiled import load as compiled
-from ...contact.contact_sets import ContactSets, make_empty_polygons
+from ...contact.contact_sets import ContactSets
+from ...contact.set_arrays import N_BUILT, SetArrays, make_set_arrays, name_set
 from ...core import ModalBasis, PatchfemError, Response
 from ...effects import not_supported_message
 from ...friction.bonds.list_rows_kernels import STATUS
@@ -325,16 +326,17 @@ class VaryingLoadRun(Run):
         """The load at the start, and what rubs under it; the contact sets stand apart, for any run may ask them."""
         model = self.model
         press = compiled("contact.press_kernels")
-        parts = model.sets.arrays() if model.load is None else _one_point(model.preload)
-        x = parts["x"]
         slot = 0
-        self.sets = press.SetArrays(**parts)
+        if model.load is None:
+            self.sets = model.sets.make_arrays()
+        else:
+            self.sets = _one_point(model.preload)
+        x = self.sets.x
         now = np.full(x.size, model.preload)
         if model.load is None:
             heave, turn = model.rows[1:] @ self.state[0]
-            slot = press.find_set(
-                self.sets, press.build_first_set(self.sets, model.sets.name(parts)), -heave, turn
-            )
+            name = name_set(self.sets, model.sets.reference.in_contact)
+            slot = press.find_set(self.sets, press.build_first_set(self.sets, name), -heave, turn)
             press.press_state(self.sets, slot, -heave, turn, now)
         if model.pointed:
             self.contact = model.points(now)
@@ -405,7 +407,7 @@ class VaryingLoadRun(Run):
     def book(self) -> dict:
         """The energy ledger [J], contact sets made, pivots, tableaus made anew."""
         return super().book() | dict(
-            zip(("contact_sets", "pivots", "renewed"), map(int, self.sets.meta[2:]))
+            zip(("contact_sets", "pivots", "renewed"), map(int, self.sets.counters[N_BUILT:]))
         )
 
     def response(self, rows, number) -> Response:
@@ -424,28 +426,11 @@ class VaryingLoadRun(Run):
         )
 
 
-def _one_point(load: float) -> dict:
-    """Arrays of contact sets that are never asked, for a load that is prescribed."""
-    return {
-        "c": np.ones((1, 1)),
-        "x": np.zeros(1),
-        "b": np.zeros(1),
-        "tableau": np.zeros((1, 4)),
-        "here": np.zeros(1, bool),
-        "rows": np.zeros((1, 3, 1)),
-        "on": np.zeros((1, 1), bool),
-        "energy": np.zeros((1, 6)),
-        "names": np.zeros(1, np.int64),
-        "heads": np.full(2, -1, np.int64),
-        "link": np.full(1, -1, np.int64),
-        "node": np.zeros(1, np.int64),
-        "wanted": np.zeros(1, bool),
-        "base": np.array([load, 0.0, 0.0, 1.0, 1.0]),
-        "side": np.zeros((2, 3, 1)),
-        "row": np.zeros(4),
-        "meta": np.zeros(5, np.int64),
-        **make_empty_polygons(1),
-    }
+def _one_point(load: float) -> SetArrays:
+    """Return arrays of contact sets that no kernel reads, for a prescribed load on one point."""
+    point = np.zeros(1)
+    reference = (load, 0.0, 0.0, 1.0, 1.0)
+    return make_set_arrays(np.ones((1, 1)), point, point, reference, np.zeros(1, bool), n_slots=1)
 
 
 def march(

@@ -1,0 +1,151 @@
+"""Records of arrays in which the compiled search stores contact sets.
+
+`press_kernels` searches for contact sets and `polygon_kernels` computes where each holds.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+MAX_POLYGON_SIDES = 16  # largest number of sides; sets with more are checked node by node
+# indices into `SetArrays.reference`
+REFERENCE_LOAD = 0  # load of the reference state [N]
+REFERENCE_MOMENT = 1  # moment of the reference state about x = 0 [N m]
+REFERENCE_ENERGY = 2  # elastic energy of the reference state [J]
+REFERENCE_OPENING = 3  # largest magnitude of its openings [m]
+REFERENCE_STIFFNESS = 4  # dN/d(approach) of the reference state [N/m]
+# indices into `SetArrays.counters`
+N_STORED = 0  # number of sets that are stored
+NEXT_SLOT = 1  # slot of the next set
+N_BUILT = 2  # number of sets computed so far
+N_PIVOTS = 3  # number of pivots so far
+N_RESETS = 4  # number of times that the tableau was computed anew
+
+
+class Tableau(NamedTuple):
+    """Tableau [T | R] of the linear complementarity problem, pivoted to one contact set.
+
+    - values (m, m + 3).
+    - in_contact (m,): nodes of the set to which it is pivoted.
+    - target (m,): nodes of the set that is searched for.
+    - row (m + 3,), forces (3, m) and residuals (3, m): workspaces.
+    """
+
+    values: np.ndarray
+    in_contact: np.ndarray
+    target: np.ndarray
+    row: np.ndarray
+    forces: np.ndarray
+    residuals: np.ndarray
+
+
+class StoredSets(NamedTuple):
+    """Contact sets in k slots, found by their 64-bit names.
+
+    The name of a set is the exclusive or of the names of its nodes.
+
+    - in_contact (k, m): nodes in contact.
+    - unknowns (k, 3, m): force [N] of nodes in contact and gap [m] of the others per (1, d, t).
+    - energy (k, 6): coefficients of 1, d, t, d^2/2, d t, t^2/2 of the energy of the preloaded contact.
+    - names (k,): names of the sets; node_names (m,): names of the nodes.
+    - heads, links (k,): hash chains of the names.
+    """
+
+    in_contact: np.ndarray
+    unknowns: np.ndarray
+    energy: np.ndarray
+    names: np.ndarray
+    node_names: np.ndarray
+    heads: np.ndarray
+    links: np.ndarray
+
+
+class Polygons(NamedTuple):
+    """Polygons of the motions at which the sets in k slots hold.
+
+    - n_sides (k,): number of sides; 0 without a polygon, and then all nodes have to be checked.
+    - nodes (k, MAX_POLYGON_SIDES): node of each side.
+    - neighbours (k, MAX_POLYGON_SIDES): slot of the set beyond each side, or -1.
+    - limits (k, 2): force [N] and gap [m] below which a node fails.
+    - corners (2, 3, 4 MAX_POLYGON_SIDES): workspace.
+    """
+
+    n_sides: np.ndarray
+    nodes: np.ndarray
+    neighbours: np.ndarray
+    limits: np.ndarray
+    corners: np.ndarray
+
+
+class SetArrays(NamedTuple):
+    """Interface of m nodes, the search for its contact sets, and the sets found so far.
+
+    - compliance (m, m) [m/N]; x (m,) [m].
+    - opening (m,): openings of the reference state without forces [m].
+    - reference (5,): properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_STIFFNESS`.
+    - tableau, stored, polygons: see there.
+    - counters (5,): from `N_STORED` to `N_RESETS`.
+    """
+
+    compliance: np.ndarray
+    x: np.ndarray
+    opening: np.ndarray
+    reference: np.ndarray
+    tableau: Tableau
+    stored: StoredSets
+    polygons: Polygons
+    counters: np.ndarray
+
+
+def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int) -> SetArrays:
+    """Return the arrays of a search that has not stored any contact set.
+
+    Parameters
+    ----------
+    compliance : (m, m) ndarray [m/N]
+    x, opening : (m,) ndarray [m]
+    reference : (5,) sequence of float
+        Properties of the reference state, from `REFERENCE_LOAD` to `REFERENCE_STIFFNESS`.
+    in_contact : (m,) bool ndarray
+        Contact set of the reference state, the first target of the search.
+    n_slots : int
+        Number of contact sets that can be stored.
+    """
+    m = x.size
+    node_names = np.random.default_rng(5).integers(-(2**63), 2**63, m, dtype=np.int64)
+    return SetArrays(
+        compliance.copy(),
+        x.copy(),
+        opening.copy(),
+        np.array(reference, float),
+        Tableau(
+            values=np.zeros((m, m + 3)),
+            in_contact=np.zeros(m, bool),
+            target=in_contact.copy(),
+            row=np.zeros(m + 3),
+            forces=np.zeros((3, m)),
+            residuals=np.zeros((3, m)),
+        ),
+        StoredSets(
+            in_contact=np.zeros((n_slots, m), bool),
+            unknowns=np.zeros((n_slots, 3, m)),
+            energy=np.zeros((n_slots, 6)),
+            names=np.zeros(n_slots, np.int64),
+            node_names=node_names,
+            heads=np.full(1 << n_slots.bit_length(), -1, np.int64),
+            links=np.zeros(n_slots, np.int64),
+        ),
+        Polygons(
+            n_sides=np.zeros(n_slots, np.int64),
+            nodes=np.zeros((n_slots, MAX_POLYGON_SIDES), np.int64),
+            neighbours=np.zeros((n_slots, MAX_POLYGON_SIDES), np.int64),
+            limits=np.zeros((n_slots, 2)),
+            corners=np.zeros((2, 3, 4 * MAX_POLYGON_SIDES)),
+        ),
+        np.zeros(5, np.int64),
+    )
+
+
+def name_set(sets: SetArrays, in_contact) -> int:
+    """Return the 64-bit name of the contact set with the nodes `in_contact` (m,)."""
+    return int(np.bitwise_xor.reduce(sets.stored.node_names[in_contact], initial=0))
