@@ -149,9 +149,7 @@ def find_floors(model, state, free, form) -> list:
         for start in _find_starts(model, state, form, left):
             fit = fit_biweight(model, concentrate(model, start, rigid), free, rounds=20)
             floors.append(_make_floor(model, fit))
-        left = [
-            block for block in left if not any(_lies_on(model, floor, block) for floor in floors)
-        ]
+            left = _drop_blocks(model, floors[-1], left)
     return floors
 
 
@@ -162,11 +160,15 @@ def _make_floor(model, fit: Fit) -> Floor:
     return Floor(fit.state, fit.scale, unworn, float((depth < -2 * MAX_UNWORN * fit.scale).mean()))
 
 
-def _lies_on(model, floor: Floor, block) -> bool:
-    """Whether the mode of a block lies on a floor."""
+def _drop_blocks(model, floor: Floor, blocks: list) -> list:
+    """Drop the blocks whose mode lies on a floor, and those with too few heights for a mode."""
     depth, _ = model.linearize(floor.state)
-    part = depth[block[block < depth.size]]
-    return part.size < 3 or abs(estimate_mode(part)) <= MAX_UNWORN * floor.scale
+    kept = []
+    for block in blocks:
+        part = depth[block[block < depth.size]]
+        if part.size >= 3 and abs(estimate_mode(part)) > MAX_UNWORN * floor.scale:
+            kept.append(block)
+    return kept
 
 
 def _find_starts(model, state, form, blocks) -> list:

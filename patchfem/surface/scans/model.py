@@ -80,6 +80,17 @@ def rotation(angle: float) -> np.ndarray:
     return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 
+class _Linearized(NamedTuple):
+    """Difference (k,) [m] of both scans without a plane, and Jacobian (k, 6), at a place.
+
+    place: rotation [rad] and shifts [m] of the second scan.
+    """
+
+    place: tuple
+    difference: np.ndarray
+    jacobian: np.ndarray
+
+
 class ScanModel:
     """Depth of a second scan below a first one at a random sample of heights of the first.
 
@@ -136,6 +147,7 @@ class ScanModel:
             for order in ((0, 1), (1, 0))
         ]
         self.slopes = np.column_stack(parts) / self.before.steps
+        self._linearized = None
 
     def smooth_slope(self, scale: float) -> None:
         """Smooth the slopes until the noise [m] of the heights contributes little to them.
@@ -169,18 +181,30 @@ class ScanModel:
         return map_coordinates(self.spline, places, order=3, prefilter=False, mode="mirror")
 
     def linearize(self, state) -> tuple:
-        """Return the depth (k,) [m] and its Jacobian (k, 6) at the sampled heights in the overlap."""
+        """Return the depth (k,) [m] and its Jacobian (k, 6) at the sampled heights in the overlap.
+
+        A fit of the plane alone calls this many times with the same place of the second scan, so the
+        heights that were read there are kept.
+        """
+        place = tuple(state[3:])
+        if self._linearized is None or self._linearized.place != place:
+            self._linearized = self._linearize_place(state, place)
+        _, difference, jacobian = self._linearized
+        return difference + (state[0] + jacobian[:, 1:3] @ state[1:3]), jacobian
+
+    def _linearize_place(self, state, place: tuple) -> "_Linearized":
+        """Read the second scan at a place, and compute the Jacobian there."""
         at, slopes, z = self.at, self.slopes, self.before.z[self.rows, self.columns]
         places = self.places(at, state)
         if not self.is_cut:
             inside = self.overlap(places)
             at, slopes, z, places = at[inside], slopes[inside], z[inside], places[:, inside]
         along = at / self.before.half
-        depth = z - self.read(places)
-        depth += state[0] + along @ state[1:3]
+        difference = z - self.read(places)
         by_angle = slopes[:, 0] * at[:, 1] - slopes[:, 1] * at[:, 0]
         by_shift = -slopes @ rotation(state[Parameter.ANGLE]).T
-        return depth, np.column_stack([np.ones(depth.size), along, by_angle, by_shift])
+        jacobian = np.column_stack([np.ones(difference.size), along, by_angle, by_shift])
+        return _Linearized(place, difference, jacobian)
 
     def limit_step(self, step, free) -> np.ndarray:
         """Limit a step of the fit to a displacement of a few pixels."""
@@ -207,6 +231,7 @@ class ScanModel:
         out.rows = self.rows[chosen]
         out.columns = self.columns[chosen]
         out.slopes = self.slopes[chosen]
+        out._linearized = None
         return out
 
     def cut(self, state) -> "ScanModel":
