@@ -1,4 +1,4 @@
-"""A backbone on disk: backbone.csv, backbone.nc, a picture and a page; its answer as text."""
+"""A backbone on disk (table, netCDF, picture and page), and its results as text."""
 
 from html import escape
 from typing import NamedTuple
@@ -23,7 +23,7 @@ HEAD = (
     "damping",
     "damping_error",
 )
-VARIABLES = {  # Unit and description of each variable of backbone.nc.
+VARIABLES = {  # unit and description of each variable of backbone.nc
     "frequency": ("Hz", "frequency"),
     "frequency_error": ("Hz", "error of the frequency"),
     "damping": ("1", "damping ratio, structure and friction together"),
@@ -43,8 +43,8 @@ LEFT_OUT = (
     " Frequencies with errors larger than the frequency itself are left out of the picture, not "
     "of the table."
 )
-MAX_WHOLE = 25  # Amplitudes of a curve that the screen shows in full.
-N_SHOWN = 9  # Amplitudes that the screen shows of a longer curve.
+MAX_WHOLE = 25  # Number of amplitudes up to which the screen shows all of them.
+N_SHOWN = 9  # Number of amplitudes of a longer curve that the screen shows.
 FLOOR_FACTOR = 0.1  # Lower end of a bar on a logarithmic axis / smallest value.
 
 
@@ -164,7 +164,7 @@ def _marks(method: str, x, y, errors, is_log: bool) -> list:
 
 
 def _has_small_error(curve: Curve) -> np.ndarray:
-    """Whether the frequency of each point (k,) exceeds its error; all if none does."""
+    """Return whether the frequency of each point (k,) exceeds its error; all True if none does."""
     found = curve.frequency_error <= curve.frequency
     return found | (not found.any())
 
@@ -191,7 +191,7 @@ def page(found: Backbone, title: str) -> str:
 
 
 def _figure(found: Backbone, made: list) -> str:
-    """Return the places of the charts on the page, with a caption."""
+    """Return the containers of the charts on the page, with a caption."""
     if not made:
         return "<p>No curve was found.</p>"
     cells = "".join(
@@ -217,6 +217,7 @@ def _methods(found: Backbone) -> str:
 
 
 def _values_table(found: Backbone) -> str:
+    """Return a table of all points with errors."""
     rows = []
     for method, curve in found.curves.items():
         for k in range(curve.amplitude.size):
@@ -233,6 +234,7 @@ class FormattedPoint(NamedTuple):
 
 
 def _format_point(curve: Curve, k: int) -> FormattedPoint:
+    """Format a point of a curve."""
     return FormattedPoint(
         formatting.format_quantity(curve.amplitude[k], "m", 3),
         formatting.format_value(curve.frequency[k], curve.frequency_error[k], unit="Hz"),
@@ -241,7 +243,7 @@ def _format_point(curve: Curve, k: int) -> FormattedPoint:
 
 
 def _format_stuck(found: Backbone) -> str:
-    """Format the frequency with a sticking contact, with its error where it is known."""
+    """Format the frequency with a sticking contact, with its error if it is known."""
     _, stuck, error = found.frequencies
     if error:
         return formatting.format_value(stuck, error, unit="Hz")
@@ -249,7 +251,7 @@ def _format_stuck(found: Backbone) -> str:
 
 
 def sentences(found: Backbone) -> list:
-    """Return the answer in sentences: first both ends of the best curve."""
+    """Return the results in sentences; the first one is on both ends of the best curve."""
     free = formatting.format_quantity(found.frequencies.free, "Hz", 5)
     stuck = ""
     if found.frequencies.stuck is not None:
@@ -303,7 +305,7 @@ def _describe_largest_damping(curve: Curve) -> list:
 
 
 def lines_of(found: Backbone) -> list:
-    """Return the answer in lines for the screen: sentences, a table, what is missing."""
+    """Return the results in lines for the screen: sentences, a table, missing curves."""
     head = f"{'method':<13}{'amplitude':>12}{'frequency':>26}{'damping ratio':>26}"
     out = [*sentences(found), head]
     for method, curve in found.curves.items():

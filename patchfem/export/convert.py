@@ -1,4 +1,4 @@
-"""A results folder in another format, or shown, as the ending of a file says."""
+"""Conversion of a results folder: another format, a picture or a page, chosen by the suffix."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -17,12 +17,30 @@ from .pages import player
 def export(
     folder: Path, out: Path, frame: int | None = None, histories: bool = False, of: str = ""
 ) -> str:
-    """Write the fields of a results folder, or its histories and loops, as the ending of `out` says; one line on what
-    was written.
+    """Write the fields, or the histories and loops, of a results folder in another format.
 
-    A .csv has the interface, or the histories where these are asked for or the folder has no fields. PatchfemError for
-    an ending, a frame or histories that do not stand together. of: the stress that a script colours, von Mises' unless
-    given.
+    Parameters
+    ----------
+    folder : Path
+    out : Path
+        File whose suffix chooses the format. A .csv contains the interface, or the histories if
+        `histories` is set or the folder has no fields.
+    frame : int, optional
+        Number of the frame, for fields at a single time.
+    histories : bool
+        Whether a .csv contains the histories.
+    of : str
+        Stress that the script for ParaView colours; by default the von Mises stress.
+
+    Returns
+    -------
+    str
+        A line about what was written.
+
+    Raises
+    ------
+    PatchfemError
+        If suffix, frame and histories do not fit together.
     """
     fields = (folder / lab.FIELDS).is_file() or not folder.is_dir()
     if out.suffix.lower() in lab.ENDINGS and (out.suffix != ".csv" or histories or not fields):
@@ -57,7 +75,23 @@ def export(
 def view(
     folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None
 ) -> str:
-    """Show the pieces of a results folder in a window, or draw them into `out`; one line on a page, "" for others."""
+    """Show the pieces of a results folder in a window, or draw them into a file.
+
+    Parameters
+    ----------
+    folder : Path
+    out : Path or None
+        File of a picture, film or page; None for a window.
+    frame : int, optional
+        Number of the frame; by default the last.
+    magnify : float, optional
+        Factor of the motion.
+
+    Returns
+    -------
+    str
+        A line about the page; "" for anything else.
+    """
     if out is None or out.suffix != ".html":
         with _beside(out):
             viewer.view(folder, out, frame, magnify)
@@ -73,20 +107,23 @@ def view(
 
 @contextmanager
 def _beside(out: Path | None) -> Iterator[None]:
-    """The folder of a file to write is made, as `run -o` makes its own, and goes where nothing was written into it;
-    Missing where it cannot be made."""
+    """Create the folder of an output file; remove it again if nothing was written into it.
+
+    Missing if it cannot be created.
+    """
     places = [] if out is None else [one for one in out.parents if not one.exists()]
     try:
         if places:
             _made(places[0], out)
         yield
     finally:
-        with suppress(OSError):  # it holds what was written
+        with suppress(OSError):  # the folder contains what was written
             for one in places:
                 one.rmdir()
 
 
 def _made(place: Path, out: Path) -> None:
+    """Create a folder; Missing if this is not possible."""
     try:
         place.mkdir(parents=True)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Error of a scene against computing time: lines for the screen, cost.csv and one picture."""
+"""Error of a scene against computing time, as lines for the screen, cost.csv and a picture."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -26,7 +26,7 @@ AXES = {
     "shear_modes": "shear modes",
     "jumps": "jumps over the cycles of wear",
 }
-# measures of the detailed table, as far as a setting changes them
+# Measures of the detailed table, if the setting changes them.
 MAIN = (
     "worn_depth_max",
     "relative_displacement_amplitude",
@@ -40,14 +40,16 @@ MAIN = (
     "normal_stiffness",
     "tangential_stiffness",
 )
-EXACT = 1e-12  # of a value, below which an error is round-off
-LABEL_HEIGHT = 0.06  # of the height of the axes, by which labels are apart
-HEIGHT = 210.0  # points: about the height of the axes
+EXACT = 1e-12  # relative error below which an error is round-off
+LABEL_HEIGHT = 0.06  # smallest distance of two labels / height of the axes
+HEIGHT = 210.0  # height of the axes [points]
 TALL = 4.2  # height of the picture [inch]
-RIGHT_PART = 0.6  # of the width, from which a label has no room on the right of its point
-MARGIN = 0.15  # of the logarithm of an axis, the room on both sides of its values
-MIN_SECONDS_RATIO = 2.0  # of the ends of the axis, for runs that take equally long
-MIN_ERROR_RATIO = 10.0  # the same for equal errors
+# fraction of the width beyond which a label does not fit to the right of its point
+RIGHT_PART = 0.6
+MARGIN = 0.15  # margin on both sides of a logarithmic axis / logarithm of the range of its values
+# smallest ratio of the ends of the time axis, for runs that take equally long
+MIN_SECONDS_RATIO = 2.0
+MIN_ERROR_RATIO = 10.0  # smallest ratio of the ends of the error axis, for equal errors
 
 
 def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
@@ -86,7 +88,7 @@ def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
 
 
 def _by_tolerance(runs: list) -> list[list]:
-    """Group the runs of a curve over tolerances: each tolerance with the settings that were tried for it."""
+    """Group the runs of a curve over tolerances: each tolerance with the settings tried for it."""
     out: list[list] = []
     for one in runs:
         if out and out[-1][0].tolerance == one.tolerance:
@@ -97,7 +99,7 @@ def _by_tolerance(runs: list) -> list[list]:
 
 
 def _outcome(group: list) -> str:
-    """Say whether a tolerance is met, by a run as it is or by the settings that were tried next."""
+    """State whether a tolerance is met, by the run itself or by settings that were tried next."""
     first, last = group[0], group[-1]
     if first.meets_tolerance():
         return ""
@@ -114,7 +116,20 @@ def _outcome(group: list) -> str:
 
 
 def details_of(knob: str, runs: list, tolerance: float) -> list[str]:
-    """Format a table of several measures: stated error and distance to the best run at every value of a setting."""
+    """Format a table of several measures with stated errors and distances to the best run.
+
+    Parameters
+    ----------
+    knob : str
+        A numerical setting.
+    runs : list of Cost
+    tolerance : float
+        That of the scene.
+
+    Returns
+    -------
+    list of str
+    """
     names = shown(runs, tolerance)
     waited, width = (
         any(one.waited() for one in runs),
@@ -146,7 +161,10 @@ def details_of(knob: str, runs: list, tolerance: float) -> list[str]:
 
 
 def _shares(one: Cost, name: str) -> str:
-    """Format the stated error of a measure and, in brackets, its distance to the best run, relative to the value."""
+    """Format the stated error of a measure and, in brackets, its distance to the best run.
+
+    Both are relative to the value.
+    """
     size = abs(one.values.get(name, 0.0))
     shares = (
         part[name] / size if size and name in part else None for part in (one.errors, one.distances)
@@ -160,8 +178,8 @@ def _shares(one: Cost, name: str) -> str:
 def shown(runs: list, tolerance: float) -> list:
     """Return the measures of the detailed table.
 
-    They are those of MAIN that the setting changes and the worst measure of each run; all that it changes if there are
-    none of these.
+    They are those of MAIN that the setting changes, and the worst measure of each run; if there are
+    none of these, all measures that it changes.
     """
     turned, names = turned_by(runs) or stated_names(runs), stated_names(runs)
     worst = {worst_error(one, names, tolerance).name for one in runs if one.errors or one.distances}
@@ -169,10 +187,17 @@ def shown(runs: list, tolerance: float) -> list:
 
 
 def write(folder: Path, curves: dict) -> Path:
-    """Write cost.csv into a folder that is made, and return its path; curves: knob -> Costs coarse to fine.
+    """Write cost.csv into a folder, which is created, and return its path.
 
-    One row per run: knob, setting, seconds of the processor, wall_seconds by the clock, timings, and of every measure
-    its value, the error that the run states and its distance to the best run, in SI units; empty where there is none.
+    There is one row per run: knob, setting, CPU seconds (`seconds`), elapsed seconds
+    (`wall_seconds`), timings, and of each measure its value, the error that the run states and its
+    distance to the best run, in SI units; empty if there is none.
+
+    Parameters
+    ----------
+    folder : Path
+    curves : dict
+        Setting -> Costs from coarse to fine.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -214,19 +239,23 @@ def write(folder: Path, curves: dict) -> Path:
 
 
 def write_picture(folder: Path, knob: str, runs: list, tolerance: float) -> Path:
-    """Write the picture of a curve, cost.svg or cost_KNOB.svg, into a folder that exists, and return its path."""
+    """Write the picture of a curve into a folder that exists, and return its path.
+
+    Its name is cost.svg, or cost_KNOB.svg.
+    """
     picture = Path(folder) / ("cost.svg" if knob == TOLERANCE else f"cost_{knob}.svg")
     write_text(picture, pictures.draw([cost_chart(knob, runs, tolerance)], height=TALL))
     return picture
 
 
 def answer_of(knob: str, runs: list, tolerance: float) -> dict:
-    """Return what the runs of a curve come to, in plain lists and dicts; SI.
+    """Return the results of the runs of a curve as plain lists and dicts, in SI.
 
-    `runs` holds each with its label, value of the setting, tolerance, CPU seconds and seconds by the clock, values,
-    errors and distances by measure, `worst` {`measure`, `error` as in the picture} and `meets_tolerance`; `cheapest`
-    the label of the quickest run within the tolerance by measure, `sentence` what all measures cost; both None for
-    TOLERANCE, whose runs have different tolerances.
+    `runs`: label, value of the setting, tolerance, CPU seconds, elapsed seconds, and values, errors
+    and distances by measure of each run, with `worst` {`measure`, `error` as in the picture} and
+    `meets_tolerance`. `cheapest`: by measure the label of the fastest run within the tolerance.
+    `sentence`: the cost of all measures. The last two are None for TOLERANCE, because its runs have
+    different tolerances.
     """
     parts = (
         "label",
@@ -261,7 +290,8 @@ def answer_of(knob: str, runs: list, tolerance: float) -> dict:
 def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
     """Return the chart of the worst error of each run against its CPU seconds.
 
-    The error is that of the measure that is farthest from the tolerance. A hollow point misses its tolerance.
+    The error is that of the measure that is farthest from the tolerance. A hollow point misses its
+    tolerance.
 
     Parameters
     ----------
@@ -269,7 +299,7 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
         TOLERANCE or a numerical setting.
     runs : list of Cost
     tolerance : float
-        That of the scene, drawn as a broken line.
+        That of the scene, drawn as a dashed line.
     """
     names = stated_names(runs)
     worst = [
@@ -303,7 +333,7 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
 
 
 class Point(NamedTuple):
-    """A run and the error of its worst measure over the value."""
+    """A run and the relative error of its worst measure."""
 
     run: Cost
     share: float
@@ -316,7 +346,10 @@ def _padded(values: list, min_ratio: float) -> list:
 
 
 def _labels(points: list, x_range: list, y_range: list) -> list:
-    """Return the settings of each point above it, those of equal runs together; labels that would overlap move up."""
+    """Return the labels of the points, which move up if they would overlap.
+
+    A label stands above its point and lists the settings of all equal runs.
+    """
     groups: dict[tuple, list] = {}
     for one, share in points:
         groups.setdefault((one.seconds, share), []).append(one.label)

@@ -1,4 +1,4 @@
-"""A finished run on disk: summary, netCDF, fields and resolved scene in one folder, then the page that shows it."""
+"""A finished run on disk: summary, netCDF, fields, resolved scene and page in one folder."""
 
 import os
 from dataclasses import replace
@@ -24,8 +24,8 @@ SCENE = "scene.resolved.toml"
 class Written(NamedTuple):
     """A run whose results are on disk.
 
-    summary: the object of summary.json; result: the run; bodies: the pressed pieces for a picture, or {}; place: device
-    and number of the folder, by which it is known wherever it is moved.
+    summary: content of summary.json; result: the run; bodies: the pressed pieces for a picture, or
+    {}; place: device and inode of the folder, which identify it after it has been renamed.
     """
 
     summary: dict
@@ -37,12 +37,35 @@ class Written(NamedTuple):
 def run_into(
     what, target: Path, say=None, progress=None, fresh: bool = False, resume: bool = False
 ) -> Written:
-    """Run a plan into the results folder `target`; its page is left to `write_page`.
+    """Run a plan into a results folder; `write_page` writes the page afterwards.
 
-    The folder is claimed first. An older folder of results is replaced only when the new one is whole, and a folder
-    with other files is refused before anything runs. A run with [wear] and a long march keep their state in the folder,
-    from which they go on with `resume`; PatchfemError where there is none. Where the motion of a run does not converge
-    the patch that was pressed before is written, marked not_converged; NotConverged where there is none.
+    The folder is locked first. An older results folder is replaced only when the new one is
+    complete, and a folder with other files is refused before anything runs. A run with [wear] and a
+    long march save their state in the folder. If the motion does not converge, the patch that was
+    pressed before is written, with the outcome not_converged.
+
+    Parameters
+    ----------
+    what : Plan
+    target : Path
+        Results folder.
+    say, progress : callable, optional
+        Take a line of text and the completed fraction.
+    fresh : bool
+        Whether nothing is read from the cache of compliances.
+    resume : bool
+        Whether to continue from the saved state.
+
+    Returns
+    -------
+    Written
+
+    Raises
+    ------
+    PatchfemError
+        If there is no state to continue from.
+    NotConverged
+        If the motion does not converge and there is no pressed patch.
     """
     with Folder(target, resume) as folder:
         if folder.dropped and say is not None:
@@ -60,7 +83,7 @@ def run_into(
 
 
 def _marked(error: NotConverged) -> Result:
-    """What a run had computed before it did not converge, with the reason among its warnings."""
+    """Return what a run had computed before it failed to converge, with the reason as a warning."""
     found = error.partial_result
     return replace(
         found,
@@ -69,13 +92,16 @@ def _marked(error: NotConverged) -> Result:
 
 
 def keeps(what) -> bool:
-    """Whether the run of a plan keeps its state on the way."""
+    """Return whether the run of a plan saves its state."""
     return (what.model.wear is not None and what.model.patch is not None) or marches(what)
 
 
 def is_complete(what, target: Path) -> bool:
-    """Whether a folder holds the whole run of a plan, so that nothing of it is left to resume, False where it holds no
-    whole run or the state of an interrupted one; PatchfemError where it holds the whole run of another scene."""
+    """Return whether a folder contains the complete run of a plan, with nothing left to resume.
+
+    It is False for an incomplete folder, or one with the state of an interrupted run. PatchfemError
+    if it contains the complete run of another scene.
+    """
     state = target.parent / f"{target.name}.partial"
     try:
         if state.is_dir() and any(is_state(one.name) for one in state.iterdir()):
@@ -94,7 +120,7 @@ def is_complete(what, target: Path) -> bool:
 
 
 def write(result: Result, path: Path) -> Written:
-    """Write every file of a run but its page into the folder `path`."""
+    """Write all files of a run except its page into the folder `path`."""
     begin, bodies = perf_counter(), {}
     text = result.plan.model.source.resolved
     write_text(path / SCENE, text)
@@ -120,9 +146,9 @@ def write(result: Result, path: Path) -> Written:
 
 
 def write_page(written: Written, folder: Path) -> Path:
-    """Draw the page of a run into its results folder, which is whole and stays so, and return the path of the page.
+    """Write the page of a run into its complete results folder, and return the path of the page.
 
-    Missing where another run has replaced the folder in the meantime.
+    Missing if another run has replaced the folder in the meantime.
     """
     text, path = (
         report.page_of(written.result, written.bodies, player.reel(folder)),
@@ -135,12 +161,16 @@ def write_page(written: Written, folder: Path) -> Path:
 
 
 def _place(folder: Path) -> tuple:
+    """Return device and inode of a folder."""
     found = os.stat(folder)
     return found.st_dev, found.st_ino
 
 
 def save(result: Result, folder: Path, page: bool = True) -> None:
-    """Write the results folder of a run that is done, with its page unless told otherwise; an older one is replaced."""
+    """Write the results folder of a finished run, by default with its page.
+
+    An older results folder is replaced.
+    """
     with Folder(folder) as claimed:
         written = write(result, claimed.path)
     if page:

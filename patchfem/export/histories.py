@@ -1,4 +1,4 @@
-"""What result.nc holds, taken from a finished run."""
+"""Content of result.nc from a finished run."""
 
 import numpy as np
 
@@ -14,7 +14,10 @@ LEDGER = ("friction_work", "energy_stored", "energy_dissipated", "energy_created
 
 
 def contents(result: Result) -> netcdf.Contents:
-    """What result.nc holds, in SI: histories, interface frames, levels, events, curve, provenance."""
+    """Return the content of result.nc in SI.
+
+    It consists of histories, interface frames, levels, events, curve and provenance.
+    """
     found, modal = histories(result)
     patch, extra = result.patch, result.extra
     surface = surface_of(patch, result.fields)
@@ -56,12 +59,19 @@ def contents(result: Result) -> netcdf.Contents:
 
 
 def largest_multiplier(extra: dict) -> float:
-    """Largest |Floquet multiplier|."""
+    """Return the largest |Floquet multiplier|."""
     return float(np.abs(np.asarray(extra["multipliers"])).max(initial=0.0))
 
 
 def histories(result: Result) -> tuple:
-    """(histories name -> (k,) or (i, k), (names, (k, n)) of the modes or None) of a run, ({}, None) without motion."""
+    """Return the histories of a run and its modal coordinates.
+
+    Returns
+    -------
+    tuple
+        Histories by name, (k,) or (i, k) for i interfaces, and (names, (k, n)) of the modes or
+        None; ({}, None) for a run without motion.
+    """
     kind, r = result.plan.kind, result.response
     if r is None:
         return {}, None
@@ -95,14 +105,15 @@ def histories(result: Result) -> tuple:
     elif kind == "rig":
         still = np.full(r.time.size, result.measures["normal_load"].value)
         out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
-        # modes move the interface otherwise than the output
+        # If modes move the interface differently from the output, the slide is a history of its
+        # own.
         if not np.array_equal(r.slide, r.output):
             out["slide"] = r.slide
     return out, (list(rig.modes.names), structure.named_motions(rig.modes, r.modal))
 
 
 def _between(result: Result) -> dict:
-    """Histories (i, k) of the interfaces of a rig of masses, those of its output beside them."""
+    """Return the histories (i, k) of the interfaces of a rig of masses, and those of its output."""
     r = result.response
     columns = {
         "relative_displacement": ("slides", r.slide),
@@ -132,7 +143,7 @@ def _between(result: Result) -> dict:
 
 
 def _coordinate(rig) -> str:
-    """What stands under modal_coordinate of a rig whose coordinates are no modes; "" where they are."""
+    """Return the description of `modal_coordinate` if the coordinates are not modes; else ""."""
     if rig is None or rig.structure.lists_modes or rig.modes.shapes is None:
         return ""
     if any(str(name).startswith("mode ") for name in rig.modes.names):
@@ -141,8 +152,7 @@ def _coordinate(rig) -> str:
 
 
 def _levels(levels) -> dict:
-    """Columns of a run in levels: the drive, whether it held, its outcome where each was judged, every measure and its
-    error."""
+    """Return the columns of a run in levels: drive, sticking, outcome, measures and errors."""
     out = {
         "level_drive": (levels[0].unit, np.array([one.drive for one in levels])),
         "level_stuck": ("1", np.array([one.stuck for one in levels], np.int8)),

@@ -1,6 +1,7 @@
-"""result.nc: histories and interface frames as one netCDF4 file with CF attributes and provenance.
+"""result.nc: histories and interface frames as netCDF4 with CF attributes and provenance.
 
-The file is the one that xarray would write, without xarray: its import takes longer than most runs.
+The file is the same as xarray would write. xarray is not used, because its import takes longer than
+most runs.
 """
 
 import hashlib
@@ -14,7 +15,7 @@ import numpy as np
 
 from ..disk.atomic_write import open_lossy, write_atomically, write_bytes
 
-LARGE = 10_000_000  # numbers
+LARGE = 10_000_000  # number of values above which a file is written to disk directly
 CACHE = 1 << 18  # bytes of each variable that stay in memory until its file is closed
 
 LONG = {
@@ -79,9 +80,14 @@ BETWEEN = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Contents:
-    """What a netCDF file holds.
+    """Content of a netCDF file.
 
-    variables and coordinates: name -> (dimension or tuple of them, values, attributes); attributes: of the file.
+    Attributes
+    ----------
+    variables, coordinates : dict
+        Name -> (dimension or tuple of dimensions, values, attributes).
+    attributes : dict
+        Attributes of the file.
     """
 
     variables: dict = field(default_factory=dict)
@@ -94,7 +100,7 @@ class Contents:
         coordinates: dict | None = None,
         attributes: dict | None = None,
     ) -> "Contents":
-        """These contents and more."""
+        """Return this content with additional entries."""
         return Contents(
             self.variables | (variables or {}),
             self.coordinates | (coordinates or {}),
@@ -102,7 +108,7 @@ class Contents:
         )
 
     def to_xarray(self):
-        """The contents as an xarray.Dataset."""
+        """Return the content as an xarray.Dataset."""
         import xarray as xr
 
         variables, coordinates = (
@@ -113,8 +119,11 @@ class Contents:
 
 
 def _variable(xr, dimensions, values, attributes=None):
-    """A variable of numbers or texts as it stands: to look for arrays of other packages xarray brings up all of Dask,
-    a quarter of its own time."""
+    """Return an xarray variable of numbers or texts without conversion.
+
+    To look for arrays of other packages, xarray would import all of Dask, which takes a quarter of
+    its own import time.
+    """
     values = np.asarray(values)
     texts = values.dtype.kind == "O" and all(isinstance(one, str) for one in values.flat)
     return xr.Variable(
@@ -133,12 +142,29 @@ def of_run(
     interfaces: tuple = (),
     coordinate: str = "",
 ) -> Contents:
-    """Contents of a run.
+    """Return the content of result.nc for a run.
 
-    histories: name -> (k,), or (i, k) of the interfaces so named, with "time"; modal: (names, (k, n)) or None; fields:
-    name -> (f, m), or (f, s, m) of strips, with "time", or {}; x, weight: (m,) or None; strips: (offsets (s,) [m],
-    pressure (s, m) [Pa]) of a patch in strips; levels: name -> (unit, (l,)) of a run in levels; coordinate: what a
-    modal coordinate is, where it is none.
+    Parameters
+    ----------
+    histories : dict
+        Name -> (k,), or (i, k) for the named interfaces, with "time".
+    modal : tuple or None
+        Names and coordinates (k, n) of the modes.
+    fields : dict
+        Name -> (f, m), or (f, s, m) for strips, with "time"; or {}.
+    x, weight : (m,) array or None
+        Positions [m] and areas [m2] of the nodes.
+    strips : tuple, optional
+        Offsets (s,) [m] and pressure (s, m) [Pa] of a patch in strips.
+    levels : dict, optional
+        Name -> (unit, (l,)) of a run in levels.
+    interfaces : tuple of str
+    coordinate : str
+        Description of the modal coordinates, if they are not modes.
+
+    Returns
+    -------
+    Contents
     """
     data, coords = {}, {}
     if histories:
@@ -216,10 +242,24 @@ def of_run(
 def with_events(
     data: Contents, time, interface, kind, slide, count: int, meanings, source: str
 ) -> Contents:
-    """The contents with the table of events (e,).
+    """Return the content with the table of events (e,).
 
-    time [s]; interface: its number from 1, 0 for a border of the drive; kind: a flag of `meanings`; slide [m]; count:
-    how many there were, the last of them are kept.
+    Parameters
+    ----------
+    data : Contents
+    time : (e,) array
+        [s]
+    interface : (e,) array
+        Number of the interface from 1; 0 for a change of the drive.
+    kind : (e,) array
+        Index of `meanings`.
+    slide : (e,) array
+        [m]
+    count : int
+        Total number of events, of which the last ones are stored.
+    meanings : sequence of str
+    source : str
+        How the events were found.
     """
     flags = {
         "long_name": "kind of event; `up` in a name means towards positive slip",
@@ -253,7 +293,7 @@ def with_events(
     )
 
 
-# off a curve
+# Columns of a curve of steady motions: unit and text.
 READ = {
     "amplitude": ("m", "half the peak-to-peak motion at the output"),
     "acceleration_peak": ("m s-2", "largest absolute acceleration"),
@@ -266,8 +306,11 @@ READ = {
 
 
 def with_curve(data: Contents, curve: dict) -> Contents:
-    """The contents with a curve of steady motions (c,): frequency [Hz], level, amplitude [m], regime, multiplier, its
-    folds, and where it has them the columns of READ and the errors of all that is read."""
+    """Return the content with a curve of steady motions (c,).
+
+    curve: frequency [Hz], level, amplitude [m], regime, multiplier, folds, and if they exist the
+    columns of READ and the errors of all that is read.
+    """
     names, number = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
     point, meanings = "curve_point", [name.replace(" ", "_") for name in names]
     out = {
@@ -330,7 +373,7 @@ DECAY = {
 
 
 def with_decay(data: Contents, decay) -> Contents:
-    """The contents with a `response.decay_curve.DecayCurve` over decay_time."""
+    """Return the content with a `response.decay_curve.DecayCurve` over decay_time."""
     over, out = "decay_time", {}
     for name, (unit, text) in DECAY.items():
         out[f"decay_{name}"] = (over, getattr(decay, name), {"units": unit, "long_name": text})
@@ -353,7 +396,7 @@ def with_decay(data: Contents, decay) -> Contents:
 
 
 def with_spectra(data: Contents, found) -> Contents:
-    """The contents with `response.stationary.Spectra` over frequency."""
+    """Return the content with `response.stationary.Spectra` over frequency."""
     columns = {
         "base_acceleration_spectrum": (
             "m2 s-3",
@@ -388,7 +431,10 @@ def with_spectra(data: Contents, found) -> Contents:
 
 
 def with_surfaces(data: Contents, gap) -> Contents:
-    """The contents with the gap (m,) [m] of the unloaded surfaces, wear included; of strips (s, m), as each has it."""
+    """Return the content with the gap (m,) [m] of the unloaded surfaces, wear included.
+
+    With strips the gap is (s, m).
+    """
     return data.also(
         {
             "unloaded_gap": (
@@ -401,8 +447,11 @@ def with_surfaces(data: Contents, gap) -> Contents:
 
 
 def with_faces(data: Contents, faces) -> Contents:
-    """The contents with the patches of interfaces (`runs.patch.faces.Face`), each on nodes of its own, frame by frame;
-    the number behind a name is that of the interface from 1."""
+    """Return the content with the patches of interfaces, each on its own nodes, frame by frame.
+
+    faces: list of `runs.patch.faces.Face`. The number at the end of a name is that of the
+    interface, from 1.
+    """
     out, places = {}, {}
     for face in faces:
         number, surface = face.number + 1, face.surface
@@ -427,7 +476,16 @@ EDGE_PEAK = (
 
 
 def with_wear(data: Contents, history: dict, units: dict) -> Contents:
-    """The contents with the measures over the cycles of wear: history name -> (j,), with `cycle`; units by name."""
+    """Return the content with measures over the cycles of wear.
+
+    Parameters
+    ----------
+    data : Contents
+    history : dict
+        Name -> (j,), with `cycle`.
+    units : dict
+        Unit by name.
+    """
     out = {
         f"wear_{name}": (
             "wear_cycle",
@@ -448,6 +506,7 @@ def with_wear(data: Contents, history: dict, units: dict) -> Contents:
 
 
 def _attributes(name: str, dimensions: int = 1) -> dict:
+    """Return unit and description of a variable."""
     unit, text = LONG[name]
     if dimensions == 2 and name in BETWEEN:
         text = BETWEEN[name]
@@ -455,9 +514,19 @@ def _attributes(name: str, dimensions: int = 1) -> dict:
 
 
 def described(data: Contents, summary: dict, scene_text: str, versions: dict) -> Contents:
-    """The contents with the origin of the numbers: program, scene, outcome, measures; no host name and no path.
+    """Return the content with its origin: program, scene, outcome, measures and versions.
 
-    summary: the object of summary.json; scene_text: the resolved scene; versions: package -> version.
+    It names neither host nor path.
+
+    Parameters
+    ----------
+    data : Contents
+    summary : dict
+        Content of summary.json.
+    scene_text : str
+        Text of the resolved scene.
+    versions : dict
+        Package -> version.
     """
     return data.also(
         attributes={
@@ -476,10 +545,11 @@ def described(data: Contents, summary: dict, scene_text: str, versions: dict) ->
 
 
 def write(data: Contents, path: Path) -> None:
-    """Write contents as netCDF4 to `path`.
+    """Write the content as netCDF4 to `path`.
 
-    A file is made in memory, so that a full disk is an OSError of one write and nothing is left open; one of more than
-    LARGE numbers is made on the disk, whose faults are held back until it is closed.
+    A file is created in memory, so that a full disk gives one OSError and leaves nothing open. A
+    file with more than LARGE numbers is created on disk; errors of writing are raised when it is
+    closed.
     """
     path = Path(path)
     size = sum(np.size(one[1]) for one in (data.variables | data.coordinates).values())
@@ -499,14 +569,18 @@ def write(data: Contents, path: Path) -> None:
 
 
 def _write(opened: h5py.File, data: Contents) -> None:
+    """Write the content into an open HDF5 file."""
     with h5netcdf.File(opened, "w") as file:
         file.attrs.update(data.attributes)
         _write_variables(file, data)
 
 
 class _Opened(h5py.File):
-    """A file that opens an object of it once: h5netcdf asks for each anew whenever it needs one of its properties, 680
-    times for 26 variables, which took half of the time of writing them."""
+    """HDF5 file that opens each of its objects only once.
+
+    h5netcdf opens an object again whenever it needs one of its properties, 680 times for 26
+    variables, which took half of the time of writing them.
+    """
 
     def __init__(self, *arguments, **options):
         self.known = {}
@@ -522,7 +596,7 @@ class _Opened(h5py.File):
         return self.known[name]
 
     def __delitem__(self, name):
-        # a dimension gives way to its coordinate, which is opened under the same name
+        # a dimension is replaced by its coordinate, which has the same name
         self.known = {
             other: one for other, one in self.known.items() if other.strip("/") != name.strip("/")
         }
@@ -530,7 +604,10 @@ class _Opened(h5py.File):
 
 
 def _write_variables(file, data: Contents) -> None:
-    """Put variables and coordinates into an open file; coordinates that are no dimension are named by what has them."""
+    """Write variables and coordinates into an open file.
+
+    Coordinates that are not a dimension are named by the variables that have them.
+    """
     known = {
         name: ((dims,) if isinstance(dims, str) else tuple(dims), values, attributes)
         for name, (dims, values, attributes) in (data.variables | data.coordinates).items()

@@ -1,4 +1,4 @@
-"""What the page and the pictures of a run show, as plain arrays and texts in SI units."""
+"""Data of the page and the pictures of a run, as plain arrays and texts in SI units."""
 
 import tomllib
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ from .summary import cycles_of, summary_of, versions
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SceneText:
-    """The scene of a run: as written, with all defaults in SI, and what was set on the command line."""
+    """The scene of a run: as written, with all defaults in SI, and the keys of the command line."""
 
     name: str
     text: str
@@ -37,13 +37,13 @@ class Verdict:
     Attributes
     ----------
     summary : dict
-        As summary.json holds it.
+        Content of summary.json.
     sentence : str
         How the run ended.
     cycles : float or None
         Cycles of the drive; None for a run without cycles.
     released : str
-        How a released output swung.
+        Motion of a released output.
     steady : dict or None
         `regime` and `multiplier` of a steady motion that was found directly.
     engine : str
@@ -60,7 +60,7 @@ class Verdict:
     means: dict = field(default_factory=dict)
 
     def is_part_of_cycle(self) -> bool:
-        """Check whether the run ended before its first cycle did."""
+        """Return whether the run ended before its first cycle was complete."""
         return self.cycles is not None and self.cycles < 1 - 1e-6
 
 
@@ -92,7 +92,7 @@ class PressedPatch:
     film: dict | None = None
 
     def touches(self) -> bool:
-        """Check whether some of the patch is in contact."""
+        """Return whether a part of the patch is in contact."""
         return (
             self.x is not None
             and bool(self.fields)
@@ -107,9 +107,11 @@ class Motion:
     Attributes
     ----------
     history : dict
-        `time`, `displacement` and `force` of the whole run; `measured` (time, force) where a file has them.
+        `time`, `displacement` and `force` of the whole run; `measured` (time, force) if a file has
+        them.
     loop : dict
-        `slide`, `force` and `time` of the friction loop; `each`: (name, slide, force) of several interfaces.
+        `slide`, `force` and `time` of the friction loop; `each`: (name, slide, force) of several
+        interfaces.
     window : dict or None
         The last cycles of a rig; None for a bench.
     period : float or None
@@ -127,7 +129,10 @@ class Motion:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Wear:
-    """Wear of a patch: `history` of measures over the cycles, `states` of the profiles, period of a cycle [s]."""
+    """Wear of a patch.
+
+    history: measures over the cycles; states: profiles; period: of a cycle [s].
+    """
 
     history: dict
     states: dict
@@ -136,7 +141,7 @@ class Wear:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Evaluations:
-    """What was evaluated beside the histories, each None where the run has none."""
+    """Evaluations besides the histories; each is None if the run does not have it."""
 
     curve: object = None
     decay: object = None
@@ -171,11 +176,11 @@ class Measured:
     share: float = 1.0
 
     def is_comparable(self) -> bool:
-        """Check whether a drive with a frequency makes the rows comparable."""
+        """Return whether the drive has a frequency, with which rows can be compared."""
         return self.input is not None and self.frequency is not None
 
     def factors(self) -> tuple:
-        """Return what accelerometer and gauge show per peak acceleration and displacement."""
+        """Return the readings of accelerometer and gauge per peak acceleration and displacement."""
         acceleration, displacement = self.gains
         return acceleration * self.share, displacement
 
@@ -194,7 +199,7 @@ class RunData:
 
 
 def data_of(result: Result) -> RunData:
-    """Collect what the page of a run shows."""
+    """Collect the data of the page of a run."""
     source = result.plan.model.source
     tables = tomllib.loads(source.resolved)
     motion = None
@@ -221,6 +226,7 @@ def data_of(result: Result) -> RunData:
 
 
 def _verdict(result: Result) -> Verdict:
+    """Return how the run ended."""
     summary = summary_of(result)
     steady = None
     if "regime" in result.extra:
@@ -237,6 +243,7 @@ def _verdict(result: Result) -> Verdict:
 
 
 def _patch(result: Result) -> PressedPatch:
+    """Return the pressed patch with its fields."""
     faces = [
         (face.surface.x, face.fields, f"interface {face.name}")
         for face in result.extra.get("faces", ())
@@ -244,7 +251,7 @@ def _patch(result: Result) -> PressedPatch:
     if result.patch is None:
         return PressedPatch(fields=result.fields, faces=faces)
     fields = result.fields
-    if "wear" in result.extra:  # the frames behind the states of the wear show the worn patch
+    if "wear" in result.extra:  # The frames after the states of the wear show the worn patch.
         count = result.extra["wear_shown"]["states"]
         fields = {name: rows[count:] for name, rows in fields.items()}
         fields["time"] = fields["time"] - fields["time"][0]
@@ -257,6 +264,7 @@ def _patch(result: Result) -> PressedPatch:
 
 
 def _evaluations(result: Result) -> Evaluations:
+    """Return the evaluations of the run."""
     extra, levels, wear = result.extra, None, None
     if "levels" in extra:
         names = ("drive", "stuck", "values", "errors", "unit", "outcome")
@@ -269,6 +277,7 @@ def _evaluations(result: Result) -> Evaluations:
 
 
 def _bench_motion(result: Result, tables: dict) -> Motion:
+    """Return the histories of a bench."""
     response, window = result.response, result.window
     history = {"time": response.time, "displacement": response.slide, "force": response.force}
     loop = {"slide": window.slide, "force": window.force, "time": window.time}
@@ -282,12 +291,13 @@ def _bench_motion(result: Result, tables: dict) -> Motion:
 
 
 def _recorded(folder: Path, slide: dict, response) -> tuple | None:
-    """Read times [s], slides [m] and forces [N] from the file of a slide; None where it holds no force."""
+    """Read times [s], slides [m] and forces [N] from the file of a slide; None without forces."""
     if slide["kind"] != "file":
         return None
     try:
         read = loops.read_loop(folder / slide["file"])
-    except PatchfemError:  # a path alone; its own mistakes were found when it was read as one
+    except PatchfemError:
+        # The file is only a path; its mistakes were found when it was read as such.
         return None
     if read.time is None:
         return None
@@ -296,6 +306,7 @@ def _recorded(folder: Path, slide: dict, response) -> tuple | None:
 
 
 def _rig_motion(result: Result) -> Motion:
+    """Return the histories of a rig."""
     response, window, rig = result.response, result.window, result.plan.model.rig
     loop = {"slide": window.slide, "force": window.force, "time": window.time}
     if rig.friction.names and "slides" in window.extra:
@@ -327,6 +338,7 @@ def _rig_motion(result: Result) -> Motion:
 
 
 def _measured(result: Result) -> Measured | None:
+    """Return the measured responses of the scene; None if there are none."""
     model = result.plan.model
     if model.measured is None:
         return None

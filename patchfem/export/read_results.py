@@ -1,4 +1,7 @@
-"""Files of results read back: one shape each, looked at when it is opened, and one fault that names what is wrong."""
+"""Results that are read again: every file is checked when it is opened.
+
+A damaged file gives one error, which says what is wrong.
+"""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,8 +12,8 @@ import numpy as np
 
 from ..core import PatchfemError
 
-HUGE = 1e100  # beyond it squares have no place in a float
-# coordinates: finite numbers along their own dimension
+HUGE = 1e100  # largest number; the squares of larger ones overflow
+# Coordinates, which contain finite numbers along their own dimension.
 ALONG = (
     "time",
     "frame_time",
@@ -20,7 +23,7 @@ ALONG = (
 
 
 class Held(NamedTuple):
-    """A variable. dims: names of its dimensions; values; unit as netCDF writes it."""
+    """A variable of a netCDF file: names of its dimensions, values, and unit as in the file."""
 
     dims: tuple
     values: np.ndarray
@@ -29,15 +32,16 @@ class Held(NamedTuple):
 
 @contextmanager
 def readable(path: Path, form: str) -> Iterator[None]:
-    """PatchfemError that names the file and what is wrong with it for anything that reading it raises.
+    """Raise PatchfemError with the name of the file for any error while it is read.
 
-    form: what it should be. Within stands only what reads and looks at shapes: nothing of it computes.
+    form: what the file should be. Only code that reads and checks shapes belongs into this context,
+    no computation.
     """
     try:
         yield
     except PatchfemError:
         raise
-    except Exception as fault:  # a damaged file has many ways to fail
+    except Exception as fault:  # a damaged file can fail in many ways
         said = " ".join(str(fault).split())[:200]
         raise PatchfemError(
             f"{path}: cannot be read as {form}: {said or type(fault).__name__}"
@@ -45,10 +49,23 @@ def readable(path: Path, form: str) -> Iterator[None]:
 
 
 def variables(path: Path, names: set | None = None) -> tuple:
-    """(attributes, {name: Held}) of a netCDF file; names: only these variables.
+    """Read a netCDF file and check its variables.
 
-    PatchfemError for a file that is none, and where the lengths, kinds or sizes of what it holds cannot be those of
-    results.
+    Parameters
+    ----------
+    path : Path
+    names : set, optional
+        Variables that are read; by default all.
+
+    Returns
+    -------
+    tuple
+        Attributes of the file, and {name: Held}.
+
+    Raises
+    ------
+    PatchfemError
+        If the file is not netCDF, or if lengths, types or sizes cannot be those of results.
     """
     import h5netcdf
 
@@ -68,7 +85,10 @@ def variables(path: Path, names: set | None = None) -> tuple:
 
 
 def _looked(name: str, one: Held, sizes: dict) -> None:
-    """ValueError for a variable that cannot be one of results; sizes: of the dimensions so far, added to."""
+    """Raise ValueError for a variable that cannot be one of results.
+
+    sizes: lengths of the dimensions so far, to which those of this variable are added.
+    """
     if one.values.dtype.kind not in "biufSUO" or len(one.dims) != one.values.ndim:
         raise ValueError(f"{name} contains {one.values.ndim}-dimensional {one.values.dtype}")
     for dim, size in zip(one.dims, one.values.shape):
@@ -89,11 +109,11 @@ def _looked(name: str, one: Held, sizes: dict) -> None:
 
 
 def numeric(values) -> bool:
-    """Whether an array holds real numbers."""
+    """Return whether an array contains real numbers."""
     return values.dtype.kind in "iuf"
 
 
 def wanted(fine: bool, text: str) -> None:
-    """ValueError with the text unless it is fine."""
+    """Raise ValueError with a text unless a condition is true."""
     if not fine:
         raise ValueError(text)

@@ -1,4 +1,4 @@
-"""report.html: one page that stands alone, the verdict first; the browser draws its pictures, nothing is fetched."""
+"""report.html: a self-contained page on a run, which begins with the verdict."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,7 +31,9 @@ from .results import MOST
 
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
-ROOM = 700_000  # characters that the numbers of all charts may take: with library and player below 3 MB
+# Characters that the numbers of all charts may take; with library and player the page stays below 3
+# MB.
+ROOM = 700_000
 FILES = (
     (
         "fields.vtkhdf",
@@ -45,7 +47,7 @@ FILES = (
 
 
 def verdict(data: RunData) -> str:
-    """The answer of a run in a few sentences of HTML, with the error of each number."""
+    """Return the results of a run in a few sentences of HTML, with the error of each number."""
     known = data.verdict
     answer = f"<b>{escape(known.summary['outcome'])}</b>: {prose(known.sentence)}"
     text = headline(
@@ -58,10 +60,10 @@ def verdict(data: RunData) -> str:
 
 
 def page(data: RunData) -> str:
-    """Return the whole HTML page of a run."""
+    """Return the HTML page of a run."""
     summary = data.verdict.summary
     title = summary["title"] or data.source.name or "patchfem run"
-    # its title speaks of the values before
+    # The title of the scene refers to the values before keys were set.
     of = f"Scene: {escape(title)} &middot; " if data.source.sets else ""
     title = changed(data.source.sets) if of else title
     motion = f" &middot; {escape(data.source.driven)}" if data.source.driven else ""
@@ -100,7 +102,7 @@ def page(data: RunData) -> str:
 
 
 def figures(data: RunData) -> tuple:
-    """The charts that this run has something to show in, each with its anchor, and the HTML of their places."""
+    """Return the charts of a run, each with its anchor, and the HTML of their containers."""
     drawn, places = [], []
     for found in (picture(name, data) for name in PICTURES):
         if found is None:
@@ -121,7 +123,7 @@ def figures(data: RunData) -> tuple:
 
 
 class Picture(NamedTuple):
-    """A picture that a run can be shown in: a function of `charts`, its arguments, a caption."""
+    """A picture of a run: a function of `charts`, its arguments, and a caption."""
 
     charts: Callable
     values: tuple
@@ -129,11 +131,12 @@ class Picture(NamedTuple):
 
 
 def picture(name: str, data: RunData) -> Picture | None:
-    """The picture of this name (a key of PICTURES), None where the run has nothing to show in it."""
+    """Return the picture of this name (a key of PICTURES); None if the run has no data for it."""
     return PICTURES[name](data)
 
 
 def _curve(data: RunData) -> Picture | None:
+    """Return the picture of a curve of steady motions."""
     found, text = data.evaluations.curve, data.source.driven
     return (
         None
@@ -147,6 +150,7 @@ def _curve(data: RunData) -> Picture | None:
 
 
 def _spectra(data: RunData) -> Picture | None:
+    """Return the picture of the spectra of a random drive."""
     if data.evaluations.spectra is None:
         return None
     found = data.verdict.summary["measures"]
@@ -172,6 +176,7 @@ def _spectra(data: RunData) -> Picture | None:
 
 
 def _decay(data: RunData) -> Picture | None:
+    """Return the picture of frequency and damping of a decay."""
     if data.evaluations.decay is None:
         return None
     return Picture(
@@ -184,6 +189,7 @@ def _decay(data: RunData) -> Picture | None:
 
 
 def _levels(data: RunData) -> Picture | None:
+    """Return the picture of a run in levels."""
     if data.evaluations.levels is None:
         return None
     return Picture(
@@ -196,6 +202,7 @@ def _levels(data: RunData) -> Picture | None:
 
 
 def _wear(data: RunData) -> Picture | None:
+    """Return the picture of the wear of a patch."""
     wear = data.evaluations.wear
     if wear is None:
         return None
@@ -215,7 +222,7 @@ def _wear(data: RunData) -> Picture | None:
 
 
 def _edge_peaks(history: dict) -> str:
-    """Which peak pressures of a wear history are those of a node at the edge of the contact, as a sentence."""
+    """State after which cycles the peak pressure is that of a node at the edge of the contact."""
     above = np.asarray(history.get("pressure_peak_at_edge", ()))
     if not (above > 0).any():
         return ""
@@ -230,6 +237,7 @@ def _edge_peaks(history: dict) -> str:
 
 
 def _worn_map(data: RunData) -> Picture | None:
+    """Return the map of the worn depth over strips."""
     wear = data.evaluations.wear
     if wear is None:
         return None
@@ -245,6 +253,7 @@ def _worn_map(data: RunData) -> Picture | None:
 
 
 def _interface(data: RunData) -> Picture | None:
+    """Return the picture of the stresses on the interface."""
     if not data.patch.touches():
         return None
     fields, caption = data.patch.fields, "Normal stress of the pressed pieces"
@@ -265,6 +274,7 @@ def _interface(data: RunData) -> Picture | None:
 
 
 def _faces(data: RunData) -> Picture | None:
+    """Return the picture of the stresses on interfaces that have their own patch."""
     found = [one for one in data.patch.faces if np.any(one[1]["normal_stress"][0] > 0)]
     part = any(charts.part_in_contact(x, fields["normal_stress"][0]) for x, fields, _ in found)
     shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in found)
@@ -287,13 +297,14 @@ def _faces(data: RunData) -> Picture | None:
 
 
 def _first(found: list) -> str:
-    """The sentence on charts that are left out, behind a caption."""
+    """Return the sentence, for the end of a caption, on charts that are left out."""
     return (
         f" Only the first {MOST} of {len(found)} interfaces are shown." if len(found) > MOST else ""
     )
 
 
 def _bodies(data: RunData) -> Picture | None:
+    """Return the picture of the von Mises stress in both pieces."""
     if data.patch.bodies is None or not data.patch.touches():
         return None
     effects = [e["effect"] for e in data.verdict.summary["effects"]]
@@ -314,7 +325,7 @@ def _bodies(data: RunData) -> Picture | None:
 
 
 def _of_mesh(data: RunData) -> str:
-    """The sentence on pressure peaks that the stress inside the pieces does not show; "" where it shows them."""
+    """Return the sentence on pressure peaks that the stress in the pieces misses; else ""."""
     sigma, mine = data.patch.fields["normal_stress"][0], data.patch.bodies["pressure"]
     if sigma.size == mine.size:
         return ""
@@ -327,7 +338,7 @@ def _of_mesh(data: RunData) -> str:
 
 
 def _at_corner(bodies: dict) -> str:
-    """Where the largest stress of both pieces has no bound, in words; "" where it has one."""
+    """Describe the corner in which the largest stress of both pieces is unbounded; else ""."""
     parts = zip(bodies["depth"], bodies["coating"], bodies["mises"])
     depth, coating, part = max(parts, key=lambda one: one[2].max())
     column, row = np.unravel_index(np.argmax(part), part.shape)
@@ -353,6 +364,7 @@ def _at_corner(bodies: dict) -> str:
 
 
 def _loop(data: RunData) -> Picture | None:
+    """Return the picture of the friction loop."""
     motion = data.motion
     if motion is None or not np.any(motion.loop["force"]) or np.ptp(motion.loop["slide"]) == 0:
         return None
@@ -385,6 +397,7 @@ def _loop(data: RunData) -> Picture | None:
 
 
 def _histories(data: RunData) -> Picture | None:
+    """Return the picture of the histories."""
     motion = data.motion
     if motion is None:
         return None
@@ -426,12 +439,16 @@ def _histories(data: RunData) -> Picture | None:
         what = "turning points and stops were kept, joined by lines." if swings else what
         unit, scale = formatting.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
-    # a swing that dies down has no band per cycle: its turns are kept, and the line through them shows it
+    # A decaying swing has no band per cycle: its reversals are stored, and the line through them
+    # shows it.
     return Picture(charts.histories, (history, window, period, title, swings), caption)
 
 
 def _under(data: RunData) -> str:
-    """What moves the run, as a sentence behind a caption; beside a curve the frequency of the motion that is shown."""
+    """Return the sentence, for the end of a caption, on what drives the run.
+
+    With a curve, it gives the frequency of the motion that is shown.
+    """
     text = data.source.driven
     if (
         text
@@ -444,6 +461,7 @@ def _under(data: RunData) -> str:
 
 
 def _measured(data: RunData) -> Picture | None:
+    """Return the picture of computed and measured responses."""
     m, found = data.measured, data.verdict.summary["measures"]
     if m is None or not m.is_comparable():
         return None
@@ -471,7 +489,7 @@ def _measured(data: RunData) -> Picture | None:
     )
 
 
-# in the order of the page
+# The keys are in the order of the page.
 PICTURES = {
     "wear": _wear,
     "worn": _worn_map,
@@ -489,6 +507,7 @@ PICTURES = {
 
 
 def _unsettled(data: RunData) -> str:
+    """Return the sentence on a motion that is not steady; "" if it is."""
     outcome = data.verdict.summary["outcome"]
     return (
         ""
@@ -501,7 +520,7 @@ def _unsettled(data: RunData) -> str:
 
 
 def _table_one(data: RunData) -> list:
-    """The section that sets the computed values beside the measured ones, none where nothing compares."""
+    """Return the section with computed and measured values; [] if they cannot be compared."""
     m, found = data.measured, data.verdict.summary["measures"]
     if not m.is_comparable():
         return []
@@ -548,8 +567,11 @@ OF_LEVELS = (
 
 
 def _table_of_levels(levels: list) -> Section:
-    """Drive, amplitude, acceleration, its distortion, the outcome where it is known, and whether it held, of every
-    level."""
+    """Return the section on all levels.
+
+    A row has drive, amplitude, acceleration, distortion, the outcome if it is known, and whether
+    the interface sticks.
+    """
     rows, judged = [], any(one.get("outcome") for one in levels)
     for number, one in enumerate(levels, 1):
         cells = []
@@ -585,12 +607,12 @@ def _table_of_levels(levels: list) -> Section:
 
 
 def measure(value: float, unit: str, error: float | None) -> dict:
-    """A measure as the object that the summary has, from a value and an error in SI."""
+    """Return a measure as an object of the summary, from a value and an error in SI."""
     return {"value": value, "unit": unit, "error": error, "floor": 0.0}
 
 
 def _measures(data: RunData) -> Section:
-    """Every measure with its error, in other units, and what it means."""
+    """Return the section on all measures with errors, in other units, and with definitions."""
     rows, means = [], data.verdict.means
     found = data.verdict.summary["measures"]
     for name, m in in_order(found).items():
@@ -627,7 +649,7 @@ def _measures(data: RunData) -> Section:
 
 
 def _cost(data: RunData) -> Section:
-    """What ran, by which equations, and how long it took."""
+    """Return the section on what was computed, by which equations, and how long it took."""
     summary = data.verdict.summary
     rows = [
         [escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"]
@@ -653,7 +675,7 @@ def _cost(data: RunData) -> Section:
 
 
 def _origin(data: RunData) -> Section:
-    """The scene as written and as understood, the files beside the page, the versions."""
+    """Return the section on the scene as written and as understood, the files and the versions."""
     versions = ", ".join(f"{k} {v}" for k, v in data.versions.items())
     lacks = ["fields.vtkhdf"] * (data.patch.x is None) + ["interfaces"] * (not data.patch.faces)
     there = [one for one in FILES if one[0] not in lacks]

@@ -1,4 +1,4 @@
-"""One page over finished runs, or over finished sweeps, made from their folders."""
+"""One page over finished runs, or over finished sweeps, from their folders."""
 
 from pathlib import Path
 
@@ -11,11 +11,24 @@ PAGE = "report.html"
 
 
 def report_of(folders: list, out: Path | None = None) -> Path:
-    """Write the page of these results folders and return its path.
+    """Write the page of results folders and return its path.
 
-    Several runs, or several sweeps over the same keys, are laid side by side; for a single sweep, its page is rebuilt.
-    out: the page; unless given, report.html in the folder of one sweep, else in this folder. PatchfemError for a folder
-    that is neither a run nor a sweep, and for runs beside sweeps; Missing where the page cannot be written.
+    Several runs, or several sweeps over the same keys, are shown side by side; the page of a single
+    sweep is rebuilt.
+
+    Parameters
+    ----------
+    folders : list of Path
+    out : Path, optional
+        The page; by default report.html in the folder of a single sweep, else in the current
+        folder.
+
+    Raises
+    ------
+    PatchfemError
+        If a folder is neither a run nor a sweep, or if there are both.
+    Missing
+        If the page cannot be written.
     """
     if not folders:
         raise PatchfemError("report: give at least one results folder")
@@ -40,6 +53,7 @@ def report_of(folders: list, out: Path | None = None) -> Path:
 
 
 def _written(text: str, out: Path) -> Path:
+    """Write a page and create its folder."""
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

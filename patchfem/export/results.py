@@ -1,6 +1,7 @@
-"""The results folder: everything is written into DIR.partial, which takes the place of DIR when whole.
+"""The results folder: files are written into DIR.partial, which replaces DIR when complete.
 
-Only folders that hold nothing but patchfem results are ever replaced; anything else is refused before a run starts.
+Only folders that contain nothing but results of patchfem are ever replaced; any other folder is
+refused before a run starts.
 """
 
 import os
@@ -14,7 +15,7 @@ from ..disk.exchange import defer_signals, old_folder_path, replace_folder, rest
 from ..disk.lock import FolderLock
 
 PAGE = "report.html"
-# fields of interfaces that have a patch of their own; so many of them
+# Folder with the fields of interfaces that have their own patch, and how many of them are written.
 INTERFACES, MOST = (
     "interfaces",
     6,
@@ -54,17 +55,30 @@ FILES = (
 )
 LOCK = ".writer"
 STATE, STARTS = "wear.npz", "starts.json"
-# of an interrupted run or fit, from which it goes on
+# States of an interrupted run or fit, from which it can continue.
 STATES = re.compile(r"wear\.npz|starts\.json|march_\d+\.npz")
 
 
 class Folder:
-    """Context of a results folder, which is claimed at entry.
+    """Context of a results folder, which is locked at entry.
 
-    `path` is the partial folder to write into. Leaving without an error puts it in the place of an older one, leaving
-    with one removes it but for kept STATES, which `resume` leaves in place at the next entry; without `resume` that
-    entry drops them, and `dropped` says so as a sentence. PatchfemError for a target that holds other files, Missing
-    where it is in use or cannot be written.
+    `path` is the partial folder into which files are written. At exit without an error it replaces
+    an older folder; at exit with an error it is removed except for saved STATES. The next entry
+    keeps these states if `resume` is set; otherwise it deletes them and says so in the sentence
+    `dropped`.
+
+    Parameters
+    ----------
+    target : Path
+    resume : bool
+        Whether saved states are kept.
+
+    Raises
+    ------
+    PatchfemError
+        If the target contains other files.
+    Missing
+        If it is in use or cannot be written.
     """
 
     def __init__(self, target: Path, resume: bool = False):
@@ -125,11 +139,12 @@ class Folder:
                 self.claim.release()
 
     def _refuse_others(self) -> None:
+        """Raise PatchfemError if the target, or its partial or old folder, contains other files."""
         for place in (self.target, self.path, old_folder_path(self.target)):
             refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
 
     def _told(self) -> str:
-        """What is said when kept states are dropped, "" where there are none."""
+        """Return the note that saved states are deleted; "" if there are none."""
         if not any(is_state(part.name) for part in self.path.iterdir()):
             return ""
         return (
@@ -138,7 +153,7 @@ class Folder:
         )
 
     def _abandon(self) -> None:
-        """Remove everything but a kept state; the folder too where there is none."""
+        """Remove everything except a saved state; without one, remove the folder as well."""
         if not any(is_state(part.name) for part in self.path.iterdir()):
             shutil.rmtree(self.path, ignore_errors=True)
             return
@@ -151,15 +166,24 @@ class Folder:
 
 
 def is_state(name: str) -> bool:
-    """Whether a file of this name is the state of an interrupted run."""
+    """Return whether a file of this name is the state of an interrupted run."""
     return STATES.fullmatch(name) is not None
 
 
 def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> None:
-    """PatchfemError for a place that is no folder or holds files that are not patchfem's.
+    """Raise PatchfemError for a path that is not a folder, or that contains other files.
 
-    shown: the place as the user named it; known: names of files, also with .partial behind them; kind: what they are,
-    in words; dots: whether names that start with a dot are among them.
+    Parameters
+    ----------
+    place : Path
+    shown : Path
+        The path as the user named it.
+    known : container of str
+        Names of files that are allowed, also with .partial at the end.
+    kind : str
+        What these files are, in words.
+    dots : bool
+        Whether names that start with a dot are allowed.
     """
     if not place.exists():
         return

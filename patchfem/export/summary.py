@@ -1,4 +1,4 @@
-"""summary.json: the answer of a run as one small object."""
+"""summary.json: the results of a run as one small object."""
 
 import json
 import math
@@ -16,17 +16,18 @@ from ..runs.patch import values
 from ..runs.results.result import Result, choices, measure_engines
 from ..runs.rig import plan as rig_plan
 
-KNOWN = 10.0  # errors of a stiffness, up to which nothing is divided by it
+KNOWN = 10.0  # Number of errors of a stiffness, below which nothing is divided by it.
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 
 def measure_object(measure) -> dict:
-    """The object {"value", "unit", "error", "floor"} of a Measure; a value that is not finite becomes null.
+    """Return a Measure as {"value", "unit", "error", "floor"}.
 
-    A measure without a value has its "reason" beside it.
+    Numbers that are not finite become None. A measure without a value also has its "reason".
     """
 
     def clean(number):
+        """Return a number as float; None if it is not finite."""
         return None if number is None or not math.isfinite(number) else float(number)
 
     out = {
@@ -49,10 +50,25 @@ def summary(
     said: tuple,
     seconds: dict,
 ) -> dict:
-    """The object of summary.json: the answer of a run with its effects, warnings, notes and times.
+    """Return the content of summary.json.
 
-    measures: name -> Measure; effects: dicts with effect, equations and seconds; absent: effects not in the scene;
-    said: (warnings on numerical trust, notes on what the model leaves out); seconds: part of the run -> time.
+    Parameters
+    ----------
+    version, title, kind, outcome : str
+    measures : dict
+        Name -> Measure.
+    effects : list of dict
+        With effect, equations and seconds.
+    absent : list of str
+        Effects that are not in the scene.
+    said : tuple
+        Warnings on numerical trust, and notes on what the model leaves out.
+    seconds : dict
+        Part of the run -> time.
+
+    Returns
+    -------
+    dict
     """
     return {
         "patchfem": version,
@@ -69,19 +85,22 @@ def summary(
 
 
 def write_json(value: dict, path: Path) -> None:
-    """Write `value` to `path` as strict JSON with a final newline; ValueError for NaN or infinity in it."""
+    """Write a value as strict JSON with a final newline; ValueError if it has NaN or infinity."""
     write_text(path, json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def read_summary(path: Path) -> dict:
-    """The object in summary.json; OSError where it cannot be read, ValueError where it is none that `summary` makes."""
+    """Read summary.json.
+
+    OSError if it cannot be read, ValueError if `summary` cannot have made it.
+    """
     text = path.read_text(encoding="utf-8")
     try:
         _shape().model_validate_json(text, strict=True)
         return json.loads(text, parse_int=_whole)
     except RecursionError:
         raise ValueError("nested deeper than a summary is") from None
-    except ValueError as fault:  # of pydantic, with many lines
+    except ValueError as fault:  # an error of pydantic has many lines
         if not hasattr(fault, "errors"):
             raise
         first = fault.errors(include_url=False)[0]
@@ -92,7 +111,7 @@ def read_summary(path: Path) -> dict:
 
 
 def _whole(digits: str) -> int:
-    """A whole number; ValueError for one that no float can hold."""
+    """Return an integer; ValueError if no float can represent it."""
     if len(digits) > 300:
         raise ValueError(f"a whole number of {len(digits)} digits cannot come from a run")
     return int(digits)
@@ -100,7 +119,7 @@ def _whole(digits: str) -> int:
 
 @cache
 def _shape() -> type:
-    """What readers of a summary rely on."""
+    """Return the pydantic model of what readers of a summary rely on."""
     from pydantic import BaseModel
 
     class Number(BaseModel):
@@ -123,7 +142,7 @@ def _shape() -> type:
 
 
 def summary_of(result: Result) -> dict:
-    """The object of summary.json."""
+    """Return the content of summary.json for a run."""
     what = result.plan
     answer = summary(
         __version__,
@@ -143,8 +162,11 @@ def summary_of(result: Result) -> dict:
 
 
 def run_away_of(result: Result) -> dict:
-    """{"run_away": {"drive": acceleration of the base, "knee": that above which friction alone does not limit the
-    amplitude at resonance}} [m s-2] of a motion that did not settle above it; {} of any other."""
+    """Return drive and knee [m s-2] of a motion that did not settle above the knee; else {}.
+
+    It is {"run_away": {"drive", "knee"}}: the acceleration of the base, and the one above which
+    friction alone does not limit the amplitude at resonance.
+    """
     found = (
         rig_plan.run_away(result.plan.model)
         if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS)
@@ -154,9 +176,12 @@ def run_away_of(result: Result) -> dict:
 
 
 def loop_of(result: Result) -> dict:
-    """{"loop": {"slide_amplitude" [m], "loss_factor", "error"}} of a bench whose slide repeats: the work of a cycle
-    over 2 pi times the largest elastic energy, W/(pi k A^2), k the equivalent stiffness; {} where this is not positive
-    beyond its error, and of any other run."""
+    """Return slide amplitude [m] and loss factor of a bench whose slide repeats; else {}.
+
+    It is {"loop": {"slide_amplitude", "loss_factor", "error"}}. The loss factor is the work of a
+    cycle over 2 pi times the largest elastic energy, W/(pi k A^2) with the equivalent stiffness k.
+    {} if this stiffness is not positive beyond its error.
+    """
     stiffness, work = (result.measures.get(name) for name in ("equivalent_stiffness", "loop_area"))
     if (
         result.plan.kind != "bench"
@@ -178,8 +203,11 @@ def loop_of(result: Result) -> dict:
 
 
 def contact_of(result: Result) -> dict:
-    """Where a pressed patch is in contact: {"contact": {"from", "to": ends of the interface, "stretches": [[begin, end]
-    of each part in contact]}}, x in m; {} without a patch that touches, and for strips."""
+    """Return where a pressed patch is in contact, x in m; {} for strips and if nothing touches.
+
+    It is {"contact": {"from", "to": ends of the interface, "stretches": [[begin, end] of each part
+    in contact]}}.
+    """
     patch = result.patch
     if patch is None or patch.strips is not None or not patch.active.any():
         return {}
@@ -196,7 +224,7 @@ def contact_of(result: Result) -> dict:
 
 
 def cycles_of(result: Result) -> float | None:
-    """Cycles of the drive, or of the slide, that were run; None where the run has none."""
+    """Return the number of cycles of the drive, or of the slide; None if the run has none."""
     r, period = result.response, result.extra.get("period")
     if r is not None and period and result.plan.kind != "bench":
         return float(r.time[-1] - r.time[0]) / period
@@ -204,9 +232,9 @@ def cycles_of(result: Result) -> float | None:
 
 
 def effects_of(result: Result) -> list:
-    """Effects of a run as [{"effect", "equations", "seconds"}].
+    """Return the effects of a run as [{"effect", "equations", "seconds"}].
 
-    The law and the modes share one loop, whose time stands with the law.
+    The law and the modes share one loop, whose time is assigned to the law.
     """
     patch, out = result.patch, []
     loop = result.seconds.get("march", result.seconds.get("bench", 0.0))
@@ -233,7 +261,7 @@ def effects_of(result: Result) -> list:
 
 
 def versions() -> dict:
-    """Versions, by name, of the interpreter and of the packages that compute, those that are there."""
+    """Return the versions, by name, of the interpreter and of the packages that compute."""
     found = installed_versions()
     return {"python": ".".join(map(str, sys.version_info[:3]))} | {
         name: found[name] for name in PACKAGES if name in found

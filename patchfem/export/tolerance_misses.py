@@ -1,4 +1,4 @@
-"""Cases of a sweep that miss their tolerance: which measures, how many cases, and the worst by its relative error."""
+"""Cases of a sweep that miss their tolerance: measures, number of cases and the worst case."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from ..core import allowed_error
 from ..formatting import format_number, format_quantity
 from .written import label
 
-# what a case answers first, named before what misses its tolerance by more
+# Main measures, which are named before others that miss the tolerance by more.
 FIRST = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
@@ -15,28 +15,37 @@ FIRST = (
     "pressure_peak",
     "contact_fraction",
 )
-# a measure in a sentence where its name alone says too little
+# Text for a measure whose label alone is not clear in a sentence.
 LONGER = {
     "relative_displacement_amplitude_steady": "the displacement amplitude to which the motion would settle"
 }
-ZERO = 10.0  # times its value, an error beyond which a value is no more than 0
+ZERO = 10.0  # error / value above which a value counts as 0
 
 
 def over(one: dict, tolerance) -> np.ndarray:
-    """(n,) whether the error of a measure is more than tolerance * |value| + floor, as a single run is warned of.
+    """Return whether (n,) the error of a measure exceeds tolerance * |value| + floor.
 
-    one: `values`, `errors` and `floors` (n,) [SI], NaN where a case has none; tolerance: of all cases or (n,), NaN
-    where it is not known.
+    This is the limit of the warning of a single run.
+
+    Parameters
+    ----------
+    one : dict
+        `values`, `errors` and `floors` (n,) [SI], NaN if a case has none.
+    tolerance : float or (n,) array
+        NaN if it is not known.
     """
     values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(invalid="ignore"):
-        return errors > allowed_error(tolerance, values, floors)  # no comparison with NaN holds
+        return errors > allowed_error(tolerance, values, floors)  # comparisons with NaN are False
 
 
 def by_floor(one: dict, tolerance) -> np.ndarray:
-    """(n,) whether an error is more than tolerance * |value| and meets the tolerance by the floor of its measure alone,
-    where the value is above this floor, so that a reader sees it with that error. Arguments as of `over`."""
+    """Return whether (n,) an error meets the tolerance only by the floor of its measure.
+
+    The value must exceed this floor, so that a reader sees it with its error. The arguments are
+    those of `over`.
+    """
     values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(invalid="ignore"):
@@ -48,14 +57,22 @@ def by_floor(one: dict, tolerance) -> np.ndarray:
 
 
 def floor_of(one: dict, cases: np.ndarray) -> str:
-    """The largest floor of a measure in some cases (n,) as people read it."""
+    """Return the largest floor of a measure in some cases (n,) as text."""
     floors = np.broadcast_to(np.asarray(one.get("floors", 0.0), float), cases.shape)
     return format_quantity(float(floors[cases].max()), one.get("unit", "1"), 2)
 
 
 def counted(measures: dict, tolerance) -> dict:
-    """{measure: {`count` of cases over the tolerance, `worst`: their largest error/|value|, None where all are 0}} of
-    the measures that miss it anywhere; measures: {name: as `over` takes it}."""
+    """Count the cases over the tolerance by measure, for measures with any.
+
+    measures: {name: as for `over`}.
+
+    Returns
+    -------
+    dict
+        By measure `count` of cases, and `worst`: their largest error/|value|, None if all values
+        are 0.
+    """
     out = {}
     for name, one in measures.items():
         if (missed := over(one, tolerance)).any():
@@ -68,11 +85,24 @@ def counted(measures: dict, tolerance) -> dict:
 
 
 def sentence(measures: dict, tolerance, where, first: str = "") -> str:
-    """How many cases miss the tolerance in the worst measure of those that answer first, where it is worst and how many
-    other measures miss it; "" where no error is known.
+    """State how many cases miss the tolerance in the worst main measure.
 
-    measures and tolerance: as `counted` takes them; where(case): the swept values of a case as people read them; first:
-    the measure that is spoken of, "" for the worst.
+    It also states the worst case, and how many other measures miss the tolerance.
+
+    Parameters
+    ----------
+    measures : dict
+        {name: as for `over`}.
+    tolerance : float or (n,) array
+    where : callable
+        Number of a case -> its swept values as text.
+    first : str
+        Measure that the sentence is on; "" for the worst.
+
+    Returns
+    -------
+    str
+        "" if no error is known.
     """
     known = {name: np.isfinite(np.asarray(one["errors"], float)) for name, one in measures.items()}
     number = max((found.size for found in known.values()), default=0)
@@ -133,12 +163,12 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
 
 
 def _others(count: int) -> str:
-    """How many measures beside that which is spoken of miss the tolerance."""
+    """State how many other measures miss the tolerance."""
     return f"{count} other measure{'s' * (count > 1)} miss{'es' * (count == 1)} the tolerance in some cases"
 
 
 def _beyond(one: dict, tolerance) -> np.ndarray:
-    """Error over what is allowed, case by case."""
+    """Return the error over the allowed error (n,)."""
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(one["errors"], float) / allowed_error(
@@ -147,7 +177,7 @@ def _beyond(one: dict, tolerance) -> np.ndarray:
 
 
 def _share(one: dict) -> np.ndarray:
-    """Error over |value|, case by case; inf where the value is 0."""
+    """Return error over |value| (n,); inf if the value is 0."""
     values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(errors > 0, errors / np.abs(values), 0.0)

@@ -1,30 +1,43 @@
-"""Values of swept keys as they were written, without the digits that only a computer wrote."""
+"""Values of swept keys as text, without digits that only a computer would write."""
 
 import re
 
 from ..formatting import format_number
 
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z")
-LONG = 9  # letters of a number from which on a range made it, not a person
-MOST = 6  # digits of such a number at most
-OFF = 0.05  # of the distance to the nearest other value, by which a value in a sentence may be off
+LONG = 9  # characters of a number from which it comes from a range, not from a person
+MOST = 6  # largest number of digits of a shortened number
+# Distance to the nearest other value, of which this fraction is the largest error of a shortened
+# value.
+OFF = 0.05
 
 
 def label(name: str) -> str:
-    """A name of the program as people read it."""
+    """Return the name of a measure or outcome as words."""
     return name.replace("_", " ")
 
 
 def brief(text: str) -> str:
-    """A value as written, its number with six digits at most: 3.16227766016838e-06 rad is 3.16228e-06 rad."""
+    """Return a value as written, with at most six digits.
+
+    For example, 3.16227766016838e-06 rad becomes 3.16228e-06 rad.
+    """
     return _short(text, MOST)
 
 
 def resolved(text: str, value: float, apart: float) -> str:
-    """A value as written, with as few digits as tell it from its neighbours: 3.16227766016838 urad between 1 urad and
-    10 urad is 3.2 urad.
+    """Return a value as written, with as few digits as distinguish it from its neighbours.
 
-    value: the same in SI; apart: distance to the nearest other value, in SI.
+    For example, 3.16227766016838 urad between 1 urad and 10 urad becomes 3.2 urad.
+
+    Parameters
+    ----------
+    text : str
+        The value as written.
+    value : float
+        The value in SI.
+    apart : float
+        Distance to the nearest other value [SI].
     """
     for digits in range(2, MOST):
         short = _short(text, digits)
@@ -37,12 +50,13 @@ def resolved(text: str, value: float, apart: float) -> str:
 
 
 def bare(text: str, beside: str) -> str:
-    """A value without its unit where the one beside it has the same: 0.1 beside 0.2 mrad."""
+    """Return a value without its unit if the next value has the same: 0.1 before 0.2 mrad."""
     number, _, unit = text.partition(" ")
     return number if unit and unit == beside.partition(" ")[2] else text
 
 
 def _short(text: str, digits: int) -> str:
+    """Shorten a number with many digits."""
     found = NUMBER.match(text)
     if found is None or len(found[1]) < LONG:
         return text
