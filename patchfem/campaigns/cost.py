@@ -399,7 +399,7 @@ def _compiled() -> int:
 def _tried(setting: Setting, label: str, say, coarse: bool = True) -> tuple | None:
     """Return (measures, warnings, steps per cycle) of a setting; None if the run fails.
 
-    The run does not use cached compliances. It fails if it does not converge or needs more memory
+    The pieces are condensed again. The run fails if it does not converge or needs more memory
     than there is.
     """
     try:

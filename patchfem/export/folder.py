@@ -52,7 +52,7 @@ def run_into(
     say, progress : callable, optional
         Take a line of text and the completed fraction.
     fresh : bool
-        Whether nothing is read from the cache of compliances.
+        Whether the pieces are condensed again.
     resume : bool
         Whether to continue from the saved state.
 

@@ -28,7 +28,10 @@ HEAD = (
 
 
 def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
-    """Return the files of a fit to a curve; folder: to which the paths of the scene are relative."""
+    """Return the files of a fit to a curve.
+
+    folder: the paths in the fitted scene are relative to it.
+    """
     answer = _answer(fitted)
     rms = answer["rms"]
     head = (

@@ -1,4 +1,4 @@
-"""Record of the files of a fit, and the function that writes them."""
+"""Files of a fit: a record of them, and the function that writes them."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -23,9 +23,22 @@ FITTED_SCENE = "scene.fitted.toml"
 class FitFiles(NamedTuple):
     """Files of a fit.
 
-    answer: the object of fit.json, in SI units; lines: the answer as text; summary: those of the lines that
-    the page begins with; scenes: text of each scene by the name of its file; rows: fit.csv, header
-    first; charts: those of fit.svg; caption: of this picture.
+    Attributes
+    ----------
+    answer : dict
+        Content of fit.json in SI units.
+    lines : list of str
+        The result as text.
+    summary : list of str
+        The lines with which the page begins.
+    scenes : dict
+        Text of each scene by the name of its file.
+    rows : list
+        Rows of fit.csv, the header first.
+    charts : list
+        Charts of fit.svg.
+    caption : str
+        Caption of this picture.
     """
 
     answer: dict
@@ -60,7 +73,7 @@ def write_fit(files: FitFiles, folder: Folder) -> None:
 
 
 def describe_measurement(title: str, measured: str, quantity: str, outcome) -> dict:
-    """Return the entries that every fit.json begins with."""
+    """Return the first entries of every fit.json."""
     return {
         "patchfem": __version__,
         "title": title,
@@ -71,12 +84,12 @@ def describe_measurement(title: str, measured: str, quantity: str, outcome) -> d
 
 
 def describe_values(keys: FittedKeys) -> dict:
-    """Return the fitted keys as they stand in fit.json."""
+    """Return the fitted keys as written in fit.json."""
     return {bound.key: describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
 
 
 def describe_value(bound: Range, fit: Fit, k: int) -> dict:
-    """Return value number k of a fit as it stands in fit.json."""
+    """Return value number k of a fit as written in fit.json."""
     ends = fit.intervals[k].tolist()
     low, high = ends if np.isfinite(ends).all() else (None, None)
     return {
@@ -93,7 +106,7 @@ def describe_value(bound: Range, fit: Fit, k: int) -> dict:
 
 
 def describe_unknown(bounds: list, fit: Fit) -> list:
-    """Return the directions that leave the residual as it is, as they stand in fit.json."""
+    """Return the directions in which the residual does not change, as written in fit.json."""
     return [
         {bound.key: part for bound, part in zip(bounds, row) if part}
         for row in fit.unknown.tolist()
@@ -101,14 +114,14 @@ def describe_unknown(bounds: list, fit: Fit) -> list:
 
 
 def describe_correlation(fit: Fit) -> list:
-    """Return the correlation of the values as it stands in fit.json."""
+    """Return the correlation of the values as written in fit.json."""
     return [
         [part if np.isfinite(part) else None for part in row] for row in fit.correlation.tolist()
     ]
 
 
 def fitted_scene_text(keys: FittedKeys, measured: str, folder: Path) -> str:
-    """Return the fitted scene in SI units with every default.
+    """Return the fitted scene in SI units with all defaults.
 
     Parameters
     ----------
@@ -127,6 +140,6 @@ def fitted_scene_text(keys: FittedKeys, measured: str, folder: Path) -> str:
         if np.isfinite(ends).all():
             interval = f", 95 % in [{ends[0]!r}, {ends[1]!r}]"
         comments.append(f"# {bound.key} fitted to {measured}: {value!r} {bound.unit}{interval}")
-    model = build(scene)  # The files of the scene are found from its old place.
+    model = build(scene)  # The files of the scene are relative to its former folder.
     text = write_resolved(move_scene(scene, folder / FITTED_SCENE), model)
     return "\n".join(comments) + "\n\n" + text

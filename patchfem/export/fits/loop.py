@@ -24,7 +24,10 @@ DOT_SIZE = 3.5  # Diameter of a measured row in the picture [points].
 
 
 def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
-    """Return the files of a fit to a loop; folder: to which the paths of the scene are relative."""
+    """Return the files of a fit to a loop.
+
+    folder: the paths in the fitted scene are relative to it.
+    """
     answer = _answer(fitted)
     share = answer["rms"] / answer["peak"]
     head = (
@@ -85,7 +88,7 @@ def _answer(fitted: FittedLoop) -> dict:
 
 
 def _rows(fitted: FittedLoop) -> list:
-    """Return the rows of fit.csv in SI units, which a fit reads again."""
+    """Return the rows of fit.csv in SI units, which can be used as input of another fit."""
     loop = fitted.loop
     unit = LABELS[loop.quantity][1]
     head = ["displacement [m]", f"{loop.quantity} [{unit}]", "fitted", "held"]

@@ -1,4 +1,4 @@
-"""Page of a fit: the values with their intervals first, then the picture, the correlation, the files."""
+"""Page of a fit: values with intervals, picture, correlation and files."""
 
 from collections.abc import Sequence
 from html import escape
@@ -70,6 +70,7 @@ def _verdict(answer: dict, values: dict, summary: Sequence) -> str:
 
 
 def _value_with_ends(described: dict) -> str:
+    """Write a value with its interval."""
     value, unit, ends = format_fitted(described)
     interval = f" ({ends[0]} to {ends[1]})" if ends else ""
     return f"{value} {unit}".strip() + interval
@@ -95,6 +96,7 @@ def _values_table(values: dict) -> str:
 
 
 def _format_bound(described: dict, end: float) -> str:
+    """Write a bound of a value."""
     value, unit, _ = format_fitted(described | {"value": end, "interval": None})
     return f"{value} {unit}"
 

@@ -20,7 +20,10 @@ Y_MARGIN = 1.05  # Height of the axis of stiffness / largest stiffness.
 
 
 def describe_patch_fit(fitted: FittedPatch, folder: Path) -> FitFiles:
-    """Return the files of the fitted laws; folder: to which the paths of the scenes are relative."""
+    """Return the files of the fitted laws.
+
+    folder: the paths in the fitted scenes are relative to it.
+    """
     answer = _answer(fitted)
     lines = _lines(answer)
     names = {FITTED_SCENE: fitted.best} | {f"scene.{law}.toml": law for law in FITTED_LAWS}
@@ -63,7 +66,7 @@ def _answer(fitted: FittedPatch) -> dict:
 
 
 def _describe_law(law: str, one: FittedLaw, fitted: FittedPatch) -> dict:
-    """Return a law as it stands in fit.json."""
+    """Return a law as written in fit.json."""
     units = FITTED_LAWS[law].units
     sizes = _sizes(one.deviations, fitted.patch.slides)
     return {
@@ -91,9 +94,11 @@ def _sizes(deviations, slides) -> dict:
 
 
 def _relative_loss(one: FittedLaw, fitted: FittedPatch) -> dict:
-    """Return the largest difference of the loss relative to that of the patch, however small it is.
+    """Return the largest difference of the loss relative to that of the patch.
 
-    Where the patch loses nothing, the difference is that of `one.deviations`.
+    Tiny losses count as well.
+
+    If the patch dissipates nothing, the difference is that of `one.deviations`.
     """
     own, loss = fitted.patch.curves.loss, one.curves.loss
     share = np.where(own > 0, loss / np.where(own > 0, own, 1.0) - 1, one.deviations[1])
@@ -102,7 +107,7 @@ def _relative_loss(one: FittedLaw, fitted: FittedPatch) -> dict:
 
 
 def _scene_text(fitted: FittedPatch, law: str, answer: dict, path: Path) -> str:
-    """Return the scene with a law in place of its patch, in SI units with every default."""
+    """Return the scene with a law in place of its patch, in SI units with all defaults."""
     scene = fitted.scene
     tables = tomllib.loads(scene.resolved())
     tables.pop("contact")
@@ -188,7 +193,7 @@ def _lines(answer: dict) -> list:
 
 
 def _format_stiffness(answer: dict) -> str:
-    """Format the stiffness while nothing slips, with its error where it is known."""
+    """Format the stiffness while nothing slips, with its error if it is known."""
     value, error = answer["stiffness"], answer["stiffness_error"]
     if error is None:
         return _format(value, "N/m")
@@ -227,7 +232,7 @@ def _costs(law: str, answer: dict) -> list:
 
 
 def _relative_sentence(loss: dict) -> str:
-    """Return a sentence on the largest difference relative to the patch if it is another one."""
+    """Return a sentence on the largest difference relative to the patch, if it differs."""
     if loss["relative"] == loss["largest"]:
         return ""
     return (
@@ -237,13 +242,16 @@ def _relative_sentence(loss: dict) -> str:
 
 
 def _percent(fraction: float) -> str:
+    """Format a fraction in percent."""
     return f"{format_number(100 * fraction, 2)} %"
 
 
 def _signed_percent(fraction: float) -> str:
+    """Format a fraction in percent with its sign."""
     sign = "+" if fraction > 0 else ""
     return f"{sign}{_percent(fraction)}"
 
 
 def _format(value: float, unit: str) -> str:
+    """Format a value in a suitable unit."""
     return format_quantity(value, SENTENCE_UNITS.get(unit, unit), 5)

@@ -1,4 +1,4 @@
-"""A fit as the command line and Python ask for it: options, kind of fit, results folder."""
+"""Request for a fit from the command line or Python: options, kind of fit, results folder."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
@@ -55,7 +55,7 @@ FITS_BY_OPTION = {
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """Options of a fit besides the free keys; OPTIONS_BY_KIND says which kind of fit takes which."""
+    """Options of a fit besides the free keys; OPTIONS_BY_KIND lists those of each kind of fit."""
 
     hold: tuple = ()
     offset: tuple = ()
@@ -76,10 +76,10 @@ class Options:
 
 @dataclass(frozen=True, slots=True)
 class Listener:
-    """Functions that are told how the work proceeds.
+    """Callbacks of a fit.
 
     say: takes a line; progress: takes the completed fraction; format_option: option -> its name for
-    this caller.
+    the caller.
     """
 
     say: Callable | None = None
@@ -190,6 +190,7 @@ def _fit_rows(
     folder: Folder,
     listener: Listener,
 ) -> FitFiles:
+    """Fit a rig to rows; searches that are done are stored in the folder."""
     wanted = parse_ranges(free)
     question = (
         scene.resolved(),

@@ -28,15 +28,22 @@ from .text import format_values
 
 MIL = 25.4e-6  # [m]
 PARTS = ("fitted", "held_out", "left_out")
-KEY_WIDTH = 28  # Letters of the longest key of a rig in the printed answer.
+KEY_WIDTH = 28  # Characters of the longest key of a rig in the printed result.
 AXIS_MARGIN = 1.1  # Ratio of the end of the line of equal values to the last point.
 
 
 class Starts:
-    """Results of searches by name, which are kept in a file while a fit runs.
+    """Results of searches by name, which are stored in a file while a fit runs.
 
-    path: of the file; question: texts on which the results depend; resume: whether those in the file
-    count. Results of another question do not.
+    Results of another question do not count.
+
+    Parameters
+    ----------
+    path : Path
+    question : iterable
+        Texts on which the results depend.
+    resume : bool
+        Whether results in the file are used.
     """
 
     def __init__(self, path: Path, question, resume: bool):
@@ -53,7 +60,7 @@ class Starts:
                 self.known = content["ends"]
 
     def __call__(self, name: str, ends: list | None = None):
-        """Return the result under a name, None if there is none; keep `ends` under it if given."""
+        """Return the result under a name, None if there is none; store `ends` under it if given."""
         if ends is not None:
             self.known[name] = ends
             write_text(self.path, json.dumps({"question": self.key, "ends": self.known}))
@@ -61,7 +68,10 @@ class Starts:
 
 
 def describe_rows_fit(fitted: FittedRows, folder: Path) -> FitFiles:
-    """Return the files of a fit to rows; folder: to which the paths of the scene are relative."""
+    """Return the files of a fit to rows.
+
+    folder: the paths in the fitted scene are relative to it.
+    """
     answer = describe_answer(fitted)
     lines = _lines(answer)
     scene = fitted_scene_text(fitted.keys, fitted.cells.path.name, folder)
@@ -216,6 +226,7 @@ def _table(answer: dict) -> list:
 
 
 def _format_cell(value: float | None, unit: float) -> str:
+    """Format a reading in a unit; "" if there is none."""
     return "" if value is None else f"{value / unit:.6g}"
 
 
@@ -286,6 +297,7 @@ def _lines(answer: dict) -> list:
 
 
 def _score_line(name: str, score: dict | None) -> str:
+    """Format the scores of a prediction as a line."""
     cells = []
     for kind in ("acceleration", "displacement", "all"):
         value = None if score is None else score[kind]

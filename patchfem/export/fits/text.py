@@ -1,4 +1,4 @@
-"""Fitted values as text, in the units that people read."""
+"""Fitted values as text, in suitable units."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ from ...formatting import SENTENCE_UNITS, display_unit, round_to_error
 
 
 class FormattedValue(NamedTuple):
-    """A value and the ends of its interval, if any, in the unit that people read."""
+    """A value and the bounds of its interval, or [], in a suitable unit."""
 
     value: str
     unit: str
@@ -31,7 +31,7 @@ def format_values(answer: dict, width: int = 26) -> list:
 
 
 def named_values(answer: dict) -> dict:
-    """Return the fitted keys and offsets of fit.json by the name that people read."""
+    """Return the fitted keys and offsets of fit.json by their names for the reader."""
     offsets = answer.get("offsets", {})
     return answer["values"] | {f"offset of the {name}": one for name, one in offsets.items()}
 

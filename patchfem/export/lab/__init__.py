@@ -1,9 +1,12 @@
-"""Histories and loops in the formats of laboratories, so that a run lies beside a measurement in any program.
+"""Histories and loops in the formats of laboratories, to compare a run with a measurement.
 
-In: a results folder (of a run or of a fit), or records that were imported. Out: universal files (dataset 58 with units
-in 164), .mat, CSV with units. `series` says what a folder holds, the others write. Read `series` first.
+In: a results folder (of a run or of a fit), or imported records. Out: universal files (dataset 58,
+with units in 164), .mat, and CSV with units. `series` reads the content of a folder; the other
+modules write.
+
+Read `series` first.
 """
 
 UNIVERSAL = (".uff", ".unv", ".uf", ".58")
 ENDINGS = (*UNIVERSAL, ".mat", ".csv")
-FIELDS = "fields.vtkhdf"  # of a results folder, beside its histories
+FIELDS = "fields.vtkhdf"  # file of a results folder that has fields in addition to histories

@@ -1,4 +1,4 @@
-"""A laboratory's files as the table that scenes and fits read, as modes of a scene, or as a frequency response."""
+"""Import of laboratory files: as a table for scenes and fits, as modes, or as a response."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,13 +16,26 @@ from ...structure import universal as universal_modes
 from . import modes as mode_lines
 from . import write
 
-# of `patchfem export`
+# Names of columns in files of `patchfem export`.
 OUTPUT = {"displacement": ("output_displacement", "relative_displacement", "slide")}
 
 
 class Estimate(NamedTuple):
-    """How modes or a response are estimated, in words, "" for the default: segment, as "2 s"; window, hann or none;
-    band, as "20 Hz..400 Hz"; decay: the record is a free decay; begin: where it begins, as "0.2 s"."""
+    """How modes or a response are estimated; "" is the default.
+
+    Attributes
+    ----------
+    segment : str
+        Length of a segment, such as "2 s".
+    window : str
+        "hann" or "none".
+    band : str
+        Frequencies, such as "20 Hz..400 Hz".
+    decay : bool
+        Whether the record is a free decay.
+    begin : str
+        Time at which it begins, such as "0.2 s".
+    """
 
     segment: str = ""
     window: str = ""
@@ -32,10 +45,27 @@ class Estimate(NamedTuple):
 
 
 def imported(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estimate) -> dict:
-    """Write records (.csv), modes (.toml) or a response (.uff) of a file, and return what is told of them.
+    """Write the records (.csv), modes (.toml) or response (.uff) of a file.
 
-    asked: channels as `patchfem import --map` has them; zero: time and displacement count from their first row. The
-    dict has `notes`, `told`, a sentence, and what was found. PatchfemError for what does not stand together.
+    Parameters
+    ----------
+    file : Path
+    out : Path
+    asked : iterable of str
+        Channels as in `patchfem import --map`.
+    zero : bool
+        Whether time and displacement are measured from their first row.
+    how : Estimate
+
+    Returns
+    -------
+    dict
+        `notes`, the sentence `told`, and what was found.
+
+    Raises
+    ------
+    PatchfemError
+        If options do not fit together.
     """
     ending = out.suffix.lower()
     if ending not in (".csv", ".toml", ".uff", ".unv"):
@@ -61,6 +91,7 @@ def imported(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estim
 
 
 def _table(file: Path, out: Path, asked, zero: bool) -> dict:
+    """Write records as a table."""
     found = laboratory.read_records(file, records.parse_requests(asked))
     values = records.shift_to_zero(found.values) if zero else found.values
     units = {name: SI_UNITS[name] for name in values}
@@ -91,6 +122,7 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
 
 
 def _decay(file: Path, out: Path, asked, begin: str) -> dict:
+    """Write frequency and damping of a free decay as a table."""
     values, notes = _records(file, asked)
     found, more = measured.decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
     write.write_table(
@@ -113,6 +145,7 @@ def _decay(file: Path, out: Path, asked, begin: str) -> dict:
 
 
 def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
+    """Write modes as tables of a scene."""
     shapes, notes = _shapes(file, asked, how)
     if shapes is not None:
         found = measured.modes_of_shapes(*shapes)
@@ -144,6 +177,7 @@ def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
 
 
 def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
+    """Write a frequency response as a universal file."""
     if how.decay or how.begin or how.band:
         raise PatchfemError(
             "--decay, --begin and --band can be used only for modes (-o modes.toml)"
@@ -164,6 +198,7 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
 
 
 def _records(file: Path, asked) -> tuple:
+    """Read records and check that one of them is a response."""
     found = laboratory.read_records(file, records.parse_requests(asked), OUTPUT)
     if found.channel_list and not found.values.keys() & measured.DERIVATIVES.keys():
         raise PatchfemError(
@@ -174,7 +209,10 @@ def _records(file: Path, asked) -> tuple:
 
 
 def _shapes(file: Path, asked, how: Estimate) -> tuple:
-    """((shapes, places), notes) of a universal file with modes or frequency responses; (None, ()) of any other."""
+    """Return ((shapes, points), notes) of a universal file with modes or frequency responses.
+
+    (None, ()) for any other file.
+    """
     names = {text.partition("=")[0].strip() for text in asked}
     if (
         file.suffix.lower() not in laboratory.UNIVERSAL_ENDINGS
@@ -198,7 +236,7 @@ def _shapes(file: Path, asked, how: Estimate) -> tuple:
 
 
 def _quantity(text: str, kind: str, option: str) -> float | None:
-    """The words of an option in SI, None where there are none."""
+    """Return the value of an option in SI; None if it is ""."""
     try:
         return quantities.parse_quantity(text, kind) if text else None
     except ValueError as error:
@@ -206,16 +244,19 @@ def _quantity(text: str, kind: str, option: str) -> float | None:
 
 
 def _segment(text: str) -> float | None:
+    """Return the length of a segment [s]; None for the default."""
     return _quantity(text, "time", f"--segment {text}")
 
 
 def _window(text: str) -> str | None:
+    """Return the name of the window; None for the default."""
     if text not in ("", "hann", "none"):
         raise PatchfemError(f"--window {text}: hann or none")
     return text or None
 
 
 def _band(text: str) -> tuple:
+    """Return both ends of a band [Hz]."""
     if not text:
         return (0.0, float("inf"))
     low, dots, high = text.partition("..")

@@ -1,4 +1,4 @@
-"""Histories as a .mat file of version 5: one variable each, column vectors in SI, and `units`, a structure of texts."""
+"""Histories as a .mat file of version 5: column vectors in SI, and a struct of `units`."""
 
 from pathlib import Path
 
@@ -6,11 +6,14 @@ import numpy as np
 
 from .series import Histories, program
 
-LONGEST = 63  # letters of a name in MATLAB
+LONGEST = 63  # largest number of characters of a name in MATLAB
 
 
 def write(path: Path, found: Histories) -> None:
-    """Write every array of the folder, histories as (k, 1), by its own name; `units.NAME` is the unit of NAME."""
+    """Write all arrays of a folder by name, histories as (k, 1).
+
+    `units.NAME` is the unit of NAME.
+    """
     from scipy.io import savemat
 
     values = {name[:LONGEST]: np.asarray(array) for name, (array, _) in found.arrays.items()}

@@ -1,4 +1,4 @@
-"""Identified modes as the [structure] of a scene, and a frequency response with its coherence as a universal file."""
+"""Identified modes as the [structure] of a scene, and a response as a universal file."""
 
 from pathlib import Path
 
@@ -13,8 +13,10 @@ RESPONSE, COHERENCE = 4, 6  # function types
 
 
 def fragment(found, source: str) -> str:
-    """[structure] and its [[structure.mode]] as text; found: `identify.measured_modes.ListedModes`; source: of the numbers,
-    in words."""
+    """Return [structure] and its [[structure.mode]] as text.
+
+    found: `identify.measured_modes.ListedModes`; source: name of the file with the measurement.
+    """
     lines = [f"# modes of {plain(source)}, by {program()}"] + [
         f"# {plain(note)}" for note in found.notes
     ]
@@ -42,13 +44,24 @@ def fragment(found, source: str) -> str:
 
 
 def plain(text: str) -> str:
-    """A text for a comment: one line of letters that a file of text can hold."""
+    """Return a text as one line of printable characters, for a comment."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def write_response(path: Path, estimate, drive: str, response: str) -> None:
-    """Write an estimated frequency response (dataset 58, type 4) and its coherence (type 6), response and reference at
-    1:+x; structure.file reads it where the input is a force."""
+    """Write an estimated frequency response (dataset 58, type 4) and its coherence (type 6).
+
+    Response and reference are at point 1 in direction +x. If the input is a force, structure.file
+    can read the file.
+
+    Parameters
+    ----------
+    path : Path
+    estimate : object
+        With frequency (k,) [Hz], complex value (k,) and coherence (k,) or None.
+    drive, response : str
+        Kinds of input and output, keys of OVER and KINDS.
+    """
     (kind, unit), (over, below) = KINDS[response], OVER[drive]
     both = {
         "type": 58,

@@ -1,4 +1,4 @@
-"""What a results folder holds over time, as columns: the histories of a run, or a measured loop beside its fit."""
+"""Columns over time in a results folder: histories of a run, or a measured and fitted loop."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ from ...inputs.columns import read_columns
 from ...inputs.units import FORCE_UNITS, SLIDE_UNITS
 from ..read_results import numeric, variables
 
-# slide, resistance: the first of one counts
+# Names of slide and resistance; the first pair that a folder has counts.
 LOOPS = (
     ("slide", "friction_force"),
     ("relative_displacement", "friction_force"),
@@ -24,8 +24,11 @@ LOOPS = (
 
 
 class Column(NamedTuple):
-    """One history. name; unit as netCDF writes it ("m s-2"); values (k,); number: of the interface or mode from 1, 0
-    where there is only one."""
+    """A history.
+
+    name; unit as in netCDF ("m s-2"); values (k,); number: of the interface or mode from 1, 0 if
+    there is only one.
+    """
 
     name: str
     unit: str
@@ -34,16 +37,24 @@ class Column(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name with the number behind it."""
+        """Name with the number at its end."""
         return f"{self.name}_{self.number}" if self.number else self.name
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Histories:
-    """Columns that share rows.
+    """Columns of equal length.
 
-    title: one line; time: (k,) [s] or None; columns: of `Column`; arrays: name -> (values, unit) of everything else in
-    the folder, for formats that hold arrays of any shape.
+    Attributes
+    ----------
+    title : str
+        One line.
+    time : (k,) array or None
+        [s]
+    columns : list of Column
+    arrays : dict
+        Name -> (values, unit) of all arrays of the folder, for formats that can contain arrays of
+        any shape.
     """
 
     title: str
@@ -52,7 +63,7 @@ class Histories:
     arrays: dict
 
     def loops(self) -> list:
-        """(slide, resistance) columns of the friction loops, one per interface."""
+        """Return the friction loops as pairs of columns (slide, resistance), one per interface."""
         by = {(one.name, one.number): one for one in self.columns}
         found = {}
         for slide, force in LOOPS:
@@ -63,10 +74,12 @@ class Histories:
 
 
 def histories_of(folder: Path) -> Histories:
-    """The histories of a results folder of a run (result.nc) or of a fit to a loop (fit.csv).
+    """Read the histories in a results folder.
 
-    Missing where the folder or both files are not there, PatchfemError where a file is none of patchfem's or has no
-    history.
+    They are those of a run (result.nc), or of a fit to a loop (fit.csv).
+
+    Missing if the folder or both files do not exist; PatchfemError if a file is not one of
+    patchfem, or has no history.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -79,6 +92,7 @@ def histories_of(folder: Path) -> Histories:
 
 
 def _of_run(path: Path) -> Histories:
+    """Read the histories of a run."""
     about, found = variables(path)
     title = str(about.get("title", ""))
     arrays = {name: (one.values, one.unit) for name, one in found.items() if numeric(one.values)}
@@ -100,6 +114,7 @@ def _of_run(path: Path) -> Histories:
 
 
 def _of_fit(path: Path) -> Histories:
+    """Read measured and fitted loop of a fit."""
     units = {**FORCE_UNITS, **SLIDE_UNITS, "fitted": {"": 1.0}}
     fitted_loop = TableFormat(
         units,
@@ -121,5 +136,5 @@ def _of_fit(path: Path) -> Histories:
 
 
 def program() -> str:
-    """The program and its version, as formats with a line for it hold them."""
+    """Return the name of the program with its version."""
     return f"patchfem {__version__}"

@@ -1,12 +1,14 @@
-"""A rig as matrices and friction elements, for NLvib (.mat) and for TMDSimPy, pyHarm or one's own script (.npz).
+"""A rig as matrices and friction elements, for NLvib (.mat) and for Python programs (.npz).
 
-M q'' + D q' + K q + sum_e w_e f_e(w_e' q) = Fex1 cos(omega t). The first coordinates q are the slides of the
-interfaces, as elements of pyHarm act on coordinates, the others motions without slide; where slides depend on one
-another, all are those of the modes. NLvib takes M, D, K, Fex1 and the structures of `nonlinear_elements`:
-elasticDryFriction with stiffness and friction_limit_force, or tanhDryFriction with friction_limit_force and eps, its
-speed [m/s]. TMDSimPy takes M, K, C, and Q, T, kt, Fs of each JenkinsForce: one row of `direction`, its transpose,
-`stiffness` and `limit`. M, K, C, slide, output and force or base are those that structure.file reads. The guide has a
-table of all variables.
+The equations are M q'' + D q' + K q + sum_e w_e f_e(w_e' q) = Fex1 cos(omega t). The first
+coordinates q are the slides of the interfaces, because elements of pyHarm act on coordinates; the
+others are motions without slide. If the slides depend on one another, q are the modal coordinates.
+
+NLvib takes M, D, K, Fex1 and the structures of `nonlinear_elements`: elasticDryFriction with
+stiffness and friction_limit_force, or tanhDryFriction with friction_limit_force and eps, its speed
+[m/s]. TMDSimPy takes M, K, C, and Q, T, kt, Fs of each JenkinsForce: one row of `direction`, its
+transpose, `stiffness` and `limit`. M, K, C, slide, output and force or base are those that
+structure.file reads. The guide has a table of all variables.
 """
 
 from pathlib import Path
@@ -24,16 +26,27 @@ from ...runs.rig import engines, numerics, pieces
 from ...scene.rules import methods
 
 ENDINGS = (".mat", ".npz")
-# singular value of the slides over the largest, below which they depend on one another
+# Smallest / largest singular value of the slides, below which they depend on one another.
 DEPEND = 1e-6
-# what matrices with friction of the speed alone describe
+# Features that matrices with friction as a function of the speed alone can describe.
 OF_SPEED = methods.EngineSupport("", "no-law faces levels")
 NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 
 
 class Elements(NamedTuple):
-    """Friction elements: form "elements" or "tanh", direction (e, n), limit (e,) [N], stiffness (e,) [N/m] of elements
-    that stretch, speed (e,) [m/s] under tanh."""
+    """Friction elements.
+
+    Attributes
+    ----------
+    form : {"elements", "tanh"}
+    direction : (e, n) array
+    limit : (e,) array
+        Friction limit [N].
+    stiffness : (e,) array
+        [N/m], for elements that stretch.
+    speed : (e,) array
+        [m/s], for tanh.
+    """
 
     form: str
     direction: np.ndarray
@@ -43,10 +56,15 @@ class Elements(NamedTuple):
 
 
 def export(model: Model, out: Path) -> str:
-    """Write the rig of a Model as .mat or .npz; one line on what was written.
+    """Write the rig of a Model as .mat or .npz, and return a line about it.
 
-    PatchfemError for another ending, a scene without [structure], a law that is neither elements that stretch and slip
-    nor tanh, a spring that bends, grooves and a load that changes; Missing where `out` cannot be written.
+    Raises
+    ------
+    PatchfemError
+        For another suffix, a scene without [structure], a law that is neither elements that stretch
+        and slip nor tanh, a nonlinear spring, grooves, and a varying load.
+    Missing
+        If `out` cannot be written.
     """
     out = Path(out)
     if out.suffix.lower() not in ENDINGS:
@@ -79,7 +97,7 @@ def export(model: Model, out: Path) -> str:
 
 
 def _left_out(model: Model) -> str:
-    """What the scene has and the file has not, as the end of a sentence."""
+    """Return the end of a sentence on what the file lacks of the scene."""
     rig = model.rig
     out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (
         rig.springs.travel < MAX_TRAVEL
@@ -97,8 +115,16 @@ def _left_out(model: Model) -> str:
 
 
 def matrices_of(model: Model) -> dict:
-    """M, C, K (n, n) [kg, N s/m, N/m], output (n,), Fex1 (n,) [N] of the drive, force or base (n,), slide (i, n),
-    Omega [rad/s] of a sine and of levels; but for a sine Fex1 is that of 1 N or 1 m/s^2, and 0 of a release."""
+    """Return the matrices and vectors of a rig.
+
+    For a drive other than a sine, Fex1 is that of 1 N or 1 m/s^2; for a release it is 0.
+
+    Returns
+    -------
+    dict
+        M, C, K (n, n) [kg, N s/m, N/m]; output (n,); Fex1 (n,) [N]; force or base (n,); slide (i,
+        n); Omega [rad/s] for a sine and for levels.
+    """
     rig, modes = model.rig, model.rig.modes
     turn, mass = (
         _motions(modes.interfaces if rig.friction.interfaces else np.zeros((0, modes.omega.size))),
@@ -132,7 +158,7 @@ def matrices_of(model: Model) -> dict:
 
 
 def _motions(slides) -> np.ndarray:
-    """Modal coordinates (n, n) of those that are written, of slides (i, n)."""
+    """Return the modal coordinates (n, n) of the written coordinates, for slides (i, n)."""
     i, n = slides.shape
     if not i or i > n:
         return np.eye(n)
@@ -145,12 +171,12 @@ def _motions(slides) -> np.ndarray:
 
 
 def _speeds(rig) -> bool:
-    """Whether the friction is of the speed alone."""
+    """Return whether the friction depends on the speed alone."""
     return all(one.numbers.law == "tanh" for one in rig.friction.interfaces)
 
 
 def _refuse(model: Model) -> None:
-    """PatchfemError for what neither matrices nor friction elements have."""
+    """Raise PatchfemError for features that neither matrices nor friction elements have."""
     rig = model.rig
     motion = engines.motion_of(model, steady=True)
     if _speeds(rig):
@@ -172,7 +198,7 @@ def _refuse(model: Model) -> None:
 
 
 def elements_of(model: Model) -> Elements:
-    """The friction elements of a rig; none of one that does not rub."""
+    """Return the friction elements of a rig; none if it has no friction."""
     rig, n = model.rig, model.rig.modes.omega.size
     none = np.zeros(0)
     if not rig.friction.interfaces:
@@ -203,7 +229,7 @@ def elements_of(model: Model) -> Elements:
 
 
 def _matlab(file, arrays: dict, found: Elements) -> None:
-    """Variables of NLvib, column vectors, and a cell array of its structures."""
+    """Write the variables of NLvib, column vectors, and a cell array of its structures."""
     from scipy.io import savemat
 
     cells = np.empty((1, found.limit.size), dtype=object)

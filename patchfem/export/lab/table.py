@@ -1,4 +1,4 @@
-"""Columns as CSV: units in the header, numbers with every digit, so that reading them gives the same bits."""
+"""Columns as CSV with units in the header and all digits, so that the same bits are read."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ from .series import Column
 
 
 def write(path: Path, time, columns: list) -> None:
-    """Write `Column`s, time (k,) [s] or None first, with headers like `force [N]`."""
+    """Write columns with headers such as `force [N]`, the time (k,) [s] first if there is one."""
     whole = [*([] if time is None else [Column("time", "s", time, 0)]), *columns]
     lines = [",".join(f"{one.label} [{one.unit}]" for one in whole)]
     lines += [",".join(map(repr, row)) for row in zip(*(one.values.tolist() for one in whole))]

@@ -1,7 +1,8 @@
-"""Histories and loops as a universal file: dataset 164 (SI), then a binary dataset 58 per history and per loop.
+"""Histories and loops as a universal file: dataset 164 (SI), and binary datasets 58.
 
-Binary and unevenly spaced, because only so are time and value kept to the last bit: text holds twelve digits of a value
-and six of a time. pyuff writes; the announced number of bytes, which it counts without the abscissa, is set right.
+The datasets are binary and unevenly spaced, because only then are time and value exact to the last
+bit: as text, a value has twelve digits and a time six. pyuff writes the file; it counts the bytes
+of a dataset without the abscissa, and this number is corrected.
 """
 
 from pathlib import Path
@@ -12,7 +13,7 @@ from ...core import Missing, PatchfemError
 from .series import Column, Histories, program
 
 TIME, DISPLACEMENT, GENERAL = 17, 8, 1  # data types
-TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13}  # unit -> data type; any other is general
+TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13}  # data type by unit; all others are general
 HISTORY, LOOP = 1, 0  # function types: time response, general
 LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
 SI = {
@@ -28,14 +29,21 @@ SI = {
 
 
 def write(path: Path, found: Histories) -> int:
-    """Write the columns over time and the loops; how many datasets 58.
+    """Write the columns over time and the loops; return the number of datasets 58.
 
-    Identification line 1 is the name of the history (of a loop, "force over slide"), line 2 the program, line 4 the
-    title; the node is the number of the interface or mode, or 1, the direction +x. PatchfemError for a folder with
-    neither time nor loop, Missing without pyuff.
+    Identification line 1 is the name of the history (for a loop, "force over slide"), line 2 the
+    program, line 4 the title; the node is the number of the interface or mode, or 1, and the
+    direction is +x.
+
+    Raises
+    ------
+    PatchfemError
+        If the folder has neither time nor loop.
+    Missing
+        If pyuff is not installed.
     """
     for one in found.columns:
-        if not np.isfinite(one.values).all():  # pyuff would write them as 0
+        if not np.isfinite(one.values).all():  # pyuff would write these values as 0
             raise PatchfemError(
                 f"{path}: {one.label} has values that are not finite, which a universal file cannot "
                 "contain; export .mat or .csv instead"
@@ -59,9 +67,9 @@ def write(path: Path, found: Histories) -> int:
 
 
 def write_sets(path: Path, sets: list) -> None:
-    """Write datasets by pyuff over an older file, those of type 58 binary, with their counts of bytes set right.
+    """Write datasets by pyuff into a new file, with correct byte counts; Missing without pyuff.
 
-    Missing without pyuff.
+    Datasets of type 58 are binary.
     """
     try:
         import pyuff
@@ -81,17 +89,27 @@ def write_sets(path: Path, sets: list) -> None:
 
 
 def _count(path: Path, begin: int, size: int) -> None:
-    """Write the number of bytes that follow the eleven lines of text of a binary dataset 58 into its first line."""
+    """Write the number of bytes after the eleven lines of text into a dataset 58.
+
+    Parameters
+    ----------
+    path : Path
+    begin : int
+        Position of the dataset in the file.
+    size : int
+        Number of bytes.
+    """
     with open(path, "r+b") as file:
         file.seek(begin)
         head = file.read(200)
-        # after byte order, float format, lines of text
+        # The number follows the byte order, the float format and the number of lines of text.
         at = head.index(b"b", head.index(b"    58")) + 1 + 6 + 6 + 12
         file.seek(begin + at)
         file.write(b"%12d" % size)
 
 
 def _function(name: str, over: Column, one: Column, kind: int, title: str) -> dict:
+    """Return a dataset 58 of a column over another one."""
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
     return {
         "type": 58,

@@ -1,4 +1,4 @@
-"""Histories of a results folder as a file of a laboratory, by its ending."""
+"""Histories of a results folder as a laboratory file, whose suffix chooses the format."""
 
 from pathlib import Path
 
@@ -11,8 +11,8 @@ from ...structure.drive_sizes import MAX_SAMPLES, MIN_SAMPLES_PER_CYCLE
 from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of
 
-FEW = 5  # rows from turn to turn, below which turning points stand alone
-# columns of a decay, behind "decay_"
+FEW = 5  # rows between reversals, below which only reversals are stored
+# columns of a decay without the prefix "decay_"
 DECAY = {
     "time": "s",
     "amplitude": "m",
@@ -24,10 +24,10 @@ DECAY = {
 
 
 def export(folder: Path, out: Path) -> str:
-    """Write the histories and loops of a results folder; one line on what was written.
+    """Write the histories and loops of a results folder, and return a line about it.
 
-    PatchfemError for another ending and a folder without histories, Missing where it is not there or `out` cannot be
-    written.
+    PatchfemError for another suffix and for a folder without histories; Missing if it does not
+    exist or `out` cannot be written.
     """
     out = Path(out)
     if out.suffix.lower() not in ENDINGS:
@@ -50,7 +50,7 @@ def export(folder: Path, out: Path) -> str:
 
 
 def _thinned(found) -> str:
-    """Words on the early rows of histories in which turning points stand alone, "" where there are none."""
+    """Return the note on early rows of histories that contain only reversals; else ""."""
     place = next((one.values for one in found.columns if one.name.endswith("displacement")), None)
     if place is None or found.time is None:
         return ""
@@ -66,13 +66,13 @@ def _thinned(found) -> str:
 
 
 def write_table(out: Path, values: dict, units: dict) -> None:
-    """Write arrays of one length by name as CSV with their units; Missing where `out` cannot be written."""
+    """Write arrays of equal length as CSV with their units; Missing if `out` cannot be written."""
     columns = [table.Column(name, units[name], column, 0) for name, column in values.items()]
     with write_atomically(out) as partial:
         table.write(partial, None, columns)
 
 
 def write_response(out: Path, estimate, drive: str, response: str) -> None:
-    """Write a frequency response as a universal file; Missing where `out` cannot be written."""
+    """Write a frequency response as a universal file; Missing if `out` cannot be written."""
     with write_atomically(out) as partial:
         modes.write_response(partial, estimate, drive, response)

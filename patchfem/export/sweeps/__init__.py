@@ -1,4 +1,6 @@
-"""A sweep on disk: its answers as columns in `chunks/`, sweep.csv and sweep.nc of them all, a folder per case if asked.
+"""A sweep on disk: results as columns in `chunks/`, tables, and optional case folders.
 
-In: the cases of a sweep and how to answer them. Out: files, whole at every moment. Read `chunks`, `folder`, then `run`.
+In: the cases of a sweep and an executor. Out: files, complete at every moment.
+
+Read `chunks`, `folder`, then `run`.
 """

@@ -1,4 +1,4 @@
-"""sweep.json: what a sweep comes to, in one sentence and in numbers."""
+"""sweep.json: the summary of a sweep, in one sentence and in numbers."""
 
 from __future__ import annotations
 
@@ -17,14 +17,28 @@ NONE = MappingProxyType({})
 
 
 def answer_of(lead: SweepHeadline, outcome: Sequence, sign: str = "", of: Mapping = NONE) -> dict:
-    """What a sweep comes to; outcome: of each case; sign, of: what the tables were written for (`run.sign_of`,
-    `run.signed_of`).
+    """Return the summary of a sweep as a dict that can be written as JSON.
 
-    `answer`: one sentence; `sentences`: all that is printed; `cases`: `count`, `failed`, `unfinished` (without an
-    answer yet), `outcomes` {outcome: count} and `over_tolerance` {measure: {`count`, `worst`: largest error/|value|}};
-    `ranking` {measure: [{`key`, `first`, `total`, `low`, `high`}]}, shares of the keys in the variance of a measure, {}
-    where the cases do not tell them; `limits` [{`measure`, `key`, `value`, `unit`, `change`, `low`, `high`}]: how far
-    a key may go, between which cases, SI.
+    `answer`: one sentence; `sentences`: all that is printed; `cases`: `count`, `failed`,
+    `unfinished` (without a result), `outcomes` {outcome: count} and `over_tolerance` {measure:
+    {`count`, `worst`: largest error/|value|}}; `ranking` {measure: [{`key`, `first`, `total`,
+    `low`, `high`}]}: Sobol indices of the keys, {} if the cases do not determine them; `limits`
+    [{`measure`, `key`, `value`, `unit`, `change`, `low`, `high`}]: limits of a key and the cases
+    between which they lie, in SI.
+
+    Parameters
+    ----------
+    lead : SweepHeadline
+    outcome : sequence of str
+        Outcome of each case.
+    sign : str
+        Hash of what the tables were written for (`run.sign_of`).
+    of : mapping
+        Scene and keys of the sweep (`run.signed_of`).
+
+    Returns
+    -------
+    dict
     """
     counts = dict(Counter(map(str, outcome)).most_common())
     return {
@@ -50,7 +64,7 @@ def write_answer(found: dict, path: Path) -> None:
 
 
 def read_answer(path: Path) -> dict:
-    """What sweep.json holds, {} where there is none that can be read."""
+    """Return the content of sweep.json; {} if it cannot be read."""
     try:
         found = json.loads(path.read_bytes())
     except (OSError, ValueError):

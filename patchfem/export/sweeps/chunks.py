@@ -1,9 +1,10 @@
-"""The answers of a sweep on disk: `chunks/`, each file with the columns of some thousand cases or fewer.
+"""Results of a sweep in `chunks/`: files with the columns of up to some thousand cases.
 
-A file is HDF5: `case` (n,) names of the cases as numbers, `values`, `errors`, `floors` (measures, n) in SI, `outcome`
-(n,) places in a list of words, `seconds` (n,); its attribute `about` is JSON with the words, the measures with their
-units, the messages of failed cases and the reasons of what has no value. A file is whole or not there, and its name has
-the sign of its bytes, so that a damaged one is none.
+A file is HDF5. It has `case` (n,), the names of the cases as numbers; `values`, `errors`, `floors`
+(measures, n) in SI; `outcome` (n,), indices of a list of words; and `seconds` (n,). Its attribute
+`about` is JSON with these words, the measures with their units, the messages of failed cases and
+the reasons of measures without a value. A file is complete or does not exist, and its name contains
+a hash of its bytes, so that a damaged file is recognised.
 """
 
 from __future__ import annotations
@@ -28,10 +29,23 @@ PARTS = ("values", "errors", "floors")
 
 
 def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseResults) -> str:
-    """Write the answers of cases into a folder; the name of the file: numbers of the first and last, and the sign of
-    its bytes.
+    """Write the results of cases into a folder, and return the name of the file.
 
-    names: (n,) uint64, one per case. WriteError where there is no space.
+    The name consists of the numbers of the first and last case and a hash of the bytes.
+
+    Parameters
+    ----------
+    folder : Path
+    numbers : sequence of int
+        Numbers of the cases.
+    names : (n,) array of uint64
+        Names of the cases.
+    found : CaseResults
+
+    Raises
+    ------
+    WriteError
+        If there is no space.
     """
     words = list(dict.fromkeys(map(str, found.outcome)))
     reasons = [
@@ -69,11 +83,12 @@ def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseRe
 
 
 def _sign(image: bytes) -> str:
+    """Return the hash of the bytes of a file."""
     return sha256(image).hexdigest()[:16]
 
 
 def _opened(path: Path) -> h5py.File:
-    """A file as it was written; ValueError where its bytes are others."""
+    """Open a file of results; ValueError if its bytes do not match its name."""
     image = path.read_bytes()
     if not path.stem.endswith(f"-{_sign(image)}"):
         raise ValueError(f"{path.name}: damaged")
@@ -81,7 +96,10 @@ def _opened(path: Path) -> h5py.File:
 
 
 def read(path: Path) -> tuple[np.ndarray, CaseResults]:
-    """(names (n,), Answers) of a file; OSError, ValueError, KeyError or TypeError where it is damaged."""
+    """Return the names (n,) and the CaseResults of a file.
+
+    OSError, ValueError, KeyError or TypeError if it is damaged.
+    """
     with _opened(path) as file:
         about, names = json.loads(bytes(file.attrs["about"])), _column(file["case"], np.uint64)
         count = names.size
@@ -102,7 +120,7 @@ def read(path: Path) -> tuple[np.ndarray, CaseResults]:
 
 
 def names_in(path: Path) -> np.ndarray:
-    """The names of the cases of a file (n,) uint64, none where it is damaged."""
+    """Return the names (n,) uint64 of the cases of a file; an empty array if it is damaged."""
     try:
         with _opened(path) as file:
             return _column(file["case"], np.uint64)
@@ -111,7 +129,17 @@ def names_in(path: Path) -> np.ndarray:
 
 
 def _column(held, kind, count: int | None = None, rows: int | None = None) -> np.ndarray:
-    """A dataset of the file; ValueError where it has another size or kind."""
+    """Read a dataset; ValueError if it has another shape or type.
+
+    Parameters
+    ----------
+    held : h5py.Dataset
+    kind : numpy type
+    count : int, optional
+        Number of cases; by default any up to 2 * MOST.
+    rows : int, optional
+        Number of measures of a two-dimensional dataset.
+    """
     shape = held.shape if count is None else (count,) if rows is None else (rows, count)
     if (
         held.dtype != kind
@@ -125,10 +153,18 @@ def _column(held, kind, count: int | None = None, rows: int | None = None) -> np
 
 @dataclass(eq=False, slots=True)
 class Chunks:
-    """The files of a folder and the cases that they hold.
+    """Files of a folder and the cases that they contain.
 
-    names: (n,) uint64 of the cases that are wanted, in their order. `held`: (n,) place of a case's file in `files`, -1
-    where none has it. `others`: number of cases that are not wanted and have an answer.
+    Attributes
+    ----------
+    folder : Path
+    names : (n,) array of uint64
+        Names of the requested cases, in their order.
+    files : list of Path
+    held : (n,) array
+        Index in `files` of the file of a case; -1 if no file contains it.
+    others : int
+        Number of cases in the files that are not requested.
     """
 
     folder: Path
@@ -138,8 +174,8 @@ class Chunks:
     others: int = 0
 
     def look(self) -> None:
-        """Find what the folder has by now."""
-        # a case may stand twice in a sweep
+        """Find the files that the folder contains now."""
+        # A case may occur twice in a sweep.
         known, same = np.unique(self.names, return_inverse=True)
         held = np.full(known.size, -1, np.int32)
         there = [
@@ -147,7 +183,7 @@ class Chunks:
             for one in os.scandir(self.folder)
             if one.name.endswith(ENDING) and not one.name.startswith(".")
         ]
-        # of a case that stands in two, the later counts
+        # If two files contain a case, the later one counts.
         there.sort(key=lambda one: (one.stat().st_mtime_ns, one.name))
         self.files, others = [Path(one.path) for one in there], [self.names[:0]]
         for place, path in enumerate(self.files):
@@ -159,7 +195,10 @@ class Chunks:
         self.held, self.others = held[same], np.unique(np.concatenate(others)).size
 
     def parts(self, numbers: np.ndarray) -> Iterator[tuple[np.ndarray, CaseResults]]:
-        """(numbers, Answers) of those of the wanted cases that are there, file by file; a damaged file has none."""
+        """Yield (numbers, CaseResults) of the requested cases that exist, file by file.
+
+        A damaged file contains no cases.
+        """
         numbers = np.asarray(numbers, int)
         for place in np.unique(self.held[numbers]).tolist():
             own = numbers[self.held[numbers] == place]
@@ -173,8 +212,10 @@ class Chunks:
                 yield own, found.some(order[np.searchsorted(names, self.names[own], sorter=order)])
 
     def pack(self, others: bool) -> None:
-        """Fill files up where most hold few cases, so that there are no more than the cases want; others: remove files
-        of other sweeps as well."""
+        """Merge files if most of them contain few cases.
+
+        others: whether to remove files of other sweeps as well.
+        """
         wanted = np.flatnonzero(self.held >= 0)
         used = set(np.unique(self.held[wanted]).tolist())
         old = [self.files[place] for place in sorted(used)]

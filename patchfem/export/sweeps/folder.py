@@ -1,7 +1,7 @@
-"""The folder of a sweep: answers as columns in `chunks/`, and `cases/<key>/` for each case where these are kept, named
-by what it computes, never half written.
+"""The folder of a sweep: columns in `chunks/`, and optionally `cases/<key>/` for each case.
 
-What is not whole has a name that starts with a dot or ends in .partial.
+The name of a case follows from what it computes. A case is never half written: whatever is
+incomplete has a name that starts with a dot or ends in .partial.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from . import chunks
 from .answer import read_answer
 from .chunks import CHUNKS
 
-KEEP = ("none", "summaries", "results", "pages")  # of each case, beside its columns
+KEEP = ("none", "summaries", "results", "pages")  # what is stored of each case besides its columns
 CASES, SUMMARY, TABLES = (
     "cases",
     "summary.json",
@@ -48,14 +48,24 @@ CASES, SUMMARY, TABLES = (
 
 @dataclass(frozen=True, slots=True)
 class Summaries:
-    """summary.json of a case, made where the case was run."""
+    """Writer of summary.json of a case, called in the process that ran the case."""
 
     cases: Cases
 
     def __call__(
         self, number: int, model: Model | PatchfemError, found: CaseResults, case: int
     ) -> str:
-        """The text of summary.json of a case; found: Answers with the case at place `case`."""
+        """Return the text of summary.json of a case.
+
+        Parameters
+        ----------
+        number : int
+            Number of the case in the sweep.
+        model : Model or PatchfemError
+        found : CaseResults
+        case : int
+            Index of the case in `found`.
+        """
         values = {axis.key: text for axis, text in zip(self.cases.axes, self.cases.texts(number))}
         known = isinstance(model, Model)
         effects = model.source.effects if known else ()
@@ -83,6 +93,7 @@ class Summaries:
 
 
 def _measures(found: CaseResults, case: int) -> dict:
+    """Return the measures of a case by name."""
     out = {}
     for name, unit in found.units.items():
         if found.has(name, case):
@@ -99,27 +110,33 @@ def _measures(found: CaseResults, case: int) -> dict:
 
 @dataclass(frozen=True, slots=True)
 class Whole:
-    """Keeps the results folder of each case; page: with its report.html, which takes more room and time than all the
-    rest of a short run."""
+    """Writer of the results folder of each case.
+
+    page: whether it contains report.html, which takes more space and time than all other files of a
+    short run.
+    """
 
     folder: Path
     names: np.ndarray
     page: bool = False
 
     def __call__(self, number: int, result) -> None:
-        """Write the folder of a case that has been run."""
+        """Write the folder of a case after its run."""
         save(result, self.folder / CASES / key_of(self.names[number]), self.page)
 
 
 def key_of(name: int) -> str:
-    """The folder of a case below cases/."""
+    """Return the name of the folder of a case in cases/."""
     return f"{int(name):016x}"
 
 
 @dataclass(frozen=True, slots=True)
 class Writer:
-    """Writes answers into the folder of a sweep from wherever it is seen: `token` is a file in it that no other folder
-    of this name has. keep: what is written of each case, one of KEEP."""
+    """Writer of results into the folder of a sweep, from any machine that has access to it.
+
+    `token` is the name of a file by which the folder is identified. keep: what is written of each
+    case, one of KEEP.
+    """
 
     target: Path
     shown: Path
@@ -128,19 +145,19 @@ class Writer:
     token: str = ""
 
     def __call__(self, numbers: Sequence[int], found: CaseResults, texts: Sequence[str]) -> bool:
-        """Write what `put` does; False where the folder is not seen from here, or has no room for it."""
+        """Write results as `put` does; return False if the folder is not accessible or is full."""
         try:
             there = (self.target / CHUNKS / self.token).is_file()
             if there:
                 self.put(numbers, found, texts)
             return there
-        except Missing:  # who asked says so
+        except Missing:  # the process that requested the case reports this
             return False
 
     def put(self, numbers: Sequence[int], found: CaseResults, texts: Sequence[str]) -> None:
-        """Write the answers of cases, first their folders where these are kept; Missing where that fails."""
+        """Write the results of cases, their folders first; Missing if this fails."""
         for case, (number, text) in enumerate(zip(numbers, texts)):
-            # the results folder of another is there
+            # Other cases have a results folder already.
             if self.keep == "summaries" or case in found.messages:
                 self._put(self.target / CASES / key_of(self.names[number]), text)
         try:
@@ -149,28 +166,42 @@ class Writer:
             raise self._fault(error) from None
 
     def _put(self, place: Path, text: str) -> None:
+        """Write summary.json of a case into its folder, which replaces an older one."""
         draft = place.with_name(f".{place.name}.{os.getpid()}")
         try:
             draft.mkdir(parents=True, exist_ok=True)
             write_in_partial_folder(draft / SUMMARY, text)
             try:
                 os.rename(draft, place)
-            except OSError:  # it is there already
+            except OSError:  # the folder exists already
                 replace_folder(draft, place)
         except (OSError, WriteError) as error:
             shutil.rmtree(draft, ignore_errors=True)
             raise self._fault(error) from None
 
     def _fault(self, error) -> Missing:
+        """Return the error of a case that cannot be written."""
         why = str(error) if isinstance(error, WriteError) else error.strerror
         return Missing(f"{self.shown}: a case cannot be written ({why}); complete cases are kept")
 
 
 class Folder:
-    """The folder of a sweep, claimed while it is open unless it is shared by shards.
+    """The folder of a sweep, which is locked while it is open, unless shards share it.
 
-    names: (n,) uint64, one per case. PatchfemError for a place that holds other files, Missing where it cannot be
-    written or is being written.
+    Parameters
+    ----------
+    target : Path
+    names : (n,) array of uint64
+        Names of the cases.
+    shared : bool
+        Whether shards share the folder.
+
+    Raises
+    ------
+    PatchfemError
+        If the target contains other files.
+    Missing
+        If it cannot be written, or is being written.
     """
 
     def __init__(self, target: Path, names: np.ndarray, shared: bool = False):
@@ -193,7 +224,7 @@ class Folder:
             try:
                 self.claim.acquire()
             except Missing:
-                if not self.claim.path.exists():  # else the folder is another's
+                if not self.claim.path.exists():  # otherwise the folder belongs to another process
                     self._remove_empty()
                 raise
         write_bytes(self.target / CHUNKS / self.token, b"")
@@ -202,7 +233,7 @@ class Folder:
         return self
 
     def _adopt(self) -> None:
-        """Take the answers of an older folder, which has them in the summaries of its cases alone, into columns."""
+        """Convert the results of an older folder, which has only summaries of its cases, to columns."""
         if not (self.target / CASES).is_dir():
             return
         named = {one.name for one in os.scandir(self.target / CASES)}
@@ -239,17 +270,20 @@ class Folder:
                 self._remove_empty()
 
     def _remove_empty(self) -> None:
+        """Remove the folders of the sweep that are empty."""
         for place in (self.target / CASES, self.target / CHUNKS, self.target):
-            with suppress(OSError):  # it holds what is older, or what this sweep has answered
+            with suppress(OSError):  # the folder contains older files or results of this sweep
                 place.rmdir()
 
     def whole(self) -> bool:
-        """Whether the folder holds the tables of a sweep that came to its end."""
+        """Return whether the folder contains the tables of a complete sweep."""
         return read_answer(self.target / "sweep.json").get("cases", {}).get("unfinished") == 0
 
     def refuse_another(self, of: dict) -> None:
-        """PatchfemError where the tables of the folder are those of another scene or of other keys, which a resumed
-        sweep would replace; of: as of `run.signed_of`."""
+        """Raise PatchfemError if the tables in the folder are of another scene or of other keys.
+
+        A resumed sweep would replace them. of: from `run.signed_of`.
+        """
         held = read_answer(self.target / "sweep.json").get("of", of)
         if held == of:
             return
@@ -265,7 +299,7 @@ class Folder:
         )
 
     def there(self, numbers: np.ndarray, keep: str = "none") -> np.ndarray:
-        """Those of the cases that have an answer, and the files of each that `keep` asks for."""
+        """Return the numbers of the cases that have a result and the files that `keep` requires."""
         numbers = np.asarray(numbers, int)
         numbers = numbers[self.chunks.held[numbers] >= 0]
         if keep == "none":
@@ -280,6 +314,7 @@ class Folder:
         )
 
     def _kept(self, number: int, keep: str, failed: bool) -> bool:
+        """Return whether the folder of a case has the files that `keep` requires."""
         place = os.path.join(self.target, CASES, key_of(self.chunks.names[number]))
         asked = (
             ()
@@ -298,26 +333,33 @@ class Folder:
         )
 
     def answers(self, total: CaseResults) -> CaseResults:
-        """`total` with the answers of all cases that have one."""
+        """Fill in the results of all cases that have any, and return `total`."""
         self.chunks.look()
         for at, part in self.chunks.parts(np.arange(len(total))):
-            part.reasons.clear()  # they stand in no table
+            part.reasons.clear()  # no table contains the reasons
             total.place(at, part)
         return total
 
     def keys(self) -> list[str]:
-        """Folders of the cases below cases/, none where these are not kept."""
+        """Return the names of the folders of the cases in cases/; [] if there are none."""
         return list(map(key_of, self.chunks.names)) if (self.target / CASES).is_dir() else []
 
     def unfinish(self) -> None:
-        """Mark the tables of an older sweep as what they are while cases are answered: not those of the folder."""
+        """Rename the tables of an older sweep while cases are computed, because they do not match."""
         for name in TABLES:
-            with suppress(FileNotFoundError):  # there is none, or another shard was first
+            with suppress(FileNotFoundError):  # there is none, or another shard has renamed it
                 os.replace(self.target / name, self.target / f"{name}.partial")
 
     def tidy(self, others: bool, keep: str = "") -> None:
-        """Remove what is left of tables and cases that were never whole; others: what is of other sweeps as well;
-        keep: the folders of cases go where it is "none"."""
+        """Remove files of tables and cases that were never complete.
+
+        Parameters
+        ----------
+        others : bool
+            Whether to remove files of other sweeps as well.
+        keep : str
+            The folders of cases are removed if it is "none".
+        """
         self.chunks.pack(others)
         for one in os.scandir(self.target / CHUNKS):
             if one.name.startswith(".") and one.name != self.token and not self.shared:
@@ -332,13 +374,13 @@ class Folder:
                 ):
                     if one.is_dir(follow_symlinks=False):
                         shutil.rmtree(one.path, ignore_errors=True)
-                    else:  # what says who writes the folder of a case, of a killed one
+                    else:  # the lock file of a process that was killed while it wrote a case
                         Path(one.path).unlink(missing_ok=True)
-            with suppress(OSError):  # cases are in it
+            with suppress(OSError):  # cases/ is not empty
                 (self.target / CASES).rmdir()
         self.finish()
 
     def finish(self) -> None:
-        """Remove the tables of an older sweep: there are those of this one."""
+        """Remove the tables of an older sweep, which those of this sweep have replaced."""
         for name in TABLES:
             (self.target / f"{name}.partial").unlink(missing_ok=True)

@@ -1,8 +1,8 @@
-"""What a whole sweep was asked for and which files it left, so that the same sweep resumed says at once that it is
-there: no case is named, no column read, and neither numpy nor the tables of a scene are loaded.
+"""Record of a complete sweep: a hash of its request, and the files that it wrote.
 
-A file counts as the one that was left while its size and the time of its last change are the same; where anything
-differs, the sweep looks at its cases.
+With it, the same sweep is recognised at once when it is resumed: no case is named and no column is
+read, and neither numpy nor the tables of a scene are loaded. A file counts as unchanged if its size
+and the time of its last change are the same; if anything differs, the sweep checks its cases.
 """
 
 import json
@@ -21,11 +21,23 @@ TABLES = "sweep.csv", "sweep.nc", "sweep.json", "report.html"
 
 
 def sign(path: Path, words: Sequence[str], cases: Path | None = None) -> str:
-    """Sign of all that a sweep is made of: the scene at a path, the words of the command, the table of its cases, the
-    files that any of these may name, this program; "" where it cannot be told."""
+    """Return a hash of all that a sweep depends on; "" if it cannot be computed.
+
+    It covers the scene, the words of the command, the table of cases, the files that these name,
+    and this program.
+
+    Parameters
+    ----------
+    path : Path
+        File of the scene.
+    words : sequence of str
+        Words of the command.
+    cases : Path, optional
+        Table of the cases.
+    """
     try:
         text = path.read_bytes().decode()
-        if cases is not None and not cases.is_file():  # a pipe is read once, by the sweep
+        if cases is not None and not cases.is_file():  # a pipe can be read only once, by the sweep
             return ""
         cells = [] if cases is None else [cases.read_text("utf-8-sig")]
         files = hash_named_files(
@@ -40,14 +52,14 @@ def sign(path: Path, words: Sequence[str], cases: Path | None = None) -> str:
 
 
 def write(folder: Path, signed: str) -> None:
-    """Write the receipt of a sweep whose cases all have an answer."""
+    """Write the record of a sweep in which every case has a result."""
     atomic_write.write_text(
         folder / NAME, json.dumps({"sign": signed, "files": _files(folder)}) + "\n"
     )
 
 
 def read(folder: Path, signed: str) -> dict:
-    """sweep.json of a folder that holds the sweep of this sign, whole; {} of any other."""
+    """Return sweep.json of a folder with the complete sweep of this hash; else {}."""
     try:
         held = json.loads((folder / NAME).read_bytes())
         if not signed or held != {"sign": signed, "files": _files(folder)}:
@@ -58,7 +70,7 @@ def read(folder: Path, signed: str) -> dict:
 
 
 def _files(folder: Path) -> list:
-    """The files of a sweep with their marks; OSError without a folder of them."""
+    """Return the files of a sweep with size and time; OSError if there is no folder."""
     chunks = [Path(one.path) for one in os.scandir(folder / "chunks") if one.name != "whole.json"]
     return sorted(
         _marks([*chunks, *(folder / name for name in TABLES if (folder / name).is_file())])
@@ -66,5 +78,5 @@ def _files(folder: Path) -> list:
 
 
 def _marks(paths) -> list:
-    """[path, bytes, time of the last change in ns] of each."""
+    """Return [path, bytes, time of the last change in ns] of each file."""
     return [[str(path), (at := path.stat()).st_size, at.st_mtime_ns] for path in paths]

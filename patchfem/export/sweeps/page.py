@@ -1,4 +1,4 @@
-"""report.html of a sweep: its table as the page takes it, from the answers or from the files of its folder."""
+"""report.html of a sweep: the table for the page, from results in memory or from files."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ from ..read_results import HUGE, wanted
 from ..written import NUMBER
 from .tables import FACTS, facts, names_of
 
-AGAIN = "--cases", "sweep.csv"  # rows whose command is not known
-# what a click on a case opens: its page where it has one
+AGAIN = "--cases", "sweep.csv"  # arguments for cases in rows whose command is not known
+# Files that a click on a case opens: its page if there is one, else its summary.
 WHOLE, SHORT = (
     "report.html",
     "summary.json",
@@ -35,12 +35,27 @@ WHOLE, SHORT = (
 
 
 def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:
-    """Write the page of all cases beside their tables."""
+    """Write the page of all cases into the folder of their tables."""
     write_text(folder / WHOLE, sweep.page(table, lead))
 
 
 def table_of(asked: Asked, cases: Cases, found: CaseResults, keys: list, folder: Path) -> dict:
-    """The table of `pages.sweep.page` from the answers of the cases."""
+    """Return the table for `pages.sweep.page` from the results of the cases.
+
+    Parameters
+    ----------
+    asked : Asked
+    cases : Cases
+    found : CaseResults
+    keys : list of str
+        Folders of the cases in cases/; [] if there are none.
+    folder : Path
+        Folder of the sweep.
+
+    Returns
+    -------
+    dict
+    """
     columns = columns_of(cases)
     measures = {
         name: {
@@ -71,7 +86,7 @@ def table_of(asked: Asked, cases: Cases, found: CaseResults, keys: list, folder:
 
 
 def columns_of(cases: Cases) -> list:
-    """The swept keys, each with its values in SI and as written in every case."""
+    """Return the swept keys, each with its values in SI and as written in every case."""
     every = np.arange(len(cases))
     places = [every] * len(cases.axes) if cases.rows else np.unravel_index(every, cases.shape)
     return [
@@ -87,8 +102,10 @@ def columns_of(cases: Cases) -> list:
 
 
 def _shared(held: dict, columns: list) -> dict:
-    """The tolerance of the cases, the size of their patch and the ends [Hz] of their curves over frequency, from what
-    all have in common and what is swept."""
+    """Return tolerance, patch size [m] and ends [Hz] of the swept frequencies of all cases.
+
+    They are those of the scene (`held`), or swept values (`columns`).
+    """
     swept = {one["name"]: one["values"] for one in columns}
     return {
         "tolerance": held.get("tolerance", swept.get("accuracy.tolerance", np.nan)),
@@ -104,17 +121,20 @@ def _shared(held: dict, columns: list) -> dict:
 
 
 def titles(columns: list, of: str) -> dict:
-    """What heads the page: the keys that were swept; the scene's own title tells of the values before they were."""
+    """Return the title of the page, made of the swept keys, and the title of the scene.
+
+    The title of the scene refers to the values before the keys were changed.
+    """
     return {"title": f"Sweep of {' × '.join(one['name'] for one in columns)}", "of": of}
 
 
 def opened(folder: Path, key: str) -> str:
-    """What a click on a case opens, as it is seen from the page."""
+    """Return the file that a click on a case opens, relative to the page."""
     return f"cases/{key}/{WHOLE if (folder / 'cases' / key / WHOLE).is_file() else SHORT}"
 
 
 def numbers(values) -> np.ndarray:
-    """Values along an axis: numbers as they are, words numbered in the order they come."""
+    """Return values along an axis: numbers unchanged, words numbered in order of occurrence."""
     if isinstance(values, array) or all(isinstance(one, int | float) for one in values):
         return np.asarray(values, float)
     order = {one: place for place, one in enumerate(dict.fromkeys(values))}
@@ -122,10 +142,11 @@ def numbers(values) -> np.ndarray:
 
 
 def wide(values) -> bool:
-    """Whether an axis of these values is better logarithmic: none < 0 and the largest > 0 ten times the smallest.
+    """Return whether a logarithmic axis suits these values.
 
-    A zero has no place on such an axis: the page tells that case in words. Where the second value above it is twice the
-    first or less, as in 0, 1, 2, .. 10, the axis is linear.
+    It does if none is negative and the largest is at least ten times the smallest positive one. A
+    value of 0 cannot be on such an axis; the page describes this case in words. If the second
+    positive value is at most twice the first, as in 0, 1, 2, .., 10, the axis is linear.
     """
     if not isinstance(values, array) and not all(isinstance(one, int | float) for one in values):
         return False
@@ -141,7 +162,7 @@ def wide(values) -> bool:
 
 
 def command(asked: Asked, cases: Cases) -> str:
-    """The line that answers the same cases again."""
+    """Return the command line that computes the same cases."""
     words = [
         "patchfem",
         "sweep",
@@ -164,9 +185,9 @@ def command(asked: Asked, cases: Cases) -> str:
 
 
 def read_table(folder: Path) -> dict:
-    """The table of a sweep from sweep.csv (values as written) and sweep.nc (numbers) of its folder.
+    """Return the table of a sweep from sweep.csv (values as written) and sweep.nc (numbers).
 
-    PatchfemError where one of them is missing or cannot be read.
+    PatchfemError if one of the files is missing or cannot be read.
     """
     import h5netcdf
 
@@ -192,7 +213,7 @@ def read_table(folder: Path) -> dict:
     except FileNotFoundError as fault:
         name = Path(fault.filename).name if fault.filename else "sweep.nc"
         raise PatchfemError(f"{folder}: not the folder of a sweep: it has no {name}") from None
-    except Exception as fault:  # damaged files have many ways to fail
+    except Exception as fault:  # damaged files can fail in many ways
         said = " ".join(str(fault).split())[:200]
         raise PatchfemError(
             f"{folder}: the sweep in this folder cannot be read: {said or type(fault).__name__}"
@@ -200,7 +221,7 @@ def read_table(folder: Path) -> dict:
 
 
 def _whole(table: dict) -> dict:
-    """The table; ValueError where its columns are not as long as it has cases, or hold no numbers of results."""
+    """Return the table; ValueError if a column has a wrong length or impossible numbers."""
     count = len(table["outcome"])
     parts = [(one["name"], one["values"]) for one in table["keys"]]
     parts += [
@@ -220,6 +241,7 @@ def _whole(table: dict) -> dict:
 
 
 def _table(folder: Path, rows: list, keys: list, file) -> dict:
+    """Return the table for `pages.sweep.page` from rows of sweep.csv and from sweep.nc."""
     columns = []
     for key in keys:
         held = file[re.sub(r"\W", "_", key)]
@@ -298,9 +320,9 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
 
 
 def joined(tables: list, names: list) -> dict:
-    """One table of several sweeps, told apart by a key `sweep` that has their names for values.
+    """Return one table of several sweeps, with a key `sweep` whose values are their names.
 
-    PatchfemError where they were not made over the same keys.
+    PatchfemError if they do not have the same keys.
     """
     keys = [[one["name"] for one in table["keys"]] for table in tables]
     if any(sorted(one) != sorted(keys[0]) for one in keys):
@@ -321,7 +343,7 @@ def joined(tables: list, names: list) -> dict:
     for key in keys[0]:
         own = [next(one for one in table["keys"] if one["name"] == key) for table in tables]
         texts = [text for one in own for text in one["texts"]]
-        words = not any(map(NUMBER.match, texts))  # each table numbered them in its own order
+        words = not any(map(NUMBER.match, texts))  # each table numbered the words in its own order
         columns.append(
             {
                 "name": key,
@@ -383,7 +405,7 @@ def joined(tables: list, names: list) -> dict:
 
 
 def seen_from(table: dict, folder: Path, page: Path) -> dict:
-    """The table with the links of its cases as they are seen from a page elsewhere."""
+    """Return the table with links of its cases that are relative to another page."""
     if table["folders"] is None:
         return table
     way = os.path.relpath(folder, page.parent)

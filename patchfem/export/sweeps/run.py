@@ -1,4 +1,4 @@
-"""A sweep run into its folder: what is there is kept, what is missing is answered, then the tables are written."""
+"""A sweep into its folder: existing results are used, others computed, tables written."""
 
 from __future__ import annotations
 
@@ -30,12 +30,21 @@ from .tables import contents, write_csv
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a sweep is kept, and how.
+    """Where and how a sweep is stored.
 
-    resume: answers that are there are taken as they are; keep: what there is of each case beside its columns, "none",
-    its "summaries", the "results" folder or that with its "pages"; a case that has less is no answer. "" keeps the
-    summaries of a sweep of some hundred cases; shard: (i, n) to answer the i-th of n parts only, into a folder that the
-    parts share; page: the sweep has one.
+    Attributes
+    ----------
+    target : Path
+    resume : bool
+        Whether existing results are used.
+    keep : str
+        What is stored of each case besides its columns: "none", its "summaries", its folder of
+        "results", or this with its "pages". A case that has less counts as missing. "" stores
+        summaries if there are at most FEW cases.
+    shard : tuple or None
+        (i, n) to compute only the i-th of n parts, into a folder that the parts share.
+    page : bool
+        Whether the sweep has a page.
     """
 
     target: Path
@@ -45,7 +54,7 @@ class Place:
     page: bool = True
 
     def kept(self, count: int) -> str:
-        """What is kept of each of so many cases."""
+        """Return what is stored of each case of a sweep with `count` cases."""
         return self.keep or ("summaries" if count <= FEW else "none")
 
 
@@ -57,10 +66,27 @@ def sweep_into(
     say: Callable | None = None,
     told: Callable | None = None,
 ) -> CaseResults:
-    """Answer the cases into a folder and write its tables; a shard writes none.
+    """Compute the cases of a sweep into a folder and write its tables; a shard writes none.
 
-    told(done, total, seconds left or None): called as cases are done, first with those that were there. What was
-    answered is kept when an exception or an interrupt ends the sweep, and stands in its tables.
+    If an exception or an interrupt ends the sweep, the results so far are kept and written into its
+    tables.
+
+    Parameters
+    ----------
+    asked : Asked
+    cases : Cases
+    place : Place
+    executor : object
+        From `campaigns.sweeps.executors`.
+    say : callable, optional
+        Takes a line of text.
+    told : callable, optional
+        told(done, total, seconds left or None) is called as cases are done, first with those that
+        existed.
+
+    Returns
+    -------
+    CaseResults
     """
     shared, keep = place.shard is not None, place.kept(len(cases))
     with Folder(place.target, cases.names(asked), shared) as folder:
@@ -109,12 +135,12 @@ def sweep_into(
 
 
 def signed_of(asked: Asked, cases: Cases) -> dict:
-    """What a sweep is of, by which `--resume` knows it: the sign of its scene, and its keys."""
+    """Return scene (as a hash) and keys of a sweep, by which `--resume` recognises it."""
     return {"scene": asked.digest(), "keys": [axis.key for axis in cases.axes]}
 
 
 def _left_out(count: int) -> str:
-    """That a resumed sweep names fewer values than the folder has answers."""
+    """Return a note that a resumed sweep has fewer values than the folder has results."""
     one = count == 1
     return (
         f"note: {count} case{'s' * (not one)} of this folder {'is' if one else 'are'} not among the values of this "
@@ -124,14 +150,14 @@ def _left_out(count: int) -> str:
 
 
 def _so_far(asked: Asked, cases: Cases, folder: Folder, found: CaseResults, page: bool) -> None:
-    """Write the tables of what an interrupted sweep has, where it has anything."""
+    """Write the tables of an interrupted sweep, if it has any results."""
     if any(found.outcome):
         write_tables(asked, cases, found, folder, page)
         folder.finish()
 
 
 class Jobs(NamedTuple):
-    """What a sweep answers, into which folder, and what is kept of each case."""
+    """The cases of a sweep, the folder for them, and what is stored of each case."""
 
     asked: Asked
     cases: Cases
@@ -142,8 +168,20 @@ class Jobs(NamedTuple):
 def _solve(
     jobs: Jobs, numbers: np.ndarray, executor, say: Callable | None, told: Callable | None
 ) -> list:
-    """Answer cases into the folder: (numbers, Answers) of those whose worker died, which are not written, so that a
-    resumed sweep tries them again. told(done, seconds left or None): called as cases are done."""
+    """Compute cases into the folder, and return (numbers, CaseResults) of those that died.
+
+    These are not written, so that a resumed sweep tries them again.
+
+    Parameters
+    ----------
+    jobs : Jobs
+    numbers : (n,) array
+        Numbers of the cases.
+    executor : object
+    say : callable or None
+    told : callable or None
+        told(done, seconds left or None) is called as cases are done.
+    """
     keep, folder, names, died = jobs.keep, jobs.folder, jobs.folder.chunks.names, []
     clock = Clock(numbers.size, executor.workers)
     writer = Writer(folder.target, folder.shown, names, keep, folder.token)
@@ -154,7 +192,7 @@ def _solve(
     for chunk, found, texts, seconds in solved(work, numbers.tolist(), executor, say):
         if texts is None:
             died.append((chunk, found))
-        elif found is not None:  # the folder is not seen from where its worker runs, or has no room
+        elif found is not None:  # The worker has no access to the folder, or found it full.
             writer.put(chunk, found, texts)
         left = clock(len(chunk), seconds)
         if told is not None:
@@ -165,19 +203,25 @@ def _solve(
 def swept(
     asked: Asked, cases: Cases, executor, say: Callable | None = None, estimate: bool = True
 ) -> CaseResults:
-    """Answers of the cases in memory alone; estimate: False leaves out the errors of cases that run one by one."""
+    """Compute the cases in memory only.
+
+    estimate: whether errors are computed for cases that run one by one.
+    """
     total = CaseResults.blank(len(cases))
     for numbers, found, *_ in solved(
         Work(asked, cases, estimate=estimate), range(len(cases)), executor, say
     ):
-        for part in (found.warnings, found.notes, found.numerics):  # in no table
+        for part in (found.warnings, found.notes, found.numerics):  # no table contains these
             part.clear()
         total.place(numbers, found)
     return total
 
 
 def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> CaseResults:
-    """All tables of a sweep whose shards are all done, from its folder. Missing where cases have no answer yet."""
+    """Write all tables of a sweep whose shards are complete, from its folder.
+
+    Missing if cases have no result yet.
+    """
     with Folder(target, cases.names(asked)) as folder:
         found = folder.answers(CaseResults.blank(len(cases), folder.target))
         missing = int(np.sum(found.outcome == ""))
@@ -192,7 +236,10 @@ def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Case
 
 
 def sign_of(asked: Asked, cases: Cases, folder: Folder, page: bool) -> str:
-    """Sign of all that the tables of a whole sweep are made of: where it is that of sweep.json, they are there."""
+    """Return a hash of all that the tables of a complete sweep depend on.
+
+    If sweep.json contains this hash, the tables exist.
+    """
     made = [
         own_of()["patchfem"],
         asked.text,
@@ -205,7 +252,7 @@ def sign_of(asked: Asked, cases: Cases, folder: Folder, page: bool) -> str:
 
 
 def _shown(axis: Axis) -> tuple:
-    """What of an axis stands in the tables: its texts, or the sign of the numbers that these are written from."""
+    """Return what the tables contain of an axis: its texts, or a hash of its numbers."""
     texts = axis.texts
     return (
         (texts.unit, sha256(texts.numbers).hexdigest())
@@ -215,7 +262,7 @@ def _shown(axis: Axis) -> tuple:
 
 
 def _written(sign: str, folder: Folder, page: bool) -> bool:
-    """Whether all tables that a sweep of this sign has are there, and nothing has come in since they were written."""
+    """Return whether all tables of a sweep with this hash exist and are up to date."""
     names = TABLES if len(folder.chunks.names) <= TABLED else ("sweep.json", WHOLE)
     return read_answer(folder.target / "sweep.json").get("sign") == sign and all(
         (folder.target / name).is_file() for name in names if page or name != WHOLE
@@ -231,9 +278,23 @@ def write_tables(
     every: bool = False,
     sign: str = "",
 ) -> None:
-    """Write sweep.json, report.html, and of TABLED cases at most, or where `every` asks for them, sweep.csv and
-    sweep.nc; what is not written is not left of other cases. sign: as of `sign_of`, where every case has an answer that
-    is kept."""
+    """Write sweep.json, report.html, sweep.csv and sweep.nc.
+
+    Tables that are not written are removed, because they would be those of other cases.
+
+    Parameters
+    ----------
+    asked : Asked
+    cases : Cases
+    found : CaseResults
+    folder : Folder
+    page : bool
+        Whether report.html is written.
+    every : bool
+        Whether sweep.csv and sweep.nc are written for more than TABLED cases.
+    sign : str
+        From `sign_of` if every case has a result that is stored; else "".
+    """
     keys, tabled = folder.keys(), every or len(cases) <= TABLED
     table = table_of(asked, cases, found, keys, folder.target) | {"tabled": tabled}
     lead = lead_of(table)
@@ -246,7 +307,7 @@ def write_tables(
         write_page(table, lead, folder.target)
     else:
         (folder.target / WHOLE).unlink(missing_ok=True)
-    # the last: it signs the others
+    # This file comes last, because it contains the hash that stands for the others.
     write_answer(
         answer_of(lead, table["outcome"], sign, signed_of(asked, cases)),
         folder.target / "sweep.json",
@@ -254,6 +315,9 @@ def write_tables(
 
 
 def _part(count: int, shard: tuple | None) -> np.ndarray:
-    """Numbers of the cases of a shard (i, n): neighbours, for they share most."""
+    """Return the case numbers of a shard (i, n), which are neighbours.
+
+    Neighbours share most of the work.
+    """
     i, n = shard or (1, 1)
     return np.arange((i - 1) * count // n, i * count // n)

@@ -26,8 +26,8 @@ from ...scene.keys.lookup import find_key
 from .. import netcdf
 from ..summary import versions
 
-BLOCK = 4000  # cases whose texts are made at once
-TRIED = 3  # cases that are asked for what all have in common
+BLOCK = 4000  # cases whose texts are in memory at the same time
+TRIED = 3  # cases that are tried to find what all cases have in common
 ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 FACTS = {
     "tolerance": ("accuracy", "tolerance"),
@@ -48,7 +48,7 @@ class Column(NamedTuple):
 
 
 def names_of(found: CaseResults) -> list[str]:
-    """Sort the measures of the cases in the order of the reference, whatever order the cases came in."""
+    """Return the measures of the cases in the order of the reference."""
     return sorted(
         found.values,
         key=lambda name: (ORDER.get(rows.remove_interface_number(name), len(ORDER)), name),
@@ -67,7 +67,7 @@ def columns_of(found: CaseResults, name: str) -> list[Column]:
 
 
 def head(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> list[str]:
-    """Return the names of the columns of `lines`."""
+    """Return the column names of `lines`."""
     measures = [column.name for name in names_of(found) for column in columns_of(found, name)]
     return [
         *(axis.key for axis in cases.axes),
@@ -79,10 +79,10 @@ def head(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> list[str
 
 
 def lines(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> Iterator[list[str]]:
-    """Yield a line of sweep.csv per case; "" stands for what a case has not.
+    """Yield a line of sweep.csv per case; "" stands for a missing value.
 
-    The swept keys as written, outcome, every measure with its error in SI, the message of a failed case, and the name
-    of its folder where `keys` are given.
+    A line contains the swept keys as written, the outcome, every measure with its error in SI, the
+    message of a failed case, and the name of its folder if `keys` are given.
     """
     columns = [column for name in names_of(found) for column in columns_of(found, name)]
     for first in range(0, len(cases), BLOCK):  # the texts of all cases would fill the memory
@@ -114,11 +114,25 @@ def write_csv(cases: Cases, found: CaseResults, keys: Sequence[str], path: Path)
 def contents(
     asked: Asked, cases: Cases, found: CaseResults, keys: Sequence[str] = (), answer: str = ""
 ) -> netcdf.Contents:
-    """Return what sweep.nc holds, in SI.
+    """Return the content of sweep.nc in SI.
 
-    A dimension per swept key, dots as underscores, or the one dimension `case` where the cases are rows; a variable
-    and an error per measure, outcome, the message of failed cases and the names of their folders; answer: the main
-    conclusion of the sweep in a sentence.
+    There is one dimension per swept key, with dots replaced by underscores, or the single dimension
+    `case` if the cases are rows. The variables are measures and their errors, outcome, the messages
+    of failed cases and the names of their folders.
+
+    Parameters
+    ----------
+    asked : Asked
+    cases : Cases
+    found : CaseResults
+    keys : sequence of str
+        Folders of the cases.
+    answer : str
+        Summary of the sweep in a sentence.
+
+    Returns
+    -------
+    netcdf.Contents
     """
     dims = ("case",) if cases.rows else tuple(axis.name for axis in cases.axes)
     coordinates = {
@@ -133,7 +147,7 @@ def contents(
         )
     columns = []
     for name in names_of(found):
-        if name in coordinates:  # normal.load is the measure of its name
+        if name in coordinates:  # normal.load is also the name of a measure
             continue
         columns += columns_of(found, name)
         if np.nan_to_num(found.floors[name]).any():
@@ -185,7 +199,7 @@ def facts(asked: Asked, cases: Cases) -> dict:
         try:
             tables = tomllib.loads(asked.scene(cases.sets(number)).resolved())
             break
-        except PatchfemError:  # this case has no answer
+        except PatchfemError:  # this case has no model
             continue
     else:
         return {}
@@ -198,10 +212,12 @@ def facts(asked: Asked, cases: Cases) -> dict:
 
 
 def _numbers(values: Sequence) -> np.ndarray:
+    """Return values as an array of numbers or of texts."""
     return np.asarray(values, float if isinstance(values[0], float) else str)
 
 
 def _about(axis) -> dict:
+    """Return the netCDF attributes of a key."""
     model, name = find_key(axis.key)
     try:
         text = types.find_meaning(model, name)
@@ -213,7 +229,7 @@ def _about(axis) -> dict:
 
 
 def cf_unit(unit: str) -> str:
-    """A unit of a scene as the results write it: "m/s^2" is "m s-2"."""
+    """Return a unit of a scene as results write it: "m/s^2" becomes "m s-2"."""
     above, *below = unit.split("/")
     parts = [one.replace("^", "") for one in above.split() if one != "1" or not below]
     for one in " ".join(below).replace("(", "").replace(")", "").split():
