@@ -31,6 +31,9 @@ BASELINE = "tests/house.toml"
 TREES = ("patchfem", "studies", "tests")
 SHOWN_LINES = 12  # lines that the message about one count names
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+CALLABLES = (*FUNCTIONS, ast.Lambda)
+SCOPES = (*CALLABLES, ast.ClassDef)
+DOCUMENTED = (*FUNCTIONS, ast.ClassDef, ast.Module)
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 NOT_COUNTED = {
     tokenize.COMMENT,
@@ -115,6 +118,21 @@ class Breach(NamedTuple):
     text: str
 
 
+class Source(NamedTuple):
+    """One file: path, text, syntax tree and all nodes of the tree."""
+
+    path: Path
+    text: str
+    tree: ast.Module
+    nodes: list
+
+
+def parse_source(text: str, path: Path) -> Source:
+    """Parse the text of a file."""
+    tree = ast.parse(text)
+    return Source(path, text, tree, list(ast.walk(tree)))
+
+
 # ---- the rules
 
 
@@ -177,18 +195,20 @@ def docstring_rules(node, documentation: str):
         yield "D5", node, f"{node.name}: {first}"
 
 
-def own_nodes(node):
-    """Yield the nodes of a function without those of the functions and classes inside it."""
-    for child in ast.iter_child_nodes(node):
-        if not isinstance(child, (*FUNCTIONS, ast.Lambda, ast.ClassDef)):
-            yield child
-            yield from own_nodes(child)
+def own_nodes(node) -> list:
+    """List the nodes of a function; of the functions and classes inside it only the nodes that define them."""
+    nodes = list(ast.iter_child_nodes(node))
+    for child in nodes:
+        if not isinstance(child, SCOPES):
+            nodes.extend(ast.iter_child_nodes(child))
+    return nodes
 
 
 def body_rules(node):
     """Yield the rules that the statements of a function break."""
     longest = 0
-    for part in own_nodes(node):
+    nodes = own_nodes(node)
+    for part in nodes:
         n_lines = getattr(part, "end_lineno", 0) - getattr(part, "lineno", 0) + 1
         if isinstance(part, ast.Return) and isinstance(part.value, ast.Tuple):
             longest = max(longest, len(part.value.elts))
@@ -204,7 +224,8 @@ def body_rules(node):
                 yield "F8", part, node.name
     if longest > 2:
         yield "F1", node, f"{node.name}: {longest} values"
-    if sum(isinstance(inner, (*FUNCTIONS, ast.Lambda)) for inner in ast.walk(node)) > 3:
+    has_inner_scopes = any(isinstance(part, SCOPES) for part in nodes)
+    if has_inner_scopes and sum(isinstance(inner, CALLABLES) for inner in ast.walk(node)) > 3:
         yield "F9", node, node.name
 
 
@@ -244,10 +265,10 @@ def constant_rules(tree, lines: list):
         yield "C4", tree, f"{n_constants} constants"
 
 
-def style_rules(tree, text: str):
+def style_rules(source: Source):
     """Yield (rule, node, text) for every breach of style in a module."""
-    yield from constant_rules(tree, text.splitlines())
-    for node in ast.walk(tree):
+    yield from constant_rules(source.tree, source.text.splitlines())
+    for node in source.nodes:
         if isinstance(node, FUNCTIONS):
             documentation = ast.get_docstring(node) or ""
             yield from name_rules(node)
@@ -264,30 +285,31 @@ def absolute_module(node, package: tuple) -> str:
     return ".".join([*base, *filter(None, [node.module])])
 
 
-def names_used(path: Path, root: Path):
+def names_used(nodes: list, package: tuple):
     """Yield the dotted names that a module imports, and those that it reads as attributes of what it imports."""
-    tree = ast.parse(path.read_text("utf-8"))
-    package = path.relative_to(root).parts[:-1]
     aliases = {}
-    for node in ast.walk(tree):
+    attributes = []
+    for node in nodes:
         if isinstance(node, ast.ImportFrom):
             module = absolute_module(node, package)
             for alias in node.names:
                 aliases[alias.asname or alias.name] = f"{module}.{alias.name}"
+        elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            attributes.append(node)
     yield from aliases.values()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute) and getattr(node.value, "id", "") in aliases:
+    for node in attributes:
+        if node.value.id in aliases:
             yield f"{aliases[node.value.id]}.{node.attr}"
 
 
-def offered_names(root: Path) -> frozenset:
+def offered_names(sources: list, root: Path) -> frozenset:
     """Return the dotted names that folders of the package offer: those that modules of other folders use."""
-    paths = list((root / "patchfem").rglob("*.py"))
-    modules = {".".join(path.relative_to(root).with_suffix("").parts) for path in paths}
+    package = [source for source in sources if source.path.is_relative_to(root / "patchfem")]
+    modules = {".".join(source.path.relative_to(root).with_suffix("").parts) for source in package}
     offered = set()
-    for path in paths:
-        own_folder = ".".join(path.relative_to(root).parts[:-1])
-        for name in names_used(path, root):
+    for source in package:
+        own_folder = ".".join(source.path.relative_to(root).parts[:-1])
+        for name in names_used(source.nodes, source.path.relative_to(root).parts[:-1]):
             # the folder of a module, or of the module that has the name
             folder = name.rsplit(".", 1 if name in modules else 2)[0]
             if folder != own_folder:
@@ -295,10 +317,10 @@ def offered_names(root: Path) -> frozenset:
     return frozenset(offered)
 
 
-def border_rules(tree, offered: frozenset):
+def border_rules(nodes: list, offered: frozenset):
     """Yield (rule, node, text) where a test reaches behind the border of a folder of the package."""
     modules = set()  # names of imported modules of the package
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "patchfem":
             modules |= {alias.asname or alias.name for alias in node.names}
             for alias in node.names:
@@ -309,7 +331,7 @@ def border_rules(tree, offered: frozenset):
                         yield "inner", node, name
                 if alias.name.startswith("_"):
                     yield "private", node, alias.name
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Attribute):
             owner = getattr(node.value, "id", "")
             if owner in modules and re.match("_[^_]", node.attr):
@@ -321,16 +343,13 @@ def border_rules(tree, offered: frozenset):
 # ---- the counts
 
 
-def count_tokens(tree, text: str) -> int:
+def count_tokens(source: Source) -> int:
     """Count the tokens of a source without comments and docstrings."""
     docstrings = set()
-    for node in ast.walk(tree):
-        if (
-            isinstance(node, (ast.Module, ast.ClassDef, *FUNCTIONS))
-            and ast.get_docstring(node) is not None
-        ):
+    for node in source.nodes:
+        if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             docstrings.add((node.body[0].lineno, node.body[0].col_offset))
-    tokens = tokenize.generate_tokens(StringIO(text).readline)
+    tokens = tokenize.generate_tokens(StringIO(source.text).readline)
     return sum(token.type not in NOT_COUNTED and token.start not in docstrings for token in tokens)
 
 
@@ -350,19 +369,20 @@ def count_sources(root: Path = ROOT) -> Counts:
     """Count tokens and breaches of the rules in every folder of a checkout."""
     values = defaultdict(Counter)
     breaches = defaultdict(list)
-    offered = offered_names(root)
-    for path in sorted(path for tree in TREES for path in (root / tree).rglob("*.py")):
-        text = path.read_text("utf-8")
-        tree = ast.parse(text)
-        folder = folder_of_file(path, root)
-        values[folder]["tokens"] += count_tokens(tree, text)
+    paths = sorted(path for tree in TREES for path in (root / tree).rglob("*.py"))
+    sources = [parse_source(path.read_text("utf-8"), path) for path in paths]
+    offered = offered_names(sources, root)
+    for source in sources:
+        folder = folder_of_file(source.path, root)
+        values[folder]["tokens"] += count_tokens(source)
         if folder.startswith("tests"):
-            found = border_rules(tree, offered)
+            found = border_rules(source.nodes, offered)
         else:
-            found = style_rules(tree, text)
+            found = style_rules(source)
         for rule, node, words in found:
             values[folder][rule] += 1
-            breaches[folder, rule].append(Breach(rule, path, getattr(node, "lineno", 1), words))
+            line = getattr(node, "lineno", 1)
+            breaches[folder, rule].append(Breach(rule, source.path, line, words))
     return Counts({folder: dict(counter) for folder, counter in values.items()}, dict(breaches))
 
 
