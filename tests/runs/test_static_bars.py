@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scene_texts import PIECE
-from static_scenes import KINDS, drawn, judged, line, missed, text_of, wider
+from static_scenes import JUDGED, KINDS, drawn, judged_rows, solve_reference, text_of
 
 import patchfem as pf
 from patchfem import build
@@ -143,9 +143,18 @@ def test_bars_of_steps_hold_and_do_not_widen_where_a_stretch_comes_on_a_finer_me
 def test_bars_of_a_random_scene_hold_an_independent_program(seed):
     """One scene of each kind (even pieces always; steps above, by truths of the same program): every bar holds, none
     widens."""
-    one = line(seed, fine=2e-3)
-    assert wider(one) == []
-    assert [row for row in judged(one) if missed(*row[2:])] == []
+    scene = drawn(seed)
+    true, doubt = solve_reference(scene, 2e-3)
+    last = dict.fromkeys(JUDGED, np.inf)
+    for tolerance in (1e-2, 1e-3, 1e-4):
+        found = measures(text_of(scene), tolerance)
+        rows = judged_rows(found, true, doubt)
+        assert [row for row in rows if not row.holds] == []
+        known = [name for name in JUDGED if found[name].value is not None]
+        assert len(rows) > 3
+        for name in known:
+            assert found[name].error <= last[name] * (1 + 1e-6) + 1e-14, (name, tolerance)
+            last[name] = found[name].error
 
 
 def test_always_unlike_pieces_say_what_friction_would_change():

@@ -1,23 +1,24 @@
-"""Random static patches, as texts of scenes and as what `static_reference` solves, and their bars held against it.
+"""Random static patches, as texts of scenes and as what `static_reference` solves.
 
-`python tests/support/static_scenes.py FIRST COUNT FILE [TOLERANCE ...]` writes a line for each scene and tolerance to
-FILE; `--again FILE OTHER` runs the scenes of FILE with the importable version of patchfem, takes the reference from
-FILE and writes OTHER; `--read FILE` prints how many bars hold, by measure and by kind.
+The campaigns "static" and "static-fine" of `campaigns.py` compare runs with a tolerance of 1e-2 and of 1e-3.
 """
 
 from __future__ import annotations
 
-import json
-import sys
-import time
-from itertools import pairwise
+from functools import partial
+from pathlib import Path
+from time import process_time
 
 import numpy as np
+from campaigns import measure_rows
 from static_reference import PieceInterface, Scene, answer
+
+import patchfem as pf
 
 KINDS = ("plain", "crown", "h1", "step", "ends", "skin")
 MATERIALS = ((121e9, 0.32), (210e9, 0.3), (70e9, 0.34), (250e9, 0.24))
-TOLERANCES = (1e-2, 1e-3, 1e-4)
+FINE = 5e-4  # tolerance of the reference
+KNOWN = 3.0  # a reference judges an error if it is known so many times better
 JUDGED = (
     "contact_fraction",
     "contact_half_width",
@@ -121,131 +122,44 @@ def text_of(scene: Scene) -> str:
     return "\n".join(rows) + "\n"
 
 
-def found(scene: Scene, tolerance: float) -> dict:
-    """The run of a scene: measures as name -> (value, error), warnings, CPU seconds."""
-    import patchfem as pf
-
-    begin = time.process_time()
-    run = pf.run(text_of(scene), **{"accuracy.tolerance": tolerance})
-    return {
-        "seconds": time.process_time() - begin,
-        "warnings": list(run.warnings),
-        "measures": {
-            name: (float(m.value), float(m.error))
-            for name, m in run.measures.items()
-            if name in JUDGED and m.value is not None
-        },
-    }
+def solve_reference(scene: Scene, tolerance: float = FINE) -> tuple:
+    """Return the measures of the reference, and their own uncertainties, by name."""
+    true, doubt = answer(scene, tolerance)
+    doubt = {name: float(doubt[name]) for name in JUDGED}
+    # zero by symmetry: known to a fraction of what it is a difference of
+    doubt["pressure_centre"] = max(doubt["pressure_centre"], 1e-6 * true["contact_half_width"])
+    return {name: float(true[name]) for name in JUDGED}, doubt
 
 
-def line(seed: int, tolerances=TOLERANCES, fine: float = 5e-4) -> dict:
-    """A scene beside its truth: what `--read` reads."""
+def compare_patch(
+    seed: int, folder: Path, earlier: dict | None = None, *, tolerance: float
+) -> dict:
+    """Compare the patch of a seed with its reference; see `campaigns`."""
     scene = drawn(seed)
-    begin = time.process_time()
-    truth, own = answer(scene, fine)
-    return {
-        "seed": seed,
-        "kind": KINDS[seed % len(KINDS)],
-        "reference_seconds": time.process_time() - begin,
-        "truth": {name: (float(truth[name]), float(own[name])) for name in JUDGED},
-        "runs": {repr(one): found(scene, one) for one in tolerances},
+    begin = process_time()
+    run = pf.run(text_of(scene), **{"accuracy.tolerance": tolerance})
+    line = {
+        "group": KINDS[seed % len(KINDS)],
+        "engine": "patch",
+        "seconds": process_time() - begin,
+        "warnings": list(run.warnings),
     }
-
-
-def run_again(path: str, other: str) -> None:
-    """Run the scenes of the file `path` with the importable version of patchfem and write the file `other`."""
-    with open(path, encoding="utf-8") as rows, open(other, "w", encoding="utf-8") as file:
-        for row in map(json.loads, rows):
-            scene = drawn(row["seed"])
-            row["runs"] = {tolerance: found(scene, float(tolerance)) for tolerance in row["runs"]}
-            print(json.dumps(row), file=file, flush=True)
-
-
-KNOWN = 3.0  # times narrower than a bar must the truth be known that is to judge it
-
-
-def missed(value: float, error: float, truth: float, own: float) -> bool:
-    """Whether a bar, with the reference's own uncertainty, does not reach a truth that is known well enough, or lies so
-    far off that no truth is."""
-    off = abs(value - truth)
-    return off > error + own + 1e-9 * abs(truth) and (
-        KNOWN * own <= error or off > error + KNOWN * own
-    )
-
-
-def floors(scene_truth: dict, name: str) -> float:
-    """Of quantities that are zero by symmetry: a millionth of what they are a difference of."""
-    half = scene_truth["contact_half_width"][0]
-    return {"pressure_centre": 1e-6 * half}.get(name, 0.0)
-
-
-def judged(one: dict):
-    """(tolerance, name, value, error, truth, own) of every measure of a line."""
-    for tolerance, run in one["runs"].items():
-        for name, (value, error) in run["measures"].items():
-            truth, own = one["truth"][name]
-            yield float(tolerance), name, value, error, truth, max(own, floors(one["truth"], name))
-
-
-def wider(one: dict) -> list:
-    """(name, tolerance) of the bars that are wider than at the looser tolerance before."""
-    out, runs = [], sorted(one["runs"].items(), key=lambda item: -float(item[0]))
-    for (_, loose), (tolerance, tight) in pairwise(runs):
-        out += [
-            (name, float(tolerance))
-            for name, (_, error) in tight["measures"].items()
-            if name in loose["measures"] and error > loose["measures"][name][1] * (1 + 1e-6) + 1e-14
-        ]
-    return out
-
-
-def read(path: str) -> None:
-    lines = [json.loads(row) for row in open(path, encoding="utf-8")]
-    rows = [(one["kind"], *row) for one in lines for row in judged(one)]
-    for title, place in (("tolerance", 1), ("measure", 2), ("kind", 0)):
-        for which in sorted({row[place] for row in rows}, key=str):
-            mine = [row for row in rows if row[place] == which]
-            out = [row for row in mine if missed(*row[3:])]
-            far = [
-                row[4] / max(abs(row[3] - row[5]), 1e-300)
-                for row in mine
-                if abs(row[3] - row[5]) > KNOWN * row[6] + 1e-9 * abs(row[5])
-            ]
-            known = sum(KNOWN * row[6] <= row[4] for row in mine)
-            share = 100 - 100 * len(out) / max(known, 1)
-            print(
-                f"{title} {which!s:22} {len(mine):5} bars {known:5} judged {len(out):4} outside {share:6.2f} %  "
-                f"bar over error: median {np.median(far) if far else 0:.3g}"
-            )
-    for one in lines:
-        for tolerance, name, value, error, truth, own in judged(one):
-            if missed(value, error, truth, own):
-                print(
-                    f"  outside: seed {one['seed']} {one['kind']} {tolerance:g} {name} {value:.9g} +- {error:.3g}, "
-                    f"{truth:.9g} +- {own:.2g}: {abs(value - truth) / error:.2f} bars"
-                )
-        for name, tolerance in wider(one):
-            print(f"  wider: seed {one['seed']} {one['kind']} {name} at {tolerance:g}")
-    print(
-        "reference CPU s",
-        sum(one["reference_seconds"] for one in lines),
-        *(
-            f"run at {t}: {np.median([one['runs'][t]['seconds'] for one in lines]):.2f}"
-            for t in lines[0]["runs"]
-        ),
-    )
-
-
-if __name__ == "__main__":
-    if sys.argv[1] == "--read":
-        read(sys.argv[2])
-    elif sys.argv[1] == "--again":
-        run_again(*sys.argv[2:])
+    if earlier and "true" in earlier:
+        line |= {key: earlier[key] for key in ("true", "doubt")}
     else:
-        with open(sys.argv[3], "a", encoding="utf-8") as file:
-            for seed in range(int(sys.argv[1]), int(sys.argv[1]) + int(sys.argv[2])):
-                print(
-                    json.dumps(line(seed, tuple(map(float, sys.argv[4:])) or TOLERANCES)),
-                    file=file,
-                    flush=True,
-                )
+        line["true"], line["doubt"] = solve_reference(scene)
+    return line | {"rows": judged_rows(run.measures, line["true"], line["doubt"])}
+
+
+compare_fine_patch = partial(compare_patch, tolerance=1e-3)
+compare_coarse_patch = partial(compare_patch, tolerance=1e-2)
+
+
+def judged_rows(measures, true: dict, doubt: dict) -> list:
+    """List the rows of measures whose reference is known well enough to judge the error."""
+    rows = measure_rows(measures, true, doubt)
+    return [
+        row
+        for row in rows
+        if KNOWN * row.doubt <= row.error or row.true_error > row.error + KNOWN * row.doubt
+    ]

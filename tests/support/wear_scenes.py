@@ -1,8 +1,6 @@
 """Random benches with wear, and an independent integration of Archard's law with which their errors are compared.
 
-`python tests/support/wear_scenes.py run FIRST COUNT FILE` computes the scenes of COUNT seeds, a line for each;
-`again FILE OTHER` runs the scenes of FILE with the importable version of patchfem, takes the reference from FILE and
-writes OTHER; `read FILE` prints how many stated errors hold.
+This is the campaign "wear" of `campaigns.py`.
 
 Truth: dh/ds = coefficient * pressure for the depth h and the slip path s, on the compliance of the cells of order 4 of
 `static_reference`. Nothing of the package is used. Each step is an implicit Euler step: the contact is solved with
@@ -12,10 +10,9 @@ uncertainty. The volume has the closed form coefficient * load * path (`wear_for
 
 from __future__ import annotations
 
-import json
-import sys
-import time
 from itertools import pairwise
+from pathlib import Path
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -23,17 +20,8 @@ import static_reference as reference
 import static_scenes
 from wear_forms import worn_volume
 
-MEASURES = (
-    "worn_volume",
-    "worn_depth_max",
-    "contact_fraction",
-    "contact_half_width",
-    "pressure_peak",
-    "approach",
-    "normal_stiffness",
-    "tangential_stiffness",
-    "rotational_stiffness",
-)
+import patchfem as pf
+
 # Cells along the part that is in contact before or after wear; the second mesh gives the truth.
 CELLS = (30, 75)
 STEPS = (30, 60, 120)  # implicit Euler steps, each a halving of the one before
@@ -216,84 +204,20 @@ def answer(scene: WearScene) -> dict:
     return truth
 
 
-def run_package(scene: WearScene) -> dict:
-    """Run a scene with the importable version of patchfem: measures, warnings and CPU seconds."""
-    import patchfem as pf
-
-    begin = time.process_time()
+def compare_bench(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the bench of a seed with its reference; see `campaigns`."""
+    scene = draw(seed)
+    line = {"group": static_scenes.KINDS[seed % len(static_scenes.KINDS)], "engine": "wear"}
+    begin = process_time()
     try:
         run = pf.run(text_of(scene))
     except pf.PatchfemError as error:
-        return {
-            "seconds": time.process_time() - begin,
-            "warnings": [f"refused: {error}"],
-            "measures": {},
-        }
-    measures = {
-        name: (float(m.value), float(m.error))
-        for name, m in run.measures.items()
-        if name in MEASURES and m.value is not None and m.error is not None
-    }
-    return {
-        "seconds": time.process_time() - begin,
-        "warnings": list(run.warnings),
-        "measures": measures,
-    }
-
-
-def compute(first: int, count: int, path: str) -> None:
-    """Compute the references and run the scenes."""
-    with open(path, "a", encoding="utf-8") as file:
-        for seed in range(first, first + count):
-            scene = draw(seed)
-            begin = time.process_time()
-            truth = answer(scene)
-            row = {
-                "seed": seed,
-                "kind": static_scenes.KINDS[seed % len(static_scenes.KINDS)],
-                "truth": truth,
-                "reference_seconds": time.process_time() - begin,
-                "run": run_package(scene),
-            }
-            print(json.dumps(row), file=file, flush=True)
-
-
-def run_again(path: str, other: str) -> None:
-    """Run the scenes of the file `path` with the importable version of patchfem and write the file `other`."""
-    with open(path, encoding="utf-8") as rows, open(other, "w", encoding="utf-8") as file:
-        for row in map(json.loads, rows):
-            print(json.dumps(row | {"run": run_package(draw(row["seed"]))}), file=file, flush=True)
-
-
-def read(path: str) -> None:
-    """Print how many stated errors hold, by measure, and those that do not."""
-    rows = []
-    for line in map(json.loads, open(path, encoding="utf-8")):
-        rows += [
-            (line["seed"], line["kind"], name, *line["run"]["measures"][name], *truth)
-            for name, truth in line["truth"].items()
-            if name in line["run"]["measures"]
-        ]
-    for name in (*MEASURES, "all"):
-        chosen = [row for row in rows if name in (row[2], "all")]
-        known = [
-            row
-            for row in chosen
-            if 3 * row[6] <= row[4] or abs(row[3] - row[5]) > row[4] + 3 * row[6]
-        ]
-        missed = [row for row in known if static_scenes.missed(*row[3:])]
-        print(
-            f"{name:22} {len(chosen):4} errors, {len(known):4} judged, {len(missed):3} do not hold"
-        )
-    for row in rows:
-        if static_scenes.missed(*row[3:]):
-            print("  does not hold: seed {} {} {} {:.9g} +- {:.3g}, {:.9g} +- {:.2g}".format(*row))
-
-
-if __name__ == "__main__":
-    if sys.argv[1] == "read":
-        read(sys.argv[2])
-    elif sys.argv[1] == "again":
-        run_again(*sys.argv[2:])
+        return line | {"rows": [], "refused": str(error)}
+    line |= {"seconds": process_time() - begin, "warnings": list(run.warnings)}
+    if earlier and "true" in earlier:
+        line |= {key: earlier[key] for key in ("true", "doubt")}
     else:
-        compute(int(sys.argv[2]), int(sys.argv[3]), sys.argv[4])
+        found = answer(scene)
+        line["true"] = {name: value for name, (value, _) in found.items()}
+        line["doubt"] = {name: doubt for name, (_, doubt) in found.items()}
+    return line | {"rows": static_scenes.judged_rows(run.measures, line["true"], line["doubt"])}
