@@ -1,5 +1,8 @@
-"""Drawings: figures of a run as data and on paper, the pressed pieces, a window on them, films, a script for ParaView.
+"""Drawings: figures of a run as data and as SVG, pictures and films of the pieces, ParaView.
 
-`charts` makes the figures of a run as data, which `pictures` draws with matplotlib and the pages draw in the browser.
-Read it first, then `panels`, which says what a picture of the pieces shows; `view`, `flat` and `film` draw it.
+`charts` makes the figures of a run as data, which `pictures` draws with matplotlib and the pages
+draw in the browser. `panels` computes what a picture of the pieces shows; `view`, `flat` and `film`
+draw it. `paraview` writes a script.
+
+Read `charts` first, then `panels`.
 """

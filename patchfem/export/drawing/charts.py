@@ -1,9 +1,11 @@
-"""The figures of a run as data: `pictures` draws them on matplotlib Axes, `curves.js` on a page.
+"""The figures of a run as data.
 
-A chart is a dict: `title`; `x`, `y`: {label, unit, log}, and `range` [low, high] where not all is shown; `marks`: what
-is drawn, from back to front; `labels`: texts beside places, on paper; `frame`: its size [pixel] where both axes have
-one scale. A mark has a `kind` (line, dots, band, span, rule, arrow, cells), a `name` for the legend ("" for none), a
-`colour` (accent, warm, soft, or #rrggbb) and its numbers, in the units of the axes.
+`pictures` draws them on matplotlib Axes, `curves.js` on a page. A chart is a dict. `title`; `x`,
+`y`: {label, unit, log}, and `range` [low, high] if not all is shown; `marks`: what is drawn, from
+back to front; `labels`: texts at points, only in `pictures`; `frame`: its size [px] if both axes
+have the same scale. A mark has a `kind` (line, dots, band, span, rule, arrow, cells), a `name` for
+the legend ("" for none), a `colour` (accent, warm, soft, or #rrggbb) and its numbers, in the units
+of the axes.
 """
 
 from itertools import pairwise
@@ -13,19 +15,20 @@ import numpy as np
 from ...core import G_N
 from ...formatting import axis_unit, format_number, needs_log_scale
 
-LINE, FRAMES = 6000, 24  # points of a line, frames of the shear stress behind the largest one
-FAINT, FEWEST = 400, 200  # points of such a frame, and those that every line keeps
+# points of a line; frames of the shear stress behind the one with the largest resultant
+LINE, FRAMES = 6000, 24
+FAINT, FEWEST = 400, 200  # points of such a frame; points that every line keeps
 GRID = 6000  # cells of a piece in a picture
 NUMBER = 13  # characters of a number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
 MIL = 25.4e-6
-# kept samples per cycle below which a line through them is no motion; cycles of an envelope
+# Samples per cycle below which a line through them does not show the motion; cycles of an envelope.
 SPARSE, BANDS = (
     20,
     1500,
 )
-# measures over the cycles of wear
+# Measures over the cycles of wear, and their labels.
 WORN = {
     "pressure_peak": "peak pressure",
     "contact_fraction": "contact fraction",
@@ -33,23 +36,24 @@ WORN = {
     "loop_area": "loop area",
     "relative_displacement_amplitude": "amplitude",
 }
-PROFILES = 6  # of a patch that wears
-COHERENT = 0.5  # coherence from which H1 is drawn as known
-TALL, WIDEST = 270, 300  # pixels of a frame in which both axes have one scale
+PROFILES = 6  # number of profiles of a patch that wears
+COHERENT = 0.5  # coherence above which H1 is drawn as known
+# Height and largest width [px] of a frame in which both axes have the same scale.
+TALL, WIDEST = 270, 300
 
 
 def axis(label: str, unit: str = "", log: bool = False) -> dict:
-    """An axis of a chart."""
+    """Return an axis of a chart."""
     return {"label": label, "unit": unit, "log": log}
 
 
 def chart(title: str, x: dict, y: dict, marks: list) -> dict:
-    """A chart of these marks."""
+    """Return a chart of marks; None among them is left out."""
     return {"title": title, "x": x, "y": y, "marks": [mark for mark in marks if mark]}
 
 
 def mark(kind: str, colour: str, name: str = "", **numbers) -> dict:
-    """What is drawn: `numbers` holds its arrays and its style."""
+    """Return a mark; `numbers` contains its arrays and its style."""
     return {"kind": kind, "colour": colour, "name": name, **numbers}
 
 
@@ -59,14 +63,17 @@ def dots(x, y, colour: str, name: str = "", **style) -> dict:
 
 
 def line(x, y, colour: str, name: str = "", most: int = LINE, **style) -> dict:
-    """A line of at most `most` points; of a longer one those that `sampled` keeps."""
+    """Return a line of at most `most` points; a longer line is reduced by `sampled`."""
     x, y = np.asarray(x, float), np.asarray(y, float)
     keep = sampled(x, y, most)
     return mark("line", colour, name, x=x[keep], y=y[keep], **style)
 
 
 def sampled(x, y, most: int) -> np.ndarray:
-    """Numbers of at most `most` points of a line: of every stretch of it the lowest and highest x and y."""
+    """Return the indices of at most `most` points of a line.
+
+    From every stretch of the line these are the lowest and the highest x and y.
+    """
     if x.size <= most:
         return np.arange(x.size)
     size = -(-x.size // ((most - 2) // 4))
@@ -74,7 +81,8 @@ def sampled(x, y, most: int) -> np.ndarray:
     room = np.full((2, first.size * size), np.nan)
     room[:, : x.size] = x, y
     held = np.where(np.isnan(room), 0.0, room).reshape(2, -1, size)
-    held[:, -1, x.size - first[-1] :] = held[:, -1, :1]  # the last stretch may be shorter
+    # The last stretch may be shorter than the others.
+    held[:, -1, x.size - first[-1] :] = held[:, -1, :1]
     ends = np.concatenate([held.argmin(axis=2).ravel(), held.argmax(axis=2).ravel()]) + np.tile(
         first, 4
     )
@@ -82,7 +90,10 @@ def sampled(x, y, most: int) -> np.ndarray:
 
 
 def within(made: list, room: int) -> list:
-    """Charts of lines and bands sampled so that all of them take about `room` characters, NUMBER for each number."""
+    """Reduce lines and bands so that all charts take about `room` characters.
+
+    A number takes NUMBER characters.
+    """
     sizes = [
         sum(np.size(value) for value in one.values() if not isinstance(value, str | dict))
         for found in made
@@ -96,6 +107,7 @@ def within(made: list, room: int) -> list:
 
 
 def _slim(one: dict, share: float) -> dict:
+    """Reduce a line or band to a fraction of its points."""
     rows = {"line": ("x", "y"), "band": ("x", "low", "high")}.get(one["kind"])
     if rows is None or np.size(one["x"]) <= FEWEST:
         return one
@@ -105,8 +117,10 @@ def _slim(one: dict, share: float) -> dict:
 
 
 def part_in_contact(x, sigma) -> tuple | None:
-    """Ends (first, last) x [m] of the part to show where less than half the length is pressed, None where all is worth
-    showing."""
+    """Return the ends x [m] of the part to show; None if all of it is worth showing.
+
+    A part is shown if less than half of the length is pressed.
+    """
     used = np.flatnonzero(sigma > 0)
     if not used.size or used.size >= 0.5 * x.size:
         return None
@@ -115,8 +129,19 @@ def part_in_contact(x, sigma) -> tuple | None:
 
 
 def interface(x, fields: dict, name: str = "") -> list:
-    """Pressure, and shear stress in every frame with that of the largest resultant in colour; name: of one of several
-    interfaces."""
+    """Return charts of the pressure, and of the shear stress in several frames.
+
+    The frame with the largest resultant force is in colour.
+
+    Parameters
+    ----------
+    x : (m,) array
+        [m]
+    fields : dict
+        `normal_stress` (f, m) [Pa], and `shear_stress` if there is any.
+    name : str
+        Name of the interface, if there are several.
+    """
     sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
     part = part_in_contact(x, sigma) or (x[0], x[-1])
     along, size = axis_unit(part, "m")
@@ -155,15 +180,23 @@ def interface(x, fields: dict, name: str = "") -> list:
 
 
 def faces(found: list) -> list:
-    """`interface` of every interface that has a patch of its own, its three arguments each."""
+    """Return `interface` of every interface with its own patch; each entry has its arguments."""
     return [one for each in found for one in interface(*each)]
 
 
 def closer(x, depth, sigma, ratio: float) -> tuple:
-    """Part (left, right, height) [m] of both pieces that shows the contact, right - left = 2 height ratio.
+    """Return the part (left, right, height) [m] of both pieces that shows the contact.
 
-    x: (m,) and depth: (ny,) [m] of the mesh; sigma: (m,) [Pa], somewhere > 0; ratio: width of the picture over its
-    height.
+    Its proportions are right - left = 2 height ratio.
+
+    Parameters
+    ----------
+    x, depth : (m,), (ny,) array
+        Mesh lines [m].
+    sigma : (m,) array
+        Normal stress [Pa], positive somewhere.
+    ratio : float
+        Width / height of the picture.
     """
     used = np.flatnonzero(sigma > 0)
     first, last, length = x[used[0]], x[used[-1]], x[-1] - x[0]
@@ -177,10 +210,18 @@ def closer(x, depth, sigma, ratio: float) -> tuple:
 
 
 def bodies(x, depths, mises, sigma) -> list:
-    """Von Mises stress [Pa] of both pieces, pressed: the whole pair, and the part around the contact.
+    """Return charts of the von Mises stress in both pieces, whole and around the contact.
 
-    depths, mises: (ny,) rows and (nx - 1, ny - 1) cells of the lower and of the upper piece; colours end at all but the
-    sharpest cells.
+    Parameters
+    ----------
+    x : (nx,) array
+        Mesh lines [m].
+    depths : tuple of (ny,) arrays
+        Mesh lines of the lower and of the upper piece [m].
+    mises : tuple of (nx - 1, ny - 1) arrays
+        Stress in their cells [Pa]. The colours end below the few most stressed cells.
+    sigma : (nx,) array
+        Normal stress [Pa].
     """
     depth = max(depths, key=lambda rows: rows[-1])
     box = closer(x, depth, sigma, 1.3)
@@ -196,12 +237,12 @@ def bodies(x, depths, mises, sigma) -> list:
         cells = [
             part[i.start : i.stop - 1, : row.size - 1] * scale for part, row in zip(mises, rows)
         ]
-        # the part around the contact comes first and sets the colours
+        # The part around the contact comes first and determines the colours.
         top = top or float(np.quantile(np.concatenate([part.ravel() for part in cells]), 0.998))
         marks = []
         for side, row, part in zip((-1, 1), rows, cells):
             along, down, means = coarser(x[i], row, part, GRID)
-            # four digits: they are colours first
+            # four digits suffice, because the values are shown as colours
             values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(
                 means.shape
             )
@@ -228,7 +269,7 @@ def bodies(x, depths, mises, sigma) -> list:
 
 
 def worn_map(x, width: float, depth) -> list:
-    """Worn depth (s, m) [m] of strips over x (m,) [m] and the width [m], as a map."""
+    """Return a map of the worn depth (s, m) [m] of strips over x (m,) [m] and the width [m]."""
     edges = np.linspace(-width / 2, width / 2, len(depth) + 1)
     (unit, scale), (name, size) = axis_unit(depth, "m"), axis_unit(np.concatenate([x, edges]), "m")
     along, over, means = coarser(x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, GRID)
@@ -255,7 +296,20 @@ def worn_map(x, width: float, depth) -> list:
 
 
 def coarser(x, depth, cells, most: int) -> tuple:
-    """Lines (n,), (m,) and cells (n - 1, m - 1) of a grid of about `most` cells, each with the mean over its area."""
+    """Reduce a grid to about `most` cells, each with the mean over its area.
+
+    Parameters
+    ----------
+    x, depth : (nx,), (ny,) array
+        Lines.
+    cells : (nx - 1, ny - 1) array
+    most : int
+
+    Returns
+    -------
+    tuple
+        Lines (n,), (m,) and cells (n - 1, m - 1).
+    """
     if cells.size <= most:
         return x, depth, cells
     rows = min(depth.size - 1, max(int((most / 2) ** 0.5), most // (x.size - 1)))
@@ -271,14 +325,23 @@ def coarser(x, depth, cells, most: int) -> tuple:
 
 
 def _frame(ratio: float) -> list:
-    """Width and height [pixel] of a frame `ratio` times as wide as tall."""
+    """Return width and height [px] of a frame with this ratio of both."""
     return (
         [round(TALL * ratio), TALL] if TALL * ratio <= WIDEST else [WIDEST, round(WIDEST / ratio)]
     )
 
 
 def loop(slide, force, title: str, measured: tuple | None = None) -> list:
-    """The friction force against the slide, over the measured one where there is one."""
+    """Return the chart of friction force against slide, with the measured loop if there is one.
+
+    Parameters
+    ----------
+    slide, force : (k,) array
+        [m], [N]
+    title : str
+    measured : tuple, optional
+        Measured slide and force.
+    """
     (along, size), (up, scale) = axis_unit(slide, "m"), axis_unit(force, "N")
     read = (
         None
@@ -296,7 +359,7 @@ def loop(slide, force, title: str, measured: tuple | None = None) -> list:
 
 
 def loops(found: list) -> list:
-    """The friction force against the slide of every interface, (name, slide [m], force [N]) each."""
+    """Return the friction loop of every interface; found: (name, slide [m], force [N]) each."""
     return [
         one
         for name, slide, force in found
@@ -305,9 +368,16 @@ def loops(found: list) -> list:
 
 
 def envelope(time, value, period: float) -> tuple:
-    """Middle, lowest and highest value of the samples of each cycle; a cycle without samples is a gap of NaN.
+    """Return middle, minimum and maximum of the samples of each cycle; NaN without samples.
 
-    time, value: (k,), ascending. Cycles are put together where there are more than a picture can show.
+    Cycles are merged if there are more than a picture can show.
+
+    Parameters
+    ----------
+    time, value : (k,) array
+        Times in ascending order [s], and values.
+    period : float
+        [s]
     """
     many = int(np.ceil(max(1.0, (time[-1] - time[0]) / period / BANDS)))
     number = np.floor(time / (many * period) + 1e-9).astype(int)
@@ -321,9 +391,19 @@ def envelope(time, value, period: float) -> tuple:
 
 
 def whole_from(time, period: float, window_start: float) -> float:
-    """Time [s] from which the kept samples show the motion itself: every later cycle holds at least SPARSE of them.
+    """Return the time [s] after which the stored samples show the motion itself.
 
-    The last window is always kept whole, so the answer is never later than its start.
+    Every later cycle has at least SPARSE samples. The last window is always stored completely, so
+    the time is never after its start.
+
+    Parameters
+    ----------
+    time : (k,) array
+        Times of the samples [s].
+    period : float
+        [s]
+    window_start : float
+        Start of the last window [s].
     """
     counts = np.bincount(np.floor(time / period + 1e-9).astype(int))[:-1]
     thin = np.flatnonzero(counts < SPARSE)
@@ -337,11 +417,20 @@ def histories(
     title: str = "Last cycles",
     joined: bool = False,
 ) -> list:
-    """The whole run, and its last cycles (a rig) or its friction force (a bench).
+    """Return charts of the whole run, and of its last cycles (rig) or friction force (bench).
 
-    history: time, displacement, force, (k,) each; window: the last cycles alone, with base and block acceleration;
-    period [s] of the drive, None where every sample was kept; joined: the turns that were kept before are drawn as a
-    line through them, not as a band per cycle. `measured` in history: times [s] and forces [N] read.
+    Parameters
+    ----------
+    history : dict
+        time, displacement, force, (k,) each; `measured`: measured times [s] and forces [N].
+    window : dict or None
+        The last cycles alone, with the accelerations of base and block.
+    period : float or None
+        Period of the drive [s]; None if every sample is stored.
+    title : str
+        Title of the last cycles.
+    joined : bool
+        Whether earlier reversals are drawn as a line through them instead of a band per cycle.
     """
     time, value, (name, per) = (
         history["time"],
@@ -408,9 +497,18 @@ def histories(
 
 
 def measured(rows: list, frequency: float, level: float, acceleration, displacement) -> list:
-    """Measured readings against the input at one frequency, with the computed point.
+    """Return charts of measured readings against the input, and of the computed point.
 
-    rows: objects of the measured table; acceleration, displacement: (value, error) computed, in SI, or None.
+    Parameters
+    ----------
+    rows : list
+        Rows of the measured table.
+    frequency : float
+        [Hz]
+    level : float
+        Input [m s-2].
+    acceleration, displacement : tuple or None
+        Computed value and error in SI.
     """
     near, out = [r for r in rows if abs(r.frequency - frequency) < 0.5], []
     for name, unit, scale, found in (
@@ -453,21 +551,24 @@ def measured(rows: list, frequency: float, level: float, acceleration, displacem
 
 
 def spans(curve: dict) -> list:
-    """Stretches [(regime, first, last + 1)] of neighbouring points of a curve of steady motions that share a regime."""
+    """Return stretches [(regime, first, last + 1)] of neighbouring points with the same regime.
+
+    curve: a curve of steady motions.
+    """
     regime = np.asarray(curve["regime"], str)
     edges = [0, *(np.flatnonzero(regime[1:] != regime[:-1]) + 1), regime.size]
     return [(str(regime[a]), int(a), int(b)) for a, b in pairwise(edges)]
 
 
 def axis_of(curve: dict) -> tuple:
-    """Horizontal axis of a curve: (values along it, their name, unit)."""
+    """Return the horizontal axis of a curve: its values, their name and unit."""
     if np.ptp(curve["frequency"]) > 0:
         return np.asarray(curve["frequency"]), "drive frequency", "Hz"
     return np.asarray(curve["level"]) / G_N, "drive level", "g"
 
 
 def regime(steady: dict | None) -> str:
-    """A sentence on the regime and the stability of the steady motion, empty where it is not known."""
+    """Return a sentence on regime and stability of a steady motion; "" if they are not known."""
     if steady is None:
         return ""
     size = steady["multiplier"]
@@ -480,7 +581,7 @@ def regime(steady: dict | None) -> str:
 
 
 def caption(found: dict) -> str:
-    """Caption of the picture of a curve of steady motions: what it shows, its regimes, folds and gaps."""
+    """Return the caption of a curve of steady motions: content, regimes, folds and gaps."""
     what, parts = axis_of(found)[1], [regime for regime, _, _ in spans(found)]
     count, folds = np.asarray(found["amplitude"]).size, len(found.get("folds", ()))
     text = f"Half the peak-to-peak steady motion at the output against the {what}, {count} points; "
@@ -493,8 +594,11 @@ def caption(found: dict) -> str:
 
 
 def curve(found: dict) -> list:
-    """Amplitude of the steady motion over frequency or level, the regime by colour and line, folds marked; its largest
-    acceleration and the first harmonic of that."""
+    """Return charts of a curve of steady motions over frequency or level.
+
+    They show the amplitude, with the regime as colour and line style and with the folds, and the
+    largest acceleration with its first harmonic.
+    """
     along, what, unit = axis_of(found)
     name, scale = axis_unit(found["amplitude"], "m")
     value, parts = np.asarray(found["amplitude"]) * scale, spans(found)
@@ -505,7 +609,7 @@ def curve(found: dict) -> list:
         for first, last in np.flatnonzero(np.diff(lost)).reshape(-1, 2)
     ]
     for regime, first, last in parts:
-        stop = min(last + 1, along.size)  # on to the next part, so that the line is whole
+        stop = min(last + 1, along.size)  # up to the next stretch, so that the line has no gap
         marks.append(
             line(
                 along[first:stop],
@@ -547,11 +651,16 @@ def curve(found: dict) -> list:
 
 
 def spectra(found, frequency: float | None) -> list:
-    """Densities of displacement and acceleration of the output and of the drive over its band, and the size of H1.
+    """Return charts of spectral densities of output and drive, and of the magnitude of H1.
 
-    found: `response.stationary.Spectra`; frequency [Hz] of the mode that was fitted to the peak of H1, None without.
+    Parameters
+    ----------
+    found : response.stationary.Spectra
+    frequency : float or None
+        Frequency [Hz] of the mode that was fitted to the peak of H1.
     """
-    driven, out = np.isfinite(found.coherence), []  # beyond the band of the drive there is leakage
+    # outside the band of the drive there is only leakage
+    driven, out = np.isfinite(found.coherence), []
     found = type(found)(*(column[driven] for column in found))
     hertz = found.frequency
     unit, scale = axis_unit([float(np.sqrt(found.place.max(initial=0.0)))], "m")
@@ -598,14 +707,16 @@ def spectra(found, frequency: float | None) -> list:
 
 
 def _above(x, y, colour: str, name: str = "") -> dict | None:
-    """The line of what is above 0; None where nothing is."""
+    """Return a line through the positive values; None if there are none."""
     there = np.isfinite(y) & (y > 0)
     return line(x[there], y[there], colour, name) if there.any() else None
 
 
 def decay(found) -> list:
-    """Frequency and damping ratio of a released output over half of its swing, with bars; found: a
-    `response.decay_curve.DecayCurve`."""
+    """Return charts of frequency and damping ratio of a released output against its amplitude.
+
+    found: a `response.decay_curve.DecayCurve`, whose errors become bars.
+    """
     unit, scale = axis_unit(found.amplitude, "m")
     out = []
     for name, label, of in (("frequency", "frequency", "Hz"), ("damping", "damping ratio", "")):
@@ -630,10 +741,14 @@ def decay(found) -> list:
 
 
 def levels(rows: list) -> list:
-    """Amplitude after every level, in the order of the test, with arrows upwards and downwards; over more than three
-    decades on a logarithmic axis, on which a level without any motion is not drawn.
+    """Return the chart of the amplitude after every level, with arrows in the order of the test.
 
-    rows: dicts with drive [m s-2], or [N] where "unit" says so, stuck, values and errors by name, as in result.nc.
+    The axis is logarithmic for more than three decades; a level without motion is then left out.
+
+    Parameters
+    ----------
+    rows : list of dict
+        drive [m s-2], or [N] if `unit` says so; stuck; values and errors by name, as in result.nc.
     """
     forced = rows[0].get("unit") == "N"
     drive = np.array([row["drive"] for row in rows]) / (1.0 if forced else G_N)
@@ -649,7 +764,7 @@ def levels(rows: list) -> list:
         needs_log_scale(amplitude),
     )
     drawn = y > 0 if log else np.isfinite(y)
-    # ends of error bars that reach below 0
+    # Lower end of error bars that would extend below 0.
     marks, style = (
         [],
         {"floor": 0.1 * float(y[drawn].min())} if log else {},
@@ -690,10 +805,18 @@ def levels(rows: list) -> list:
 
 
 def wear(x, cycles, pressure, depth, history: dict) -> list:
-    """Pressure and worn depth over x at some of the cycles, and measures over their first value.
+    """Return charts of pressure and worn depth over x, and of measures over the cycles of wear.
 
-    x (m,) [m]; cycles (k,) of the profiles, pressure (k, m) [Pa] and depth (k, m) [m] at them; history: name -> (j,)
-    with `cycle`.
+    Parameters
+    ----------
+    x : (m,) array
+        [m]
+    cycles : (k,) array
+        Cycles of the profiles.
+    pressure, depth : (k, m) array
+        [Pa], [m]
+    history : dict
+        Name -> (j,), with `cycle`; measures are divided by their first value.
     """
     (along, size), out = axis_unit(x, "m"), []
     pick = np.unique(np.linspace(0, len(cycles) - 1, PROFILES).round().astype(int))

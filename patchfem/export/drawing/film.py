@@ -1,8 +1,9 @@
-"""The pressed pieces through the last cycle as a film, .gif or .mp4; needs no OpenGL.
+"""Film of the pressed pieces through the last cycle, .gif or .mp4, without OpenGL.
 
-All frames have one scale of colours, one factor of the motion and one window, so that what changes is what moves. The
-slide of the upper piece as a whole is taken out before the rest is magnified, and drawn with a factor of its own: the
-factor that shows a bent pad would throw the block aside by half its length.
+All frames have the same colour scale, factor of the motion and window, so that only the motion
+changes. The slide of the upper piece as a whole is subtracted before the rest is magnified, and is
+drawn with its own factor: the factor that makes the deformation of a pad visible would move the
+block by half its length.
 """
 
 import logging
@@ -24,19 +25,35 @@ ENDINGS = (".gif", ".mp4")
 FRAME_SIZE = (12.0, 6.8)  # width and height of a frame [inch]
 DPI = 100  # pixels per inch; with FRAME_SIZE an even number of pixels, which video formats require
 BIT_RATE = 4000  # of a video [kbit/s]
-SLIDE = 0.03  # share of the length of the pieces that the largest slide takes
-LASTS = 2.4  # s that a cycle takes, as far as LEAST and MOST let it
-LEAST, MOST = 0.04, 0.3  # s that a frame takes
+SLIDE = 0.03  # largest slide as drawn / length of the pieces
+LASTS = 2.4  # duration of a cycle [s], unless LEAST or MOST limits it
+LEAST, MOST = 0.04, 0.3  # shortest and longest duration of a frame [s]
 
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """What all frames of a film share.
+    """What all frames of a film have in common.
 
-    numbers: of its frames in the series; factors of the motion in both panels; close: window [mm] of the second one;
-    aside: factor of the slide; windows: ((left, right, bottom, top), ...) [mm] drawn; tops: stresses [Pa] at the upper
-    ends of the colours; over: whether some cell exceeds them; reach: (lowest, highest) stress [Pa] on the interface;
-    pressure: highest normal stress [Pa] there.
+    Attributes
+    ----------
+    numbers : tuple of int
+        Numbers of its frames in the series.
+    factors : tuple of float
+        Factor of the motion in each panel.
+    close : tuple
+        Window [mm] of the second panel.
+    aside : float
+        Factor of the slide.
+    windows : tuple
+        (left, right, bottom, top) [mm] of each panel.
+    tops : tuple of float
+        Stress at the upper end of the colours of each panel [Pa].
+    over : tuple of bool
+        Whether some cell exceeds this stress.
+    reach : tuple
+        Minimum and maximum stress on the interface [Pa].
+    pressure : float
+        Maximum normal stress on the interface [Pa].
     """
 
     numbers: tuple
@@ -51,11 +68,11 @@ class Film:
 
     @property
     def seconds(self) -> float:
-        """How long a frame is shown [s]."""
+        """Duration of a frame [s]."""
         return float(np.clip(LASTS / len(self.numbers), LEAST, MOST))
 
     def panels(self, frame: Frame) -> tuple:
-        """The panels of a frame, with the windows and colours of the film."""
+        """Return the panels of a frame, with the windows and colours of the film."""
         return tuple(
             replace(one, window=window, top=top, over=over)
             for one, window, top, over in zip(
@@ -68,9 +85,19 @@ class Film:
 
 
 def film_of(series: Series, magnify: float | None = None) -> Film:
-    """What the frames of the last cycle of a series share; PatchfemError where there is only one frame.
+    """Return what the frames of the last cycle of a series have in common.
 
-    magnify: factor of the motion in both panels; unless given the largest that suits every frame, one for each panel.
+    Parameters
+    ----------
+    series : Series
+    magnify : float, optional
+        Factor of the motion in both panels; by default the largest that suits every frame, for each
+        panel.
+
+    Raises
+    ------
+    PatchfemError
+        If there is only one frame.
     """
     numbers = moving(series.times)
     if len(numbers) < 2:
@@ -117,6 +144,7 @@ def film_of(series: Series, magnify: float | None = None) -> Film:
 
 
 def _hull(windows: list) -> tuple:
+    """Return the smallest window that contains several windows."""
     low, high = np.min(windows, axis=0), np.max(windows, axis=0)
     return (float(low[0]), float(high[1]), float(low[2]), float(high[3]))
 
@@ -160,7 +188,7 @@ def shoot(series: Series, head: str, magnify: float | None, out: Path) -> str:
                 picture.show(frame, text, shown)
             try:
                 writer.grab_frame()
-            except BrokenPipeError:  # ffmpeg has ended early; `finish` states the reason
+            except BrokenPipeError:  # ffmpeg has ended early; `finish` gives the reason
                 break
         _finish(writer, out)
     first, last = series.times[list(film.numbers)][[0, -1]]
@@ -174,7 +202,7 @@ def check_ffmpeg(out: Path) -> None:
 
 
 def _ffmpeg(out: Path) -> str:
-    """Return the path of the program ffmpeg, that of imageio-ffmpeg where there is no other."""
+    """Return the path of the program ffmpeg, or that of imageio-ffmpeg if there is no other."""
     program = shutil.which("ffmpeg")
     if program is None and find_spec("imageio_ffmpeg"):
         from imageio_ffmpeg import get_ffmpeg_exe
@@ -189,21 +217,21 @@ def _ffmpeg(out: Path) -> str:
 
 
 def _writer_of(out: Path, seconds: float):
-    """Make the writer of matplotlib for a .gif or .mp4 file whose frames last so many seconds."""
+    """Return a matplotlib writer for a .gif or .mp4 file; seconds: duration of a frame."""
     if out.suffix == ".gif":
         from .gif_writer import GifWriter
 
         return GifWriter(fps=1 / seconds)
     from matplotlib import animation
 
-    # `_finish` states what ffmpeg prints
+    # `_finish` reports what ffmpeg prints
     logging.getLogger(animation.__name__).setLevel(logging.ERROR)
     matplotlib.rcParams["animation.ffmpeg_path"] = _ffmpeg(out)
     return animation.FFMpegWriter(fps=1 / seconds, codec="h264", bitrate=BIT_RATE)
 
 
 def _finish(writer, out: Path) -> None:
-    """Close the file; raise Missing with the last line of ffmpeg where it fails."""
+    """Close the file; raise Missing with the last line of ffmpeg if this fails."""
     try:
         writer.finish()
     except subprocess.CalledProcessError as error:

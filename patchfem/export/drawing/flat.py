@@ -1,6 +1,6 @@
-"""The picture of the pressed pieces: the panels of `panels` drawn by matplotlib, which needs no OpenGL.
+"""Picture of the pressed pieces: the panels of `panels` drawn by matplotlib, without OpenGL.
 
-A picture is drawn once; a film shows frame after frame in the same picture.
+A picture is drawn once; a film updates the same picture frame after frame.
 """
 
 from pathlib import Path
@@ -17,17 +17,38 @@ LOOK = STYLE | {"axes.grid": False}
 
 
 def draw(frame: Frame, head: str, magnify: float | None, path: Path) -> None:
-    """Draw both pieces whole and near their contact, and the stress along the interface, as the ending of `path`
-    says."""
+    """Draw both pieces, their contact and the stress along the interface into a file.
+
+    Parameters
+    ----------
+    frame : Frame
+    head : str
+        First line of the title.
+    magnify : float or None
+        Factor of the motion; None for one that makes it visible.
+    path : Path
+        File whose suffix chooses the format.
+    """
     with matplotlib.rc_context(LOOK):
         Picture(frame, head, panels(frame, magnify), (12, 20 / 3)).figure.savefig(path, dpi=150)
 
 
 class Picture:
-    """A figure of one frame that `show` turns into that of another one of the same series.
+    """Figure of a frame that `show` can change to another frame of the same series.
 
-    head: its first line; shown: (whole, close) Panels; size [inch]; reach: (lowest, highest) stress [Pa] of the axis of
-    the curves, that of the frame unless given. Axes and colours stay as they are first drawn.
+    Axes and colours stay as they are first drawn.
+
+    Parameters
+    ----------
+    frame : Frame
+    head : str
+        First line of the title.
+    shown : tuple of Panel
+        Panels of the whole pieces and of their contact.
+    size : tuple
+        [inch]
+    reach : tuple, optional
+        Minimum and maximum stress [Pa] of the axis of the curves; by default those of the frame.
     """
 
     def __init__(
@@ -60,7 +81,7 @@ class Picture:
         self._head(head, shown)
 
     def show(self, frame: Frame, head: str, shown: tuple) -> None:
-        """Move the pieces and the curves to another frame."""
+        """Change the pieces and the curves to those of another frame."""
         for one, panel in zip(self.bodies, shown):
             one.show(frame, panel)
         for line, (_, values) in zip(self.lines, curves(frame, self.reach)[1]):
@@ -68,26 +89,27 @@ class Picture:
         self._head(head, shown)
 
     def freeze_layout(self, dpi: float) -> None:
-        """Lay the axes out at this resolution and keep them there in all later frames."""
+        """Lay out the axes at this resolution and keep the layout for all later frames."""
         self.figure.set_dpi(dpi)
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
 
     def _head(self, head: str, shown: tuple) -> None:
+        """Write the titles of both panels."""
         whole, close = self.bodies
         whole.axes.set_title(f"{head}\n{shown[0].title()}")
         close.axes.set_title(f"where they touch, {shown[1].title(False)}")
 
 
 class _Bodies:
-    """The cells of a panel, coloured by their stress, with the borders of the pieces."""
+    """Cells of a panel, coloured by their stress, with the borders of the pieces."""
 
     def __init__(self, axes, frame: Frame, panel: Panel):
         from matplotlib.collections import LineCollection, PolyCollection
 
         self.scale = axis_unit([panel.top], "Pa")[1]
         self.axes, self.edges = axes, borders(frame, panel.cells)
-        self.cells = []  # (which, corners, collection) of triangles and of quadrilaterals
+        self.cells = []  # (selection, corners, collection) of triangles and of quadrilaterals
         size = np.diff(frame.offsets)
         for count in np.unique(size[panel.cells]):
             mine = panel.cells & (size == count)
@@ -114,6 +136,7 @@ class _Bodies:
         self.show(frame, panel)
 
     def show(self, frame: Frame, panel: Panel) -> None:
+        """Change the cells and borders to those of another frame."""
         for mine, corners, drawn in self.cells:
             drawn.set_verts(panel.places[corners])
             drawn.set_array(frame.cell_data["von_mises"][mine] * self.scale)

@@ -1,4 +1,4 @@
-"""A writer of matplotlib for .gif files in which a colour is the same in every frame."""
+"""matplotlib writer for .gif files in which a colour is the same in every frame."""
 
 from io import BytesIO
 
@@ -16,21 +16,21 @@ N_TINTS = 16  # tints of each curve from white to its colour
 
 
 class GifWriter(AbstractMovieWriter):
-    """Write frames with one table of 256 colours.
+    """Writer of frames with one palette of 256 colours.
 
-    `matplotlib.animation.PillowWriter` gives each frame 256 colours of its own, so that a stress has another
-    colour in the next frame.
+    `matplotlib.animation.PillowWriter` chooses 256 colours for each frame, so that the same stress
+    has another colour in the next frame.
     """
 
     def setup(self, fig, outfile, dpi=None):
-        """Begin the film of a figure."""
+        """Start the film of a figure."""
         super().setup(fig, outfile, dpi=dpi)
         self.frames = []
         self.palette = Image.new("P", (1, 1))
         self.palette.putpalette(_colours().tobytes())
 
     def grab_frame(self, **savefig):
-        """Add the figure as it is now."""
+        """Add the figure in its current state."""
         buffer = BytesIO()
         self.fig.savefig(buffer, **savefig, format="rgba", dpi=self.dpi)
         image = Image.frombuffer(
@@ -53,7 +53,7 @@ class GifWriter(AbstractMovieWriter):
 
 
 def _colours() -> np.ndarray:
-    """Return the colours (256, 3) uint8 of a film: the scale of stresses, greys, tints of both curves."""
+    """Return the palette (256, 3) uint8: the scale of stresses, greys, and tints of both curves."""
     scale = colormaps["viridis"](np.linspace(0, 1, N_SCALE))[:, :3]
     greys = np.linspace(0, 1, N_GREYS)[:, None] * np.ones(3)
     share = np.linspace(0, 1, N_TINTS)[:, None]

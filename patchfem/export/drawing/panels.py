@@ -1,4 +1,4 @@
-"""What a picture of the pressed pieces shows, as numbers: places drawn, how much magnified, which part, which scale."""
+"""Numbers behind a picture of the pieces: positions, magnification, window, colour scale."""
 
 from dataclasses import dataclass
 
@@ -7,19 +7,37 @@ import numpy as np
 from ...formatting import axis_unit
 from ..fields.series import Frame
 
-SHOWN = 0.995  # share of the area of a panel whose stress the colours tell apart
-CLIPPED = 0.8  # share of the largest stress above which the colours reach all the way
-ROUND_OFF = 1e-5  # of the largest motion: what is kept is in single precision, a slide is a difference of two
-VISIBLE = 0.05  # share of the height of a panel that the largest motion or gap in it takes
+SHOWN = 0.995  # fraction of the area of a panel whose stresses the colours distinguish
+# Ratio of that stress to the largest one, above which the colours cover the whole range.
+CLIPPED = 0.8
+# Fraction of the largest motion that is round-off: fields are stored in single precision, and a
+# slide is a difference.
+ROUND_OFF = 1e-5
+VISIBLE = 0.05  # Largest motion or gap as drawn / height of a panel.
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Panel:
     """One view of both pieces.
 
-    places: (N, 2) [mm] as drawn; cells: (cells,) bool, those drawn; factor of the motion; slide [mm] of the upper piece
-    as a whole, drawn `aside` times as long as it is; window: (left, right, bottom, top) [mm] of what is drawn; top:
-    stress [Pa] at the upper end of the colours; over: whether some cell exceeds it.
+    Attributes
+    ----------
+    places : (N, 2) array
+        Positions as drawn [mm].
+    cells : (cells,) array of bool
+        Cells that are drawn.
+    factor : float
+        Factor of the motion.
+    slide : float
+        Slide of the upper piece as a whole [mm].
+    window : tuple
+        (left, right, bottom, top) [mm].
+    top : float
+        Stress at the upper end of the colours [Pa].
+    over : bool
+        Whether some cell exceeds this stress.
+    aside : float
+        Factor of the slide.
     """
 
     places: np.ndarray
@@ -32,8 +50,10 @@ class Panel:
     aside: float = 1.0
 
     def title(self, scaled: bool = True) -> str:
-        """Head of the panel: how much its motion is magnified, and where `scaled` which stress the top colour stands
-        for."""
+        """Return the title of the panel, with the factors of motion and slide.
+
+        scaled: whether it contains the stress of the upper end of the colours.
+        """
         text = (
             "drawn to scale"
             if self.factor == 0
@@ -58,11 +78,25 @@ def panels(
     close: tuple | None = None,
     aside: float = 1.0,
 ) -> tuple:
-    """Panels of both pieces whole and of the place where they touch, with one scale of colours, each with a factor of
-    its own unless `magnify` is given, one for both or one for each.
+    """Return the panels of both pieces, whole and around their contact, with one colour scale.
 
-    close: second window [mm], that of `near` unless given; aside: factor of the slide of the upper piece as a whole.
-    The upper piece is drawn with the shape of its surface, which lives in the gap and not in the mesh.
+    The upper piece is drawn with the shape of its surface, which is part of the gap and not of the
+    mesh.
+
+    Parameters
+    ----------
+    frame : Frame
+    magnify : float or tuple, optional
+        Factor of the motion, for both panels or for each; by default one that makes it visible, for
+        each.
+    close : tuple, optional
+        Window of the second panel [mm]; by default that of `near`.
+    aside : float
+        Factor of the slide of the upper piece as a whole.
+
+    Returns
+    -------
+    tuple of Panel
     """
     motion = moved(frame), slide_of(frame), aside
     used = np.unique(
@@ -74,13 +108,13 @@ def panels(
     windows = (whole, near(frame) if close is None else close)
     inside = [_inside(frame, window) for window in windows]
     mises, area = frame.cell_data["von_mises"], areas(frame)
-    # one scale for what stands side by side
+    # Panels side by side have the same scale.
     top = max(_limit(mises[cells], area[cells]) for cells in inside)
     return tuple(_panel(frame, motion, *each, top) for each in zip(windows, inside, factors))
 
 
 def _inside(frame: Frame, window: tuple) -> np.ndarray:
-    """Cells (cells,) bool of a window that have a stress."""
+    """Return which cells (cells,) bool of a window have a stress."""
     left, right, bottom, top = window
     x, y = middles(frame).T
     return (
@@ -93,7 +127,10 @@ def _inside(frame: Frame, window: tuple) -> np.ndarray:
 
 
 def _limit(mises, area) -> float:
-    """Stress [Pa] at the upper end of the colours of some cells: the largest, unless that stands out in a corner."""
+    """Return the stress [Pa] at the upper end of the colours of some cells.
+
+    It is the largest stress, unless this is a peak in a corner.
+    """
     largest, most = float(mises.max(initial=0.0)), float(_exceeded(mises, area, SHOWN))
     return most if most < CLIPPED * largest else largest
 
@@ -101,6 +138,22 @@ def _limit(mises, area) -> float:
 def _panel(
     frame: Frame, motion: tuple, window: tuple, here, magnify: float | None, limit: float
 ) -> Panel:
+    """Return the panel of a window.
+
+    Parameters
+    ----------
+    frame : Frame
+    motion : tuple
+        Displacement (N, 2) [m], slide [m] and factor of the slide.
+    window : tuple
+        (left, right, bottom, top) [mm].
+    here : (cells,) array of bool
+        Cells that are drawn.
+    magnify : float or None
+        Factor of the motion.
+    limit : float
+        Stress at the upper end of the colours [Pa].
+    """
     move, slide, aside = motion
     left, right, bottom, top = window
     x, y = frame.points[:, :2].T * 1e3
@@ -131,7 +184,7 @@ def _panel(
 
 
 def _exceeded(values, weight, share: float) -> float:
-    """The value below which `share` of the weight lies."""
+    """Return the value below which the fraction `share` of the weight lies."""
     if not values.size:
         return 0.0
     order = np.argsort(values)
@@ -140,12 +193,15 @@ def _exceeded(values, weight, share: float) -> float:
 
 
 def upper_points(frame: Frame) -> np.ndarray:
-    """Numbers of the points of the upper piece."""
+    """Return the numbers of the points of the upper piece."""
     return np.unique(np.concatenate([block.ravel() for block in frame.cells(1)]))
 
 
 def slide_of(frame: Frame) -> float:
-    """Slide [m] of the upper piece as a whole: of its far face, which is held rigid, carried down to y = 0."""
+    """Return the slide [m] of the upper piece as a whole.
+
+    It is the motion of its rigid far face, extrapolated to y = 0.
+    """
     upper = upper_points(frame)
     return float(
         slides(frame.points[upper], frame.point_data["displacement"][None, upper].astype(float))[0]
@@ -153,21 +209,29 @@ def slide_of(frame: Frame) -> float:
 
 
 def slides(points, moves) -> np.ndarray:
-    """Slides (f,) [m], as `slide_of`, of an upper piece whose points (n, 2) [m] move by (f, n, 2) [m]."""
+    """Return the slides (f,) [m], as `slide_of`, of an upper piece.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        [m]
+    moves : (f, n, 2) array
+        Displacements [m].
+    """
     height = points[:, 1].max()
     far = points[:, 1] >= height * (1 - 1e-9)
     apart = points[far, 0] - points[far, 0].mean()
-    # the far face is held rigid: a slope is its rotation
+    # The far face is rigid, so its slope is its rotation.
     turn = moves[:, far, 1] @ apart / (apart @ apart)
     slide = moves[:, far, 0].mean(axis=1) + turn * height
     return np.where(np.abs(slide) > ROUND_OFF * np.abs(moves).max(axis=(1, 2)), slide, 0.0)
 
 
 def moved(frame: Frame) -> np.ndarray:
-    """Displacement (N, 2) [m] as drawn.
+    """Return the displacement (N, 2) [m] as drawn.
 
-    That of the upper piece includes the shape of its surface, fading towards its far face, so that the drawn gap is the
-    gap.
+    For the upper piece it includes the shape of its surface, decreasing towards its far face, so
+    that the drawn gap is the computed one.
     """
     move = frame.points[:, :2] * 0 + frame.point_data["displacement"][:, :2]
     line, upper = frame.interface(), upper_points(frame)
@@ -179,9 +243,18 @@ def moved(frame: Frame) -> np.ndarray:
 
 
 def shape(points, up, x, surface) -> np.ndarray:
-    """What the shape of its surface adds to the motion (f, n) [m] across the interface of an upper piece, as `moved`.
+    """Return what the shape of its surface adds to the motion (f, n) [m] of an upper piece.
 
-    points: (n, 2) [m]; up: (f, n) [m]; surface: (f, m) [m], where it is at the places x (m,) [m].
+    Parameters
+    ----------
+    points : (n, 2) array
+        [m]
+    up : (f, n) array
+        Motion across the interface [m].
+    x : (m,) array
+        [m]
+    surface : (f, m) array
+        Position of the surface at x [m].
     """
     height = points[:, 1].max()
     face = np.flatnonzero(points[:, 1] <= 1e-9 * height)
@@ -194,7 +267,7 @@ def shape(points, up, x, surface) -> np.ndarray:
 
 
 def rounded(factor: float, least: float = 1.0) -> float:
-    """A factor > 0 rounded down to 1, 2 or 5 times a power of ten; `least` where it is smaller than that."""
+    """Return a factor > 0 rounded down to 1, 2 or 5 times a power of ten, but at least `least`."""
     if factor < least:
         return least
     power = 10.0 ** np.floor(np.log10(factor))
@@ -202,7 +275,7 @@ def rounded(factor: float, least: float = 1.0) -> float:
 
 
 def near(frame: Frame) -> tuple:
-    """Window [mm] around the contact, or around its most stressed quarter where it is longer than that."""
+    """Return a window [mm] around the contact; for a long contact, around its largest pressure."""
     line = frame.interface()
     x, sigma = frame.points[line, 0] * 1e3, frame.point_data["normal_stress"][line]
     length, touching = np.ptp(x), x[sigma > 0]
@@ -219,33 +292,42 @@ def near(frame: Frame) -> tuple:
 
 
 def middles(frame: Frame) -> np.ndarray:
-    """Middles of the cells (cells, 2) [mm] of a frame, lines of the interface included."""
+    """Return the centres (cells, 2) [mm] of the cells of a frame, and of the interface segments."""
     sums = np.add.reduceat(frame.points[frame.connectivity, :2], frame.offsets[:-1])
     return sums / np.diff(frame.offsets)[:, None] * 1e3
 
 
 def areas(frame: Frame) -> np.ndarray:
-    """Areas of the cells (cells,) [m2] of a frame, 0 of lines."""
+    """Return the areas (cells,) [m2] of the cells of a frame; 0 for interface segments."""
     return sizes(frame.points[:, :2], corners(frame.connectivity, frame.offsets))
 
 
 def corners(connectivity, offsets) -> np.ndarray:
-    """Corners (m, 4) of lines, triangles and quadrilaterals as VTK lists them, the last one more often in the first."""
+    """Return the corners (m, 4) of cells in VTK form; smaller cells repeat their last corner."""
     last = np.diff(offsets)[:, None] - 1
     return connectivity[offsets[:-1, None] + np.minimum(np.arange(4), last)]
 
 
 def sizes(points, cells) -> np.ndarray:
-    """Areas (m,) of cells of four corners (m, 4) among points (n, 2)."""
+    """Return the areas (m,) of cells with four corners (m, 4) among points (n, 2)."""
     corner = points[cells]
     after = np.roll(corner, -1, axis=1)
     return np.abs((corner[..., 0] * after[..., 1] - corner[..., 1] * after[..., 0]).sum(axis=1)) / 2
 
 
 def curves(frame: Frame, reach: tuple | None = None) -> tuple:
-    """Stresses along the interface of a frame: (x (m,) [mm], ((label, values (m,) in the unit), ...), unit).
+    """Return the stresses along the interface of a frame: x [mm], curves, and their unit.
 
-    reach: (lowest, highest) stress [Pa] that the unit suits, that of the frame unless given.
+    Parameters
+    ----------
+    frame : Frame
+    reach : tuple, optional
+        Minimum and maximum stress [Pa] that determine the unit; by default those of the frame.
+
+    Returns
+    -------
+    tuple
+        x (m,) [mm], ((label, values (m,)), ...) and the unit.
     """
     line = frame.interface()
     shown = [("normal stress", frame.point_data["normal_stress"][line])]
@@ -262,7 +344,10 @@ def curves(frame: Frame, reach: tuple | None = None) -> tuple:
 
 
 def borders(frame: Frame, cells) -> tuple:
-    """Edges (e, 2) of the `cells` (bool), as point numbers: outer ones of both pieces, and those under a coating."""
+    """Return the outer edges (e, 2) of some cells as point numbers, and those below a coating.
+
+    cells: (cells,) bool.
+    """
     outer, inner = [], []
     size, material = np.diff(frame.offsets), frame.cell_data["material"]
     for part in (0, 1):

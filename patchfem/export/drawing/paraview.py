@@ -1,8 +1,9 @@
-"""The last cycle for ParaView: its fields as a .pvd and a script beside it that colours, warps and plays them.
+"""The last cycle for ParaView: its fields as .pvd, and a script that colours and plays them.
 
-The fields carry two more point arrays: `motion`, the displacement as pictures draw it, whose gap is the gap, without
-the slide of the upper piece as a whole; and `slide`, that slide. So each has a factor of its own. What is coloured
-stands in MPa: `shown` in the cells of the pieces, `contact_pressure` at the points of the interface.
+The fields have two more point arrays: `motion`, the displacement as pictures draw it, which
+includes the gap but not the slide of the upper piece as a whole; and `slide`, this slide. Thus each
+can have its own factor. Coloured arrays are in MPa: `shown` in the cells of the pieces,
+`contact_pressure` at the points of the interface.
 """
 
 from dataclasses import replace
@@ -18,8 +19,11 @@ from .film import Film, film_of
 from .panels import moved, slide_of, upper_points
 
 MPA = 1e-6
-SHARPEST = 0.998  # share of the cells whose stress the colours of a component reach: the others stand out in corners
-STRESSES = {  # name -> (title, place in the stored stress xx, yy, zz, xy, yz, xz; None: of its own)
+# Fraction of the cells whose stress the colours of a component cover; the others are peaks in
+# corners.
+SHARPEST = 0.998
+# name -> (title, index in the stored stress xx, yy, zz, xy, yz, xz; None for an array of its own)
+STRESSES = {
     "von_mises": ("von Mises stress", None),
     "sigma_xx": ("stress sigma_xx", 0),
     "sigma_yy": ("stress sigma_yy", 1),
@@ -27,7 +31,7 @@ STRESSES = {  # name -> (title, place in the stored stress xx, yy, zz, xy, yz, x
     "tau_xy": ("shear stress tau_xy", 3),
 }
 
-STATUS = "status"  # of the interface: 0 open, 1 sticks, 2 slips
+STATUS = "status"  # state of the interface: 0 open, 1 sticks, 2 slips
 
 SCRIPT = '''\
 """Both pieces through the last cycle: {title} in them, contact pressure on their interface.
@@ -136,11 +140,23 @@ if not films:
 
 
 def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
-    """Write the script `out`, and its fields beside it, for the last cycle of a results folder; one line on them.
+    """Write script and fields for the last cycle of a results folder; return a line on them.
 
-    of: the stress that colours the pieces, a key of STRESSES; STATUS: von Mises stress in the pieces, and where the
-    interface is open, sticks and slips. Missing without fields or where `out` cannot be written;
-    PatchfemError for fields of one moment, in which nothing moves, and for a stress that is none.
+    Parameters
+    ----------
+    folder : Path
+    out : Path
+        File of the script; the fields are written next to it.
+    of : str
+        Stress that colours the pieces, a key of STRESSES; or STATUS for von Mises stress in the
+        pieces and the state of the interface.
+
+    Raises
+    ------
+    Missing
+        If there are no fields, or `out` cannot be written.
+    PatchfemError
+        If the fields have only one frame, or the stress is unknown.
     """
     status, of = of == STATUS, "von_mises" if of == STATUS else of
     if of not in STRESSES:
@@ -159,7 +175,10 @@ def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
 
 
 def _ends(series: Series, film: Film, of: str) -> tuple:
-    """Ends of the colours of a stress [Pa]: those of the pictures; of a component as far above 0 as below."""
+    """Return the ends of the colours of a stress [Pa].
+
+    For the von Mises stress they are those of pictures; for a component they are symmetric about 0.
+    """
     if of == "von_mises":
         return 0.0, float(film.tops[0])
     top = 0.0
@@ -172,14 +191,25 @@ def _ends(series: Series, film: Film, of: str) -> tuple:
 
 
 def stress_of(cell_data: dict, of: str) -> np.ndarray:
-    """A stress (cells,) [Pa] of STRESSES; tension is > 0."""
+    """Return a stress (cells,) [Pa] of STRESSES; tension is positive."""
     place = STRESSES[of][1]
     return cell_data["von_mises"] if place is None else cell_data["stress"][:, place]
 
 
 def script(out: Path, film: Film, of: str, ends: tuple, status: bool = False) -> str:
-    """The text of the script `out` that plays a film; ends: of the colours of the stress [Pa]; status: the
-    interface shows where it sticks and slips."""
+    """Return the text of the script that plays a film.
+
+    Parameters
+    ----------
+    out : Path
+    film : Film
+    of : str
+        A key of STRESSES.
+    ends : tuple
+        Ends of the colours of the stress [Pa].
+    status : bool
+        Whether the interface shows where it sticks and slips.
+    """
     fields = out.with_suffix(".pvd")
     return SCRIPT.format(
         fields=fields.name,
@@ -195,8 +225,11 @@ def script(out: Path, film: Film, of: str, ends: tuple, status: bool = False) ->
 
 
 def with_motion(frame: Frame, of: str = "von_mises") -> Frame:
-    """A frame whose blocks hold `motion` and `slide` (n, 3) [m] too, which add up to the drawn displacement, and what
-    the script colours [MPa]."""
+    """Return a frame with the additional arrays `motion` and `slide` (n, 3) [m].
+
+    Their sum is the displacement as drawn. The arrays that the script colours [MPa] are added as
+    well.
+    """
     slide = np.zeros((len(frame.points), 3))
     slide[upper_points(frame), 0] = slide_of(frame)
     motion = np.column_stack([moved(frame), np.zeros(len(slide))]) - slide

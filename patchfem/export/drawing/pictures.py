@@ -1,4 +1,4 @@
-"""Charts and other pictures drawn by matplotlib, as SVG text: the same bytes for the same numbers."""
+"""Charts and other pictures drawn by matplotlib as SVG; equal numbers give equal bytes."""
 
 import io
 import re
@@ -7,7 +7,7 @@ from functools import partial, wraps
 from ...formatting import format_number
 
 BLUE, ORANGE, GREY = "#1f5f99", "#c8551b", "#8a8a8a"
-WIDTH = 9.6  # inches; the page stretches a picture to its text column
+WIDTH = 9.6  # inches; the page scales a picture to the width of its text
 STYLE = {
     "svg.hashsalt": "patchfem",
     "svg.fonttype": "none",
@@ -25,17 +25,31 @@ STYLE = {
     "figure.constrained_layout.use": True,
     "lines.linewidth": 1.4,
 }
-COLOURS = {"accent": BLUE, "warm": ORANGE, "soft": GREY}  # those of a chart by name
+COLOURS = {"accent": BLUE, "warm": ORANGE, "soft": GREY}  # colours of a chart by name
 SHAPES = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^"}
-TALL = 3.6  # inches
-# of the ends of a logarithmic axis; up to it three numbers a decade have room
+TALL = 3.6  # height of a chart [inch]
+# Ratio of the ends of a logarithmic axis up to which three numbers per decade fit.
 MAX_PLAIN_RATIO = 1e3
 
 
 def drawing(columns: int = 1, height: float = 3.2, onto=None, **layout):
-    """An empty Figure of the page's width with `columns` axes side by side: (figure, axes).
+    """Return a figure of the width of the page, and its axes side by side.
 
-    height [inch]; onto: matplotlib Axes that stand in place of all of them; layout: passed on to `subplots`.
+    Parameters
+    ----------
+    columns : int
+        Number of axes.
+    height : float
+        [inch]
+    onto : Axes, optional
+        Axes that replace all of them.
+    layout
+        Passed to `subplots`.
+
+    Returns
+    -------
+    tuple
+        Figure and list of Axes.
     """
     if onto is not None:
         return onto.figure, [onto]
@@ -52,7 +66,10 @@ def drawing(columns: int = 1, height: float = 3.2, onto=None, **layout):
 
 
 def _svg(figure) -> str:
-    """The drawing alone, without date, creator or any address but those of the XML namespaces."""
+    """Return the SVG of a figure without date, creator and addresses.
+
+    The only addresses left are those of the XML namespaces.
+    """
     import matplotlib
 
     text = io.StringIO()
@@ -63,24 +80,27 @@ def _svg(figure) -> str:
 
 
 def styled(draw):
-    """Turn a function that draws a Figure into one that answers with its SVG text.
+    """Turn a function that draws a Figure into one that returns its SVG text.
 
-    Its `figure` gives the Figure itself, which a notebook shows, as each of its axes, as the same SVG.
+    The attribute `figure` of the result returns the Figure itself, which a notebook shows as the
+    same SVG, as it does each of its axes.
     """
 
     @wraps(draw)
     def figure(*args, **kwargs):
+        """Return the drawn Figure."""
         import matplotlib
 
         with matplotlib.rc_context(STYLE):
             drawn = draw(*args, **kwargs)
-        if kwargs.get("onto") is None:  # else the picture is its owner's
+        if kwargs.get("onto") is None:  # otherwise the caller owns the figure
             for shown in (drawn, *drawn.axes):
                 shown._repr_svg_ = partial(_svg, drawn)
         return drawn
 
     @wraps(draw)
     def svg(*args, **kwargs) -> str:
+        """Return the SVG text of the drawn Figure."""
         return _svg(figure(*args, **kwargs))
 
     svg.figure = figure
@@ -89,7 +109,16 @@ def styled(draw):
 
 @styled
 def draw(made: list, onto=None, height: float = TALL):
-    """Draw charts as `charts` describes them, side by side, `height` inches tall; onto Axes the first alone."""
+    """Draw charts, as `charts` describes them, side by side.
+
+    Parameters
+    ----------
+    made : list of dict
+    onto : Axes, optional
+        Axes for the first chart alone.
+    height : float
+        [inch]
+    """
     figure, axes = drawing(len(made), height, onto)
     for axis, one in zip(axes, made):
         for mark in one["marks"]:
@@ -123,7 +152,7 @@ def draw(made: list, onto=None, height: float = TALL):
 
 
 def _write_plain_numbers(axis) -> None:
-    """Label a logarithmic axis by numbers such as 0.1, 0.2 and 0.5; over many decades by powers of ten alone."""
+    """Label a logarithmic axis by numbers such as 0.1, 0.2, 0.5, or by powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = sorted(axis.get_view_interval())
@@ -135,7 +164,7 @@ def _write_plain_numbers(axis) -> None:
 
 
 def _write_label(axis, label: dict) -> None:
-    """Write a text beside a place (x, y), `raised` [points] above it, to its left or right."""
+    """Write a text at a point (x, y), `raised` [points] above it, to its left or right."""
     on_left = label.get("side") == "left"
     axis.annotate(
         label["text"],
@@ -150,10 +179,12 @@ def _write_label(axis, label: dict) -> None:
 
 
 def _colour(mark: dict) -> str:
+    """Return the colour of a mark."""
     return COLOURS.get(mark["colour"], mark["colour"])
 
 
 def _line(axis, mark: dict) -> None:
+    """Draw a line."""
     axis.plot(
         mark["x"],
         mark["y"],
@@ -166,6 +197,7 @@ def _line(axis, mark: dict) -> None:
 
 
 def _dots(axis, mark: dict) -> None:
+    """Draw points with error bars."""
     axis.errorbar(
         mark["x"],
         mark["y"],
@@ -180,6 +212,7 @@ def _dots(axis, mark: dict) -> None:
 
 
 def _band(axis, mark: dict) -> None:
+    """Draw a band between two curves."""
     axis.fill_between(
         mark["x"],
         mark["low"],
@@ -192,6 +225,7 @@ def _band(axis, mark: dict) -> None:
 
 
 def _span(axis, mark: dict) -> None:
+    """Draw a vertical strip."""
     axis.axvspan(
         mark["left"],
         mark["right"],
@@ -203,6 +237,7 @@ def _span(axis, mark: dict) -> None:
 
 
 def _rule(axis, mark: dict) -> None:
+    """Draw a vertical line."""
     axis.axvline(
         mark["x"],
         color=_colour(mark),
@@ -213,7 +248,7 @@ def _rule(axis, mark: dict) -> None:
 
 
 def _arrow(axis, mark: dict) -> None:
-    """A line with a head in its middle; with a floor, of a logarithmic axis."""
+    """Draw a line with an arrowhead in its middle; with a floor the axis is logarithmic."""
     _line(axis, mark)
     (a, b), (c, d) = mark["x"], mark["y"]
     tail, tip = (
@@ -226,7 +261,7 @@ def _arrow(axis, mark: dict) -> None:
 
 
 def _cells(axis, mark: dict) -> None:
-    """Cells over the lines x and y, coloured by their value; the first of an axis brings the scale of colours."""
+    """Draw cells between the lines x and y, coloured by value; the first ones add a colour bar."""
     first = not axis.collections
     drawn = axis.pcolormesh(
         mark["x"], mark["y"], mark["value"].T, vmin=0.0, vmax=mark["top"], rasterized=True

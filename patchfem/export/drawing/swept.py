@@ -9,26 +9,26 @@ from ..tolerance_misses import over
 from ..written import label
 from . import charts
 
-# Largest / smallest value of a key, all above 0, from which its axis is logarithmic.
+# Largest / smallest value of a key, all positive, above which its axis is logarithmic.
 MIN_KEY_RATIO = 10.0
 MIN_MEASURE_RATIO = 100.0  # The same for the values of the measure.
 
 
 def sweep_chart(dataset, measure: str) -> dict:
-    """Return the chart of a measure over the key with most values.
+    """Return the chart of a measure against the key with the most values.
 
     Hollow points miss the tolerance.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        Of a sweep.
+        Content of sweep.nc.
     measure : str
 
     Raises
     ------
     PatchfemError
-        For a measure that the sweep does not have.
+        If the sweep does not have this measure.
     """
     known = sorted(name.removesuffix("_error") for name in dataset if name.endswith("_error"))
     if measure not in known:
@@ -70,7 +70,7 @@ def sweep_chart(dataset, measure: str) -> dict:
 
 
 def _key_axis(key: str, along) -> tuple:
-    """Return the places (n,) of the values of a key, and their axis; words stand side by side."""
+    """Return the positions (n,) of the values of a key, and their axis; words are evenly spaced."""
     if along.dtype.kind != "f":
         places = np.arange(float(along.size))
         ticks = [(place, str(word)) for place, word in zip(places, along.values)]
@@ -81,14 +81,14 @@ def _key_axis(key: str, along) -> tuple:
 
 
 def _spans(values, ratio: float) -> bool:
-    """Whether values, all above 0, span a ratio."""
+    """Return whether values are all positive and span a ratio."""
     if values.dtype.kind != "f" or values.size < 2 or values.min() <= 0:
         return False
     return values.max() >= ratio * values.min()
 
 
 def _axis_unit(values, unit: str) -> tuple:
-    """Return unit and scale of an axis of these values [SI]."""
+    """Return unit and scale for an axis of these values [SI]."""
     return axis_unit(values, unit) if unit in UNIT_LADDERS else (unit, 1.0)
 
 

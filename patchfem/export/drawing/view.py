@@ -1,7 +1,8 @@
-"""The pressed pieces in a window or a picture: von Mises stress, motion magnified, stress along the interface.
+"""The pressed pieces in a window or a picture: von Mises stress, motion, interface stress.
 
-Pictures are drawn by matplotlib (`flat`), the window by pyvista, which nothing else touches. A child process finds out
-whether OpenGL can draw the window: without a working driver VTK 9.7 ends its process by a segmentation fault.
+Pictures are drawn by matplotlib (`flat`), the window by pyvista, which no other module uses. A
+child process checks whether OpenGL can draw the window, because VTK 9.7 crashes without a working
+driver.
 """
 
 import os
@@ -19,7 +20,8 @@ from . import film, flat
 from .panels import Panel, borders, curves, panels
 
 ENDINGS = (".png", ".svg", ".pdf")
-SECONDS = 60  # the child may take; starting pyvista and drawing takes 6 s to 9 s on a busy machine
+# [s] for the child process; to start pyvista and draw takes 6 s to 9 s on a busy machine
+SECONDS = 60
 PROBE = """\
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))
@@ -34,12 +36,25 @@ FONT = 20
 def view(
     folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None
 ) -> None:
-    """Open a window on the fields of a results folder (the last frame or `frame`), or draw them into `out`, of which
-    .gif and .mp4 show the last cycle.
+    """Show the fields of a results folder in a window, or draw them into a file.
 
-    magnify: factor of the drawn motion, one that makes it visible by default. Missing without fields, without a screen
-    for the window, without what writes .mp4 or when `out` cannot be written; PatchfemError for another ending, frame or
-    factor, and for a film of one frame.
+    Parameters
+    ----------
+    folder : Path
+    out : Path or None
+        Picture, or film (.gif, .mp4) of the last cycle; None for a window.
+    frame : int, optional
+        Number of the frame; by default the last.
+    magnify : float, optional
+        Factor of the motion; by default one that makes it visible.
+
+    Raises
+    ------
+    Missing
+        If there are no fields, no screen for the window, no program that writes .mp4, or if `out`
+        cannot be written.
+    PatchfemError
+        For an impossible suffix, frame or factor, and for a film of a single frame.
     """
     if magnify is not None and not (np.isfinite(magnify) and magnify >= 0):
         raise PatchfemError(f"--magnify: {magnify} must be 0 or more")
@@ -66,6 +81,7 @@ def view(
 
 
 def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
+    """Write a film of the last cycle."""
     if frame is not None:
         raise PatchfemError(
             f"--frame: {out.suffix} shows the whole last cycle; use a .png for one frame"
@@ -78,6 +94,7 @@ def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> 
 
 
 def _window(one: Frame, head: str, magnify) -> None:
+    """Open a window; Missing without a screen or without OpenGL."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
@@ -93,7 +110,10 @@ def _window(one: Frame, head: str, magnify) -> None:
 
 
 def no_opengl() -> str | None:
-    """Reason why nothing can be drawn with OpenGL here, None where it can; a child process draws a tiny picture."""
+    """Return the reason why OpenGL cannot draw here; None if it can.
+
+    A child process draws a tiny picture.
+    """
     try:
         done = subprocess.run(
             [sys.executable, "-P", "-c", PROBE], capture_output=True, text=True, timeout=SECONDS
@@ -113,11 +133,11 @@ def no_opengl() -> str | None:
 
 
 def plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = False):
-    """The pyvista Plotter of the window: both pieces whole, the place where they touch, the stresses between them."""
+    """Return the pyvista Plotter of the window: both pieces, their contact, and the stresses."""
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    # it reports every display it does not find
+    # it would report every display that it does not find
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     made = pv.Plotter(
         off_screen=off_screen,
@@ -138,6 +158,7 @@ def plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = Fal
 
 
 def _bodies(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
+    """Draw both pieces in a panel."""
     import pyvista as pv
 
     unit, scale = axis_unit([panel.top], "Pa")
@@ -191,10 +212,11 @@ def _bodies(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
         show_zlabels=False,
     )
     plotter.reset_camera(bounds=(*panel.window, 0, 0))
-    plotter.camera.zoom(0.95)  # the scale of colours stands beside the pieces
+    plotter.camera.zoom(0.95)  # leaves space for the colour bar beside the pieces
 
 
 def _chart(plotter, one: Frame) -> None:
+    """Draw the stresses along the interface."""
     import pyvista as pv
 
     x, shown, unit = curves(one)

@@ -1,12 +1,12 @@
-"""Both pieces and their interface as three named blocks of cells with their fields, and what their codes mean."""
+"""Both pieces and their interface as three named blocks of cells with fields and codes."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-LINE, TRIANGLE, QUAD = 3, 5, 9  # cell types of VTK
+LINE, TRIANGLE, QUAD = 3, 5, 9  # VTK cell types
 NAMES = ("lower", "upper", "interface")
-# the last of a patch that wears in strips; the place of a name is its code in `part`
+# The last part is that of a patch that wears in strips; the index of a name is its code in `part`.
 PARTS = (
     *NAMES,
     "strips",
@@ -29,8 +29,14 @@ CODES = {
 class Block:
     """Cells with their fields.
 
-    points: (n, 3) [m]; connectivity, offsets (c + 1,), types (c,): as VTK has them; point_data, cell_data: name ->
-    (n or c, ...) at one moment, (f or 1, n or c, ...) of a series, 1 if constant.
+    Attributes
+    ----------
+    points : (n, 3) array
+        [m]
+    connectivity, offsets, types : array
+        Cells in VTK form; offsets has (c + 1,) entries, types (c,).
+    point_data, cell_data : dict
+        Name -> (n or c, ...) at one time, or (f or 1, n or c, ...) of a series, 1 if constant.
     """
 
     points: np.ndarray
@@ -42,7 +48,16 @@ class Block:
 
 
 def block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
-    """A Block of points (n, 2) [m] and of arrays (c, 2 to 4) of node numbers: lines, triangles or quadrilaterals."""
+    """Return a Block of points and cells.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        [m]
+    cells : list of (c, 2 to 4) arrays
+        Node numbers of segments, triangles or quadrilaterals.
+    point_data, cell_data : dict
+    """
     sizes = np.concatenate([np.full(len(one), one.shape[1]) for one in cells])
     return Block(
         np.column_stack([points, np.zeros(len(points))]),
@@ -55,13 +70,28 @@ def block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
 
 
 def blocks_of(lower: dict, upper: dict, x, interface: dict, width: float = 0.0) -> dict:
-    """The blocks of a pair, by name.
+    """Return the blocks of a pair of pieces by name.
 
-    lower, upper: "points" (n, 2) [m], "blocks" of cells numbered from 0, "material" (t,) of all of them, "interface"
-    (m,) node numbers by rising x, "displacement" (f, n, 2) [m], "stress" (f, t, 4) as xx, yy, zz, xy [Pa], "mises"
-    (f, t) [Pa], "stress_error" (f, t) [1], "bond" name -> (f, k), stress under its coating at x, {} without one;
-    interface: name -> (f, k) at the places x (k,) [m], or (f, s, k) of strips, of which it has the mean over the width
-    [m] and a block `strips` all. The interface moves with the lower piece.
+    The interface moves with the lower piece.
+
+    Parameters
+    ----------
+    lower, upper : dict
+        "points" (n, 2) [m]; "blocks" of cells numbered from 0; "material" (t,) of all cells;
+        "interface" (m,) node numbers in order of x; "displacement" (f, n, 2) [m]; "stress" (f, t,
+        4) as xx, yy, zz, xy [Pa]; "mises" (f, t) [Pa]; "stress_error" (f, t) [1]; "bond" name ->
+        (f, k), stress below its coating at x, {} without a coating.
+    x : (k,) array
+        Positions along the interface [m].
+    interface : dict
+        Name -> (f, k), or (f, s, k) for strips; the block `interface` then has the mean over the
+        width, and a block `strips` has all of them.
+    width : float
+        [m]
+
+    Returns
+    -------
+    dict of Block
     """
     line = lower["interface"]
     own = lower["points"][line, 0]
@@ -89,11 +119,13 @@ def blocks_of(lower: dict, upper: dict, x, interface: dict, width: float = 0.0) 
 
 
 def _strips(x, width: float, areal: dict) -> Block:
-    """Strips side by side over the width [m] in the plane of the interface, each with its values (f, s, k) from edge to
-    edge; `width` runs along z."""
+    """Return strips side by side over the width [m], in the plane of the interface.
+
+    The values (f, s, k) of a strip are constant from edge to edge; the width is along z.
+    """
     count, k = next(iter(areal.values())).shape[1:]
     edges = np.linspace(-width / 2, width / 2, count + 1)
-    sides = np.stack([edges[:-1], edges[1:]], axis=1).ravel()  # of each strip in turn
+    sides = np.stack([edges[:-1], edges[1:]], axis=1).ravel()  # edges of each strip in turn
     low = (np.arange(count)[:, None] * 2 * k + np.arange(k - 1)).ravel()
     one = block(
         np.column_stack([np.tile(x, 2 * count), np.zeros(2 * count * k)]),
@@ -106,6 +138,7 @@ def _strips(x, width: float, areal: dict) -> Block:
 
 
 def _body(body: dict) -> Block:
+    """Return the block of a piece."""
     frames, cells = len(body["displacement"]), len(body["material"])
     move = np.zeros((frames, len(body["points"]), 3), np.float32)
     move[..., :2] = body["displacement"]
@@ -125,8 +158,10 @@ def _body(body: dict) -> Block:
 
 
 def joined(blocks: dict) -> Block:
-    """Blocks of one moment as one, with the cell array `part` of CODES; what a block does not have is NaN there, or -1
-    of a code."""
+    """Merge blocks of one time into one block with the cell array `part` of CODES.
+
+    Values that a block does not have are NaN, or -1 for codes.
+    """
     first = np.cumsum([0, *(len(one.points) for one in blocks.values())])
     ends = np.cumsum([0, *(one.connectivity.size for one in blocks.values())])
     all_of = list(blocks.values())
@@ -146,6 +181,7 @@ def joined(blocks: dict) -> Block:
 
 
 def _filled(parts: list, sizes: list) -> dict:
+    """Concatenate arrays by name, with NaN or -1 for a block that does not have an array."""
     out = {}
     for name in dict.fromkeys(name for part in parts for name in part):
         like = next(part[name] for part in parts if name in part)

@@ -1,4 +1,4 @@
-"""The bodies and their interface frame by frame: what a run writes for VTK and draws in its report."""
+"""Fields of both pieces and their interface, frame by frame, for VTK and for the report."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -41,18 +41,21 @@ UNITS = {
     f"{name}_{side}": "Pa" for name in ("normal_bond", "shear_bond") for side in ("lower", "upper")
 }
 
-SHARE = 0.25  # of the estimated error of the stress that rounding may add to it: sqrt(1 + 1/16) is 3 % more
-TOGETHER = 8  # frames that are worked on in one pass
-FINEST = 2.0**-10  # of the largest value: a step of rounding that no scale of colours shows
-# of the largest displacement of a piece in its holder: its error in space is of the order of 1e-4
+# Error that rounding may add, as a fraction of the estimated error of the stress: sqrt(1 + 1/16) is
+# 3 % more.
+SHARE = 0.25
+TOGETHER = 8  # frames that are processed together
+FINEST = 2.0**-10  # rounding step / largest value; such a step is invisible in any colour scale
+# Rounding step / largest displacement of a piece in its holder, whose discretisation error is about
+# 1e-4.
 DEFORMED = 2.0**-14
 
 
 def write_fields(result, path: Path) -> dict:
-    """Write both bodies and the interface of one pair, frame by frame.
+    """Write both pieces and the interface of a pair, frame by frame.
 
-    Returns the pressed state for the report's picture, after all wear; it is drawn for tensor grids only. A stress
-    beyond the yield strength of a named material is noted in the result.
+    Returns the pressed state for the picture of the report, after all wear; only tensor grids have
+    it. A stress beyond the yield strength of a named material is added to the notes of the result.
     """
     patch, fields = result.patch, result.fields
     times = fields["time"]
@@ -95,8 +98,16 @@ def write_fields(result, path: Path) -> dict:
 
 
 def _loads(patch, fields: dict, side: str) -> tuple:
-    """Loads (shear, normal) (1 + f, n) [N/m] on the nodes of a piece: the pressed state, then the shear of every
-    frame."""
+    """Return the loads (shear, normal) (1 + f, n) [N/m] on the nodes of a piece.
+
+    The first row is the pressed state; the others are the shear of every frame.
+
+    Parameters
+    ----------
+    patch : Patch
+    fields : dict
+    side : {"lower", "upper"}
+    """
     sign, at = (-1.0, 0) if side == "lower" else (1.0, 1)
     force = patch.pieces.interface.weight / patch.pieces.interface.width
     tau = fields.get("shear_stress", np.zeros((len(fields["time"]), force.size)))
@@ -111,7 +122,10 @@ def _loads(patch, fields: dict, side: str) -> tuple:
 
 
 def _motions(patch, loads: list) -> list:
-    """Displacements (1 + f, nodes, 2) of both pieces; alike ones share one factorisation."""
+    """Return the displacements (1 + f, nodes, 2) of both pieces.
+
+    Equal pieces share one factorisation.
+    """
     pair = patch.pair
     if pair.upper is pair.piece:
         both = compute_displacement(pair.piece, *(np.concatenate(parts) for parts in zip(*loads)))
@@ -122,9 +136,20 @@ def _motions(patch, loads: list) -> list:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Inside:
-    """What the fields of a piece are made with, once for two pieces alike.
+    """Mesh of a piece and what computes its fields; equal pieces share it.
 
-    points: (n, 2) [m] as x and depth; blocks: of cells; interface: (m,) node numbers; stress: cell stresses of motions.
+    Attributes
+    ----------
+    points : (n, 2) array
+        x and depth [m].
+    blocks : list
+        Cells.
+    interface : (m,) array
+        Node numbers.
+    stress : callable
+        Displacements -> stresses of cells.
+    cells, rules, found
+        Cells, quadratures and recovery for the error of the stress.
     """
 
     points: np.ndarray
@@ -137,6 +162,7 @@ class _Inside:
 
 
 def _inside(piece, grid) -> _Inside:
+    """Return mesh, stress and recovery of a piece."""
     cells = get_cells(piece)
     if isinstance(piece, Piece):
         points, blocks, interface = (
@@ -158,8 +184,21 @@ def _inside(piece, grid) -> _Inside:
 
 
 def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
-    """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface;
-    x: (k,) [m] of the interface; u: of `_motions`, whose pressed state is that of the first frame."""
+    """Return the fields of a piece for the file: mesh, displacement and stress in all frames.
+
+    y points away from the interface.
+
+    Parameters
+    ----------
+    patch : Patch
+    fields : dict
+    x : (k,) array
+        Positions along the interface [m].
+    side : {"lower", "upper"}
+    inside : _Inside
+    u : (1 + f, n, 2) array
+        From `_motions`; its first row is the pressed state.
+    """
     lower, cells, frames = side == "lower", inside.cells, len(u) - 1
     sign = -1.0 if lower else 1.0
     out = {
@@ -190,7 +229,8 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
     )
     bond = {name: rows[:1] + rows[1:] for name, rows in bond.items()}
     if bond:
-        bond["shear_bond"] *= -sign  # on the lower piece along +x, as the interface shear
+        # positive along +x on the lower piece, like the shear stress of the interface
+        bond["shear_bond"] *= -sign
     blocks = [block if not lower else block[:, ::-1] for block in inside.blocks]
     finest = min(
         choose_rounding_step(inside.found, error, inside.rules, SHARE),
@@ -208,7 +248,7 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
 
 
 def _rigid(patch, fields: dict, points, some: slice) -> np.ndarray:
-    """Motion (f, n, 2) [m] of the upper holder at the places (n, 2) [m] in some of the frames."""
+    """Return the motion (f, n, 2) [m] of the upper holder at points (n, 2) [m] in some frames."""
     same = np.ones((len(fields["time"][some]), 1))
     rotation, closing, slide = (
         fields[f"holder_{name}"][some, None] if f"holder_{name}" in fields else constant * same

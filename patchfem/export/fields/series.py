@@ -1,4 +1,4 @@
-"""fields.vtkhdf read back, frame by frame."""
+"""Reader of fields.vtkhdf, frame by frame."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,25 +11,27 @@ from ..read_results import HUGE, numeric, readable, wanted
 from .blocks import NAMES, PARTS, Block, joined
 from .vtkhdf import NAME
 
-TAILS = {"displacement": (3,), "stress": (6,)}  # of arrays with several values a place
+TAILS = {"displacement": (3,), "stress": (6,)}  # shape of arrays with several values at a point
 BODY = {"PointData": ("displacement",), "CellData": ("material", "stress", "von_mises")}
 LINE = {"PointData": ("displacement", "gap", "normal_stress"), "CellData": ()}
-# what a reader relies on
+# Arrays that a reader needs.
 LEAST = {
     "lower": BODY,
     "upper": BODY,
     "interface": LINE,
     "strips": {"PointData": (), "CellData": ()},
 }
-MOST = 4  # nodes of a cell
-APART = 3.0  # of the usual step between frames: a longer one divides the pressed state from the last cycle
+MOST = 4  # largest number of nodes of a cell
+# Ratio to the usual step between frames; a longer step separates the pressed state from the last
+# cycle.
+APART = 3.0
 
 
 def moving(times) -> tuple:
-    """Numbers of the frames that follow each other up to the end of the times (f,) [s].
+    """Return the numbers of consecutive frames up to the last of the times (f,) [s].
 
-    Of a rig these are the frames of its last cycle, without the pressed state long before them; of a bench all of its
-    slide.
+    For a rig they are the frames of its last cycle, without the pressed state long before it; for a
+    bench all frames of its slide.
     """
     steps = np.diff(times)
     apart = np.flatnonzero(steps > APART * np.median(steps)) if steps.size else steps
@@ -38,9 +40,17 @@ def moving(times) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Frame(Block):
-    """One moment of a series: all of its blocks as one mesh, that of `joined`, and each of them.
+    """One time of a series: all blocks as one mesh, as from `joined`, and each of them.
 
-    blocks: name -> Block; units: name -> unit; time [s]; number: from 0.
+    Attributes
+    ----------
+    blocks : dict of Block
+    units : dict
+        Unit by name.
+    time : float
+        [s]
+    number : int
+        Number of the frame, from 0.
     """
 
     blocks: dict
@@ -49,7 +59,10 @@ class Frame(Block):
     number: int
 
     def cells(self, part: int) -> list:
-        """The cells of a part as arrays (c, nodes), one per size; `part` 0 lower, 1 upper piece, 2 interface."""
+        """Return the cells of a part as arrays (c, nodes), one per number of nodes.
+
+        part: 0 lower piece, 1 upper piece, 2 interface.
+        """
         mine, size = self.cell_data["part"] == part, np.diff(self.offsets)
         return [
             self.connectivity[self.offsets[:-1][mine & (size == n)][:, None] + np.arange(n)]
@@ -57,15 +70,22 @@ class Frame(Block):
         ]
 
     def interface(self) -> np.ndarray:
-        """Numbers of the points of the interface (m,), by rising x."""
+        """Return the numbers of the points of the interface (m,), in order of x."""
         nodes = np.unique(np.concatenate([block.ravel() for block in self.cells(2)]))
         return nodes[np.argsort(self.points[nodes, 0], kind="stable")]
 
 
 class Series:
-    """The fields of a results folder, frame by frame, as written; a context that holds the file.
+    """Context that reads the fields of a results folder frame by frame.
 
-    times: (f,) [s]. Missing where the folder has no fields, PatchfemError for a file that is not one of `write_series`.
+    times: (f,) [s].
+
+    Raises
+    ------
+    Missing
+        If the folder has no fields.
+    PatchfemError
+        If `write_series` cannot have written the file.
     """
 
     def __init__(self, folder: Path):
@@ -95,6 +115,7 @@ class Series:
             raise
 
     def _open(self) -> None:
+        """Read times, units and blocks, and check them."""
         self.root = self.file["VTKHDF"]
         if self.root.attrs["Type"] == b"UnstructuredGrid":
             raise PatchfemError(
@@ -115,11 +136,11 @@ class Series:
             self._looked(name, self.root[name])
 
     def _looked(self, name: str, group) -> None:
-        """ValueError for a block whose cells or arrays are not those of its points in every frame."""
+        """Raise ValueError for a block whose cells or arrays do not fit its points in every frame."""
         points, nodes, ends, types = (
             group[one][:] for one in ("Points", "Connectivity", "Offsets", "Types")
         )
-        # NaN is not below it
+        # the comparison is False for NaN
         wanted(
             points.ndim == 2
             and points.shape[1] == 3
@@ -173,9 +194,9 @@ class Series:
         return len(self.times)
 
     def frame(self, number: int = -1) -> Frame:
-        """The frame `number` from 0, counted from the end where it is negative.
+        """Read a frame by its number from 0; negative numbers count from the end.
 
-        PatchfemError for a number that is not there and for a file that is damaged.
+        PatchfemError for a number that does not exist, and for a damaged file.
         """
         count = len(self)
         if not -count <= number < count:
@@ -200,32 +221,42 @@ class Series:
         )
 
     def names(self, block: str, kind: str) -> tuple:
-        """Names of the arrays of a block; kind: "PointData" or "CellData"."""
+        """Return the names of the arrays of a block; kind: "PointData" or "CellData"."""
         return tuple(self.root[block][kind])
 
     def stack(self, block: str, kind: str, name: str, numbers: list) -> np.ndarray:
-        """One array of a block, on its points or its cells, in several frames: (f, n, ...)."""
+        """Return an array of a block in several frames (f, n, ...).
+
+        Parameters
+        ----------
+        block : str
+        kind : {"PointData", "CellData"}
+        name : str
+        numbers : list of int
+            Numbers of the frames.
+        """
         group = self.root[block]
         rows, size = (
             group[f"{kind}/{name}"],
             len(group["Points" if kind == "PointData" else "Types"]),
         )
         first = group[f"Steps/{kind}Offsets/{name}"][:][numbers]
-        if np.all(np.diff(first) == size):  # one after the other: one read
+        if np.all(np.diff(first) == size):  # consecutive frames need a single read
             whole = rows[int(first[0]) : int(first[-1]) + size]
             return whole.reshape(len(numbers), size, *whole.shape[1:])
         return np.stack([rows[int(at) : int(at) + size] for at in first])
 
     def points(self, block: str) -> np.ndarray:
-        """Points (n, 3) [m] of a block."""
+        """Return the points (n, 3) [m] of a block."""
         return self.root[block]["Points"][:]
 
     def cells(self, block: str) -> tuple:
-        """Connectivity and offsets (c + 1,) of the cells of a block."""
+        """Return connectivity and offsets (c + 1,) of the cells of a block."""
         return self.root[block]["Connectivity"][:], self.root[block]["Offsets"][:]
 
     @staticmethod
     def _block(group, number: int) -> Block:
+        """Read a block in one frame."""
         data = [
             {name: _rows(group, kind, name, number, size) for name in group[kind]}
             for kind, size in (
@@ -243,5 +274,6 @@ class Series:
 
 
 def _rows(group, kind: str, name: str, number: int, size: int) -> np.ndarray:
+    """Read the values of an array in one frame."""
     first = int(group[f"Steps/{kind}Offsets/{name}"][number])
     return group[f"{kind}/{name}"][first : first + size]

@@ -1,19 +1,35 @@
-"""Where the stress of a run is beyond the yield strength of a named material: what flows there is left out."""
+"""Notes on stresses beyond the yield strength of a named material.
+
+The model does not include plastic flow.
+"""
 
 import numpy as np
 
 from ...formatting import format_length
 from ...runs.patch.strength import NEGLECTED, Strength, strength_of
 
-HELD = 0.2  # of a piece's height beside its held far face: nearer, stress grows as elements shrink (test_strength)
+# Fraction of the height of a piece near its fixed far face, where stress increases as elements
+# shrink (test_strength).
+HELD = 0.2
 
 
 def beyond_yield(asked, bodies: dict) -> dict:
-    """Find the materials whose von Mises stress exceeds their yield strength in some cell and frame: Strength -> note.
+    """Find the materials whose von Mises stress exceeds their yield strength anywhere.
 
-    asked: the patch of a model; bodies: "lower" and "upper" -> {"points" (n, 2) [m], "blocks" of cells, "material"
-    (c,) True for coating, "mises" (f, c) [Pa]}. What lies beside the held far face is left out: the stress in its
-    corners is that of a rigid hold, without bound.
+    The region near the fixed far face is left out, because the stress in its corners is unbounded
+    for a rigid holder.
+
+    Parameters
+    ----------
+    asked : PatchModel
+    bodies : dict
+        "lower" and "upper" -> {"points" (n, 2) [m], "blocks" of cells, "material" (c,) True for
+        coating, "mises" (f, c) [Pa]}.
+
+    Returns
+    -------
+    dict
+        Strength -> note.
     """
     found = {}
     for side, body in bodies.items():
@@ -41,6 +57,7 @@ def beyond_yield(asked, bodies: dict) -> dict:
 
 
 def _note(known: Strength, highest: tuple, pieces: int) -> str:
+    """Return the note on a material; highest: (stress [Pa], side, position [m])."""
     stress, side, (x, y) = highest
     both = "; the other piece exceeds its yield strength too" * (pieces > 1)
     return (

@@ -1,15 +1,18 @@
-"""fields.vtkhdf: a time series of three named blocks on fixed meshes, as VTK 9.4 to 9.7 and their ParaViews read it.
+"""Writer of fields.vtkhdf: a time series of three named blocks for VTK 9.4 to 9.7.
 
-The blocks `lower`, `upper` and `interface` are one vtkMultiBlockDataSet. Units, and the meanings of codes, stand as
-attributes of the arrays and in the field arrays `units` and `codes` of every block, which VTK 9.6 and 9.7 pass over.
+The blocks `lower`, `upper` and `interface` form a vtkMultiBlockDataSet. Units and the meanings of
+codes are attributes of the arrays, and also in the field arrays `units` and `codes` of every block,
+which VTK 9.6 and 9.7 ignore.
 
-VTK 9.6 and 9.7 stay at the first time without `Steps` beside the blocks; 9.4 takes whatever stands there for a block.
-So `Steps` is a whole mesh too, an empty one that the assembly leaves out.
+VTK 9.6 and 9.7 stay at the first time unless there is a group `Steps` next to the blocks; VTK 9.4
+takes any such group for a block. Therefore `Steps` is also a complete but empty mesh that is not
+part of the assembly.
 
-The changing arrays of a series of more than PACKED bytes are packed, component by component. Their numbers are rounded,
-to a multiple of a step or to so many bits, and every array says what that changes: at most `rounding_error` in its
-unit, or the share 2^-(significant_bits + 1) of each value. A series of more than LARGE bytes is written frame after
-frame as well: what a killed process leaves (`.fields.*.vtkhdf`) holds every frame that its `NSteps` count.
+The varying arrays of a series with more than PACKED bytes are compressed, component by component.
+Their numbers are rounded, to a multiple of a step or to a number of bits, and every array states
+the effect: at most `rounding_error` in its unit, or the fraction 2^-(significant_bits + 1) of each
+value. A series of more than LARGE bytes is written frame after frame: what a killed process leaves
+(`.fields.*.vtkhdf`) contains every frame that `NSteps` counts.
 """
 
 import math
@@ -24,12 +27,13 @@ from ...disk.atomic_write import open_lossy, write_atomically
 from .blocks import CODES, MEANINGS, Block
 
 NAME = "fields.vtkhdf"
-VERSION = np.array([2, 2], np.int64)  # of the format; later ones add nothing that stands here
-PACKED = 1 << 22  # bytes of all arrays: the shipped rig keeps 2.8 of 9.6 MB for .06 s more
-LARGE = 1 << 28  # bytes of all arrays
-# kept of 23 behind the leading one, where packed: an estimate is good to some 10 %
+# version of the format; later versions add nothing that is used here
+VERSION = np.array([2, 2], np.int64)
+PACKED = 1 << 22  # bytes of all arrays: the shipped rig keeps 2.8 of 9.6 MB, which takes .06 s more
+LARGE = 1 << 28  # bytes of all arrays above which frames are written one after the other
+# Bits of 23 after the leading one that are kept; the estimated error is accurate to some 10 %.
 BITS = {"stress_error": 5}
-# of every other array without a step: 3e-5 of a value, far below what the elements err by
+# Bits of every other array without a step: 3e-5 of a value, far below the discretisation error.
 MOST_BITS = 14
 EMPTY = Block(
     np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.uint8), {}, {}
@@ -39,9 +43,20 @@ EMPTY = Block(
 def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | None = None) -> None:
     """Write a series of fields on fixed meshes.
 
-    blocks: name -> Block whose data are (f or 1, n or c, ...), 1 if constant; times: (f,) [s]; units: name -> unit;
-    steps: block -> array -> largest step [its unit] that a packed series may round it to. The file is written whole
-    beside `path` and then renamed; it is of an HDF5 version that VTK's reader knows.
+    The file is written completely under another name and then renamed. Its HDF5 version is one that
+    the reader of VTK knows.
+
+    Parameters
+    ----------
+    path : Path
+    blocks : dict of Block
+        By name; data are (f or 1, n or c, ...), 1 if constant.
+    times : (f,) array
+        [s]
+    units : dict
+        Unit by name.
+    steps : dict, optional
+        Block -> array -> largest step [its unit] to which a compressed series may round the array.
     """
     path = Path(path)
     size = sum(
@@ -76,10 +91,19 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
 
 
 def _frames(file, steps: list, later: list, count: int) -> None:
-    """Write the arrays that wait, [(dataset, (f, n, ...), rounding of one frame)], frame after frame, each on the disk
-    before it counts.
+    """Write arrays frame after frame; each frame is on disk before it counts.
 
-    steps: the groups `Steps`, whose times are as many as their frames: VTK reads over the end of its memory otherwise.
+    VTK reads beyond its memory unless there are as many times as frames.
+
+    Parameters
+    ----------
+    file : h5py.File
+    steps : list
+        Groups `Steps`.
+    later : list
+        (dataset, values (f, n, ...), rounding of one frame) of each array.
+    count : int
+        Number of frames.
     """
     times = [one["Values"][:] for one in steps]
     for number in range(count):
@@ -91,12 +115,24 @@ def _frames(file, steps: list, later: list, count: int) -> None:
 
 
 def _frame(dataset, values, nearest, number: int) -> None:
-    """Write a frame, a chunk for each component (the bytes of its numbers side by side, then deflated, as HDF5 does it)
-    but for those that are 0, which a reader is given for a chunk that is not there."""
+    """Write a frame of an array, with one chunk per component.
+
+    A chunk has the bytes of its numbers shuffled and deflated, as HDF5 does it. A chunk of zeros is
+    left out, because readers get 0 for a missing chunk.
+
+    Parameters
+    ----------
+    dataset : h5py.Dataset
+    values : (f, n, ...) array
+    nearest : callable
+        Rounding.
+    number : int
+        Number of the frame.
+    """
     size = values.shape[1]
     for place, part in enumerate(nearest(values[number]).reshape(size, -1).T):
         if part.any():
-            # behind the shuffle 3/4 of the time of all matches
+            # after the shuffle this strategy takes 3/4 of the time of all matches
             packer = zlib.compressobj(1, strategy=zlib.Z_RLE)
             raw = np.ascontiguousarray(part).view(np.uint8).reshape(size, -1).T.tobytes()
             dataset.id.write_direct_chunk(
@@ -105,6 +141,7 @@ def _frame(dataset, values, nearest, number: int) -> None:
 
 
 def _counted(steps: list, times: list, count: int) -> None:
+    """Set the number of frames that count."""
     for one, all_times in zip(steps, times):
         one.attrs["NSteps"] = np.int64(count)
         one["Values"].resize((count,))
@@ -112,9 +149,15 @@ def _counted(steps: list, times: list, count: int) -> None:
 
 
 def rounded(values, bits: int) -> np.ndarray:
-    """float32 values with so many bits kept behind the leading one, rounded to nearest; the rest are zeros, which pack.
+    """Return float32 values rounded to a number of bits after the leading one.
 
-    bits: 0 < bits < 23; the relative error is at most 2^-(bits + 1), infinities and NaN stay.
+    The other bits are zeros, which compress well.
+
+    Parameters
+    ----------
+    values : array
+    bits : int
+        0 < bits < 23; the relative error is at most 2^-(bits + 1). Infinities and NaN are kept.
     """
     raw, drop = np.ascontiguousarray(values, np.float32).view(np.uint32), np.uint32(23 - bits)
     half, one = np.uint32(1) << (drop - np.uint32(1)), np.uint32(1)
@@ -123,13 +166,14 @@ def rounded(values, bits: int) -> np.ndarray:
 
 
 def stepped(values, step: float) -> np.ndarray:
-    """float32 values rounded to the nearest multiple of `step`, a power of two: off by half a step at most.
+    """Return float32 values rounded to the nearest multiple of `step`, a power of two.
 
-    Infinities, NaN and what is too large to have parts of a step stay.
+    The error is at most half a step. Infinities, NaN and values too large to have fractions of a
+    step are kept.
     """
     values = np.asarray(values, np.float32)
     step, each = np.float32(step), np.float32(1 / step)
-    # without a NaN
+    # The comparison is False if there is a NaN.
     if max(values.max(initial=0.0), -values.min(initial=0.0)) < step * np.float32(1 << 23):
         return np.rint(values * each) * step
     with np.errstate(over="ignore"):
@@ -139,8 +183,11 @@ def stepped(values, step: float) -> np.ndarray:
 
 
 def _nearest(dataset, step: float, bits: int):
-    """The rounding of an array, said in its attributes: to the power of two at or below `step`, to `bits` where that is
-    0 or beyond what float32 is divided by."""
+    """Return the rounding of an array, and state it in its attributes.
+
+    It is to the power of two at or below `step`, or to `bits` if the step is 0 or outside the range
+    of float32.
+    """
     if not 1e-30 < step < 1e30:
         dataset.attrs["significant_bits"] = bits
         return partial(rounded, bits=bits)
@@ -150,11 +197,12 @@ def _nearest(dataset, step: float, bits: int):
 
 
 def _group(parent, name: str):
+    """Create a group whose entries keep their order."""
     return parent.create_group(name, track_order=True)
 
 
 def _text(blocks: dict, units: dict) -> dict:
-    """Field arrays of text: the units of all arrays, the meanings of their codes."""
+    """Return the field arrays of text: the units of all arrays, and the meanings of their codes."""
     names = dict.fromkeys(
         name for one in blocks.values() for name in (*one.point_data, *one.cell_data)
     )
@@ -169,6 +217,7 @@ def _text(blocks: dict, units: dict) -> dict:
 
 
 def _steps(group, times):
+    """Create the group `Steps` with the times."""
     steps = _group(group, "Steps")
     steps.attrs["NSteps"] = np.int64(len(times))
     steps.create_dataset("Values", data=np.asarray(times, np.float64), maxshape=(None,))
@@ -176,6 +225,7 @@ def _steps(group, times):
 
 
 def _field_data(group, steps, text: dict, count: int) -> None:
+    """Write field arrays of text, which are the same in all frames."""
     field = group["FieldData"]
     offsets, sizes = _group(steps, "FieldDataOffsets"), _group(steps, "FieldDataSizes")
     for name, lines in text.items():
@@ -186,6 +236,7 @@ def _field_data(group, steps, text: dict, count: int) -> None:
 
 
 def _mesh(group, one: Block) -> None:
+    """Write the mesh of a block."""
     group.attrs["Version"] = VERSION
     group.attrs.create("Type", np.bytes_("UnstructuredGrid"))
     group["NumberOfPoints"] = np.array([len(one.points)], np.int64)
@@ -198,8 +249,12 @@ def _mesh(group, one: Block) -> None:
 
 
 def _block(group, one: Block, times, about: tuple) -> None:
-    """about: units by name, the field arrays of text, the list that takes what is written frame after frame, None where
-    all is written at once, and the steps of rounding by name, None where nothing is packed."""
+    """Write a block.
+
+    about: units by name; the field arrays of text; the list for arrays that are written frame after
+    frame, None if all are written at once; and the steps of rounding by name, None without
+    compression.
+    """
     units, text, later, rounding = about
     _mesh(group, one)
     steps, count = _steps(group, times), len(times)
@@ -214,12 +269,14 @@ def _block(group, one: Block, times, about: tuple) -> None:
 
 
 def _arrays(group, steps, kind: str, data: dict, about: tuple) -> None:
+    """Write the arrays of a block; about: as for `_block`, without the text."""
     (units, later, rounding), into, offsets = about, group[kind], _group(steps, f"{kind}Offsets")
     count = int(steps.attrs["NSteps"])
     for name, values in data.items():
         size = values.shape[1]
         if rounding is not None and values.dtype == np.float32 and len(values) == count:
-            # a chunk holds one component: neighbours in it are neighbours in space, which pack to three quarters
+            # A chunk has one component: neighbours in it are neighbours in space, which compress to
+            # three quarters.
             one = into.create_dataset(
                 name,
                 (count * size, *values.shape[2:]),

@@ -1,12 +1,14 @@
-"""Results folder to other files: a frame as .vtu, the series as .pvd with named blocks, the interface as .csv.
+"""Conversion of fields: a frame as .vtu, the series as .pvd, the interface as .csv.
 
-The .vtu is inline XML, arrays in base64 of LZMA blocks, the numbers those of fields.vtkhdf to the last bit. A unit
-stands in the information key UNITS_LABEL of its array, where VTK keeps units, and where every reader shows it: in the
-name of a field array, "unit of gap: m". Codes too, as "code of material: coating" with the code as its value. Both are
-numbers because meshio refuses a file with field arrays of text. ParaView reads TimeValue.
+The .vtu is inline XML with arrays in base64 of LZMA blocks; the numbers are those of fields.vtkhdf
+to the last bit. A unit is in the information key UNITS_LABEL of its array, where VTK stores units,
+and in the name of a field array, "unit of gap: m", which every reader shows. Codes are given in the
+same form, as "code of material: coating" with the code as its value. These field arrays are
+numbers, because meshio refuses files with field arrays of text. ParaView reads TimeValue.
 
-LZMA behind a difference of neighbouring points takes 0.4 of the bytes of zlib, in up to twice the time; that makes good
-what base64 and a mesh in every frame cost beside fields.vtkhdf. VTK reads it from 8.2 on, ParaView from 5.6.
+LZMA after a difference of neighbouring points takes 0.4 of the bytes of zlib, in up to twice the
+time; this compensates for base64 and for the mesh in every frame. VTK reads it from 8.2 on,
+ParaView from 5.6 on.
 """
 
 import base64
@@ -23,8 +25,8 @@ from ...disk.atomic_write import explain_write_error, is_partial_name, write_ato
 from .blocks import CODES, PARTS, Block
 from .series import Frame, Series
 
-BLOCK = 1 << 20  # bytes of a compressed block
-# for numbers of four bytes
+BLOCK = 1 << 20  # bytes of a block before compression
+# Settings for numbers of four bytes.
 PACKING = {
     "id": lzma.FILTER_LZMA2,
     "preset": 0,
@@ -45,10 +47,22 @@ ENDINGS = (".pvd", ".vtu", ".csv", ".vtkhdf")
 
 
 def export(folder: Path, out: Path, frame: int | None = None) -> str:
-    """Write the fields of a results folder as the ending of `out` says; one line on what was written.
+    """Write the fields of a results folder in the format of a suffix; return a line on the file.
 
-    .vtu and .csv hold one frame (the last, or `frame`), .pvd and .vtkhdf the series. PatchfemError for another ending
-    and a frame that is not there, Missing where there are no fields or `out` cannot be written.
+    Parameters
+    ----------
+    folder : Path
+    out : Path
+        .vtu and .csv contain one frame, .pvd and .vtkhdf the series.
+    frame : int, optional
+        Number of the frame; by default the last.
+
+    Raises
+    ------
+    PatchfemError
+        For another suffix, and for a frame that does not exist.
+    Missing
+        If there are no fields, or `out` cannot be written.
     """
     out = Path(out)
     if out.suffix not in ENDINGS:
@@ -65,6 +79,7 @@ def export(folder: Path, out: Path, frame: int | None = None) -> str:
 
 
 def _export(series: Series, out: Path, number: int) -> str:
+    """Write a series, or its frame of a number, in the format of a suffix."""
     if out.suffix == ".vtkhdf":
         if out.exists() and out.samefile(series.path):
             raise PatchfemError(f"{out}: this is the file to export; choose another name with -o")
@@ -84,20 +99,34 @@ def _export(series: Series, out: Path, number: int) -> str:
 
 
 def _frames(count: int) -> str:
+    """Return the number of frames as text."""
     return f"{count} frame{'s' * (count != 1)}"
 
 
 def frames_beside(path: Path) -> Path:
-    """The folder of the frames of a .pvd."""
+    """Return the folder of the frames of a .pvd."""
     return path.with_name(path.stem + "_frames")
 
 
 def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
-    """Write the series as a .pvd, which any ParaView opens; returns the number of frames.
+    """Write the series as a .pvd, which any ParaView opens; return the number of frames.
 
-    numbers: of the frames written, all unless given; change: makes of a Frame the one that is written.
-    In the folder beside it stand a .vtm per frame, which names the blocks, and a .vtu per block.
-    Frames left there by a longer series are removed; PatchfemError where the folder holds anything else.
+    A folder with the same stem contains a .vtm per frame, which names the blocks, and a .vtu per
+    block. Frames of a longer series in this folder are removed.
+
+    Parameters
+    ----------
+    path : Path
+    series : Series
+    numbers : sequence of int, optional
+        Numbers of the frames; by default all.
+    change : callable, optional
+        Frame -> the Frame that is written.
+
+    Raises
+    ------
+    PatchfemError
+        If the folder contains other files.
     """
     folder = frames_beside(path)
     old = list(folder.iterdir()) if folder.is_dir() else []
@@ -131,7 +160,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
 
 
 def _write_vtm(folder: Path, stem: str, frame: Frame) -> list:
-    """Write a frame as a .vtm and a .vtu per block; the names of the files, the .vtm first."""
+    """Write a frame as a .vtm and a .vtu per block; return the file names, the .vtm first."""
     names = [f"{stem}_{name}.vtu" for name in frame.blocks]
     for name, one in zip(names, frame.blocks.values()):
         write_vtu(folder / name, one, frame.time, frame.units)
@@ -148,7 +177,7 @@ def _write_vtm(folder: Path, stem: str, frame: Frame) -> list:
 
 
 def _listing(path: Path, kind: str, version: str, lines: list) -> None:
-    """Write a file of VTK that lists other files."""
+    """Write a VTK file that lists other files."""
     text = "\n".join(
         [
             '<?xml version="1.0"?>',
@@ -164,7 +193,17 @@ def _listing(path: Path, kind: str, version: str, lines: list) -> None:
 
 
 def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> None:
-    """Write a block, or a whole frame as one mesh, at a time [s] with inline arrays; units: name -> unit."""
+    """Write a block, or a whole frame as one mesh, with inline arrays.
+
+    Parameters
+    ----------
+    path : Path
+    frame : Block or Frame
+    time : float
+        [s]
+    units : dict
+        Unit by name.
+    """
     count, cells = len(frame.points), len(frame.types)
     text = [
         '<?xml version="1.0"?>',
@@ -206,7 +245,7 @@ def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> Non
 
 
 def _meanings(names: tuple, units: dict) -> list:
-    """(Name, value, None) of the field arrays that say the unit of every array and its codes."""
+    """Return field arrays (name, value, None) that state the unit and the codes of every array."""
     return [(f"unit of {name}: {units.get(name, '1')}", 1.0, None) for name in names] + [
         (f"code of {name}: {meaning}", code, None)
         for name in names
@@ -215,6 +254,7 @@ def _meanings(names: tuple, units: dict) -> list:
 
 
 def _array(name: str, values, unit: str | None = None, more: str = "") -> str:
+    """Return an array as XML."""
     values = np.ascontiguousarray(values)
     kind = TYPES[values.dtype.newbyteorder("<").str[1:]]
     if values.ndim > 1:
@@ -229,7 +269,7 @@ def _array(name: str, values, unit: str | None = None, more: str = "") -> str:
 
 
 def _packed(values) -> str:
-    """Sizes and LZMA blocks of an array, each in base64, as VTK's XML formats hold compressed inline data."""
+    """Return sizes and LZMA blocks of an array in base64, as in the XML formats of VTK."""
     raw = values.astype(values.dtype.newbyteorder("<")).tobytes()
     width = values.dtype.itemsize * (values.shape[1] if values.ndim > 1 else 1)
     filters = [{"id": lzma.FILTER_DELTA, "dist": min(width, 256)}, PACKING]
@@ -242,7 +282,10 @@ def _packed(values) -> str:
 
 
 def write_csv(path: Path, frame: Frame) -> None:
-    """Write the interface of one frame: a row per node by rising x, a column per field; SI, the unit in the header."""
+    """Write the interface of a frame as CSV: a row per node in order of x, a column per field.
+
+    The values are in SI, with the unit in the header.
+    """
     line = frame.blocks["interface"]
     nodes = np.argsort(line.points[:, 0], kind="stable")
     head, columns = ["x [m]"], [[repr(float(x)) for x in line.points[nodes, 0]]]
