@@ -12,11 +12,16 @@ import numpy as np
 
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..protocol_kernels import HAS_SPEED_LAYER as HAS_SPEED_LAYER
-from ..protocol_kernels import IS_SET_VALUED as IS_SET_VALUED
-from ..protocol_kernels import IntegratedStretch, Rates, Reading, RelaxedStretch
-from ..protocol_kernels import solve_step as solve_step
-from ..protocol_kernels import step_bond_length as step_bond_length
+from ..protocol_kernels import (
+    HAS_SPEED_LAYER,
+    IS_SET_VALUED,
+    IntegratedStretch,
+    Rates,
+    Reading,
+    RelaxedStretch,
+    solve_step,
+    step_bond_length,
+)
 from .exponential_kernels import exp_minus
 
 NUMBER_UNITS = "N m 1 1"  # units of `numbers`, for batches that scale time and force

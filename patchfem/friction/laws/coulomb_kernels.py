@@ -7,9 +7,7 @@ numbers: static and kinetic force [N]; memory: force of the last step [N]. NumPy
 
 from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
-from ..protocol_kernels import Reading
-from ..protocol_kernels import solve_step as solve_step
-from ..protocol_kernels import step_bond_length as step_bond_length
+from ..protocol_kernels import Reading, solve_step, step_bond_length
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

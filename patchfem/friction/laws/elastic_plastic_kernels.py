@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..protocol_kernels import Reading, StepSolution
-from ..protocol_kernels import step_bond_length as step_bond_length
+from ..protocol_kernels import Reading, StepSolution, step_bond_length
 
 MIN_INCREMENT = 1e-290  # increment below which a quotient by it would overflow
 

@@ -11,14 +11,18 @@ from typing import NamedTuple
 from ...compiled.jit import njit
 from ..bonds.point_kernels import shape_functions
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..protocol_kernels import HAS_SPEED_LAYER as HAS_SPEED_LAYER
-from ..protocol_kernels import HAS_ZERO_KINK as HAS_ZERO_KINK
-from ..protocol_kernels import IS_RATE_INDEPENDENT as IS_RATE_INDEPENDENT
-from ..protocol_kernels import IS_SET_VALUED as IS_SET_VALUED
-from ..protocol_kernels import Rates, Reading, RelaxedStretch
-from ..protocol_kernels import integrate_stretch as integrate_stretch
-from ..protocol_kernels import solve_step as solve_step
-from ..protocol_kernels import step_bond_length as step_bond_length
+from ..protocol_kernels import (
+    HAS_SPEED_LAYER,
+    HAS_ZERO_KINK,
+    IS_RATE_INDEPENDENT,
+    IS_SET_VALUED,
+    Rates,
+    Reading,
+    RelaxedStretch,
+    integrate_stretch,
+    solve_step,
+    step_bond_length,
+)
 from .exponential_kernels import exp_minus
 
 # units of `numbers`, for batches that scale time and force

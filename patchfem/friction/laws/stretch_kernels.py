@@ -20,11 +20,16 @@ from ..bonds.point_kernels import (
     grow,
 )
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..protocol_kernels import HAS_SPEED_LAYER as HAS_SPEED_LAYER
-from ..protocol_kernels import HAS_ZERO_KINK as HAS_ZERO_KINK
-from ..protocol_kernels import IS_SET_VALUED as IS_SET_VALUED
-from ..protocol_kernels import IntegratedStretch, Rates, Reading, RelaxedStretch
-from ..protocol_kernels import solve_step as solve_step
+from ..protocol_kernels import (
+    HAS_SPEED_LAYER,
+    HAS_ZERO_KINK,
+    IS_SET_VALUED,
+    IntegratedStretch,
+    Rates,
+    Reading,
+    RelaxedStretch,
+    solve_step,
+)
 from .exponential_kernels import exp_minus
 
 NUMBER_UNITS = "N/m m"  # units of `numbers`, for batches that scale time and force

@@ -22,9 +22,13 @@ from ..bonds.point_kernels import (
 )
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..protocol_kernels import Reading
-from .stretch_kernels import BREAKAWAY_INDEX, FIRST_POINT_INDEX, GROWTH_INDEX
-from .stretch_kernels import solve_step as solve_step
-from .stretch_kernels import step_bond_length as step_bond_length
+from .stretch_kernels import (
+    BREAKAWAY_INDEX,
+    FIRST_POINT_INDEX,
+    GROWTH_INDEX,
+    solve_step,
+    step_bond_length,
+)
 
 
 class _Points(NamedTuple):

@@ -7,13 +7,16 @@ from math import inf, nan, tanh
 
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..protocol_kernels import HAS_ZERO_KINK as HAS_ZERO_KINK
-from ..protocol_kernels import IS_RATE_INDEPENDENT as IS_RATE_INDEPENDENT
-from ..protocol_kernels import IS_SET_VALUED as IS_SET_VALUED
-from ..protocol_kernels import Rates, Reading
-from ..protocol_kernels import integrate_stretch as integrate_stretch
-from ..protocol_kernels import solve_step as solve_step
-from ..protocol_kernels import step_bond_length as step_bond_length
+from ..protocol_kernels import (
+    HAS_ZERO_KINK,
+    IS_RATE_INDEPENDENT,
+    IS_SET_VALUED,
+    Rates,
+    Reading,
+    integrate_stretch,
+    solve_step,
+    step_bond_length,
+)
 
 NUMBER_UNITS = "N s/m"  # units of `numbers`, for batches that scale time and force
 HAS_SPEED_LAYER = True  # the force changes at speeds of the order of v_0
