@@ -67,6 +67,21 @@ class StripLayout(NamedTuple):
     offsets: np.ndarray
 
 
+class HolderLoads(NamedTuple):
+    """Load and moments of the holder; a motion without load or moment is prescribed.
+
+    - load: Normal load [N] of all strips, or None under an approach.
+    - moment: Moment sum f x [N m] of a free rotation about y, or None.
+    - roll_moment: Moment sum f y [N m] of a free roll, or None.
+    - spring: Stiffness [N m/rad] of the holder against the rotation about y.
+    """
+
+    load: float | None
+    moment: float | None
+    roll_moment: float | None
+    spring: float
+
+
 class HolderPosition(NamedTuple):
     """Approach delta [m] and rotations theta about y and roll about x [rad] of the holder."""
 
@@ -319,70 +334,89 @@ def press_strips(
     layout = StripLayout(x, weight, np.atleast_1d(np.asarray(offsets, float)))
     if not isinstance(compliance, StripCompliance):
         compliance = StripCompliance(compliance)
-    offsets = layout.offsets
-    gap = np.broadcast_to(gap, (offsets.size, x.size)) + roll * offsets[:, None]
-    is_held = spring and load is not None
-    _refuse_controls(asperities, x, gap, load, None if is_held else moment, approach)
-    _refuse_roll(offsets, load, roll_moment)
-    if isinstance(asperities, ExponentialAsperities) and asperities.reference is None and load:
-        asperities = replace(asperities, reference=load / (weight.sum() * offsets.size))
+    loads = HolderLoads(load, moment, roll_moment, spring)
+    gap = np.broadcast_to(gap, (layout.offsets.size, x.size)) + roll * layout.offsets[:, None]
+    _refuse_controls(asperities, x, gap, loads, approach)
+    _refuse_roll(layout.offsets, load, roll_moment)
     if load == 0:
         position = HolderPosition(float(gap.min()), rotation, roll)
         return _make_state(asperities, layout, np.zeros(gap.shape), gap - gap.min(), position)
-    loads = {"load": load, "moment": moment, "roll_moment": roll_moment}
-    problem = _holder_problem(layout, gap, loads, spring)
+    if isinstance(asperities, ExponentialAsperities) and asperities.reference is None:
+        mean_pressure = load / (weight.sum() * layout.offsets.size)
+        asperities = replace(asperities, reference=mean_pressure)
+    problem = _holder_problem(layout, gap, loads)
     with one_thread():
         if isinstance(asperities, SmoothAsperities):
             solution = _press_with_asperities(asperities, compliance, layout, problem, approach)
         else:
             solution = _press_bare(asperities, compliance, layout, problem, approach)
     force = solution.force.reshape(gap.shape)
-    delta, theta, rolled = _holder_position(solution.motion, moment, roll_moment)
-    gap = gap + rolled * offsets[:, None]
+    change = _holder_position(solution.motion, loads)
+    gap = gap + change.roll * layout.offsets[:, None]
     residuals = compute_strip_residuals(
-        asperities, compliance, x, weight, gap, force, delta, theta, load, moment, spring
+        asperities,
+        compliance,
+        x,
+        weight,
+        gap,
+        force,
+        delta=change.delta,
+        theta=change.theta,
+        load=load,
+        moment=moment,
+        spring=spring,
     )
     if roll_moment is not None:
-        error = abs(force.sum(axis=1) @ offsets - roll_moment) / (load * np.ptp(offsets))
-        residuals = MappingProxyType({**residuals, "roll_balance": float(error)})
+        error = abs(force.sum(axis=1) @ layout.offsets - roll_moment)
+        relative_error = float(error / (load * np.ptp(layout.offsets)))
+        residuals = MappingProxyType({**residuals, "roll_balance": relative_error})
     # one node of a single strip may carry the load; `unilateral.solve` then chooses the rotation
-    if not isinstance(asperities, SmoothAsperities) and offsets.size > 1:
-        _refuse_loose_holder(force, moment is not None and spring == 0, roll_moment is not None)
+    if not isinstance(asperities, SmoothAsperities) and layout.offsets.size > 1:
+        _refuse_loose_holder(force, loads)
     _refuse_strip_residuals(asperities, residuals)
-    if isinstance(asperities, SmoothAsperities):
-        opening = solution.separation.reshape(gap.shape)
-    else:
-        displacement = compliance.product(solution.force).reshape(gap.shape)
-        opening = np.maximum(gap + theta * x - delta + displacement, 0.0)
-        pressed = 0.0 if asperities is None else -force / (asperities.k * weight)
-        opening = np.where(force > 0, pressed, opening)
-    position = HolderPosition(delta, rotation + theta, roll + rolled)
+    opening = _strip_opening(asperities, compliance, layout, gap, solution, change)
+    position = HolderPosition(change.delta, rotation + change.theta, roll + change.roll)
     return _make_state(
         asperities, layout, force, opening, position, solution.n_iterations, residuals
     )
 
 
-def _holder_problem(layout: StripLayout, gap, loads: dict, spring: float) -> ContactProblem:
+def _strip_opening(asperities, compliance, layout: StripLayout, gap, solution, position):
+    """Return the gap (s, m) [m] of pressed strips; separations of the mean planes with asperities.
+
+    gap: (s, m) [m] before loading, with the rotation about x; position: HolderPosition beyond that in
+    the gap.
+    """
+    if isinstance(asperities, SmoothAsperities):
+        return solution.separation.reshape(gap.shape)
+    force = solution.force.reshape(gap.shape)
+    displacement = compliance.product(solution.force).reshape(gap.shape)
+    opening = np.maximum(gap + position.theta * layout.x - position.delta + displacement, 0.0)
+    compressed = 0.0 if asperities is None else -force / (asperities.k * layout.weight)
+    return np.where(force > 0, compressed, opening)
+
+
+def _holder_problem(layout: StripLayout, gap, loads: HolderLoads) -> ContactProblem:
     """Return the contact problem of all strips, with one motion for each given load."""
     n_strips = layout.offsets.size
-    columns = {
-        "load": np.ones(gap.size),
-        "moment": np.tile(layout.x, n_strips),
-        "roll_moment": np.repeat(layout.offsets, layout.x.size),
-    }
-    given = [name for name, value in loads.items() if value is not None]
+    motions = (
+        (loads.load, np.ones(gap.size), 0.0),
+        (loads.moment, np.tile(layout.x, n_strips), loads.spring),
+        (loads.roll_moment, np.repeat(layout.offsets, layout.x.size), 0.0),
+    )
+    free = [motion for motion in motions if motion[0] is not None]
     return ContactProblem(
         gap.ravel(),
-        np.array([columns[name] for name in given]).reshape(len(given), gap.size).T,
-        np.array([loads[name] for name in given], float),
-        np.array([spring if name == "moment" else 0.0 for name in given]),
+        np.array([column for _, column, _ in free]).reshape(len(free), gap.size).T,
+        np.array([target for target, _, _ in free], float),
+        np.array([spring for _, _, spring in free]),
     )
 
 
-def _holder_position(motion, moment, roll_moment) -> HolderPosition:
+def _holder_position(motion, loads: HolderLoads) -> HolderPosition:
     """Return the position of the holder from the motion (r,) of the rotations that are free."""
-    theta = -float(motion[1]) if moment is not None else 0.0
-    roll = -float(motion[-1]) if roll_moment is not None else 0.0
+    theta = -float(motion[1]) if loads.moment is not None else 0.0
+    roll = -float(motion[-1]) if loads.roll_moment is not None else 0.0
     return HolderPosition(float(motion[0]), theta, roll)
 
 
@@ -399,7 +433,8 @@ def _press_bare(asperities, compliance, layout: StripLayout, problem: ContactPro
         else:
             solution = ContactSolution(np.zeros(gap.size), np.zeros(0), 0.0, 0)
         return solution._replace(motion=np.array([approach]))
-    touch, start = problem.gap.min(), None
+    touch = problem.gap.min()
+    start = None
     if warm_start is not None and warm_start.contact_set is not None:
         start = np.asarray(warm_start.contact_set).ravel()
     try:
@@ -440,8 +475,10 @@ def _press_with_asperities(
     return solution._replace(motion=np.array([approach]))
 
 
-def _refuse_controls(asperities, x, gap, load, moment, approach) -> None:
+def _refuse_controls(asperities, x, gap, loads: HolderLoads, approach) -> None:
     """Raise PatchfemError for controls without a solution."""
+    load = loads.load
+    moment = loads.moment
     if (load is None) == (approach is None) or (moment is not None and load is None):
         raise PatchfemError("contact: give a load, a load and a moment, or an approach")
     control = load if approach is None else approach
@@ -449,7 +486,7 @@ def _refuse_controls(asperities, x, gap, load, moment, approach) -> None:
         raise PatchfemError(
             "contact.load: the load must be >= 0, and load, approach and gap must be finite"
         )
-    if load and moment is not None:
+    if load and moment is not None and not loads.spring:
         refuse_tipping(moment / load, 0.0, np.ptp(x) / 2)
     if (
         load is None
@@ -482,15 +519,16 @@ def _refuse_roll(offsets, load, roll_moment) -> None:
         )
 
 
-def _refuse_loose_holder(force, rotation_is_free: bool, roll_is_free: bool) -> None:
+def _refuse_loose_holder(force, loads: HolderLoads) -> None:
     """Raise NotConverged where the nodes in contact do not determine a free rotation."""
     is_loaded = force > MIN_RELATIVE_FORCE * force.max()
-    if rotation_is_free and is_loaded.any(axis=0).sum() < 2:
+    is_rotation_free = loads.moment is not None and loads.spring == 0
+    if is_rotation_free and is_loaded.any(axis=0).sum() < 2:
         raise NotConverged(
             "contact.strips: the nodes that touch do not determine the rotation of the piece; lower "
             "contact.element_size or set contact.holder.rotational_stiffness"
         )
-    if roll_is_free and is_loaded.any(axis=1).sum() < 2:
+    if loads.roll_moment is not None and is_loaded.any(axis=1).sum() < 2:
         raise NotConverged(LOOSE_ROLL_MESSAGE)
 
 
@@ -503,7 +541,8 @@ def _refuse_strip_residuals(asperities, residuals) -> None:
             "leave the layer out"
         )
     else:
-        place, remedy = "contact.strips", "; lower contact.strips.roll or raise the load"
+        place = "contact.strips"
+        remedy = "; lower contact.strips.roll or raise the load"
     refuse_residuals(residuals, STRIP_RESIDUAL_TOL, place, remedy)
 
 
@@ -517,7 +556,8 @@ def _make_state(
     residuals=(),
 ) -> StripsState:
     """Return the frozen state of strips; without load its outcome is no_contact."""
-    is_pressed, stiffness = force.sum() > 0, None
+    is_pressed = force.sum() > 0
+    stiffness = None
     if asperities is not None:
         stiffness = asperities.stiffness(opening) * (force > 0) if is_pressed else force
     return StripsState(
