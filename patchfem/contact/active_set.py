@@ -369,7 +369,8 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
     load, moment, spring : float
         Load [N], moment about x = 0 [N m] and stiffness of the holder [N m/rad].
     """
-    left, right = 0, x.size - 1
+    left = 0
+    right = x.size - 1
     while left < right:
         theta = -(gap[right] - gap[left]) / (x[right] - x[left])
         height = gap + theta * x

@@ -128,11 +128,14 @@ def peak_integral(h: np.ndarray) -> tuple:
     scale = 1 + np.maximum(flat, 0.0)
     square = TRAPEZOID_NODES**2 / scale
     weight = np.exp(-flat * square - square**2 / 2) * square
-    low, high = weight.sum(axis=1), (weight * square).sum(axis=1)
+    low = weight.sum(axis=1)
+    high = (weight * square).sum(axis=1)
     log = -(flat[:, 0] ** 2) / 2 + np.log(0.2 * high / np.sqrt(2 * np.pi * scale[:, 0]))
-    log, fall = log.reshape(h.shape), (1.5 * low / high).reshape(h.shape)
+    log = log.reshape(h.shape)
+    fall = (1.5 * low / high).reshape(h.shape)
     depth = np.where(h < -8, -h, 8.0)
-    three, one = _moment(1.5, depth), _moment(0.5, depth)
+    three = _moment(1.5, depth)
+    one = _moment(0.5, depth)
     return np.where(h < -8, 1.5 * np.log(depth) + np.log(three), log), np.where(
         h < -8, 1.5 * one / three / depth, fall
     )
@@ -143,7 +146,8 @@ def _moment(n: float, a: np.ndarray) -> np.ndarray:
 
     It is the sum of binom(n, 2k) (2k - 1)!! a^-2k.
     """
-    out, term = np.zeros_like(a), np.ones_like(a)
+    out = np.zeros_like(a)
+    term = np.ones_like(a)
     for k in range(0, 24, 2):
         out += term
         term = term * ((n - k) * (n - k - 1) / (k + 2)) / a**2

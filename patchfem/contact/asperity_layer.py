@@ -106,9 +106,11 @@ def solve_tangent(compliance, motions, slope, values) -> tuple:
     tangent : (r, r) ndarray
         Derivative of the resultants by the motion.
     """
-    n_nodes, n_motions = len(compliance.common), motions.shape[1]
+    n_nodes = len(compliance.common)
+    n_motions = motions.shape[1]
     negligible = MIN_RELATIVE_SLOPE * slope.max()
-    responses, tangent = [], np.zeros((n_motions, n_motions))
+    responses = []
+    tangent = np.zeros((n_motions, n_motions))
     for strip, strip_slope in enumerate(slope.reshape(-1, n_nodes)):
         in_strip = np.flatnonzero(strip_slope > negligible)
         if not in_strip.size:
@@ -146,7 +148,8 @@ def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> tuple:
 
 def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolution | None:
     """Solve by Newton's method from separations and motion; None if it does not converge."""
-    contact, asperities = problem.contact, problem.asperities
+    contact = problem.contact
+    asperities = problem.asperities
     for iteration in range(1, MAX_NEWTON_STEPS + 1):
         log_pressure, decay = asperities.log_pressure(separation)
         log_force = log_pressure + np.log(problem.area)
@@ -189,7 +192,8 @@ def _guess_separation(problem: AsperityProblem) -> np.ndarray | None:
 
     No node can carry more force than the one that flattens its overlap.
     """
-    asperities, gap = problem.asperities, problem.contact.gap
+    asperities = problem.asperities
+    gap = problem.contact.gap
     diagonal = problem.compliance.common.diagonal()
     separation = gap
     if asperities.log_pressure(separation)[0].max() <= MIN_LOG_PRESSURE:
@@ -209,7 +213,8 @@ def _guess_separation(problem: AsperityProblem) -> np.ndarray | None:
 
 def _solve_strip(problem: AsperityProblem) -> AsperitySolution:
     """Solve one strip under a prescribed approach."""
-    gap, no_motion = problem.contact.gap, np.zeros(0)
+    gap = problem.contact.gap
+    no_motion = np.zeros(0)
     separation = _guess_separation(problem)
     if separation is None:
         return AsperitySolution(np.zeros(gap.size), gap, no_motion, 0)
@@ -280,7 +285,8 @@ def _minimise_dual(problem: AsperityProblem, approach: float, length: float) -> 
     if solution is None:
         no_force = np.zeros(contact.gap.size)
         return AsperitySolution(no_force, problem.separation(no_force, motion), motion, 0)
-    n_iterations, min_imbalance = solution.n_iterations, np.inf
+    n_iterations = solution.n_iterations
+    min_imbalance = np.inf
     for _ in range(MAX_DUAL_STEPS):
         imbalance = problem.imbalance(solution.force, solution.motion)
         if np.abs(imbalance).max() <= NEWTON_TOL * contact.target[0]:
@@ -309,17 +315,23 @@ def _search_dual(
     min_imbalance: smallest imbalance so far; a trial that halves it is taken at once.
     """
     first_slope = problem.imbalance(start.force, start.motion) @ direction
-    lower, upper, length, best, n_iterations = 0.0, np.inf, 1.0, None, 0
+    lower = 0.0
+    upper = np.inf
+    length = 1.0
+    best = None
+    n_iterations = 0
     for _ in range(MAX_DUAL_STEPS):
         trial = _try_approach(problem, start.motion + length * direction)
-        slope, is_halved = -np.inf, False
+        slope = -np.inf
+        is_halved = False
         if trial is not None:
             n_iterations += trial.n_iterations
             imbalance = problem.imbalance(trial.force, trial.motion)
             slope = imbalance @ direction
             is_halved = np.abs(imbalance).max() <= 0.5 * min_imbalance
         if slope >= 0 or is_halved:
-            best, lower = trial, length
+            best = trial
+            lower = length
             if is_halved or slope <= 0.5 * first_slope:
                 break
         else:
@@ -330,7 +342,8 @@ def _search_dual(
 
 def _linearised_start(problem: AsperityProblem) -> tuple:
     """Return first separations and motion, from the law linearised at the mean pressure."""
-    contact, mean_pressure = problem.contact, problem.mean_pressure
+    contact = problem.contact
+    mean_pressure = problem.mean_pressure
     mean_separation = problem.asperities.separation(np.array([mean_pressure]))
     stiffness = mean_pressure * problem.asperities.log_pressure(mean_separation)[1][0]
     # separation at which the tangent becomes zero

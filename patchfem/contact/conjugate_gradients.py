@@ -37,7 +37,8 @@ def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram
 
     A spring becomes two more forces >= 0 that turn the piece either way, each with the compliance of a node.
     """
-    rigid, target = problem.motions.astype(float), problem.target.copy()
+    rigid = problem.motions.astype(float)
+    target = problem.target.copy()
     half_length = np.ones(target.size)
     for k in range(1, target.size):
         middle = rigid[:, k].mean()
@@ -47,12 +48,14 @@ def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram
     sprung = np.flatnonzero(problem.springs)
     if not sprung.size:
         return _QuadraticProgram(compliance.product, problem.gap, rigid, target)
-    k, node_compliance = sprung[0], compliance.node_compliance
+    k = sprung[0]
+    node_compliance = compliance.node_compliance
     arms = np.zeros((2, target.size))
     arms[:, k] = np.sqrt(problem.springs[k] * node_compliance) / half_length[k]
     arms[1] *= -1
 
     def product(force: np.ndarray) -> np.ndarray:
+        """Return the displacements of nodes and springs under forces (n + 2,)."""
         return np.concatenate([compliance.product(force[:-2]), node_compliance * force[-2:]])
 
     gap = np.append(problem.gap, np.zeros(2))
@@ -105,7 +108,8 @@ def _line_search(start: np.ndarray, change: np.ndarray, wanted: float) -> float:
     crossing = np.flatnonzero(start * change < 0)
     t = -start[crossing] / change[crossing]
     order = np.argsort(t)
-    crossing, t = crossing[order], t[order]
+    crossing = crossing[order]
+    t = t[order]
     sign = np.sign(change[crossing])
     first_value = start[is_positive] @ change[is_positive]
     first_slope = change[is_positive] @ change[is_positive]
@@ -145,17 +149,16 @@ def solve_by_gradients(
     """
     program = _quadratic_program(compliance, problem)
     product, gap, rigid, target = program
-    n_nodes, eigenvalue_bound = problem.gap.size, compliance.eigenvalue_bound
+    n_nodes = problem.gap.size
+    eigenvalue_bound = compliance.eigenvalue_bound
     safe_step = 1 / max(eigenvalue_bound, compliance.node_compliance)
-    if start is not None:
-        guess = np.append(start, np.zeros(gap.size - n_nodes))
-    elif target.size:
-        guess = np.full(gap.size, target[0] / gap.size)
-    else:
-        guess = np.maximum(-gap, 0.0) / eigenvalue_bound
+    guess = _guess_forces(program, start, n_nodes, eigenvalue_bound)
     force = project_forces(guess, rigid, target)
-    direction, last_square, is_conjugate = np.zeros(gap.size), 1.0, 0.0
-    best_force, min_energy = force, np.inf
+    direction = np.zeros(gap.size)
+    last_square = 1.0
+    is_conjugate = 0.0
+    best_force = force
+    min_energy = np.inf
     for iteration in range(1, max_iterations + 1):
         displacement = product(force)
         energy = force @ (gap + displacement / 2)
@@ -164,12 +167,13 @@ def solve_by_gradients(
             # a projected gradient step of this length always lowers the energy
             downhill = best_force - safe_step * (gap + product(best_force))
             force = project_forces(downhill, rigid, target)
-            is_conjugate, min_energy = 0.0, np.inf
+            is_conjugate = 0.0
+            min_energy = np.inf
             continue
-        best_force, min_energy = force, energy
+        best_force = force
+        min_energy = energy
         in_contact = force > 0
-        slope = gap + displacement
-        slope -= rigid @ _fit_motion(rigid[in_contact], slope[in_contact])
+        slope = _energy_slope(program, in_contact, displacement)
         square = slope[in_contact] @ slope[in_contact]
         residual = max(np.abs(slope[in_contact]).max(initial=0.0), -slope.min())
         noise = OPENING_NOISE * np.abs(gap[in_contact]).max(initial=0.0)
@@ -187,6 +191,26 @@ def solve_by_gradients(
         moved[is_entering] -= step * slope[is_entering]
         force = _restore_resultants(moved, rigid, target)
     return force[:n_nodes], max_iterations
+
+
+def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bound: float):
+    """Return the first forces, before their resultants are corrected.
+
+    start: (n_nodes,) forces [N] of the nodes, or None. The springs of the holder begin without force.
+    """
+    n_forces = program.gap.size
+    if start is not None:
+        return np.append(start, np.zeros(n_forces - n_nodes))
+    if program.target.size:
+        return np.full(n_forces, program.target[0] / n_forces)
+    return np.maximum(-program.gap, 0.0) / eigenvalue_bound
+
+
+def _energy_slope(program: _QuadraticProgram, in_contact, displacement) -> np.ndarray:
+    """Return the slope of the energy by each force (n,) [m], without the rigid motion that fits it."""
+    slope = program.gap + displacement
+    motion = _fit_motion(program.rigid[in_contact], slope[in_contact])
+    return slope - program.rigid @ motion
 
 
 def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray) -> np.ndarray:

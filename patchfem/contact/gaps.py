@@ -44,8 +44,19 @@ def crown(x: np.ndarray, radius: float) -> np.ndarray:
 
 
 def step(x: np.ndarray, height: float, at: float) -> np.ndarray:
-    """Return a gap (m,) [m] that is `height` [m] beyond x = at [m].
+    """Return a gap that jumps from 0 to a height; a node on the edge has half the height.
 
-    A node on the edge has half the height.
+    Parameters
+    ----------
+    x : (m,) ndarray
+        Positions [m].
+    height : float
+        Gap [m] beyond the edge.
+    at : float
+        Position [m] of the edge.
+
+    Returns
+    -------
+    (m,) ndarray [m]
     """
     return height * np.heaviside(x - at, 0.5)

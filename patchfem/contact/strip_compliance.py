@@ -126,6 +126,7 @@ class StripCompliance:
             start += nodes.size
 
         def solve(right_sides: np.ndarray) -> np.ndarray:
+            """Solve with the block of every strip."""
             parts = [dpotrs(factor, right_sides[rows], lower=1)[0] for rows, factor in blocks]
             return parts[0] if len(parts) == 1 else np.concatenate(parts)
 

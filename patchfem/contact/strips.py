@@ -353,32 +353,44 @@ def press_strips(
     force = solution.force.reshape(gap.shape)
     change = _holder_position(solution.motion, loads)
     gap = gap + change.roll * layout.offsets[:, None]
-    residuals = compute_strip_residuals(
-        asperities,
-        compliance,
-        x,
-        weight,
-        gap,
-        force,
-        delta=change.delta,
-        theta=change.theta,
-        load=load,
-        moment=moment,
-        spring=spring,
-    )
-    if roll_moment is not None:
-        error = abs(force.sum(axis=1) @ layout.offsets - roll_moment)
-        relative_error = float(error / (load * np.ptp(layout.offsets)))
-        residuals = MappingProxyType({**residuals, "roll_balance": relative_error})
-    # one node of a single strip may carry the load; `unilateral.solve` then chooses the rotation
-    if not isinstance(asperities, SmoothAsperities) and layout.offsets.size > 1:
-        _refuse_loose_holder(force, loads)
-    _refuse_strip_residuals(asperities, residuals)
+    residuals = _check_strips(asperities, compliance, layout, gap, force, change, loads)
     opening = _strip_opening(asperities, compliance, layout, gap, solution, change)
     position = HolderPosition(change.delta, rotation + change.theta, roll + change.roll)
     return _make_state(
         asperities, layout, force, opening, position, solution.n_iterations, residuals
     )
+
+
+def _check_strips(
+    asperities, compliance, layout: StripLayout, gap, force, position, loads: HolderLoads
+) -> MappingProxyType:
+    """Return the residuals of pressed strips; NotConverged if one is too large.
+
+    gap: (s, m) [m] before loading, with the rotation about x; position: HolderPosition beyond that in
+    the gap.
+    """
+    residuals = compute_strip_residuals(
+        asperities,
+        compliance,
+        layout.x,
+        layout.weight,
+        gap,
+        force,
+        delta=position.delta,
+        theta=position.theta,
+        load=loads.load,
+        moment=loads.moment,
+        spring=loads.spring,
+    )
+    if loads.roll_moment is not None:
+        error = abs(force.sum(axis=1) @ layout.offsets - loads.roll_moment)
+        relative_error = float(error / (loads.load * np.ptp(layout.offsets)))
+        residuals = MappingProxyType({**residuals, "roll_balance": relative_error})
+    # one node of a single strip may carry the load; `unilateral.solve` then chooses the rotation
+    if not isinstance(asperities, SmoothAsperities) and layout.offsets.size > 1:
+        _refuse_loose_holder(force, loads)
+    _refuse_strip_residuals(asperities, residuals)
+    return residuals
 
 
 def _strip_opening(asperities, compliance, layout: StripLayout, gap, solution, position):

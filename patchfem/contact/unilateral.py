@@ -102,7 +102,8 @@ def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float
 
     rest_rotation: rotation q [rad] that is already contained in the gap.
     """
-    gap, position = problem.gap, problem.motions[:, 1]
+    gap = problem.gap
+    position = problem.motions[:, 1]
     load, moment = problem.target
     node = int(np.argmin(np.abs(position - moment / load)))
     if abs(position[node] - moment / load) > 1e-15 * np.ptp(position):
@@ -162,7 +163,8 @@ def solve(
     problem = problem._replace(
         gap=problem.gap - problem.motions @ rest, target=problem.target - problem.springs * rest
     )
-    solution, n_iterations = None, 0
+    solution = None
+    n_iterations = 0
     is_patch = problem.gap.size == len(compliance.common)
     if is_patch and problem.min_nodes == 2:
         solution = _solve_on_one_node(compliance, problem, rest[1])
@@ -286,14 +288,18 @@ def refuse_unsolvable(x, gap, load: float, moment: float | None, spring: float) 
             f"holder ({spring:.6g} N m/rad) >= 0"
         )
     if load and spring == 0:
-        middle, half_length = (x[0] + x[-1]) / 2, np.ptp(x) / 2
+        middle = (x[0] + x[-1]) / 2
+        half_length = np.ptp(x) / 2
         refuse_tipping(moment / load, middle, half_length * (1 - 1e-13))
 
 
 def refuse_tipping(load_line: float, middle: float, half_length: float) -> None:
-    """Raise PatchfemError unless the load line [m] lies within the patch.
+    """Raise PatchfemError unless the load line lies within the patch.
 
-    middle, half_length: extent of the patch [m].
+    Parameters
+    ----------
+    load_line, middle, half_length : float
+        Position of the load line [m] and extent of the patch [m].
     """
     if not abs(load_line - middle) < half_length:
         raise PatchfemError(
@@ -417,7 +423,8 @@ def _solve_and_check(
 
     A large offset of the gap then costs no digits.
     """
-    x, weight = pieces.interface.x, pieces.interface.weight
+    x = pieces.interface.x
+    weight = pieces.interface.weight
     with one_thread():
         try:
             solution = solve(StripCompliance(pieces.normal), problem, start)
@@ -482,7 +489,8 @@ def check_solution(c, x, problem: ContactProblem, solution: ContactSolution) -> 
     NotConverged
         If a residual exceeds 1e-12.
     """
-    force, loads = solution.force, problem.target
+    force = solution.force
+    loads = problem.target
     residuals = compute_residuals(
         c,
         x,

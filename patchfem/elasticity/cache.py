@@ -16,7 +16,8 @@ import numpy as np
 from ..core import frozen_array
 from ..disk import user_cache
 
-MAX_FOLDER_BYTES = 512 * 2**20  # above it the least recently used files are deleted
+# size of all files above which the least recently used files are deleted
+MAX_FOLDER_BYTES = 512 * 2**20
 # Source files from which a result is computed; their text is hashed into its key.
 REFERENCE_SOURCE_FILES = ("plane_form.py",)
 COMMON_SOURCE_FILES = ("elasticity.py", "plane_form.py", "lapack.py")

@@ -24,17 +24,8 @@ class NestedStretches(NamedTuple):
     workspace: np.ndarray
 
 
-class Cases(NamedTuple):
-    """Problems of q cases and their solutions.
-
-    Given:
-
-    - first_try (q,): left end that is tried first.
-    - end_limit (q,): node before which the contact is expected to end.
-    - gap (q, m) [m].
-    - loads (q, 3): load [N], moment about x = 0 [N m] and stiffness of the holder [N m/rad].
-
-    Written:
+class CaseSolutions(NamedTuple):
+    """Solutions of q cases on m nodes.
 
     - first, stop (q,): the stretch in contact, from `first` on and before `stop`, which is 0 for none.
     - force (q, m) [N].
@@ -44,16 +35,29 @@ class Cases(NamedTuple):
     - gap_rate (q, 2): for both ends the decrease of the gap at the next node per approach.
     """
 
-    first_try: np.ndarray
-    end_limit: np.ndarray
-    gap: np.ndarray
-    loads: np.ndarray
     first: np.ndarray
     stop: np.ndarray
     force: np.ndarray
     motion: np.ndarray
     leaving: np.ndarray
     gap_rate: np.ndarray
+
+
+class Cases(NamedTuple):
+    """Problems of q cases, and the arrays to which their solutions are written.
+
+    - first_try (q,): left end that is tried first.
+    - end_limit (q,): node before which the contact is expected to end.
+    - gap (q, m) [m].
+    - loads (q, 3): load [N], moment about x = 0 [N m] and stiffness of the holder [N m/rad].
+    - solutions: zeros until a case is solved.
+    """
+
+    first_try: np.ndarray
+    end_limit: np.ndarray
+    gap: np.ndarray
+    loads: np.ndarray
+    solutions: CaseSolutions
 
 
 def make_cases(first_try, end_limit, gap, loads) -> Cases:
@@ -67,11 +71,7 @@ def make_cases(first_try, end_limit, gap, loads) -> Cases:
         As in `Cases`.
     """
     n_cases = len(gap)
-    return Cases(
-        first_try,
-        end_limit,
-        gap,
-        loads,
+    solutions = CaseSolutions(
         first=np.zeros(n_cases, int),
         stop=np.zeros(n_cases, int),
         force=np.zeros(gap.shape),
@@ -79,3 +79,4 @@ def make_cases(first_try, end_limit, gap, loads) -> Cases:
         leaving=np.zeros((n_cases, 2)),
         gap_rate=np.ones((n_cases, 2)),
     )
+    return Cases(first_try, end_limit, gap, loads, solutions)

@@ -50,7 +50,7 @@ class ContactBatch(NamedTuple):
         return self.stop - self.first
 
 
-class _Solutions(NamedTuple):
+class _LeftEndSolutions(NamedTuple):
     """Solutions of n cases whose contacts begin at the same node `left_end`.
 
     - lower (k, k): lower Cholesky factor of the compliance of the k nodes from `left_end` on.
@@ -81,7 +81,7 @@ class Intervals:
         # the sums of `arrays.NestedStretches`, filled for the left ends that were visited
         self.sums = np.zeros((x.size + 1, 3, x.size + 1))
 
-    def press(self, gap, load, moment=None, spring=0.0, known=None) -> ContactBatch:
+    def press(self, gap, load, moment=None, spring=0.0, brackets=None) -> ContactBatch:
         """Solve the contacts of q cases.
 
         Parameters
@@ -95,7 +95,7 @@ class Intervals:
             prescribed and contained in the gap.
         spring : float or (q,) ndarray
             Stiffness of the holder against the rotation [N m/rad].
-        known : tuple of (q,) ndarray, optional
+        brackets : tuple of (q,) ndarray, optional
             First node and end of stretches that are expected to contain the contacts.
 
         Returns
@@ -105,36 +105,38 @@ class Intervals:
         """
         is_free = moment is not None
         columns = np.broadcast_arrays(load, moment if is_free else 0.0, spring)
-        return self._press(gap, np.stack(columns, axis=1).astype(float), known, is_free=is_free)
+        return self._press(gap, np.stack(columns, axis=1).astype(float), brackets, is_free=is_free)
 
-    def _press(self, gap, loads: np.ndarray, known, *, is_free: bool) -> ContactBatch:
+    def _press(self, gap, loads: np.ndarray, brackets, *, is_free: bool) -> ContactBatch:
         n_cases, m = gap.shape
         gap = np.ascontiguousarray(gap)
         everywhere = ((0,), (m,))
-        if known is None:
-            known = everywhere
+        if brackets is None:
+            brackets = everywhere
             if m > MIN_COARSE_NODES:
-                known = self._bracket_on_coarse(gap, loads, is_free=is_free)
-        first, stop = np.clip(known, [[0], [1]], [[m - 1], [m]])
+                brackets = self._bracket_on_coarse(gap, loads, is_free=is_free)
+        first, stop = np.clip(brackets, [[0], [1]], [[m - 1], [m]])
         first_try = np.broadcast_to(first, n_cases).astype(int)
         is_known = first_try.any()
         cases = make_cases(first_try, np.broadcast_to(stop, n_cases).astype(int), gap, loads)
         n_tries = N_TRIES if is_known else m
         self._solve_all(cases, int(first_try.min()) - 1, 0, n_tries, is_free=is_free)
-        displacement = cases.force @ self.c
-        opening = self._opening(gap, displacement, cases.motion)
+        displacement = cases.solutions.force @ self.c
+        opening = self._opening(gap, displacement, cases.solutions.motion)
         nodes = np.arange(m)
-        in_contact = (nodes >= cases.first[:, None]) & (nodes < cases.stop[:, None])
+        in_contact = (nodes >= cases.solutions.first[:, None]) & (
+            nodes < cases.solutions.stop[:, None]
+        )
         residual = self._residual(cases, displacement, opening, is_free=is_free)
         contacts = ContactBatch(
-            first=cases.first,
-            stop=cases.stop,
-            force=cases.force,
+            first=cases.solutions.first,
+            stop=cases.solutions.stop,
+            force=cases.solutions.force,
             opening=np.where(in_contact, 0.0, np.maximum(opening, 0.0)),
-            closing=cases.motion[:, 0],
-            theta=cases.motion[:, 1],
+            closing=cases.solutions.motion[:, 0],
+            theta=cases.solutions.motion[:, 1],
             fractions=self._edge_fractions(cases, opening),
-            residual=np.where(cases.stop > 0, residual, np.inf),
+            residual=np.where(cases.solutions.stop > 0, residual, np.inf),
         )
         missed = np.flatnonzero(~(contacts.residual <= RESIDUAL_TOL))
         if is_known and missed.size:
@@ -185,67 +187,75 @@ class Intervals:
             here = np.flatnonzero(next_try == a)
             here = here[np.argsort(cases.end_limit[here], kind="stable")]
             for start in range(0, here.size, BATCH_SIZE):
-                some = here[start : start + BATCH_SIZE]
-                next_try[some] = self._try_left_end(stretches, cases, some, a, is_free=is_free)
-            if (cases.stop[here] > 0).any():
+                indices = here[start : start + BATCH_SIZE]
+                next_try[indices] = self._try_left_end(
+                    stretches, cases, indices, a, is_free=is_free
+                )
+            if (cases.solutions.stop[here] > 0).any():
                 high = max(high, a + 1)
             next_try[next_try >= cases.first_try + n_tries] = m
         if min(high, m - 1) > a:
             kernels.move_left_end(stretches, a, min(high, m - 1), 0)
 
-    def _try_left_end(self, stretches, cases: Cases, some, a: int, *, is_free: bool) -> np.ndarray:
-        """Try the left end a for the cases `some` (n,); return the next left ends (n,), m if solved."""
+    def _try_left_end(
+        self, stretches, cases: Cases, indices, a: int, *, is_free: bool
+    ) -> np.ndarray:
+        """Try the left end a for some cases; return the next left ends (n,), m if solved."""
         m = self.x.size
-        limits = np.minimum(cases.end_limit[some], m)
+        limits = np.minimum(cases.end_limit[indices], m)
         nodes = slice(a, max(int(limits.max()), a + 1))
         lower = np.asfortranarray(stretches.upper[nodes, nodes].T)
-        y = _substitute(lower, cases.gap[some, nodes])
-        stop = np.zeros(some.size, int)
-        motion = np.zeros((some.size, 2))
-        kernels.solve_ends(stretches, a, y, limits, cases.loads[some], stop, motion, int(is_free))
+        y = _substitute(lower, cases.gap[indices, nodes])
+        stop = np.zeros(indices.size, int)
+        motion = np.zeros((indices.size, 2))
+        kernels.solve_ends(
+            stretches, a, y, limits, cases.loads[indices], stop, motion, int(is_free)
+        )
         force = _substitute(lower, y, is_backward=True)
         is_solved = (stop > 0) & (force[:, 0] > 0)
         # without an end before its limit, a contact is searched once more up to the end of the interface
         is_cut = (stop == 0) & (limits < m)
-        cases.end_limit[some[is_cut]] = m
+        cases.end_limit[indices[is_cut]] = m
         if is_solved.any():
-            found = _Solutions(
+            group = _LeftEndSolutions(
                 a, lower, force[is_solved], stop[is_solved], motion=motion[is_solved]
             )
-            self._store(stretches, cases, some[is_solved], found, is_free=is_free)
+            self._store_solutions(stretches, cases, indices[is_solved], group, is_free=is_free)
         return np.where(is_solved, m, np.where(is_cut, a, a + 1))
 
-    def _store(self, stretches, cases: Cases, some, found: _Solutions, *, is_free: bool) -> None:
+    def _store_solutions(
+        self, stretches, cases: Cases, indices, group: _LeftEndSolutions, *, is_free: bool
+    ) -> None:
         """Store the solutions of the cases `some` (n,) after a step of iterative refinement."""
-        a = found.left_end
-        stop = found.stop
-        nodes = slice(a, a + found.force.shape[1])
+        a = group.left_end
+        stop = group.stop
+        nodes = slice(a, a + group.force.shape[1])
         x = self.x[nodes]
         in_contact = np.arange(nodes.start, nodes.stop) < stop[:, None]
-        imbalance = cases.loads[some].copy()
-        imbalance[:, 0] -= found.force.sum(axis=1)
-        imbalance[:, 1] += imbalance[:, 2] * found.motion[:, 1] - found.force @ x
-        displacement = found.force @ self.c[nodes, nodes]
-        opening = self._opening(cases.gap[some, nodes], displacement, found.motion, x)
-        y = _substitute(found.lower, in_contact * opening)
-        motion_change = np.zeros_like(found.motion)
+        imbalance = cases.loads[indices].copy()
+        imbalance[:, 0] -= group.force.sum(axis=1)
+        imbalance[:, 1] += imbalance[:, 2] * group.motion[:, 1] - group.force @ x
+        displacement = group.force @ self.c[nodes, nodes]
+        opening = self._opening(cases.gap[indices, nodes], displacement, group.motion, x)
+        y = _substitute(group.lower, in_contact * opening)
+        motion_change = np.zeros_like(group.motion)
         kernels.solve_ends(stretches, a, y, stop, imbalance, stop, motion_change, int(is_free))
-        force = found.force + _substitute(found.lower, y, is_backward=True)
-        cases.force[some, nodes] = force
-        cases.motion[some] = found.motion + motion_change
-        cases.first[some] = a
-        cases.stop[some] = stop
+        force = group.force + _substitute(group.lower, y, is_backward=True)
+        cases.solutions.force[indices, nodes] = force
+        cases.solutions.motion[indices] = group.motion + motion_change
+        cases.solutions.first[indices] = a
+        cases.solutions.stop[indices] = stop
         unit = stretches.unit[0]
         pivots = stretches.upper.diagonal()
         inside = np.flatnonzero(stop < self.x.size)
         end = stop[inside]
         last_force = force[inside, end - 1 - a]
-        cases.leaving[some[inside], 1] = last_force * pivots[end - 1] / unit[end - 1]
-        cases.gap_rate[some[inside], 1] = pivots[end] * unit[end]
+        cases.solutions.leaving[indices[inside], 1] = last_force * pivots[end - 1] / unit[end - 1]
+        cases.solutions.gap_rate[indices[inside], 1] = pivots[end] * unit[end]
         if a > 0:
-            increase = _substitute(found.lower, in_contact * unit[nodes], is_backward=True)
-            cases.leaving[some, 0] = force[:, 0] / increase[:, 0]
-            cases.gap_rate[some, 0] = 1 - increase @ self.c[nodes, a - 1]
+            increase = _substitute(group.lower, in_contact * unit[nodes], is_backward=True)
+            cases.solutions.leaving[indices, 0] = force[:, 0] / increase[:, 0]
+            cases.solutions.gap_rate[indices, 0] = 1 - increase @ self.c[nodes, a - 1]
 
     def edge_positions(self, contacts: ContactBatch, softness, row_height: float) -> np.ndarray:
         """Return the positions (2, q) [m] of the edges, as in `edges.ContactEdge`.
@@ -310,12 +320,12 @@ class Intervals:
     def _edge_fractions(self, cases: Cases, opening) -> np.ndarray:
         """Return `ContactBatch.fractions`; 1/2 where the set does not change with the approach."""
         m = self.x.size
-        neighbour = np.stack([cases.first - 1, cases.stop], axis=1)
+        neighbour = np.stack([cases.solutions.first - 1, cases.solutions.stop], axis=1)
         has_neighbour = (neighbour >= 0) & (neighbour < m)
         rows = np.arange(len(neighbour))[:, None]
         gaps = np.where(has_neighbour, opening[rows, np.clip(neighbour, 0, m - 1)], 0.0)
-        entering = gaps / cases.gap_rate
-        leaving = cases.leaving
+        entering = gaps / cases.solutions.gap_rate
+        leaving = cases.solutions.leaving
         is_valid = (leaving >= 0) & (entering >= 0) & (leaving + entering > 0)
         fractions = np.full(leaving.shape, 0.5)
         return np.divide(leaving, leaving + entering, out=fractions, where=is_valid)
@@ -326,8 +336,8 @@ class Intervals:
         An overlap within OPENING_NOISE of its terms counts as 0.
         """
         load, moment, spring = cases.loads.T
-        closing, theta = cases.motion.T
-        force = cases.force
+        closing, theta = cases.solutions.motion.T
+        force = cases.solutions.force
         scale = np.abs(cases.gap) + np.abs(theta[:, None] * self.x)
         scale = scale + np.abs(closing)[:, None] + np.abs(displacement)
         relative_opening = opening / np.where(scale > 0, scale, 1.0)

@@ -57,13 +57,15 @@ def layer_compliance(k, height: float, thickness: float, layers: Layers) -> Wave
 
 def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
     """Solve for the waves k (n,) > 0 [1/m] that reach through all layers."""
-    n_unknowns, scale = 4 * len(depths), moduli[0][1]
+    n_unknowns = 4 * len(depths)
+    scale = moduli[0][1]
     matrix = np.zeros((k.size, n_unknowns, n_unknowns))
     face = _layer_states(k, 0.0, depths[0], moduli[0], scale)
     # the tractions of the face are prescribed
     matrix[:, 0:2, :4] = face[:, 2:4]
     for n, (depth, layer_moduli) in enumerate(zip(depths, moduli)):
-        first_row, first_column = 2 + 4 * n, 4 * n
+        first_row = 2 + 4 * n
+        first_column = 4 * n
         columns = slice(first_column, first_column + 4)
         foot = _layer_states(k, depth, depth, layer_moduli, scale)
         if n == len(depths) - 1:

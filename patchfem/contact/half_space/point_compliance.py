@@ -83,7 +83,8 @@ class PointCompliance:
         """
         residual = np.where(active, motion, 0.0)
         tolerance = EQUATION_TOL * np.abs(residual).max()
-        force, direction = np.zeros(residual.size), np.zeros(residual.size)
+        force = np.zeros(residual.size)
+        direction = np.zeros(residual.size)
         last_square = np.inf
         for _ in range(max_iterations):
             if np.abs(residual).max() <= tolerance:
@@ -148,9 +149,11 @@ def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
     list of ContactEdge
         By increasing x.
     """
-    active, x = force > 0, compliance.x
+    active = force > 0
+    x = compliance.x
     gap_rate = 1 - compliance.product(force_rate)
-    cell, edges = x[1] - x[0], []
+    cell = x[1] - x[0]
+    edges = []
     for change in np.flatnonzero(active[1:] != active[:-1]):
         node, side = (int(change), 1) if active[change] else (int(change) + 1, -1)
         outside = node + side
@@ -184,7 +187,8 @@ def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> f
         return stiffness
     mismatch = motion - compliance.product(force)
     longest = max(edges, key=lambda edge: _contact_length(active, edge))
-    indices, outside = np.arange(motion.size), longest.node + longest.side
+    indices = np.arange(motion.size)
+    outside = longest.node + longest.side
     inner = compliance.solve_forces(active, (indices == longest.node).astype(float))
     inner_stiffness = inner[longest.node]
     column = compliance.product((indices == outside).astype(float))

@@ -81,7 +81,7 @@ def test_exact_edges_and_stiffnesses_are_those_of_the_set():
 def test_exact_a_wrong_guess_of_the_stretch_changes_nothing(off):
     load, gap = family(20)
     found = Intervals(C, X).press(gap, load)
-    again = Intervals(C, X).press(gap, load, known=(found.first + off, found.stop + off))
+    again = Intervals(C, X).press(gap, load, brackets=(found.first + off, found.stop + off))
     np.testing.assert_array_equal(again.first, found.first)
     assert again.force == pytest.approx(found.force, rel=1e-11, abs=1e-12 * load.max())
 
