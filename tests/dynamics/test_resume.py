@@ -64,7 +64,7 @@ RIGS = {
 @pytest.fixture
 def often(monkeypatch):
     """Marches keep their state after every second cycle; the list has a number per state."""
-    monkeypatch.setattr(march, "PIECES", 2)
+    monkeypatch.setattr(march, "MAX_PIECE_CYCLES", 2)
     saved, save = [], checkpoint.save
 
     def counted(*of):
@@ -190,7 +190,7 @@ def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
     scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
     code = (
         "from patchfem.dynamics import checkpoint as c; c.SECONDS = 0.05; c.SHARE = 1.0; "
-        "from patchfem.dynamics.march import march; march.REPEATS = -1.0; "
+        "from patchfem.dynamics.march import march; march.PERIODIC_TOL = -1.0; "
         "from patchfem.__main__ import main; main()"
     )
     words = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]

@@ -303,10 +303,7 @@ def set_derived_state(workspace, lane):
     )
 
 
-@njit(**NJIT_INLINE)
-def restore_derived_state(workspace, lane):
-    """Set what follows from an extrapolated motion."""
-    set_derived_state(workspace, lane)
+restore_derived_state = set_derived_state
 
 
 @njit(**NJIT_INLINE)

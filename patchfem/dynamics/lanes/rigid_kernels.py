@@ -3,7 +3,8 @@
 The equation in the angle of the drive is x'' + D x' + W x = P sin - f. The friction f is +-KINETIC in a slip and at most
 STATIC in a stick. A reference is the engine `dynamics.events`.
 
-This module is the pattern of a law: every other law has the functions and constants that are in `LAW_PROTOCOL`.
+This module is the pattern of a law: every other law has the functions and constants that the other laws list in `__all__`.
+Their meaning is documented here.
 """
 
 from typing import NamedTuple
@@ -33,31 +34,12 @@ from .rows_kernels import (
     SX,
 )
 
-LAW_PROTOCOL = (
-    "STICK_IS_RIGID",  # whether nothing moves in a stick
-    "EVENT_KEEPS_STICK",  # whether a stick may go on after an event
-    "PROOF_TOL",  # error of an extrapolated cycle, as a fraction of its range, that is accepted; 0 asks for no proof
-    "N_KEPT",  # number of numbers of the state of the law that follow the map of a cycle
-    "friction_force",
-    "friction_rate",
-    "irreversible_slide",
-    "slip_increment",
-    "is_sticking",
-    "friction_at_reversal",
-    "stick_fractions",
-    "prepare_step",
-    "try_step",
-    "resolve_step",
-    "records_own_peaks",
-    "slide_at_reversal",
-    "set_derived_state",
-    "restore_derived_state",
-    "can_extrapolate",
+STICK_IS_RIGID = True  # whether nothing moves in a stick
+EVENT_KEEPS_STICK = False  # whether a stick may go on after an event
+PROOF_TOL = (
+    0.0  # accepted error of an extrapolated cycle, as a fraction of its range; 0 asks for no proof
 )
-STICK_IS_RIGID = True
-EVENT_KEEPS_STICK = False
-PROOF_TOL = 0.0
-N_KEPT = 0
+N_KEPT = 0  # number of numbers of the state of the law that follow the map of a cycle
 N_NEWTON = 3  # Newton steps from the secant; the cubic of a step is then solved to round-off
 N_CROSSING = 4  # Newton steps from a guess that is worse than the secant
 

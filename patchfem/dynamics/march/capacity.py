@@ -1,7 +1,7 @@
-"""Capacity for a list of bonds that grows: what a stretch of a run may change is kept, and where the list fills up the
-stretch is gone through again with twice the capacity.
+"""Capacity of a list of bonds that grows.
 
-A contact without a list has all the capacity it needs; for it everything here does nothing.
+What a part of a run may change is copied before it. If the list fills up, the part is run again with twice the capacity. A
+contact without a list has all the capacity that it needs; for it everything here does nothing.
 """
 
 from typing import NamedTuple
@@ -11,22 +11,26 @@ import numpy as np
 from ...core import Missing
 from ...friction.bonds.list_rows_kernels import N_ROWS, STATUS
 
-MOST_STRIPS = 2_000_000  # entries of a list of bonds, beyond which a run is refused
-ENTRY = 8 * N_ROWS  # bytes of one
+MAX_ENTRIES = 2_000_000  # number of entries of a list of bonds beyond which a run is refused
+ENTRY_BYTES = 8 * N_ROWS
 CURE = 'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
 
 
 class Kept(NamedTuple):
-    """Copies of arrays: the entries in use of every list of bonds, the other fields of their contact by name, and more
-    that belong to the run."""
+    """Copies of arrays of a run, to go back to.
+
+    - `entries`: entries in use of every list of bonds.
+    - `fields`: other arrays of the contact by name.
+    - `others`: further arrays of the run.
+    """
 
     entries: list
     fields: dict
     others: tuple
 
 
-def keep(contact, *others) -> Kept | None:
-    """What to go back to, of a contact with a list of bonds and of other arrays; None of a contact without one."""
+def copy_state(contact, *others) -> Kept | None:
+    """Return copies of a contact with a list of bonds and of other arrays; None for a contact without a list."""
     if not hasattr(contact, "bondlist"):
         return None
     fields = {name: array.copy() for name, array in contact._asdict().items() if name != "bondlist"}
@@ -38,31 +42,37 @@ def keep(contact, *others) -> Kept | None:
 
 
 def _statuses(contact) -> np.ndarray:
-    """The statuses (m, 16) of the lists of a contact."""
+    """Return the statuses (m, 16) of the lists of a contact."""
     return contact.statuses if hasattr(contact, "statuses") else contact.status[None]
 
 
-def full(contact) -> bool:
-    """Whether a list of a contact has no room; a single one misses nothing else."""
+def is_full(contact) -> bool:
+    """Return whether a list of a contact is full; a single list is then the only thing that failed."""
     return hasattr(contact, "bondlist") and (not hasattr(contact, "flow") or contact.flow[0] == 1.0)
 
 
-def lengthened(contact, kept: Kept, place: str, *others):
-    """The contact as it was kept, with twice the capacity; the other arrays are set back in place.
+def enlarge_list(contact, kept: Kept, place: str, *others):
+    """Return a contact as it was kept, with twice the capacity; the other arrays are set back in place.
 
-    place: where the run stands, for the message. Missing beyond MOST_STRIPS entries.
+    Parameters
+    ----------
+    contact : tuple
+        Arrays of a contact with a list of bonds.
+    kept : Kept
+    place : str
+        Where the run is, for the message.
     """
     rows, have = contact.bondlist.shape
-    if have >= MOST_STRIPS:
+    if have >= MAX_ENTRIES:
         raise Missing(
-            f"the bond list grew beyond {have} entries ({have * ENTRY / 1e6:.0f} MB) {place}; {CURE}",
+            f"the bond list grew beyond {have} entries ({have * ENTRY_BYTES / 1e6:.0f} MB) {place}; {CURE}",
             "",
         )
     for array, old in zip(others, kept.others):
         array[...] = old
     found = contact._replace(**{name: array.copy() for name, array in kept.fields.items()})
     statuses = _statuses(found)
-    capacity = min(2 * have, MOST_STRIPS) // len(statuses)
+    capacity = min(2 * have, MAX_ENTRIES) // len(statuses)
     wider = np.zeros((rows, capacity * len(statuses)))
     for j, (status, entries) in enumerate(zip(statuses, kept.entries)):
         status[STATUS.room_start] = status[STATUS.head] = j * capacity
@@ -72,6 +82,6 @@ def lengthened(contact, kept: Kept, place: str, *others):
     return found._replace(bondlist=wider)
 
 
-def most_bytes(strips: float) -> float:
-    """Memory [bytes] that a list of so many entries may take: while its room doubles the old one stands beside."""
-    return 3 * ENTRY * min(strips, MOST_STRIPS)
+def max_bytes(strips: float) -> float:
+    """Return the memory [bytes] of a list of so many entries; while it is enlarged the old one is there too."""
+    return 3 * ENTRY_BYTES * min(strips, MAX_ENTRIES)

@@ -9,8 +9,20 @@ GOAL = 1e-11  # residual of the step solve over the friction limit
 
 
 def faces_of(model, prop, modal_system, mass: float):
-    """Fresh `arrays.Faces` of a march, from the Propagator and the ModalArrays of its modes, mass in kg;
-    `arrays.Single` of a model without joints."""
+    """Return the arrays of the elements of a march at its start; `arrays.Single` for a model without elements.
+
+    Parameters
+    ----------
+    model : ContactModel, joints.JointsModel or varying_load.VaryingLoadModel
+    prop : propagator.Propagator
+    modal_system : ModalArrays
+    mass : float
+        [kg]
+
+    Returns
+    -------
+    interfaces.arrays.Faces or Single
+    """
     if not model.joints:
         return arrays.Single(np.array([GOAL * model.limit]))
     elements, (p, n), numbers = (

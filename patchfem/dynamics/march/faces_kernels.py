@@ -1,10 +1,10 @@
-"""Faces beside each other in a step: every element and the contact on port 0 take turns until all agree.
+"""Several elements, and a contact, over a step: block descent on their forces.
 
-Port p is a row of slides; the contact, where there is one, and the elements each act on one port. Within a step the
-path-mean forces F satisfy d = free - beta F together with every law. Turn by turn each law is solved with the others
-held (block descent on a convex problem for laws that dissipate); the rest of the forces moves d of the others by beta.
-All set-valued elements are one block, followed from stop to release inside the step (`stops_kernels`). The text runs
-with any contact and any laws: `instances` makes an instance per set of them. j: `contacts.arrays.Faces`.
+Port p is a row of slides. The contact, if there is one, acts on port 0, and every element on its own port. Over a step the
+path-mean forces F satisfy d = free - beta F together with every law. Each law is solved in turn under the forces of the
+others, which is block descent on a convex problem for laws that dissipate. All set-valued elements are one block, which is
+followed from stop to release inside the step (`stops_kernels`). Where the turns converge slowly, a Newton step on all
+forces takes over (`together_kernels`). The text runs with any contact and any laws; `instances` makes an instance of it.
 """
 
 import numpy as np
@@ -18,265 +18,419 @@ from ..interfaces import element_kernels as contact
 from ..interfaces import element_solve_kernels as solver
 from ..modal_kernels import ended, free_rate, free_slide
 from . import parts_kernels as parts
-from . import stops_kernels as stops
+from . import stops_kernels as stop_kernels
 from . import together_kernels as together
 from .stops_kernels import (
-    AIM,
-    BESIDE,
+    AT_END,
     BETA,
     BLOW,
-    CLOSE,
-    DQ,
-    END,
-    EPS,
-    FORCE_OWN,
-    FOUND,
-    FREE,
+    BOND_LENGTH,
+    CONTACT_FORCE,
+    CONTACT_INCREMENT,
+    CONTACT_SAMPLE,
+    CONTACT_TOL,
+    ELEMENT_FORCE,
+    ELEMENT_SLIDE,
+    ELEMENT_SPEED,
+    FACE_INCREMENT,
+    FORCE_TOL,
+    FREE_SLIDE,
+    FREE_SPEED,
     GAMMA,
-    HOLDS,
-    KNOWN,
+    INCREMENT,
+    INCREMENT_BEFORE,
+    IS_FRICTION,
+    LAST_INCREMENT,
     MATE,
-    MEAN,
-    MOST,
-    NOW_OWN,
-    PACE,
-    PLACE,
+    MAX_FORCE,
+    MEAN_FORCE,
+    MODAL_SCRATCH,
+    OTHER_ACCELERATION,
     PORT,
-    PULL,
-    RATE,
-    ROOM,
-    RUBS,
-    START,
+    SET_VALUED,
+    SLIP_STATE,
+    SOLUTION,
+    START_SPEED,
     STATIC,
-    STEP,
-    STEP_OWN,
-    WAY,
-    WENT,
-    WENT_BEFORE,
+    STOPS_KNOWN,
 )
 
-# by which branches are left out
-STOPS, SMOOTH, THERE, SEVERAL = (
-    parts.STOPS,
-    parts.SMOOTH,
-    parts.THERE,
-    parts.SEVERAL,
+# Numba leaves out the branches of flags that are False.
+HAS_STOPS = parts.HAS_STOPS
+HAS_SLOPES = parts.HAS_SLOPES
+HAS_CONTACT = parts.HAS_CONTACT
+IS_COUPLED = parts.IS_COUPLED
+HAS_PLANES = parts.HAS_PLANES
+MAX_TURNS = 1000  # turns of all elements after which a step has failed
+MAX_EVENT_TURNS = (
+    60  # the same with stops and releases inside the step; the first half settles which they are
 )
-PLANE = parts.PLANE
-# of all elements in a step before it counts as failed; with stops and releases inside it
-TURNS, FEW = (
-    1000,
-    60,
+ROUND_OFF = 4e-15  # smallest residual that can be reached, as a fraction of a free slide over its give and of a force
+ELEMENT_COLUMNS = (
+    5  # slide, speed, force, slip, and mean force of the step that follows, of an element in a row
 )
-ROUND = 4e-15  # of a slide over its give, and of a force: no residual is smaller
-EACH = 5  # columns of an element in a row: slide, speed, force, slip, mean force of the step that follows
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def sampled(q, v, motion, row, c, j):
-    """(force, energy of friction, slip, energy of springs) at a sample: of the contact, or else of the first element;
-    slide, speed, force and slip of every element into its row."""
+def sample_elements(q, v, motion, row, interface, faces):
+    """Sample the contact, or else the first element, and write all elements into the row.
+
+    Parameters
+    ----------
+    q : float
+        Slide of the contact at the start of the step [m].
+    v : float
+        Its speed [m/s].
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    row : (k,) array
+        Row of samples of `loop_kernels.march`; it is written.
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    tuple
+        Force [N], friction energy [J], slip [m] and energy of the springs [J].
+    """
     n = motion.shape[1]
     m = 2 * motion.shape[1] + 7
     first = 0.0
     slip = q
     energy = 0.0
     springs = 0.0
-    for e in range(j.of.shape[1]):
+    for e in range(faces.of.shape[1]):
         here = 0.0
         rate = 0.0
         for k in range(n):
-            here += j.rows[j.of[PORT, e], k] * motion[0, k]
-            rate += j.rows[j.of[PORT, e], k] * motion[1, k]
-        force, stock, moved = law.read_memory(j.num[e], j.mem[e], here, rate)
-        j.each[PLACE, e] = here
-        j.each[PACE, e] = rate
-        at = m + EACH * e
+            here += faces.rows[faces.of[PORT, e], k] * motion[0, k]
+            rate += faces.rows[faces.of[PORT, e], k] * motion[1, k]
+        force, stock, moved = law.read_memory(faces.num[e], faces.mem[e], here, rate)
+        faces.each[ELEMENT_SLIDE, e] = here
+        faces.each[ELEMENT_SPEED, e] = rate
+        at = m + ELEMENT_COLUMNS * e
         row[at] = here
         row[at + 1] = rate
         row[at + 2] = force
         row[at + 3] = moved
-        if j.of[RUBS, e]:
+        if faces.of[IS_FRICTION, e]:
             energy += stock
         else:
             springs += stock
-        if e == 0 and j.of[RUBS, 0]:
+        if e == 0 and faces.of[IS_FRICTION, 0]:
             first = force
             slip = moved
-    if THERE:
-        first, stock, slip = contact.state(c, q, v)
+    if HAS_CONTACT:
+        first, stock, slip = contact.state(interface, q, v)
         energy += stock
-        j.own[NOW_OWN] = first
+        faces.own[CONTACT_SAMPLE] = first
     return first, energy, slip, springs
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def held(motion, modal_system, drive, force, row, j):
-    """Write the forces of the set-valued elements at a sample into their memory and the row: kinetic friction of those
-    that slide, of those that rest what leaves them no acceleration. Returns the force [N] of the first element where it
-    is one of them and no contact is there, else `force`; drive [m s-2]."""
-    s = j.stops
+def sample_set_valued(motion, modal_system, drive, force, row, faces):
+    """Write the forces of the set-valued elements at a sample into their memory and the row.
+
+    Elements that slide have their kinetic friction, those that rest the force that leaves them no acceleration.
+
+    Parameters
+    ----------
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    drive : float
+        Acceleration of the base [m s-2].
+    force : float
+        Force of the contact [N].
+    row : (k,) array
+        Row of samples of `loop_kernels.march`; it is written.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+        Force of the first element if it is set-valued and there is no contact, otherwise `force`.
+    """
+    stops = faces.stops
     m = 2 * motion.shape[1] + 7
     accel = modal_system.workspace[0]
-    count = j.of.shape[1]
-    for i in range(s.names.size):
-        e = s.element[i]
-        way = s.field[WAY, i]
-        limit = j.num[e, 1] if abs(way) == 2.0 else j.num[e, 2]
-        j.mem[e, 0] = np.sign(way) * limit
-        row[m + EACH * e + 2] = j.mem[e, 0]
+    count = faces.of.shape[1]
+    for i in range(stops.names.size):
+        e = stops.element[i]
+        way = stops.field[SLIP_STATE, i]
+        limit = faces.num[e, 1] if abs(way) == 2.0 else faces.num[e, 2]
+        faces.mem[e, 0] = np.sign(way) * limit
+        row[m + ELEMENT_COLUMNS * e + 2] = faces.mem[e, 0]
     for k in range(accel.size):
-        accel[k] = j.modal[BESIDE, k] - modal_system.slide[k] * j.own[NOW_OWN] / modal_system.mass
+        accel[k] = (
+            faces.modal[OTHER_ACCELERATION, k]
+            - modal_system.slide[k] * faces.own[CONTACT_SAMPLE] / modal_system.mass
+        )
         for e in range(count):
-            accel[k] -= j.rows[j.of[PORT, e], k] * row[m + EACH * e + 2] / modal_system.mass
+            accel[k] -= (
+                faces.rows[faces.of[PORT, e], k]
+                * row[m + ELEMENT_COLUMNS * e + 2]
+                / modal_system.mass
+            )
     for i in range(
-        stops.reactions(motion, modal_system, drive, accel, modal_system.workspace[1:], s)
+        stop_kernels.find_reactions(
+            motion, modal_system, drive, accel, modal_system.workspace[1:], stops
+        )
     ):
-        e = s.element[s.names[i]]
-        j.mem[e, 0] = min(max(s.field[FOUND, i], -j.num[e, 1]), j.num[e, 1])
-        row[m + EACH * e + 2] = j.mem[e, 0]
-    if THERE:
+        e = stops.element[stops.names[i]]
+        faces.mem[e, 0] = min(max(stops.field[SOLUTION, i], -faces.num[e, 1]), faces.num[e, 1])
+        row[m + ELEMENT_COLUMNS * e + 2] = faces.mem[e, 0]
+    if HAS_CONTACT:
         return force
     else:
-        return row[m + 2] if j.num[0, 0] == HOLDS else force
+        return row[m + 2] if faces.num[0, 0] == SET_VALUED else force
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def begun(motion, modal_system, table, at, dt, j):
-    """Free slides, and where elements are set-valued free rates, of all ports in the step; the lengths of its bonds."""
-    for p in range(j.port.shape[1]):
-        j.port[FREE, p] = free_slide(motion, modal_system.reach, p, table, at)
-        if STOPS:
-            j.port[RATE, p] = free_rate(
-                motion, j.rows[p], modal_system.free, modal_system.dense, table, at
-            )
-    for e in range(j.of.shape[1]):
-        j.each[EPS, e] = law.step_bond_length(j.num[e], j.mem[e], j.each[PACE, e], dt)
+def prepare_step(motion, modal_system, table, at, dt, faces):
+    """Write the free slides and speeds of all ports and the bond lengths of the step.
 
-
-@njit(error_model="numpy", **NJIT_INTERNAL)
-def elsewhere(mine, port, j):
-    """Slide [m] that the forces of all others take from a port; mine: the element, -1 for the contact on port 0."""
-    out = 0.0
-    for k in range(j.of.shape[1]):
-        if k != mine:
-            out += j.gives[BETA, port, j.of[PORT, k]] * j.each[PULL, k]
-    return out + j.gives[BETA, port, 0] * j.own[FORCE_OWN] if mine >= 0 else out
-
-
-@njit(error_model="numpy", **NJIT_INTERNAL)
-def turned(e, turn, j, dt):
-    """Solve element e with all others held: (change of its force over its goal [1], iterations).
-
-    turn: from 0; the change is inf where the solve failed. The first direction of an element in a plane has both.
+    Parameters
+    ----------
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    at : int
+        Row of the table for this step.
+    dt : float
+        Length of the step [s].
+    faces : interfaces.arrays.Faces
     """
-    if PLANE:
-        if j.of[MATE, e] != e:
-            return turned_in_plane(e, turn, j) if j.of[MATE, e] > e else (0.0, 0)
-    p = j.of[PORT, e]
-    beta = j.gives[BETA, p, p]
-    dq = j.each[STEP, e]
+    for p in range(faces.port.shape[1]):
+        faces.port[FREE_SLIDE, p] = free_slide(motion, modal_system.reach, p, table, at)
+        if HAS_STOPS:
+            faces.port[FREE_SPEED, p] = free_rate(
+                motion, faces.rows[p], modal_system.free, modal_system.dense, table, at
+            )
+    for e in range(faces.of.shape[1]):
+        faces.each[BOND_LENGTH, e] = law.step_bond_length(
+            faces.num[e], faces.mem[e], faces.each[ELEMENT_SPEED, e], dt
+        )
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def slide_by_others(mine, port, faces):
+    """Return the slide [m] that the forces of all others take from a port.
+
+    Parameters
+    ----------
+    mine : int
+        Number of the element, -1 for the contact.
+    port : int
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+    """
+    out = 0.0
+    for k in range(faces.of.shape[1]):
+        if k != mine:
+            out += faces.gives[BETA, port, faces.of[PORT, k]] * faces.each[ELEMENT_FORCE, k]
+    return out + faces.gives[BETA, port, 0] * faces.own[CONTACT_FORCE] if mine >= 0 else out
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def solve_one_element(e, turn, faces, dt):
+    """Solve an element under the forces of all others.
+
+    The first direction of an element in a plane is solved together with its second one.
+
+    Parameters
+    ----------
+    e : int
+        Number of the element.
+    turn : int
+        Number of the turn, from 0.
+    faces : interfaces.arrays.Faces
+    dt : float
+        Length of the step [s].
+
+    Returns
+    -------
+    float
+        Change of its force over the tolerance, infinite if the solution fails.
+    int
+        Number of iterations.
+    """
+    if HAS_PLANES:
+        if faces.of[MATE, e] != e:
+            return solve_plane_element(e, turn, faces) if faces.of[MATE, e] > e else (0.0, 0)
+    p = faces.of[PORT, e]
+    beta = faces.gives[BETA, p, p]
+    dq = faces.each[INCREMENT, e]
     tries = 1
-    mine = j.port[FREE, p] - elsewhere(e, p, j)
-    if STOPS:
-        if j.num[e, 0] == HOLDS:
-            dq = solve_coulomb_step(mine, beta, j.num[e, 1], j.num[e, 2])[0]
-    if SMOOTH:
-        if j.num[e, 0] != HOLDS:
-            guess = 2 * j.each[WENT, e] - j.each[WENT_BEFORE, e] if turn == 0 else dq
+    mine = faces.port[FREE_SLIDE, p] - slide_by_others(e, p, faces)
+    if HAS_STOPS:
+        if faces.num[e, 0] == SET_VALUED:
+            dq = solve_coulomb_step(mine, beta, faces.num[e, 1], faces.num[e, 2])[0]
+    if HAS_SLOPES:
+        if faces.num[e, 0] != SET_VALUED:
+            guess = (
+                2 * faces.each[LAST_INCREMENT, e] - faces.each[INCREMENT_BEFORE, e]
+                if turn == 0
+                else dq
+            )
             dq, _, tries = solver.solve_element(
                 mine,
                 beta,
-                j.num[e],
-                j.mem[e],
-                j.each[PLACE, e],
-                j.each[EPS, e],
+                faces.num[e],
+                faces.mem[e],
+                faces.each[ELEMENT_SLIDE, e],
+                faces.each[BOND_LENGTH, e],
                 dt,
                 guess,
-                j.each[MOST, e],
-                0.1 * j.each[CLOSE, e],
+                faces.each[MAX_FORCE, e],
+                0.1 * faces.each[FORCE_TOL, e],
             )
     used = (mine - dq) / beta
-    change = abs(used - j.each[PULL, e]) / (
-        j.each[CLOSE, e] + ROUND * (abs(mine) / beta + abs(used))
+    change = abs(used - faces.each[ELEMENT_FORCE, e]) / (
+        faces.each[FORCE_TOL, e] + ROUND_OFF * (abs(mine) / beta + abs(used))
     )
-    j.each[STEP, e] = dq
-    j.each[PULL, e] = used
+    faces.each[INCREMENT, e] = dq
+    faces.each[ELEMENT_FORCE, e] = used
     return change if tries >= 0 else np.inf, abs(tries)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def turned_in_plane(e, turn, j):
-    """`turned` of both directions of the element whose first one is e."""
-    f = j.of[MATE, e]
-    p = j.of[PORT, e]
-    r = j.of[PORT, f]
-    xx = j.gives[BETA, p, p]
-    xy = j.gives[BETA, p, r]
-    yy = j.gives[BETA, r, r]
-    x = j.port[FREE, p] - elsewhere(e, p, j) + xy * j.each[PULL, f]
-    y = j.port[FREE, r] - elsewhere(f, r, j) + xy * j.each[PULL, e]
-    dx = j.each[STEP, e]
-    dy = j.each[STEP, f]
+def solve_plane_element(e, turn, faces):
+    """Solve both directions of an element in a plane, as `solve_one_element`.
+
+    Parameters
+    ----------
+    e : int
+        Number of the element.
+    turn : int
+        Number of the turn, from 0.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+    int
+    """
+    f = faces.of[MATE, e]
+    p = faces.of[PORT, e]
+    r = faces.of[PORT, f]
+    xx = faces.gives[BETA, p, p]
+    xy = faces.gives[BETA, p, r]
+    yy = faces.gives[BETA, r, r]
+    x = faces.port[FREE_SLIDE, p] - slide_by_others(e, p, faces) + xy * faces.each[ELEMENT_FORCE, f]
+    y = faces.port[FREE_SLIDE, r] - slide_by_others(f, r, faces) + xy * faces.each[ELEMENT_FORCE, e]
+    dx = faces.each[INCREMENT, e]
+    dy = faces.each[INCREMENT, f]
     if turn == 0:
-        dx = 2 * j.each[WENT, e] - j.each[WENT_BEFORE, e]
-        dy = 2 * j.each[WENT, f] - j.each[WENT_BEFORE, f]
+        dx = 2 * faces.each[LAST_INCREMENT, e] - faces.each[INCREMENT_BEFORE, e]
+        dy = 2 * faces.each[LAST_INCREMENT, f] - faces.each[INCREMENT_BEFORE, f]
     dx, dy, pull, across, tries = plane.solve_plane_step(
         (x, y),
         (xx, xy, yy),
-        (j.num[e, 2], j.num[e, 3]),
-        (j.mem[e, 3], j.mem[f, 3]),
+        (faces.num[e, 2], faces.num[e, 3]),
+        (faces.mem[e, 3], faces.mem[f, 3]),
         (dx, dy),
-        0.1 * j.each[CLOSE, e],
+        0.1 * faces.each[FORCE_TOL, e],
     )
     change = max(
-        abs(pull - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * (abs(x) / xx + abs(pull))),
-        abs(across - j.each[PULL, f]) / (j.each[CLOSE, e] + ROUND * (abs(y) / yy + abs(across))),
+        abs(pull - faces.each[ELEMENT_FORCE, e])
+        / (faces.each[FORCE_TOL, e] + ROUND_OFF * (abs(x) / xx + abs(pull))),
+        abs(across - faces.each[ELEMENT_FORCE, f])
+        / (faces.each[FORCE_TOL, e] + ROUND_OFF * (abs(y) / yy + abs(across))),
     )
-    j.each[STEP, e] = dx
-    j.each[STEP, f] = dy
-    j.each[PULL, e] = pull
-    j.each[PULL, f] = across
+    faces.each[INCREMENT, e] = dx
+    faces.each[INCREMENT, f] = dy
+    faces.each[ELEMENT_FORCE, e] = pull
+    faces.each[ELEMENT_FORCE, f] = across
     return change if tries >= 0 else np.inf, abs(tries)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def turned_contact(q, v, dt, c, j):
-    """Solve the contact on port 0 with all elements held: (its slide, change of its force over its goal, iterations)."""
-    free = j.port[FREE, 0] - elsewhere(-1, 0, j)
-    beta = j.gives[BETA, 0, 0]
-    dq, _, tries = contact.solve(free, beta, q, v, dt, c, j.own[AIM])
+def solve_contact(q, v, dt, interface, faces):
+    """Solve the contact on port 0 under the forces of all elements.
+
+    Parameters
+    ----------
+    q : float
+        Slide of the contact at the start of the step [m].
+    v : float
+        Its speed [m/s].
+    dt : float
+        Length of the step [s].
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+        Increment of its slide [m].
+    float
+        Change of its force over the tolerance.
+    int
+        Number of iterations.
+    """
+    free = faces.port[FREE_SLIDE, 0] - slide_by_others(-1, 0, faces)
+    beta = faces.gives[BETA, 0, 0]
+    dq, _, tries = contact.solve(free, beta, q, v, dt, interface, faces.own[CONTACT_TOL])
     used = (free - dq) / beta
-    change = abs(used - j.own[FORCE_OWN]) / (
-        j.own[AIM] + ROUND * (abs(j.port[FREE, 0]) / beta + abs(used))
+    change = abs(used - faces.own[CONTACT_FORCE]) / (
+        faces.own[CONTACT_TOL] + ROUND_OFF * (abs(faces.port[FREE_SLIDE, 0]) / beta + abs(used))
     )
-    j.own[FORCE_OWN] = used
+    faces.own[CONTACT_FORCE] = used
     return dq, change if tries >= 0 else np.inf, abs(tries)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_coupled_forces(q, v, modal_system, c, j):
-    """Forces of contact and elements over a step, in j.own and j.each: (slide of the contact, iterations), < 0
-    where they do not agree. Every element takes its turn, a set-valued one by the mean force alone."""
-    count = j.of.shape[1]
+def solve_coupled_forces(q, v, modal_system, interface, faces):
+    """Solve contact and elements over a step by block descent, with mean forces alone.
+
+    Each is solved in turn under the forces of the others, into faces.own and faces.each. A Newton step on all
+    forces speeds up turns that converge slowly.
+
+    Parameters
+    ----------
+    q : float
+        Slide of the contact at the start of the step [m].
+    v : float
+        Its speed [m/s].
+    modal_system : interfaces.arrays.ModalArrays
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+        Increment of the slide of the contact [m].
+    int
+        Number of iterations, negative if the forces do not converge.
+    """
+    count = faces.of.shape[1]
     dt = modal_system.dt
     iterations = 0
     last_worst = np.inf
     dq = 0.0
-    for turn in range(TURNS):
+    for turn in range(MAX_TURNS):
         worst = 0.0
-        if THERE:
-            dq, worst, tries = turned_contact(q, v, dt, c, j)
+        if HAS_CONTACT:
+            dq, worst, tries = solve_contact(q, v, dt, interface, faces)
             iterations += tries
         for e in range(count):
-            change, tries = turned(e, turn, j, dt)
+            change, tries = solve_one_element(e, turn, faces, dt)
             worst = max(worst, change)
             iterations += tries
         if worst <= 1.0:
             return dq, iterations
-        if SEVERAL:
+        if IS_COUPLED:
             if turn > 1:
-                iterations += together_now(turn, worst, last_worst, modal_system, j)
+                iterations += speed_up_turns(turn, worst, last_worst, modal_system, faces)
         else:
             return dq, iterations if worst < np.inf else -iterations
         last_worst = worst
@@ -284,273 +438,448 @@ def solve_coupled_forces(q, v, modal_system, c, j):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def together_now(turn, worst, last_worst, modal_system, j):
-    """A step on the forces of all elements at once, where there is no contact: of laws with a slope to their minimum,
-    of others where the turns get there too slowly. Iterations."""
-    if THERE:
+def speed_up_turns(turn, worst, last_worst, modal_system, faces):
+    """Take a step on the forces of all elements at once, if there is no contact; return the iterations.
+
+    Laws with a slope are solved to the minimum of their potential; others take a Newton step if the turns are
+    slow.
+
+    Parameters
+    ----------
+    turn : int
+        Number of the turn, from 0.
+    worst : float
+        Largest change of a force in the turn, over its tolerance.
+    last_worst : float
+        The same of the turn before.
+    modal_system : interfaces.arrays.ModalArrays
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    int
+    """
+    if HAS_CONTACT:
         return 0
-    elif SMOOTH:
-        if PLANE:  # its force has no potential
+    elif HAS_SLOPES:
+        if HAS_PLANES:  # its force has no potential
             pass
-        elif j.stops.names.size == 0 and modal_system.dense.size == 0:
-            return abs(together.solve_smooth(j, modal_system.dt))
+        elif faces.stops.names.size == 0 and modal_system.dense.size == 0:
+            return abs(together.solve_smooth(faces, modal_system.dt))
     if turn > 4 and worst > 0.2 * last_worst:
-        together.newton_turn(j, modal_system.dt, False)
+        together.newton_step(faces, modal_system.dt, False)
     return 0
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def between(j):
-    """Free slides and speeds of the set-valued elements under the forces of all others, into j.stops.field."""
-    s = j.stops
-    for i in range(s.names.size):
-        p = j.of[PORT, s.element[i]]
-        slide = j.port[FREE, p] - j.gives[BETA, p, 0] * j.own[FORCE_OWN]
-        speed = j.port[RATE, p] - j.gives[GAMMA, p, 0] * j.own[FORCE_OWN]
-        for e in range(j.of.shape[1]):
-            if j.num[e, 0] != HOLDS:
-                slide -= j.gives[BETA, p, j.of[PORT, e]] * j.each[PULL, e]
-                speed -= j.gives[GAMMA, p, j.of[PORT, e]] * j.each[PULL, e]
-        s.field[FREE, i] = slide
-        s.field[RATE, i] = speed
+def set_free_motion(faces):
+    """Write the slides and speeds under the forces of all other elements into faces.stops.field."""
+    stops = faces.stops
+    for i in range(stops.names.size):
+        p = faces.of[PORT, stops.element[i]]
+        slide = faces.port[FREE_SLIDE, p] - faces.gives[BETA, p, 0] * faces.own[CONTACT_FORCE]
+        speed = faces.port[FREE_SPEED, p] - faces.gives[GAMMA, p, 0] * faces.own[CONTACT_FORCE]
+        for e in range(faces.of.shape[1]):
+            if faces.num[e, 0] != SET_VALUED:
+                slide -= faces.gives[BETA, p, faces.of[PORT, e]] * faces.each[ELEMENT_FORCE, e]
+                speed -= faces.gives[GAMMA, p, faces.of[PORT, e]] * faces.each[ELEMENT_FORCE, e]
+        stops.field[FREE_SLIDE, i] = slide
+        stops.field[FREE_SPEED, i] = speed
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def taken(j):
-    """Forces and slides of the set-valued elements into j.each; the largest change of a force over its
-    goal."""
-    s = j.stops
+def take_stop_forces(faces):
+    """Take the forces of the stops into faces.each; return their largest change over the tolerance."""
+    stops = faces.stops
     worst = 0.0
-    for i in range(s.names.size):
-        e = s.element[i]
-        force = s.field[MEAN, i]
-        worst = max(worst, abs(force - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * abs(force)))
-        j.each[PULL, e] = force
-        j.each[STEP, e] = s.field[DQ, i]
+    for i in range(stops.names.size):
+        e = stops.element[i]
+        force = stops.field[MEAN_FORCE, i]
+        worst = max(
+            worst,
+            abs(force - faces.each[ELEMENT_FORCE, e])
+            / (faces.each[FORCE_TOL, e] + ROUND_OFF * abs(force)),
+        )
+        faces.each[ELEMENT_FORCE, e] = force
+        faces.each[INCREMENT, e] = stops.field[FACE_INCREMENT, i]
     return worst
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def still(motion, modal_system, table, at, j):
-    """Whether all set-valued elements rest through the step and at its end, held by static friction."""
-    if not stops.stays(j.stops):
+def rests_in_step(motion, modal_system, table, at, faces):
+    """Return whether static friction holds all set-valued elements through the step and at its end.
+
+    Parameters
+    ----------
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    at : int
+        Row of the table for this step.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    bool
+    """
+    if not stop_kernels.rests_through_step(faces.stops):
         return False
-    end = j.modal[ROOM : ROOM + 2]
+    end = faces.modal[MODAL_SCRATCH : MODAL_SCRATCH + 2]
     accel = modal_system.workspace[0]
-    pushed(modal_system, j, accel)
-    for i in range(j.stops.names.size):
-        e = j.stops.element[i]
+    set_accelerations(modal_system, faces, accel)
+    for i in range(faces.stops.names.size):
+        e = faces.stops.element[i]
         for k in range(accel.size):
             accel[k] -= (
-                j.rows[j.of[PORT, e], k]
-                * (j.stops.field[MEAN, i] - j.each[PULL, e])
+                faces.rows[faces.of[PORT, e], k]
+                * (faces.stops.field[MEAN_FORCE, i] - faces.each[ELEMENT_FORCE, e])
                 / modal_system.mass
             )
     ended(motion, modal_system.free, modal_system.push, modal_system.dense, table, at, accel, end)
-    for i in range(j.stops.names.size):
-        e = j.stops.element[i]
+    for i in range(faces.stops.names.size):
+        e = faces.stops.element[i]
         for k in range(accel.size):
-            accel[k] += j.rows[j.of[PORT, e], k] * j.stops.field[MEAN, i] / modal_system.mass
-    return stops.stays_to_the_end(
-        end, modal_system, table[at, 8 * accel.size + 2], accel, modal_system.workspace[1:], j.stops
+            accel[k] += (
+                faces.rows[faces.of[PORT, e], k]
+                * faces.stops.field[MEAN_FORCE, i]
+                / modal_system.mass
+            )
+    return stop_kernels.rests_at_end(
+        end,
+        modal_system,
+        table[at, 8 * accel.size + 2],
+        accel,
+        modal_system.workspace[1:],
+        faces.stops,
     )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def passed(q, v, motion, modal_system, table, at, c, j):
-    """As `solve_coupled_forces`, with the stops and releases of the set-valued elements inside the
-    step, and their blows.
+def solve_with_events(q, v, motion, modal_system, table, at, interface, faces):
+    """Solve the step with the stops and releases of the set-valued elements inside it, and their blows.
 
-    (slide of the contact, iterations, True), False where no such step is found or it would give energy. Which of them
-    stop and go is settled in the first turns; then the slides that follow from it are kept.
+    Which of them stop and go is settled in the first half of the turns; then the slides that follow from it are
+    kept.
+
+    Parameters
+    ----------
+    q : float
+        Slide of the contact at the start of the step [m].
+    v : float
+        Its speed [m/s].
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    at : int
+        Row of the table for this step.
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+        Increment of the slide of the contact [m].
+    int
+        Number of iterations.
+    bool
+        False if no such step is found, or if it would create energy.
     """
-    s = j.stops
+    stops = faces.stops
     iterations = 0
     last_worst = np.inf
     dq = 0.0
     dt = modal_system.dt
-    for i in range(s.names.size):
-        s.field[START, i] = j.each[PACE, s.element[i]]
-    for turn in range(FEW):
+    for i in range(stops.names.size):
+        stops.field[START_SPEED, i] = faces.each[ELEMENT_SPEED, stops.element[i]]
+    for turn in range(MAX_EVENT_TURNS):
         worst = 0.0
-        if THERE:
-            dq, worst, tries = turned_contact(q, v, dt, c, j)
+        if HAS_CONTACT:
+            dq, worst, tries = solve_contact(q, v, dt, interface, faces)
             iterations += tries
-        if SMOOTH:
-            for e in range(j.of.shape[1]):
-                if j.num[e, 0] != HOLDS:
-                    change, tries = turned(e, turn, j, dt)
+        if HAS_SLOPES:
+            for e in range(faces.of.shape[1]):
+                if faces.num[e, 0] != SET_VALUED:
+                    change, tries = solve_one_element(e, turn, faces, dt)
                     worst = max(worst, change)
                     iterations += tries
-        between(j)
-        if turn < FEW // 2 and not (
-            still(motion, modal_system, table, at, j) or stops.watched(dt, s)
+        set_free_motion(faces)
+        if turn < MAX_EVENT_TURNS // 2 and not (
+            rests_in_step(motion, modal_system, table, at, faces)
+            or stop_kernels.follow_step(dt, stops)
         ):
             return dq, iterations, False
-        if not stops.met(s):
+        if not stop_kernels.match_mean_forces(stops):
             return dq, iterations, False
-        worst = max(worst, taken(j))
+        worst = max(worst, take_stop_forces(faces))
         iterations += 1
-        if worst <= 1.0 or settles_at_once(j):
-            return dq, iterations, stops.blows(s) >= 0.0
-        if SEVERAL:
+        if worst <= 1.0 or is_all_set_valued(faces):
+            return dq, iterations, stop_kernels.find_blows(stops) >= 0.0
+        if IS_COUPLED:
             if turn > 4 and worst > 0.2 * last_worst:
-                newton_of_stops(j, dt)
+                newton_with_stops(faces, dt)
         last_worst = worst
     return dq, iterations, False
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def settles_at_once(j):
-    """Whether all that rubs is set-valued, which is solved as one."""
-    if THERE:
+def is_all_set_valued(faces):
+    """Return whether all that rubs is set-valued, which is then solved at once."""
+    if HAS_CONTACT:
         return False
     else:
-        return j.stops.names.size == j.of.shape[1]
+        return faces.stops.names.size == faces.of.shape[1]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def newton_of_stops(j, dt):
-    """A Newton step on the forces of all elements beside the stops that are known, where there is no contact."""
-    if SMOOTH:
-        if THERE:
+def newton_with_stops(faces, dt):
+    """Take a Newton step on the forces of all elements beside known stops, if there is no contact."""
+    if HAS_SLOPES:
+        if HAS_CONTACT:
             return
         else:
-            together.newton_turn(j, dt, True)
+            together.newton_step(faces, dt, True)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solved(q, v, motion, modal_system, table, at, c, j):
-    """Forces of contact and elements over a step whose free slides stand in j: (slide of the contact, iterations),
-    below 0 where they do not agree. Blows of set-valued elements stand in j.stops, or are left to `blown`."""
-    if STOPS:
-        dq, tried, found = passed(q, v, motion, modal_system, table, at, c, j)
+def solve_step(q, v, motion, modal_system, table, at, interface, faces):
+    """Solve contact and elements over a step whose free slides are in faces.port.
+
+    Blows of set-valued elements are in faces.stops then, or are left to `strike_modes`.
+
+    Parameters
+    ----------
+    q : float
+        Slide of the contact at the start of the step [m].
+    v : float
+        Its speed [m/s].
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    at : int
+        Row of the table for this step.
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+        Increment of the slide of the contact [m].
+    int
+        Number of iterations, negative if the forces do not converge.
+    """
+    if HAS_STOPS:
+        dq, tried, found = solve_with_events(
+            q, v, motion, modal_system, table, at, interface, faces
+        )
         if found:
-            j.own[KNOWN] = 1.0
+            faces.own[STOPS_KNOWN] = 1.0
             return dq, tried
-        dq, iterations = solve_coupled_forces(q, v, modal_system, c, j)
-        j.own[KNOWN] = 0.0
+        dq, iterations = solve_coupled_forces(q, v, modal_system, interface, faces)
+        faces.own[STOPS_KNOWN] = 0.0
         return dq, iterations + tried if iterations >= 0 else iterations - tried
     else:
-        return solve_coupled_forces(q, v, modal_system, c, j)
+        return solve_coupled_forces(q, v, modal_system, interface, faces)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def pushed(modal_system, j, accel):
-    """Modal accelerations (n,) [m s-2] of all forces into `accel`."""
+def set_accelerations(modal_system, faces, accel):
+    """Write the modal accelerations of all forces [m s-2] into accel (n,).
+
+    Parameters
+    ----------
+    modal_system : interfaces.arrays.ModalArrays
+    faces : interfaces.arrays.Faces
+    accel : (n,) array
+        Modal accelerations of the forces [m s-2].
+    """
     for k in range(accel.size):
-        accel[k] = j.modal[BESIDE, k] - modal_system.slide[k] * j.own[FORCE_OWN] / modal_system.mass
-    for e in range(j.of.shape[1]):
+        accel[k] = (
+            faces.modal[OTHER_ACCELERATION, k]
+            - modal_system.slide[k] * faces.own[CONTACT_FORCE] / modal_system.mass
+        )
+    for e in range(faces.of.shape[1]):
         for k in range(accel.size):
-            accel[k] -= j.rows[j.of[PORT, e], k] * j.each[PULL, e] / modal_system.mass
+            accel[k] -= (
+                faces.rows[faces.of[PORT, e], k] * faces.each[ELEMENT_FORCE, e] / modal_system.mass
+            )
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def worked(dq, row, j):
-    """Friction work of the step [J]; its mean forces go into the row of its first sample. dq [m]: slide of the contact."""
-    m = 2 * j.modal.shape[1] + 7
-    work = j.own[FORCE_OWN] * dq
-    row[m - 3] = j.each[PULL, 0] if j.of[RUBS, 0] else 0.0
-    if THERE:
-        row[m - 3] = j.own[FORCE_OWN]
-    for e in range(j.of.shape[1]):
-        row[m + EACH * e + 4] = j.each[PULL, e]
-        if j.of[RUBS, e]:
-            work += j.each[PULL, e] * j.each[STEP, e]
+def friction_work(dq, row, faces):
+    """Write the mean forces of the step into the row of its start; return its friction work [J].
+
+    Parameters
+    ----------
+    dq : float
+        Increment of the slide of the contact [m].
+    row : (k,) array
+        Row of samples of `loop_kernels.march`; it is written.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+    """
+    m = 2 * faces.modal.shape[1] + 7
+    work = faces.own[CONTACT_FORCE] * dq
+    row[m - 3] = faces.each[ELEMENT_FORCE, 0] if faces.of[IS_FRICTION, 0] else 0.0
+    if HAS_CONTACT:
+        row[m - 3] = faces.own[CONTACT_FORCE]
+    for e in range(faces.of.shape[1]):
+        row[m + ELEMENT_COLUMNS * e + 4] = faces.each[ELEMENT_FORCE, e]
+        if faces.of[IS_FRICTION, e]:
+            work += faces.each[ELEMENT_FORCE, e] * faces.each[INCREMENT, e]
     return work
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def blown(motion, mass, j):
-    """Strike the modes by the blows of the set-valued elements, in place; the energy that they take [J]. Where no stops
-    were found those are brought to rest that did not slide."""
-    s = j.stops
-    if j.own[KNOWN] == 0.0:
-        for i in range(s.names.size):
-            s.field[DQ, i] = j.each[STEP, s.element[i]]
-        stops.brought(motion, s)
-    return stops.struck(motion, mass, s)
+def strike_modes(motion, mass, faces):
+    """Strike the modes by the blows of set-valued elements; return the energy that they take [J].
+
+    If no stops are known, the elements that do not slide are brought to rest.
+
+    Parameters
+    ----------
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    mass : float
+        [kg]
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+    """
+    stops = faces.stops
+    if faces.own[STOPS_KNOWN] == 0.0:
+        for i in range(stops.names.size):
+            stops.field[FACE_INCREMENT, i] = faces.each[INCREMENT, stops.element[i]]
+        stop_kernels.find_stopping_blows(motion, stops)
+    return stop_kernels.apply_blows(motion, mass, stops)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def committed(q, v, dq, motion, modal_system, c, j):
-    """Move the memories of contact and elements by the step: (energy dissipated [J], False where one is full)."""
+def commit_step(q, v, dq, motion, modal_system, interface, faces):
+    """Move the memories of contact and elements by the step.
+
+    Parameters
+    ----------
+    q : float
+        Slide of the contact at the start of the step [m].
+    v : float
+        Its speed [m/s].
+    dq : float
+        Increment of the slide of the contact [m].
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+        Dissipated energy [J].
+    bool
+        False if a memory is full.
+    """
     lost = 0.0
     ok = True
-    if THERE:
+    if HAS_CONTACT:
         speed = 0.0
         for k in range(modal_system.slide.size):
             speed += modal_system.slide[k] * motion[1, k]
-        lost, ok = contact.commit(dq, j.own[FORCE_OWN], q, v, speed, modal_system.dt, c)
-        j.own[STEP_OWN] = dq
-    for e in range(j.of.shape[1]):
+        lost, ok = contact.commit(
+            dq, faces.own[CONTACT_FORCE], q, v, speed, modal_system.dt, interface
+        )
+        faces.own[CONTACT_INCREMENT] = dq
+    for e in range(faces.of.shape[1]):
         speed = 0.0
         for k in range(modal_system.slide.size):
-            speed += j.rows[j.of[PORT, e], k] * motion[1, k]
-        if PLANE:
-            if j.of[MATE, e] == e:
+            speed += faces.rows[faces.of[PORT, e], k] * motion[1, k]
+        if HAS_PLANES:
+            if faces.of[MATE, e] == e:
                 lost += law.update_memory(
-                    j.num[e],
-                    j.mem[e],
-                    j.each[STEP, e],
-                    j.each[PULL, e],
-                    j.each[PACE, e],
+                    faces.num[e],
+                    faces.mem[e],
+                    faces.each[INCREMENT, e],
+                    faces.each[ELEMENT_FORCE, e],
+                    faces.each[ELEMENT_SPEED, e],
                     speed,
                     modal_system.dt,
-                    j.each[EPS, e],
+                    faces.each[BOND_LENGTH, e],
                 )
-            elif j.of[MATE, e] > e:
+            elif faces.of[MATE, e] > e:
                 lost += plane.update_plane_memory(
-                    j.num[e],
-                    j.mem[e],
-                    j.mem[j.of[MATE, e]],
-                    (j.each[STEP, e], j.each[STEP, j.of[MATE, e]]),
+                    faces.num[e],
+                    faces.mem[e],
+                    faces.mem[faces.of[MATE, e]],
+                    (faces.each[INCREMENT, e], faces.each[INCREMENT, faces.of[MATE, e]]),
                 )
         else:
             lost += law.update_memory(
-                j.num[e],
-                j.mem[e],
-                j.each[STEP, e],
-                j.each[PULL, e],
-                j.each[PACE, e],
+                faces.num[e],
+                faces.mem[e],
+                faces.each[INCREMENT, e],
+                faces.each[ELEMENT_FORCE, e],
+                faces.each[ELEMENT_SPEED, e],
                 speed,
                 modal_system.dt,
-                j.each[EPS, e],
+                faces.each[BOND_LENGTH, e],
             )
-        j.each[WENT_BEFORE, e] = j.each[WENT, e]
-        j.each[WENT, e] = j.each[STEP, e]
+        faces.each[INCREMENT_BEFORE, e] = faces.each[LAST_INCREMENT, e]
+        faces.each[LAST_INCREMENT, e] = faces.each[INCREMENT, e]
     return lost, ok
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def limited(load0, load1, mu, j):
-    """The set-valued elements under a load that goes from load0 to load1 [N] in the step; mu (2,): static and kinetic
-    coefficient."""
-    s = j.stops
+def set_limits(load0, load1, mu, faces):
+    """Set the limits of the set-valued elements under a load that changes linearly in the step.
+
+    Parameters
+    ----------
+    load0 : float
+        Load at the start of the step [N].
+    load1 : float
+        Load at its end [N].
+    mu : (2,) array
+        Static and kinetic coefficient.
+    faces : interfaces.arrays.Faces
+    """
+    stops = faces.stops
     load1 = max(load1, 0.0)
-    for i in range(s.names.size):
-        e = s.element[i]
+    for i in range(stops.names.size):
+        e = stops.element[i]
         for k in range(2):
-            s.limit[STATIC + k, i] = mu[k] * load0
-            s.limit[STATIC + k + END, i] = mu[k] * load1
-            j.num[e, 1 + k] = 0.5 * mu[k] * (load0 + load1)
+            stops.limit[STATIC + k, i] = mu[k] * load0
+            stops.limit[STATIC + k + AT_END, i] = mu[k] * load1
+            faces.num[e, 1 + k] = 0.5 * mu[k] * (load0 + load1)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def capped(j):
-    """No force of a set-valued element at a sample above what its load bears."""
-    for i in range(j.stops.names.size):
-        e = j.stops.element[i]
-        j.mem[e, 0] = min(max(j.mem[e, 0], -j.num[e, 1]), j.num[e, 1])
+def cap_forces(faces):
+    """Limit the forces of the set-valued elements at a sample to their static friction."""
+    for i in range(faces.stops.names.size):
+        e = faces.stops.element[i]
+        faces.mem[e, 0] = min(max(faces.mem[e, 0], -faces.num[e, 1]), faces.num[e, 1])
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def slide_freely(used, j):
-    """Let the one set-valued element slide through the step under a mean force [N], without a blow; its slide [m]."""
-    f = j.stops.field
-    j.each[PULL, 0] = used
-    j.each[STEP, 0] = j.port[FREE, 0] - j.gives[BETA, 0, 0] * used
-    j.own[KNOWN] = 1.0
+def slide_freely(used, faces):
+    """Let the only set-valued element slide through the step under a mean force; return its slide."""
+    f = faces.stops.field
+    faces.each[ELEMENT_FORCE, 0] = used
+    faces.each[INCREMENT, 0] = faces.port[FREE_SLIDE, 0] - faces.gives[BETA, 0, 0] * used
+    faces.own[STOPS_KNOWN] = 1.0
     f[BLOW, 0] = 0.0
-    f[WAY, 0] = 1.0 if used >= 0 else -1.0
-    return j.each[STEP, 0]
+    f[SLIP_STATE, 0] = 1.0 if used >= 0 else -1.0
+    return faces.each[INCREMENT, 0]

@@ -1,6 +1,6 @@
-"""The compiled loops by the faces that they meet: an instance of one text per contact, laws and load.
+"""The compiled loops: one instance of the text per contact, set of laws and load.
 
-`loop_kernels` runs with any contact, `contacts.element_kernels` and its solver with any law. A law passed to a compiled
+`loop_kernels` runs with any contact, `interfaces.element_kernels` and its solver with any law. A law passed to a compiled
 function as an argument is never found on disk again, so `compiled.instance` writes the loop once per law instead.
 """
 
@@ -9,19 +9,17 @@ from functools import cache
 from ... import compiled
 from ..interfaces.dispatch import COULOMB, law_of
 
-HERE = "dynamics.march"
+FOLDER = "dynamics.march"
 SHEARED_LISTS = "dynamics.interfaces.shear_list_kernels"  # lists of bonds behind shear modes
-# loads: that stays; that changes, borne as a whole or point by point
-STEADY, WHOLE, POINTS = (
-    "",
-    "whole",
-    "points",
-)
+# Kinds of loads: constant, varying on the whole interface, varying on each point.
+STEADY = ""
+WHOLE = "whole"
+POINTS = "points"
 
 
 @cache
-def contact_of(kind: tuple):
-    """The compiled contact of a ContactModel's kind (contact, law)."""
+def load_contact(kind: tuple):
+    """Return the compiled contact of a ContactModel's kind (contact, law)."""
     contact, law = kind
     if contact == SHEARED_LISTS:
         return compiled.instance(
@@ -41,7 +39,7 @@ def contact_of(kind: tuple):
 
 
 @cache
-def loop_of(
+def load_loop(
     kind: tuple,
     laws: tuple = (),
     load: str = STEADY,
@@ -49,30 +47,48 @@ def loop_of(
     several: bool = False,
     plane: bool = False,
 ):
-    """The loop of a rig: its `march` and `follow`. kind: of the contact; laws: modules of the elements beside it or in
-    its place; load: STEADY, WHOLE or POINTS; there: whether the contact is; several: whether more than one rub; plane:
-    whether any slides in a plane."""
-    contact = contact_of(kind)
+    """Return the loop of a rig, with its functions `march` and `follow`.
+
+    Parameters
+    ----------
+    kind : tuple of str
+        Modules of the contact and of its law.
+    laws : tuple of str
+        Modules of the laws of the elements.
+    load : str
+        STEADY, WHOLE or POINTS.
+    there : bool
+        Whether there is a contact.
+    several : bool
+        Whether more than one element or contact rubs.
+    plane : bool
+        Whether an element slides in a plane.
+
+    Returns
+    -------
+    Kernels
+    """
+    contact = load_contact(kind)
     named = {}
     flags = {
-        "MANY": bool(laws),
-        "STOPS": COULOMB in laws,
-        "SMOOTH": {*laws} > {COULOMB} or COULOMB not in laws,
-        "THERE": there,
-        "SEVERAL": several,
-        "PLANE": plane,
-        "PRESSED": load != STEADY,
-        "POINTED": load == POINTS,
-        "LISTED": kind[0] == SHEARED_LISTS,
+        "HAS_ELEMENTS": bool(laws),
+        "HAS_STOPS": COULOMB in laws,
+        "HAS_SLOPES": {*laws} > {COULOMB} or COULOMB not in laws,
+        "HAS_CONTACT": there,
+        "IS_COUPLED": several,
+        "HAS_PLANES": plane,
+        "LOAD_VARIES": load != STEADY,
+        "HAS_POINTS": load == POINTS,
+        "HAS_LISTS": kind[0] == SHEARED_LISTS,
     }
     text = '"""Parts of a loop, written by patchfem.dynamics.march.instances."""\n\n' + "".join(
         f"{name} = {value}\n" for name, value in flags.items()
     )
-    parts = compiled.written(f"{HERE}.parts_{compiled.digest(text)}_kernels", text)
+    parts = compiled.written(f"{FOLDER}.parts_{compiled.digest(text)}_kernels", text)
     if laws:
         law = law_of(laws)
-        named["faces"] = compiled.instance(
-            f"{HERE}.faces_kernels",
+        named["coupling"] = compiled.instance(
+            f"{FOLDER}.faces_kernels",
             {
                 "law": law,
                 "contact": contact,
@@ -81,29 +97,49 @@ def loop_of(
                     "dynamics.interfaces.element_solve_kernels", {"law": law}
                 ),
                 "together": compiled.instance(
-                    f"{HERE}.together_kernels", {"law": law, "parts": parts}
+                    f"{FOLDER}.together_kernels", {"law": law, "parts": parts}
                 ),
             },
         )
     if load != STEADY:
         named["pressing"] = compiled.instance(
-            f"{HERE}.pressing_kernels", {"contact": contact, "parts": parts} | named
+            f"{FOLDER}.pressing_kernels", {"contact": contact, "parts": parts} | named
         )
-    return compiled.instance(f"{HERE}.loop_kernels", {"contact": contact, "parts": parts} | named)
+    return compiled.instance(f"{FOLDER}.loop_kernels", {"contact": contact, "parts": parts} | named)
 
 
 def march(model, *arguments) -> tuple:
-    """`loop_kernels.march` with the faces of a model: (steps done, status)."""
+    """March a model by `loop_kernels.march`; return the number of steps done and the status."""
     there = not model.joints or getattr(model, "patch", None) is not None
     # a loop of several laws is one text
     several = len(model.joints) + there > 1 or len(model.laws) > 1
     plane = any(one.mate for one in model.joints)
-    return loop_of(model.kind, model.laws, model.loading, there, several, plane).march(*arguments)
+    return load_loop(model.kind, model.laws, model.loading, there, several, plane).march(*arguments)
 
 
 def follow_path(path, dt, kind, contact, goal, energies, forces) -> int:
-    """Drive a contact of this kind along a prescribed path: `loop_kernels.follow`. Number of steps that failed.
+    """Move a contact along a prescribed path by `loop_kernels.follow`.
 
-    path (k,) [m] at steps of dt [s]; goal: relative residual of a step; energies and forces are filled.
+    Parameters
+    ----------
+    path : (k,) array
+        Slides [m].
+    dt : float
+        Length of a step [s].
+    kind : tuple of str
+        Kind of the contact.
+    contact : tuple
+        Arrays of a contact.
+    goal : float
+        Residual of a step over the friction limit.
+    energies : (k, 2) array
+        See `loop_kernels.follow`; it is written.
+    forces : (k, 3) array
+        See `loop_kernels.follow`; it is written.
+
+    Returns
+    -------
+    int
+        Number of steps that failed.
     """
-    return loop_of(kind).follow(path, float(dt), contact, float(goal), energies, forces)
+    return load_loop(kind).follow(path, float(dt), contact, float(goal), energies, forces)

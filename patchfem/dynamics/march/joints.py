@@ -10,14 +10,24 @@ from .models import IDLE, ContactModel, Joint, free_model
 
 
 def cubic(port: int, stiffness: float) -> Joint:
-    """Spring on a port with the restoring force k_3 q^3 [N]; stiffness: k_3 [N/m3]."""
+    """Return a spring on a port with the restoring force k_3 q^3 [N]; stiffness is k_3 [N/m3]."""
     return _spring(port, [0.0, stiffness, 0.0, 1.0], lambda q: 0.25 * stiffness * q**4)
 
 
 def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
-    """Spring on a port with the restoring force k lambda/(2 pi) sin(2 pi q/lambda) [N] of interlocking peaks.
+    """Return a spring on a port with the force k lambda/(2 pi) sin(2 pi q/lambda) [N] of interlocking peaks.
 
-    stiffness: k [N/m] at rest; wavelength: lambda [m].
+    Parameters
+    ----------
+    port : int
+    stiffness : float
+        k [N/m], at rest.
+    wavelength : float
+        lambda [m].
+
+    Returns
+    -------
+    Joint
     """
     turn = 2 * np.pi / wavelength
     return _spring(
@@ -33,8 +43,11 @@ def _spring(port: int, numbers, potential) -> Joint:
 
 
 def in_planes(joints, planes) -> list:
-    """Joints of interfaces (i,) on ports of their numbers with those behind them that are second directions of the ones
-    where planes (i,) is true, on ports from i on."""
+    """Return joints of interfaces (i,) with those of the second directions of the ones that slide in a plane.
+
+    They act on the ports of their numbers, and the second directions on ports from i on; planes (i,) says
+    which have one.
+    """
     count = len(joints)
     second = [k for k, plane in enumerate(planes) if plane]
     out = list(joints)
@@ -46,11 +59,17 @@ def in_planes(joints, planes) -> list:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JointsModel:
-    """A patch (ContactModel on port 0, or None) and joints; rows (p, n): slide of every port per coordinate.
+    """Elements beside a contact, or in its place.
 
-    A patch of set-valued friction becomes the first of the joints, since all that hold are solved together.
-    scale [N]: force against which residuals of springs count; also: modules of compiled laws that the loop knows
-    besides those of the joints, so that models of several sets of laws share one loop.
+    A patch with set-valued friction becomes the first of the joints, because all set-valued elements are
+    solved together.
+
+    - `patch`: the contact on port 0, or None.
+    - `joints`: the elements.
+    - `rows` (p, n): slide of every port per coordinate.
+    - `scale`: force to which residuals of springs are compared [N].
+    - `also`: modules of further laws that the loop has, so that models of several sets of laws share one
+      loop.
     """
 
     patch: ContactModel | None
@@ -67,19 +86,19 @@ class JointsModel:
 
     @property
     def limit(self) -> float:
-        """Friction limit [N] of patch and joints together."""
+        """Friction limit of patch and joints together [N]."""
         return (self.patch.limit if self.patch is not None else 0.0) + sum(
             one.element.limit for one in self.joints if one.mate >= 0
         )
 
     @property
     def length(self) -> float:
-        """Bond length [m] of the patch, or else of the first interface."""
+        """Bond length of the patch, or else of the first interface [m]."""
         return self.patch.length if self.patch is not None else self.joints[0].element.length
 
     @property
     def reduction(self):
-        """What the arrays of the patch were reduced from (ContactModel.reduction), None without a patch."""
+        """What the arrays of the patch were reduced from (`ContactModel.reduction`); None without a patch."""
         return self.patch.reduction if self.patch is not None else None
 
     @property
@@ -96,13 +115,13 @@ class JointsModel:
 
     @property
     def kind(self) -> tuple:
-        """Kind of the patch's contact (ContactModel.kind), that of an idle one without a patch."""
+        """Kind of the patch's contact (`ContactModel.kind`); that of an idle contact without a patch."""
         return self.patch.kind if self.patch is not None else IDLE
 
     def shown(self, contact) -> dict:
-        """What a picture needs of the patch's memory (ContactModel.shown), {} without a patch."""
+        """Return what a picture needs of the patch's memory (`ContactModel.shown`); empty without a patch."""
         return self.patch.shown(contact) if self.patch is not None else {}
 
     def build(self):
-        """The contact of the patch with arrays of its own; an idle point where there is none."""
+        """Return the contact of the patch with arrays of its own; an idle point if there is none."""
         return (self.patch or free_model()).build()

@@ -13,8 +13,14 @@ KERNELS = "dynamics.march.lanes_kernels"
 
 
 class Points(NamedTuple):
-    """The points of a case: limits (p,) [N], shape (p, r) slides per coordinate, stiffness (r,) [N/m] of the pieces,
-    bond length [m]; amplitude [m s-2] of its drive."""
+    """Points of a case.
+
+    - `limit` (p,): friction limits [N].
+    - `shape` (p, r), `stiffness` (r,): slides of the points per coordinate of the pieces, and stiffness of
+      these [N/m].
+    - `length`: bond length [m].
+    - `amplitude`: amplitude of the drive [m s-2].
+    """
 
     limit: np.ndarray
     shape: np.ndarray
@@ -24,9 +30,15 @@ class Points(NamedTuple):
 
 
 class Marched(NamedTuple):
-    """n cases after their march: extremes (n, c, 2) [m] of the output and its phasors (n, c) [m] by cycles; book: sums
-    of the run by name, (n,) [J]; of the last cycles the samples: z, rate (s, modes, n), force [N] and slip [m] (s, n),
-    and the friction work `worked` (n,) [J]; reach (n,) [m]: largest slide; bad (n,): steps without a solution."""
+    """n cases after their march.
+
+    - `extremes` (n, c, 2), `phasors` (n, c): of the output in each cycle [m].
+    - `book`: sums of the run by name, (n,) [J].
+    - `z`, `rate` (s, modes, n), `force` (s, n), `slip` (s, n): samples of the last cycles.
+    - `worked` (n,): friction work of the last cycles [J].
+    - `reach` (n,): largest slide [m].
+    - `bad` (n,): number of steps without a solution.
+    """
 
     extremes: np.ndarray
     phasors: np.ndarray
@@ -41,20 +53,27 @@ class Marched(NamedTuple):
 
 
 def fits(modes: ModalBasis) -> bool:
-    """Whether lanes march a rig."""
+    """Return whether lanes can march a rig."""
     return modes.omega.size <= load(KERNELS).RIG and modes.damping is None
 
 
 def _rig(kernels, modes: ModalBasis, prop) -> np.ndarray:
-    """The rows of a rig as the kernels take them."""
+    """Return the rows of a rig as the kernels take them.
+
+    Parameters
+    ----------
+    kernels
+    modes : ModalBasis
+    prop : propagator.Propagator
+    """
     n = modes.omega.size
-    out = np.zeros((kernels.RIGS + 1, 3))
+    out = np.zeros((kernels.N_RIG_ROWS + 1, 3))
     for first, rows in (
         (kernels.ZZ, prop.free),
         (kernels.BY_Z, prop.push),
         (kernels.REACH_Z, prop.reach[0].reshape(2, n)),
         (kernels.LOSS, prop.loss),
-        (kernels.SLIDE, [modes.slide, modes.output, modes.omega**2]),
+        (kernels.SLIDE_SHAPE, [modes.slide, modes.output, modes.omega**2]),
     ):
         out[first : first + len(rows), :n] = rows
     out[-1] = prop.beta[0, 0], modes.mass, prop.dt
@@ -71,49 +90,82 @@ def _rig(kernels, modes: ModalBasis, prop) -> np.ndarray:
 
 
 def _table(kernels, modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
-    """The table of the steps of a cycle under a drive of 1 m s-2."""
+    """Return the table of the steps of a cycle under a drive of 1 m s-2.
+
+    Parameters
+    ----------
+    kernels
+    modes : ModalBasis
+    drive : float
+        Acceleration of the base [m s-2].
+    steps
+    prop : propagator.Propagator
+    """
     n = modes.omega.size
     unit = replace(drive, acceleration=1.0)
     found = prop.tables(unit, 0, steps)
-    out = np.zeros((steps, kernels.COLUMNS))
+    out = np.zeros((steps, kernels.N_COLUMNS))
     for k in range(8):  # one column of each kind per mode
-        out[:, k * kernels.RIG : k * kernels.RIG + n] = found[:, k * n : (k + 1) * n]
+        out[:, k * kernels.N_RIG_MODES : k * kernels.N_RIG_MODES + n] = found[
+            :, k * n : (k + 1) * n
+        ]
     angle = 2 * np.pi * np.arange(steps) / steps
-    for forms in (kernels.WORKS, kernels.LOSSES):  # of forces [N] in place of accelerations
-        out[:, forms + 2 * kernels.RIG : forms + 3 * kernels.RIG] /= modes.mass
-    out[:, kernels.REST : kernels.REST + 2] = found[:, 8 * n : 8 * n + 2]
-    out[:, kernels.PORT] = found[:, 8 * n + 3]
-    out[:, kernels.WAVE :] = np.array([np.cos(angle), np.sin(angle)]).T
+    for forms in (
+        kernels.WORK_FORMS,
+        kernels.LOSS_FORMS,
+    ):  # of forces [N] in place of accelerations
+        out[:, forms + 2 * kernels.N_RIG_MODES : forms + 3 * kernels.N_RIG_MODES] /= modes.mass
+    out[:, kernels.REMAINDERS : kernels.REMAINDERS + 2] = found[:, 8 * n : 8 * n + 2]
+    out[:, kernels.PORT_SLIDE] = found[:, 8 * n + 3]
+    out[:, kernels.WAVES :] = np.array([np.cos(angle), np.sin(angle)]).T
     return out
 
 
 def _room(kernels, cases: list) -> np.ndarray:
-    """The workspace of cases at rest; of one too few lanes the last case has more than one."""
-    out = np.zeros((kernels.NUMBERS, kernels.LANES))
-    points = kernels.POINTS
+    """Return the workspace of cases at rest; the last case fills lanes that are left over."""
+    out = np.zeros((kernels.N_NUMBERS, kernels.LANES))
+    points = kernels.N_POINTS
     for i in range(kernels.LANES):
         one = cases[min(i, len(cases) - 1)]
         few, modes = one.shape.shape
-        out[[kernels.PUSH, kernels.LENGTH, kernels.LIMIT], i] = (
+        out[[kernels.DRIVE, kernels.BOND_LENGTH, kernels.LIMIT], i] = (
             one.amplitude,
             one.length,
             one.limit.sum(),
         )
-        out[kernels.OF_POINT : kernels.OF_POINT + few, i] = one.limit
-        out[kernels.KAPPA : kernels.KAPPA + kernels.MODES, i] = one.stiffness.max()
+        out[kernels.POINT_LIMITS : kernels.POINT_LIMITS + few, i] = one.limit
+        out[kernels.STIFFNESSES : kernels.STIFFNESSES + kernels.N_PIECE_MODES, i] = (
+            one.stiffness.max()
+        )
         for k in range(modes):
-            first = kernels.SHAPE + k * points
+            first = kernels.SHAPES + k * points
             out[first : first + few, i] = one.shape[:, k]
-            out[kernels.KAPPA + k, i] = one.stiffness[k]
-            out[kernels.REACH + k, i] = np.abs(one.shape[:, k]).max()
-            out[kernels.MEAN + k, i] = one.limit @ one.shape[:, k] / one.limit.sum()
+            out[kernels.STIFFNESSES + k, i] = one.stiffness[k]
+            out[kernels.MAX_SHAPES + k, i] = np.abs(one.shape[:, k]).max()
+            out[kernels.MEAN_SHAPES + k, i] = one.limit @ one.shape[:, k] / one.limit.sum()
     return out
 
 
 def march(
     modes: ModalBasis, drive: SineDrive, cases: list, cycles: int, steps: int, window: int
 ) -> Marched:
-    """March cases of `Points` over so many cycles of a drive, each under its own amplitude, from rest."""
+    """March cases over cycles of a drive from rest, each under its own amplitude.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : SineDrive
+    cases : list of Points
+    cycles : int
+    steps : int
+        Number of steps of a cycle.
+    window : int
+        Number of last cycles whose samples are kept.
+
+    Returns
+    -------
+    Marched
+    """
     kernels = load(KERNELS)
     prop = propagator(modes, drive, steps)
     rig = _rig(kernels, modes, prop)
@@ -125,12 +177,12 @@ def march(
         few = min(kernels.LANES, n - first)
         history = np.zeros((cycles, 4, kernels.LANES))
         work = np.zeros(kernels.LANES)
-        samples = np.zeros((window * steps + 1, kernels.KEPT, kernels.LANES))
+        samples = np.zeros((window * steps + 1, kernels.N_SAMPLE, kernels.LANES))
         kernels.march(workspace.ravel(), rig, table, history, samples, work)
         parts.append((workspace[:, :few], history[:, :, :few], samples[:, :, :few], work[:few]))
     workspace, history, samples, work = (np.concatenate(one, axis=-1) for one in zip(*parts))
     m = modes.omega.size
-    r = kernels.RIG
+    r = kernels.N_RIG_MODES
     names = (
         "WORK_IN",
         "VISCOUS",
@@ -145,9 +197,10 @@ def march(
     )
     book = {name.lower(): workspace[getattr(kernels, name)] for name in names}
     moving = (
-        workspace[kernels.V : kernels.V + m] ** 2 + (modes.omega[:, None] * workspace[:m]) ** 2
+        workspace[kernels.RIG_RATE : kernels.RIG_RATE + m] ** 2
+        + (modes.omega[:, None] * workspace[:m]) ** 2
     ).sum(axis=0)
-    book["stored"] = 0.5 * modes.mass * moving + workspace[kernels.ENERGY]
+    book["stored"] = 0.5 * modes.mass * moving + workspace[kernels.INTERFACE_ENERGY]
     return Marched(
         history[:, :2].transpose(2, 0, 1),
         (history[:, 2] + 1j * history[:, 3]).T,
@@ -157,6 +210,6 @@ def march(
         samples[:, 2 * r],
         samples[:, 2 * r + 1],
         book["booked"] - work,
-        workspace[kernels.FAR],
-        workspace[kernels.BAD],
+        workspace[kernels.MAX_SLIDE],
+        workspace[kernels.N_UNSOLVED],
     )

@@ -1,78 +1,118 @@
 """Patches with bonds behind shear modes marched side by side, one case in a lane: the steps of `passing_kernels`.
 
-The cases share the modes of their rig and the frequency of their drive, and have POINTS points behind MODES modes of
-the pieces each. In every step all lanes take the turns of Newton's method that the slowest of them asks for. A workspace is
-a flat array as in `lanes.names_kernels`: number n of lane i stands at n * LANES + i. Stretches are over the bond length
-and squares over its square, for bonds whose density stays. Twin: `march.Run`, case by case. Cost: 20 ns a step of a
-case on a core with vectors of eight numbers.
+The cases share the modes of their rig and the frequency of their drive, and have N_POINTS points behind N_PIECE_MODES modes
+of the pieces each. In every step all lanes take as many turns of Newton's method as the slowest of them needs. The workspace
+is a flat array as in `lanes.rows_kernels`: row r of lane i is the element r * LANES + i. Stretches are over the bond length
+and squares over its square, for bonds whose density is constant. A test compares a case with `march.Run`. Cost: 20 ns per
+step and case on a core with vectors of eight numbers.
 """
 
 from math import sqrt
 
 from ...compiled.jit import njit
-from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from ..lanes.rows_kernels import NJIT_INLINE
 
-LANES, POINTS, MODES, RIG = 32, 6, 2, 2  # MODES of the pieces, RIG of the rig
-# what moves: coordinates and rates of the rig, coordinates of the pieces, stretch and square of the points
-Z, V, B, STRETCH, SQUARE = 0, RIG, 2 * RIG, 2 * RIG + MODES, 2 * RIG + MODES + POINTS
-# the step: slide and coordinates; those of the two before, Newton's step and by how much it falls
-Y = SQUARE + POINTS
-LAST, BEFORE, P, FALL, DONE = Y + 3, Y + 6, Y + 9, Y + 12, Y + 13
-(FREE, FORCE, ENERGY, SLIP, OUT, RATE, OUT0, RATE0, PLACE, USED, WORK, LOSS_NOW, MOVING) = range(
-    DONE + 1, DONE + 14
-)
-# of a case: drive over that of the table, bond length, limit, limits of the points, slides per coordinate, stiffness
-# of the coordinates, largest and mean slide per coordinate
-PUSH, LENGTH, LIMIT, OF_POINT = range(MOVING + 1, MOVING + 5)
-SHAPE = OF_POINT + POINTS
-KAPPA, REACH, MEAN = (SHAPE + (POINTS + k) * MODES for k in range(3))
-# sums of the run; extremes and phasor of the output in a cycle; steps without a solution, largest slide
-(
-    WORK_IN,
-    VISCOUS,
-    POWER,
-    LOST,
-    PEAK,
-    BOOKED,
-    SAMPLED,
-    PASSED,
-    GONE,
-    CREATED,
-    LOW,
-    HIGH,
-    COS,
-    SIN,
-    BAD,
-    FAR,
-) = range(MEAN + MODES, MEAN + MODES + 16)
-NUMBERS = FAR + 1
-# rows of a mode of the rig: its step as `propagator.Propagator` has it, of forces in place of accelerations, then
-# slide, output, square of its rate; RIGS: how many, behind them give of the slide [m/N], mass [kg], step [s]
-ZZ, ZV, VZ, VV, BY_Z, BY_V, REACH_Z, REACH_V, LOSS, SLIDE, OUTPUT, RATES = (*range(9), 14, 15, 16)
-RIGS = 17
-# columns of the table, of a drive of 1 m s-2: what it adds to coordinates and rates, linear forms of its work and of
-# the viscous loss, the rest of both, what it moves the slide, its cosine and sine at the start of the step
-BY_DRIVE, WORKS, LOSSES, REST, PORT, WAVE = 0, 2 * RIG, 5 * RIG, 8 * RIG, 8 * RIG + 2, 8 * RIG + 3
-COLUMNS = WAVE + 2
-KEPT = 2 * RIG + 2  # of a sample: coordinates, rates, force, slip
-# bond lengths of Newton's last step, as in `shear_solve_kernels`; turns of a step
-NEAR, MOST = (
-    4e-6,
-    60,
-)
-CURVED = 1e-9  # of the friction limit, which the forces may bend in it
-# bond lengths of a slide that the series takes; from which on nothing is left of a bond
-SHORT, LONG = (
-    0.5,
-    40.0,
-)
+LANES = 32  # number of cases that march side by side
+N_POINTS = 6  # points of the interface of a case
+N_PIECE_MODES = 2  # shear modes of the pieces of a case
+N_RIG_MODES = 2  # modes of the rig
+N_UNKNOWNS = 1 + N_PIECE_MODES  # increments of the slide and of the coordinates of the pieces
+
+# These rows are the state: coordinates and rates of the rig, coordinates of the pieces, stretches and their squares.
+RIG_POSITION = 0
+RIG_RATE = N_RIG_MODES
+PIECE_POSITION = 2 * N_RIG_MODES
+STRETCHES = PIECE_POSITION + N_PIECE_MODES
+SQUARES = STRETCHES + N_POINTS
+# These rows are the unknowns of a step, those of the two steps before, and the step of Newton's method.
+INCREMENTS = SQUARES + N_POINTS
+LAST_INCREMENTS = INCREMENTS + N_UNKNOWNS
+INCREMENTS_BEFORE = INCREMENTS + 2 * N_UNKNOWNS
+NEWTON_STEP = INCREMENTS + 3 * N_UNKNOWNS
+DESCENT = INCREMENTS + 4 * N_UNKNOWNS  # decrease that the last step of Newton's method predicts
+IS_SOLVED = DESCENT + 1  # 1 if the step is solved
+FREE_SLIDE = DESCENT + 2  # increment of the slide without friction [m]
+FRICTION = DESCENT + 3  # friction force at the sample [N]
+INTERFACE_ENERGY = DESCENT + 4  # energy of bonds and pieces [J]
+SLIP = DESCENT + 5  # mean slip of the points [m]
+OUTPUT = DESCENT + 6  # displacement of the output [m]
+OUTPUT_RATE = DESCENT + 7  # rate of the output [m/s]
+LAST_OUTPUT = DESCENT + 8  # the same at the start of the step
+LAST_OUTPUT_RATE = DESCENT + 9
+RIG_SLIDE = DESCENT + 10  # slide of the rig [m]
+MEAN_FORCE = DESCENT + 11  # mean friction force of the step [N]
+DRIVE_WORK = DESCENT + 12  # work of the drive in the step [J]
+VISCOUS_LOSS = DESCENT + 13  # viscous loss in the step [J]
+RATE_SQUARES = DESCENT + 14  # sum of v^2 + omega^2 z^2 of the modes
+# These rows are the numbers of a case.
+DRIVE = DESCENT + 15  # amplitude of its drive over that of the table
+BOND_LENGTH = DESCENT + 16  # [m]
+LIMIT = DESCENT + 17  # friction limit [N]
+POINT_LIMITS = DESCENT + 18  # friction limits of the points [N]
+SHAPES = POINT_LIMITS + N_POINTS  # slides of the points per coordinate of the pieces
+STIFFNESSES = SHAPES + N_PIECE_MODES * N_POINTS  # stiffness of the coordinates of the pieces [N/m]
+MAX_SHAPES = STIFFNESSES + N_PIECE_MODES  # largest absolute slide of a point per coordinate
+MEAN_SHAPES = MAX_SHAPES + N_PIECE_MODES  # mean slide of the points per coordinate
+# These rows are the sums of the run [J], which `lanes.Marched` names.
+WORK_IN = MEAN_SHAPES + N_PIECE_MODES
+VISCOUS = WORK_IN + 1
+POWER = WORK_IN + 2
+LOST = WORK_IN + 3
+PEAK = WORK_IN + 4
+BOOKED = WORK_IN + 5
+SAMPLED = WORK_IN + 6
+PASSED = WORK_IN + 7
+GONE = WORK_IN + 8
+CREATED = WORK_IN + 9
+# These rows are the extremes and the phasor of the output in a cycle [m].
+MIN_OUTPUT = WORK_IN + 10
+MAX_OUTPUT = WORK_IN + 11
+COS_SUM = WORK_IN + 12
+SIN_SUM = WORK_IN + 13
+N_UNSOLVED = WORK_IN + 14  # number of steps without a solution
+MAX_SLIDE = WORK_IN + 15  # largest slide of the run [m]
+N_NUMBERS = WORK_IN + 16
+
+# Rows of a mode of the rig: its step as `propagator.Propagator` has it, for forces in place of accelerations.
+ZZ = 0
+ZV = 1
+VZ = 2
+VV = 3
+BY_Z = 4
+BY_V = 5
+REACH_Z = 6
+REACH_V = 7
+LOSS = 8  # six coefficients of the quadratic form of the viscous loss
+SLIDE_SHAPE = 14  # slide per coordinate
+OUTPUT_SHAPE = 15  # output per coordinate
+OMEGA_SQUARE = 16  # square of the angular frequency
+N_RIG_ROWS = 17  # after them: give of the slide [m/N], mass [kg], length of a step [s]
+# Columns of the table of a step, for a drive of 1 m s-2.
+BY_DRIVE = 0  # what it adds to coordinates and rates
+WORK_FORMS = 2 * N_RIG_MODES  # coefficients of its work
+LOSS_FORMS = 5 * N_RIG_MODES  # coefficients of the viscous loss
+REMAINDERS = 8 * N_RIG_MODES  # constant parts of work and loss
+PORT_SLIDE = REMAINDERS + 2  # increment of the slide
+WAVES = REMAINDERS + 3  # cosine and sine of the drive at the start of the step
+N_COLUMNS = WAVES + 2
+N_SAMPLE = 2 * N_RIG_MODES + 2  # numbers of a sample: coordinates, rates, force, slip
+
+NEWTON_TOL = 4e-6  # last step of Newton's method, in bond lengths, as in `shear_solve_kernels`
+MAX_TURNS = 60  # turns of Newton's method
+BEND_TOL = 1e-9  # bend of the forces over the last step of Newton's method that is neglected, over the limit
+MAX_SERIES = 0.5  # slide, in bond lengths, up to which the series is used
+MAX_EXPONENT = 40.0  # slide, in bond lengths, after which nothing is left of a bond
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def shape(x, far):
-    """(f1, f2, exp(-x)) of `point_kernels.shape`, by the series of half of x <= SHORT: f2(2 y) = f2(y)/2 + f1(y)^2/4;
-    far: whether x may be larger, exp(-x) then comes from a 256th of it."""
-    y = 0.5 * (min(x, SHORT) if far else x)
+@njit(**NJIT_INLINE)
+def path_shapes(x, far):
+    """Return the shape functions f1 and f2 of the mean force over a slide of x bond lengths, and exp(-x).
+
+    See `friction.bonds.point_kernels`. The series of half of x is doubled by f2(2 y) = f2(y)/2 + f1(y)^2/4. A
+    larger x takes exp(-x) from its 256th part, so no branch and no call is needed.
+    """
+    y = 0.5 * (min(x, MAX_SERIES) if far else x)
     f2 = 0.5 - y * (
         1 / 6
         - y
@@ -99,7 +139,7 @@ def shape(x, far):
     f1 = 0.5 * f1 * (1 + e)
     e = e * e
     if far:
-        y = min(x, LONG) / 256
+        y = min(x, MAX_EXPONENT) / 256
         d = 1 - y * (
             1
             - y
@@ -114,26 +154,47 @@ def shape(x, far):
         d = d * d
         d = d * d
         d = d * d
-        over = 1 / max(x, SHORT)
+        over = 1 / max(x, MAX_SERIES)
         one = (1 - d) * over
-        f1 = one if x > SHORT else f1
-        f2 = (1 - one) * over if x > SHORT else f2
-        e = d if x > SHORT else e
+        f1 = one if x > MAX_SERIES else f1
+        f2 = (1 - one) * over if x > MAX_SERIES else f2
+        e = d if x > MAX_SERIES else e
     return f1, f2, e
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def add_point(s, workspace, i, j, y, over, far):
-    """Residual and lower half of the Hessian `s` (9) at the step y (3) with what the point j adds."""
+@njit(**NJIT_INLINE)
+def add_point(s, workspace, lane, j, y, over, far):
+    """Add a point to the residual and to the lower half of the Hessian, s (9,), at the increments y.
+
+    Parameters
+    ----------
+    s : tuple of float
+        Residual (3,), then rows of the lower half of the Hessian (6,).
+    workspace : array
+        Rows of the lanes, named at the top of the module.
+    lane : int
+    j : int
+        Number of the point.
+    y : tuple of float
+        Increments of the slide and of the coordinates of the pieces [m].
+    over : float
+        1 over the bond length [1/m].
+    far : bool
+        Whether a slide may exceed MAX_SERIES; a constant of the call.
+
+    Returns
+    -------
+    tuple of float
+    """
     g0, g1, g2, h00, h01, h02, h11, h12, h22 = s
-    a = workspace[(SHAPE + j) * LANES + i]
-    b = workspace[(SHAPE + POINTS + j) * LANES + i]
-    limit = workspace[(OF_POINT + j) * LANES + i]
-    stretch = workspace[(STRETCH + j) * LANES + i]
+    a = workspace[(SHAPES + j) * LANES + lane]
+    b = workspace[(SHAPES + N_POINTS + j) * LANES + lane]
+    limit = workspace[(POINT_LIMITS + j) * LANES + lane]
+    stretch = workspace[(STRETCHES + j) * LANES + lane]
     xi = y[0] - a * y[1] - b * y[2]
     way = 1.0 if xi > 0.0 else -1.0
     x = abs(xi) * over
-    f1, f2, _ = shape(x, far)
+    f1, f2, _ = path_shapes(x, far)
     force = limit * (stretch * f1 + way * x * f2)
     slope = limit * over * (f1 - f2) * max(1 - way * stretch, 0.0)
     return (
@@ -149,26 +210,37 @@ def add_point(s, workspace, i, j, y, over, far):
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def turn(workspace, i, beta, far):
-    """A turn of Newton's method in a lane; where the last step went too far, half of it is taken back."""
-    y0 = workspace[Y * LANES + i]
-    y1 = workspace[(Y + 1) * LANES + i]
-    y2 = workspace[(Y + 2) * LANES + i]
-    p0 = workspace[P * LANES + i]
-    p1 = workspace[(P + 1) * LANES + i]
-    p2 = workspace[(P + 2) * LANES + i]
-    length = workspace[LENGTH * LANES + i]
-    fall = workspace[FALL * LANES + i]
-    done = workspace[DONE * LANES + i]
+@njit(**NJIT_INLINE)
+def take_newton_turn(workspace, lane, beta, far):
+    """Take a turn of Newton's method in a lane; if the last step went too far, half of it is taken back.
+
+    Parameters
+    ----------
+    workspace : array
+        Rows of the lanes, named at the top of the module.
+    lane : int
+    beta : float
+        Give of the slide in a step [m/N].
+    far : bool
+        Whether a slide may exceed MAX_SERIES; a constant of the call.
+    """
+    y0 = workspace[INCREMENTS * LANES + lane]
+    y1 = workspace[(INCREMENTS + 1) * LANES + lane]
+    y2 = workspace[(INCREMENTS + 2) * LANES + lane]
+    p0 = workspace[NEWTON_STEP * LANES + lane]
+    p1 = workspace[(NEWTON_STEP + 1) * LANES + lane]
+    p2 = workspace[(NEWTON_STEP + 2) * LANES + lane]
+    length = workspace[BOND_LENGTH * LANES + lane]
+    fall = workspace[DESCENT * LANES + lane]
+    done = workspace[IS_SOLVED * LANES + lane]
     over = 1 / length
-    one = 0.5 * workspace[KAPPA * LANES + i]
-    two = 0.5 * workspace[(KAPPA + 1) * LANES + i]
+    one = 0.5 * workspace[STIFFNESSES * LANES + lane]
+    two = 0.5 * workspace[(STIFFNESSES + 1) * LANES + lane]
     y = (y0, y1, y2)
     s = (
-        (y0 - workspace[FREE * LANES + i]) / beta,
-        one * (2 * workspace[B * LANES + i] + y1),
-        two * (2 * workspace[(B + 1) * LANES + i] + y2),
+        (y0 - workspace[FREE_SLIDE * LANES + lane]) / beta,
+        one * (2 * workspace[PIECE_POSITION * LANES + lane] + y1),
+        two * (2 * workspace[(PIECE_POSITION + 1) * LANES + lane] + y2),
         1 / beta,
         0.0,
         0.0,
@@ -177,12 +249,12 @@ def turn(workspace, i, beta, far):
         two,
     )
     # one after the other: a loop over them is not taken in several lanes at once
-    s = add_point(s, workspace, i, 0, y, over, far)
-    s = add_point(s, workspace, i, 1, y, over, far)
-    s = add_point(s, workspace, i, 2, y, over, far)
-    s = add_point(s, workspace, i, 3, y, over, far)
-    s = add_point(s, workspace, i, 4, y, over, far)
-    g0, g1, g2, h00, h01, h02, h11, h12, h22 = add_point(s, workspace, i, 5, y, over, far)
+    s = add_point(s, workspace, lane, 0, y, over, far)
+    s = add_point(s, workspace, lane, 1, y, over, far)
+    s = add_point(s, workspace, lane, 2, y, over, far)
+    s = add_point(s, workspace, lane, 3, y, over, far)
+    s = add_point(s, workspace, lane, 4, y, over, far)
+    g0, g1, g2, h00, h01, h02, h11, h12, h22 = add_point(s, workspace, lane, 5, y, over, far)
     back = g0 * p0 + g1 * p1 + g2 * p2 > 0.5 * fall
     r00 = 1 / h00
     l1 = h01 * r00
@@ -194,46 +266,66 @@ def turn(workspace, i, beta, far):
     n2 = -(g2 - l2 * g0 - l3 * r1) / (h22 - l2 * h02 - l3 * m)
     n1 = -r1 * r11 - l3 * n2
     n0 = -g0 * r00 - l1 * n1 - l2 * n2
-    one = workspace[REACH * LANES + i]
-    two = workspace[(REACH + 1) * LANES + i]
+    one = workspace[MAX_SHAPES * LANES + lane]
+    two = workspace[(MAX_SHAPES + 1) * LANES + lane]
     slopes = h00 - 1 / beta
     size = abs(n0) + one * abs(n1) + two * abs(n2)
     least = abs(y0) - one * abs(y1) - two * abs(y2)
     # where no point turns over in this step, what the forces bend in it is told by their slopes, which a drag has not
-    near = size <= NEAR * length or (
-        least > size and slopes * size * size <= CURVED * workspace[LIMIT * LANES + i] * length
+    near = size <= NEWTON_TOL * length or (
+        least > size and slopes * size * size <= BEND_TOL * workspace[LIMIT * LANES + lane] * length
     )
     on = 0.0 if done > 0.0 else 1.0
-    workspace[Y * LANES + i] = y0 + on * (-0.5 * p0 if back else n0)
-    workspace[(Y + 1) * LANES + i] = y1 + on * (-0.5 * p1 if back else n1)
-    workspace[(Y + 2) * LANES + i] = y2 + on * (-0.5 * p2 if back else n2)
-    workspace[P * LANES + i] = 0.5 * p0 if back else n0
-    workspace[(P + 1) * LANES + i] = 0.5 * p1 if back else n1
-    workspace[(P + 2) * LANES + i] = 0.5 * p2 if back else n2
-    workspace[FALL * LANES + i] = 0.5 * fall if back else -(g0 * n0 + g1 * n1 + g2 * n2)
-    workspace[DONE * LANES + i] = 1.0 if done > 0.0 or (near and not back) else 0.0
+    workspace[INCREMENTS * LANES + lane] = y0 + on * (-0.5 * p0 if back else n0)
+    workspace[(INCREMENTS + 1) * LANES + lane] = y1 + on * (-0.5 * p1 if back else n1)
+    workspace[(INCREMENTS + 2) * LANES + lane] = y2 + on * (-0.5 * p2 if back else n2)
+    workspace[NEWTON_STEP * LANES + lane] = 0.5 * p0 if back else n0
+    workspace[(NEWTON_STEP + 1) * LANES + lane] = 0.5 * p1 if back else n1
+    workspace[(NEWTON_STEP + 2) * LANES + lane] = 0.5 * p2 if back else n2
+    workspace[DESCENT * LANES + lane] = 0.5 * fall if back else -(g0 * n0 + g1 * n1 + g2 * n2)
+    workspace[IS_SOLVED * LANES + lane] = 1.0 if done > 0.0 or (near and not back) else 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def moved(s, workspace, i, j, y, over, far):
-    """Move the point j by the step y (3); `s`: its work over the limit, the rise of its square, force and square with
-    what it adds."""
+@njit(**NJIT_INLINE)
+def move_point(s, workspace, lane, j, y, over, far):
+    """Move a point by the increments and add it to the sums s (4,).
+
+    Parameters
+    ----------
+    s : tuple of float
+        Work over the limit, increase of the squares, force and squares of the points.
+    workspace : array
+        Rows of the lanes, named at the top of the module.
+    lane : int
+    j : int
+        Number of the point.
+    y : tuple of float
+        Increments of the slide and of the coordinates of the pieces [m].
+    over : float
+        1 over the bond length [1/m].
+    far : bool
+        Whether a slide may exceed MAX_SERIES; a constant of the call.
+
+    Returns
+    -------
+    tuple of float
+    """
     worked, rise, force, square = s
-    a = workspace[(SHAPE + j) * LANES + i]
-    b = workspace[(SHAPE + POINTS + j) * LANES + i]
-    limit = workspace[(OF_POINT + j) * LANES + i]
-    stretch = workspace[(STRETCH + j) * LANES + i]
-    old = workspace[(SQUARE + j) * LANES + i]
+    a = workspace[(SHAPES + j) * LANES + lane]
+    b = workspace[(SHAPES + N_POINTS + j) * LANES + lane]
+    limit = workspace[(POINT_LIMITS + j) * LANES + lane]
+    stretch = workspace[(STRETCHES + j) * LANES + lane]
+    old = workspace[(SQUARES + j) * LANES + lane]
     xi = y[0] - a * y[1] - b * y[2]
     way = 1.0 if xi > 0.0 else -1.0
     x = abs(xi) * over
-    f1, f2, e = shape(x, far)
-    far_x = min(x, LONG)
+    f1, f2, e = path_shapes(x, far)
+    far_x = min(x, MAX_EXPONENT)
     new = e * (old + 2 * way * stretch * x + x * x) + (2 - e * (far_x * far_x + 2 * far_x + 2))
-    new = new if x < LONG else 2.0
+    new = new if x < MAX_EXPONENT else 2.0
     one = stretch * e + way * (1 - e)
-    workspace[(STRETCH + j) * LANES + i] = one
-    workspace[(SQUARE + j) * LANES + i] = new
+    workspace[(STRETCHES + j) * LANES + lane] = one
+    workspace[(SQUARES + j) * LANES + lane] = new
     return (
         worked + limit * (stretch * f1 + way * x * f2) * xi,
         rise + limit * (new - old),
@@ -242,56 +334,82 @@ def moved(s, workspace, i, j, y, over, far):
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def commit(workspace, i, beta, far):
-    """Move the points and the pieces of a lane by its solved step and add to their sums."""
-    y0 = workspace[Y * LANES + i]
-    y1 = workspace[(Y + 1) * LANES + i]
-    y2 = workspace[(Y + 2) * LANES + i]
-    length = workspace[LENGTH * LANES + i]
-    used = (workspace[FREE * LANES + i] - y0) / beta
+@njit(**NJIT_INLINE)
+def commit_step(workspace, lane, beta, far):
+    """Move the points and the pieces of a lane by its solved step and add to their sums.
+
+    Parameters
+    ----------
+    workspace : array
+        Rows of the lanes, named at the top of the module.
+    lane : int
+    beta : float
+        Give of the slide in a step [m/N].
+    far : bool
+        Whether a slide may exceed MAX_SERIES; a constant of the call.
+    """
+    y0 = workspace[INCREMENTS * LANES + lane]
+    y1 = workspace[(INCREMENTS + 1) * LANES + lane]
+    y2 = workspace[(INCREMENTS + 2) * LANES + lane]
+    length = workspace[BOND_LENGTH * LANES + lane]
+    used = (workspace[FREE_SLIDE * LANES + lane] - y0) / beta
     over = 1 / length
     y = (y0, y1, y2)
-    b1 = workspace[B * LANES + i] + y1
-    b2 = workspace[(B + 1) * LANES + i] + y2
-    s = moved((0.0, 0.0, 0.0, 0.0), workspace, i, 0, y, over, far)
-    s = moved(s, workspace, i, 1, y, over, far)
-    s = moved(s, workspace, i, 2, y, over, far)
-    s = moved(s, workspace, i, 3, y, over, far)
-    s = moved(s, workspace, i, 4, y, over, far)
-    worked, rise, force, square = moved(s, workspace, i, 5, y, over, far)
+    b1 = workspace[PIECE_POSITION * LANES + lane] + y1
+    b2 = workspace[(PIECE_POSITION + 1) * LANES + lane] + y2
+    s = move_point((0.0, 0.0, 0.0, 0.0), workspace, lane, 0, y, over, far)
+    s = move_point(s, workspace, lane, 1, y, over, far)
+    s = move_point(s, workspace, lane, 2, y, over, far)
+    s = move_point(s, workspace, lane, 3, y, over, far)
+    s = move_point(s, workspace, lane, 4, y, over, far)
+    worked, rise, force, square = move_point(s, workspace, lane, 5, y, over, far)
     energy = 0.5 * (
         length * square
-        + workspace[KAPPA * LANES + i] * b1 * b1
-        + workspace[(KAPPA + 1) * LANES + i] * b2 * b2
+        + workspace[STIFFNESSES * LANES + lane] * b1 * b1
+        + workspace[(STIFFNESSES + 1) * LANES + lane] * b2 * b2
     )
     work = used * y0
-    q = workspace[PLACE * LANES + i]
-    gone = work - (energy - workspace[ENERGY * LANES + i])
-    noise = workspace[LIMIT * LANES + i] * (1e-12 * abs(y0) + 1e-15 * abs(q))
-    workspace[B * LANES + i] = b1
-    workspace[(B + 1) * LANES + i] = b2
-    workspace[USED * LANES + i] = used
-    workspace[LOST * LANES + i] += worked - 0.5 * length * rise
-    workspace[BOOKED * LANES + i] += work
-    workspace[PASSED * LANES + i] += abs(work)
-    workspace[SAMPLED * LANES + i] += 0.5 * (workspace[FORCE * LANES + i] + force) * y0
-    workspace[GONE * LANES + i] += gone if gone > -noise else 0.0
-    workspace[CREATED * LANES + i] -= gone if gone < -noise else 0.0
-    workspace[FORCE * LANES + i] = force
-    workspace[ENERGY * LANES + i] = energy
+    q = workspace[RIG_SLIDE * LANES + lane]
+    gone = work - (energy - workspace[INTERFACE_ENERGY * LANES + lane])
+    noise = workspace[LIMIT * LANES + lane] * (1e-12 * abs(y0) + 1e-15 * abs(q))
+    workspace[PIECE_POSITION * LANES + lane] = b1
+    workspace[(PIECE_POSITION + 1) * LANES + lane] = b2
+    workspace[MEAN_FORCE * LANES + lane] = used
+    workspace[LOST * LANES + lane] += worked - 0.5 * length * rise
+    workspace[BOOKED * LANES + lane] += work
+    workspace[PASSED * LANES + lane] += abs(work)
+    workspace[SAMPLED * LANES + lane] += 0.5 * (workspace[FRICTION * LANES + lane] + force) * y0
+    workspace[GONE * LANES + lane] += gone if gone > -noise else 0.0
+    workspace[CREATED * LANES + lane] -= gone if gone < -noise else 0.0
+    workspace[FRICTION * LANES + lane] = force
+    workspace[INTERFACE_ENERGY * LANES + lane] = energy
     # the next guess, as the last three steps went on
     for k in range(3):
-        here = workspace[(Y + k) * LANES + i]
-        last = workspace[(LAST + k) * LANES + i]
-        workspace[(Y + k) * LANES + i] = 3 * (here - last) + workspace[(BEFORE + k) * LANES + i]
-        workspace[(BEFORE + k) * LANES + i] = last
-        workspace[(LAST + k) * LANES + i] = here
+        here = workspace[(INCREMENTS + k) * LANES + lane]
+        last = workspace[(LAST_INCREMENTS + k) * LANES + lane]
+        workspace[(INCREMENTS + k) * LANES + lane] = (
+            3 * (here - last) + workspace[(INCREMENTS_BEFORE + k) * LANES + lane]
+        )
+        workspace[(INCREMENTS_BEFORE + k) * LANES + lane] = last
+        workspace[(LAST_INCREMENTS + k) * LANES + lane] = here
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def flow(workspace, i, k, mode, push):
-    """Move a mode of the rig of a lane by a step, and add what it shows and takes."""
+@njit(**NJIT_INLINE)
+def move_mode(workspace, lane, k, mode, push):
+    """Move a mode of the rig of a lane by a step, and add its outputs and energies.
+
+    Parameters
+    ----------
+    workspace : array
+        Rows of the lanes, named at the top of the module.
+    lane : int
+    k : int
+        Number of the mode.
+    mode : tuple of float
+        Rows of the mode in `rig`.
+    push : tuple of float
+        Columns of the mode in the table.
+    """
     (
         zz,
         zv,
@@ -310,117 +428,162 @@ def flow(workspace, i, k, mode, push):
         rate,
     ) = mode
     more_z, more_v, work_z, work_v, work_f, lost_z, lost_v, lost_f = push
-    z = workspace[(Z + k) * LANES + i]
-    v = workspace[(V + k) * LANES + i]
-    f = slide * workspace[USED * LANES + i]
-    drive = workspace[PUSH * LANES + i]
+    z = workspace[(RIG_POSITION + k) * LANES + lane]
+    v = workspace[(RIG_RATE + k) * LANES + lane]
+    f = slide * workspace[MEAN_FORCE * LANES + lane]
+    drive = workspace[DRIVE * LANES + lane]
     z1 = zz * z + zv * v - by_z * f + drive * more_z
     v1 = vz * z + vv * v - by_v * f + drive * more_v
-    workspace[WORK * LANES + i] += drive * (work_z * z + work_v * v - work_f * f)
-    workspace[LOSS_NOW * LANES + i] += (
+    workspace[DRIVE_WORK * LANES + lane] += drive * (work_z * z + work_v * v - work_f * f)
+    workspace[VISCOUS_LOSS * LANES + lane] += (
         drive * (lost_z * z + lost_v * v - lost_f * f)
         + (loss_zz * z + loss_zv * v - loss_zf * f) * z
         + (loss_vv * v - loss_vf * f) * v
         + loss_ff * f * f
     )
-    workspace[(Z + k) * LANES + i] = z1
-    workspace[(V + k) * LANES + i] = v1
-    workspace[PLACE * LANES + i] += slide * z1
-    workspace[OUT * LANES + i] += output * z1
-    workspace[RATE * LANES + i] += output * v1
-    workspace[MOVING * LANES + i] += v1 * v1 + rate * z1 * z1
+    workspace[(RIG_POSITION + k) * LANES + lane] = z1
+    workspace[(RIG_RATE + k) * LANES + lane] = v1
+    workspace[RIG_SLIDE * LANES + lane] += slide * z1
+    workspace[OUTPUT * LANES + lane] += output * z1
+    workspace[OUTPUT_RATE * LANES + lane] += output * v1
+    workspace[RATE_SQUARES * LANES + lane] += v1 * v1 + rate * z1 * z1
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def opened(workspace, i, work, lost, cosine, sine):
-    """Begin the sums of a step of a lane over the modes, with what the drive alone gives and takes of 1 m s-2."""
-    out = workspace[OUT * LANES + i]
-    square = workspace[PUSH * LANES + i] * workspace[PUSH * LANES + i]
-    workspace[COS * LANES + i] += out * cosine
-    workspace[SIN * LANES + i] += out * sine
-    workspace[OUT0 * LANES + i] = out
-    workspace[RATE0 * LANES + i] = workspace[RATE * LANES + i]
-    workspace[WORK * LANES + i] = square * work
-    workspace[LOSS_NOW * LANES + i] = square * lost
-    workspace[PLACE * LANES + i] = workspace[OUT * LANES + i] = workspace[
-        RATE * LANES + i
-    ] = workspace[MOVING * LANES + i] = 0.0
+@njit(**NJIT_INLINE)
+def start_sums(workspace, lane, work, lost, cosine, sine):
+    """Start the sums of a step over the modes with what the drive alone does.
+
+    Parameters
+    ----------
+    workspace : array
+        Rows of the lanes, named at the top of the module.
+    lane : int
+    work : float
+        Constant part of its work [J].
+    lost : float
+        Constant part of the viscous loss [J].
+    cosine : float
+        Of the drive at the start of the step.
+    sine : float
+    """
+    out = workspace[OUTPUT * LANES + lane]
+    square = workspace[DRIVE * LANES + lane] * workspace[DRIVE * LANES + lane]
+    workspace[COS_SUM * LANES + lane] += out * cosine
+    workspace[SIN_SUM * LANES + lane] += out * sine
+    workspace[LAST_OUTPUT * LANES + lane] = out
+    workspace[LAST_OUTPUT_RATE * LANES + lane] = workspace[OUTPUT_RATE * LANES + lane]
+    workspace[DRIVE_WORK * LANES + lane] = square * work
+    workspace[VISCOUS_LOSS * LANES + lane] = square * lost
+    workspace[RIG_SLIDE * LANES + lane] = workspace[OUTPUT * LANES + lane] = workspace[
+        OUTPUT_RATE * LANES + lane
+    ] = workspace[RATE_SQUARES * LANES + lane] = 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def closed(workspace, i, half_mass):
-    """Add a step of a lane to the sums of its run and cycle."""
-    place = workspace[PLACE * LANES + i]
-    out = workspace[OUT * LANES + i]
-    work = workspace[WORK * LANES + i]
-    workspace[WORK_IN * LANES + i] += work
-    workspace[POWER * LANES + i] += abs(work)
-    workspace[VISCOUS * LANES + i] += workspace[LOSS_NOW * LANES + i]
-    held = workspace[ENERGY * LANES + i] + half_mass * workspace[MOVING * LANES + i]
-    workspace[PEAK * LANES + i] = max(workspace[PEAK * LANES + i], held)
-    workspace[FAR * LANES + i] = max(workspace[FAR * LANES + i], abs(place))
-    workspace[LOW * LANES + i] = min(workspace[LOW * LANES + i], out)
-    workspace[HIGH * LANES + i] = max(workspace[HIGH * LANES + i], out)
-    workspace[SLIP * LANES + i] = (
+@njit(**NJIT_INLINE)
+def finish_sums(workspace, lane, half_mass):
+    """Add a step of a lane to the sums of its run and of its cycle.
+
+    Parameters
+    ----------
+    workspace : array
+        Rows of the lanes, named at the top of the module.
+    lane : int
+    half_mass : float
+        Half of the modal mass [kg].
+    """
+    place = workspace[RIG_SLIDE * LANES + lane]
+    out = workspace[OUTPUT * LANES + lane]
+    work = workspace[DRIVE_WORK * LANES + lane]
+    workspace[WORK_IN * LANES + lane] += work
+    workspace[POWER * LANES + lane] += abs(work)
+    workspace[VISCOUS * LANES + lane] += workspace[VISCOUS_LOSS * LANES + lane]
+    held = (
+        workspace[INTERFACE_ENERGY * LANES + lane]
+        + half_mass * workspace[RATE_SQUARES * LANES + lane]
+    )
+    workspace[PEAK * LANES + lane] = max(workspace[PEAK * LANES + lane], held)
+    workspace[MAX_SLIDE * LANES + lane] = max(workspace[MAX_SLIDE * LANES + lane], abs(place))
+    workspace[MIN_OUTPUT * LANES + lane] = min(workspace[MIN_OUTPUT * LANES + lane], out)
+    workspace[MAX_OUTPUT * LANES + lane] = max(workspace[MAX_OUTPUT * LANES + lane], out)
+    workspace[SLIP * LANES + lane] = (
         place
-        - workspace[MEAN * LANES + i] * workspace[B * LANES + i]
-        - workspace[(MEAN + 1) * LANES + i] * workspace[(B + 1) * LANES + i]
-        - workspace[LENGTH * LANES + i]
-        * workspace[FORCE * LANES + i]
-        / workspace[LIMIT * LANES + i]
+        - workspace[MEAN_SHAPES * LANES + lane] * workspace[PIECE_POSITION * LANES + lane]
+        - workspace[(MEAN_SHAPES + 1) * LANES + lane]
+        * workspace[(PIECE_POSITION + 1) * LANES + lane]
+        - workspace[BOND_LENGTH * LANES + lane]
+        * workspace[FRICTION * LANES + lane]
+        / workspace[LIMIT * LANES + lane]
     )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def begun(workspace, i, rig, row):
-    """Set the free slide of a step, from the motion at its start."""
-    free = workspace[PUSH * LANES + i] * row[PORT]
-    for k in range(RIG):
+@njit(**NJIT_INLINE)
+def set_free_slide(workspace, lane, rig, row):
+    """Set the free slide of a step from the motion at its start.
+
+    Parameters
+    ----------
+    workspace : array
+        Rows of the lanes, named at the top of the module.
+    lane : int
+    rig : (N_RIG_ROWS + 1, 3) array
+        Rows of the modes of the rig.
+    row : (N_COLUMNS,) array
+        Row of the table of the step.
+    """
+    free = workspace[DRIVE * LANES + lane] * row[PORT_SLIDE]
+    for k in range(N_RIG_MODES):
         free += (
-            rig[REACH_Z, k] * workspace[(Z + k) * LANES + i]
-            + rig[REACH_V, k] * workspace[(V + k) * LANES + i]
+            rig[REACH_Z, k] * workspace[(RIG_POSITION + k) * LANES + lane]
+            + rig[REACH_V, k] * workspace[(RIG_RATE + k) * LANES + lane]
         )
-    workspace[FREE * LANES + i] = free
-    workspace[DONE * LANES + i] = workspace[FALL * LANES + i] = 0.0
-    workspace[P * LANES + i] = workspace[(P + 1) * LANES + i] = workspace[(P + 2) * LANES + i] = 0.0
+    workspace[FREE_SLIDE * LANES + lane] = free
+    workspace[IS_SOLVED * LANES + lane] = workspace[DESCENT * LANES + lane] = 0.0
+    workspace[NEWTON_STEP * LANES + lane] = workspace[(NEWTON_STEP + 1) * LANES + lane] = workspace[
+        (NEWTON_STEP + 2) * LANES + lane
+    ] = 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def beyond(workspace, lengths):
-    """Number of lanes in which a point may slide farther than so many bond lengths in the step, or as far as nan."""
+@njit(**NJIT_INLINE)
+def count_long_slides(workspace, lengths):
+    """Return the number of lanes in which a point may slide further than so many bond lengths, or by nan."""
     near = 0.0
-    for i in range(LANES):
+    for lane in range(LANES):
         far = (
-            abs(workspace[Y * LANES + i])
-            + workspace[REACH * LANES + i] * abs(workspace[(Y + 1) * LANES + i])
-            + workspace[(REACH + 1) * LANES + i] * abs(workspace[(Y + 2) * LANES + i])
+            abs(workspace[INCREMENTS * LANES + lane])
+            + workspace[MAX_SHAPES * LANES + lane] * abs(workspace[(INCREMENTS + 1) * LANES + lane])
+            + workspace[(MAX_SHAPES + 1) * LANES + lane]
+            * abs(workspace[(INCREMENTS + 2) * LANES + lane])
         )
-        near += 1.0 if far <= lengths * workspace[LENGTH * LANES + i] else 0.0
+        near += 1.0 if far <= lengths * workspace[BOND_LENGTH * LANES + lane] else 0.0
     return LANES - near
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def left(workspace):
-    """Number of lanes whose step is not solved."""
+@njit(**NJIT_INLINE)
+def count_unsolved(workspace):
+    """Return the number of lanes whose step is not solved."""
     done = 0.0
-    for i in range(LANES):
-        done += workspace[DONE * LANES + i]
+    for lane in range(LANES):
+        done += workspace[IS_SOLVED * LANES + lane]
     return LANES - done
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def turned(workspace, dt):
-    """Take the extremes of the output inside a step into those of the cycle, by the cubic through values and rates as
-    `passing_kernels.shown` has it."""
+def update_extremes(workspace, dt):
+    """Update the extremes of the cycle with those inside a step, as `passing_kernels.read_cycle` finds them."""
     turns = 0.0
-    for i in range(LANES):
-        turns += 1.0 if workspace[RATE0 * LANES + i] * workspace[RATE * LANES + i] < 0.0 else 0.0
-    for i in range(LANES if turns > 0.0 else 0):
-        if workspace[RATE0 * LANES + i] * workspace[RATE * LANES + i] < 0.0:
-            a = workspace[OUT0 * LANES + i]
-            b = workspace[OUT * LANES + i]
-            p = workspace[RATE0 * LANES + i] * dt
-            r = workspace[RATE * LANES + i] * dt
+    for lane in range(LANES):
+        turns += (
+            1.0
+            if workspace[LAST_OUTPUT_RATE * LANES + lane] * workspace[OUTPUT_RATE * LANES + lane]
+            < 0.0
+            else 0.0
+        )
+    for lane in range(LANES if turns > 0.0 else 0):
+        if workspace[LAST_OUTPUT_RATE * LANES + lane] * workspace[OUTPUT_RATE * LANES + lane] < 0.0:
+            a = workspace[LAST_OUTPUT * LANES + lane]
+            b = workspace[OUTPUT * LANES + lane]
+            p = workspace[LAST_OUTPUT_RATE * LANES + lane] * dt
+            r = workspace[OUTPUT_RATE * LANES + lane] * dt
             big = 2 * (a - b) + p + r
             mid = 3 * (b - a) - 2 * p - r
             root = sqrt(max(mid * mid - 3 * big * p, 0.0))
@@ -428,42 +591,56 @@ def turned(workspace, dt):
                 s = -p / (mid + sign * root)
                 if 0.0 <= s <= 1.0:
                     value = a + p * s + mid * s * s + big * s * s * s
-                    workspace[LOW * LANES + i] = min(workspace[LOW * LANES + i], value)
-                    workspace[HIGH * LANES + i] = max(workspace[HIGH * LANES + i], value)
+                    workspace[MIN_OUTPUT * LANES + lane] = min(
+                        workspace[MIN_OUTPUT * LANES + lane], value
+                    )
+                    workspace[MAX_OUTPUT * LANES + lane] = max(
+                        workspace[MAX_OUTPUT * LANES + lane], value
+                    )
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def step(workspace, rig, row):
-    """Move all lanes by a step."""
-    beta = rig[RIGS, 0]
-    for i in range(LANES):
-        begun(workspace, i, rig, row)
-    for _ in range(MOST):
-        if beyond(workspace, SHORT) == 0.0:
-            for i in range(LANES):
-                turn(workspace, i, beta, False)
+@njit(**NJIT_INLINE)
+def march_step(workspace, rig, row):
+    """March all lanes by a step.
+
+    Parameters
+    ----------
+    workspace : array
+        Rows of the lanes, named at the top of the module.
+    rig : (N_RIG_ROWS + 1, 3) array
+        Rows of the modes of the rig.
+    row : (N_COLUMNS,) array
+        Row of the table of the step.
+    """
+    beta = rig[N_RIG_ROWS, 0]
+    for lane in range(LANES):
+        set_free_slide(workspace, lane, rig, row)
+    for _ in range(MAX_TURNS):
+        if count_long_slides(workspace, MAX_SERIES) == 0.0:
+            for lane in range(LANES):
+                take_newton_turn(workspace, lane, beta, False)
         else:
-            for i in range(LANES):
-                turn(workspace, i, beta, True)
-        if left(workspace) == 0.0:
+            for lane in range(LANES):
+                take_newton_turn(workspace, lane, beta, True)
+        if count_unsolved(workspace) == 0.0:
             break
-    if left(workspace) > 0.0:
-        for i in range(LANES):
-            workspace[BAD * LANES + i] += 1.0 - workspace[DONE * LANES + i]
-    if beyond(workspace, SHORT) == 0.0:
-        for i in range(LANES):
-            commit(workspace, i, beta, False)
+    if count_unsolved(workspace) > 0.0:
+        for lane in range(LANES):
+            workspace[N_UNSOLVED * LANES + lane] += 1.0 - workspace[IS_SOLVED * LANES + lane]
+    if count_long_slides(workspace, MAX_SERIES) == 0.0:
+        for lane in range(LANES):
+            commit_step(workspace, lane, beta, False)
     else:
-        for i in range(LANES):
-            commit(workspace, i, beta, True)
-    work = row[REST]
-    lost = row[REST + 1]
-    cosine = row[WAVE]
-    sine = row[WAVE + 1]
-    half_mass = 0.5 * rig[RIGS, 1]
-    for i in range(LANES):
-        opened(workspace, i, work, lost, cosine, sine)
-    for k in range(RIG):
+        for lane in range(LANES):
+            commit_step(workspace, lane, beta, True)
+    work = row[REMAINDERS]
+    lost = row[REMAINDERS + 1]
+    cosine = row[WAVES]
+    sine = row[WAVES + 1]
+    half_mass = 0.5 * rig[N_RIG_ROWS, 1]
+    for lane in range(LANES):
+        start_sums(workspace, lane, work, lost, cosine, sine)
+    for k in range(N_RIG_MODES):
         mode = (
             rig[ZZ, k],
             rig[ZV, k],
@@ -477,61 +654,74 @@ def step(workspace, rig, row):
             rig[LOSS + 3, k],
             rig[LOSS + 4, k],
             rig[LOSS + 5, k],
-            rig[SLIDE, k],
-            rig[OUTPUT, k],
-            rig[RATES, k],
+            rig[SLIDE_SHAPE, k],
+            rig[OUTPUT_SHAPE, k],
+            rig[OMEGA_SQUARE, k],
         )
         push = (
             row[BY_DRIVE + k],
-            row[BY_DRIVE + RIG + k],
-            row[WORKS + k],
-            row[WORKS + RIG + k],
-            row[WORKS + 2 * RIG + k],
-            row[LOSSES + k],
-            row[LOSSES + RIG + k],
-            row[LOSSES + 2 * RIG + k],
+            row[BY_DRIVE + N_RIG_MODES + k],
+            row[WORK_FORMS + k],
+            row[WORK_FORMS + N_RIG_MODES + k],
+            row[WORK_FORMS + 2 * N_RIG_MODES + k],
+            row[LOSS_FORMS + k],
+            row[LOSS_FORMS + N_RIG_MODES + k],
+            row[LOSS_FORMS + 2 * N_RIG_MODES + k],
         )
-        for i in range(LANES):
-            flow(workspace, i, k, mode, push)
-    for i in range(LANES):
-        closed(workspace, i, half_mass)
-    turned(workspace, rig[RIGS, 2])
+        for lane in range(LANES):
+            move_mode(workspace, lane, k, mode, push)
+    for lane in range(LANES):
+        finish_sums(workspace, lane, half_mass)
+    update_extremes(workspace, rig[N_RIG_ROWS, 2])
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def keep(workspace, sample):
-    """Write the sample (KEPT, LANES) of all lanes."""
-    for i in range(LANES):
-        for k in range(2 * RIG):
-            sample[k, i] = workspace[k * LANES + i]
-        sample[2 * RIG, i] = workspace[FORCE * LANES + i]
-        sample[2 * RIG + 1, i] = workspace[SLIP * LANES + i]
+def store_samples(workspace, sample):
+    """Write the samples (N_SAMPLE, LANES) of all lanes."""
+    for lane in range(LANES):
+        for k in range(2 * N_RIG_MODES):
+            sample[k, lane] = workspace[k * LANES + lane]
+        sample[2 * N_RIG_MODES, lane] = workspace[FRICTION * LANES + lane]
+        sample[2 * N_RIG_MODES + 1, lane] = workspace[SLIP * LANES + lane]
 
 
 @njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
 def march(workspace, rig, table, history, samples, work):
-    """March all lanes over cycles, the last of which are kept.
+    """March all lanes over cycles, of which the last ones are kept.
 
-    workspace (NUMBERS * LANES,): of the lanes; rig (RIGS + 1, 3): of the rig that they share; table (s, COLUMNS): of the
-    steps of a cycle; history (c, 4, LANES) [m]: least and largest output of a cycle, real and imaginary part of its
-    phasor; samples (w s + 1, KEPT, LANES): of the last w cycles; work (LANES,) [J]: friction work before these.
+    Parameters
+    ----------
+    workspace : array
+        Rows of the lanes, named at the top of the module.
+    rig : (N_RIG_ROWS + 1, 3) array
+        Rows of the modes of the rig.
+    table : (s, N_COLUMNS) array
+        Rows of the steps of a cycle.
+    history : (c, 4, LANES) array
+        Smallest and largest output of each cycle, and its phasor [m]; it is written.
+    samples : (w s + 1, N_SAMPLE, LANES) array
+        Samples of the last w cycles; it is written.
+    work : (LANES,) array
+        Friction work before these cycles [J]; it is written.
     """
     steps = table.shape[0]
     cycles = history.shape[0]
     first = cycles - (samples.shape[0] - 1) // steps
     for c in range(cycles):
-        for i in range(LANES):
-            workspace[LOW * LANES + i] = workspace[HIGH * LANES + i] = workspace[OUT * LANES + i]
-            workspace[COS * LANES + i] = workspace[SIN * LANES + i] = 0.0
+        for lane in range(LANES):
+            workspace[MIN_OUTPUT * LANES + lane] = workspace[MAX_OUTPUT * LANES + lane] = workspace[
+                OUTPUT * LANES + lane
+            ]
+            workspace[COS_SUM * LANES + lane] = workspace[SIN_SUM * LANES + lane] = 0.0
             if c == first:
-                work[i] = workspace[BOOKED * LANES + i]
+                work[lane] = workspace[BOOKED * LANES + lane]
         for s in range(steps):
             if c >= first:
-                keep(workspace, samples[(c - first) * steps + s])
-            step(workspace, rig, table[s])
-        for i in range(LANES):
-            history[c, 0, i] = workspace[LOW * LANES + i]
-            history[c, 1, i] = workspace[HIGH * LANES + i]
-            history[c, 2, i] = 2 * workspace[COS * LANES + i] / steps
-            history[c, 3, i] = -2 * workspace[SIN * LANES + i] / steps
-    keep(workspace, samples[samples.shape[0] - 1])
+                store_samples(workspace, samples[(c - first) * steps + s])
+            march_step(workspace, rig, table[s])
+        for lane in range(LANES):
+            history[c, 0, lane] = workspace[MIN_OUTPUT * LANES + lane]
+            history[c, 1, lane] = workspace[MAX_OUTPUT * LANES + lane]
+            history[c, 2, lane] = 2 * workspace[COS_SUM * LANES + lane] / steps
+            history[c, 3, lane] = -2 * workspace[SIN_SUM * LANES + lane] / steps
+    store_samples(workspace, samples[samples.shape[0] - 1])

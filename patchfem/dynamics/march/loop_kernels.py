@@ -1,11 +1,10 @@
-"""The compiled loop where faces and modes meet, and its twin for a slide that is given.
+"""The compiled loop of the march, and its counterpart for a prescribed slide.
 
 Over a step the modes move exactly under the path means of the friction forces along the straight increments of slide,
-which do exactly the work of the laws: the sum of all energies never rises by itself. The faces are one contact, or
-elements beside it or in its place (`faces_kernels`), of which the set-valued ones say too at what speed the step ends
-(`stops_kernels`); the load stays, or changes (`pressing_kernels`). The text runs with any of them: `instances` makes an
-instance of it per contact, of a module with solve, given, commit and state as those named here, and per set of parts,
-and what a rig does not have is not compiled.
+which do exactly the work of the laws: the sum of all energies never grows by itself. What rubs is one contact, or elements
+beside it or in its place (`faces_kernels`); the load is constant or varies (`pressing_kernels`). A contact is a module with
+`solve`, `given`, `commit` and `state`, as `interfaces.element_kernels` has them. `instances` makes an instance of this text
+per contact and set of parts, and what a rig does not have is not compiled.
 """
 
 from ...compiled.jit import njit
@@ -13,58 +12,106 @@ from ...contact.set_arrays import REFERENCE_LOAD
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..interfaces import element_kernels as contact
 from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
-from . import faces_kernels as faces
+from . import faces_kernels as coupling
 from . import parts_kernels as parts
 from . import pressing_kernels as pressing
 
-# numba leaves branches out
-MANY, STOPS, PRESSED, LISTED = (
-    parts.MANY,
-    parts.STOPS,
-    parts.PRESSED,
-    parts.LISTED,
-)
-UNFIT = 4  # status where no contact set fits
+# Numba leaves out the branches of flags that are False.
+HAS_ELEMENTS = parts.HAS_ELEMENTS
+HAS_STOPS = parts.HAS_STOPS
+LOAD_VARIES = parts.LOAD_VARIES
+HAS_LISTS = parts.HAS_LISTS
+# Status of a march.
+FINISHED = 0
+EXCEEDS_TRAVEL = 1
+MEMORY_FULL = 2
+NOT_FINITE = 3
+NO_CONTACT_SET = 4
+N_UNCONVERGED = 7  # place of the number of steps without convergence in the ledger
+DISSIPATED = 3  # place of the dissipated energy in the ledger
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def seen(i, last, drive, motion, modal_system, row, c, j, n):
-    """Sample i as (slide, its rate, output; force, energy and slip of the interface; energy of what stands beside it),
-    written into its row; drive: acceleration of the step before."""
+def sample_interface(i, last, drive, motion, modal_system, row, interface, faces, press):
+    """Sample modes and interface at the start of a step and write them into a row.
+
+    Parameters
+    ----------
+    i : int
+        Number of the sample.
+    last : bool
+        Whether it is the last sample.
+    drive : float
+        Acceleration of the base in the step before [m s-2].
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    row : (k,) array
+        Row of samples of `loop_kernels.march`; it is written.
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+    press : interfaces.arrays.Pressing or Steady
+
+    Returns
+    -------
+    tuple
+        Slide [m], its speed [m/s] and output [m]; force [N], energy [J] and slip [m] of the interface; energy beside it [J].
+    """
     q, v, out = sample(row, motion, modal_system.slide, modal_system.output)
     force = 0.0
     energy = 0.0
     slip = 0.0
     beside = 0.0
-    if PRESSED:
-        beside = pressing.pressed(i, last, motion, modal_system.mass, c, j, n, row)
-        if n.slot[0] < 0:
+    if LOAD_VARIES:
+        beside = pressing.sample_load(
+            i, last, motion, modal_system.mass, interface, faces, press, row
+        )
+        if press.slot[0] < 0:
             return q, v, out, force, energy, slip, beside
-    if MANY:
-        force, energy, slip, springs = faces.sampled(q, v, motion, row, c, j)
+    if HAS_ELEMENTS:
+        force, energy, slip, springs = coupling.sample_elements(q, v, motion, row, interface, faces)
         beside += springs
-        if STOPS:
+        if HAS_STOPS:
             if i > 0:
-                force = faces.held(motion, modal_system, drive, force, row, j)
+                force = coupling.sample_set_valued(motion, modal_system, drive, force, row, faces)
     else:
-        force, energy, slip = contact.state(c, q, v)
+        force, energy, slip = contact.state(interface, q, v)
     return q, v, out, force, energy, slip, beside
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def march(first, steps, motion, modal_system, table, c, j, n, travel, ledger, rows):
-    """March `steps` steps, the first by row `first` of the table (in turns); 0.1-0.3 us a step, a few ns per point.
+def march(first, steps, motion, modal_system, table, interface, faces, press, travel, ledger, rows):
+    """March a number of steps, at 0.1 to 0.3 us per step and a few ns per point.
 
-    motion (2, n): coordinates and rates; table: of `propagator.Propagator`; c: the contact on port 0; j: Faces, or
-    Single; n: Pressing, or Steady (all of `contacts.arrays`);
-    ledger (9,): work in, viscous loss, |work in| per step, friction loss, peak stored, iterations, worst iterations,
-    steps without convergence, friction work;
-    rows (steps + 1, 2 n + 7 + ...): z, z', q, q', F, slip, mean force of the step that follows, energy in the
-    interface, friction work of the step that follows [J], of the contact or else the first element; then slide, speed,
-    force, slip and mean force of the step that follows of every element, of which the springs' energy does not count;
-    under a load that changes then load, moment, energy of the preloaded contact, heave and pitch.
-    Returns (steps done, status): 0 finished, 1 travel exceeded, 2 memory of the contact full, 3 not finite, 4 no
-    contact set fits.
+    Parameters
+    ----------
+    first : int
+        Row of the table for the first step; the rows are used in turns.
+    steps : int
+        Number of steps.
+    motion, modal_system, table
+        Coordinates and rates of the modes (2, n), their arrays, and the table of `propagator.Propagator`.
+    interface, faces, press
+        Arrays of the contact on port 0, of the elements and of the load, in `interfaces.arrays`.
+    travel : float
+        Largest displacement of the output [m], beyond which the march ends.
+    ledger : (9,) array
+        Energy balance [J] and counters, updated in place: work of the drive, viscous loss, sum of the absolute
+        works of the steps, dissipated energy, largest stored energy, iterations, most iterations of a step, steps
+        without convergence, friction work.
+    rows : (steps + 1, k) array
+        Samples, which are written. Columns: modes and their rates; of the contact, or else the first element,
+        slide, speed, force, slip, mean force of the step that follows, energy, friction work of the step that
+        follows; of every element slide, speed, force, slip and mean force of the step that follows; under a load
+        that varies load, moment, energy of the preloaded contact, heave and pitch.
+
+    Returns
+    -------
+    int
+        Number of steps that are done.
+    int
+        Status, named at the top of the module.
     """
     slide = modal_system.slide
     dt = modal_system.dt
@@ -73,17 +120,17 @@ def march(first, steps, motion, modal_system, table, c, j, n, travel, ledger, ro
     accel = modal_system.workspace[0]
     scratch = modal_system.workspace[1:]
     beta = modal_system.beta
-    if PRESSED:
-        n.few[:] = 0.0
-        n.few[0] = n.sets.reference[REFERENCE_LOAD]
+    if LOAD_VARIES:
+        press.few[:] = 0.0
+        press.few[0] = press.sets.reference[REFERENCE_LOAD]
     for i in range(steps + 1):
-        drive = table[(first + i - 1) % around, 4 * size + 2] if STOPS else 0.0
-        q, v, out, force, energy, slip, beside = seen(
-            i, i == steps, drive, motion, modal_system, rows[i], c, j, n
+        drive = table[(first + i - 1) % around, 4 * size + 2] if HAS_STOPS else 0.0
+        q, v, out, force, energy, slip, beside = sample_interface(
+            i, i == steps, drive, motion, modal_system, rows[i], interface, faces, press
         )
-        if PRESSED:
-            if n.slot[0] < 0:
-                return i, UNFIT
+        if LOAD_VARIES:
+            if press.slot[0] < 0:
+                return i, NO_CONTACT_SET
         status = note(
             rows[i, : size + 6],
             force,
@@ -99,28 +146,28 @@ def march(first, steps, motion, modal_system, table, c, j, n, travel, ledger, ro
         if i == steps:
             break
         at = (first + i) % around
-        if PRESSED:
+        if LOAD_VARIES:
             dq, used, count = pressing.solve_coupled_forces(
-                i, q, v, motion, modal_system, table, at, c, j, n
+                i, q, v, motion, modal_system, table, at, interface, faces, press
             )
-            if n.slot[0] < 0:
-                return i, UNFIT
-        elif MANY:
-            faces.begun(motion, modal_system, table, at, dt, j)
-            dq, count = faces.solved(q, v, motion, modal_system, table, at, c, j)
+            if press.slot[0] < 0:
+                return i, NO_CONTACT_SET
+        elif HAS_ELEMENTS:
+            coupling.prepare_step(motion, modal_system, table, at, dt, faces)
+            dq, count = coupling.solve_step(q, v, motion, modal_system, table, at, interface, faces)
         else:
             free = free_slide(motion, modal_system.reach, 0, table, at)
-            dq, _, count = contact.solve(free, beta, q, v, dt, c, j.goal[0])
+            dq, _, count = contact.solve(free, beta, q, v, dt, interface, faces.goal[0])
             used = (free - dq) / beta
-        if MANY:
-            faces.pushed(modal_system, j, accel)
-            work = faces.worked(dq, rows[i], j)
+        if HAS_ELEMENTS:
+            coupling.set_accelerations(modal_system, faces, accel)
+            work = coupling.friction_work(dq, rows[i], faces)
         else:
             push_back(used, slide, modal_system.mass, accel)
             rows[i, size + 4] = used
             work = used * dq
-            if PRESSED:
-                pressing.pushed(n, modal_system.mass, accel)
+            if LOAD_VARIES:
+                pressing.add_press_accelerations(press, modal_system.mass, accel)
         move(
             motion,
             modal_system.free,
@@ -134,50 +181,66 @@ def march(first, steps, motion, modal_system, table, c, j, n, travel, ledger, ro
             scratch,
             ledger,
         )
-        if STOPS:
-            blow = faces.blown(motion, modal_system.mass, j)
+        if HAS_STOPS:
+            blow = coupling.strike_modes(motion, modal_system.mass, faces)
             work += blow
-            ledger[3] += blow
+            ledger[DISSIPATED] += blow
         tell(count, work, ledger)
         rows[i, size + 6] = work
-        if MANY:
-            lost, ok = faces.committed(q, v, dq, motion, modal_system, c, j)
+        if HAS_ELEMENTS:
+            lost, ok = coupling.commit_step(q, v, dq, motion, modal_system, interface, faces)
         else:
             after = 0.0
             for k in range(slide.size):
                 after += slide[k] * motion[1, k]
-            lost, ok = contact.commit(dq, used, q, v, after, dt, c)
-        ledger[3] += lost
+            lost, ok = contact.commit(dq, used, q, v, after, dt, interface)
+        ledger[DISSIPATED] += lost
         if not ok:
-            if PRESSED and not LISTED:
-                ledger[7] += 1.0
+            if LOAD_VARIES and not HAS_LISTS:
+                ledger[N_UNCONVERGED] += 1.0
             else:
-                return i, 2
-    return steps, 0
+                return i, MEMORY_FULL
+    return steps, FINISHED
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def follow(path, dt, c, goal, lost, forces):
-    """Resultant along a slide path (k,) [m] that is given, with steps of dt [s].
+def follow(path, dt, interface, goal, lost, forces):
+    """Move a contact along a prescribed slide.
 
-    forces (k, 3): force at the sample, at the mean speed of the steps beside it, mean over the step that follows,
-    irreversible slip; lost (k, 2): energy dissipated in the step that follows, energy stored at the sample. Returns the
-    steps that did not converge or found the memory of the contact full.
+    Parameters
+    ----------
+    path : (k,) array
+        Slides at the samples [m].
+    dt : float
+        Length of the step [s].
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    goal : float
+        Tolerance of a step [N].
+    lost : (k, 2) array
+        Energy dissipated in the step that follows and energy stored at the sample [J]; it is written.
+    forces : (k, 3) array
+        Force at the sample, mean force of the step that follows [N] and irreversible slip [m]; it is written.
+
+    Returns
+    -------
+    int
+        Number of steps that did not converge or found the memory of the contact full.
     """
     bad = 0
     before = 0.0
     for i in range(path.size):
         dq = path[i + 1] - path[i] if i < path.size - 1 else before * dt
         v = dq / dt if dt > 0 else 0.0
-        force, energy, slip = contact.state(c, path[i], 0.5 * (before + v) if i else v)
+        force, energy, slip = contact.state(interface, path[i], 0.5 * (before + v) if i else v)
         forces[i, 0] = force
         forces[i, 2] = slip
         lost[i, 1] = energy
         if i == path.size - 1:
             break
-        mean, good = contact.given(dq, path[i], v, dt, c, goal)
+        mean, good = contact.given(dq, path[i], v, dt, interface, goal)
         forces[i, 1] = mean
-        lost[i, 0], ok = contact.commit(dq, mean, path[i], v, v, dt, c)
+        lost[i, 0], ok = contact.commit(dq, mean, path[i], v, v, dt, interface)
         bad += not (good and ok)
         before = v
     return bad

@@ -1,9 +1,10 @@
-"""From the results of the stages to the arrays of the compiled loop, and the march in pieces of one drive cycle."""
+"""The march of a model in pieces of one or some drive cycles, and what is kept of it."""
 
 from collections import deque
 from copy import copy
 from dataclasses import dataclass, replace
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -21,28 +22,36 @@ from ..interfaces import arrays
 from ..interfaces.arrays import ModalArrays
 from ..periodicity import APART, ahead, looked_at, until_look
 from ..propagator import propagator
-from .capacity import keep, lengthened
+from .capacity import copy_state, enlarge_list
 from .faces import GOAL, faces_of
 from .models import ContactModel, free_model, load_kernels
 
-# status of a loop whose list of bonds is full, and where no contact set fits the motion
-FULL, UNFIT = (
-    2,
-    4,
-)
-FLUNG = 10.0  # times beyond its stop that no step ends which followed the motion
-EACH = 5  # columns of an element in a row, as of `faces_kernels`
-AT_ONCE, PIECES = 8000, 16  # steps and cycles of a piece of a run of which nothing is kept
+# Status of `loop_kernels.march` if a list of bonds is full, and if no contact set fits the motion.
+FULL = 2
+UNFIT = 4
+FLUNG = 10.0  # times beyond the travel at which a step cannot have followed the motion
+ELEMENT_COLUMNS = 5  # columns of an element in a row, as in `faces_kernels`
+MAX_PIECE_STEPS = 8000  # number of steps of a piece of a march
+MAX_PIECE_CYCLES = 16  # number of cycles of a piece of a march
 PASSING = "dynamics.march.passing_kernels"
-# of its size, by which a motion that repeats may still change in all that is left of it
-REPEATS = 1e-12
-SUMS = [0, 1, 2, 3, 5, 7, 8]  # of the ledger: what grows from cycle to cycle
+PERIODIC_TOL = 1e-12  # change of a periodic motion in all cycles that are left, over its size
+SUMS = [0, 1, 2, 3, 5, 7, 8]  # places of the ledger that grow from cycle to cycle
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MarchResult:
-    """A march: kept samples, the last cycles whole and their step-mean forces, extremes and phasors per cycle, the
-    energy ledger and how it ended."""
+    """Samples, cycles, energies and outcome of a march.
+
+    - `response`: the samples that are kept.
+    - `window`, `step_force`, `window_work`: samples of the last cycles, mean forces of their steps [N] and
+      friction work [J].
+    - `amplitudes` (c, 2), `phasors` (c,): extremes and phasor of the output in each cycle [m].
+    - `ledger`: energies [J] by name, as `Run.book` returns them.
+    - `outcome`, `message`: how the march ended, None and "" if it reached its last step.
+    - `snapshots`: states of the interface in the last cycle.
+    - `cycles_done`: number of cycles.
+    - `marks`: the `Mark` of each number of cycles that was asked for.
+    """
 
     response: Response
     window: Response
@@ -60,8 +69,11 @@ class MarchResult:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Mark:
-    """The last window of cycles before a mark: its samples, step-mean forces, friction work [J], extremes of the output
-    per cycle (c, 2), the ledger there, and the march as it stood (`after`), to go on from."""
+    """The window of cycles before a mark, and the march as it was there.
+
+    - `window`, `step_force`, `work`, `amplitudes`, `ledger`: as in `MarchResult`.
+    - `after`: the `Run` to continue from.
+    """
 
     window: Response
     step_force: np.ndarray
@@ -72,7 +84,20 @@ class Mark:
 
 
 def _response(rows, number, dt, modes, drive) -> Response:
-    """Histories of the samples with step numbers `number` (k,)."""
+    """Return the histories of samples.
+
+    Parameters
+    ----------
+    rows : (k, w) array
+        Samples, as the loop writes them.
+    number : (k,) array
+        Numbers of their steps.
+    dt : float
+        Length of the step [s].
+    modes : ModalBasis
+    drive : float
+        Acceleration of the base [m s-2].
+    """
     n = modes.omega.size
     return histories(
         modes,
@@ -85,7 +110,7 @@ def _response(rows, number, dt, modes, drive) -> Response:
 
 
 def modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
-    """The ModalArrays of a basis and its Propagator."""
+    """Return the `ModalArrays` of a basis and its propagator."""
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
     own = (
         modes.omega,
@@ -107,12 +132,21 @@ def modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
 
 
 def _runner(model):
-    """The class that marches a model: Run, or its own."""
+    """Return the class that marches a model: `Run`, or its own."""
     return getattr(model, "runner", None) or Run
 
 
 def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) -> None:
-    """Load the compiled loop of a model, or compile it, by a march of no steps; say: told before it compiles."""
+    """Load the compiled loop of a model, or compile it, by a march without steps.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : SineDrive
+    model : ContactModel, joints.JointsModel or varying_load.VaryingLoadModel
+    say : callable or None
+        Callback that is told before the loop is compiled.
+    """
     runner = _runner(model)
     kind = (
         (
@@ -137,7 +171,23 @@ _WARM = set()  # kinds of patches that have marched: their code is there
 def fresh(
     modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float = np.inf, start=None
 ):
-    """A Run of a model at its start, from rest or from `start`; travel [m]: of the output, where it ends."""
+    """Return the march of a model at its start.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : SineDrive
+    model : ContactModel, joints.JointsModel or varying_load.VaryingLoadModel
+    steps_per_cycle : int
+    travel : float
+        Largest displacement of the output [m].
+    start : core.InitialState or None
+        Rest if None.
+
+    Returns
+    -------
+    Run
+    """
     return _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(), start)
 
 
@@ -159,128 +209,199 @@ def march(
     *,
     even: bool = False,
 ) -> MarchResult:
-    """March for `cycles` drive cycles at `steps_per_cycle` steps from rest or from `start` (core.InitialState).
+    """March a model over cycles of its drive, from rest or from an initial state.
 
-    window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle; marks: numbers
-    of whole cycles after which a Mark is kept besides; whole: False keeps nothing, samples and extremes, from
-    before the last cycles of a run without marks; folds: of bonds behind shear modes extremes and phasors of all
-    cycles are kept besides, and the sample of the largest slide; even: as `wanted` of `stored_samples_per_cycle`. The
-    outcome is set for travel and where a step missed its residual or the motion is not finite (not_converged, `message`
-    says what); Missing when a bond list overflows.
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : SineDrive
+        Or another drive; a motion is only found to be periodic under a sine.
+    model : ContactModel, joints.JointsModel or varying_load.VaryingLoadModel
+    cycles : float
+        Number of cycles of the drive; a fraction of a cycle comes first.
+    steps_per_cycle : int
+    window : int
+        Number of whole cycles at the end whose samples are all kept.
+    travel : float
+        Largest displacement of the output [m], beyond which the march ends.
+    frames : int
+        Number of snapshots of the interface during the last cycle.
+    say : callable or None
+        Callback that is told if the loop has to be compiled first.
+    progress : callable or None
+        Callback that is told the fraction of the march that is done.
+    start : core.InitialState or None
+    marks : sequence of float
+        Numbers of whole cycles after which a `Mark` is kept.
+    whole : bool
+        Whether samples and extremes from before the last cycles are kept; always true with marks.
+    folds : bool
+        Whether extremes and phasors of all cycles are kept for bonds behind shear modes although `whole` is false,
+        and the sample of the largest slide.
+    even : bool
+        The argument `wanted` of `stored_samples_per_cycle`.
+
+    Returns
+    -------
+    MarchResult
+        The outcome is set if the travel was exceeded, and if a step missed its residual or the motion is not finite.
+
+    Raises
+    ------
+    Missing
+        If a list of bonds becomes too long.
+    """
+    run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
+    n_last = max(window, 2)
+    mark_steps = sorted({round(mark * steps_per_cycle) for mark in marks})
+    plan = _Plan(round(cycles * steps_per_cycle), steps_per_cycle, window, frames, mark_steps)
+    samples = Samples(deque(maxlen=n_last))
+
+    def restart():
+        return fresh(modes, drive, model, steps_per_cycle, travel, start)
+
+    slot = slot_of(
+        run, (plan.n_steps, steps_per_cycle, window, frames, whole, *mark_steps), samples, restart
+    )
+    before_last = plan.n_steps - n_last * steps_per_cycle
+    keeps_samples = whole or bool(mark_steps)
+    keeps_folded = folds and run.folds and not mark_steps
+    if keeps_folded:
+        if not run.folded(before_last, samples):
+            # The march ends before its last cycles, so it is repeated cycle by cycle with all samples.
+            run = restart()
+            samples = Samples(samples.last)
+            keeps_folded = False
+            keeps_samples = True
+    elif not keeps_samples and not samples.again:
+        if not run.passed(before_last, lambda: slot.offer(run, samples)):
+            run = restart()
+            samples.again = True
+    n_even = stored_samples_per_cycle(drive, cycles, wanted=even)
+    recorder = _Recorder(samples, keeps_samples, keeps_samples or keeps_folded, n_even)
+    snapshots = _march_recorded(run, recorder, plan, slot, progress)
+    run.check()
+    extremes = samples.extremes if recorder.keeps_extremes else ends_of(samples.last, run)
+    phasors = samples.phasors if recorder.keeps_extremes else []
+    end = mark_of(run, list(samples.last)[-window:], extremes)
+    rows, first = _join_cycles(list(samples.last))
+    number = np.concatenate([*samples.kept_at, first + np.arange(len(rows))])
+    return MarchResult(
+        response=run.response(np.concatenate([*samples.kept, rows]), number),
+        window=end.window,
+        step_force=end.step_force,
+        amplitudes=end.amplitudes,
+        phasors=np.array(phasors),
+        ledger=end.ledger,
+        outcome=run.outcome,
+        snapshots=snapshots,
+        window_work=end.work,
+        cycles_done=run.done / steps_per_cycle,
+        message=run.message,
+        marks=tuple(mark_of(*mark, mark[0]) for mark in samples.marks),
+    )
+
+
+class _Plan(NamedTuple):
+    """Number of steps of a march and of a cycle, cycles of the window, snapshots of the last cycle, steps of marks."""
+
+    n_steps: int
+    steps_per_cycle: int
+    window: int
+    frames: int
+    mark_steps: list
+
+    def next_mark(self, done: int) -> int:
+        """Return the number of steps at the next mark, or at the end."""
+        return min((step for step in self.mark_steps if step > done), default=self.n_steps)
+
+
+class _Recorder:
+    """What a march keeps of its cycles: all samples of the last ones, and before them those worth keeping.
+
+    - `samples`: the `checkpoint.Samples` that are kept.
+    - `keeps_samples`, `keeps_extremes`: whether samples from before the last cycles are kept, and extremes and phasors
+      of all cycles.
+    - `capacity`: number of samples from before the last cycles that may still be kept.
     """
 
-    # samples: what is kept so far, `last` of it the cycles of the window; marks may be those of an interrupted march
-    run = _runner(model)(modes, drive, model, steps_per_cycle, travel, load_kernels(say), start)
-    total = round(cycles * steps_per_cycle)
-    samples = Samples(deque(maxlen=max(window, 2)))
-    last = samples.last
+    def __init__(self, samples: Samples, keeps_samples: bool, keeps_extremes: bool, n_even: int):
+        self.samples = samples
+        self.keeps_samples = keeps_samples
+        self.keeps_extremes = keeps_extremes
+        self.capacity = samples.capacity
+        self._n_even = n_even
+        self._picks = {}  # first step of a cycle -> numbers of its samples that are worth keeping
+
+    def add(self, run, first: int, rows, works) -> None:
+        """Add cycles (k, steps + 1, width) that start at step `first`, with their friction works (k,) [J]."""
+        last = self.samples.last
+        picks = [None] * len(works)
+        if self.keeps_samples and self.capacity > 0 and rows.shape[1] > 1:
+            picks = thinned(rows, run, self._n_even)
+        for k, work in enumerate(works):
+            if self.keeps_samples and len(last) == last.maxlen and self.capacity > 0:
+                pick = self._picks.pop(last[0][0], None)
+                self.capacity -= _keep_samples(self.samples, run, last[0], pick)
+            last.append((first + k * run.prop.steps, rows[k], work))
+            self._picks[last[-1][0]] = picks[k]
+        if self.keeps_extremes:
+            self.samples.extremes += extremes_of(rows, run.modes, run.prop.dt)
+            self.samples.phasors += phasors_of(rows, run.modes, first, run.prop.steps)
+
+    def repeat_last(self, run, count: int) -> None:
+        """Skip cycles that are equal to the last one."""
+        self.capacity = _repeat_last_cycle(self.samples, run, count)
+
+
+def _march_recorded(run, recorder: _Recorder, plan: _Plan, slot, progress) -> list:
+    """March to the end of a plan and record the cycles; return the snapshots of the last cycle.
+
+    A motion that has become periodic is not marched on; see `Run.repeats`.
+    """
+    samples = recorder.samples
     snapshots = []
-    asked = {round(mark * steps_per_cycle) for mark in marks}
-    slot = slot_of(
-        run,
-        (total, steps_per_cycle, window, frames, whole, *sorted(asked)),
-        samples,
-        lambda: fresh(modes, drive, model, steps_per_cycle, travel, start),
-    )
-    found = [mark_of(*one, one[0]) for one in samples.marks]
-    behind = total - max(window, 2) * steps_per_cycle
-    folds = folds and run.folds and not asked
-    if folds and not run.folded(behind, samples):
-        run = fresh(modes, drive, model, steps_per_cycle, travel, start)
-        samples = Samples(last)
-        # it ends before: once more, cycle by cycle
-        folds = False
-        whole = True
-    elif not (
-        folds
-        or whole
-        or asked
-        or samples.again
-        or run.passed(behind, lambda: slot.offer(run, samples))
-    ):
-        run = fresh(modes, drive, model, steps_per_cycle, travel, start)
-        samples.again = True
-    extremes = samples.extremes
-    phasors = samples.phasors
-    # capacity: how many more samples of cycles before the window may be kept;
-    # picked: first step of a cycle -> its samples worth keeping
-    capacity = samples.capacity
-    whole = whole or bool(asked)
-    picked = {}
-    even = stored_samples_per_cycle(drive, cycles, wanted=even)
-    # a fraction of a cycle comes first, the window is whole
-    size = (total - run.done) % steps_per_cycle or steps_per_cycle
-    while run.done < total and run.outcome is None:
-        stop = min((mark for mark in asked if mark > run.done), default=total)
-        for first, rows, works in run.cycles(size, stop, frames if stop == total else 0, snapshots):
-            picks = (
-                thinned(rows, run, even)
-                if whole and capacity > 0 and rows.shape[1] > 1
-                else [None] * len(works)
-            )
-            for k, work in enumerate(works):
-                if whole and len(last) == last.maxlen and capacity > 0:
-                    capacity -= _shelved(samples, run, last[0], picked.pop(last[0][0], None))
-                last.append((first + k * steps_per_cycle, rows[k], work))
-                picked[last[-1][0]] = picks[k]
-            if whole or folds:
-                extremes += extremes_of(rows, modes, run.prop.dt)
-                phasors += phasors_of(rows, modes, first, steps_per_cycle)
-        if run.done in asked:
-            samples.marks.append((run.fork(run.drive), list(last)[-window:], extremes[-window:]))
-            found.append(mark_of(*samples.marks[-1], samples.marks[-1][0]))
-        size = steps_per_cycle
-        left = (
-            min((mark for mark in asked if mark > run.done), default=total) - run.done
-        ) // size - last.maxlen
-        if whole and run.repeats(left):
-            capacity = _left_out(samples, run, left)
-        if run.done < total:
+    # A fraction of a cycle comes first, so that the window has whole cycles.
+    size = (plan.n_steps - run.done) % plan.steps_per_cycle or plan.steps_per_cycle
+    while run.done < plan.n_steps and run.outcome is None:
+        stop = plan.next_mark(run.done)
+        frames = plan.frames if stop == plan.n_steps else 0
+        for first, rows, works in run.cycles(size, stop, frames, snapshots):
+            recorder.add(run, first, rows, works)
+        if run.done in plan.mark_steps:
+            cycles = list(samples.last)[-plan.window :]
+            samples.marks.append((run.fork(run.drive), cycles, samples.extremes[-plan.window :]))
+        size = plan.steps_per_cycle
+        n_left = (plan.next_mark(run.done) - run.done) // size - samples.last.maxlen
+        if recorder.keeps_samples and run.repeats(n_left):
+            recorder.repeat_last(run, n_left)
+        if run.done < plan.n_steps:
             slot.offer(run, samples)
         if progress is not None:
-            progress(run.done / total)
-    run.check()
-    if not (whole or folds):
-        extremes = ends_of(last, run)
-        phasors = []
-    end = mark_of(run, list(last)[-window:], extremes)
-    rows, start = _joined(list(last))
-    number = np.concatenate([*samples.kept_at, start + np.arange(len(rows))])
-    full = run.response(np.concatenate([*samples.kept, rows]), number)
-    return MarchResult(
-        full,
-        end.window,
-        end.step_force,
-        end.amplitudes,
-        np.array(phasors),
-        end.ledger,
-        run.outcome,
-        snapshots,
-        end.work,
-        run.done / steps_per_cycle,
-        run.message,
-        tuple(found),
-    )
+            progress(run.done / plan.n_steps)
+    return snapshots
 
 
-def _shelved(samples: Samples, run, cycle, pick=None) -> int:
-    """Keep what is worth it of a cycle (first step, rows, work) that is none of the last ones; how many samples. pick:
-    their numbers where they are known."""
+def _keep_samples(samples: Samples, run, cycle, pick=None) -> int:
+    """Keep samples of a cycle (first step, rows, work) that is none of the last ones; return how many.
+
+    `pick` has their numbers if they are known.
+    """
     first, rows, _ = cycle
     pick = thinned(rows[None], run)[0] if pick is None else pick
     samples.early(rows[pick], first + pick)
     return len(pick)
 
 
-def _left_out(samples: Samples, run, count: int) -> int:
-    """Go on by `count` cycles that are as the last one; the samples that may be kept yet.
+def _repeat_last_cycle(samples: Samples, run, count: int) -> int:
+    """Skip `count` cycles that are equal to the last one; return how many samples may still be kept.
 
-    What is kept of them are the samples of that cycle, with the sums that have grown since.
+    The samples of the last cycle are kept again for the skipped ones, with the sums that have grown since.
     """
     first, rows, _ = samples.last[-1]
     for cycle in samples.last:
         if samples.capacity > 0:
-            _shelved(samples, run, cycle)
+            _keep_samples(samples, run, cycle)
     samples.last.clear()
     samples.extremes += [samples.extremes[-1]] * count
     samples.phasors += [samples.phasors[-1]] * count
@@ -297,16 +418,27 @@ def _left_out(samples: Samples, run, count: int) -> int:
 
 
 def ends_of(cycles, run) -> list:
-    """(smallest, largest) output [m] of each of the cycles (first step, rows, work)."""
+    """Return the smallest and largest output [m] of each of the cycles (first step, rows, work)."""
     return [one for _, rows, _ in cycles for one in extremes_of(rows[None], run.modes, run.prop.dt)]
 
 
 def mark_of(run, cycles, extremes, after=None) -> Mark:
-    """The Mark of the cycles (first step, rows, work [J]) that end here.
+    """Return the `Mark` of the cycles (first step, rows, work [J]) that end here.
 
-    extremes: (smallest, largest) output [m] of each cycle so far; after: the march to go on with.
+    Parameters
+    ----------
+    run : Run
+    cycles : list of tuple
+    extremes : list of tuple
+        Smallest and largest output [m] of each cycle so far.
+    after : Run or None
+        The march to continue from.
+
+    Returns
+    -------
+    Mark
     """
-    rows, first = _joined(cycles)
+    rows, first = _join_cycles(cycles)
     return Mark(
         run.response(rows, first + np.arange(len(rows))),
         rows[:-1, 2 * run.modes.omega.size + 4].copy(),
@@ -317,13 +449,22 @@ def mark_of(run, cycles, extremes, after=None) -> Mark:
     )
 
 
-def _joined(parts) -> tuple:
-    """Rows of successive cycles without their shared samples, and the number of the first step."""
+def _join_cycles(parts) -> tuple:
+    """Return the rows of successive cycles without their shared samples, and the number of the first step."""
     return np.concatenate([rows[:-1] for _, rows, _ in parts] + [parts[-1][1][-1:]]), parts[0][0]
 
 
 class Run:
-    """The arrays of one march and its clock."""
+    """The arrays of a march, and how far it is.
+
+    - `state` (2, n): coordinates and rates of the modes.
+    - `contact`, `faces`, `load`: arrays of what rubs and of the load, in `interfaces.arrays`.
+    - `ledger` (9,): energy balance of `loop_kernels.march`.
+    - `totals` (3,): friction work, dissipated and created energy since the start [J].
+    - `second` (2,): friction work from the samples, and sum of the absolute works of the steps [J].
+    - `done`: number of steps that are done.
+    - `outcome`, `message`: how it ended.
+    """
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
         self.modes = modes
@@ -348,19 +489,21 @@ class Run:
             faces_of(model, self.prop, self.modal_system, modes.mass),
             self._pressing(),
         )
-        self.width = 2 * modes.omega.size + 7 + EACH * len(model.joints) + 5 * bool(model.loading)
+        self.width = (
+            2 * modes.omega.size + 7 + ELEMENT_COLUMNS * len(model.joints) + 5 * bool(model.loading)
+        )
         if model.joints or model.loading:
             self.ledger[0] += self.strained()
         self.periodic = (
             self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
         )
         # of `repeats`: states at the last look and one cycle before the next, their sizes; the books a cycle before
-        self.looks = np.zeros((3, sum(map(len, self._carried()))))
+        self.looks = np.zeros((3, sum(map(len, self._carried_state()))))
         self.books = np.zeros(14)
         self.change = np.inf
 
     def fork(self, drive):
-        """A copy of the march as it stands that goes on by itself, under another drive."""
+        """Return a copy of the march as it is, which continues under another drive."""
         twin = copy(self)
         twin.drive = drive
         twin.periodic = None
@@ -372,9 +515,12 @@ class Run:
         )
         return twin
 
-    def _carried(self) -> list:
-        """What the march carries from one step to the next, as rows of numbers of one kind each: coordinates and rates
-        over the drive's frequency, then the memories. [] of one that no period brings back."""
+    def _carried_state(self) -> list:
+        """Return what the march carries to the next step, as rows of numbers of one kind each.
+
+        The first row has the coordinates and the rates over the frequency of the drive, the others the
+        memories. The list is empty if no period brings the state back.
+        """
         model = self.model
         rubs = arrays.carried(self.contact, getattr(model, "element", None) or free_model().element)
         if self.periodic is None or rubs is None or getattr(model, "load", None) is not None:
@@ -390,19 +536,19 @@ class Run:
         return [np.append(self.state[0], self.state[1] / self.drive.omega), *rubs, *chain(*beside)]
 
     def _sums_so_far(self) -> np.ndarray:
-        """The ledger, the sums of `_sums` and the second book, (14,)."""
+        """Return the ledger, the totals and the second energies, (14,)."""
         return np.concatenate([self.ledger, self.totals, self.second])
 
     def repeats(self, left: int) -> bool:
-        """Whether the motion has become periodic, at the end of a cycle, so that `left` more may be left out.
+        """Return whether the motion has become periodic, so that `left` more cycles may be skipped.
 
-        Asked for at the end of every cycle, or of those that `dynamics.periodicity.until_look` names.
+        It is to be called at the end of every cycle, or of those that `dynamics.periodicity.until_look` names.
         """
         number = self.done // self.prop.steps
         size = self.looks.shape[1]
         if not size or self.periodic is None or not (looked_at(number) or looked_at(number + 1)):
             return False
-        rows = self._carried()
+        rows = self._carried_state()
         now = np.concatenate(rows)
         if not looked_at(number):
             self.looks[1], self.books = now, self._sums_so_far()
@@ -417,12 +563,12 @@ class Run:
         known = left > 0 and number >= 4 * APART  # two changes between looks
         return (
             known
-            and max(change, last) <= REPEATS
-            and ahead(change, before, left, number) <= REPEATS
+            and max(change, last) <= PERIODIC_TOL
+            and ahead(change, before, left, number) <= PERIODIC_TOL
         )
 
     def leave_out(self, count: int) -> None:
-        """Go on by `count` cycles that are as the last one, right after `repeats`."""
+        """Skip `count` cycles that are equal to the last one, directly after `repeats`."""
         grown = count * (self._sums_so_far() - self.books)
         self.ledger[SUMS] += grown[SUMS]
         self.totals += grown[9:12]
@@ -430,8 +576,7 @@ class Run:
         self.done += count * self.prop.steps
 
     def placed(self, place, rate) -> None:
-        """Go on from the coordinates place and rates (n,) at the start of a cycle of a drive that repeats, the contact
-        slid there slowly."""
+        """Move the march to coordinates and rates (n,) at the start of a cycle; the contact slides there slowly."""
         path = np.array([self.modes.slide @ self.state[0], self.modes.slide @ place])
         if path[0] != path[1]:
             self._slid(path)
@@ -439,7 +584,7 @@ class Run:
         self.done = 0
 
     def _slid(self, path) -> None:
-        """Move the memory of the contact along a slide, path (2,) [m], in a second."""
+        """Move the memory of the contact along a slide path (2,) [m] in a second."""
         self.loops.follow_path(
             path,
             1.0,
@@ -451,7 +596,7 @@ class Run:
         )
 
     def books_anew(self) -> None:
-        """Begin the books here, with the energies that are there, at the start of a cycle of a drive that repeats."""
+        """Start the energy balance here, with the present energies, at the start of a cycle."""
         self.ledger[:] = 0.0
         self.totals[:] = 0.0
         self.second[:] = 0.0
@@ -459,7 +604,7 @@ class Run:
         self.ledger[0] = self.motion() + self.strained()
 
     def mark(self, cycles: int, window: int) -> Mark:
-        """The Mark of the last `window` of `cycles` more cycles."""
+        """March more cycles and return the `Mark` of the last `window` of them."""
         parts = deque(maxlen=window)
         for _ in range(cycles):
             parts.append(self.cycle(self.prop.steps, 0, []))
@@ -468,19 +613,22 @@ class Run:
         return mark_of(self, list(parts), ends_of(parts, self))
 
     def table(self, count: int) -> tuple:
-        """(table of `propagator.tables`, row of the next step in it) for `count` steps from here."""
+        """Return a table of `propagator.tables` for the next steps, and the row of the first of them."""
         if self.periodic is not None:
             return self.periodic, self.done % len(self.periodic)
         return self.prop.tables(self.drive, self.done, max(count, 1)), 0
 
     def response(self, rows, number) -> Response:
-        """Histories of the samples with step numbers `number` (k,)."""
+        """Return the histories of the samples with step numbers `number` (k,)."""
         out = _response(rows, number, self.prop.dt, self.modes, self.drive)
-        return self._beside(out, rows) if hasattr(self.model, "patch") else out
+        return self._add_elements(out, rows) if hasattr(self.model, "patch") else out
 
-    def _beside(self, out, rows) -> Response:
-        """Histories with the elements beside the first: `extra` has slides, slide_rates, forces, slips (k, i) of the
-        interfaces and spring_forces (k, s), and lateral_slides and so on (k, i) of those in a plane, 0 of others."""
+    def _add_elements(self, out, rows) -> Response:
+        """Add the elements to the histories.
+
+        `extra` gets slides, slide_rates, forces and slips (k, i) of the interfaces, spring_forces (k, s), and
+        for elements in a plane lateral_slides and so on (k, i), which are 0 for the other elements.
+        """
         modes = self.modes
         faces = self.faces
         parts, (ports, rubs, mates) = self._elements(rows), faces.of
@@ -500,18 +648,24 @@ class Run:
         return replace(out, acceleration=out.acceleration + push @ modes.output, extra=extra)
 
     def _elements(self, rows) -> np.ndarray:
-        """The columns of the elements (k, e, EACH) in booked rows, or in those of the loop (`_moved`)."""
+        """Return the columns of the elements (k, e, ELEMENT_COLUMNS) of samples."""
         count = len(self.model.joints)
         begin = 2 * self.modes.omega.size + 7 + rows.shape[1] - self.width
-        return rows[:, begin : begin + EACH * count].reshape(len(rows), count, EACH)
+        return rows[:, begin : begin + ELEMENT_COLUMNS * count].reshape(
+            len(rows), count, ELEMENT_COLUMNS
+        )
 
     def passed(self, steps: int, tell=None) -> bool:
-        """March to the step of this number in long pieces, of which nothing is kept; whether the run went on so far.
-        tell: called after each."""
+        """March to a step in long pieces without keeping samples; return whether the march got there.
+
+        `tell` is called after each piece.
+        """
         size = self.prop.steps
         while self.done < steps and self.outcome is None:
             look = (until_look(self.done // size) + self.done // size) * size - self.done
-            rows = self._moved(min(steps - self.done, AT_ONCE, PIECES * size, look), 0, [])
+            rows = self._march_rows(
+                min(steps - self.done, MAX_PIECE_STEPS, MAX_PIECE_CYCLES * size, look), 0, []
+            )
             self.totals += self._parts(rows).sum(axis=1)
             left = (steps - self.done) // size
             if self.done % size == 0 and self.outcome is None and self.repeats(left):
@@ -522,12 +676,14 @@ class Run:
 
     @property
     def folds(self) -> bool:
-        """Whether `folded` marches it: bonds behind shear modes alone, under a load that stays."""
+        """Whether `folded` can march it: bonds behind shear modes alone, under a constant load."""
         return type(self) is Run and self.model.tuple_of is arrays.Sheared and not self.model.joints
 
     def folded(self, steps: int, samples: Samples) -> bool:
-        """March to the step of this number as `passed` does, and keep the extremes and phasors of its cycles and the
-        sample of the largest slide."""
+        """March to a step as `passed` does, and keep extremes and phasors of all cycles and the largest slide.
+
+        Return whether the march got there.
+        """
         n = 2 * self.modes.omega.size
         around = self.prop.steps
         table = None
@@ -551,7 +707,7 @@ class Run:
             )
             if rows is not table:
                 table = rows
-                held = kernels.passing.held(
+                held = kernels.march_folded_cycles.held(
                     self.state,
                     self.modal_system,
                     rows,
@@ -566,7 +722,9 @@ class Run:
             phase = 2 * np.pi * (begin % around + np.arange(size + 1)) / around
             at[0] = -1
             trace = np.array([0 * phase, 0 * phase, np.cos(phase), np.sin(phase)])
-            did, status = kernels.passing.call_with_bound_args(held, row, sums, trace, seen)
+            did, status = kernels.march_folded_cycles.call_with_bound_args(
+                held, row, sums, trace, seen
+            )
             self.done = begin + did
             number = begin + int(at[0]) - row if at[0] >= 0 else number
             self.totals += sums[:3]
@@ -584,22 +742,42 @@ class Run:
         return self.outcome is None
 
     def cycles(self, size: int, stop: int, frames: int, snapshots: list) -> list:
-        """March a cycle of `size` steps, or some whole ones at once, none beyond the step `stop` or the next look of
-        `repeats`; with frames the last of them by itself, in so many pieces with a snapshot after each.
+        """March a cycle, or several whole cycles at once.
 
-        Returns parts of cycles (k,): (first step, rows (k, steps + 1, width), friction works (k,) [J]), the whole ones
-        and what was begun of the next where the run ends.
+        No cycle goes beyond the step `stop` or the next look of `repeats`. With frames the last cycle is
+        marched by itself, in as many pieces, with a snapshot after each.
+
+        Parameters
+        ----------
+        size : int
+            Number of steps.
+        stop : int
+            Number of a step.
+        frames : int
+            Number of snapshots.
+        snapshots : list
+            Snapshots, which are appended.
+
+        Returns
+        -------
+        list of tuple
+            Parts of cycles: first step, rows (k, steps + 1, width) and friction works (k,) [J]; first the
+            whole cycles, then what
+            was begun of the next one if the march ends.
         """
         first = self.done
         n = 2 * self.modes.omega.size + 6
         whole = self.prop.steps
         together = min(
-            PIECES, AT_ONCE // whole, (stop - first) // whole, until_look(-(-first // whole))
+            MAX_PIECE_CYCLES,
+            MAX_PIECE_STEPS // whole,
+            (stop - first) // whole,
+            until_look(-(-first // whole)),
         )
         if frames and first + together * whole == stop:
             together -= 1
         count = max(1, together) if size == whole else 1
-        rows = self._moved(count * size, frames if first + size == stop else 0, snapshots)
+        rows = self._march_rows(count * size, frames if first + size == stop else 0, snapshots)
         works = self._works(rows)
         booked = np.concatenate([rows[:, :n], self._sums(rows).T, rows[:, n:]], axis=1)
         done = (len(rows) - 1) // size if size else 0
@@ -625,34 +803,54 @@ class Run:
         return out
 
     def cycle(self, size: int, frames: int, snapshots: list) -> tuple:
-        """March `size` steps as one cycle: (first step, rows (steps + 1, width), friction work [J])."""
+        """March `size` steps as one cycle: return first step, rows (steps + 1, width) and friction work [J].
+
+        Parameters
+        ----------
+        size : int
+            Number of steps.
+        frames : int
+            Number of snapshots.
+        snapshots : list
+            Snapshots, which are appended.
+        """
         ((first, rows, works),) = self.cycles(size, self.done + size, frames, snapshots)
         return first, rows[0], works[0]
 
-    def _moved(self, size: int, frames: int, snapshots: list) -> np.ndarray:
-        """The rows (steps + 1, width) of `size` steps as the loop writes them; arguments as `cycles`."""
+    def _march_rows(self, size: int, frames: int, snapshots: list) -> np.ndarray:
+        """Return the rows (steps + 1, width) of `size` steps as the loop writes them; arguments as of `cycles`.
+
+        Parameters
+        ----------
+        size : int
+            Number of steps.
+        frames : int
+            Number of snapshots.
+        snapshots : list
+            Snapshots, which are appended.
+        """
         parts = []
         edges = np.linspace(0, size, max(min(frames, size), 1) + 1).round().astype(int)
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, self.width))
             rows[-1] = 0.0  # what belongs to the step after the last one is nothing yet
-            kept = keep(self.contact, *self._moving())
+            kept = copy_state(self.contact, *self._changing_arrays())
             begin = self._before_a_fling()
             did, status = self._steps(int(piece), rows)
             while status == FULL:
-                self.contact = lengthened(
-                    self.contact, kept, f"at step {self.done + did}", *self._moving()
+                self.contact = enlarge_list(
+                    self.contact, kept, f"at step {self.done + did}", *self._changing_arrays()
                 )
                 did, status = self._steps(int(piece), rows)
-            if begin and self._flung(rows[: did + 1]):
-                for array, old in zip((*self.contact, *self._moving()), begin):
+            if begin and self._is_flung(rows[: did + 1]):
+                for array, old in zip((*self.contact, *self._changing_arrays()), begin):
                     array[...] = old
                 did = self._steps(did - 1, rows)[0]
                 status = 1
+                distance = format_length(self._output_distance(rows[did]), 3)
                 self.message = (
-                    f"beyond a displacement of {format_length(self._out(rows[did]), 3)} the motion grows without "
-                    "limit, because the force of the softening spring no longer pulls the block back; the "
-                    "run ended there"
+                    f"beyond a displacement of {distance} the motion grows without limit, because the "
+                    "force of the softening spring no longer pulls the block back; the run ended there"
                 )
             self.done += did
             parts.append(rows[: did + 1])
@@ -670,23 +868,27 @@ class Run:
         return rows
 
     def _before_a_fling(self) -> tuple:
-        """Copies of all that steps change, beside a spring that bends."""
+        """Return copies of all that steps change, if a spring is nonlinear."""
         springs = any(one.potential is not None for one in self.model.joints)
-        return tuple(array.copy() for array in (*self.contact, *self._moving())) if springs else ()
-
-    def _flung(self, rows) -> bool:
-        """Whether the last step of the rows ends FLUNG times beyond the stop, or nowhere."""
-        return len(rows) > 1 and not (
-            self._out(rows[-1]) <= FLUNG * self.travel and np.isfinite(rows[-1]).all()
+        return (
+            tuple(array.copy() for array in (*self.contact, *self._changing_arrays()))
+            if springs
+            else ()
         )
 
-    def _out(self, row) -> float:
-        """Distance of the output from rest [m] in a row."""
+    def _is_flung(self, rows) -> bool:
+        """Return whether the last step ends FLUNG times beyond the travel, or is not finite."""
+        return len(rows) > 1 and not (
+            self._output_distance(rows[-1]) <= FLUNG * self.travel and np.isfinite(rows[-1]).all()
+        )
+
+    def _output_distance(self, row) -> float:
+        """Return the distance of the output from rest [m] in a row."""
         with np.errstate(invalid="ignore", over="ignore"):
             return abs(float(self.modes.output @ row[: self.modes.omega.size]))
 
     def _steps(self, count: int, rows) -> tuple:
-        """March `count` steps into rows (count + 1, width): (steps done, status)."""
+        """March `count` steps into rows (count + 1, width); return the number of steps done and the status."""
         table, row = self.table(count)
         return self.loops.march(
             self.model,
@@ -704,16 +906,18 @@ class Run:
         )
 
     def _pressing(self):
-        """The load at the start: one that stays."""
+        """Return the load at the start; here it is constant."""
         return arrays.Steady(np.zeros(0))
 
     def _load(self, count: int):
-        """What the loop is told of the load in the next steps."""
+        """Return the arrays of the load in the next steps."""
         return self.load
 
     def _sums(self, rows) -> np.ndarray:
-        """Friction work, the energy dissipated and that created since the start (3, steps + 1) [J] at the rows; `cycle`
-        puts them into the rows as further columns."""
+        """Return friction work, dissipated and created energy since the start at the rows (3, steps + 1) [J].
+
+        `cycles` inserts them into the rows as further columns.
+        """
         parts = self._parts(rows)
         sums = np.empty((3, parts.shape[1] + 1))
         sums[:, 0] = self.totals
@@ -723,8 +927,10 @@ class Run:
         return sums
 
     def _parts(self, rows) -> np.ndarray:
-        """What `_sums` adds up, of the steps between the rows (3, steps) [J]: the net of the work and of what the
-        interface stores."""
+        """Return the friction work, the dissipated and the created energy of the steps between the rows (3, steps) [J].
+
+        The dissipated energy is the work less the increase of the energy of the interface.
+        """
         n = 2 * self.modes.omega.size
         parts = np.zeros((3, len(rows) - 1))
         parts[0] = self._works(rows)
@@ -741,14 +947,14 @@ class Run:
         return parts
 
     def _works(self, rows) -> np.ndarray:
-        """Friction work [J] of the steps between the rows."""
+        """Return the friction work of the steps between the rows [J]."""
         return rows[:-1, 2 * self.modes.omega.size + 6]
 
     def _sampled(self, rows) -> np.ndarray:
-        """Friction work [J] of the steps between the rows, off their slides and forces alone.
+        """Return the friction work of the steps between the rows [J] from slides and forces alone.
 
-        What blows take at the end of a step, from slides that stop or hold, has no slide to be read off: where all that
-        rubs is set-valued it counts.
+        Blows at the end of a step, of slides that stop, have no slide from which their work could be read;
+        their work is added if all that rubs is set-valued.
         """
         n = 2 * self.modes.omega.size
         model = self.model
@@ -764,8 +970,8 @@ class Run:
                 smooth |= steady
         return out if smooth else out + blows
 
-    def _moving(self) -> tuple:
-        """The arrays that a step changes besides those of the contact."""
+    def _changing_arrays(self) -> tuple:
+        """Return the arrays that a step changes besides those of the contact."""
         faces = self.faces
         return self.state, self.ledger, *faces[:-1], *(faces.stops if self.model.joints else ())
 
@@ -796,7 +1002,7 @@ class Run:
         } | self.model.shown(self.contact)
 
     def check(self) -> None:
-        """Mark the run not_converged when a step missed its residual; what was computed is kept."""
+        """Set the outcome to not_converged if a step missed its residual; the samples are kept."""
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
@@ -805,7 +1011,7 @@ class Run:
             )
 
     def watched(self, rows) -> tuple:
-        """Slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in booked rows."""
+        """Return slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in the rows of `cycles`."""
         n = 2 * self.modes.omega.size
         parts = self._elements(rows)
         return np.column_stack([rows[:, n + 1], parts[:, :, 1]]), np.column_stack(
@@ -813,7 +1019,7 @@ class Run:
         )
 
     def motion(self) -> float:
-        """Kinetic and elastic energy of the modes [J]."""
+        """Return the kinetic and elastic energy of the modes [J]."""
         return (
             0.5
             * self.modes.mass
@@ -821,7 +1027,7 @@ class Run:
         )
 
     def strained(self) -> float:
-        """Energy stored in what rubs, in springs and in the contact that presses [J]."""
+        """Return the energy in what rubs, in springs and in the normal contact [J]."""
         n = 2 * self.modes.omega.size
         rows = np.zeros((1, self.width))
         self.loops.march(
@@ -847,7 +1053,7 @@ class Run:
         return float(rows[0, n + 5] + normal + sum(springs))
 
     def book(self) -> dict:
-        """The energy ledger [J]."""
+        """Return the energy balance [J] and the counters by name."""
         names = (
             "work_in",
             "viscous",

@@ -18,15 +18,16 @@ from ..interfaces.dispatch import COULOMB
 
 HERE = "dynamics.interfaces"
 ELEMENTS = f"{HERE}.element_kernels"
-# strips that the list of a point has room for before it grows, besides those of one step
-MOST_AT_FIRST = 256
+MOST_AT_FIRST = (
+    256  # entries of the list of a point before it is enlarged, besides those of one step
+)
 WIDE = 1e-6  # bond lengths over which the first bonds of a point lie: one may rest where their force turns
-LANES = 16  # points that compiled loops take at once: fewer left over are one after the other
+LANES = 16  # number of points that compiled loops take at once; points are filled up to a multiple of it
 IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"  # kind of a contact that nothing asks
 
 
 def load_kernels(say=None):
-    """The instances of the loop of the march, `instances`; `say` is told when its loops have to be compiled first."""
+    """Load the module `instances`; `say` is told if its loops have to be compiled first."""
     return load("dynamics.march.instances", say)
 
 
@@ -34,9 +35,11 @@ def load_kernels(say=None):
 class Joint:
     """A law on one port.
 
-    port: row of slides; element: the law under its load; potential: energy [J] of a slide [m] of a spring, None for
-    friction; mate: of one that slides in a plane, how far behind it in the list the joint of its second direction
-    stands, below 0 of that one how far before it the first; 0 of all others.
+    - `port`: number of the row of slides.
+    - `element`: the law under its load.
+    - `potential`: energy [J] of a slide [m] of a spring, None for friction.
+    - `mate`: for an element that slides in a plane, the distance in the list to the joint of its second
+      direction, negative for that joint itself; 0 for all others.
     """
 
     port: int
@@ -47,12 +50,15 @@ class Joint:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactModel:
-    """What the loop needs to know of an interface; `build()` makes fresh arrays, so a model can be run many times.
+    """What the loop needs to know of an interface; `build` makes fresh arrays, so a model can be run many times.
 
-    contact: module of the compiled contact; law: that of the compiled law in it, "" where the contact
-    has none to choose; limit: friction limit [N]; fields: arrays of `tuple_of`;
-    length: bond length for the stick criterion [m]; reduction: the JenkinsSet or ShearModes behind the arrays; element:
-    the law of an Element.
+    - `contact`: module of the compiled contact.
+    - `limit`: friction limit [N].
+    - `fields`: arrays of `tuple_of`.
+    - `length`: bond length for the criterion of sticking [m].
+    - `law`: module of the compiled law, "" if the contact has none to choose.
+    - `reduction`: the JenkinsSet or ShearModes from which the arrays were made.
+    - `element`: the law of an `interfaces.arrays.Element`.
     """
 
     contact: str
@@ -68,7 +74,7 @@ class ContactModel:
 
     @property
     def kind(self) -> tuple:
-        """(contact, law): what `instances` takes an instance of the loop for."""
+        """Contact and law, by which `instances` makes an instance of the loop."""
         return self.contact, self.law
 
     @property
@@ -83,11 +89,11 @@ class ContactModel:
 
     @property
     def joints(self) -> tuple:
-        """Elements in place of the contact: a set-valued one, as all that hold are solved together."""
+        """Elements in place of the contact: a set-valued one, because all of them are solved together."""
         return (Joint(0, self.element),) if self.set_valued else ()
 
     def shown(self, contact) -> dict:
-        """What a picture of the interface needs of the memory: "stretch" (t,) of elements, or "bonds" (5, m)."""
+        """Return what a picture needs of the memory: "stretch" (t,) of elements, or "bonds" (5, m)."""
         form = self.element.form if self.element is not None else ""
         if form == "parallel":
             return {"stretch": contact.mem[0, 3:].copy()}
@@ -99,7 +105,7 @@ class ContactModel:
             # as if all bonds of a point were stretched alike
             load = contact.points[4]
             share = contact.statuses[:, STATUS.force]
-            here = load * pressures_of(contact)
+            here = load * point_pressures(contact)
             return {
                 "bonds": np.stack(
                     [
@@ -119,13 +125,13 @@ class ContactModel:
         }
 
     def build(self):
-        """The contact with arrays of its own."""
+        """Return the contact with arrays of its own."""
         made = {k: np.array(v, dtype=np.float64, order="C") for k, v in self.fields.items()}
         return self.tuple_of(**made)
 
 
 def element_model(element: Element, reduction=None) -> ContactModel:
-    """A contact of one law on one slide."""
+    """Return a contact of one law on one slide."""
     bound = element.limit if element.is_bounded else np.inf
     fields = {
         "num": element.numbers[None],
@@ -147,25 +153,46 @@ def element_model(element: Element, reduction=None) -> ContactModel:
 
 @cache
 def free_model() -> ContactModel:
-    """A contact that rubs nothing."""
+    """Return a contact without friction."""
     return jenkins_model([0.0], [1.0])
 
 
 def coulomb_model(static: float, kinetic: float) -> ContactModel:
-    """Rigid Coulomb contact with static and kinetic friction force [N]."""
+    """Return a rigid Coulomb contact with static and kinetic friction force [N]."""
     return element_model(Coulomb(kinetic, static).element(1.0))
 
 
 def jenkins_model(stiffness, yield_displacement, reduction=None) -> ContactModel:
-    """Parallel Jenkins elements (t,) [N/m], [m]."""
+    """Return parallel Jenkins elements of stiffness (t,) [N/m] and yield slide (t,) [m].
+
+    Parameters
+    ----------
+    stiffness
+    yield_displacement
+    reduction
+    """
     return element_model(parallel_element(stiffness, yield_displacement), reduction)
 
 
 def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
-    """Bond points (stretch reading, p = 1) on nodal areas (m,) [m2] under sigma (m,) [Pa].
+    """Return bond points of the stretch reading with order 1.
 
-    shear: ShearModes of the contact set or None for a rigid slide; pattern: (x, sigma on x) when the pressure stays on
-    the lower piece, `area` and `sigma` then belong to the points of the upper one. ValueError for both together.
+    Parameters
+    ----------
+    law : friction.bonds.parameters.Bonds
+    area : (m,) array
+        Nodal areas [m2].
+    sigma : (m,) array
+        Pressures [Pa].
+    shear : ShearModes or None
+        Shear of the pieces; None for pieces that are rigid in shear.
+    pattern : tuple or None
+        Places x and pressures of a pressure that stays on the lower piece; `area` and `sigma` then belong to the
+        points of the upper one. It cannot be combined with `shear`.
+
+    Returns
+    -------
+    ContactModel
     """
     if shear is not None and pattern is not None:
         raise ValueError(
@@ -194,10 +221,29 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
 def lists_model(
     law, limit, sigma, shear, reach: float, merge: float, under: dict | None = None
 ) -> ContactModel:
-    """Lists of bonds behind shear modes, one a point: any order, either reading. limit: mu_s N (m,) [N] of the points
-    of the ShearModes `shear`, None of pieces that are rigid in shear; sigma: their pressures (m,) [Pa]; reach, merge:
-    as `list_model` has them; under: `under_the_lower` or `under_loads` of a pressure that changes, of which limit and
-    sigma are then a measure."""
+    """Return lists of bonds behind shear modes, one per point, of any order and either reading.
+
+    Parameters
+    ----------
+    law : friction.bonds.parameters.Bonds
+    limit : (m,) array
+        Friction limits of the points [N].
+    sigma : (m,) array
+        Pressures [Pa].
+    shear : ShearModes or None
+        Shear of the pieces; None for pieces that are rigid in shear.
+    reach : float
+        Cut-off in bond lengths.
+    merge : float
+        Widest merged strip in bond lengths at zero age; 0 merges nothing.
+    under : dict or None
+        Result of `under_the_lower` or `under_loads` for a pressure that changes; `limit` and `sigma` are then a
+        measure of it.
+
+    Returns
+    -------
+    ContactModel
+    """
     limit = np.asarray(limit, float)
     shape, stiffness = (
         (np.zeros((limit.size, 0)), ())
@@ -242,8 +288,21 @@ def lists_model(
 
 
 def under_the_lower(x, sigma, measure: float) -> dict:
-    """What `lists_model` asks of points at x (m,) [m] under the pressure sigma (m,) [Pa] of the lower piece, that stays
-    there; measure [Pa]: the pressure of their limits."""
+    """Return what `lists_model` needs for points under a pressure that stays on the lower piece.
+
+    Parameters
+    ----------
+    x : (m,) array
+        Places of the points [m].
+    sigma : (m,) array
+        Pressures [Pa].
+    measure : float
+        Pressure of their limits [Pa].
+
+    Returns
+    -------
+    dict
+    """
     return {
         "pattern": np.stack([x, sigma / measure]),
         "places": np.array(x, float),
@@ -252,13 +311,12 @@ def under_the_lower(x, sigma, measure: float) -> dict:
 
 
 def under_loads(force, measure) -> dict:
-    """What `lists_model` asks of points under nodal forces that change; force (m,) [N]: at the start, measure (m,) [N]:
-    those of their limits, which are its `sigma` as well."""
+    """Return what `lists_model` needs for points under nodal forces (m,) [N] that change, and those of their limits."""
     return {"pressed": np.stack([force, force]), "at first": force / measure}
 
 
-def pressures_of(contact) -> np.ndarray:
-    """Pressures (m,) of the points of a `ShearedLists` as they stand, over those of their limits."""
+def point_pressures(contact) -> np.ndarray:
+    """Return the present pressures (m,) of the points of a `ShearedLists`, over those of their limits."""
     if contact.pattern.size:
         x, pressure = contact.pattern
         return np.interp(
@@ -272,9 +330,21 @@ def pressures_of(contact) -> np.ndarray:
 
 
 def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
-    """One shared bond list for a rigid slide: any order, either reading; limit = mu_s N [N].
+    """Return one list of bonds for a rigid slide, of any order and either reading.
 
-    reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
+    Parameters
+    ----------
+    law : friction.bonds.parameters.Bonds
+    limit : float
+        Friction limit mu_s N [N].
+    reach : float
+        Cut-off in bond lengths.
+    merge : float
+        Widest merged strip in bond lengths at zero age; 0 merges nothing.
+
+    Returns
+    -------
+    ContactModel
     """
     capacity = numbers.list_capacity(law, reach, merge)
     fields = {

@@ -1,14 +1,14 @@
-"""What a loop of `loop_kernels` holds, by flags: here one contact under a load that stays. `instances` writes others.
+"""The flags of the loop of a rig; here those of one contact under a constant load. `instances` writes others.
 
-Numba leaves out the branches behind what is False, so nothing is compiled that a rig does not have.
+Numba leaves out the branches of a flag that is False, so nothing is compiled that a rig does not have.
 """
 
-MANY = False  # elements beside the contact, or in place of it
-STOPS = False  # elements that are set-valued
-SMOOTH = False  # elements that have a slope
-THERE = True  # the contact; it is not where elements take its place
-SEVERAL = False  # of elements and contact more than one
-PLANE = False  # elements that slide in a plane, two directions each
-PRESSED = False  # a load that changes
-POINTED = False  # points that bear their own share of it
-LISTED = False  # points that are lists of bonds
+HAS_ELEMENTS = False  # elements beside the contact, or in place of it
+HAS_STOPS = False  # some elements are set-valued
+HAS_SLOPES = False  # some elements have a slope
+HAS_CONTACT = True  # there is a contact; elements may take its place
+IS_COUPLED = False  # elements and contact are more than one
+HAS_PLANES = False  # some elements slide in a plane, with two directions each
+LOAD_VARIES = False  # the load varies
+HAS_POINTS = False  # points bear their own fraction of a load that varies
+HAS_LISTS = False  # points are lists of bonds

@@ -1,8 +1,8 @@
-"""Cycles of bonds behind shear modes of which no sample is kept: what they add up to is folded as they pass.
+"""Cycles of bonds behind shear modes of which no sample is stored: extremes, phasors and energies are folded as they pass.
 
-The steps are those of `loop_kernels.march` with `contacts.shear_kernels`, its twin. Where all points drag the friction
-stays, and the modes of the pieces swing about their place from one step to the next, forth and back; what is left of
-such a step are the modes of the rig. Cost of it: 25 ns of 150.
+The steps are those of `loop_kernels.march` with the contact `interfaces.shear_kernels`; a test compares both. While all
+points slip one way the friction is constant, and the modes of the pieces alternate about their mean from one step to the
+next. What is left of such a step are the modes of the rig, at 25 ns in place of 150.
 """
 
 import numpy as np
@@ -13,32 +13,84 @@ from ..interfaces import shear_kernels as contact
 from ..interfaces.shear_kernels import PULL, REACH, SLID, WAY
 from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
 
-WORK, LOST, CREATED, SAMPLED, PASSED = range(5)  # of `sums` [J]
-# of `trace`: output and its rate at the samples, the waves of the drive there
-OUT, RATE, COS, SIN = range(4)
-LOW, HIGH, RE, IM = range(4)  # of `seen`: extremes and phasor of the output in a cycle [m]
-# of `workspace`, at the steps of a block; as many to waste
-POWER, DAMPED, SLIDE, SPEED, PLACE, PACE, STORED = range(7)
-BLOCK = 32  # steps of a drag that are tried at once
-REST = 1e-12  # of the square of the largest rate of a cycle, as of `dynamics.cycles`
+# Places in `sums` [J].
+WORK_SUM = 0  # friction work
+LOSS_SUM = 1  # dissipated energy
+CREATED_SUM = 2  # created energy
+SAMPLED_SUM = 3  # friction work from the samples alone
+WORK_SIZE_SUM = 4  # sum of the absolute works of the steps
+# Rows of `trace`, at the samples of a cycle: output and its rate, cosine and sine of the drive.
+OUTPUT = 0
+OUTPUT_RATE = 1
+DRIVE_COS = 2
+DRIVE_SIN = 3
+# Columns of `cycles`: extremes and phasor of the output in a cycle [m].
+MIN_OUTPUT = 0
+MAX_OUTPUT = 1
+PHASOR_REAL = 2
+PHASOR_IMAG = 3
+# Rows of `workspace`, at the steps of a block. As many rows again receive results that are not used.
+DRIVE_WORK = 0
+VISCOUS_LOSS = 1
+SLIDE_ROW = 2
+SPEED_ROW = 3
+OUTPUT_ROW = 4
+RATE_ROW = 5
+ENERGY_ROW = 6
+N_BLOCK_ROWS = 7
+BLOCK = 32  # number of steps of a drag that are tried at once
+RATE_TOL = 1e-12  # product of two rates over the square of the largest one above which they have the same sign
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def folded(work, rise, q, after, mean, limit, sums):
-    """Add a step from the slide q to `after` [m] to the sums: its work and the rise of the interface's energy [J], the
-    mean of the forces at its ends [N]."""
+def add_step(work, rise, q, after, mean, limit, sums):
+    """Add a step to the sums.
+
+    Parameters
+    ----------
+    work : float
+        Work of the step [J].
+    rise : float
+        Increase of the energy of the interface [J].
+    q : float
+        Slide at the start [m].
+    after : float
+        Slide at the end [m].
+    mean : float
+        Mean of the forces at both ends [N].
+    limit : float
+        Friction limit [N].
+    sums : (5,) array
+        Sums [J], named at the top of the module; updated in place.
+    """
     lost = work - rise
     noise = limit * (1e-12 * abs(after - q) + 1e-15 * abs(q))
-    sums[WORK] += work
-    sums[LOST] += lost if lost > -noise else 0.0
-    sums[CREATED] -= lost if lost < -noise else 0.0
-    sums[SAMPLED] += mean * (after - q)
-    sums[PASSED] += abs(work)
+    sums[WORK_SUM] += work
+    sums[LOSS_SUM] += lost if lost > -noise else 0.0
+    sums[CREATED_SUM] -= lost if lost < -noise else 0.0
+    sums[SAMPLED_SUM] += mean * (after - q)
+    sums[WORK_SIZE_SUM] += abs(work)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def reached(row, number, totals, sums, far, far_at):
-    """Keep the sample of this number in `far`, as `Run.cycles` books it, where its slide is the largest so far."""
+def keep_largest(row, number, totals, sums, far, far_at):
+    """Keep a sample in `far`, in the form of `Run.cycles`, if its slide is the largest so far.
+
+    Parameters
+    ----------
+    row : (2 n + 7,) array
+        Space for a sample.
+    number : int
+        Number of the sample.
+    totals : (3,) array
+        The first three sums before these cycles.
+    sums : (5,) array
+        Sums [J], named at the top of the module; updated in place.
+    far : (2 n + 10,) array
+        Sample of the largest slide, with the sums there; updated in place.
+    far_at : (1,) array
+        Number of that sample, from the first step.
+    """
     n = row.size - 7
     if not abs(row[n]) > abs(far[n]):
         return
@@ -51,29 +103,59 @@ def reached(row, number, totals, sums, far, far_at):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def swung(c, did, slides):
-    """Move the modes of the pieces by `did` steps of a drag, forth and back; the next guess is as `went_on` leaves it.
+def swing_pieces(interface, did, slides):
+    """Move the modes of the pieces by steps of a drag, in which they alternate.
 
-    slides (did,): increments of the slide [m].
+    The next guess of an increment is the one that `shear_solve_kernels` makes of the last three steps.
+
+    Parameters
+    ----------
+    interface : interfaces.arrays.Sheared
+    did : int
+        Number of steps.
+    slides : (did,) array
+        Increments of the slide [m].
     """
-    way = c.flow[WAY]
-    last = c.last
-    for k in range(c.y.shape[1]):
-        swing = 2 * (way * c.drag[PULL, k] / c.kappa[k - 1] - c.b[k - 1]) if k > 0 else 0.0
+    way = interface.flow[WAY]
+    last = interface.last
+    for k in range(interface.y.shape[1]):
+        swing = (
+            2 * (way * interface.drag[PULL, k] / interface.kappa[k - 1] - interface.b[k - 1])
+            if k > 0
+            else 0.0
+        )
         for m in range(max(0, did - 3), did):
             here = slides[m] if k == 0 else swing if m % 2 == 0 else -swing
-            c.y[0, k] = 3 * (here - last[0, k]) + last[1, k]
+            interface.y[0, k] = 3 * (here - last[0, k]) + last[1, k]
             last[1, k] = last[0, k]
             last[0, k] = here
         if k > 0 and did % 2:
-            c.b[k - 1] += swing
-    c.ready[:] = 0.0
+            interface.b[k - 1] += swing
+    interface.ready[:] = 0.0
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def flown(k, count, motion, modal_system, table, at, accel, workspace):
-    """Move a mode by `count` steps of a force that stays, by row `at` of the table on; what it shows and takes is added
-    to `workspace`."""
+def move_mode(k, count, motion, modal_system, table, at, accel, workspace):
+    """Move a mode by steps under a constant force, and add its outputs and energies to the workspace.
+
+    Parameters
+    ----------
+    k : int
+        Number of the mode.
+    count : int
+        Number of steps.
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    at : int
+        Row of the table for this step.
+    accel : float
+        Modal acceleration of the friction [m s-2].
+    workspace : (14, BLOCK) array
+        Space for a block of steps.
+    """
     n = motion.shape[1]
     z = motion[0, k]
     v = motion[1, k]
@@ -94,27 +176,27 @@ def flown(k, count, motion, modal_system, table, at, accel, workspace):
     g = modal_system.loss[5, k] * accel * accel
     for s in range(count):
         row = at + s
-        workspace[POWER, s] += (
+        workspace[DRIVE_WORK, s] += (
             table[row, 2 * n + k] * z + table[row, 3 * n + k] * v + table[row, 4 * n + k] * accel
         )
-        workspace[DAMPED, s] += (
+        workspace[VISCOUS_LOSS, s] += (
             (table[row, 5 * n + k] + a * z + b * v + e) * z
             + (table[row, 6 * n + k] + d * v + f) * v
             + table[row, 7 * n + k] * accel
             + g
         )
         z, v = zz * z + zv * v + by_z + table[row, k], vz * z + vv * v + by_v + table[row, n + k]
-        workspace[SLIDE, s] += slide * z
-        workspace[SPEED, s] += slide * v
-        workspace[PLACE, s] += output * z
-        workspace[PACE, s] += output * v
-        workspace[STORED, s] += v * v + square * z * z
+        workspace[SLIDE_ROW, s] += slide * z
+        workspace[SPEED_ROW, s] += slide * v
+        workspace[OUTPUT_ROW, s] += output * z
+        workspace[RATE_ROW, s] += output * v
+        workspace[ENERGY_ROW, s] += v * v + square * z * z
     motion[0, k] = z
     motion[1, k] = v
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def dragged_on(
+def march_drag(
     first,
     count,
     i,
@@ -122,7 +204,7 @@ def dragged_on(
     motion,
     modal_system,
     table,
-    c,
+    interface,
     travel,
     limit,
     ledger,
@@ -130,41 +212,75 @@ def dragged_on(
     trace,
     workspace,
 ):
-    """Move on from the sample i of a cycle, at the slide q, by up to `count` steps in which all points drag; how many
-    they are.
+    """March on while all points slip one way.
 
-    The sample at the end of the last of them is not read; none between is as far. Modes go over a BLOCK of steps one
-    after the other, and once more over those before the drag ends in it.
+    The sample at the end of the last step is not read; no sample before it has a larger slide in its direction.
+    The modes go over a block of steps one after the other, and once more over the steps before the drag ends in
+    the block.
+
+    Parameters
+    ----------
+    first : int
+        Row of the table for the first step; the rows are used in turns.
+    count : int
+        Number of steps.
+    i : int
+        Number of the sample in the cycle.
+    q : float
+        Slide at the start [m].
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    interface : interfaces.arrays.Sheared
+    travel : float
+        Largest displacement of the output [m].
+    limit : float
+        Friction limit [N].
+    ledger : (9,) array
+        See `loop_kernels.march`.
+    sums : (5,) array
+        Sums [J], named at the top of the module; updated in place.
+    trace : (4, s + 1) array
+        Samples of the output and waves of the drive, named at the top of the module.
+    workspace : (14, BLOCK) array
+        Space for a block of steps.
+
+    Returns
+    -------
+    int
+        Number of steps.
     """
-    way = c.flow[WAY]
+    way = interface.flow[WAY]
     n = motion.shape[1]
     size = 2 * motion.shape[1]
     at = first % table.shape[0]
-    force = way * c.drag[PULL, 0]
+    force = way * interface.drag[PULL, 0]
     accel = modal_system.workspace[0]
     begun = modal_system.workspace[1:]
     least = 0.0
     taken = 0.0
-    energy = c.eps[0] * c.drag[PULL, 0]
+    energy = interface.eps[0] * interface.drag[PULL, 0]
     swing = 0.0
-    for k in range(c.b.size):
-        y = 2 * (way * c.drag[PULL, k + 1] / c.kappa[k] - c.b[k])
-        least += c.drag[REACH, k + 1] * abs(y)
-        taken += way * c.drag[PULL, k + 1] * y
-        energy += 0.5 * c.kappa[k] * c.b[k] * c.b[k]
-        swing += c.kappa[k] * y * (c.b[k] + 0.5 * y)
+    for k in range(interface.b.size):
+        y = 2 * (way * interface.drag[PULL, k + 1] / interface.kappa[k] - interface.b[k])
+        least += interface.drag[REACH, k + 1] * abs(y)
+        taken += way * interface.drag[PULL, k + 1] * y
+        energy += 0.5 * interface.kappa[k] * interface.b[k] * interface.b[k]
+        swing += interface.kappa[k] * y * (interface.b[k] + 0.5 * y)
     push_back(force, modal_system.slide, modal_system.mass, accel)
     block = min(count, workspace.shape[1], table.shape[0] - at)
-    for part in range(7):
+    for row in range(N_BLOCK_ROWS):
         for s in range(block):
-            workspace[part, s] = 0.0
+            workspace[row, s] = 0.0
     for k in range(n):
         begun[0, k] = motion[0, k]
         begun[1, k] = motion[1, k]
-        flown(k, block, motion, modal_system, table, at, accel[k], workspace)
+        move_mode(k, block, motion, modal_system, table, at, accel[k], workspace)
     did = 0
     for s in range(block):
-        after = workspace[SLIDE, s]
+        after = workspace[SLIDE_ROW, s]
         dq = after - q
         if way * dq <= least:
             break
@@ -172,40 +288,42 @@ def dragged_on(
         did = s + 1
         swings = 1.0 if s % 2 == 0 else -1.0
         odd = 0.5 * (1.0 + swings)
-        power = workspace[POWER, s] + table[at + s, 4 * size]
-        folded(force * dq, swings * swing, q, after, force, limit, sums)
+        power = workspace[DRIVE_WORK, s] + table[at + s, 4 * size]
+        add_step(force * dq, swings * swing, q, after, force, limit, sums)
         ledger[0] += power
-        ledger[1] += workspace[DAMPED, s] + table[at + s, 4 * size + 1]
+        ledger[1] += workspace[VISCOUS_LOSS, s] + table[at + s, 4 * size + 1]
         ledger[2] += abs(power)
         ledger[3] += force * dq - swings * taken
         ledger[4] = max(
-            ledger[4], energy + odd * swing + 0.5 * modal_system.mass * workspace[STORED, s]
+            ledger[4], energy + odd * swing + 0.5 * modal_system.mass * workspace[ENERGY_ROW, s]
         )
         ledger[8] += force * dq
-        trace[OUT, i + did] = workspace[PLACE, s]
-        trace[RATE, i + did] = workspace[PACE, s]
+        trace[OUTPUT, i + did] = workspace[OUTPUT_ROW, s]
+        trace[OUTPUT_RATE, i + did] = workspace[RATE_ROW, s]
         q = after
-        workspace[SLIDE, s] = dq
-        c.flow[SLID] += dq
-        if not (abs(workspace[PLACE, s]) <= travel and np.isfinite(q + workspace[SPEED, s])):
+        workspace[SLIDE_ROW, s] = dq
+        interface.flow[SLID] += dq
+        if not (
+            abs(workspace[OUTPUT_ROW, s]) <= travel and np.isfinite(q + workspace[SPEED_ROW, s])
+        ):
             break
     if did < block:
         for k in range(n):
             motion[0, k] = begun[0, k]
             motion[1, k] = begun[1, k]
-            flown(k, did, motion, modal_system, table, at, accel[k], workspace[7:])
+            move_mode(k, did, motion, modal_system, table, at, accel[k], workspace[N_BLOCK_ROWS:])
     if did:
-        swung(c, did, workspace[SLIDE])
+        swing_pieces(interface, did, workspace[SLIDE_ROW])
     return did
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def through(
+def march_folded_cycle(
     first,
     motion,
     modal_system,
     table,
-    c,
+    interface,
     goal,
     limit,
     travel,
@@ -218,8 +336,20 @@ def through(
     far_at,
     workspace,
 ):
-    """March a cycle of samples as of `trace`, the first step by row `first` of the table (in turns); (steps done,
-    status) as of `loop_kernels.march`."""
+    """March a cycle.
+
+    Parameters
+    ----------
+    first, motion, ..., workspace
+        See `march_folded_cycles`, of which only `cycles` is missing.
+
+    Returns
+    -------
+    int
+        Number of steps that are done.
+    int
+        Status of `loop_kernels`.
+    """
     count = trace.shape[1] - 1
     n = motion.shape[1]
     size = 2 * motion.shape[1]
@@ -235,7 +365,7 @@ def through(
     energy0 = 0.0
     while True:
         q, v, out = sample(row, motion, modal_system.slide, modal_system.output)
-        force, energy, slip = contact.state(c, q, v)
+        force, energy, slip = contact.state(interface, q, v)
         status = note(
             row[: size + 6],
             force,
@@ -247,17 +377,17 @@ def through(
             ledger,
         )
         if open_step:
-            folded(work, energy - energy0, q0, q, 0.5 * (force0 + force), limit, sums)
+            add_step(work, energy - energy0, q0, q, 0.5 * (force0 + force), limit, sums)
         rate = 0.0
         for k in range(n):
             rate += modal_system.output[k] * motion[1, k]
-        trace[OUT, i] = out
-        trace[RATE, i] = rate
-        reached(row, first + i, totals, sums, far, far_at)
+        trace[OUTPUT, i] = out
+        trace[OUTPUT_RATE, i] = rate
+        keep_largest(row, first + i, totals, sums, far, far_at)
         if status or i == count:
             return i, status
-        if c.flow[WAY] != 0.0 and modal_system.dense.size == 0:
-            did = dragged_on(
+        if interface.flow[WAY] != 0.0 and modal_system.dense.size == 0:
+            did = march_drag(
                 first + i,
                 count - i,
                 i,
@@ -265,7 +395,7 @@ def through(
                 motion,
                 modal_system,
                 table,
-                c,
+                interface,
                 travel,
                 limit,
                 ledger,
@@ -279,7 +409,7 @@ def through(
                 continue
         at = (first + i) % around
         free = free_slide(motion, modal_system.reach, 0, table, at)
-        dq, _, turns = contact.solve(free, modal_system.beta, q, v, dt, c, goal)
+        dq, _, turns = contact.solve(free, modal_system.beta, q, v, dt, interface, goal)
         used = (free - dq) / modal_system.beta
         push_back(used, modal_system.slide, modal_system.mass, accel)
         work = used * dq
@@ -300,7 +430,7 @@ def through(
         after = 0.0
         for k in range(n):
             after += modal_system.slide[k] * motion[1, k]
-        lost, _ = contact.commit(dq, used, q, v, after, dt, c)
+        lost, _ = contact.commit(dq, used, q, v, after, dt, interface)
         ledger[3] += lost
         q0 = q
         force0 = force
@@ -310,9 +440,20 @@ def through(
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def shown(trace, dt, seen):
-    """Extremes of the output between the samples of a cycle, by the cubic through values and rates as
-    `cycles.hermite_extremes` has it, and its phasor, into seen (4,)."""
+def read_cycle(trace, dt, cycles):
+    """Compute the extremes of the output between the samples of a cycle, and its phasor.
+
+    The output is a cubic through values and rates, as in `cycles.hermite_extremes`.
+
+    Parameters
+    ----------
+    trace : (4, s + 1) array
+        Samples of the output and waves of the drive, named at the top of the module.
+    dt : float
+        Length of a step [s].
+    cycles : (4,) array
+        Extremes and phasor, which are written.
+    """
     count = trace.shape[1] - 1
     low = np.inf
     high = -np.inf
@@ -320,19 +461,19 @@ def shown(trace, dt, seen):
     im = 0.0
     fastest = 0.0
     for i in range(count + 1):
-        low = min(low, trace[OUT, i])
-        high = max(high, trace[OUT, i])
-        fastest = max(fastest, abs(trace[RATE, i]))
+        low = min(low, trace[OUTPUT, i])
+        high = max(high, trace[OUTPUT, i])
+        fastest = max(fastest, abs(trace[OUTPUT_RATE, i]))
     for i in range(count):
-        re += trace[OUT, i] * trace[COS, i]
-        im -= trace[OUT, i] * trace[SIN, i]
+        re += trace[OUTPUT, i] * trace[DRIVE_COS, i]
+        im -= trace[OUTPUT, i] * trace[DRIVE_SIN, i]
     for i in range(count):
-        if not trace[RATE, i] * trace[RATE, i + 1] < -REST * fastest * fastest:
+        if not trace[OUTPUT_RATE, i] * trace[OUTPUT_RATE, i + 1] < -RATE_TOL * fastest * fastest:
             continue
-        a = trace[OUT, i]
-        b = trace[OUT, i + 1]
-        p = trace[RATE, i] * dt
-        r = trace[RATE, i + 1] * dt
+        a = trace[OUTPUT, i]
+        b = trace[OUTPUT, i + 1]
+        p = trace[OUTPUT_RATE, i] * dt
+        r = trace[OUTPUT_RATE, i + 1] * dt
         big = 2 * (a - b) + p + r
         mid = 3 * (b - a) - 2 * p - r
         root = np.sqrt(max(mid * mid - 3 * big * p, 0.0))
@@ -342,22 +483,22 @@ def shown(trace, dt, seen):
                 value = a + p * s + mid * s * s + big * s * s * s
                 low = min(low, value)
                 high = max(high, value)
-    seen[LOW] = low
-    seen[HIGH] = high
-    seen[RE] = 2 * re / count
-    seen[IM] = 2 * im / count
+    cycles[MIN_OUTPUT] = low
+    cycles[MAX_OUTPUT] = high
+    cycles[PHASOR_REAL] = 2 * re / count
+    cycles[PHASOR_IMAG] = 2 * im / count
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def passing(
+def march_folded_cycles(
     first,
     sums,
     trace,
-    seen,
+    cycles,
     motion,
     modal_system,
     table,
-    c,
+    interface,
     goal,
     limit,
     travel,
@@ -368,23 +509,58 @@ def passing(
     far_at,
     workspace,
 ):
-    """March cycles (k,) of as many samples as `trace` has, of which rows of `seen` (k, 4) are left, the first step by
-    row `first` of the table (in turns).
+    """March cycles of which the extremes, phasors and sums are kept.
 
-    motion, modal_system, table, c, travel, ledger: as of `loop_kernels.march`; goal [N]: of a step; limit [N]: of friction;
-    sums (5,) [J]: friction work, what was dissipated and created, the work off the samples and the sizes of the works,
-    which grow; totals (3,): the first three before; far (2 n + 10,), far_at (1,): the sample of the largest slide and
-    its number from the first step; row (2 n + 7,), workspace (14, BLOCK): room. Returns (steps done, status) as of the
-    march.
+    Parameters
+    ----------
+    first : int
+        Row of the table for the first step; the rows are used in turns.
+    sums : (5,) array
+        Sums [J], named at the top of the module; updated in place.
+    trace : (4, s + 1) array
+        Samples of the output and waves of the drive, named at the top of the module.
+    cycles : (k, 4) array
+        Extremes and phasors of the cycles, which are written.
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    interface : interfaces.arrays.Sheared
+    goal : float
+        Tolerance of a step [N].
+    limit : float
+        Friction limit [N].
+    travel : float
+        Largest displacement of the output [m].
+    ledger : (9,) array
+        See `loop_kernels.march`.
+    totals : (3,) array
+        The first three sums before these cycles.
+    row : (2 n + 7,) array
+        Space for a sample.
+    far : (2 n + 10,) array
+        Sample of the largest slide, with the sums there; updated in place.
+    far_at : (1,) array
+        Number of that sample, from the first step.
+    workspace : (14, BLOCK) array
+        Space for a block of steps.
+
+    Returns
+    -------
+    int
+        Number of steps that are done.
+    int
+        Status of `loop_kernels`.
     """
     count = trace.shape[1] - 1
-    for cycle in range(seen.shape[0]):
-        did, status = through(
+    for cycle in range(cycles.shape[0]):
+        did, status = march_folded_cycle(
             first + cycle * count,
             motion,
             modal_system,
             table,
-            c,
+            interface,
             goal,
             limit,
             travel,
@@ -399,5 +575,5 @@ def passing(
         )
         if status:
             return cycle * count + did, status
-        shown(trace, modal_system.dt, seen[cycle])
-    return seen.shape[0] * count, 0
+        read_cycle(trace, modal_system.dt, cycles[cycle])
+    return cycles.shape[0] * count, 0

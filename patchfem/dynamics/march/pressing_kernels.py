@@ -1,12 +1,14 @@
-"""A load that changes: the normal force and the moment of the contact on the modes, or a load prescribed in time.
+"""A load that varies: the normal force and the moment of the contact on the modes, or a load prescribed in time.
 
-Heave h (> 0 away) and pitch t (> 0 opens +x) move the upper holder, so d = -h closes it. Over a step the modes move
-exactly under constant forces. Those of the normal contact are the path mean of its slopes along the straight increment,
-through every contact set on the way, so they do exactly the work E(end) - E(start) (a discrete gradient; McLachlan,
-Quispel, Robidoux, Phil. Trans. R. Soc. A 357, 1999). Friction acts with the path mean of its law under the mean load of
-the step; Coulomb's stops and goes inside it, under a load that changes linearly (`stops_kernels`). So the sum of all
-energies never rises by itself. n: `contacts.arrays.Pressing`, c: the contact that rubs, j: Faces of the set-valued one.
+Heave h (positive away) and pitch t (positive if it opens +x) move the upper holder, so the approach d = -h closes it. Over
+a step the modes move exactly under constant forces. Those of the normal contact are the path mean of its forces along the
+straight increment, through every contact set on the way, so they do exactly the work E(end) - E(start): a discrete gradient
+(McLachlan, Quispel, Robidoux, Phil. Trans. R. Soc. A 357, 1999). Friction acts with the path mean of its law under the mean
+load of the step; Coulomb friction stops and is released inside it, under a load that changes linearly (`stops_kernels`). So
+the sum of all energies never grows by itself.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,18 +19,64 @@ from ...contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT, REFERENCE_ST
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ..interfaces import element_kernels as contact
 from ..modal_kernels import free_rate, free_slide
-from . import faces_kernels as faces
+from . import faces_kernels as coupling
 from . import parts_kernels as parts
-from .stops_kernels import BESIDE, FREE, GAMMA, KNOWN, PULL, RATE, STEP
+from .stops_kernels import (
+    ELEMENT_FORCE,
+    FREE_SLIDE,
+    FREE_SPEED,
+    GAMMA,
+    INCREMENT,
+    OTHER_ACCELERATION,
+    STOPS_KNOWN,
+)
 
-STOPS, POINTED = parts.STOPS, parts.POINTED
-TIGHT = 0.01  # of the goal, to which friction and normal contact agree
-MOST = 80  # guesses of the force that friction and normal contact agree on; the bracket of the secant shuts within 60
+# Numba leaves out the branches of flags that are False.
+HAS_STOPS = parts.HAS_STOPS
+HAS_POINTS = parts.HAS_POINTS
+COUPLING_FACTOR = (
+    0.01  # tolerance of the agreement of friction and normal contact, over that of the friction
+)
+MAX_GUESSES = (
+    80  # guesses of the force on which both agree; the bracket of the secant closes within 60
+)
+BISECT_EVERY = 8  # guesses after which the secant method takes the middle of its bracket
+BRACKET_TOL = 4e-16  # width of a bracket over its ends below which it is closed
+MAX_ITERATIONS = 100  # Newton steps for heave and pitch
+# Places in `few` of `interfaces.arrays.Pressing`.
+LOAD = 0  # load now [N]
+MEAN_PRESS = 3  # mean forces of the step on heave [N] and pitch [N m]
+PRESS_GUESS = 6  # increments of heave and pitch of the step before, the guess of this one
+PRESS_OUT = 8  # results of `path_mean` (9,)
+PRESS_START = 17  # heave, pitch, energy and forces at the start of the step (5,)
+
+
+class Secant(NamedTuple):
+    """Bracket of the force on which friction and normal contact agree, and the last guess with its miss [N]."""
+
+    low: float
+    high: float
+    guess: float
+    miss: float
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def place_of(motion, rows, r):
-    """Slide, heave or pitch of the modes."""
+def port_motion(motion, rows, r):
+    """Return the slide, heave or pitch of the modes.
+
+    Parameters
+    ----------
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    rows : (p, n) array
+        Slides of the ports per coordinate.
+    r : int
+        Number of the port.
+
+    Returns
+    -------
+    float
+    """
     out = 0.0
     for i in range(motion.shape[1]):
         out += rows[r, i] * motion[0, i]
@@ -36,15 +84,40 @@ def place_of(motion, rows, r):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def press_step(n, k0, begin, f1, f2, turn, out):
-    """Heave and pitch of a step: (dh, dt) = (f1, f2) - beta mean slope, by Newton's method with step halving from the
-    guess in `turn` (2,). Returns (set at the end, iterations, residual as a force [N]); `out` as in `path_mean`.
+def solve_press_step(press, k0, begin, f1, f2, turn, out):
+    """Solve heave and pitch of a step by Newton's method with step halving.
 
-    The slopes have a convex potential, so the answer is unique; inside one set one step finds it.
+    The increments are (f1, f2) - beta * mean force. The forces have a convex potential, so the solution is
+    unique; inside a single contact set one step finds it.
+
+    Parameters
+    ----------
+    press : interfaces.arrays.Pressing
+    k0 : int
+        Contact set at the start.
+    begin : (5,) array
+        Heave, pitch, energy and forces at the start of the step.
+    f1 : float
+        Increment of the heave without contact forces [m].
+    f2 : float
+        Increment of the pitch without contact forces [rad].
+    turn : (2,) array
+        Guess of the increments; the solution is written.
+    out : (9,) array
+        Mean forces and slopes, as `path_mean` writes them.
+
+    Returns
+    -------
+    int
+        Contact set at the end of the step, negative if none fits.
+    int
+        Number of iterations.
+    float
+        Residual as a force [N].
     """
-    sets = n.sets
-    beta = n.beta
-    arm = n.arm[0]
+    sets = press.sets
+    beta = press.beta
+    arm = press.arm[0]
     b11 = beta[1, 1]
     b12 = beta[1, 2]
     b21 = beta[2, 1]
@@ -59,7 +132,7 @@ def press_step(n, k0, begin, f1, f2, turn, out):
     part = 1.0
     best = np.inf
     k = k0
-    for count in range(1, 100):
+    for count in range(1, MAX_ITERATIONS):
         k = path_mean(sets, k0, begin[0], begin[1], dh, dt, out)
         if k < 0:
             return k, count, np.inf
@@ -94,204 +167,401 @@ def press_step(n, k0, begin, f1, f2, turn, out):
                 return k, count, best / softness
         dh = old_h - part * step_h
         dt = old_t - part * step_t
-    return k, 100, best / softness
+    return k, MAX_ITERATIONS, best / softness
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def pressed(i, last, motion, mass, c, j, n, row):
-    """Load [N], moment [N m], energy [J] of the preloaded contact, heave and pitch at sample i into the last columns of
-    its row; what rubs knows its load. The energy [J]; n.slot < 0 where no contact set fits."""
-    begin = n.few[17:22]
-    load = n.few[0]
-    moment = n.sets.reference[REFERENCE_MOMENT]
+def sample_load(i, last, motion, mass, interface, faces, press, row):
+    """Write load, moment, contact energy, heave and pitch of a sample into the row.
+
+    press.slot is negative if no contact set fits.
+
+    Parameters
+    ----------
+    i : int
+        Number of the sample.
+    last : bool
+        Whether it is the last sample.
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    mass : float
+        [kg]
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+    press : interfaces.arrays.Pressing
+    row : (k,) array
+        Row of samples of `loop_kernels.march`; it is written.
+
+    Returns
+    -------
+    float
+        Energy of the preloaded contact [J].
+    """
+    begin = press.few[PRESS_START : PRESS_START + 5]
+    load = press.few[LOAD]
+    moment = press.sets.reference[REFERENCE_MOMENT]
     m = row.size - 5
-    begin[0], begin[1] = place_of(motion, n.rows, 1), place_of(motion, n.rows, 2)
+    begin[0], begin[1] = port_motion(motion, press.rows, 1), port_motion(motion, press.rows, 2)
     begin[2] = 0.0
     begin[3] = 0.0
     begin[4] = 0.0
-    if n.loads.size > 0:
-        load = n.loads[i]
-        n.now[0] = load
+    if press.loads.size > 0:
+        load = press.loads[i]
+        press.now[0] = load
     else:
-        n.slot[0] = find_set(n.sets, n.slot[0], -begin[0], begin[1])
-        if n.slot[0] < 0:
+        press.slot[0] = find_set(press.sets, press.slot[0], -begin[0], begin[1])
+        if press.slot[0] < 0:
             return 0.0
-        begin[2], begin[3], begin[4] = compute_energy(n.sets, n.slot[0], begin[0], begin[1])
-        load = max(n.sets.reference[REFERENCE_LOAD] - begin[3], 0.0)
+        begin[2], begin[3], begin[4] = compute_energy(press.sets, press.slot[0], begin[0], begin[1])
+        load = max(press.sets.reference[REFERENCE_LOAD] - begin[3], 0.0)
         moment = moment - begin[4]
-        if POINTED or last:
-            press_state(n.sets, n.slot[0], -begin[0], begin[1], n.now)
-    n.few[0] = load
+        if HAS_POINTS or last:
+            press_state(press.sets, press.slot[0], -begin[0], begin[1], press.now)
+    press.few[LOAD] = load
     row[m] = load
     row[m + 1] = moment
     row[m + 2] = begin[2]
     row[m + 3] = begin[0]
     row[m + 4] = begin[1]
-    weigh(load, load, c, j, n)
-    if STOPS:
-        faces.capped(j)
-        pushes(begin[3], begin[4], mass, n, j.modal[BESIDE])
+    set_loads(load, load, interface, faces, press)
+    if HAS_STOPS:
+        coupling.cap_forces(faces)
+        set_press_accelerations(begin[3], begin[4], mass, press, faces.modal[OTHER_ACCELERATION])
     return begin[2]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def weigh(before, after, c, j, n):
-    """Tell what rubs its load at both ends of a step [N]; the nodal forces of points at the later one stand in n.now."""
-    if POINTED:
-        for i in range(n.now.size):
-            c.pressed[1, i] = n.now[i]
-    elif STOPS:
-        faces.limited(before, after, n.force, j)
+def set_loads(before, after, interface, faces, press):
+    """Give the loads at both ends of a step to what rubs; those of points at the later end are in press.now.
+
+    Parameters
+    ----------
+    before : float
+        Load at the start of the step [N].
+    after : float
+        Load at its end [N].
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+    press : interfaces.arrays.Pressing
+    """
+    if HAS_POINTS:
+        for i in range(press.now.size):
+            interface.pressed[1, i] = press.now[i]
+    elif HAS_STOPS:
+        coupling.set_limits(before, after, press.force, faces)
     else:
-        c.num[0, 1] = n.force[0] * 0.5 * (before + after)
-        c.bound[0] = c.num[0, 1]
+        interface.num[0, 1] = press.force[0] * 0.5 * (before + after)
+        interface.bound[0] = interface.num[0, 1]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def pushes(heave, pitch, mass, n, accel):
-    """Modal accelerations (n,) under forces that resist heave [N] and pitch [N m]."""
+def set_press_accelerations(heave, pitch, mass, press, accel):
+    """Write the modal accelerations under forces that resist heave and pitch into accel (n,).
+
+    Parameters
+    ----------
+    heave : float
+        Force that resists the heave [N].
+    pitch : float
+        Moment that resists the pitch [N m].
+    mass : float
+        [kg]
+    press : interfaces.arrays.Pressing
+    accel : (n,) array
+        Modal accelerations of the forces [m s-2].
+    """
     for i in range(accel.size):
-        accel[i] = -(n.rows[1, i] * heave + n.rows[2, i] * pitch) / mass
+        accel[i] = -(press.rows[1, i] * heave + press.rows[2, i] * pitch) / mass
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def pushed(n, mass, accel):
-    """Add the modal accelerations of the mean forces of a step on heave and pitch, n.few[3:5], to accel (n,)."""
+def add_press_accelerations(press, mass, accel):
+    """Add the modal accelerations of the mean forces of a step on heave and pitch to accel (n,).
+
+    Parameters
+    ----------
+    press : interfaces.arrays.Pressing
+    mass : float
+        [kg]
+    accel : (n,) array
+        Modal accelerations of the forces [m s-2].
+    """
     for i in range(accel.size):
-        accel[i] -= (n.rows[1, i] * n.few[3] + n.rows[2, i] * n.few[4]) / mass
+        accel[i] -= (
+            press.rows[1, i] * press.few[MEAN_PRESS] + press.rows[2, i] * press.few[MEAN_PRESS + 1]
+        ) / mass
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_step(q, v, force, whole, motion, modal_system, table, at, c, j, n):
-    """(slide dq [m], mean friction force [N], iterations) of a step under the mean forces force (2,) on heave and
-    pitch; iterations < 0 where it failed. whole: no stop or release inside the step."""
+def solve_friction_step(
+    q, v, force, whole, motion, modal_system, table, at, interface, faces, press
+):
+    """Solve the friction of a step under given mean forces on heave and pitch.
+
+    Parameters
+    ----------
+    q : float
+        Slide of the contact at the start of the step [m].
+    v : float
+        Its speed [m/s].
+    force : (2,) array
+        Mean force on the heave [N] and moment on the pitch [N m].
+    whole : bool
+        Whether stops and releases inside the step are left out.
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    at : int
+        Row of the table for this step.
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+    press : interfaces.arrays.Pressing
+
+    Returns
+    -------
+    float
+        Increment of the slide [m].
+    float
+        Mean friction force [N].
+    int
+        Number of iterations, negative if the solution fails.
+    """
     free = (
         free_slide(motion, modal_system.reach, 0, table, at)
-        - n.beta[0, 1] * force[0]
-        - n.beta[0, 2] * force[1]
+        - press.beta[0, 1] * force[0]
+        - press.beta[0, 2] * force[1]
     )
-    if STOPS:
-        pushes(force[0], force[1], modal_system.mass, n, j.modal[BESIDE])
-        j.port[FREE, 0] = free
-        if n.beta[0, 0] == 0.0:  # nothing slides
-            return faces.slide_freely(0.0, j), 0.0, 1
-        j.port[RATE, 0] = (
+    if HAS_STOPS:
+        set_press_accelerations(
+            force[0], force[1], modal_system.mass, press, faces.modal[OTHER_ACCELERATION]
+        )
+        faces.port[FREE_SLIDE, 0] = free
+        if press.beta[0, 0] == 0.0:  # nothing slides
+            return coupling.slide_freely(0.0, faces), 0.0, 1
+        faces.port[FREE_SPEED, 0] = (
             free_rate(motion, modal_system.slide, modal_system.free, modal_system.dense, table, at)
-            - j.gives[GAMMA, 0, 1] * force[0]
-            - j.gives[GAMMA, 0, 2] * force[1]
+            - faces.gives[GAMMA, 0, 1] * force[0]
+            - faces.gives[GAMMA, 0, 2] * force[1]
         )
         if whole:
-            _, count = faces.solve_coupled_forces(q, v, modal_system, c, j)
-            j.own[KNOWN] = 0.0
+            _, count = coupling.solve_coupled_forces(q, v, modal_system, interface, faces)
+            faces.own[STOPS_KNOWN] = 0.0
         else:
-            _, count = faces.solved(q, v, motion, modal_system, table, at, c, j)
-        return j.each[STEP, 0], j.each[PULL, 0], count
+            _, count = coupling.solve_step(q, v, motion, modal_system, table, at, interface, faces)
+        return faces.each[INCREMENT, 0], faces.each[ELEMENT_FORCE, 0], count
     else:
-        return contact.solve(free, n.beta[0, 0], q, v, modal_system.dt, c, TIGHT * n.goal[0])
+        return contact.solve(
+            free,
+            press.beta[0, 0],
+            q,
+            v,
+            modal_system.dt,
+            interface,
+            COUPLING_FACTOR * press.goal[0],
+        )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
-    """Friction and normal contact over a step from sample i, each under the mean force of the other: (dq [m], mean
-    friction force [N], iterations, < 0 where they disagree); n.slot < 0 where no contact set fits. The mean forces on
-    heave and pitch stand in n.few[3:5].
+def solve_press_part(heave, pitch, friction, press):
+    """Solve heave and pitch of a step under a mean friction force, and keep their mean forces in press.few.
 
-    Where friction moves heave and pitch too the secant, kept inside its bracket, finds the force that both agree on.
-    The force jumps where a stop inside the step comes or goes with the guess; where none is its own answer, the mean
-    force of the whole step, which does not jump between stick and slip at one coefficient, is sought in turn.
+    Parameters
+    ----------
+    heave, pitch : float
+        Increments without interface forces [m], [rad].
+    friction : float
+        [N]
+    press : interfaces.arrays.Pressing
+
+    Returns
+    -------
+    int
+        Contact set at the end of the step, negative if none fits.
+    int
+        Number of iterations.
+    float
+        Residual as a force [N].
     """
-    few = n.few
-    beta = n.beta
-    load = n.few[0]
-    goal = n.goal[0]
-    force = few[3:5]
-    turn = few[6:8]
-    out = few[8:17]
-    begin = few[17:22]
-    given = n.loads.size > 0
-    coupled = beta[0, 1] != 0 or beta[0, 2] != 0
-    moves = not given and (beta[1, 1] != 0 or beta[2, 2] != 0)
+    few = press.few
+    beta = press.beta
+    increments = few[PRESS_GUESS : PRESS_GUESS + 2]
+    out = few[PRESS_OUT : PRESS_OUT + 9]
+    start = few[PRESS_START : PRESS_START + 5]
+    end, iterations, residual = solve_press_step(
+        press,
+        press.slot[0],
+        start,
+        heave - beta[1, 0] * friction,
+        pitch - beta[2, 0] * friction,
+        increments,
+        out,
+    )
+    if end >= 0:
+        few[MEAN_PRESS] = out[0]
+        few[MEAN_PRESS + 1] = out[1]
+        if HAS_POINTS:
+            approach = -(start[0] + increments[0])
+            press_state(press.sets, end, approach, start[1] + increments[1], press.now)
+    return end, iterations, residual
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def is_closed(secant):
+    """Return whether the bracket is closed to round-off."""
+    low = secant.low
+    high = secant.high
+    is_bracket = high < np.inf and low > -np.inf
+    return is_bracket and high - low <= BRACKET_TOL * (abs(low) + abs(high))
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def next_guess(secant, guess, used, turn):
+    """Take a secant step inside the bracket; every eighth step is a bisection, as jumps can throw secants to and fro.
+
+    Parameters
+    ----------
+    secant : Secant
+    guess, used : float
+        Force that was assumed, and the one that followed from it [N].
+    turn : int
+        Number of the guess, from 1.
+
+    Returns
+    -------
+    Secant
+    float
+        Next guess [N].
+    """
+    miss = used - guess
+    low = secant.low
+    high = secant.high
+    if miss > 0:
+        low = guess
+    else:
+        high = guess
+    following = used
+    if secant.miss < np.inf and miss != secant.miss:
+        following = guess - miss * (guess - secant.guess) / (miss - secant.miss)
+    if not (low < following < high) or turn % BISECT_EVERY == 0:
+        is_bracket = low > -np.inf and high < np.inf
+        following = 0.5 * (low + high) if is_bracket else used
+    return Secant(low, high, guess, miss), following
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def solve_coupled_forces(i, q, v, motion, modal_system, table, at, interface, faces, press):
+    """Solve friction and normal contact over a step, each under the mean force of the other.
+
+    If friction moves heave or pitch too, the secant method in a bracket finds the force on which both agree. The
+    force jumps where a stop inside the step comes or goes with the guess. If no force agrees with itself then,
+    the mean force of the whole step is found instead, which does not jump between stick and slip at one
+    coefficient. The mean forces on heave and pitch are in press.few then.
+
+    Parameters
+    ----------
+    i : int
+        Number of the sample at which the step starts.
+    q : float
+        Slide of the contact at the start of the step [m].
+    v : float
+        Its speed [m/s].
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    table : (s, k) array
+        Table of `propagator.Propagator`.
+    at : int
+        Row of the table for this step.
+    interface : tuple
+        Arrays of the contact on port 0, in `interfaces.arrays`.
+    faces : interfaces.arrays.Faces
+    press : interfaces.arrays.Pressing
+
+    Returns
+    -------
+    float
+        Increment of the slide [m].
+    float
+        Mean friction force [N].
+    int
+        Number of iterations, negative if they do not agree.
+    """
+    beta = press.beta
+    load = press.few[LOAD]
+    goal = press.goal[0]
+    is_given = press.loads.size > 0
+    moves = not is_given and (beta[1, 1] != 0 or beta[2, 2] != 0)
+    is_coupled = moves and (beta[0, 1] != 0 or beta[0, 2] != 0)
     heave = free_slide(motion, modal_system.reach, 1, table, at)
     pitch = free_slide(motion, modal_system.reach, 2, table, at)
-    guess = n.mean[0]
+    after = load
+    if is_given:
+        after = press.loads[i + 1]
+        press.now[0] = after
+    if HAS_POINTS:
+        for k in range(press.now.size):
+            interface.pressed[0, k] = interface.pressed[1, k]
+    guess = press.mean[0]
+    secant = Secant(-np.inf, np.inf, 0.0, np.inf)
+    end = press.slot[0]
     count = 0
     wrong = 0.0
-    end = n.slot[0]
-    bad = False
-    low = -np.inf
-    high = np.inf
-    last_f = 0.0
-    last_r = np.inf
     dq = 0.0
     used = 0.0
-    after = load
-    whole = False
-    last = MOST
-    if given:
-        after = n.loads[i + 1]
-        n.now[0] = after
-    if POINTED:
-        for k in range(n.now.size):
-            c.pressed[0, k] = c.pressed[1, k]
-    for outer in range(1, 2 * MOST + 1):
+    is_bad = False
+    is_whole = False
+    last_turn = MAX_GUESSES
+    for turn in range(1, 2 * MAX_GUESSES + 1):
         if moves:
-            end, its, wrong = press_step(
-                n,
-                n.slot[0],
-                begin,
-                heave - beta[1, 0] * guess,
-                pitch - beta[2, 0] * guess,
-                turn,
-                out,
-            )
+            end, iterations, wrong = solve_press_part(heave, pitch, guess, press)
             if end < 0:
-                n.slot[0] = end
+                press.slot[0] = end
                 return dq, used, count
-            force[0] = out[0]
-            force[1] = out[1]
-            count += its
-            after = 2 * max(n.sets.reference[REFERENCE_LOAD] - out[0], 0.0) - load
-            if POINTED:
-                press_state(n.sets, end, -(begin[0] + turn[0]), begin[1] + turn[1], n.now)
-        weigh(load, after, c, j, n)
-        dq, used, its = solve_step(q, v, force, whole, motion, modal_system, table, at, c, j, n)
-        count += abs(its)
-        bad = its < 0 or wrong > goal
+            count += iterations
+            after = 2 * max(press.sets.reference[REFERENCE_LOAD] - press.few[PRESS_OUT], 0.0) - load
+        set_loads(load, after, interface, faces, press)
+        dq, used, iterations = solve_friction_step(
+            q,
+            v,
+            press.few[MEAN_PRESS : MEAN_PRESS + 2],
+            is_whole,
+            motion,
+            modal_system,
+            table,
+            at,
+            interface,
+            faces,
+            press,
+        )
+        count += abs(iterations)
+        is_bad = iterations < 0 or wrong > goal
         miss = used - guess
-        if not (moves and coupled) or abs(miss) <= TIGHT * goal:
+        if not is_coupled or abs(miss) <= COUPLING_FACTOR * goal:
             break
-        if outer == last or (
-            high < np.inf and low > -np.inf and high - low <= 4e-16 * (abs(low) + abs(high))
-        ):
-            if STOPS:
-                mean = 0.5 * (load + max(after, 0.0))
-                if n.force[1] * mean <= abs(guess) <= n.force[0] * mean:
-                    used = guess  # between kinetic and static friction the step starts to slip
-                    dq = faces.slide_freely(used, j)
-                    break
-                if not whole:
-                    whole = True
-                    last = outer + MOST
-                    low = -np.inf
-                    high = np.inf
-                    last_r = np.inf
-                    continue
-            bad = bad or abs(miss) > goal
-            break
-        if miss > 0:
-            low = guess
-        else:
-            high = guess
-        following = used
-        if last_r < np.inf and miss != last_r:
-            following = guess - miss * (guess - last_f) / (miss - last_r)
-        last_f = guess
-        last_r = miss
-        if not (low < following < high) or outer % 8 == 0:
-            following = 0.5 * (low + high) if low > -np.inf and high < np.inf else used
-        guess = following
-    n.mean[0] = used
-    n.slot[0] = end
+        if turn < last_turn and not is_closed(secant):
+            secant, guess = next_guess(secant, guess, used, turn)
+            continue
+        if HAS_STOPS:
+            mean_load = 0.5 * (load + max(after, 0.0))
+            if press.force[1] * mean_load <= abs(guess) <= press.force[0] * mean_load:
+                # A force between kinetic and static friction: the step starts to slip.
+                used = guess
+                dq = coupling.slide_freely(used, faces)
+                break
+            if not is_whole:
+                is_whole = True
+                last_turn = turn + MAX_GUESSES
+                secant = Secant(-np.inf, np.inf, 0.0, np.inf)
+                continue
+        is_bad = is_bad or abs(miss) > goal
+        break
+    press.mean[0] = used
+    press.slot[0] = end
     if moves:
-        few[0] = max(n.sets.reference[REFERENCE_LOAD] - out[3], 0.0)
-    return dq, used, -count if bad else count
+        press.few[LOAD] = max(press.sets.reference[REFERENCE_LOAD] - press.few[PRESS_OUT + 3], 0.0)
+    return dq, used, -count if is_bad else count

@@ -1,21 +1,21 @@
-"""Stops and releases of set-valued faces inside a step: which rest, slide or carry, and the forces they need for it.
+"""Stops and releases of set-valued faces inside a step: which rest, slide or carry, and the forces that this needs.
 
-A march moves the modes under mean forces, so a stop or a release inside the step would be off by up to a step, and a
-slide that holds would keep a speed. Here the forces h(x) that would hold all faces change linearly over the step, 0 <=
-x <= 1, and a slide accelerates by what they differ from the friction: every stop and every release is the root of a
-line or a parabola. From event to event some faces rest and some slide. Those that rest share what the others and the
-modes ask of them; dependent ones share by least squares, and one that this share would overload while the others hold
-it carries its static friction. The limits may change linearly over the step, as under a load that changes.
+A march moves the modes under mean forces, so a stop or a release inside the step would be off by up to a step, and a slide
+that is held would keep a speed. Here the forces h(x) that would hold all faces change linearly over the step, 0 <= x <= 1,
+and a slide accelerates by the difference between h and the friction. So every stop and every release is the root of a line
+or a parabola. Between events some faces rest and the others slide. Faces that rest share the force that the others and the
+modes ask of them; dependent ones share it by least squares, and one that would be overloaded while the others hold it
+carries its static friction. The limits may change linearly over the step, as under a load that varies.
 
-The step then needs slides and speeds at its end: mean forces give the slides, blows at its end the speeds. Both are of
-second order in the step. `blows` says what work friction takes in all; the loop steps by the mean forces alone where it
-would give some. s: `contacts.arrays.Stops`. Read `watched` first.
+The step then needs slides and speeds at its end. Mean forces give the slides, and blows at the end give the speeds; both
+are of second order in the step. `find_blows` computes the work of all friction. If the friction would do work on the modes,
+the loop steps by mean forces alone. Read `follow_step` first.
 
-Stiff elastic-plastic faces do not replace this text. They have one coefficient of friction, so a kinetic coefficient
-below the static one cannot be given to them. With equal coefficients, on 119 random rigs, 98 % of the
-errors hold with set-valued faces; with elastic-plastic ones 50 %, 74 % and 81 % hold for bond lengths of 0.1, 0.01 and
-0.001 of the tolerance times the friction force over the stiffness of the mode, and 72 %, 88 % and 91 % of the values
-are within the tolerance, where all set-valued ones are.
+Stiff elastic-plastic faces do not replace this module, because they have one coefficient of friction: a kinetic
+coefficient below the static one cannot be given to them. With equal coefficients, on 119 random rigs, 98 % of the errors
+hold with set-valued faces; with elastic-plastic ones 50 %, 74 % and 81 % hold for bond lengths of 0.1, 0.01 and 0.001 of
+the tolerance times the friction force over the stiffness of the mode, and 72 %, 88 % and 91 % of the values are within the
+tolerance, where all set-valued ones are.
 """
 
 import numpy as np
@@ -25,69 +25,133 @@ from ...friction.flags_kernels import NJIT_INTERNAL, NJIT_NO_REFCOUNT
 from ..dense_kernels import factor, solve
 from ..modal_kernels import accelerations
 
-HOLDS = 0  # of num: the law that holds without a stretch
-# of arrays.Faces: rows of `of` and of `modal`, places of `own`, rows of `each`
-PORT, RUBS, MATE = range(3)
-GIVE, BESIDE, ROOM = range(3)
-FORCE_OWN, STEP_OWN, NOW_OWN, AIM, KNOWN = range(5)
-PULL, PLACE, PACE, EPS, STEP, LACK, MOST, CLOSE, WENT, WENT_BEFORE = range(10)
-TRACE = 1e-10  # of the diagonal: give of dependent faces, which leaves their share free
-TIED = 1e-7  # of the diagonal: what is left of a face's own give where others hold it
-BETA, GAMMA, TUG = range(3)  # of `gives`
-# of `limit`: at the start of the step, and END rows further on at its end
-STATIC, KINETIC, END = range(3)
-# rows of `field`: free slide and speed, speed at the start, whether it rests there; holding force at both ends; slide
-# and speed so far, mean force; force now and its slope; way (0 rest, +-1 slides, +-2 carries), whether it slides all
-# the way; right side, solution, residual; slide of the step, blow
-(
-    FREE,
-    RATE,
-    START,
-    REST,
-    FIRST,
-    LAST,
-    SLIDE,
-    SPEED,
-    MEAN,
-    FORCE,
-    SLOPE,
-    WAY,
-    SLIDES,
-    RIGHT,
-    FOUND,
-    MISS,
-    DQ,
-    BLOW,
-) = range(18)
+# Number of the law in `num` of an element that holds without a stretch; it is set-valued.
+SET_VALUED = 0
+# Rows of `interfaces.arrays.Faces`. `of`: port of an element, whether it is friction, and the element of the other
+# direction of a slide in a plane.
+PORT = 0
+IS_FRICTION = 1
+MATE = 2
+# `modal`: give of the coordinates [m/N], accelerations by other forces [m s-2], and the first row of scratch space.
+COORDINATE_GIVE = 0
+OTHER_ACCELERATION = 1
+MODAL_SCRATCH = 2
+# `own`: of the contact its mean force, increment of slide, force at the sample and tolerance of the force; then 1 if the
+# stops of the step are known.
+CONTACT_FORCE = 0
+CONTACT_INCREMENT = 1
+CONTACT_SAMPLE = 2
+CONTACT_TOL = 3
+STOPS_KNOWN = 4
+# `each`: of an element its mean force [N], slide, speed, bond length, increment of slide, residual, largest force,
+# tolerance of the force, and increments of the last two steps.
+ELEMENT_FORCE = 0
+ELEMENT_SLIDE = 1
+ELEMENT_SPEED = 2
+BOND_LENGTH = 3
+INCREMENT = 4
+ELEMENT_RESIDUAL = 5
+MAX_FORCE = 6
+FORCE_TOL = 7
+LAST_INCREMENT = 8
+INCREMENT_BEFORE = 9
+# `gives`: what constant forces take from the slides [m/N] and speeds [m/(s N)] in a step, and from accelerations [1/kg].
+BETA = 0
+GAMMA = 1
+ACCELERANCE = 2
+# `limit`: static and kinetic friction at the start of the step, and AT_END rows further on at its end.
+STATIC = 0
+KINETIC = 1
+AT_END = 2
+# `field`, of a face in the step:
+FREE_SLIDE = 0  # increment of slide without its forces [m]
+FREE_SPEED = 1  # speed at the end without its forces [m/s]
+START_SPEED = 2  # speed at the start [m/s]
+WAS_RESTING = 3  # 1 if it rests at the start
+HOLDING_START = 4  # force that would hold it, at the start [N]
+HOLDING_END = 5  # force that would hold it, at the end [N]
+SLIDE = 6  # slide since the start [m]
+SPEED = 7  # speed now [m/s]
+MEAN_FORCE = 8  # mean force so far [N]
+FORCE_NOW = 9  # force now [N]
+FORCE_SLOPE = 10  # slope of the force over the step [N]
+SLIP_STATE = (
+    11  # 0: it rests; +-1: it slides; +-2: it carries its static friction while others hold it
+)
+SLIDES_ON = 12  # 1 if it slides in one direction through the whole step
+RIGHT_SIDE = 13  # right side of the equations that are solved
+SOLUTION = 14  # solution of these equations
+RESIDUAL = 15  # their residual, also scratch space
+FACE_INCREMENT = 16  # increment of slide of the step [m]
+BLOW = 17  # impulse at the end of the step [N s]
+N_FIELDS = 18
+
+DIAGONAL_SHIFT = (
+    1e-10  # relative shift of the diagonal that makes equations of dependent faces regular
+)
+DEPENDENT_TOL = 1e-7  # remaining fraction of a face's own give below which the other faces hold it
+OVERLOAD_TOL = 1e-9  # fraction by which a force may exceed the static friction
+SAME_TIME_TOL = 1e-12  # fraction of a speed below which equal faces stop at once
+ZERO_SLIDE_TOL = 1e-14  # fraction of its terms below which an increment of slide is zero
+TINY = 1e-300  # keeps a divisor above 0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def bound(which, e, x, s):
-    """Static or kinetic friction [N] of face e at the place x of the step."""
-    return s.limit[which, e] + x * (s.limit[which + END, e] - s.limit[which, e])
+def friction_bound(which, e, x, stops):
+    """Return the static or kinetic friction [N] of a face at a place of the step.
 
+    Parameters
+    ----------
+    which : int
+        STATIC or KINETIC.
+    e : int
+        Number of the face.
+    x : float
+        Place in the step, from 0 at its start to 1.
+    stops : interfaces.arrays.Stops
 
-@njit(error_model="numpy", **NJIT_INTERNAL)
-def shared(which, count, s):
-    """Put the solution x of A x = b into row FOUND of s.field, b in row RIGHT, A = s.gives[which] of the faces
-    s.names[:count].
-
-    b and x are in the order of the names. Of dependent faces it is the smallest x. False where A has no positive
-    diagonal.
+    Returns
+    -------
+    float
     """
-    a = s.system[:count, :count]
-    b = s.field[RIGHT]
-    x = s.field[FOUND]
-    r = s.field[MISS]
-    names = s.names
+    return stops.limit[which, e] + x * (stops.limit[which + AT_END, e] - stops.limit[which, e])
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def solve_shared_forces(which, count, stops):
+    """Solve A x = b for the forces x that the faces `stops.names[:count]` share.
+
+    A is stops.gives[which] of these faces, b their row RIGHT_SIDE of stops.field, and x is written into the row
+    SOLUTION, both in the order of the names. Of forces that depend on each other the smallest x is found: a shift
+    of the diagonal makes A regular, and one step of iterative refinement removes the shift where it has no
+    effect.
+
+    Parameters
+    ----------
+    which : int
+        BETA, GAMMA or ACCELERANCE.
+    count : int
+        Number of faces.
+    stops : interfaces.arrays.Stops
+
+    Returns
+    -------
+    bool
+        Whether A has a positive diagonal.
+    """
+    a = stops.system[:count, :count]
+    b = stops.field[RIGHT_SIDE]
+    x = stops.field[SOLUTION]
+    r = stops.field[RESIDUAL]
+    names = stops.names
     if count == 1:
-        give = s.gives[which, names[0], names[0]]
+        give = stops.gives[which, names[0], names[0]]
         x[0] = b[0] / give
         return give > 0.0
     for i in range(count):
         for k in range(count):
-            a[i, k] = s.gives[which, names[i], names[k]]
-        a[i, i] *= 1 + TRACE
+            a[i, k] = stops.gives[which, names[i], names[k]]
+        a[i, i] *= 1 + DIAGONAL_SHIFT
         x[i] = 0.0
     if not factor(a):
         return False
@@ -95,7 +159,7 @@ def shared(which, count, s):
         for i in range(count):
             r[i] = b[i]
             for k in range(count):
-                r[i] -= s.gives[which, names[i], names[k]] * x[k]
+                r[i] -= stops.gives[which, names[i], names[k]] * x[k]
         solve(a, r[:count])
         for i in range(count):
             x[i] += r[i]
@@ -103,93 +167,117 @@ def shared(which, count, s):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def resting(s):
-    """Numbers of the faces that rest into s.names; how many."""
+def list_resting(stops):
+    """Write the numbers of the faces that rest into stops.names; return how many."""
     count = 0
-    for e in range(s.names.size):
-        if s.field[WAY, e] == 0.0:
-            s.names[count] = e
+    for e in range(stops.names.size):
+        if stops.field[SLIP_STATE, e] == 0.0:
+            stops.names[count] = e
             count += 1
     return count
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def forces_at(x, s):
-    """Forces of all faces at the place x of the step and their slopes, into s.field; False where there are none."""
-    f = s.field
-    count = resting(s)
-    for e in range(s.names.size):
-        which = STATIC if abs(f[WAY, e]) == 2.0 else KINETIC
-        way = np.sign(f[WAY, e])
-        f[FORCE, e] = way * bound(which, e, x, s)
-        f[SLOPE, e] = way * (s.limit[which + END, e] - s.limit[which, e])
+def find_forces(x, stops):
+    """Write the forces of all faces and their slopes into stops.field; return whether they exist."""
+    f = stops.field
+    count = list_resting(stops)
+    for e in range(stops.names.size):
+        which = STATIC if abs(f[SLIP_STATE, e]) == 2.0 else KINETIC
+        way = np.sign(f[SLIP_STATE, e])
+        f[FORCE_NOW, e] = way * friction_bound(which, e, x, stops)
+        f[FORCE_SLOPE, e] = way * (stops.limit[which + AT_END, e] - stops.limit[which, e])
     for part in range(2):
         for i in range(count):
-            f[RIGHT, i] = 0.0
-            for e in range(s.names.size):
-                if f[WAY, e] != 0.0:
-                    rise = f[LAST, e] - f[FIRST, e]
+            f[RIGHT_SIDE, i] = 0.0
+            for e in range(stops.names.size):
+                if f[SLIP_STATE, e] != 0.0:
+                    rise = f[HOLDING_END, e] - f[HOLDING_START, e]
                     beyond = (
-                        f[FIRST, e] + rise * x - f[FORCE, e] if part == 0 else rise - f[SLOPE, e]
+                        f[HOLDING_START, e] + rise * x - f[FORCE_NOW, e]
+                        if part == 0
+                        else rise - f[FORCE_SLOPE, e]
                     )
-                    f[RIGHT, i] += s.gives[TUG, s.names[i], e] * beyond
-        if count and not shared(TUG, count, s):
+                    f[RIGHT_SIDE, i] += stops.gives[ACCELERANCE, stops.names[i], e] * beyond
+        if count and not solve_shared_forces(ACCELERANCE, count, stops):
             return False
         for i in range(count):
-            e = s.names[i]
-            rise = f[LAST, e] - f[FIRST, e]
+            e = stops.names[i]
+            rise = f[HOLDING_END, e] - f[HOLDING_START, e]
             if part == 0:
-                f[FORCE, e] = f[FIRST, e] + rise * x + f[FOUND, i]
+                f[FORCE_NOW, e] = f[HOLDING_START, e] + rise * x + f[SOLUTION, i]
             else:
-                f[SLOPE, e] = rise + f[FOUND, i]
+                f[FORCE_SLOPE, e] = rise + f[SOLUTION, i]
     return True
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def let_go(e, way, s):
-    """Let face e slide along way, or carry its static friction where the others that rest hold it."""
-    f = s.field
+def release_face(e, way, stops):
+    """Let a face slide, or carry its static friction if the other resting faces hold it.
+
+    Parameters
+    ----------
+    e : int
+        Number of the face.
+    way : float
+        Sign of the slide.
+    stops : interfaces.arrays.Stops
+    """
+    f = stops.field
     # no more among those that rest
-    f[WAY, e] = way
-    f[SLIDES, e] = 0.0
-    count = resting(s)
+    f[SLIP_STATE, e] = way
+    f[SLIDES_ON, e] = 0.0
+    count = list_resting(stops)
     for i in range(count):
-        f[RIGHT, i] = s.gives[TUG, s.names[i], e]
-    if count == 0 or not shared(TUG, count, s):
+        f[RIGHT_SIDE, i] = stops.gives[ACCELERANCE, stops.names[i], e]
+    if count == 0 or not solve_shared_forces(ACCELERANCE, count, stops):
         return
-    left = s.gives[TUG, e, e]
+    left = stops.gives[ACCELERANCE, e, e]
     for i in range(count):
-        left -= s.gives[TUG, e, s.names[i]] * f[FOUND, i]
-    if left <= TIED * s.gives[TUG, e, e]:
-        f[WAY, e] = 2 * way
+        left -= stops.gives[ACCELERANCE, e, stops.names[i]] * f[SOLUTION, i]
+    if left <= DEPENDENT_TOL * stops.gives[ACCELERANCE, e, e]:
+        f[SLIP_STATE, e] = 2 * way
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def settled(x, s):
-    """Which faces rest, slide or carry at the place x, and their forces; False where no choice is found."""
-    f = s.field
-    for e in range(s.names.size):
-        if abs(f[WAY, e]) == 2.0:
-            f[WAY, e] = 0.0
-    for _ in range(2 * s.names.size + 2):
-        if not forces_at(x, s):
+def choose_states(x, stops):
+    """Choose which faces rest, slide or carry at a place of the step; return whether it succeeds."""
+    f = stops.field
+    for e in range(stops.names.size):
+        if abs(f[SLIP_STATE, e]) == 2.0:
+            f[SLIP_STATE, e] = 0.0
+    for _ in range(2 * stops.names.size + 2):
+        if not find_forces(x, stops):
             return False
-        worst = 1e-9
+        worst = OVERLOAD_TOL
         who = -1
-        for e in range(s.names.size):
-            over = abs(f[FORCE, e]) / max(bound(STATIC, e, x, s), 1e-300) - 1
-            if f[WAY, e] == 0.0 and over > worst:
+        for e in range(stops.names.size):
+            over = abs(f[FORCE_NOW, e]) / max(friction_bound(STATIC, e, x, stops), TINY) - 1
+            if f[SLIP_STATE, e] == 0.0 and over > worst:
                 worst = over
                 who = e
         if who < 0:
             return True
-        let_go(who, 1.0 if f[FORCE, who] > 0 else -1.0, s)
+        release_face(who, 1.0 if f[FORCE_NOW, who] > 0 else -1.0, stops)
     return False
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def passes_zero(speed, start, bend):
-    """Where speed + start y + bend y^2 falls to 0, infinite where it does not; speed >= 0, start >= 0 where it is 0."""
+def first_zero(speed, start, bend):
+    """Return the first y >= 0 at which speed + start y + bend y^2 falls to 0, infinite if it does not.
+
+    The speed must not be negative, and `start` not negative where the speed is 0.
+
+    Parameters
+    ----------
+    speed : float
+    start : float
+    bend : float
+
+    Returns
+    -------
+    float
+    """
     if speed == 0.0:
         return -start / bend if bend < 0 else np.inf
     root = start * start - 4 * bend * speed
@@ -200,41 +288,83 @@ def passes_zero(speed, start, bend):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def pulls(e, x, dt, s):
-    """(change of speed [m/s] of face e per length of the step at the place x, half of the slope of that)."""
+def speed_rates(e, x, dt, stops):
+    """Return the change of the speed of a face per length of the step, and half of its slope.
+
+    Parameters
+    ----------
+    e : int
+        Number of the face.
+    x : float
+        Place in the step, from 0 at its start to 1.
+    dt : float
+        Length of the step [s].
+    stops : interfaces.arrays.Stops
+
+    Returns
+    -------
+    float
+        [m/s]
+    float
+        [m/s]
+    """
     start = 0.0
     bend = 0.0
-    f = s.field
-    for k in range(s.names.size):
-        g = dt * s.gives[TUG, e, k]
-        rise = f[LAST, k] - f[FIRST, k]
-        start += g * (f[FIRST, k] + rise * x - f[FORCE, k])
-        bend += 0.5 * g * (rise - f[SLOPE, k])
+    f = stops.field
+    for k in range(stops.names.size):
+        g = dt * stops.gives[ACCELERANCE, e, k]
+        rise = f[HOLDING_END, k] - f[HOLDING_START, k]
+        start += g * (f[HOLDING_START, k] + rise * x - f[FORCE_NOW, k])
+        bend += 0.5 * g * (rise - f[FORCE_SLOPE, k])
     if f[SPEED, e] == 0.0:  # just let go: forward but for round-off
-        start = f[WAY, e] * max(f[WAY, e] * start, 0.0)
+        start = f[SLIP_STATE, e] * max(f[SLIP_STATE, e] * start, 0.0)
     return start, bend
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def next_event(x, dt, s):
-    """(how far from the place x the next face stops or goes, which, the way it goes or 0)."""
-    f = s.field
+def find_next_event(x, dt, stops):
+    """Find the next stop or release after a place of the step.
+
+    Parameters
+    ----------
+    x : float
+        Place in the step, from 0 at its start to 1.
+    dt : float
+        Length of the step [s].
+    stops : interfaces.arrays.Stops
+
+    Returns
+    -------
+    float
+        Distance to the event, in lengths of the step.
+    int
+        Number of the face, -1 for no event.
+    float
+        Sign of the slide after a release, 0 for a stop.
+    """
+    f = stops.field
     y = 1.0 - x
     who = -1
     way = 0.0
-    for e in range(s.names.size):
-        if abs(f[WAY, e]) == 1.0:
-            start, bend = pulls(e, x, dt, s)
-            at = passes_zero(f[WAY, e] * f[SPEED, e], f[WAY, e] * start, f[WAY, e] * bend)
+    for e in range(stops.names.size):
+        if abs(f[SLIP_STATE, e]) == 1.0:
+            start, bend = speed_rates(e, x, dt, stops)
+            at = first_zero(
+                f[SLIP_STATE, e] * f[SPEED, e], f[SLIP_STATE, e] * start, f[SLIP_STATE, e] * bend
+            )
             if at < y:
                 y = at
                 who = e
                 way = 0.0
-        elif f[WAY, e] == 0.0:
+        elif f[SLIP_STATE, e] == 0.0:
             for sign in (1.0, -1.0):
-                rise = sign * f[SLOPE, e] - (s.limit[STATIC + END, e] - s.limit[STATIC, e])
+                rise = sign * f[FORCE_SLOPE, e] - (
+                    stops.limit[STATIC + AT_END, e] - stops.limit[STATIC, e]
+                )
                 if rise > 0:
-                    at = max((bound(STATIC, e, x, s) - sign * f[FORCE, e]) / rise, 0.0)
+                    at = max(
+                        (friction_bound(STATIC, e, x, stops) - sign * f[FORCE_NOW, e]) / rise, 0.0
+                    )
                     if at < y:
                         y = at
                         who = e
@@ -243,257 +373,315 @@ def next_event(x, dt, s):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def moved(x, y, who, dt, s):
-    """Move all faces on by y from the place x, where face `who` stops if it slides."""
-    f = s.field
-    for e in range(s.names.size):
-        f[MEAN, e] += y * (f[FORCE, e] + 0.5 * y * f[SLOPE, e])
-        if abs(f[WAY, e]) == 1.0:
-            start, bend = pulls(e, x, dt, s)
+def advance_faces(x, y, who, dt, stops):
+    """Move all faces on from a place of the step up to an event.
+
+    Parameters
+    ----------
+    x : float
+        Place in the step, from 0 at its start to 1.
+    y : float
+        Distance in lengths of the step.
+    who : int
+        Number of the face that has the event, -1 for none; it stops if it slides.
+    dt : float
+        Length of the step [s].
+    stops : interfaces.arrays.Stops
+    """
+    f = stops.field
+    for e in range(stops.names.size):
+        f[MEAN_FORCE, e] += y * (f[FORCE_NOW, e] + 0.5 * y * f[FORCE_SLOPE, e])
+        if abs(f[SLIP_STATE, e]) == 1.0:
+            start, bend = speed_rates(e, x, dt, stops)
             f[SLIDE, e] += y * dt * (f[SPEED, e] + y * (0.5 * start + y * bend / 3))
-            f[MISS, e] = f[SPEED, e] + y * (start + y * bend)
-    for e in range(s.names.size):
-        if abs(f[WAY, e]) == 1.0:
+            f[RESIDUAL, e] = f[SPEED, e] + y * (start + y * bend)
+    for e in range(stops.names.size):
+        if abs(f[SLIP_STATE, e]) == 1.0:
             last = abs(f[SPEED, e])
-            f[SPEED, e] = f[MISS, e]
-            least = 1e-12 * last if last > 0.0 else -1.0  # alike faces stop at once
+            f[SPEED, e] = f[RESIDUAL, e]
+            least = SAME_TIME_TOL * last if last > 0.0 else -1.0  # alike faces stop at once
             if (
                 e == who
-                or (who < 0 and f[WAY, e] * f[SPEED, e] <= 0)
-                or f[WAY, e] * f[SPEED, e] <= least
+                or (who < 0 and f[SLIP_STATE, e] * f[SPEED, e] <= 0)
+                or f[SLIP_STATE, e] * f[SPEED, e] <= least
             ):
                 f[SPEED, e] = 0.0
-                f[WAY, e] = 0.0
-                f[SLIDES, e] = 0.0
+                f[SLIP_STATE, e] = 0.0
+                f[SLIDES_ON, e] = 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def followed(dt, s):
-    """Follow all faces through the step: slides, speeds, ways and mean forces in s.field; False where it fails."""
+def follow_events(dt, stops):
+    """Follow the faces from event to event into stops.field; return whether that succeeds."""
     x = 0.0
-    for _ in range(6 * s.names.size + 12):
-        if not settled(x, s):
+    for _ in range(6 * stops.names.size + 12):
+        if not choose_states(x, stops):
             return False
-        y, who, way = next_event(x, dt, s)
-        moved(x, y, who, dt, s)
+        y, who, way = find_next_event(x, dt, stops)
+        advance_faces(x, y, who, dt, stops)
         if who < 0:
             return True
         x += y
         if way != 0.0:
-            let_go(who, way, s)
+            release_face(who, way, stops)
     return False
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def slides_on(s):
-    """Whether all faces slide the way they do to the end of the step; ways and speeds stand in s.field then."""
-    f = s.field
-    count = s.names.size
+def check_all_slide(stops):
+    """Return whether all faces slide on to the end of the step; stops.field then has their speeds."""
+    f = stops.field
+    count = stops.names.size
     for e in range(count):
-        f[WAY, e] = np.sign(f[START, e])
-        f[SLIDES, e] = 1.0
-        if f[START, e] == 0.0:
+        f[SLIP_STATE, e] = np.sign(f[START_SPEED, e])
+        f[SLIDES_ON, e] = 1.0
+        if f[START_SPEED, e] == 0.0:
             return False
     for e in range(count):
-        dq = f[FREE, e]
-        end = f[RATE, e]
+        dq = f[FREE_SLIDE, e]
+        end = f[FREE_SPEED, e]
         for k in range(count):
-            force = f[WAY, k] * bound(KINETIC, k, 0.5, s)
-            dq -= s.gives[BETA, e, k] * force
-            end -= s.gives[GAMMA, e, k] * force
-        if f[WAY, e] * dq < 0 or f[WAY, e] * end <= 0:
+            force = f[SLIP_STATE, k] * friction_bound(KINETIC, k, 0.5, stops)
+            dq -= stops.gives[BETA, e, k] * force
+            end -= stops.gives[GAMMA, e, k] * force
+        if f[SLIP_STATE, e] * dq < 0 or f[SLIP_STATE, e] * end <= 0:
             return False
         f[SPEED, e] = end
     return True
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def asked(dt, s):
-    """Forces that would hold the faces at the ends of the step, rows FIRST and LAST of s.field; False: none found.
+def find_holding_forces(dt, stops):
+    """Find the forces that would hold the faces at both ends of the step; return whether they exist.
 
-    First of all faces at once. Those that rest are held by what the step itself asks of them beside those that slide:
-    the others' accelerations are right to the first order in the step alone, which would place a release anywhere.
+    They are found for all faces at once, and then for the resting ones as the step itself asks of them beside
+    those that slide: accelerations are known to the first order of the step only, which would place a release
+    anywhere.
     """
-    f = s.field
-    faces = s.names.size
+    f = stops.field
+    coupling = stops.names.size
     for stage in range(2):
-        count = faces
+        count = coupling
         if stage == 0:
-            for e in range(faces):
-                s.names[e] = e
+            for e in range(coupling):
+                stops.names[e] = e
         else:
-            count = resting(s)
-            if count == 0 or count == faces:
+            count = list_resting(stops)
+            if count == 0 or count == coupling:
                 return True
-            if not forces_at(0.0, s):
+            if not find_forces(0.0, stops):
                 return False
         for part in range(2):
             which = BETA if part == 0 else GAMMA
             for i in range(count):
-                e = s.names[i]
-                f[RIGHT, i] = (
-                    f[FREE, e] - f[START, e] * dt if part == 0 else f[RATE, e] - f[START, e]
+                e = stops.names[i]
+                f[RIGHT_SIDE, i] = (
+                    f[FREE_SLIDE, e] - f[START_SPEED, e] * dt
+                    if part == 0
+                    else f[FREE_SPEED, e] - f[START_SPEED, e]
                 )
-                for k in range(faces if stage == 1 else 0):
-                    if f[WAY, k] != 0.0:
-                        mean = f[FORCE, k] + f[SLOPE, k] * (1 / 3 if part == 0 else 1 / 2)
-                        f[RIGHT, i] -= s.gives[which, e, k] * mean
-            if not shared(which, count, s):
+                for k in range(coupling if stage == 1 else 0):
+                    if f[SLIP_STATE, k] != 0.0:
+                        mean = f[FORCE_NOW, k] + f[FORCE_SLOPE, k] * (1 / 3 if part == 0 else 1 / 2)
+                        f[RIGHT_SIDE, i] -= stops.gives[which, e, k] * mean
+            if not solve_shared_forces(which, count, stops):
                 return False
             for i in range(count):
-                e = s.names[i]
-                found = f[FOUND, i]
+                e = stops.names[i]
+                found = f[SOLUTION, i]
                 if part == 0:
-                    f[MEAN, e] = found
+                    f[MEAN_FORCE, e] = found
                 else:
-                    first = 3 * f[MEAN, e] - 2 * found
-                    last = 4 * found - 3 * f[MEAN, e]
-                    f[FIRST, e] = first if stage == 0 else f[FIRST, e] + first - f[FORCE, e]
-                    f[LAST, e] = (
-                        last if stage == 0 else f[LAST, e] + last - f[FORCE, e] - f[SLOPE, e]
+                    first = 3 * f[MEAN_FORCE, e] - 2 * found
+                    last = 4 * found - 3 * f[MEAN_FORCE, e]
+                    f[HOLDING_START, e] = (
+                        first if stage == 0 else f[HOLDING_START, e] + first - f[FORCE_NOW, e]
+                    )
+                    f[HOLDING_END, e] = (
+                        last
+                        if stage == 0
+                        else f[HOLDING_END, e] + last - f[FORCE_NOW, e] - f[FORCE_SLOPE, e]
                     )
     return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def watched(dt, s):
-    """Follow the faces from event to event; False where it fails. The ways, slides and speeds stand in s.field.
-
-    Rows FREE, RATE, START and REST are given. Where modes swing within the step nothing inside it can be told.
-    """
-    f = s.field
+def follow_step(dt, stops):
+    """Follow the faces through a step into stops.field; return whether that succeeds."""
+    f = stops.field
     resolved = True
-    for e in range(s.names.size):
-        give = dt * s.gives[TUG, e, e]
+    for e in range(stops.names.size):
+        give = dt * stops.gives[ACCELERANCE, e, e]
         resolved = (
             resolved
-            and s.gives[BETA, e, e] > 0.25 * give * dt
-            and s.gives[GAMMA, e, e] > 0.5 * give
+            and stops.gives[BETA, e, e] > 0.25 * give * dt
+            and stops.gives[GAMMA, e, e] > 0.5 * give
         )
-        f[START, e] = 0.0 if f[REST, e] == 1.0 else f[START, e]
-    if slides_on(s):
+        f[START_SPEED, e] = 0.0 if f[WAS_RESTING, e] == 1.0 else f[START_SPEED, e]
+    if check_all_slide(stops):
         return True
-    if not resolved or not asked(dt, s):
+    if not resolved or not find_holding_forces(dt, stops):
         return False
-    for e in range(s.names.size):
-        f[SPEED, e] = f[START, e]
-        f[WAY, e] = np.sign(f[START, e])
+    for e in range(stops.names.size):
+        f[SPEED, e] = f[START_SPEED, e]
+        f[SLIP_STATE, e] = np.sign(f[START_SPEED, e])
         f[SLIDE, e] = 0.0
-        f[MEAN, e] = 0.0
-        f[SLIDES, e] = abs(f[WAY, e])
-    return followed(dt, s)
+        f[MEAN_FORCE, e] = 0.0
+        f[SLIDES_ON, e] = abs(f[SLIP_STATE, e])
+    return follow_events(dt, stops)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def met(s):
-    """Mean forces of all faces, row MEAN, that give the slides that were found, and their slides, row DQ; False where
-    none are found."""
-    f = s.field
+def match_mean_forces(stops):
+    """Find mean forces of all faces that give the slides of stops.field; return whether they exist."""
+    f = stops.field
     count = 0
-    for e in range(s.names.size):
-        if f[SLIDES, e] == 1.0:
-            f[MEAN, e] = f[WAY, e] * bound(KINETIC, e, 0.5, s)
+    for e in range(stops.names.size):
+        if f[SLIDES_ON, e] == 1.0:
+            f[MEAN_FORCE, e] = f[SLIP_STATE, e] * friction_bound(KINETIC, e, 0.5, stops)
         else:
-            s.names[count] = e
+            stops.names[count] = e
             count += 1
     for i in range(count):
-        e = s.names[i]
-        f[RIGHT, i] = f[FREE, e] - f[SLIDE, e]
-        for k in range(s.names.size):
-            f[RIGHT, i] -= s.gives[BETA, e, k] * f[MEAN, k]
-    if count and not shared(BETA, count, s):
+        e = stops.names[i]
+        f[RIGHT_SIDE, i] = f[FREE_SLIDE, e] - f[SLIDE, e]
+        for k in range(stops.names.size):
+            f[RIGHT_SIDE, i] -= stops.gives[BETA, e, k] * f[MEAN_FORCE, k]
+    if count and not solve_shared_forces(BETA, count, stops):
         return False
     for i in range(count):
-        e = s.names[i]
-        most = max(s.limit[STATIC, e], s.limit[STATIC + END, e])
-        f[MEAN, e] = min(max(f[MEAN, e] + f[FOUND, i], -most), most)
-    for e in range(s.names.size):
-        f[DQ, e] = f[FREE, e]
-        size = abs(f[FREE, e])
-        for k in range(s.names.size):
-            part = s.gives[BETA, e, k] * f[MEAN, k]
-            f[DQ, e] -= part
+        e = stops.names[i]
+        most = max(stops.limit[STATIC, e], stops.limit[STATIC + AT_END, e])
+        f[MEAN_FORCE, e] = min(max(f[MEAN_FORCE, e] + f[SOLUTION, i], -most), most)
+    for e in range(stops.names.size):
+        f[FACE_INCREMENT, e] = f[FREE_SLIDE, e]
+        size = abs(f[FREE_SLIDE, e])
+        for k in range(stops.names.size):
+            part = stops.gives[BETA, e, k] * f[MEAN_FORCE, k]
+            f[FACE_INCREMENT, e] -= part
             size += abs(part)
-        if f[SLIDE, e] == 0.0 and f[SLIDES, e] == 0.0 and abs(f[DQ, e]) <= 1e-14 * size:
-            f[DQ, e] = 0.0
+        if (
+            f[SLIDE, e] == 0.0
+            and f[SLIDES_ON, e] == 0.0
+            and abs(f[FACE_INCREMENT, e]) <= ZERO_SLIDE_TOL * size
+        ):
+            f[FACE_INCREMENT, e] = 0.0
     return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def blows(s):
-    """Blows, row BLOW [N s], that bring every face that stopped, went, turned or rests to its speed; work that all
-    friction takes in the step [J]."""
-    f = s.field
+def find_blows(stops):
+    """Find the blows that give the faces their speeds; return the work of all friction [J]."""
+    f = stops.field
     count = 0
     work = 0.0
-    for e in range(s.names.size):
+    for e in range(stops.names.size):
         f[BLOW, e] = 0.0
-        work += f[MEAN, e] * f[DQ, e]
-        for k in range(s.names.size):
-            f[RATE, e] -= s.gives[GAMMA, e, k] * f[MEAN, k]
-        turned = f[SLIDES, e] == 0.0 or f[WAY, e] * f[RATE, e] <= 0.0
-        if turned and abs(f[WAY, e]) != 2.0:
-            s.names[count] = e
+        work += f[MEAN_FORCE, e] * f[FACE_INCREMENT, e]
+        for k in range(stops.names.size):
+            f[FREE_SPEED, e] -= stops.gives[GAMMA, e, k] * f[MEAN_FORCE, k]
+        turned = f[SLIDES_ON, e] == 0.0 or f[SLIP_STATE, e] * f[FREE_SPEED, e] <= 0.0
+        if turned and abs(f[SLIP_STATE, e]) != 2.0:
+            stops.names[count] = e
             count += 1
     for i in range(count):
-        f[RIGHT, i] = f[RATE, s.names[i]] - f[SPEED, s.names[i]]
-    if count and not shared(TUG, count, s):
+        f[RIGHT_SIDE, i] = f[FREE_SPEED, stops.names[i]] - f[SPEED, stops.names[i]]
+    if count and not solve_shared_forces(ACCELERANCE, count, stops):
         return -np.inf
     for i in range(count):
-        e = s.names[i]
-        f[BLOW, e] = f[FOUND, i]
-        work += 0.5 * f[FOUND, i] * (f[RATE, e] + f[SPEED, e])
+        e = stops.names[i]
+        f[BLOW, e] = f[SOLUTION, i]
+        work += 0.5 * f[SOLUTION, i] * (f[FREE_SPEED, e] + f[SPEED, e])
     return work
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def brought(motion, s):
-    """After a step by mean forces alone: blows that bring the faces without a slide to rest, as the modes move."""
-    f = s.field
+def find_stopping_blows(motion, stops):
+    """Find the blows that stop the faces without a slide, after a step by mean forces alone."""
+    f = stops.field
     count = 0
-    for e in range(s.names.size):
+    for e in range(stops.names.size):
         f[BLOW, e] = 0.0
-        f[WAY, e] = np.sign(f[DQ, e])
-        if f[DQ, e] == 0.0:
-            f[RIGHT, count] = speed_of(motion, e, s)
-            s.names[count] = e
+        f[SLIP_STATE, e] = np.sign(f[FACE_INCREMENT, e])
+        if f[FACE_INCREMENT, e] == 0.0:
+            f[RIGHT_SIDE, count] = face_speed(motion, e, stops)
+            stops.names[count] = e
             count += 1
-    if count and shared(TUG, count, s):
+    if count and solve_shared_forces(ACCELERANCE, count, stops):
         for i in range(count):
-            f[BLOW, s.names[i]] = f[FOUND, i]
+            f[BLOW, stops.names[i]] = f[SOLUTION, i]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def speed_of(motion, e, s):
-    """Speed [m/s] of face e as the modes move."""
+def face_speed(motion, e, stops):
+    """Return the speed of a face [m/s].
+
+    Parameters
+    ----------
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    e : int
+        Number of the face.
+    stops : interfaces.arrays.Stops
+    """
     out = 0.0
     for k in range(motion.shape[1]):
-        out += s.rows[e, k] * motion[1, k]
+        out += stops.rows[e, k] * motion[1, k]
     return out
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def struck(motion, mass, s):
-    """Strike the modes by the blows, in place; energy that they take [J]. Faces at rest are noted in row REST."""
-    f = s.field
+def apply_blows(motion, mass, stops):
+    """Strike the modes by the blows; return the energy that the blows take [J].
+
+    Parameters
+    ----------
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    mass : float
+        [kg]
+    stops : interfaces.arrays.Stops
+
+    Returns
+    -------
+    float
+    """
+    f = stops.field
     lost = 0.0
     for k in range(motion.shape[1]):
         change = 0.0
-        for e in range(s.names.size):
-            change -= s.rows[e, k] * f[BLOW, e] / mass
+        for e in range(stops.names.size):
+            change -= stops.rows[e, k] * f[BLOW, e] / mass
         lost -= mass * change * (motion[1, k] + 0.5 * change)
         motion[1, k] += change
-    for e in range(s.names.size):
-        f[REST, e] = 0.0 if abs(f[WAY, e]) == 1.0 else 1.0
+    for e in range(stops.names.size):
+        f[WAS_RESTING, e] = 0.0 if abs(f[SLIP_STATE, e]) == 1.0 else 1.0
     return lost
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def reactions(motion, modal_system, drive, accel, scratch, s):
-    """Forces that leave the faces at rest, row WAY of s.field, no acceleration at an instant, into row FOUND in the
-    order of s.names; how many they are, 0 where none are found.
+def find_reactions(motion, modal_system, drive, accel, scratch, stops):
+    """Find the forces on the resting faces that leave them no acceleration at an instant.
 
-    accel (n,): modal accelerations [m/s2] of all other forces; drive [m/s2]; scratch (2, n): room.
+    They are written into the row SOLUTION of stops.field, in the order of stops.names.
+
+    Parameters
+    ----------
+    motion : (2, n) array
+        Coordinates and rates of the modes.
+    modal_system : interfaces.arrays.ModalArrays
+    drive : float
+        Acceleration of the base [m s-2].
+    accel : (n,) array
+        Modal accelerations of the forces [m s-2].
+    scratch : (2, n) array
+        Space for results.
+    stops : interfaces.arrays.Stops
+
+    Returns
+    -------
+    int
+        Number of the forces, 0 if none are found.
     """
     accelerations(
         motion,
@@ -505,57 +693,72 @@ def reactions(motion, modal_system, drive, accel, scratch, s):
         accel,
         scratch,
     )
-    count = resting(s)
+    count = list_resting(stops)
     for i in range(count):
-        s.field[RIGHT, i] = 0.0
+        stops.field[RIGHT_SIDE, i] = 0.0
         for k in range(accel.size):
-            s.field[RIGHT, i] += s.rows[s.names[i], k] * scratch[0, k]
-    return count if count and shared(TUG, count, s) else 0
+            stops.field[RIGHT_SIDE, i] += stops.rows[stops.names[i], k] * scratch[0, k]
+    return count if count and solve_shared_forces(ACCELERANCE, count, stops) else 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def stays(s):
-    """Whether all faces rest at the start of the step, and mean forces below their static friction hold them, row MEAN;
-    ways, slides and speeds stand in s.field then."""
-    f = s.field
-    faces = s.names.size
-    for e in range(faces):
-        if f[REST, e] == 0.0 and f[START, e] != 0.0:
+def rests_through_step(stops):
+    """Return whether all faces rest through the step under mean forces below their static friction."""
+    f = stops.field
+    coupling = stops.names.size
+    for e in range(coupling):
+        if f[WAS_RESTING, e] == 0.0 and f[START_SPEED, e] != 0.0:
             return False
-        s.names[e] = e
-        f[RIGHT, e] = f[FREE, e]
-    if not shared(BETA, faces, s):
+        stops.names[e] = e
+        f[RIGHT_SIDE, e] = f[FREE_SLIDE, e]
+    if not solve_shared_forces(BETA, coupling, stops):
         return False
-    for e in range(faces):
-        if abs(f[FOUND, e]) > min(s.limit[STATIC, e], s.limit[STATIC + END, e]):
+    for e in range(coupling):
+        if abs(f[SOLUTION, e]) > min(stops.limit[STATIC, e], stops.limit[STATIC + AT_END, e]):
             return False
-        f[MEAN, e] = f[FOUND, e]
-        f[WAY, e] = 0.0
-        f[SLIDES, e] = 0.0
+        f[MEAN_FORCE, e] = f[SOLUTION, e]
+        f[SLIP_STATE, e] = 0.0
+        f[SLIDES_ON, e] = 0.0
         f[SLIDE, e] = 0.0
         f[SPEED, e] = 0.0
     return True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def stays_to_the_end(motion, modal_system, drive, accel, scratch, s):
-    """Whether static friction holds all faces at the end of a step through which they rest: a line of the holding
-    forces would pass above a crest of them.
+def rests_at_end(motion, modal_system, drive, accel, scratch, stops):
+    """Return whether static friction holds the faces at the end of a step through which they rest.
 
-    motion (2, n): at the end of the step; it is changed; the other arguments are those of `reactions`.
+    A straight line between the holding forces at both ends would miss a peak of them beyond the end.
+
+    Parameters
+    ----------
+    motion : (2, n) array
+        Coordinates and rates at the end of the step; they are changed.
+    modal_system : interfaces.arrays.ModalArrays
+    drive : float
+        Acceleration of the base [m s-2].
+    accel : (n,) array
+        Modal accelerations of the forces [m s-2].
+    scratch : (2, n) array
+        Space for results.
+    stops : interfaces.arrays.Stops
+
+    Returns
+    -------
+    bool
     """
-    faces = s.names.size
-    for e in range(faces):
-        s.field[RIGHT, e] = speed_of(motion, e, s)
-        s.names[e] = e
-    if not shared(TUG, faces, s):
+    coupling = stops.names.size
+    for e in range(coupling):
+        stops.field[RIGHT_SIDE, e] = face_speed(motion, e, stops)
+        stops.names[e] = e
+    if not solve_shared_forces(ACCELERANCE, coupling, stops):
         return False
     for k in range(accel.size):
-        for e in range(faces):
-            motion[1, k] -= s.rows[e, k] * s.field[FOUND, e] / modal_system.mass
-    if reactions(motion, modal_system, drive, accel, scratch, s) < faces:
+        for e in range(coupling):
+            motion[1, k] -= stops.rows[e, k] * stops.field[SOLUTION, e] / modal_system.mass
+    if find_reactions(motion, modal_system, drive, accel, scratch, stops) < coupling:
         return False
-    for i in range(faces):
-        if abs(s.field[FOUND, i]) > s.limit[STATIC + END, s.names[i]]:
+    for i in range(coupling):
+        if abs(stops.field[SOLUTION, i]) > stops.limit[STATIC + AT_END, stops.names[i]]:
             return False
     return True

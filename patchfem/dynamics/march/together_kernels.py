@@ -1,9 +1,10 @@
-"""Solvers of all elements of a step at once, for where one element after the other gets there too slowly.
+"""Newton's method on all elements of a step at once, for where one element after the other converges slowly.
 
-With y_i what the forces take from coordinate i over the step, the slides are d = free - R y, and y is the minimum of
-sum y_i^2/(2 S_i) + sum Psi_e(d_e), Psi_e' the path-mean force of element e, S_i the give of a coordinate [m/N].
-Newton's direction with a search along it that follows the sign of the slope: it cannot be thrown to and fro between
-elements that depend on each other, however many there are.
+With y_i what the forces take from coordinate i over the step, the slides are d = free - R y, and y minimises
+sum y_i^2/(2 S_i) + sum Psi_e(d_e), where Psi_e' is the path-mean force of element e and S_i the give of a coordinate [m/N].
+`solve_smooth` takes Newton's direction and searches along it by the sign of the slope, so it cannot be thrown to and fro
+between elements that depend on each other, however many there are. `newton_step` solves the equations of the forces
+instead, which laws without a potential have too.
 """
 
 import numpy as np
@@ -16,105 +17,165 @@ from ..dense_kernels import eliminate, factor, solve
 from . import parts_kernels as parts
 from .stops_kernels import (
     BETA,
-    CLOSE,
-    EPS,
-    FREE,
-    GIVE,
-    HOLDS,
-    LACK,
+    BOND_LENGTH,
+    COORDINATE_GIVE,
+    ELEMENT_FORCE,
+    ELEMENT_RESIDUAL,
+    ELEMENT_SLIDE,
+    FORCE_TOL,
+    FREE_SLIDE,
     MATE,
-    PLACE,
+    MODAL_SCRATCH,
     PORT,
-    PULL,
-    ROOM,
+    SET_VALUED,
     SLIDE,
-    SLIDES,
+    SLIDES_ON,
 )
 
-PLANE = parts.PLANE
+HAS_PLANES = parts.HAS_PLANES
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def slide_of(e, y, j):
-    """Slide of element e [m] at y (n,)."""
-    p = j.of[PORT, e]
-    out = j.port[FREE, p]
+def element_slide(e, y, faces):
+    """Return the slide of an element [m] at y.
+
+    Parameters
+    ----------
+    e : int
+        Number of the element.
+    y : (n,) array
+        What the forces take from the coordinates.
+    faces : interfaces.arrays.Faces
+
+    Returns
+    -------
+    float
+    """
+    p = faces.of[PORT, e]
+    out = faces.port[FREE_SLIDE, p]
     for i in range(y.size):
-        out -= j.rows[p, i] * y[i]
+        out -= faces.rows[p, i] * y[i]
     return out
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def along(t, y, step, trial, j, dt):
-    """Slope of the minimum's function along `step` at y + t step."""
+def slope_along(t, y, step, trial, faces, dt):
+    """Return the slope of the function that is minimised along a step, at y + t step.
+
+    Parameters
+    ----------
+    t : float
+        Factor of the step.
+    y : (n,) array
+        What the forces take from the coordinates.
+    step : (n,) array
+    trial : (n,) array
+        Space for y + t step.
+    faces : interfaces.arrays.Faces
+    dt : float
+        Length of the step [s].
+
+    Returns
+    -------
+    float
+    """
     out = 0.0
     for i in range(y.size):
         trial[i] = y[i] + t * step[i]
-        out += step[i] * trial[i] / j.modal[GIVE, i]
-    for e in range(j.of.shape[1]):
+        out += step[i] * trial[i] / faces.modal[COORDINATE_GIVE, i]
+    for e in range(faces.of.shape[1]):
         force = law.mean_force(
-            j.num[e], j.mem[e], j.each[PLACE, e], slide_of(e, trial, j), j.each[EPS, e], dt
+            faces.num[e],
+            faces.mem[e],
+            faces.each[ELEMENT_SLIDE, e],
+            element_slide(e, trial, faces),
+            faces.each[BOND_LENGTH, e],
+            dt,
         )[0]
         for i in range(y.size):
-            out -= step[i] * j.rows[j.of[PORT, e], i] * force
+            out -= step[i] * faces.rows[faces.of[PORT, e], i] * force
     return out
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def slope_at(y, step, j, dt, hess):
-    """Newton's equations at y (n,): minus the slope in `step`, the Hessian, the forces of the laws; the largest change
-    of a force over its goal."""
+def newton_equations(y, step, faces, dt, hess):
+    """Write minus the gradient at y into `step`, and the Hessian.
+
+    The forces of the laws are written into faces.each.
+
+    Parameters
+    ----------
+    y : (n,) array
+        What the forces take from the coordinates.
+    step : (n,) array
+    faces : interfaces.arrays.Faces
+    dt : float
+        Length of the step [s].
+    hess : (n, n) array
+        Hessian; it is written.
+
+    Returns
+    -------
+    float
+        Largest change of a force over its tolerance.
+    """
     n = y.size
     worst = 0.0
     for i in range(n):
-        step[i] = -y[i] / j.modal[GIVE, i]
+        step[i] = -y[i] / faces.modal[COORDINATE_GIVE, i]
         for k in range(n):
             hess[i, k] = 0.0
-        hess[i, i] = 1 / j.modal[GIVE, i]
-    for e in range(j.of.shape[1]):
-        p = j.of[PORT, e]
+        hess[i, i] = 1 / faces.modal[COORDINATE_GIVE, i]
+    for e in range(faces.of.shape[1]):
+        p = faces.of[PORT, e]
         force, slope = law.mean_force(
-            j.num[e], j.mem[e], j.each[PLACE, e], slide_of(e, y, j), j.each[EPS, e], dt
+            faces.num[e],
+            faces.mem[e],
+            faces.each[ELEMENT_SLIDE, e],
+            element_slide(e, y, faces),
+            faces.each[BOND_LENGTH, e],
+            dt,
         )
-        worst = max(worst, abs(force - j.each[PULL, e]) / j.each[CLOSE, e])
-        j.each[PULL, e] = force
+        worst = max(worst, abs(force - faces.each[ELEMENT_FORCE, e]) / faces.each[FORCE_TOL, e])
+        faces.each[ELEMENT_FORCE, e] = force
         slope = max(slope, 0.0)
         for i in range(n):
-            step[i] += j.rows[p, i] * force
+            step[i] += faces.rows[p, i] * force
             for k in range(i + 1):
-                hess[i, k] += slope * j.rows[p, i] * j.rows[p, k]
+                hess[i, k] += slope * faces.rows[p, i] * faces.rows[p, k]
     return worst
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_smooth(j, dt):
-    """Forces of a step in place, from those there are, where every law has a slope.
-
-    Returns the iterations, below 0 where the minimum was not reached.
-    """
-    y = j.modal[ROOM]
-    step = j.modal[ROOM + 1]
-    trial = j.modal[ROOM + 2]
-    hess = j.hess
+def solve_smooth(faces, dt):
+    """Solve the forces of a step by Newton's method; return the iterations, negative if it fails."""
+    y = faces.modal[MODAL_SCRATCH]
+    step = faces.modal[MODAL_SCRATCH + 1]
+    trial = faces.modal[MODAL_SCRATCH + 2]
+    hess = faces.hess
     n = y.size
-    count = j.of.shape[1]
+    count = faces.of.shape[1]
     for i in range(n):
         y[i] = 0.0
         for e in range(count):
-            y[i] += j.modal[GIVE, i] * j.rows[j.of[PORT, e], i] * j.each[PULL, e]
+            y[i] += (
+                faces.modal[COORDINATE_GIVE, i]
+                * faces.rows[faces.of[PORT, e], i]
+                * faces.each[ELEMENT_FORCE, e]
+            )
     for turn in range(1, 80):
-        worst = slope_at(y, step, j, dt, hess)
+        worst = newton_equations(y, step, faces, dt, hess)
         if turn > 1 and worst <= 0.1:
             return turn
         if not factor(hess):
             return -turn
         solve(hess, step)
-        begin = along(0.0, y, step, trial, j, dt)
+        begin = slope_along(0.0, y, step, trial, faces, dt)
         low = 0.0
         high = np.inf
         t = 1.0
         for _ in range(40):
-            here = along(t, y, step, trial, j, dt)
+            here = slope_along(t, y, step, trial, faces, dt)
             if abs(here) <= 0.1 * abs(begin):
                 break
             if here > 0:
@@ -128,86 +189,126 @@ def solve_smooth(j, dt):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def equations(j, dt, known):
-    """Newton's equations j.system (e, e), row LACK of j.each on the forces of all elements, residual forces -
-    law(free - beta forces).
+def force_equations(faces, dt, known):
+    """Write the Newton equations of the residual forces - law(free - beta forces) into faces.system.
 
-    An element that holds asks for no slide, with a trace of give where elements that depend on each other share their
-    force in more ways than one; one that slips keeps its force. known: the slides of those that do not slip all the way
-    stand in j.stops instead (`stops_kernels`).
+    An element that holds has the equation of no slide, with a trace of give where elements that depend on each
+    other could share their force in several ways; an element that slips keeps its force.
+
+    Parameters
+    ----------
+    faces : interfaces.arrays.Faces
+    dt : float
+        Length of the step [s].
+    known : bool
+        Whether the slides of the faces that do not slip all the way are known, in faces.stops.
     """
-    count = j.of.shape[1]
-    beta = j.gives[BETA]
+    count = faces.of.shape[1]
+    beta = faces.gives[BETA]
     face = 0
     for e in range(count):
-        p = j.of[PORT, e]
-        dq = j.port[FREE, p]
+        p = faces.of[PORT, e]
+        dq = faces.port[FREE_SLIDE, p]
         own = beta[p, p]
         for k in range(count):
-            dq -= beta[p, j.of[PORT, k]] * j.each[PULL, k]
-        if j.num[e, 0] == HOLDS:
+            dq -= beta[p, faces.of[PORT, k]] * faces.each[ELEMENT_FORCE, k]
+        if faces.num[e, 0] == SET_VALUED:
             holds = (
-                abs(j.each[PULL, e]) < j.num[e, 1] * (1 - 1e-12)
-                and abs(j.each[PULL, e]) != j.num[e, 2]
+                abs(faces.each[ELEMENT_FORCE, e]) < faces.num[e, 1] * (1 - 1e-12)
+                and abs(faces.each[ELEMENT_FORCE, e]) != faces.num[e, 2]
             )
             goal = 0.0
             if known:
-                holds = j.stops.field[SLIDES, face] == 0.0
-                goal = j.stops.field[SLIDE, face]
+                holds = faces.stops.field[SLIDES_ON, face] == 0.0
+                goal = faces.stops.field[SLIDE, face]
             face += 1
-            j.each[LACK, e] = (dq - goal) / own if holds else 0.0
+            faces.each[ELEMENT_RESIDUAL, e] = (dq - goal) / own if holds else 0.0
             for k in range(count):
-                j.system[e, k] = beta[p, j.of[PORT, k]] / own if holds else 0.0
-            j.system[e, e] += 1e-9 if holds else 1.0
+                faces.system[e, k] = beta[p, faces.of[PORT, k]] / own if holds else 0.0
+            faces.system[e, e] += 1e-9 if holds else 1.0
             continue
-        if PLANE:
-            if j.of[MATE, e] != e:
-                if j.of[MATE, e] > e:
-                    in_plane(e, j.of[MATE, e], dq, j)
+        if HAS_PLANES:
+            if faces.of[MATE, e] != e:
+                if faces.of[MATE, e] > e:
+                    plane_equations(e, faces.of[MATE, e], dq, faces)
                 continue
-        force, slope = law.mean_force(j.num[e], j.mem[e], j.each[PLACE, e], dq, j.each[EPS, e], dt)
-        j.each[LACK, e] = force - j.each[PULL, e]
+        force, slope = law.mean_force(
+            faces.num[e],
+            faces.mem[e],
+            faces.each[ELEMENT_SLIDE, e],
+            dq,
+            faces.each[BOND_LENGTH, e],
+            dt,
+        )
+        faces.each[ELEMENT_RESIDUAL, e] = force - faces.each[ELEMENT_FORCE, e]
         for k in range(count):
-            j.system[e, k] = slope * beta[p, j.of[PORT, k]]
-        j.system[e, e] += 1.0
+            faces.system[e, k] = slope * beta[p, faces.of[PORT, k]]
+        faces.system[e, e] += 1.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def in_plane(e, f, dx, j):
-    """The two of Newton's equations of an element whose directions are e and f; dx [m]: slide of e."""
-    beta = j.gives[BETA]
-    p = j.of[PORT, e]
-    r = j.of[PORT, f]
-    dy = j.port[FREE, r]
-    for k in range(j.of.shape[1]):
-        dy -= beta[r, j.of[PORT, k]] * j.each[PULL, k]
-    slide = plane.advance_straight((j.num[e, 2], j.num[e, 3]), (j.mem[e, 3], j.mem[f, 3]), (dx, dy))
-    j.each[LACK, e] = slide.mean_x - j.each[PULL, e]
-    j.each[LACK, f] = slide.mean_y - j.each[PULL, f]
-    for k in range(j.of.shape[1]):
-        one = beta[p, j.of[PORT, k]]
-        other = beta[r, j.of[PORT, k]]
-        j.system[e, k] = slide.slope.xx * one + slide.slope.xy * other
-        j.system[f, k] = slide.slope.yx * one + slide.slope.yy * other
-    j.system[e, e] += 1.0
-    j.system[f, f] += 1.0
+def plane_equations(e, f, dx, faces):
+    """Write the two Newton equations of an element in a plane.
+
+    Parameters
+    ----------
+    e : int
+        Number of the element.
+    f : int
+        Number of the element of its second direction.
+    dx : float
+        Increment of the slide of e [m].
+    faces : interfaces.arrays.Faces
+    """
+    beta = faces.gives[BETA]
+    p = faces.of[PORT, e]
+    r = faces.of[PORT, f]
+    dy = faces.port[FREE_SLIDE, r]
+    for k in range(faces.of.shape[1]):
+        dy -= beta[r, faces.of[PORT, k]] * faces.each[ELEMENT_FORCE, k]
+    slide = plane.advance_straight(
+        (faces.num[e, 2], faces.num[e, 3]), (faces.mem[e, 3], faces.mem[f, 3]), (dx, dy)
+    )
+    faces.each[ELEMENT_RESIDUAL, e] = slide.mean_x - faces.each[ELEMENT_FORCE, e]
+    faces.each[ELEMENT_RESIDUAL, f] = slide.mean_y - faces.each[ELEMENT_FORCE, f]
+    for k in range(faces.of.shape[1]):
+        one = beta[p, faces.of[PORT, k]]
+        other = beta[r, faces.of[PORT, k]]
+        faces.system[e, k] = slide.slope.xx * one + slide.slope.xy * other
+        faces.system[f, k] = slide.slope.yx * one + slide.slope.yy * other
+    faces.system[e, e] += 1.0
+    faces.system[f, f] += 1.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def newton_turn(j, dt, known):
-    """One Newton step on the forces of all elements at once, without a patch; False where it fails. known: as of
-    `equations`."""
-    count = j.of.shape[1]
-    miss = j.each[LACK]
-    equations(j, dt, known)
+def newton_step(faces, dt, known):
+    """Take a Newton step on the forces of all elements at once; return whether it succeeds.
+
+    Parameters
+    ----------
+    faces : interfaces.arrays.Faces
+    dt : float
+        Length of the step [s].
+    known : bool
+        Whether the slides of the faces that do not slip all the way are known, in faces.stops.
+
+    Returns
+    -------
+    bool
+    """
+    count = faces.of.shape[1]
+    miss = faces.each[ELEMENT_RESIDUAL]
+    force_equations(faces, dt, known)
     # pivots in place: 1 + slope beta leads its row for laws that resist
-    if not eliminate(j.system, miss):
+    if not eliminate(faces.system, miss):
         return False
     for e in range(count):
         if not np.isfinite(miss[e]):
             return False
     for e in range(count):
-        j.each[PULL, e] += miss[e]
-        if j.num[e, 0] == HOLDS:
-            j.each[PULL, e] = min(max(j.each[PULL, e], -j.num[e, 1]), j.num[e, 1])
+        faces.each[ELEMENT_FORCE, e] += miss[e]
+        if faces.num[e, 0] == SET_VALUED:
+            faces.each[ELEMENT_FORCE, e] = min(
+                max(faces.each[ELEMENT_FORCE, e], -faces.num[e, 1]), faces.num[e, 1]
+            )
     return True

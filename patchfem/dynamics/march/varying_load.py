@@ -1,9 +1,9 @@
-"""Modes that feel the normal force, the moment and the friction of the contact, each under the load of the moment.
+"""Modes under the normal force, the moment and the friction of a contact, each under the present load.
 
-The upper holder moves from its solved preload by heave h = normal . z and pitch th = pitch . z; the nodal forces are
-those of the unilateral contact at approach delta0 - h and rotation theta0 + th (`contact.contact_sets`). The modes
-count from the preloaded equilibrium: modal force normal (N - N0) + pitch (M - M0) - slide F. The holder's rotational
-spring is in series with the pitch, a compliance x_i x_j/K beside that of the pieces.
+The upper holder moves from its solved preload by the heave h = normal . z and the pitch th = pitch . z. The nodal forces are
+those of the unilateral contact at approach delta0 - h and rotation theta0 + th (`contact.contact_sets`). The modes are
+measured from the preloaded equilibrium: the modal force is normal (N - N0) + pitch (M - M0) - slide F. The rotational
+spring of the holder is in series with the pitch, as a compliance x_i x_j/K beside that of the pieces.
 """
 
 from dataclasses import dataclass, replace
@@ -28,18 +28,28 @@ from .march import Run
 from .march import march as run
 from .models import IDLE, Joint, element_model, lists_model, under_loads
 
-COULOMB, PLASTIC, POINTS, LISTS, RATE = range(5)
-SETTLED = 1e4  # times the goal: the residual that sums over bonds keep
-# least pressure of a node in the weights of the shear modes, over the mean of the preload
-FLOOR = 1.0
-PRESS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
+# Kinds of laws.
+COULOMB = 0
+PLASTIC = 1
+POINTS = 2
+LISTS = 3
+RATE = 4
+LIST_TOL_FACTOR = 1e4  # residual that sums over bonds keep, over that of other laws
+FLOOR = 1.0  # smallest pressure of a node in the weights of the shear modes, over the mean of the preload
+PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rubbing:
-    """A law of friction under a load that changes: its kind and the first numbers of `contacts.arrays.Rub`, v_0 of a
-    rate law in place of mu_k; static: mu_s, which times the preload is the scale of the residuals; summed: the
-    `friction.bonds.parameters.Bonds` of a list with its cut-off and its merge width, as `list_model` has them."""
+    """A friction law under a load that varies.
+
+    - `kind`: COULOMB, PLASTIC, POINTS, LISTS or RATE.
+    - `static`: mu_s, which times the preload is the scale of the residuals.
+    - `force`: first numbers of `interfaces.arrays.Rub`, with v_0 of a rate law in place of mu_k.
+    - `growth`: numbers of the growth of bonds.
+    - `length`: bond length [m].
+    - `summed`: the Bonds of a list with its cut-off and its merge width, as `models.list_model` takes them.
+    """
 
     kind: int
     static: float
@@ -50,22 +60,22 @@ class Rubbing:
 
 
 def coulomb(static: float, kinetic: float | None = None) -> Rubbing:
-    """Set-valued Coulomb friction on the resultant load."""
+    """Return set-valued Coulomb friction on the resultant load."""
     return Rubbing(COULOMB, static, (static, static if kinetic is None else kinetic, 0.0, 1.0))
 
 
 def rate(static: float, speed: float) -> Rubbing:
-    """Eq. 2.4, mu N tanh(v/v_0), v_0 [m/s]."""
+    """Return the law mu N tanh(v/v_0) of eq. 2.4, v_0 in m/s."""
     return Rubbing(RATE, static, (static, speed, 0.0, 1.0))
 
 
 def plastic(static: float, length: float) -> Rubbing:
-    """Eq. 3.12 at every point under its own load, length [m]."""
+    """Return the elastic-plastic law of eq. 3.12 at every point under its own load, with a length [m]."""
     return Rubbing(PLASTIC, static, (static, static, length, 1.0), length=length)
 
 
 def bonds(law) -> Rubbing:
-    """The stretch reading with p = 1 of friction.bonds.parameters.Bonds at every point. PatchfemError for others."""
+    """Return the stretch reading of bonds with order 1 at every point; PatchfemError for other bonds."""
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
         raise PatchfemError(
             not_supported_message(
@@ -85,8 +95,19 @@ def bonds(law) -> Rubbing:
 
 
 def lists(law, reach: float, merge: float) -> Rubbing:
-    """The printed reading of friction.bonds.parameters.Bonds, a list of bonds at every point: bonds keep the pressure
-    that they formed under. PatchfemError for the other, of which bonds are let go as the load falls."""
+    """Return the printed reading of bonds, a list of bonds at every point; PatchfemError for the stretch reading.
+
+    Bonds keep the pressure under which they formed. In the stretch reading bonds are released as the load
+    falls.
+
+    Parameters
+    ----------
+    law : Rubbing
+    reach : float
+        Cut-off in bond lengths.
+    merge : float
+        Widest merged strip in bond lengths at zero age; 0 merges nothing.
+    """
     if law.reading != "report":
         raise PatchfemError(
             not_supported_message(
@@ -105,10 +126,11 @@ def lists(law, reach: float, merge: float) -> Rubbing:
     )
 
 
-def sets_of(patch, spring: float = 0.0) -> ContactSets:
-    """The contact sets around the solved state of a patch; spring [N m/rad] of the holder's rotation, 0: rigid.
+def contact_sets_of(patch, spring: float = 0.0) -> ContactSets:
+    """Return the contact sets around the solved state of a patch.
 
-    PatchfemError for a smooth skin, strips, or a patch that carries no load.
+    `spring` is the rotational stiffness of the holder [N m/rad], 0 for a rigid one. PatchfemError for a nonlinear asperity
+    layer, for strips and for a patch that carries no load.
     """
     if patch.skin is not None:
         raise PatchfemError(
@@ -128,8 +150,8 @@ def sets_of(patch, spring: float = 0.0) -> ContactSets:
     return ContactSets(c, x, patch.pressure.gap - c @ force, force > 0)
 
 
-def rows_of(modes: ModalBasis) -> np.ndarray:
-    """(3, n): slide, heave and pitch per coordinate."""
+def port_rows(modes: ModalBasis) -> np.ndarray:
+    """Return slide, heave and pitch per coordinate, (3, n)."""
     none = np.zeros(modes.omega.size)
     return np.stack(
         [
@@ -140,9 +162,21 @@ def rows_of(modes: ModalBasis) -> np.ndarray:
 
 
 def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
-    """The fields of a fresh `contacts.arrays.Rub`, as a tuple: points under the nodal forces normal (m,) [N].
+    """Return the fields of a fresh `interfaces.arrays.Rub` for points under nodal forces.
 
-    shear: ShearModes on the points, None of pieces that are rigid in shear; limit [N]: scale of the residuals.
+    Parameters
+    ----------
+    law : Rubbing
+    normal : (m,) array
+        Nodal forces [N].
+    shear : ShearModes or None
+        Shear of the pieces; None for pieces that are rigid in shear.
+    limit : float
+        Scale of the residuals [N].
+
+    Returns
+    -------
+    tuple
     """
     memory = np.zeros((3, normal.size))
     size = normal.size
@@ -162,10 +196,13 @@ def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class VaryingLoadModel:
-    """What `march.march` needs to know: law, contact sets, rows (3, n) of slide, heave and pitch.
+    """What `march.march` needs to know of a load that varies.
 
-    load: function of times (k,) [s] to a load [N] >= 0 that is prescribed on one point, in place of the contact; shear:
-    ShearModes on every node where the pieces give way, see `shear_of`.
+    - `law`: what rubs.
+    - `sets`: contact sets.
+    - `rows` (3, n): slide, heave and pitch per coordinate.
+    - `load`: function of times (k,) [s] to a prescribed load [N] on one point, in place of the contact.
+    - `shear`: ShearModes on every node, from `shear_of`.
     """
 
     law: Rubbing
@@ -176,7 +213,7 @@ class VaryingLoadModel:
 
     @property
     def preload(self) -> float:
-        """Load [N] at the start."""
+        """Load at the start [N]."""
         return self.sets.load if self.load is None else float(self.load(np.zeros(1))[0])
 
     @property
@@ -186,12 +223,12 @@ class VaryingLoadModel:
 
     @property
     def length(self) -> float:
-        """Bond length [m], 0 without."""
+        """Bond length [m], 0 for a law without bonds."""
         return self.law.length
 
     @property
     def reduction(self):
-        """ShearModes, None of pieces that are rigid in shear."""
+        """ShearModes; None for pieces that are rigid in shear."""
         return self.shear
 
     @property
@@ -201,12 +238,12 @@ class VaryingLoadModel:
 
     @property
     def runner(self):
-        """The class that marches it."""
+        """The class that marches the model."""
         return VaryingLoadRun
 
     @property
     def pointed(self) -> bool:
-        """Whether points bear their own share of the load."""
+        """Whether points bear their own fraction of the load."""
         return self.law.kind in (PLASTIC, POINTS, LISTS)
 
     @property
@@ -230,7 +267,7 @@ class VaryingLoadModel:
 
     @property
     def kind(self) -> tuple:
-        """(contact, law) of what rubs beside the joints: what `instances` takes an instance of the loop for."""
+        """Contact and law of what rubs beside the joints, by which `instances` makes an instance of the loop."""
         if self.law.kind == LISTS:
             return SHEARED_LISTS, ""
         if self.pointed:
@@ -238,7 +275,7 @@ class VaryingLoadModel:
         return IDLE if self.set_valued else (IDLE[0], "friction.laws.tanh_kernels")
 
     def build(self):
-        """The contact with arrays of its own, under the preload."""
+        """Return the contact with arrays of its own, under the preload."""
         law = self.law
         if self.pointed:
             return self.points(
@@ -249,7 +286,7 @@ class VaryingLoadModel:
         ).build()
 
     def points(self, force):
-        """Fresh points under nodal forces (m,) [N], those of the preload."""
+        """Return fresh points under the nodal forces (m,) [N] of the preload."""
         law = self.law
         if law.kind != LISTS:
             return arrays.Rub(*rub_of(law, force, self.shear, self.limit))
@@ -264,18 +301,34 @@ class VaryingLoadModel:
         ).build()
 
     def shown(self, contact) -> dict:
-        """Nothing: its memory is that of the run."""
+        """Return nothing: the memory of the interface is that of the run."""
         return {}
 
 
 def shear_of(
     giving, law: Rubbing, force, weight, count: int | None = None, tolerance: float = 1e-3
 ):
-    """ShearModes of pieces whose contact set changes: of the tangential compliance (m, m) [m/N] on every node.
+    """Return the ShearModes of pieces whose contact set changes.
 
-    force (m,) [N]: nodal forces of the preload, weight (m,) areas. Modes are weighted with mu_s times the preload and
-    `FLOOR` of its mean pressure, so nodes that are open at first have their share; with m modes they are exact whatever
-    the weights. count: how many, None: as the backbone under these weights asks for at a tenth of the tolerance.
+    Modes are weighted with mu_s times the preload plus FLOOR of its mean pressure, so nodes that are open
+    at first count too; with m modes they are exact for any weights.
+
+    Parameters
+    ----------
+    giving : (m, m) array
+        Tangential compliance on every node [m/N].
+    law : Rubbing
+    force : (m,) array
+        Nodal forces of the preload [N].
+    weight : (m,) array
+        Nodal areas.
+    count : int or None
+        Number of modes; None: as many as a tenth of the tolerance asks for.
+    tolerance : float
+
+    Returns
+    -------
+    ShearModes
     """
     limit = law.static * (force + FLOOR * force.sum() * weight / weight.sum())
     # a patch that could jump by itself is refused, under its preload as where the load stays
@@ -295,8 +348,25 @@ def shear_of(
 def model_of(
     modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=None, shear=None
 ) -> VaryingLoadModel:
-    """The model of a basis on contact sets, or under a prescribed load on one point, which no heave or pitch can move.
-    shear: ShearModes of an elastic-plastic law or of bonds; PatchfemError beside any other."""
+    """Return the model of a basis on contact sets, or under a prescribed load on one point.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    law : Rubbing
+    sets : ContactSets or None
+        What touches at each load and tilt; None where the load of a point is prescribed.
+    load : callable or None
+        Prescribed load [N] at times (k,) [s], in place of the contact.
+    shear : ShearModes or None
+        Shear of the pieces; None for pieces that are rigid in shear.
+
+    Returns
+    -------
+    VaryingLoadModel
+        PatchfemError for shear modes beside a law other than elastic-plastic or bonds, and for a point
+        with heave or pitch.
+    """
     if shear is not None and law.kind not in (PLASTIC, POINTS, LISTS):
         raise PatchfemError(
             not_supported_message(
@@ -316,14 +386,17 @@ def model_of(
             "structure.mode.normal: with [normal] the contact is a single point, which cannot move "
             "normal to the contact (`normal`) or rotate (`pitch`); use [contact] in place of [normal]"
         )
-    return VaryingLoadModel(law, sets, rows_of(modes), load, shear)
+    return VaryingLoadModel(law, sets, port_rows(modes), load, shear)
 
 
 class VaryingLoadRun(Run):
-    """The arrays of a march under a load that varies, and its clock."""
+    """The arrays of a march under a load that varies, and how far it is."""
 
     def _pressing(self) -> arrays.Pressing:
-        """The load at the start, and what rubs under it; the contact sets stand apart, for any run may ask them."""
+        """Return the load at the start, and set what rubs under it.
+
+        The contact sets are kept apart, because other runs may ask them.
+        """
         model = self.model
         press = compiled("contact.press_kernels")
         slot = 0
@@ -340,7 +413,7 @@ class VaryingLoadRun(Run):
             press.press_state(self.sets, slot, -heave, turn, now)
         if model.pointed:
             self.contact = model.points(now)
-        goal = GOAL * model.limit * (SETTLED if model.law.kind == LISTS else 1.0)
+        goal = GOAL * model.limit * (LIST_TOL_FACTOR if model.law.kind == LISTS else 1.0)
         return arrays.Pressing(
             (),
             np.ascontiguousarray(model.rows, float),
@@ -355,9 +428,9 @@ class VaryingLoadRun(Run):
             np.zeros(22),
         )
 
-    def _moving(self) -> tuple:
+    def _changing_arrays(self) -> tuple:
         press = self.load
-        return *super()._moving(), press.now, press.slot, press.mean, press.few
+        return *super()._changing_arrays(), press.now, press.slot, press.mean, press.few
 
     def _load(self, count: int) -> arrays.Pressing:
         loads = self.load.loads
@@ -368,9 +441,12 @@ class VaryingLoadRun(Run):
         return self.load._replace(sets=self.sets, loads=loads)
 
     def _parts(self, rows) -> np.ndarray:
-        """As of a Run; the noise is that of the largest force, of the mean force, which is read off the slide that it
-        takes (2e-16 of it over `beta`, much where the modes hardly slide), of the slide's last digit (a sum over the
-        modes) and of the stored energy."""
+        """Return the same as `Run._parts`, with the noise of a load that varies.
+
+        The noise is that of the largest force, of the mean force, which is computed from the slide that it
+        takes (2e-16 of it over `beta`, which is much if the modes hardly slide), of the last digit of the
+        slide, and of the stored energy.
+        """
         n = 2 * self.modes.omega.size
         work = self._works(rows)
         lost = work - np.diff(rows[:, n + 5])
@@ -405,17 +481,20 @@ class VaryingLoadRun(Run):
         return super()._snapshot(row) | {"heave": row[-2], "turn": row[-1], "nodal": nodal} | found
 
     def book(self) -> dict:
-        """The energy ledger [J], contact sets made, pivots, tableaus made anew."""
+        """Return the energy balance [J], and the numbers of contact sets, pivots and new tableaus."""
         return super().book() | dict(
             zip(("contact_sets", "pivots", "renewed"), map(int, self.sets.counters[N_BUILT:]))
         )
 
     def response(self, rows, number) -> Response:
-        """Histories; `extra` has normal_load [N], normal_moment [N m], normal_energy [J], heave [m] and turn [rad]."""
+        """Return the histories.
+
+        `extra` has normal_load [N], normal_moment [N m], normal_energy [J], heave [m] and turn [rad].
+        """
         out = super().response(rows, number)
         modes = self.modes
         model = self.model
-        extra = out.extra | dict(zip(PRESS, rows[:, -5:].T))
+        extra = out.extra | dict(zip(PRESS_COLUMNS, rows[:, -5:].T))
         if model.load is not None:
             return replace(out, extra=extra)
         pull = np.stack([rows[:, -5] - model.sets.load, rows[:, -4] - model.sets.moment], axis=1)
@@ -449,10 +528,33 @@ def march(
     progress=None,
     shear=None,
 ):
-    """`march.march` of a basis on contact sets, or under a prescribed load, from rest or from `start`.
+    """March a basis on contact sets, or under a prescribed load, from rest or from `start`.
 
-    sets: what touches at each load and tilt, None where the load of a point is prescribed by `load`; law: what rubs;
-    shear: the ShearModes behind it. The other arguments, and what it returns and refuses, are those of `march.march`.
+    The other arguments, the result and the errors are those of `march.march`.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive
+    sets : ContactSets or None
+        What touches at each load and tilt; None where the load of a point is prescribed.
+    law : Rubbing
+    cycles
+    steps_per_cycle
+    window
+    travel
+    frames
+    start
+    load : callable or None
+        Prescribed load [N] at times (k,) [s], in place of the contact.
+    say
+    progress
+    shear : ShearModes or None
+        Shear of the pieces; None for pieces that are rigid in shear.
+
+    Returns
+    -------
+    march.MarchResult
     """
     model = model_of(modes, law, sets, load, shear)
     return run(

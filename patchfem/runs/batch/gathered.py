@@ -225,7 +225,7 @@ def _pressed(model: Model) -> _Pressed | None:
                 return None
             kernels, tolerance = load(lanes.KERNELS), SHARE * model.accuracy.tolerance
             found = [
-                few_points(one, model.bonds, tolerance, kernels.POINTS, kernels.MODES)
+                few_points(one, model.bonds, tolerance, kernels.N_POINTS, kernels.N_PIECE_MODES)
                 for one in (patch, coarse[0])
             ]
             if None in found:

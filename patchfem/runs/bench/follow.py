@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...dynamics.march.capacity import full, keep, lengthened
+from ...dynamics.march.capacity import copy_state, enlarge_list, is_full
 from ...dynamics.march.march import GOAL
 from ...dynamics.march.models import load_kernels
 from .ledger import BLOCK, Watch, frame_numbers, ledger_of
@@ -80,7 +80,7 @@ def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = Fal
     forces, energies = np.zeros((slide.size, 3)), np.zeros((slide.size, 2))
     states, missed, told = [], 0, 0
     for a, b in pairwise(edges):
-        kept = keep(contact)
+        kept = copy_state(contact)
 
         def slid(contact, a=a, b=b):
             """Follow the samples a to b; return the number of steps with too large a residual."""
@@ -96,8 +96,8 @@ def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = Fal
             )
 
         failed = slid(contact)
-        while failed and full(contact):
-            contact = lengthened(contact, kept, f"before sample {b} of the prescribed slide")
+        while failed and is_full(contact):
+            contact = enlarge_list(contact, kept, f"before sample {b} of the prescribed slide")
             failed = slid(contact)
         missed += failed
         if b in at:

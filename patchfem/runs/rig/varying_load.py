@@ -39,7 +39,7 @@ def varying_load_model(model: Model, numerics: Numerics, patch):
     load, sets = (
         (model.point.at, None)
         if patch is None
-        else (None, march.sets_of(patch, model.patch.loading.rotational_stiffness))
+        else (None, march.contact_sets_of(patch, model.patch.loading.rotational_stiffness))
     )
     law, shear = rubbing_of(model, numerics), None
     if model.partial_slip:

@@ -60,7 +60,7 @@ def test_exact_a_march_whose_list_grows_is_that_with_room_from_the_start(law, be
 
 
 def test_refuses_more_entries_than_the_stated_limit(monkeypatch):
-    monkeypatch.setattr(capacity, "MOST_STRIPS", 100)
+    monkeypatch.setattr(capacity, "MAX_ENTRIES", 100)
     with pytest.raises(
         Missing, match=r"grew beyond 100 entries \(0 MB\) at step \d+; raise accuracy.tail"
     ):

@@ -55,11 +55,11 @@ CASES = {
 def marched(case: str, monkeypatch, repeats: bool, **more):
     """(result, share of the steps that were marched)."""
     basis, model = CASES[case]()
-    steps, moved = [], marching.Run._moved
-    monkeypatch.setattr(marching, "REPEATS", 1e-12 if repeats else -1.0)
+    steps, moved = [], marching.Run._march_rows
+    monkeypatch.setattr(marching, "PERIODIC_TOL", 1e-12 if repeats else -1.0)
     monkeypatch.setattr(
         marching.Run,
-        "_moved",
+        "_march_rows",
         lambda run, size, *rest: steps.append(size) or moved(run, size, *rest),
     )
     done = march(basis, DRIVE, model, CYCLES, STEPS, 5, **more)
@@ -164,7 +164,9 @@ def test_always_what_creeps_beats_or_has_another_period_does_not_repeat(
 ):
     """Of a state that goes as a formula over 1024 cycles with 1e5 to come."""
     run = marching.fresh(BASIS, DRIVE, rate_model(20.0, 5e-3), STEPS)
-    monkeypatch.setattr(run, "_carried", lambda: [np.array([1.0 + motion(run.done // STEPS), 1.0])])
+    monkeypatch.setattr(
+        run, "_carried_state", lambda: [np.array([1.0 + motion(run.done // STEPS), 1.0])]
+    )
     run.looks, found = np.zeros((3, 2)), False
     for number in range(1, 1025):
         run.done = number * STEPS

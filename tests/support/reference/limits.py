@@ -35,7 +35,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "surface.samples.MAX_LENGTH": "length of a trace [m]",
     "model.slide.MAX_STEPS": "steps per cycle of a prescribed slide",
     "runs.rig.costs.MOST_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
-    "dynamics.march.capacity.MOST_STRIPS": "number of entries in a list of bonds",
+    "dynamics.march.capacity.MAX_ENTRIES": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
     "runs.rig.costs.LONGEST": "estimated time to compute a whole motion by the event-to-event method [s]",
     "structure.drive_sizes.MAX_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
