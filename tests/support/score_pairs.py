@@ -1,6 +1,4 @@
-"""Score `patchfem compare` on pairs of stylus traces with known truth (`stylus_pairs`, `known_pairs`).
-
-    python tests/support/score_pairs.py GENERATOR --seeds 90000-90016 [--table FILE.json]
+"""Rules and command line of the scores of `patchfem compare` on pairs with known truth.
 
 A headline is false where it says something that is not so: wear on an unworn surface, no wear although the worn part is
 deeper than the comparison claims to detect, one place for two. An interval holds where it contains the truth.
@@ -8,11 +6,11 @@ deeper than the comparison claims to detect, one place for two. An interval hold
 
 import argparse
 import contextlib
-import importlib
 import io
 import json
+import multiprocessing
+import os
 import re
-import tempfile
 import time
 from collections import defaultdict
 from pathlib import Path
@@ -133,66 +131,8 @@ def check_intervals(pair, answer: dict) -> dict:
     return found
 
 
-def main() -> None:
-    """Score a generator and print one line per pair, then shares per kind and per quantity."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("generator", choices=("stylus_pairs", "known_pairs"))
-    parser.add_argument("--seeds", required=True, metavar="FIRST-LAST")
-    parser.add_argument("--table", type=Path)
-    request = parser.parse_args()
-    module = importlib.import_module(request.generator)
-    draw = getattr(module, "draw_pair", None) or module.pair
-    unworn_kinds = getattr(module, "UNWORN", None) or ("unworn", "dust", "mirrored", "turned")
-    first, last = map(int, request.seeds.split("-"))
-    rows = []
-    for kind in module.KINDS:
-        for seed in range(first, last + 1):
-            pair = draw(kind, seed)
-            with tempfile.TemporaryDirectory() as folder:
-                answer = compare(pair, Path(folder))
-            if "error" in answer:
-                row = {
-                    "kind": kind,
-                    "seed": seed,
-                    "seconds": answer["seconds"],
-                    "error": answer["error"],
-                    "faults": [],
-                    "intervals": {},
-                    "headline": "",
-                }
-            else:
-                row = {
-                    "kind": kind,
-                    "seed": seed,
-                    "seconds": answer["seconds"],
-                    "headline": answer["verdict"],
-                    "faults": find_faults(pair, kind in unworn_kinds, answer),
-                    "intervals": check_intervals(pair, answer),
-                }
-            rows.append(row)
-            wrong = [
-                f"{name} {value[3]:.1f}" for name, value in row["intervals"].items() if not value[0]
-            ]
-            print(
-                f"{kind:16s} {seed} {row['seconds']:.2f} s  {row['headline'][:60]!r} {row.get('error', '')} "
-                f"{row['faults'] or ''} {wrong or ''}",
-                flush=True,
-            )
-    print_summary(rows)
-    if request.table:
-        request.table.write_text(json.dumps(rows, default=float))
-
-
-def print_summary(rows: list) -> None:
-    """Print the shares per kind and per quantity."""
-    for kind in dict.fromkeys(row["kind"] for row in rows):
-        chosen = [row for row in rows if row["kind"] == kind]
-        checks = [value for row in chosen for value in row["intervals"].values()]
-        answered = sum("worn_depth_mean" in row["intervals"] for row in chosen)
-        print(
-            f"{kind:16s} {len(chosen)} pairs, {sum(bool(row['faults']) for row in chosen)} false, "
-            f"{answered} with a mean depth, intervals {sum(c[0] for c in checks)}/{len(checks)}"
-        )
+def print_quantities(rows: list) -> None:
+    """Print for each quantity how many intervals hold, and the counts of all pairs."""
     checks = defaultdict(list)
     for row in rows:
         for name, value in row["intervals"].items():
@@ -210,5 +150,41 @@ def print_summary(rows: list) -> None:
     )
 
 
-if __name__ == "__main__":
-    main()
+def run_scores(score, requests: list, request, print_row) -> list:
+    """Score pairs in several processes and print each.
+
+    Parameters
+    ----------
+    score : callable
+        From an entry of `requests` to a row.
+    requests : list
+    request : argparse.Namespace
+        Options of `parse_request`.
+    print_row : callable
+    """
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # the processes share the cores
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    rows = []
+    with multiprocessing.get_context("spawn").Pool(request.jobs) as pool:
+        for row in pool.imap(score, requests):
+            rows.append(row)
+            print_row(row)
+    print("\nheld/intervals (median half-width / truth) per kind")
+    return rows
+
+
+def make_parser(description: str) -> argparse.ArgumentParser:
+    """Return the options that all scores have."""
+    parser = argparse.ArgumentParser(description=description.splitlines()[0])
+    parser.add_argument("--first", type=int, required=True, help="first seed")
+    parser.add_argument("--count", type=int, required=True, help="number of seeds")
+    parser.add_argument("-j", "--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--table", type=Path, help="JSON file of the scores")
+    return parser
+
+
+def write_table(path: Path | None, summary: dict, rows: list) -> None:
+    """Write the summary and the rows where a file is named."""
+    if path:
+        table = {"summary": summary, "rows": rows}
+        path.write_text(json.dumps(table, indent=1, default=float), "utf-8")

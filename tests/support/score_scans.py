@@ -10,10 +10,6 @@ the truth. The names end in a word where several definitions are scored: `_inner
 border of the region, `_median` is of 3 x 3 depths, `_flat` of flanks that run out flat.
 """
 
-import argparse
-import json
-import multiprocessing
-import os
 import re
 import tempfile
 import time
@@ -22,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 import scan_pairs
+from score_pairs import UNITS, make_parser, run_scores, write_table
 
-UNITS = {"nm": 1e-9, "um": 1e-6, "mm": 1e-3, "m": 1.0}
 SHOWN = (
     "worn_depth_mean",
     "worn_depth_max",
@@ -230,7 +226,6 @@ def _summarize_checks(checks: list) -> dict:
 
 def print_summary(summary: dict) -> None:
     """Print a line per kind, and a line per quantity over all kinds."""
-    print("\nheld/intervals (median half-width / truth) per kind")
     for kind, entry in summary.items():
         cells = []
         for name in SHOWN:
@@ -257,26 +252,12 @@ def print_summary(summary: dict) -> None:
 
 def main() -> None:
     """Score the pairs of consecutive seeds."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--first", type=int, required=True, help="first seed")
-    parser.add_argument("--count", type=int, required=True, help="number of seeds")
-    parser.add_argument("-j", "--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--table", type=Path, help="JSON file of the scores")
-    request = parser.parse_args()
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # the processes share the cores
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    request = make_parser(__doc__).parse_args()
     seeds = range(request.first, request.first + request.count)
-    rows = []
-    with multiprocessing.get_context("spawn").Pool(request.jobs) as pool:
-        for row in pool.imap(score_seed, seeds):
-            rows.append(row)
-            print_row(row)
+    rows = run_scores(score_seed, list(seeds), request, print_row)
     summary = summarize(rows)
     print_summary(summary)
-    if request.table:
-        request.table.write_text(
-            json.dumps({"summary": summary, "rows": rows}, indent=1, default=float)
-        )
+    write_table(request.table, summary, rows)
 
 
 if __name__ == "__main__":

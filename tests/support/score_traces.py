@@ -2,7 +2,8 @@
 
     python tests/support/score_traces.py --first 1 --count 16 -j 2 --table scores.json
 
-A seed gives one pair: the kinds take turns. With --all each seed gives a pair of every kind. Flanks that run out flat
+A seed gives one pair: the kinds take turns. With --all each seed gives a pair of every kind; with --generator
+stylus_pairs the pairs are those of another generator. Flanks that run out flat
 (`trace_pairs.RUN_OUT`) are scored apart: the ends and widths of their tracks have the suffix `_flat`.
 
 Seeds 1 to 60 serve for building. The score of a method counts on seeds that nobody has used before: 2001 to 2304 are
@@ -11,17 +12,22 @@ spent; for intervals that allow for a drift of the datum they are 2401 to 2704:
     python tests/support/score_traces.py --first 2401 --count 304 -j 2 --table scores.json
 """
 
-import argparse
-import json
-import multiprocessing
-import os
 import tempfile
 from collections import defaultdict
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
-import trace_pairs
-from score_pairs import check_intervals, compare, find_faults, print_summary
+from score_pairs import (
+    check_intervals,
+    compare,
+    find_faults,
+    make_parser,
+    print_quantities,
+    run_scores,
+    write_table,
+)
+from trace_pairs import RUN_OUT
 
 PLACES = (
     "track_from",
@@ -34,9 +40,10 @@ PLACES = (
 
 
 def score_pair(request: tuple) -> dict:
-    """Compare the pair (kind, seed) and score the answer."""
-    kind, seed = request
-    pair = trace_pairs.draw_pair(kind, seed)
+    """Compare the pair (generator, kind, seed) and score the answer."""
+    name, kind, seed = request
+    generator = import_module(name)
+    pair = generator.draw_pair(kind, seed)
     with tempfile.TemporaryDirectory() as folder:
         try:
             answer = compare(pair, Path(folder))
@@ -58,12 +65,12 @@ def score_pair(request: tuple) -> dict:
         }
     intervals = check_intervals(pair, answer)
     truth = {name: answer[name]["value"] - check[2] for name, check in intervals.items()}
-    suffix = "_flat" if kind in trace_pairs.RUN_OUT else ""
+    suffix = "_flat" if kind in RUN_OUT else ""
     names = {name: name + suffix if name in PLACES else name for name in intervals}
-    is_worn = kind not in (*trace_pairs.UNWORN, *trace_pairs.HIDDEN, "elsewhere", "deposits")
+    is_worn = kind not in (*generator.UNWORN, *generator.HIDDEN, "elsewhere", "deposits")
     return row | {
         "sentences": answer.get("sentences", []),
-        "faults": find_faults(pair, kind in trace_pairs.UNWORN, answer),
+        "faults": find_faults(pair, kind in generator.UNWORN, answer),
         "intervals": {names[name]: check for name, check in intervals.items()},
         "truth": {names[name]: value for name, value in truth.items()},
         "missed": is_worn and "worn" not in row["headline"].lower(),
@@ -118,32 +125,22 @@ def print_precision(rows: list) -> dict:
 
 def main() -> None:
     """Score the pairs of consecutive seeds."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--first", type=int, required=True, help="first seed")
-    parser.add_argument("--count", type=int, required=True, help="number of seeds")
+    parser = make_parser(__doc__)
     parser.add_argument("--all", action="store_true", help="every kind for each seed")
-    parser.add_argument("-j", "--jobs", type=int, default=1, help="processes")
-    parser.add_argument("--table", type=Path, help="JSON file of the scores")
+    parser.add_argument(
+        "--generator", default="trace_pairs", choices=("trace_pairs", "stylus_pairs")
+    )
     request = parser.parse_args()
-    os.environ.setdefault("OMP_NUM_THREADS", "1")  # the processes share the cores
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    kinds, seeds = trace_pairs.KINDS, range(request.first, request.first + request.count)
-    wanted = [(kinds[(seed - 1) % len(kinds)], seed) for seed in seeds]
+    kinds = import_module(request.generator).KINDS
+    seeds = range(request.first, request.first + request.count)
+    wanted = [(request.generator, kinds[(seed - 1) % len(kinds)], seed) for seed in seeds]
     if request.all:
-        wanted = [(kind, seed) for seed in seeds for kind in kinds]
-    rows = []
-    with multiprocessing.get_context("spawn").Pool(request.jobs) as pool:
-        for row in pool.imap(score_pair, wanted):
-            rows.append(row)
-            print_row(row)
-    print("\nheld/intervals (median half-width / truth) per kind")
+        wanted = [(request.generator, kind, seed) for seed in seeds for kind in kinds]
+    rows = run_scores(score_pair, wanted, request, print_row)
     summary = print_precision(rows)
     print()
-    print_summary(rows)
-    if request.table:
-        request.table.write_text(
-            json.dumps({"summary": summary, "rows": rows}, indent=1, default=float)
-        )
+    print_quantities(rows)
+    write_table(request.table, summary, rows)
 
 
 if __name__ == "__main__":

@@ -34,20 +34,13 @@ HIDDEN = ("even", "wedge")  # an offset or a slope of the trace explains the wea
 class StylusPair:
     """Two traces and their truth.
 
-    Attributes
-    ----------
-    kind : str
-        One of `KINDS`.
-    before, after : tuple of ndarray
-        Positions and heights (n,) [m] of each trace.
-    worn : ndarray
-        Height lost (> 0) or gained (< 0) at the samples of `after`, (n,) [m].
-    shift : float
-        Position on the piece of the first sample of `after` minus that of `before` [m].
-    span : tuple of float or None
-        Start and end of the worn part in the coordinates of `after` [m], where there is a single worn part.
-        A trace is interpolated between the samples of the surface, so the worn part begins half a sample
-        before the first lowered one and ends half a sample behind the last.
+    - `kind`: one of `KINDS`
+    - `before`, `after`: positions and heights (n,) [m] of each trace
+    - `worn` (n,) [m]: height lost (> 0) or gained (< 0) at the samples of `after`
+    - `shift` [m]: position on the piece of the first sample of `after` minus that of `before`
+    - `span` [m]: start and end of the worn part in the coordinates of `after`; None if there is not a single worn part.
+      A trace is interpolated between the samples of the surface, so the worn part begins half a sample before the first
+      lowered one and ends half a sample after the last.
     """
 
     kind: str
