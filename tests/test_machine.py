@@ -265,7 +265,7 @@ print(json.dumps([out, "numba" in sys.modules]))
 def test_always_threads_that_call_first_at_once_bring_code_once(monkeypatch):
     """Two that loaded the same function at once ended the process in 1 of 2 first sweeps of Iwan cases."""
     entry, brought, at_once = (
-        kernels_of_its_own("dynamics.events.series_kernels").powers,
+        kernels_of_its_own("dynamics.events.series_kernels").find_highest_power,
         [],
         Barrier(2),
     )

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 
 from ..core import ModalBasis, NotConverged
 from . import propagator
-from .harmonic.backbone import Free, FreeBalance, trace
+from .harmonic.backbone import FreeBalance, FreeMotion, trace
 from .harmonic.forces import Group
 from .harmonic.harmonic import pack
 from .harmonic.point import balance_of
@@ -142,7 +142,7 @@ def _balanced_at(cycle, amplitude: float, own: float, more: float) -> tuple | No
 
 
 def _flow(modes: ModalBasis, t) -> np.ndarray:
-    """Free motion (k, 2n, 2n) of (z, z') over times t (k,)."""
+    """FreeMotion motion (k, 2n, 2n) of (z, z') over times t (k,)."""
     blocks = propagator.free_motion(modes, t)
     if modes.damping is None:
         blocks = [part[..., None] * np.eye(modes.omega.size) for part in blocks]
@@ -282,13 +282,13 @@ def _crossings(modes: ModalBasis, group: Group, mode: int, path: tuple, harmonic
     return out
 
 
-def _unknowns(equations: FreeBalance, one: Free) -> np.ndarray:
+def _unknowns(equations: FreeBalance, one: FreeMotion) -> np.ndarray:
     """Unknowns of `FreeBalance.solve` at a free motion."""
     y = equations.balance.lift.T @ one.slides[:, : equations.h + 1]
     return np.append(pack(y) / one.amplitude, [one.omega / equations.scale, one.zeta])
 
 
-def _between(equations: FreeBalance, low: Free, high: Free) -> Free:
+def _between(equations: FreeBalance, low: FreeMotion, high: FreeMotion) -> FreeMotion:
     """The free motion without damping between two of unlike sign, by the secant kept between them (Illinois)."""
     ends = [(np.log(one.amplitude), one.zeta, one) for one in (low, high)]
     last = 0

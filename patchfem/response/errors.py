@@ -162,7 +162,7 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     The force of a density in cells is exact at the ends of a cell and has its largest error, of
     second order in the width, in the middle. A measure that depends on the instants at which the
     interface starts or stops slipping has an error of first order, because the stiffness jumps from
-    cell to cell. `dynamics.events.elements.JOINED` states where the merging starts.
+    cell to cell. `dynamics.events.elements.CELL_MERGES` states where the merging starts.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ import numpy as np
 
 from patchfem.core import ModalBasis, SineDrive, frozen_array
 from patchfem.dynamics.events.elements import coulomb
-from patchfem.dynamics.events.histories import motion_at
+from patchfem.dynamics.events.histories import evaluate_motion
 
 
 def basis(omega, zeta, slide, base) -> ModalBasis:
@@ -36,7 +36,7 @@ TWO_LIMIT = 3.0  # friction [N]
 
 def sampled(modes, drive, limit, cycles: float, times, start=None):
     """Response at `times` (k,) of `cycles` by the event engine of any modes."""
-    return motion_at(modes, drive, [coulomb(limit, limit)], cycles, times, start)
+    return evaluate_motion(modes, drive, [coulomb(limit, limit)], cycles, times, start)
 
 
 def exact(name: str, times):

@@ -183,11 +183,11 @@ def test_exact_drift(count, samples):
 def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
     """Slide (k,) [m] at the middles of equal parts of the cycle that begins at `begin` cycles, by the event engine."""
     from patchfem.dynamics.events.elements import coulomb
-    from patchfem.dynamics.events.histories import motion_at
+    from patchfem.dynamics.events.histories import evaluate_motion
 
     model, rig = done.plan.model, done.plan.model.rig
     times = (begin + (np.arange(samples) + 0.5) / samples) * PERIOD
-    return motion_at(
+    return evaluate_motion(
         rig.modes,
         rig.drive.signal,
         [coulomb(*model.friction_limits(model.point.load))],

@@ -55,7 +55,7 @@ def test_always_a_motion_found_by_harmonics_is_no_start_for_the_map_of_yields(fi
 
     asked = fitting.RUNGS["second path"].question("peak").asked([(143.0, 49.03)])
     values = np.array([0.4, 3.5e6, 1400.0, 0.09])
-    find_steady = steady.steady
+    find_steady = steady.solve_steady
     failures = [NotConverged("lost")]
 
     def lost(*given):
@@ -64,7 +64,7 @@ def test_always_a_motion_found_by_harmonics_is_no_start_for_the_map_of_yields(fi
         return find_steady(*given)
 
     computed = Computed(asked)
-    monkeypatch.setattr(steady, "steady", lost)
+    monkeypatch.setattr(steady, "solve_steady", lost)
     by_balance, after = np.array(computed(values, [0])), np.array(computed(values * 1.0001, [0]))
     assert by_balance == pytest.approx(np.array(Computed(asked)(values, [0])), rel=0.02)
     assert after == pytest.approx(np.array(Computed(asked)(values * 1.0001, [0])), rel=1e-9)

@@ -6,6 +6,7 @@ import numpy as np
 
 from patchfem.dynamics.events import histories, stick_steady
 from patchfem.dynamics.events.elements import coulomb
+from patchfem.dynamics.events.positions_kernels import BEGIN, COLUMN
 
 
 def groups_of(modes, static, kinetic) -> list:
@@ -24,20 +25,20 @@ def simulate(
 
 
 def steady(modes, drive, static, kinetic, start=None, cycles=30, periods=1):
-    """`stick_steady.steady` of Coulomb friction."""
-    return stick_steady.steady(
+    """`stick_steady.solve_steady` of Coulomb friction."""
+    return stick_steady.solve_steady(
         modes, drive, groups_of(modes, static, kinetic), start, cycles, periods
     )
 
 
 def period_map(modes, drive, static, kinetic, state, periods=1):
-    """`stick_steady.period_map` of Coulomb friction."""
-    return stick_steady.period_map(modes, drive, groups_of(modes, static, kinetic), state, periods)
+    """`stick_steady.map_period` of Coulomb friction."""
+    return stick_steady.map_period(modes, drive, groups_of(modes, static, kinetic), state, periods)
 
 
 @dataclass(frozen=True)
 class Signal:
-    """Columns of `dense_kernels.evaluate` of a run, weighted, from the start of a phase on; their rates beside them."""
+    """Columns of `dense_kernels.evaluate_rows` of a run, weighted, from the start of a phase on; their rates beside them."""
 
     run: object
     rows: np.ndarray
@@ -59,7 +60,7 @@ class Signal:
         tau = np.clip(t - since[owner], 0.0, self.rows[owner, 1])
         order = np.argsort(owner, kind="stable")
         out = np.empty((t.size, 2 * len(self.run.modes.omega) + 1 + 6 * len(self.run.groups)))
-        out[order] = self.run.dense_values(self.rows, owner[order], tau[order])
+        out[order] = self.run.evaluate_rows(self.rows, owner[order], tau[order])
         return out[:, columns] @ np.array(self.weights)
 
     def __call__(self, t):
@@ -109,22 +110,23 @@ class Phase:
 def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple:
     """(run, rows of all its pieces) from rest or `start`, the clock put to the cycle `begin` at first."""
     groups = groups_of(modes, static, kinetic)
-    one = histories.started(modes, drive, groups, cycles, int(cycles) + 2, start=start)
+    one = histories.start_run(modes, drive, groups, cycles, int(cycles) + 2, start=start)
     one.time_state.now[0], rows = begin, []
-    one.until(cycles, one._into(rows))
+    one.run_to(cycles, one._collect_into(rows))
     return one, np.concatenate(rows)
 
 
 def run(modes, drive, static, kinetic, duration, start=None) -> list:
     """The phases of a run up to `duration` [s]; the last one is cut there."""
     one, rows = rows_of(modes, drive, static, kinetic, duration / drive.period, start)
-    begins = np.flatnonzero(rows[:, 4] >= one.kernels.SWITCHED)
+    begins = np.flatnonzero(rows[:, 4] >= BEGIN.stick_or_slip)
     n, i = len(modes.omega), len(one.groups)
     out = []
     for first, end in zip([0, *begins[begins > 0]], [*begins[begins > 0], len(rows)]):
         part = rows[first:end]
         ways = tuple(
-            int(part[0, one._at(f, 7)]) if group.static else 1 for f, group in enumerate(one.groups)
+            int(part[0, one._column(f, COLUMN.direction)]) if group.static else 1
+            for f, group in enumerate(one.groups)
         )
         modal = [Signal(one, part, (k,), (n + k,), (1.0,)) for k in range(n)]
         forces = [Signal(one, part, (2 * n + 1 + 6 * f + 2,), (), (1.0,)) for f in range(i)]

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from patchfem.core import ModalBasis
-from patchfem.dynamics.harmonic.laws import Flow, OfSpeed
+from patchfem.dynamics.harmonic.laws import Flow, SpeedLaw
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.stretch import points_element
 from patchfem.friction.laws.tanh import TanhLaw
@@ -12,7 +12,7 @@ from patchfem.friction.laws.tanh import TanhLaw
 
 def of_speed(limit, speed):
     """limit tanh(v/speed)."""
-    return OfSpeed(TanhLaw(limit, speed).element(1.0))
+    return SpeedLaw(TanhLaw(limit, speed).element(1.0))
 
 
 def bonds(limit, length):

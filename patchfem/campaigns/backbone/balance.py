@@ -13,7 +13,7 @@ from ...dynamics.harmonic.backbone import FreeBalance
 from ...dynamics.harmonic.forces import Group
 from ...dynamics.harmonic.harmonic import pack
 from ...dynamics.harmonic.laws import synthesis
-from ...dynamics.harmonic.point import balance_of, top
+from ...dynamics.harmonic.point import balance_of, find_peak
 from ...formatting import format_length
 from ...response.errors import error_of_change
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
@@ -37,7 +37,7 @@ MIN_SLOPE = 0.1
 class FreeMotion(NamedTuple):
     """A free motion.
 
-    free: a `harmonic.backbone.Free`; unknowns: (N,); reach: amplitude at the output / amplitude of
+    free: a `harmonic.backbone.FreeMotion`; unknowns: (N,); reach: amplitude at the output / amplitude of
     the coordinate.
     """
 
@@ -130,7 +130,7 @@ def find_free_motions(group: Group, joint: Joint, amplitudes, harmonics: int) ->
     Returns
     -------
     list of Free or None
-        `dynamics.harmonic.backbone.Free`; None if no motion is found.
+        `dynamics.harmonic.backbone.FreeMotion`; None if no motion is found.
     """
     search = _FreeMotionSearch(group, joint, amplitudes, harmonics)
     out: list = [None] * len(amplitudes)
@@ -271,7 +271,7 @@ def _solve_from_stuck(equations: FreeBalance, first, small: float, here: float) 
 def half_range(harmonics) -> float:
     """Return (maximum - minimum)/2 of a motion with harmonics (H + 1,)."""
     motion = synthesis(harmonics, N_SAMPLES)
-    return (top(motion) + top(-motion)) / 2
+    return (find_peak(motion) + find_peak(-motion)) / 2
 
 
 def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:

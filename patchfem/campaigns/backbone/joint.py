@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...dynamics.events.elements import JOINED, cells_joined
+from ...dynamics.events.elements import CELL_MERGES, join_cells
 from ...dynamics.harmonic.forces import Group
 from ...effects import law_has_trait, not_supported_message
 from ...model.model import Model
@@ -244,7 +244,8 @@ class Joint(NamedTuple):
         if has_cells:
             best = read(fine)
             changes = [
-                np.abs(read(fine.remade(partial(cells_joined, *cells))) - best) for cells in JOINED
+                np.abs(read(fine.with_elements(partial(join_cells, *cells))) - best)
+                for cells in CELL_MERGES
             ]
             error = error + error_of_change(np.max(changes, axis=0), ratio=4.0, order=2.0)
         return error

@@ -111,7 +111,9 @@ def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
 def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
     """Return amplitude, frequency, damping and loss (4, k) by loops at displacements (k,) [m]."""
     modes = joint.modes
-    statics = quasi_static.through(modes, modes.interfaces[0], joint.held, slides, loops)
+    statics = quasi_static.static_motions_from_loops(
+        modes, modes.interfaces[0], joint.held, slides, loops
+    )
     return decays.rows_of(modes, statics)
 
 

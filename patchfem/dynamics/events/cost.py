@@ -1,4 +1,9 @@
-"""What a run costs as Python, by which its loop is compiled or not: estimates, the same in every process."""
+"""Computing time of a run as interpreted Python.
+
+The engine decides by it whether to compile its loop.
+
+The estimates are the same in every process.
+"""
 
 from math import pi, sqrt
 
@@ -10,8 +15,21 @@ from ...structure.drive_sizes import max_frequency_ratio
 
 
 def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) -> float:
-    """CPU seconds of a cycle of the drive as Python, not compiled; stiffness [N/m] that an interface has at most,
-    elements of all of them."""
+    """Estimate the CPU seconds of a cycle of the drive as interpreted Python.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive
+    stiffness : float
+        Largest stiffness of an interface [N/m].
+    elements : int
+        Number of elements of all interfaces.
+
+    Returns
+    -------
+    float
+    """
     faces = len(modes.interfaces)
     damper = float(np.linalg.norm(modes.damping_matrix, 2)) / 2
     most = stiffness * float((modes.interfaces**2).sum(axis=1).max(initial=0.0)) / modes.mass
@@ -23,7 +41,7 @@ def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) ->
 
 
 def sample_seconds(modes: ModalBasis) -> float:
-    """CPU seconds of a sample of the motion as Python."""
+    """Estimate the CPU seconds of a sample of the motion as interpreted Python."""
     return (
         PYTHON_SAMPLE_FRACTION
         * PYTHON_PIECE_SECONDS

@@ -1,153 +1,189 @@
-"""Compiled reading of a run's rows: the motion at any time in a piece, and the largest absolute acceleration."""
+"""Motion of a run at any time, from the rows of its pieces, and its peaks (compiled)."""
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .drive_kernels import RATE, drive_series, rate_of
-from .march_kernels import EACH, HEAD
-from .memory_kernels import RIGID
-from .search_kernels import moved, speed_series
-from .series_kernels import REACH, fastest, largest, motion_series, powers, value
-from .slow_kernels import at_reach, shortened
-from .stick_kernels import constrain
+from .drive_kernels import expand_drive, fastest_drive_rate
+from .memory_kernels import RIGID_STIFFNESS
+from .positions_kernels import COLUMN, HOLD, N_COLUMNS, ROW, SEGMENT
+from .search_kernels import displacement_at, expand_speed
+from .series_kernels import (
+    MAX_RATE_TIME,
+    bound_modal_rate,
+    evaluate_polynomial,
+    expand_motion,
+    find_highest_power,
+    find_largest_magnitude,
+)
+from .slow_kernels import expand_slow_piece, shorten_series
+from .stick_kernels import constrain_slides
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def unfold(row, h, modal_system, time_state, workspace):
-    """Fill the workspace with the series of the piece of a row over h [s]; the highest power.
+def expand_row(row, h, modal_system, time_state, workspace):
+    """Expand the piece of a row over h [s] into the workspace; returns the highest power.
 
-    What holds is found again where it is not what workspace.mask has; workspace.held[0] < 0 before the first row.
+    The constraint is built again where the held interfaces differ from those of the row before;
+    constraint.status[HOLD.n_held] < 0 asks for it.
     """
-    n = len(modal_system.square)
-    faces = len(modal_system.reach)
-    segment = time_state.segments[int(row[3])]
-    start = HEAD + 2 * n
-    place = row[HEAD : HEAD + n]
-    speed = row[HEAD + n : start]
-    for f in range(faces):
-        workspace.polys[faces, f] = row[start + EACH * f]
-        workspace.springs[f] = row[start + EACH * f + 1]
-        holds = 1.0 if workspace.springs[f] == RIGID else 0.0
-        if workspace.mask[f] != holds:
-            workspace.mask[f] = holds
-            workspace.held[0] = -1.0
-    if workspace.held[0] < 0.0:
-        constrain(modal_system, workspace)
-    own = fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0
-    rate = rate_of(segment, time_state.period[0])
-    if own * h > REACH * (1 + 1e-9):
-        at_reach(
+    constraint = workspace.constraint
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
+    segment = time_state.segments[int(row[ROW.segment])]
+    start = ROW.motion + 2 * n
+    displacement = row[ROW.motion : ROW.motion + n]
+    speed = row[ROW.motion + n : start]
+    for f in range(n_interfaces):
+        workspace.polynomials[n_interfaces, f] = row[start + N_COLUMNS * f + COLUMN.force]
+        workspace.stiffness[f] = row[start + N_COLUMNS * f + COLUMN.stiffness]
+        is_held = 1.0 if workspace.stiffness[f] == RIGID_STIFFNESS else 0.0
+        if constraint.is_held[f] != is_held:
+            constraint.is_held[f] = is_held
+            constraint.status[HOLD.n_held] = -1.0
+    if constraint.status[HOLD.n_held] < 0.0:
+        constrain_slides(modal_system, workspace)
+    modal_rate = bound_modal_rate(modal_system, workspace)
+    rate = fastest_drive_rate(segment, time_state.period[0])
+    if modal_rate * h > MAX_RATE_TIME * (1 + 1e-9):
+        expand_slow_piece(
             segment,
-            row[5],
-            row[6],
+            row[ROW.cycle],
+            row[ROW.offset],
             time_state.period[0],
-            place,
+            displacement,
             speed,
-            workspace.polys[faces],
+            workspace.polynomials[n_interfaces],
             modal_system,
             workspace,
         )
-        top = powers(rate * h)
-        shortened(rate * h / REACH, top, faces, workspace)
+        top = find_highest_power(rate * h)
+        shorten_series(rate * h / MAX_RATE_TIME, top, n_interfaces, workspace)
     else:
-        top = powers(max(own, segment[RATE]) * h)
-        drive_series(segment, row[5], row[6], time_state.period[0], h, top, workspace.waves)
-        motion_series(
-            place,
+        top = find_highest_power(max(modal_rate, segment[SEGMENT.rate]) * h)
+        expand_drive(
+            segment, row[ROW.cycle], row[ROW.offset], time_state.period[0], h, top, workspace.drive
+        )
+        expand_motion(
+            displacement,
             speed,
-            workspace.polys[faces],
-            workspace.springs,
+            workspace.polynomials[n_interfaces],
+            workspace.stiffness,
             modal_system,
-            workspace.waves[0],
+            workspace.drive[0],
             h,
             top,
-            workspace.coefs,
+            workspace.coefficients,
             workspace,
         )
-    for f in range(faces):
-        speed_series(
-            modal_system.faces[f],
-            len(modal_system.square),
-            workspace.coefs,
+    for f in range(n_interfaces):
+        expand_speed(
+            modal_system.interfaces[f],
+            n,
+            workspace.coefficients,
             top,
-            workspace.polys[f],
+            workspace.polynomials[f],
         )
     return top
 
 
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def evaluate(rows, owner, tau, modal_system, time_state, workspace, out):
-    """Motion at tau (j,) [s] after the starts of the rows owner (j,), rising.
+def evaluate_rows(rows, owner, tau, modal_system, time_state, workspace, out):
+    """Evaluate the motion at times after the starts of rows.
 
-    out (j, 2 n + 1 + 6 i): z, v, drive [m s-2], then of every interface slide [m], rate [m/s], force [N], slip [m],
-    work and loss [J].
+    Parameters
+    ----------
+    rows : ndarray
+        (r, w) see `RowColumns`.
+    owner, tau : ndarray
+        (j,) row of each time, in increasing order, and time since its start [s].
+    modal_system, time_state, workspace
+    out : ndarray
+        (j, 2 n + 1 + 6 i): modal coordinates, rates, drive [m s-2], then of every interface
+        relative displacement [m], its rate [m/s], force [N], slip [m], work and loss [J].
     """
-    n = len(modal_system.square)
-    faces = len(modal_system.reach)
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
     last = -1
     top = 0
     h = 1.0
-    workspace.held[0] = -1.0
+    workspace.constraint.status[HOLD.n_held] = -1.0
     for j in range(owner.size):
         row = rows[owner[j]]
         if owner[j] != last:
             last = owner[j]
-            h = max(row[1], 1e-300)
-            top = unfold(row, h, modal_system, time_state, workspace)
+            h = max(row[ROW.duration], 1e-300)
+            top = expand_row(row, h, modal_system, time_state, workspace)
         u = tau[j] / h
         for i in range(n):
-            out[j, i] = value(workspace.coefs[:, i], 0, top, u)
-            rate = top * workspace.coefs[top, i]
+            out[j, i] = evaluate_polynomial(workspace.coefficients[:, i], 0, top, u)
+            rate = top * workspace.coefficients[top, i]
             for k in range(top - 1, 0, -1):
-                rate = rate * u + k * workspace.coefs[k, i]
+                rate = rate * u + k * workspace.coefficients[k, i]
             out[j, n + i] = rate / h
-        out[j, 2 * n] = value(workspace.waves[0], 0, top, u)
-        for f in range(faces):
-            at = HEAD + 2 * n + EACH * f
-            to = 2 * n + 1 + 6 * f
-            if workspace.springs[f] == RIGID:
-                out[j, to] = row[at + 8]
-                out[j, to + 1] = 0.0
-                out[j, to + 2] = value(workspace.reactions[f], 0, top - 2, u)
-                out[j, to + 3] = row[at + 4]
-                out[j, to + 4] = row[at + 5]
-                out[j, to + 5] = row[at + 6]
+        out[j, 2 * n] = evaluate_polynomial(workspace.drive[0], 0, top, u)
+        for f in range(n_interfaces):
+            at = ROW.motion + 2 * n + N_COLUMNS * f
+            first = 2 * n + 1 + 6 * f
+            if workspace.stiffness[f] == RIGID_STIFFNESS:
+                out[j, first] = row[at + COLUMN.slide]
+                out[j, first + 1] = 0.0
+                out[j, first + 2] = evaluate_polynomial(
+                    workspace.constraint.reactions[f], 0, top - 2, u
+                )
+                out[j, first + 3] = row[at + COLUMN.slip]
+                out[j, first + 4] = row[at + COLUMN.work]
+                out[j, first + 5] = row[at + COLUMN.loss]
                 continue
-            step = moved(workspace.polys[f], top, u)
-            place = 0.0
+            step = displacement_at(workspace.polynomials[f], top, u)
+            displacement = 0.0
             for i in range(n):
-                place += modal_system.faces[f, i] * out[j, i]
-            out[j, to] = place
-            out[j, to + 1] = value(workspace.polys[f], 0, top - 1, u) / h
-            out[j, to + 2] = row[at] + row[at + 1] * step
-            out[j, to + 3] = row[at + 4] + row[at + 2] * step
-            out[j, to + 4] = row[at + 5] + (row[at] + 0.5 * row[at + 1] * step) * step
-            out[j, to + 5] = row[at + 6] + row[at + 3] * abs(step)
+                displacement += modal_system.interfaces[f, i] * out[j, i]
+            out[j, first] = displacement
+            out[j, first + 1] = evaluate_polynomial(workspace.polynomials[f], 0, top - 1, u) / h
+            out[j, first + 2] = row[at + COLUMN.force] + row[at + COLUMN.stiffness] * step
+            out[j, first + 3] = row[at + COLUMN.slip] + row[at + COLUMN.slipping] * step
+            out[j, first + 4] = (
+                row[at + COLUMN.work]
+                + (row[at + COLUMN.force] + 0.5 * row[at + COLUMN.stiffness] * step) * step
+            )
+            out[j, first + 5] = row[at + COLUMN.loss] + row[at + COLUMN.limit] * abs(step)
 
 
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def peak(rows, modal_system, time_state, moving, workspace, reactions):
-    """Largest |acceleration| [m s-2] of the output over the pieces of rows, that of a moving base included; reactions
-    (i,) [N] becomes the largest of every interface while a rigid element holds it."""
-    best = 0.0
-    poly = workspace.polys[len(modal_system.reach)]
-    faces = len(modal_system.reach)
-    workspace.held[0] = -1.0
-    for f in range(faces):
+def find_peaks(rows, modal_system, time_state, base_moves, workspace, reactions):
+    """Return the largest acceleration [m s-2] of the output over the pieces of rows.
+
+    Parameters
+    ----------
+    rows, modal_system, time_state, workspace
+    base_moves : float
+        1 where the acceleration of the base counts, else 0.
+    reactions : ndarray
+        (i,) becomes the largest reaction [N] of every interface while its rigid element sticks.
+
+    Returns
+    -------
+    float
+    """
+    largest = 0.0
+    n_interfaces = len(modal_system.inverse_mass)
+    poly = workspace.polynomials[n_interfaces]
+    workspace.constraint.status[HOLD.n_held] = -1.0
+    for f in range(n_interfaces):
         reactions[f] = 0.0
     for j in range(rows.shape[0]):
-        h = rows[j, 1]
+        h = rows[j, ROW.duration]
         if h <= 0:
             continue
-        top = unfold(rows[j], h, modal_system, time_state, workspace)
+        top = expand_row(rows[j], h, modal_system, time_state, workspace)
         for k in range(top - 1):
             part = 0.0
-            for i in range(len(modal_system.square)):
-                part += modal_system.output[i] * workspace.coefs[k + 2, i]
-            poly[k] = part * (k + 1) * (k + 2) / (h * h) + moving * workspace.waves[0, k]
-        best = largest(poly, top - 2, best, workspace.hulls)
-        for f in range(faces):
-            if workspace.springs[f] == RIGID:
-                reactions[f] = largest(
-                    workspace.reactions[f], top - 2, reactions[f], workspace.hulls
+            for i in range(len(modal_system.omega_squared)):
+                part += modal_system.output[i] * workspace.coefficients[k + 2, i]
+            poly[k] = part * (k + 1) * (k + 2) / (h * h) + base_moves * workspace.drive[0, k]
+        largest = find_largest_magnitude(poly, top - 2, largest, workspace.hulls)
+        for f in range(n_interfaces):
+            if workspace.stiffness[f] == RIGID_STIFFNESS:
+                reactions[f] = find_largest_magnitude(
+                    workspace.constraint.reactions[f], top - 2, reactions[f], workspace.hulls
                 )
-    return best
+    return largest

@@ -1,163 +1,185 @@
-"""Compiled series of a drive over a short piece: sines and constants, straight lines, sweeps of either kind.
+"""Drive of a run over a short piece as a power series (compiled).
 
-A segment of the drive is a row: cycle and offset [s] of its start, kind, constant [m s-2], amplitude, omega [rad/s],
-phase [rad] at the start of its first cycle (of a sweep at its own start), slope, whether the amplitude is a
-displacement, fastest rate [1/s], and what its turns per cycle have beyond a whole number, in two parts: 24 bits, whose
-product with a number of cycles is exact, and the rest. So the phase keeps its digits over a million cycles.
+A segment of the drive is a sine, a straight line, or a sweep with linear or logarithmic frequency;
+its numbers are named in `positions_kernels.SegmentColumns`.
 """
 
 from math import cos, exp, expm1, floor, pi, sin
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .series_kernels import TWICE
-
-# kinds of a segment
-SINE = 0.0
-LINE = 1.0
-CHIRP = 2.0
-LOG_CHIRP = 3.0
-(
-    CYCLE,
-    OFFSET,
-    KIND,
-    CONSTANT,
-    AMPLITUDE,
-    OMEGA,
-    PHASE,
-    SLOPE,
-    DISPLACED,
-    RATE,
-    TURNS,
-    TURNS_LEFT,
-) = range(12)
+from .positions_kernels import KIND, SEGMENT
+from .series_kernels import DOUBLE_INTEGRAL
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def since(segment, cycle, offset, period):
-    """Time [s] since a segment began."""
-    return (cycle - segment[CYCLE]) * period + (offset - segment[OFFSET])
+def time_since_start(segment, cycle, offset, period):
+    """Return the time [s] since a segment began."""
+    return (cycle - segment[SEGMENT.cycle]) * period + (offset - segment[SEGMENT.offset])
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rate_of(segment, period):
-    """Fastest rate [1/s] of a drive, and at least that of its cycles, whose sines and cosines are taken of the
-    motion."""
-    return max(segment[RATE], 2 * pi / period)
+def fastest_drive_rate(segment, period):
+    """Return the fastest rate [1/s] that a piece must resolve: of the drive, and of its cycles.
+
+    The motion is integrated with sines and cosines of the cycle.
+    """
+    return max(segment[SEGMENT.rate], 2 * pi / period)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def phase_of(segment, cycle, offset, period):
-    """Phase of the drive [rad], modulo 2 pi; along a straight line that of the cycle."""
-    if segment[KIND] == SINE:
-        theta = segment[PHASE] + segment[OMEGA] * offset
-        gone = cycle - segment[CYCLE]
-        if segment[TURNS] != 0.0:
-            extra = gone * segment[TURNS]
-            theta += 2 * pi * (extra - floor(extra) + gone * segment[TURNS_LEFT])
+def drive_phase(segment, cycle, offset, period):
+    """Return the phase of the drive [rad] in [0, 2 pi); along a straight line that of the cycle."""
+    if segment[SEGMENT.kind] == KIND.sine:
+        theta = segment[SEGMENT.phase] + segment[SEGMENT.omega] * offset
+        cycles = cycle - segment[SEGMENT.cycle]
+        if segment[SEGMENT.turns] != 0.0:
+            extra = cycles * segment[SEGMENT.turns]
+            theta += 2 * pi * (extra - floor(extra) + cycles * segment[SEGMENT.turns_remainder])
         return theta - 2 * pi * floor(theta / (2 * pi))  # a tenth of the time of %
-    if segment[KIND] == LINE:
+    if segment[SEGMENT.kind] == KIND.line:
         return 2 * pi * offset / period
-    time = since(segment, cycle, offset, period)
-    if segment[KIND] == CHIRP:
-        return (segment[PHASE] + time * (segment[OMEGA] + 0.5 * segment[SLOPE] * time)) % (2 * pi)
-    return (segment[PHASE] + segment[OMEGA] * expm1(segment[SLOPE] * time) / segment[SLOPE]) % (
-        2 * pi
-    )
+    time = time_since_start(segment, cycle, offset, period)
+    if segment[SEGMENT.kind] == KIND.chirp:
+        return (
+            segment[SEGMENT.phase]
+            + time * (segment[SEGMENT.omega] + 0.5 * segment[SEGMENT.slope] * time)
+        ) % (2 * pi)
+    return (
+        segment[SEGMENT.phase]
+        + segment[SEGMENT.omega] * expm1(segment[SEGMENT.slope] * time) / segment[SEGMENT.slope]
+    ) % (2 * pi)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def value_now(segment, cycle, offset, period):
-    """Drive [m s-2] of a segment at a time (cycle, offset)."""
-    kind = segment[KIND]
-    theta = phase_of(segment, cycle, offset, period)
-    time = since(segment, cycle, offset, period)
-    if kind == LINE:
-        return segment[CONSTANT] + segment[SLOPE] * time
-    size = segment[AMPLITUDE]
-    if segment[DISPLACED] == 1.0:
+def drive_value(segment, cycle, offset, period):
+    """Return the acceleration [m s-2] of a segment at a time (cycle, offset [s])."""
+    kind = segment[SEGMENT.kind]
+    theta = drive_phase(segment, cycle, offset, period)
+    time = time_since_start(segment, cycle, offset, period)
+    if kind == KIND.line:
+        return segment[SEGMENT.constant] + segment[SEGMENT.slope] * time
+    size = segment[SEGMENT.amplitude]
+    if segment[SEGMENT.is_displacement] == 1.0:
         omega = (
-            segment[OMEGA] + segment[SLOPE] * time
-            if kind == CHIRP
-            else segment[OMEGA] * exp(segment[SLOPE] * time)
+            segment[SEGMENT.omega] + segment[SEGMENT.slope] * time
+            if kind == KIND.chirp
+            else segment[SEGMENT.omega] * exp(segment[SEGMENT.slope] * time)
         )
         size *= omega * omega
-    return segment[CONSTANT] + size * sin(theta)
+    return segment[SEGMENT.constant] + size * sin(theta)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def drive_series(segment, cycle, offset, period, h, top, waves):
-    """Fill waves[0] (>= top + 1,) with the series over u = t/h of a drive [m s-2] from the time (cycle, offset) on.
+def expand_drive(segment, cycle, offset, period, h, top, waves):
+    """Write the series of the drive [m s-2] over u = t/h into waves[0].
 
-    waves (3, >= top + 1): the rest is room.
+    Parameters
+    ----------
+    segment : ndarray
+        (12,) see `SegmentColumns`.
+    cycle, offset, period : float
+        Cycle and offset [s] of the start of the piece, and duration of a cycle [s].
+    h : float
+        Duration of the piece [s].
+    top : int
+        Highest power.
+    waves : ndarray
+        (3, >= top + 1); rows 1 and 2 are workspace.
     """
-    wave = waves[0]
-    kind = segment[KIND]
-    theta = phase_of(segment, cycle, offset, period)
-    if kind == SINE:
-        turn = segment[OMEGA] * h
-        wave[0] = segment[AMPLITUDE] * sin(theta)
-        wave[1] = segment[AMPLITUDE] * cos(theta) * turn
+    series = waves[0]
+    kind = segment[SEGMENT.kind]
+    theta = drive_phase(segment, cycle, offset, period)
+    if kind == KIND.sine:
+        angle = segment[SEGMENT.omega] * h
+        series[0] = segment[SEGMENT.amplitude] * sin(theta)
+        series[1] = segment[SEGMENT.amplitude] * cos(theta) * angle
         for k in range(2, top + 1):
-            wave[k] = -wave[k - 2] * (turn * turn * TWICE[k])
-        wave[0] += segment[CONSTANT]
+            series[k] = -series[k - 2] * (angle * angle * DOUBLE_INTEGRAL[k])
+        series[0] += segment[SEGMENT.constant]
         return
-    time = since(segment, cycle, offset, period)
-    if kind == LINE:
+    time = time_since_start(segment, cycle, offset, period)
+    if kind == KIND.line:
         for k in range(top + 1):
-            wave[k] = 0.0
-        wave[0] = segment[CONSTANT] + segment[SLOPE] * time
-        wave[1] = segment[SLOPE] * h
+            series[k] = 0.0
+        series[0] = segment[SEGMENT.constant] + segment[SEGMENT.slope] * time
+        series[1] = segment[SEGMENT.slope] * h
         return
     omega = (
-        segment[OMEGA] + segment[SLOPE] * time
-        if kind == CHIRP
-        else segment[OMEGA] * exp(segment[SLOPE] * time)
+        segment[SEGMENT.omega] + segment[SEGMENT.slope] * time
+        if kind == KIND.chirp
+        else segment[SEGMENT.omega] * exp(segment[SEGMENT.slope] * time)
     )
-    swept(kind, omega, theta, segment[SLOPE] * h, h, top, waves)
-    if segment[DISPLACED] == 1.0:
-        squared(kind, omega, segment[SLOPE] * h, top, waves)
+    expand_sweep(kind, omega, theta, segment[SEGMENT.slope] * h, h, top, waves)
+    if segment[SEGMENT.is_displacement] == 1.0:
+        multiply_by_squared_frequency(kind, omega, segment[SEGMENT.slope] * h, top, waves)
     for k in range(top + 1):
-        wave[k] *= segment[AMPLITUDE]
+        series[k] *= segment[SEGMENT.amplitude]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def swept(kind, omega, theta, slope, h, top, waves):
-    """Fill waves[0] with the series of the sine of a swept phase, by s' = phi' c and c' = -phi' s; waves[2] with phi'.
+def expand_sweep(kind, omega, theta, slope, h, top, waves):
+    """Write the series of the sine of a swept phase into waves[0].
 
-    omega [rad/s] and theta: here; slope: of omega [rad/s] over u, or of its logarithm.
+    The series of its frequency is left in waves[2].
+
+    The recursion is s' = phi' c and c' = -phi' s.
+
+    Parameters
+    ----------
+    kind : float
+        `KIND.chirp` or `KIND.log_chirp`.
+    omega, theta : float
+        Angular frequency [rad/s] and phase [rad] at the start of the piece.
+    slope : float
+        Change over the piece of omega [rad/s], or of its logarithm.
+    h : float
+        Duration of the piece [s].
+    top : int
+        Highest power.
+    waves : ndarray
+        (3, >= top + 1).
     """
-    wave = waves[0]
+    series = waves[0]
     cosine = waves[1]
     rate = waves[2]
-    wave[0] = sin(theta)
+    series[0] = sin(theta)
     cosine[0] = cos(theta)
     rate[0] = omega * h
     for k in range(1, top + 1):
-        rate[k] = rate[k - 1] * slope / k if kind == LOG_CHIRP else slope * h if k == 1 else 0.0
+        if kind == KIND.log_chirp:
+            rate[k] = rate[k - 1] * slope / k
+        else:
+            rate[k] = slope * h if k == 1 else 0.0
     for k in range(top):
         s = 0.0
         c = 0.0
-        for j in range(min(k + 1, 2) if kind == CHIRP else k + 1):
+        for j in range(min(k + 1, 2) if kind == KIND.chirp else k + 1):
             s += rate[j] * cosine[k - j]
-            c -= rate[j] * wave[k - j]
-        wave[k + 1] = s / (k + 1)
+            c -= rate[j] * series[k - j]
+        series[k + 1] = s / (k + 1)
         cosine[k + 1] = c / (k + 1)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def squared(kind, omega, slope, top, waves):
-    """Multiply waves[0] by the series of the swept omega squared."""
-    wave = waves[0]
+def multiply_by_squared_frequency(kind, omega, slope, top, waves):
+    """Multiply waves[0] by the series of the squared frequency of a sweep.
+
+    Parameters
+    ----------
+    kind, omega, slope, top, waves
+        As of `expand_sweep`.
+    """
+    series = waves[0]
     square = waves[2]
     square[0] = omega * omega
     for k in range(1, top + 1):
-        if kind == LOG_CHIRP:
-            square[k] = square[k - 1] * 2 * slope / k
-        else:
-            square[k] = 2 * omega * slope if k == 1 else slope * slope if k == 2 else 0.0
+        square[k] = square[k - 1] * 2 * slope / k if kind == KIND.log_chirp else 0.0
+    if kind == KIND.chirp:
+        square[1] = 2 * omega * slope
+        square[2] = slope * slope
     for k in range(top, -1, -1):
-        out = 0.0
+        total = 0.0
         for j in range(k + 1):
-            out += square[j] * wave[k - j]
-        wave[k] = out
+            total += square[j] * series[k - j]
+        series[k] = total

@@ -1,5 +1,8 @@
-"""Elements side by side under one slide: a rigid one (Coulomb), elastic-plastic ones sorted by the slide at which they
-yield."""
+"""Elements of an interface side by side: a rigid one (Coulomb) and elastic-plastic ones, and what they remember.
+
+Every element feels the relative displacement of its interface. The elastic-plastic ones are sorted by yield slide, the
+stretch at which they slip.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -8,20 +11,22 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 
-# (cells of a density that are one, from which on) in the runs for its error
-JOINED = (4, 0), (4, 1), (4, 2), (4, 3)
-SAME = 1e-14  # relative difference of two yield slides that are one
+# (number of cells of a density that are merged into one, first cell) of the coarser runs that show the error of a density
+CELL_MERGES = (4, 0), (4, 1), (4, 2), (4, 3)
+# relative difference of two yield slides below which they count as equal; it is round-off
+YIELD_TOL = 1e-14
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Elements:
-    """Elements of one interface: springs k_j that slip at a stretch y_j, F = sum k_j e_j with |e_j| <= y_j, and a rigid
-    element before them.
+    """Elements of one interface: F = sum k_j e_j with stretches |e_j| <= y_j, and a rigid element before them.
 
-    stiffness: (t,) [N/m]; yield_displacement: (t,) [m], rising; rank: (a,) element that each given one became part of, -1
-    for one without stiffness or yield slide, which carries nothing. static, kinetic [N]: limits of the rigid element,
-    which holds the slide until its reaction reaches static and then slips under kinetic; static = 0 where there is
-    none.
+    - stiffness: (t,) k_j [N/m]
+    - yield_displacement: (t,) y_j [m], in increasing order
+    - rank: (a,) number of the element that each given element became part of; -1 for one without stiffness or yield
+      slide, which carries nothing
+    - static, kinetic: limits of the rigid element [N]; it holds the relative displacement until its reaction reaches
+      `static` and then slips under `kinetic`; static = 0 stands for no rigid element
     """
 
     stiffness: np.ndarray
@@ -36,10 +41,22 @@ class Elements:
         return float(self.stiffness @ self.yield_displacement)
 
 
-def elements_of(stiffness, yield_displacement) -> Elements:
-    """Elements from stiffness (a,) [N/m] >= 0 and yield slide (a,) [m] >= 0 in any order; equal yields become one.
+def make_elements(stiffness, yield_displacement) -> Elements:
+    """Return elastic-plastic elements, sorted; those with equal yield slides become one.
 
-    PatchfemError for values below zero or not finite.
+    Parameters
+    ----------
+    stiffness, yield_displacement : array_like
+        (a,) stiffness [N/m] and yield slide [m] in any order.
+
+    Returns
+    -------
+    Elements
+
+    Raises
+    ------
+    PatchfemError
+        If a value is below 0 or not finite.
     """
     k = np.asarray(stiffness, float)
     y = np.asarray(yield_displacement, float)
@@ -47,26 +64,40 @@ def elements_of(stiffness, yield_displacement) -> Elements:
         raise PatchfemError(
             "friction: the stiffness and the yield slide of each element must be finite and >= 0"
         )
-    if k.size == 1 and k[0] > 0 and y[0] > 0:  # nothing to sort, in two fifths of the time
+    # one element is sorted; the general case takes 2.5 times as long
+    if k.size == 1 and k[0] > 0 and y[0] > 0:
         return Elements(frozen_array(k), frozen_array(y), frozen_array([0], np.int64))
     order = np.flatnonzero((k > 0) & (y > 0))
     order = order[np.argsort(y[order], kind="stable")]
-    new = np.ones(order.size, bool)
-    new[1:] = np.diff(y[order]) > SAME * y[order][1:]
-    place = np.cumsum(new) - 1
-    first = np.flatnonzero(new)
+    is_new = np.ones(order.size, bool)
+    is_new[1:] = np.diff(y[order]) > YIELD_TOL * y[order][1:]
+    first = np.flatnonzero(is_new)
     rank = np.full(k.size, -1, np.int64)
-    rank[order] = place
-    stiff = np.add.reduceat(k[order], first) if first.size else np.zeros(0)
+    rank[order] = np.cumsum(is_new) - 1
+    merged = np.add.reduceat(k[order], first) if first.size else np.zeros(0)
     return Elements(
-        frozen_array(stiff), frozen_array(y[order][first]), frozen_array(rank, np.int64)
+        frozen_array(merged), frozen_array(y[order][first]), frozen_array(rank, np.int64)
     )
 
 
 def coulomb(static: float, kinetic: float | None = None) -> Elements:
-    """The rigid element of Coulomb friction alone: limits static and kinetic [N], kinetic as static without it.
+    """Return the rigid element of Coulomb friction.
 
-    PatchfemError unless 0 <= kinetic <= static.
+    Parameters
+    ----------
+    static : float
+        Static limit [N].
+    kinetic : float, optional
+        Kinetic limit [N]; the static one by default.
+
+    Returns
+    -------
+    Elements
+
+    Raises
+    ------
+    PatchfemError
+        Unless 0 <= kinetic <= static.
     """
     kinetic = static if kinetic is None else kinetic
     if not 0 <= kinetic <= static:
@@ -75,137 +106,196 @@ def coulomb(static: float, kinetic: float | None = None) -> Elements:
     return Elements(none, none, frozen_array([], np.int64), float(static), float(kinetic))
 
 
-def merged(parts: Elements, count: int = 2, first: int = 0) -> Elements:
-    """Fewer elements: each `count` that yield one after the other as one of their stiffness and limit together, from
-    the number `first` on, and those before it; of an odd number the last one stays."""
-    k = parts.stiffness
-    limit = parts.stiffness * parts.yield_displacement
+def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elements:
+    """Return fewer elements, each of which has the stiffness and the limit of some of the given ones together.
+
+    Parameters
+    ----------
+    elements : Elements
+    count : int, optional
+        Elements that become one, neighbours by yield slide.
+    first : int, optional
+        First element that is merged with those after it; those before it become one too. The last one of an odd number
+        stays.
+
+    Returns
+    -------
+    Elements
+    """
+    k = elements.stiffness
     if not k.size:
-        return parts
-    last = k.size % 2
-    begins = np.unique(
-        np.r_[0, np.arange(first, k.size - last, count), [k.size - 1] * last]
-    ).astype(int)
-    stiff = np.add.reduceat(k, begins)
-    # between those of its parts each new yield is, so they rise and differ: nothing to sort
+        return elements
+    n_last = k.size % 2
+    begins = np.r_[0, np.arange(first, k.size - n_last, count), [k.size - 1] * n_last]
+    begins = np.unique(begins).astype(int)
+    stiffness = np.add.reduceat(k, begins)
+    # each yield slide lies between those of its parts, so they are in increasing order
+    yield_slide = np.add.reduceat(k * elements.yield_displacement, begins) / stiffness
     return Elements(
-        frozen_array(stiff),
-        frozen_array(np.add.reduceat(limit, begins) / stiff),
+        frozen_array(stiffness),
+        frozen_array(yield_slide),
         frozen_array(np.arange(begins.size), np.int64),
     )
 
 
-def cells_joined(count: int, first: int, stiffness, yield_displacement) -> tuple:
-    """(stiffness [N/m], yield slide [m]) of elements (t,) each, `merged`."""
-    one = merged(Elements(stiffness, yield_displacement, np.arange(stiffness.size)), count, first)
-    return one.stiffness, one.yield_displacement
+def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
+    """Return stiffness [N/m] and yield slide [m] of merged elements, see `merge_elements`.
+
+    Parameters
+    ----------
+    count, first : int
+        As of `merge_elements`.
+    stiffness, yield_displacement : ndarray
+        (t,) of the elements, in increasing order of the yield slide.
+
+    Returns
+    -------
+    stiffness, yield_displacement : ndarray
+    """
+    elements = Elements(stiffness, yield_displacement, np.arange(stiffness.size))
+    merged = merge_elements(elements, count, first)
+    return merged.stiffness, merged.yield_displacement
 
 
-class Table(NamedTuple):
-    """Elements of all interfaces (i) as the compiled loop takes them, t of the longest list.
+class ElementTable(NamedTuple):
+    """Elements of all interfaces (i) as the kernels take them; t is the length of the longest list.
 
-    count: (i,); reach: (i, t) yield slides [m], infinite behind the last; and sums over the first j elements, j = 0 to
-    t: stiff (i, t + 1) of k [N/m], limit of k y [N], twice of k y^2 [J]. static, kinetic: (i,) [N] limits of the rigid
-    elements, 0 where there is none.
+    - n_elements: (i,) number of elements
+    - yield_slide: (i, t + 1) [m], infinite after the last element
+    - stiffness_sum, limit_sum, energy_sum: (i, t + 1) sums of k [N/m], k y [N] and k y^2 [J] over the first j elements
+    - static_limit, kinetic_limit: (i,) limits of the rigid elements [N], 0 where there is none
     """
 
-    count: np.ndarray
-    reach: np.ndarray
-    stiff: np.ndarray
-    limit: np.ndarray
-    twice: np.ndarray
-    static: np.ndarray
-    kinetic: np.ndarray
+    n_elements: np.ndarray
+    yield_slide: np.ndarray
+    stiffness_sum: np.ndarray
+    limit_sum: np.ndarray
+    energy_sum: np.ndarray
+    static_limit: np.ndarray
+    kinetic_limit: np.ndarray
 
 
-def table_of(groups) -> Table:
-    """The Table of Elements of every interface, in order."""
-    most = max((one.stiffness.size for one in groups), default=0)
-    reach = np.full((len(groups), most + 1), np.inf)
-    sums = np.zeros((3, len(groups), most + 1))
-    for i, one in enumerate(groups):
-        k = one.stiffness
-        y = one.yield_displacement
-        reach[i, : y.size] = y
+def make_table(groups) -> ElementTable:
+    """Return the table of the Elements of every interface."""
+    longest = max((group.stiffness.size for group in groups), default=0)
+    yield_slide = np.full((len(groups), longest + 1), np.inf)
+    sums = np.zeros((3, len(groups), longest + 1))
+    for i, group in enumerate(groups):
+        k = group.stiffness
+        y = group.yield_displacement
+        yield_slide[i, : y.size] = y
         for j, part in enumerate((k, k * y, k * y * y)):
             sums[j, i, 1 : y.size + 1] = np.cumsum(part)
             sums[j, i, y.size + 1 :] = sums[j, i, y.size]
-    limits = np.array([(one.static, one.kinetic) for one in groups], float).reshape(-1, 2).T
-    return Table(
-        np.array([one.stiffness.size for one in groups], np.int64), reach, *sums, *limits.copy()
+    limits = np.array([(group.static, group.kinetic) for group in groups], float)
+    return ElementTable(
+        np.array([group.stiffness.size for group in groups], np.int64),
+        yield_slide,
+        *sums,
+        *limits.reshape(-1, 2).T.copy(),
     )
 
 
 class Memory(NamedTuple):
     """What the elements of all interfaces (i) remember.
 
-    place: (i,) slide [m]; slipping: (i,) how many elements slip, the first of the sorted list; way: (i,) sign of their
-    slip; the others keep their stretch since a turning point, in groups: depth (i,) groups, the innermost last; upto
-    (i, t + 1) the elements before this number, from where the inner group ends; at (i, t + 1) [m] the slide at which a
-    group stopped slipping; side (i, t + 1) the sign of that slip, 0 for elements that never slipped, unstretched at
-    `at`. force [N], slip [m] (mean irreversible slide, weighted with k y), worked, lost [J]: (i,). head: (i,) of the
-    rigid element the sign of its slip, 0 while it holds, twice the sign where it is at its limit while others hold the
-    slide.
+    - slide: (i,) relative displacement [m]
+    - n_slipping, direction: (i,) number of elements that slip, the first ones of the list, and the sign of their slip
+    - n_groups: (i,) groups of elements that stopped together at a turning point, the innermost group last
+    - group_end: (i, t + 2) end of a group in the list; it begins where the group inside it ends
+    - group_slide, group_sign: (i, t + 2) relative displacement [m] at which a group stopped, and the sign of its slip
+      before; the sign is 0 for elements that never slipped, which are unstretched at that displacement
+    - force, slip: (i,) force [N], and mean slip [m] weighted with k y
+    - work, loss: (i,) work done on the elements and energy that they dissipated [J]
+    - rigid_state: (i,) sign of the slip of the rigid element, 0 in stick, and twice the sign where it is at its limit
+      while other interfaces hold this relative displacement
     """
 
-    place: np.ndarray
-    slipping: np.ndarray
-    way: np.ndarray
-    depth: np.ndarray
-    upto: np.ndarray
-    at: np.ndarray
-    side: np.ndarray
+    slide: np.ndarray
+    n_slipping: np.ndarray
+    direction: np.ndarray
+    n_groups: np.ndarray
+    group_end: np.ndarray
+    group_slide: np.ndarray
+    group_sign: np.ndarray
     force: np.ndarray
     slip: np.ndarray
-    worked: np.ndarray
-    lost: np.ndarray
-    head: np.ndarray
+    work: np.ndarray
+    loss: np.ndarray
+    rigid_state: np.ndarray
 
 
-def virgin(table: Table, slide) -> Memory:
-    """Memory of unstretched elements at slides (i,) [m]."""
-    faces, wide = table.stiff.shape
-    upto = np.zeros((faces, wide + 1), np.int64)
-    upto[:, 0] = table.count
-    at = np.zeros((faces, wide + 1))
-    at[:, 0] = slide
-    zero = [np.zeros(faces) for _ in range(6)]
+def unstretched_memory(table: ElementTable, slide) -> Memory:
+    """Return the memory of unstretched elements at relative displacements (i,) [m]."""
+    n_interfaces, n_sums = table.stiffness_sum.shape
+    shape = n_interfaces, n_sums + 1
+    group_end = np.zeros(shape, np.int64)
+    group_end[:, 0] = table.n_elements
+    group_slide = np.zeros(shape)
+    group_slide[:, 0] = slide
     return Memory(
-        np.array(slide, float),
-        np.zeros(faces, np.int64),
-        zero[0],
-        np.ones(faces, np.int64),
-        upto,
-        at,
-        np.zeros((faces, wide + 1)),
-        *zero[1:],
+        slide=np.array(slide, float),
+        n_slipping=np.zeros(n_interfaces, np.int64),
+        direction=np.zeros(n_interfaces),
+        n_groups=np.ones(n_interfaces, np.int64),
+        group_end=group_end,
+        group_slide=group_slide,
+        group_sign=np.zeros(shape),
+        force=np.zeros(n_interfaces),
+        slip=np.zeros(n_interfaces),
+        work=np.zeros(n_interfaces),
+        loss=np.zeros(n_interfaces),
+        rigid_state=np.zeros(n_interfaces),
     )
 
 
-def books_begin(memory: Memory) -> Memory:
-    """The same stretches with no work counted yet: for a run that begins here."""
-    return memory._replace(worked=np.zeros_like(memory.worked), lost=np.zeros_like(memory.lost))
+def reset_work(memory: Memory) -> Memory:
+    """Return the memory with work and loss set to 0, for a run that begins here."""
+    return memory._replace(work=np.zeros_like(memory.work), loss=np.zeros_like(memory.loss))
 
 
-def stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
-    """Stretch (a,) [m] of every element as given to `elements_of`, of the interface `face`; 0 where it carries
-    nothing."""
-    out = sorted_stretches(group, memory, face)
-    return (
-        np.where(group.rank >= 0, out[group.rank], 0.0) if out.size else np.zeros(group.rank.size)
-    )
+def element_stretches(group: Elements, memory: Memory, interface: int) -> np.ndarray:
+    """Return the stretch (a,) [m] of every element in the order in which `make_elements` got them.
+
+    Parameters
+    ----------
+    group : Elements
+        Elements of the interface.
+    memory : Memory
+    interface : int
+
+    Returns
+    -------
+    ndarray
+        0 for an element that carries nothing.
+    """
+    stretches = sorted_stretches(group, memory, interface)
+    if not stretches.size:
+        return np.zeros(group.rank.size)
+    return np.where(group.rank >= 0, stretches[group.rank], 0.0)
 
 
-def sorted_stretches(group: Elements, memory: Memory, face: int) -> np.ndarray:
-    """Stretch (t,) [m] of every element in the order of the yield slides, of the interface `face`."""
-    out = np.zeros(group.yield_displacement.size)
+def sorted_stretches(group: Elements, memory: Memory, interface: int) -> np.ndarray:
+    """Return the stretch (t,) [m] of every element in increasing order of the yield slide.
+
+    Parameters
+    ----------
+    group : Elements
+        Elements of the interface.
+    memory : Memory
+    interface : int
+
+    Returns
+    -------
+    ndarray
+    """
     y = group.yield_displacement
-    first = int(memory.slipping[face])
-    out[:first] = memory.way[face] * y[:first]
-    for k in range(int(memory.depth[face]) - 1, -1, -1):
-        end = int(memory.upto[face, k])
-        out[first:end] = (
-            memory.side[face, k] * y[first:end] + memory.place[face] - memory.at[face, k]
-        )
+    stretches = np.zeros(y.size)
+    first = int(memory.n_slipping[interface])
+    stretches[:first] = memory.direction[interface] * y[:first]
+    for k in range(int(memory.n_groups[interface]) - 1, -1, -1):
+        end = int(memory.group_end[interface, k])
+        distance = memory.slide[interface] - memory.group_slide[interface, k]
+        stretches[first:end] = memory.group_sign[interface, k] * y[first:end] + distance
         first = end
-    return out
+    return stretches

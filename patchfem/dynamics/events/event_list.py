@@ -1,22 +1,27 @@
-"""List of the events of a run: what happened at which interface, when and where."""
+"""List of the events of a run: kind, interface, time and place of each."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+# kinds of events in `EventLog.what`
 STOP = 0
 RELEASE = 1
 REVERSAL = 2
 BORDER = 9
-ROOM = 400_000
+# events that a log lists
+MAX_EVENTS = 400_000
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EventLog:
-    """Events in order, the last ROOM of them at most; count: how many there were.
+    """Events of a run in order of time, at most the last MAX_EVENTS.
 
-    time (k,) [s]; phase (k,) of the drive [rad]; interface (k,), -1 for a border of two segments of the drive; what
-    (k,): STOP 0, RELEASE +1 or -1 and REVERSAL +2 or -2 (the sign of the slip that follows), BORDER 9; slide (k,) [m].
+    - time, phase: (k,) time [s] and phase of the drive [rad]
+    - interface: (k,) number of the interface, -1 for a border between two segments of the drive
+    - what: (k,) STOP, +-RELEASE or +-REVERSAL with the sign of the slip that follows, or BORDER
+    - slide: (k,) relative displacement [m]
+    - count: number of events of the run, with those that are not listed
     """
 
     time: np.ndarray
@@ -27,7 +32,7 @@ class EventLog:
     count: int
 
     def until(self, end: float) -> "EventLog":
-        """The events up to `end` [s], their count without the later ones."""
+        """Return the events up to a time [s]; `count` leaves out the later ones."""
         kept = int(np.searchsorted(self.time, end, side="right"))
         if kept == len(self.time):
             return self

@@ -1,164 +1,204 @@
-"""Compiled run from event to event of modes behind rigid and elastic-plastic elements.
+"""March from event to event of modes behind rigid and elastic-plastic elements (compiled).
 
-An event is a yield, the release of a slide that a rigid element holds, a turning point of a slide or of the output
-(`search_kernels`), or a border of the drive.
+The loop `march` does five things for every piece: it chooses the length of the piece, expands the
+motion, searches for the first event, moves the state to it, and changes the elements as the event
+asks. An event is a yield, the release of an interface that a rigid element holds, a turning point
+of an interface or of the output (`search_kernels`), or a border of the drive.
 """
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .drive_kernels import KIND, SINE, drive_series, phase_of, rate_of, value_now
-from .memory_kernels import carried, give_way, holds, pulled, tangent, threshold, turn
-from .repeat_kernels import come_back, forget
-from .search_kernels import (
-    NOTHING,
-    OUTPUT_TURNS,
-    RELEASES,
-    STOPS,
-    TURNS,
-    YIELDS,
-    crossing,
-    moved,
-    next_event,
-    speed_series,
+from .drive_kernels import drive_phase, drive_value, expand_drive, fastest_drive_rate
+from .memory_kernels import (
+    find_force_and_energy,
+    find_tangent,
+    interface_force,
+    is_held,
+    next_yield_slide,
+    release_next_element,
+    store_turning_point,
 )
-from .series_kernels import EPS, NONE, REACH, fastest, motion_series, powers, value
-from .slow_kernels import followed, shortened
-from .stick_kernels import LAST, at_rest, keep, settle
-from .sum_kernels import sums
+from .positions_kernels import (
+    BEGIN,
+    COLUMN,
+    EVENT,
+    KIND,
+    LEDGER,
+    LIMIT,
+    N_COLUMNS,
+    ROW,
+    SEGMENT,
+    STATUS,
+    TIME,
+)
+from .repeat_kernels import detect_repeat, forget_previous
+from .search_kernels import displacement_at, expand_speed, find_crossing, find_next_event
+from .series_kernels import (
+    EPS,
+    MAX_RATE_TIME,
+    NO_ROOT,
+    bound_fastest_rate,
+    bound_modal_rate,
+    evaluate_polynomial,
+    expand_motion,
+    find_highest_power,
+)
+from .slow_kernels import find_slow_rate, shorten_series
+from .stick_kernels import MAX_ORDER, choose_sticks, correct_held_slides, find_resting_slides
+from .sum_kernels import add_piece_sums
 
-# how `march` returns; OPEN: no choice of what holds obeys the law
-DONE = 0
-FULL = 1
-TRAVEL = 2
-PILED = 3
-OPEN = 4
-REPEATS = 5
-# columns of a row: of the piece, then of every interface behind z and v
-HEAD = 8
-EACH = 9
-# what begins a row: nothing, a yield, a turning point, a change of stick and slip, a border of the drive
-ON = 0
-YIELDED = 1
-TURNED = 2
-SWITCHED = 3
-BORDERED = 4
-AT_ONCE = 1e-12  # share of a piece in which what stood still stands still: two turning points at one place
-MOST_IDLE = 1000.0  # events in a row without progress
+# fraction of a piece: within it, what was at rest at a turning point still is, so no second reversal is found there
+MIN_MOVING_FRACTION = 1e-12
+# events in a row without progress in time; more are taken for an endless sequence
+MAX_IDLE_EVENTS = 1000.0
+# a piece is longer by this factor than the predicted time to the next yield, which should lie in it
+YIELD_MARGIN = 1.3
+# fraction of the longest piece that a piece takes at least where a yield is near
+MIN_FRACTION = 0.02
+# fraction of the sum of magnitudes of a velocity, below which it is round-off
+REST_TOL = 64 * EPS
+# [fraction of a cycle] progress below which an event counts as idle
+MIN_PROGRESS = 1e-13
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def left_of(time_state, stop):
-    """Time [s] to the next border: of the drive's segments, of the cycle, or `stop` (cycle, offset)."""
+def time_to_border(time_state, stop):
+    """Return the time [s] to the next border.
+
+    Borders are the end of the cycle, the next segment of the drive, and `stop` (cycle, offset).
+    """
     now = time_state.now
     period = time_state.period[0]
-    left = period - now[1]
-    if stop[0] == now[0]:
-        left = min(left, stop[1] - now[1])
-    k = int(now[2]) + 1
-    if k < time_state.segments.shape[0] and time_state.segments[k, 0] == now[0]:
-        left = min(left, time_state.segments[k, 1] - now[1])
-    return max(left, 0.0)
+    remaining = period - now[TIME.offset]
+    if stop[0] == now[TIME.cycle]:
+        remaining = min(remaining, stop[1] - now[TIME.offset])
+    k = int(now[TIME.segment]) + 1
+    if (
+        k < time_state.segments.shape[0]
+        and time_state.segments[k, SEGMENT.cycle] == now[TIME.cycle]
+    ):
+        remaining = min(remaining, time_state.segments[k, SEGMENT.offset] - now[TIME.offset])
+    return max(remaining, 0.0)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def arrive(time_state, stop, left):
-    """Step onto the border `left` [s] away; whether the drive changes there: to another sine, or by a jump."""
-    before = int(time_state.now[2])
-    cycle = time_state.now[0]
-    offset = time_state.now[1] + left
-    changes = False
+def step_to_border(time_state, stop, remaining):
+    """Move the time to the border that is `remaining` [s] away.
+
+    Returns whether the drive changes there.
+
+    The drive changes from one sine to another, or by a jump.
+    """
+    before = int(time_state.now[TIME.segment])
+    cycle = time_state.now[TIME.cycle]
+    offset = time_state.now[TIME.offset] + remaining
+    drive_changes = False
     now = time_state.now
     period = time_state.period[0]
-    k = int(now[2]) + 1
+    k = int(now[TIME.segment]) + 1
     after = (
         k < time_state.segments.shape[0]
-        and time_state.segments[k, 0] == now[0]
-        and time_state.segments[k, 1] - now[1] <= left
+        and time_state.segments[k, SEGMENT.cycle] == now[TIME.cycle]
+        and time_state.segments[k, SEGMENT.offset] - now[TIME.offset] <= remaining
     )
     if after:
-        now[1] = time_state.segments[k, 1]
-        now[2] = k
-    elif stop[0] == now[0] and stop[1] - now[1] <= left:
-        now[1] = stop[1]
+        now[TIME.offset] = time_state.segments[k, SEGMENT.offset]
+        now[TIME.segment] = k
+    elif stop[0] == now[TIME.cycle] and stop[1] - now[TIME.offset] <= remaining:
+        now[TIME.offset] = stop[1]
     else:
-        now[0] = now[0] + 1
-        now[1] = 0.0
-    if now[1] >= period:
-        now[0] = now[0] + 1
-        now[1] = 0.0
-    k = int(now[2]) + 1
+        now[TIME.cycle] = now[TIME.cycle] + 1
+        now[TIME.offset] = 0.0
+    if now[TIME.offset] >= period:
+        now[TIME.cycle] = now[TIME.cycle] + 1
+        now[TIME.offset] = 0.0
+    k = int(now[TIME.segment]) + 1
     if (
         k < time_state.segments.shape[0]
-        and time_state.segments[k, 0] == now[0]
-        and time_state.segments[k, 1] <= now[1]
+        and time_state.segments[k, SEGMENT.cycle] == now[TIME.cycle]
+        and time_state.segments[k, SEGMENT.offset] <= now[TIME.offset]
     ):
-        now[2] = k
-    if int(now[2]) != before:
-        segment = time_state.segments[int(now[2])]
-        old = value_now(time_state.segments[before], cycle, offset, period)
-        new = value_now(segment, now[0], now[1], period)
-        changes = (segment[KIND] == SINE and time_state.segments[before, KIND] == SINE) or abs(
-            new - old
-        ) > 1e-12 * max(abs(old), abs(new))
-    if changes:
-        now[4] = 0.0
-    return changes
+        now[TIME.segment] = k
+    if int(now[TIME.segment]) != before:
+        segment = time_state.segments[int(now[TIME.segment])]
+        old = drive_value(time_state.segments[before], cycle, offset, period)
+        new = drive_value(segment, now[TIME.cycle], now[TIME.offset], period)
+        drive_changes = (
+            segment[SEGMENT.kind] == KIND.sine
+            and time_state.segments[before, SEGMENT.kind] == KIND.sine
+        ) or abs(new - old) > 1e-12 * max(abs(old), abs(new))
+    if drive_changes:
+        now[TIME.n_quiet] = 0.0
+    return drive_changes
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def write(row, motion, span, theta, first, modal_system, table, memory, time_state):
-    """A row of a piece as it begins: time, span, phase, segment, what begins it, cycle, offset, then z, v, then of
-    every interface force, springs, share that slips, its limit, slip, work, loss, direction, slide."""
-    n = len(modal_system.square)
-    row[0] = time_state.now[0] * time_state.period[0] + time_state.now[1]
-    row[1] = span
-    row[2] = theta
-    row[3] = time_state.now[2]
-    row[4] = first
-    row[5] = time_state.now[0]
-    row[6] = time_state.now[1]
+def write_row(row, motion, duration, theta, begin, modal_system, table, memory, time_state):
+    """Write the row of a piece as it begins.
+
+    Parameters
+    ----------
+    row : ndarray
+        (w,) see `RowColumns` and `InterfaceColumns`.
+    motion, modal_system, table, memory, time_state
+    duration : float
+        [s].
+    theta : float
+        Phase of the drive [rad].
+    begin : float
+        A number of `RowBegins`.
+    """
+    n = len(modal_system.omega_squared)
+    now = time_state.now
+    row[ROW.time] = now[TIME.cycle] * time_state.period[0] + now[TIME.offset]
+    row[ROW.duration] = duration
+    row[ROW.phase] = theta
+    row[ROW.segment] = now[TIME.segment]
+    row[ROW.begin] = begin
+    row[ROW.cycle] = now[TIME.cycle]
+    row[ROW.offset] = now[TIME.offset]
     for i in range(n):
-        row[HEAD + i] = motion[0, i]
-        row[HEAD + n + i] = motion[1, i]
-    for f in range(len(modal_system.reach)):
-        at = HEAD + 2 * n + EACH * f
-        row[at] = memory.force[f]
-        row[at + 1], row[at + 2], row[at + 3] = tangent(f, table, memory)
-        row[at + 4] = memory.slip[f]
-        row[at + 5] = memory.worked[f]
-        row[at + 6] = memory.lost[f]
-        row[at + 7] = (
-            memory.way[f]
-            if table.static[f] == 0.0
-            else memory.head[f]
-            if abs(memory.head[f]) < 2.0
-            else 0.0
-        )
-        row[at + 8] = memory.place[f]
+        row[ROW.motion + i] = motion[0, i]
+        row[ROW.motion + n + i] = motion[1, i]
+    for f in range(len(modal_system.inverse_mass)):
+        at = ROW.motion + 2 * n + N_COLUMNS * f
+        tangent = find_tangent(f, table, memory)
+        row[at + COLUMN.force] = memory.force[f]
+        row[at + COLUMN.stiffness] = tangent.stiffness
+        row[at + COLUMN.slipping] = tangent.slipping
+        row[at + COLUMN.limit] = tangent.limit
+        row[at + COLUMN.slip] = memory.slip[f]
+        row[at + COLUMN.work] = memory.work[f]
+        row[at + COLUMN.loss] = memory.loss[f]
+        direction = memory.direction[f]
+        if table.static_limit[f] > 0.0:
+            direction = memory.rigid_state[f] if abs(memory.rigid_state[f]) < 2.0 else 0.0
+        row[at + COLUMN.direction] = direction
+        row[at + COLUMN.slide] = memory.slide[f]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def advance(u, h, top, motion, modal_system, table, memory, time_state, books, workspace):
-    """Move coordinates, slides and elements to u, with the energies that the elements take; whether the output passes
-    the travel."""
-    n = len(modal_system.square)
-    coefs = workspace.coefs
-    ledger = books.ledger
-    for f in range(len(modal_system.reach)):
-        if holds(f, table, memory):
-            memory.force[f] = value(workspace.reactions[f], 0, top - 2, u)
+def move_state(u, h, top, motion, modal_system, table, memory, time_state, run_sums, workspace):
+    """Move coordinates, interfaces and elements to u, and add their energies."""
+    n_interfaces = len(modal_system.inverse_mass)
+    n = len(modal_system.omega_squared)
+    coefs = workspace.coefficients
+    ledger = run_sums.ledger
+    for f in range(n_interfaces):
+        if is_held(f, table, memory):
+            memory.force[f] = evaluate_polynomial(workspace.constraint.reactions[f], 0, top - 2, u)
             continue
-        stiff, share, limit = tangent(f, table, memory)
-        step = moved(workspace.polys[f], top, u)
-        work = (memory.force[f] + 0.5 * stiff * step) * step
-        memory.worked[f] += work
-        memory.lost[f] += limit * abs(step)
-        memory.slip[f] += share * step
-        memory.force[f] += stiff * step
-        ledger[3] += work
-        ledger[4] += limit * abs(step)
-        if share >= 0.5:
-            ledger[7] = 1.0
+        stiffness, slipping, limit = find_tangent(f, table, memory)
+        step = displacement_at(workspace.polynomials[f], top, u)
+        work = (memory.force[f] + 0.5 * stiffness * step) * step
+        memory.work[f] += work
+        memory.loss[f] += limit * abs(step)
+        memory.slip[f] += slipping * step
+        memory.force[f] += stiffness * step
+        ledger[LEDGER.friction_work] += work
+        ledger[LEDGER.friction_loss] += limit * abs(step)
+        if slipping >= 0.5:
+            ledger[LEDGER.has_slipped] = 1.0
     out = 0.0
     for i in range(n):
         place = coefs[top, i]
@@ -169,306 +209,423 @@ def advance(u, h, top, motion, modal_system, table, memory, time_state, books, w
         motion[0, i] += u * place
         motion[1, i] = rate / h
         out += modal_system.output[i] * motion[0, i]
-    for f in range(len(modal_system.reach)):
-        if holds(f, table, memory):
+    for f in range(n_interfaces):
+        if is_held(f, table, memory):
             continue
         place = 0.0
         for i in range(n):
-            place += modal_system.faces[f, i] * motion[0, i]
-        memory.place[f] = place
-    keep(motion, modal_system, memory, workspace)
-    widen(out, time_state, books)
+            place += modal_system.interfaces[f, i] * motion[0, i]
+        memory.slide[f] = place
+    correct_held_slides(motion, modal_system, memory, workspace)
+    widen_extremes(out, time_state, run_sums)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def widen(out, time_state, books):
-    """Take an output [m] into the extremes of its cycle."""
-    cycle = int(time_state.now[0])
-    books.extremes[cycle, 0] = min(books.extremes[cycle, 0], out)
-    books.extremes[cycle, 1] = max(books.extremes[cycle, 1], out)
+def widen_extremes(out, time_state, run_sums):
+    """Widen the extremes of the present cycle by an output [m]."""
+    cycle = int(time_state.now[TIME.cycle])
+    run_sums.extremes[cycle, 0] = min(run_sums.extremes[cycle, 0], out)
+    run_sums.extremes[cycle, 1] = max(run_sums.extremes[cycle, 1], out)
 
 
 @njit(
     error_model="numpy", cache=True, forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT
 )
-def stored(motion, modal_system, table, memory):
-    """Energy of the modes and of the elements [J]."""
+def stored_energy(motion, modal_system, table, memory):
+    """Return the energy [J] of the modes and of the elements."""
     out = 0.0
-    for i in range(len(modal_system.square)):
-        out += motion[1, i] ** 2 + modal_system.square[i] * motion[0, i] ** 2
+    for i in range(len(modal_system.omega_squared)):
+        out += motion[1, i] ** 2 + modal_system.omega_squared[i] * motion[0, i] ** 2
     out *= 0.5 * modal_system.mass
-    for f in range(len(modal_system.reach)):
-        out += carried(f, table, memory)[1]
+    for f in range(len(modal_system.inverse_mass)):
+        out += find_force_and_energy(f, table, memory)[1]
     return out
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def enter(motion, modal_system, table, memory, time_state, workspace):
-    """`settle` from here on, the guess and what rests being noted; whether a choice was found."""
-    segment = time_state.segments[int(time_state.now[2])]
+def choose_sticks_here(motion, modal_system, table, memory, time_state, workspace):
+    """Choose which interfaces stick from here on; returns whether a choice was found.
+
+    workspace.choice holds the guess and which interfaces are at rest.
+    """
+    segment = time_state.segments[int(time_state.now[TIME.segment])]
     now = time_state.now
-    for f in range(len(modal_system.reach)):
-        stiff = tangent(f, table, memory)[0]
-        workspace.springs[f] = (
-            0.0 if table.static[f] > 0.0 and workspace.resting[f] == 1.0 else stiff
+    for f in range(len(modal_system.inverse_mass)):
+        stiffness = find_tangent(f, table, memory).stiffness
+        workspace.stiffness[f] = (
+            0.0
+            if table.static_limit[f] > 0.0 and workspace.choice.is_resting[f] == 1.0
+            else stiffness
         )
-    h = REACH / max(
-        fastest(modal_system, workspace.springs), rate_of(segment, time_state.period[0])
+    h = MAX_RATE_TIME / max(
+        bound_fastest_rate(modal_system, workspace.stiffness),
+        fastest_drive_rate(segment, time_state.period[0]),
     )
-    drive_series(segment, now[0], now[1], time_state.period[0], h, LAST + 1, workspace.waves)
-    return settle(motion, modal_system, table, memory, h, workspace)
+    expand_drive(
+        segment,
+        now[TIME.cycle],
+        now[TIME.offset],
+        time_state.period[0],
+        h,
+        MAX_ORDER + 1,
+        workspace.drive,
+    )
+    return choose_sticks(motion, modal_system, table, memory, h, workspace)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def begin(motion, modal_system, table, memory, time_state, workspace):
-    """Choose what holds at the start of a run, where a rigid element holds if its slide rests; whether a choice was
-    found."""
-    rigid = False
-    for f in range(len(modal_system.reach)):
+def choose_initial_sticks(motion, modal_system, table, memory, time_state, workspace):
+    """Choose which interfaces stick at the start of a run; returns whether a choice was found.
+
+    The guess is that a rigid element sticks where its interface is at rest.
+    """
+    choice = workspace.choice
+    has_rigid = False
+    for f in range(len(modal_system.inverse_mass)):
         speed = 0.0
         size = 0.0
-        for i in range(len(modal_system.square)):
-            part = modal_system.faces[f, i] * motion[1, i]
+        for i in range(len(modal_system.omega_squared)):
+            part = modal_system.interfaces[f, i] * motion[1, i]
             speed += part
             size += abs(part)
-        moves = abs(speed) > 64 * EPS * size
-        workspace.signs[f] = (
-            0.0 if table.static[f] == 0.0 or not moves else 1.0 if speed > 0 else -1.0
-        )
-        workspace.resting[f] = 1.0 if table.static[f] > 0.0 and not moves else 0.0
-        rigid = rigid or table.static[f] > 0.0
-        workspace.orders[f, 0] = 0.0
-        workspace.orders[f, 1] = 0.0
-        if table.static[f] > 0.0:
-            memory.head[f] = workspace.signs[f]
-    return enter(motion, modal_system, table, memory, time_state, workspace) if rigid else True
+        moves = abs(speed) > REST_TOL * size
+        choice.slip_signs[f] = 0.0
+        choice.is_resting[f] = 0.0
+        choice.orders[f, 0] = 0.0
+        choice.orders[f, 1] = 0.0
+        if table.static_limit[f] == 0.0:
+            continue
+        has_rigid = True
+        if moves:
+            choice.slip_signs[f] = 1.0 if speed > 0 else -1.0
+        else:
+            choice.is_resting[f] = 1.0
+        memory.rigid_state[f] = choice.slip_signs[f]
+    if not has_rigid:
+        return True
+    return choose_sticks_here(motion, modal_system, table, memory, time_state, workspace)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def wait(motion, modal_system, table, memory):
-    """A little longer [s] than until the next element yields, by the speeds of the slides."""
-    out = 1e300
-    for f in range(len(modal_system.reach)):
+def estimate_time_to_yield(motion, modal_system, table, memory):
+    """Return an estimate of the time [s] to the next yield by the present speeds."""
+    time = 1e300
+    for f in range(len(modal_system.inverse_mass)):
         speed = 0.0
-        for i in range(len(modal_system.square)):
-            speed += modal_system.faces[f, i] * motion[1, i]
-        gap = threshold(f, 1.0 if speed > 0 else -1.0, table, memory) - memory.place[f]
+        for i in range(len(modal_system.omega_squared)):
+            speed += modal_system.interfaces[f, i] * motion[1, i]
+        gap = next_yield_slide(f, 1.0 if speed > 0 else -1.0, table, memory) - memory.slide[f]
         if speed * gap > 0:
-            out = min(out, gap / speed)
-    return 1.3 / REACH * out
+            time = min(time, gap / speed)
+    return YIELD_MARGIN / MAX_RATE_TIME * time
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def output_of(motion, modal_system):
-    """Motion of the output [m]."""
+def output_displacement(motion, modal_system):
+    """Return the displacement of the output [m]."""
     out = 0.0
-    for i in range(len(modal_system.square)):
+    for i in range(len(modal_system.omega_squared)):
         out += modal_system.output[i] * motion[0, i]
     return out
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def happen(what, face, sign, modal_system, table, memory, time_state):
-    """Change the elements, and note what stands still, as the event asks."""
-    if what != NOTHING and what != OUTPUT_TURNS:
-        time_state.now[4] = 0.0
-    if what == YIELDS:
-        give_way(face, sign, table, memory)
-    elif what == TURNS:
-        turn(face, memory)
-        time_state.rest[face] = 1.0
-        if modal_system.along == face:
-            time_state.rest[len(modal_system.reach)] = 1.0
-    elif what == OUTPUT_TURNS:
-        time_state.rest[face] = 1.0
-    if (what == YIELDS or what == TURNS) and table.static[face] == 0.0:
-        memory.force[face] = carried(face, table, memory)[0]
+def apply_event(kind, interface, sign, modal_system, table, memory, time_state):
+    """Change the elements as an event asks, and note which interfaces are at rest."""
+    if kind != EVENT.none and kind != EVENT.output_reversal:
+        time_state.now[TIME.n_quiet] = 0.0
+    if kind == EVENT.yielding:
+        release_next_element(interface, sign, table, memory)
+    elif kind == EVENT.reversal:
+        store_turning_point(interface, memory)
+        time_state.is_at_turn[interface] = 1.0
+        if modal_system.output_interface == interface:
+            time_state.is_at_turn[len(modal_system.inverse_mass)] = 1.0
+    elif kind == EVENT.output_reversal:
+        time_state.is_at_turn[interface] = 1.0
+    if (kind == EVENT.yielding or kind == EVENT.reversal) and table.static_limit[interface] == 0.0:
+        memory.force[interface] = find_force_and_energy(interface, table, memory)[0]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def piece_series(h, rate, slow, motion, force, modal_system, time_state, workspace):
-    """Fill the workspace with the series of a piece of h [s] from here on; its highest power. rate: the fastest [1/s]; slow:
-    as of `followed`, whose series the workspace has where it is not 0."""
-    top = powers(rate * h)
+def expand_piece(h, rate, slow_rate, motion, force, modal_system, time_state, workspace):
+    """Expand the motion over a piece of h [s]; returns the highest power.
+
+    rate: fastest rate [1/s]; slow_rate: as of `find_slow_rate`, whose series is in the workspace
+    where it is not 0.
+    """
+    top = find_highest_power(rate * h)
     now = time_state.now
-    segment = time_state.segments[int(time_state.now[2])]
-    if slow > 0.0:
-        shortened(slow * h / REACH, top, len(modal_system.reach), workspace)
+    segment = time_state.segments[int(time_state.now[TIME.segment])]
+    if slow_rate > 0.0:
+        shorten_series(
+            slow_rate * h / MAX_RATE_TIME, top, len(modal_system.inverse_mass), workspace
+        )
     else:
-        drive_series(segment, now[0], now[1], time_state.period[0], h, top, workspace.waves)
-        motion_series(
+        expand_drive(
+            segment,
+            now[TIME.cycle],
+            now[TIME.offset],
+            time_state.period[0],
+            h,
+            top,
+            workspace.drive,
+        )
+        expand_motion(
             motion[0],
             motion[1],
             force,
-            workspace.springs,
+            workspace.stiffness,
             modal_system,
-            workspace.waves[0],
+            workspace.drive[0],
             h,
             top,
-            workspace.coefs,
+            workspace.coefficients,
             workspace,
         )
     return top
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def passed(top, modal_system, motion, workspace, travel, u):
-    """u at which the output, monotone up to `u`, passes +-travel [m]; NONE if it does not."""
-    faces = len(modal_system.reach)
-    poly = workspace.polys[faces + 1]
-    speed_series(modal_system.output, len(modal_system.square), workspace.coefs, top, poly)
-    here = output_of(motion, modal_system)
-    step = moved(poly, top, u)
+def find_travel_crossing(top, modal_system, motion, workspace, travel, u):
+    """Return u at which the output passes +-travel [m]; NO_ROOT if it does not.
+
+    The output is monotone up to u.
+    """
+    n_interfaces = len(modal_system.inverse_mass)
+    poly = workspace.polynomials[n_interfaces + 1]
+    expand_speed(
+        modal_system.output, len(modal_system.omega_squared), workspace.coefficients, top, poly
+    )
+    here = output_displacement(motion, modal_system)
+    step = displacement_at(poly, top, u)
     if abs(here + step) <= travel or step == 0.0:
-        return NONE
-    return crossing(poly, top, (travel if step > 0 else -travel) - here, u, workspace.polys[faces])
+        return NO_ROOT
+    return find_crossing(
+        poly, top, (travel if step > 0 else -travel) - here, u, workspace.polynomials[n_interfaces]
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def begin_piece(left, motion, modal_system, table, memory, time_state, workspace):
-    """The next piece of the motion as series, and the forces of what holds: (its length [s], `left` [s] at most; the
-    rate [1/s] that it was chosen by; the order of the series)."""
-    segment = time_state.segments[int(time_state.now[2])]
-    for f in range(len(modal_system.reach)):
-        workspace.springs[f] = tangent(f, table, memory)[0]
-    own = fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0
-    slow = followed(motion, memory.force, modal_system, time_state, workspace) if own > 0.0 else 0.0
-    rate = slow if slow > 0.0 else max(own, rate_of(segment, time_state.period[0]))
-    h = min(
-        REACH / rate * min(1.0, max(rate * wait(motion, modal_system, table, memory), 0.02)), left
+def choose_length(rate, remaining, motion, modal_system, table, memory):
+    """Return the duration [s] of the next piece, at most `remaining`; rate: fastest rate [1/s].
+
+    It ends just after the next yield that the present speeds predict, but is at least MIN_FRACTION of
+    the longest piece.
+    """
+    to_yield = rate * estimate_time_to_yield(motion, modal_system, table, memory)
+    return min(MAX_RATE_TIME / rate * min(1.0, max(to_yield, MIN_FRACTION)), remaining)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def start_piece(remaining, motion, modal_system, table, memory, time_state, workspace):
+    """Choose the length of the next piece and expand the motion over it.
+
+    Returns
+    -------
+    h : float
+        Duration [s], at most `remaining`.
+    rate : float
+        Fastest rate [1/s] by which it was chosen.
+    top : int
+        Highest power of the series.
+    """
+    n_interfaces = len(modal_system.inverse_mass)
+    segment = time_state.segments[int(time_state.now[TIME.segment])]
+    for f in range(n_interfaces):
+        workspace.stiffness[f] = find_tangent(f, table, memory).stiffness
+    modal_rate = bound_modal_rate(modal_system, workspace)
+    slow_rate = 0.0
+    if modal_rate > 0.0:
+        slow_rate = find_slow_rate(motion, memory.force, modal_system, time_state, workspace)
+    rate = slow_rate
+    if slow_rate == 0.0:
+        rate = max(modal_rate, fastest_drive_rate(segment, time_state.period[0]))
+    h = choose_length(rate, remaining, motion, modal_system, table, memory)
+    top = expand_piece(
+        h, rate, slow_rate, motion, memory.force, modal_system, time_state, workspace
     )
-    top = piece_series(h, rate, slow, motion, memory.force, modal_system, time_state, workspace)
-    for f in range(len(modal_system.reach)):
-        if holds(f, table, memory):
-            memory.force[f] = workspace.reactions[f, 0]
+    for f in range(n_interfaces):
+        if is_held(f, table, memory):
+            memory.force[f] = workspace.constraint.reactions[f, 0]
     return h, rate, top
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def cross_border(what, left, stop, motion, modal_system, table, memory, past, time_state):
-    """Pass the end of a cycle or of a part of the drive: (whether the drive changes, whether the motion repeats)."""
-    changes = arrive(time_state, stop, left)
-    came = False
-    if time_state.now[1] == 0.0 and what == NOTHING:
-        came = come_back(motion, modal_system, memory, time_state, past)
-    elif time_state.now[1] == 0.0:
-        forget(past)
-    for f in range(len(modal_system.reach)):  # at every border, so that a run in parts is the run
-        memory.force[f] = pulled(f, table, memory)
-    return changes, came
+def cross_border(kind, remaining, stop, motion, modal_system, table, memory, previous, time_state):
+    """Pass the end of a cycle or of a segment.
+
+    Returns whether the drive changes, and whether the motion repeats.
+    """
+    drive_changes = step_to_border(time_state, stop, remaining)
+    repeats = False
+    if time_state.now[TIME.offset] == 0.0 and kind == EVENT.none:
+        repeats = detect_repeat(motion, modal_system, memory, time_state, previous)
+    elif time_state.now[TIME.offset] == 0.0:
+        forget_previous(previous)
+    for f in range(
+        len(modal_system.inverse_mass)
+    ):  # at every border, so that a run in parts is the run
+        memory.force[f] = interface_force(f, table, memory)
+    return drive_changes, repeats
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def clear_rests(u, time_state):
+    """Forget which interfaces were at rest at a turning point, after a motion up to u of a piece."""
+    if u > MIN_MOVING_FRACTION:
+        time_state.is_at_turn[:] = 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def is_before(now, stop):
+    """Return whether the time lies before `stop` (cycle, offset [s])."""
+    if now[TIME.cycle] == stop[0]:
+        return now[TIME.offset] < stop[1]
+    return now[TIME.cycle] < stop[0]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def is_idle(progress, time_state, run_sums):
+    """Count the events without progress [s] in time; returns whether there are too many in a row."""
+    if progress < MIN_PROGRESS * time_state.period[0]:
+        run_sums.limits[LIMIT.n_idle] += 1
+    else:
+        run_sums.limits[LIMIT.n_idle] = 0.0
+    return run_sums.limits[LIMIT.n_idle] > MAX_IDLE_EVENTS
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def next_begin(kind, changes_stick, drive_changes):
+    """Return what begins the next row, a number of `RowBegins`, after an event of some kind."""
+    if changes_stick:
+        return float(BEGIN.stick_or_slip)
+    if drive_changes:
+        return float(BEGIN.drive_border)
+    if kind == EVENT.yielding:
+        return float(BEGIN.yielding)
+    if kind == EVENT.reversal or kind == EVENT.output_reversal:
+        return float(BEGIN.reversal)
+    return float(BEGIN.none)
 
 
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def march(stop, motion, modal_system, table, memory, past, time_state, books, workspace, rows):
-    """Run from the clock's time to `stop` (cycle, offset [s]).
+def march(
+    stop, motion, modal_system, table, memory, previous, time_state, run_sums, workspace, rows
+):
+    """March from the present time to `stop` (cycle, offset [s]).
 
-    motion (2, n), memory, time_state and books move along; past: the state a cycle before, as `repeat_kernels` notes it;
-    rows (r, HEAD + 2 n + EACH i): one per piece, none are written where r = 0. Returns (DONE, FULL, TRAVEL, PILED,
-    OPEN, or REPEATS at the first border from where on every cycle is the last one bit by bit, rows used). Where it goes
-    on does not change a bit. Cost: 0.2 to 0.5 us a piece of one mode.
+    Parameters
+    ----------
+    stop : tuple
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s]; they move along, as do memory, time_state and
+        run_sums.
+    modal_system, table, memory
+    previous : PreviousCycle
+        State at the end of the cycle before, for `repeat_kernels`.
+    time_state, run_sums, workspace
+    rows : ndarray
+        (r, w) becomes one row per piece, see `RowColumns`; none is written where r = 0.
+
+    Returns
+    -------
+    status : int
+        A number of `MarchStatus`.
+    n_rows : int
+        Rows written.
+
+    Notes
+    -----
+    A run that is made in parts is the same bit by bit. Cost: 0.2 to 0.5 us per piece of one mode.
     """
+    choice = workspace.choice
     used = 0
     now = time_state.now
-    came = False
-    faces = len(modal_system.reach)
-    first = max(now[3], float(YIELDED))
-    now[3] = 0.0
-    if workspace.orders[0, 0] < 0.0 and not begin(
+    repeats = False
+    n_interfaces = len(modal_system.inverse_mass)
+    begin = max(now[TIME.begin], float(BEGIN.yielding))
+    now[TIME.begin] = 0.0
+    if choice.orders[0, 0] < 0.0 and not choose_initial_sticks(
         motion, modal_system, table, memory, time_state, workspace
     ):
-        return OPEN, used
-    if now[5] == 0.0:
-        for f in range(faces):
-            memory.force[f] = pulled(f, table, memory)
-    now[5] = 0.0
-    while now[0] < stop[0] or (now[0] == stop[0] and now[1] < stop[1]):
+        return STATUS.undetermined, used
+    if now[TIME.is_paused] == 0.0:
+        for f in range(n_interfaces):
+            memory.force[f] = interface_force(f, table, memory)
+    now[TIME.is_paused] = 0.0
+    while is_before(now, stop):
         if used == rows.shape[0] and used > 0:
             # the forces go on as they are
-            now[3] = first
-            now[5] = 1.0
-            return FULL, used
-        left = left_of(time_state, stop)
-        theta = phase_of(time_state.segments[int(now[2])], now[0], now[1], time_state.period[0])
-        h, rate, top = begin_piece(left, motion, modal_system, table, memory, time_state, workspace)
-        whole = h == left
-        u, what, face, sign = next_event(top, modal_system, table, memory, time_state, workspace)
-        if books.limits[0] < 1e300 and u > 0:
-            root = passed(top, modal_system, motion, workspace, books.limits[0], u)
+            now[TIME.begin] = begin
+            now[TIME.is_paused] = 1.0
+            return STATUS.full, used
+        remaining = time_to_border(time_state, stop)
+        segment = time_state.segments[int(now[TIME.segment])]
+        theta = drive_phase(segment, now[TIME.cycle], now[TIME.offset], time_state.period[0])
+        h, rate, top = start_piece(
+            remaining, motion, modal_system, table, memory, time_state, workspace
+        )
+        is_to_border = h == remaining
+        u, kind, interface, sign = find_next_event(
+            top, modal_system, table, memory, time_state, workspace
+        )
+        if run_sums.limits[LIMIT.travel] < 1e300 and u > 0:
+            travel = run_sums.limits[LIMIT.travel]
+            root = find_travel_crossing(top, modal_system, motion, workspace, travel, u)
             if root <= u:
                 u = root
-                what = STOPS
-        switches = (what == TURNS or what == RELEASES) and table.static[face] > 0.0
-        changes = False
-        if switches or whole:
-            at_rest(u, h, top, modal_system, table, memory, workspace)
+                kind = EVENT.travel
+        changes_stick = False
+        if kind == EVENT.reversal or kind == EVENT.release:
+            changes_stick = table.static_limit[interface] > 0.0
+        drive_changes = False
+        if changes_stick or is_to_border:
+            find_resting_slides(u, h, top, modal_system, table, memory, workspace)
         if u > 0:
-            if now[1] == 0.0:
-                widen(output_of(motion, modal_system), time_state, books)
+            if now[TIME.offset] == 0.0:
+                widen_extremes(output_displacement(motion, modal_system), time_state, run_sums)
             if rows.shape[0] > 0:
-                write(
-                    rows[used], motion, u * h, theta, first, modal_system, table, memory, time_state
+                write_row(
+                    rows[used], motion, u * h, theta, begin, modal_system, table, memory, time_state
                 )
                 used += 1
-            sums(rate * h, u, h, top, modal_system, time_state, books, workspace)
-            if u > AT_ONCE:
-                for f in range(faces + 1):
-                    time_state.rest[f] = 0.0
-            for f in range(faces):
-                workspace.orders[f, 0] = 0.0
-                workspace.orders[f, 1] = 0.0
-            advance(u, h, top, motion, modal_system, table, memory, time_state, books, workspace)
+            add_piece_sums(rate * h, u, h, top, modal_system, time_state, run_sums, workspace)
+            clear_rests(u, time_state)
+            choice.orders[:] = 0.0
+            move_state(
+                u, h, top, motion, modal_system, table, memory, time_state, run_sums, workspace
+            )
             # an event on the border, to the last digit
-            if whole and (u == 1.0 or now[1] + u * h >= now[1] + left):
-                changes, came = cross_border(
-                    what, left, stop, motion, modal_system, table, memory, past, time_state
+            if is_to_border and (
+                u == 1.0 or now[TIME.offset] + u * h >= now[TIME.offset] + remaining
+            ):
+                drive_changes, repeats = cross_border(
+                    kind, remaining, stop, motion, modal_system, table, memory, previous, time_state
                 )
             else:
-                now[1] += u * h
-            books.ledger[5] = max(books.ledger[5], stored(motion, modal_system, table, memory))
-            books.ledger[6] += 1
-        books.limits[1] = books.limits[1] + 1 if u * h < 1e-13 * time_state.period[0] else 0.0
-        if books.limits[1] > MOST_IDLE:
-            return PILED, used
-        first = float(
-            SWITCHED
-            if switches
-            else BORDERED
-            if changes
-            else YIELDED
-            if what == YIELDS
-            else TURNED
-            if what == TURNS or what == OUTPUT_TURNS
-            else ON
-        )
-        happen(what, face, sign, modal_system, table, memory, time_state)
-        if switches:
-            workspace.resting[face] = 1.0
-            workspace.signs[face] = sign if what == RELEASES else 0.0
-        if (switches or changes) and not enter(
+                now[TIME.offset] += u * h
+            run_sums.ledger[LEDGER.max_stored] = max(
+                run_sums.ledger[LEDGER.max_stored],
+                stored_energy(motion, modal_system, table, memory),
+            )
+            run_sums.ledger[LEDGER.n_pieces] += 1
+        if is_idle(u * h, time_state, run_sums):
+            return STATUS.idle, used
+        begin = next_begin(kind, changes_stick, drive_changes)
+        apply_event(kind, interface, sign, modal_system, table, memory, time_state)
+        if changes_stick:
+            choice.is_resting[interface] = 1.0
+            choice.slip_signs[interface] = sign if kind == EVENT.release else 0.0
+        if (changes_stick or drive_changes) and not choose_sticks_here(
             motion, modal_system, table, memory, time_state, workspace
         ):
-            return OPEN, used
-        if what == STOPS or came:
-            now[3] = first if came and what != STOPS else 0.0
-            return TRAVEL if what == STOPS else REPEATS, used
-    now[3] = first
-    return DONE, used
-
-
-__all__ = [
-    "BORDERED",
-    "DONE",
-    "EACH",
-    "EPS",
-    "FULL",
-    "HEAD",
-    "ON",
-    "OPEN",
-    "PILED",
-    "REPEATS",
-    "SWITCHED",
-    "TRAVEL",
-    "TURNED",
-    "YIELDED",
-    "march",
-]
+            return STATUS.undetermined, used
+        if kind == EVENT.travel:
+            now[TIME.begin] = 0.0
+            return STATUS.travel, used
+        if repeats:
+            now[TIME.begin] = begin
+            return STATUS.repeats, used
+    now[TIME.begin] = begin
+    return STATUS.done, used

@@ -1,117 +1,149 @@
-"""Compiled memory of elastic-plastic elements under one slide: who slips next, and what a turning point leaves behind.
+"""Memory of elastic-plastic elements under one relative displacement (compiled).
 
-Elements are sorted by yield slide. Those that slip are always the first ones of the list: an element of a shorter yield
-slide yields before one of a longer, since both were stretched by the same moves (Masing). Where the slide turns at a
-place `at`, the first ones stop together, stretched to side * y, and stay a group: each slips again after 2 y back, or
-all at once where the slide comes back to `at`. A group that slips as a whole is forgotten. So every event costs the
-same, whatever the number of elements. Twin: elements one by one, in the tests.
+The elements of an interface are sorted by yield slide, the relative displacement at which they yield. The elements that
+slip are always the first ones of the list: all were stretched by the same moves, so an element with a shorter yield
+slide yields before one with a longer one (Masing). At a turning point the elements that slip stop together, stretched to
++-y, and stay a group: each slips again after 2 y in the other direction, or all of them where the relative displacement
+comes back to the turning point. A group that slips as a whole is forgotten. So every event costs the same, whatever the
+number of elements. The tests compare with elements that are followed one by one.
 
-Before the list may stand a rigid element, Coulomb friction: while it holds, the slide does not move (`stick_kernels`
-says which hold after an event); in slip it adds a constant.
+A rigid element, Coulomb friction, may stand before the list. While it sticks the relative displacement does not change
+(`stick_kernels` chooses which ones stick after an event); while it slips it adds a constant force.
 """
 
 from math import inf
+from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
-RIGID = inf  # stiffness of an element that holds the slide
+# [N/m] stiffness of an interface while its rigid element sticks
+RIGID_STIFFNESS = inf
+# [m] yield slide of an interface whose elements all slip
+NO_YIELD = 1e300
+
+
+class Tangent(NamedTuple):
+    """Tangent of an interface.
+
+    - stiffness: of the elements that stick [N/m], RIGID_STIFFNESS while a rigid element sticks
+    - slipping: fraction of the friction limit that slips; 1 without elements
+    - limit: friction limit of the elements that slip [N]
+    """
+
+    stiffness: float
+    slipping: float
+    limit: float
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def threshold(face, way, table, memory):
-    """Slide [m] at which the next element of an interface slips in the direction `way`; infinite where all slip."""
-    first = memory.slipping[face]
-    top = memory.depth[face] - 1
+def next_yield_slide(interface, direction, table, memory):
+    """Return the relative displacement [m] at which the next element slips in a direction.
+
+    It is +-NO_YIELD where all elements slip.
+    """
+    first = memory.n_slipping[interface]
+    if first >= table.n_elements[interface]:
+        return direction * NO_YIELD
+    group = memory.n_groups[interface] - 1
+    slide = memory.group_slide[interface, group]
+    sign = memory.group_sign[interface, group]
+    if sign == direction:
+        return slide
+    return slide + (direction - sign) * table.yield_slide[interface, first]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def release_next_element(interface, direction, table, memory):
+    """Let the next element slip in a direction, or the whole innermost group that slipped this way before."""
+    group = memory.n_groups[interface] - 1
+    if memory.group_sign[interface, group] == direction:
+        memory.n_slipping[interface] = memory.group_end[interface, group]
+    else:
+        memory.n_slipping[interface] += 1
+    memory.direction[interface] = direction
+    if memory.n_slipping[interface] == memory.group_end[interface, group]:
+        memory.n_groups[interface] = group
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def store_turning_point(interface, memory):
+    """Stop all elements that slip; they stay one group, stretched to their yield slides."""
+    if memory.n_slipping[interface] == 0:
+        return
+    group = memory.n_groups[interface]
+    memory.group_end[interface, group] = memory.n_slipping[interface]
+    memory.group_slide[interface, group] = memory.slide[interface]
+    memory.group_sign[interface, group] = memory.direction[interface]
+    memory.n_groups[interface] = group + 1
+    memory.n_slipping[interface] = 0
+    memory.direction[interface] = 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def is_held(interface, table, memory):
+    """Return whether the rigid element of an interface sticks and holds the relative displacement."""
+    return table.static_limit[interface] > 0.0 and memory.rigid_state[interface] == 0.0
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def rigid_friction(interface, table, memory):
+    """Return the friction force [N] of the rigid element of an interface.
+
+    It is the kinetic limit in slip, and the static limit where other elements hold the relative displacement. It is 0
+    in stick, where the constraint tells the reaction, and without a rigid element.
+    """
+    state = memory.rigid_state[interface]
+    if abs(state) == 1.0:
+        return state * table.kinetic_limit[interface]
+    return 0.5 * state * table.static_limit[interface]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def interface_force(interface, table, memory):
+    """Return the friction force [N] of an interface, without the reaction of a rigid element that sticks."""
     return (
-        memory.at[face, top] + (way - memory.side[face, top]) * table.reach[face, first]
-        if first < table.count[face] and memory.side[face, top] != way
-        else memory.at[face, top]
-        if first < table.count[face]
-        else way * 1e300
+        rigid_friction(interface, table, memory)
+        + find_force_and_energy(interface, table, memory)[0]
     )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def give_way(face, way, table, memory):
-    """Let the next element slip in the direction `way`, or the whole innermost group that had slipped this way."""
-    top = memory.depth[face] - 1
-    whole = memory.side[face, top] == way
-    memory.slipping[face] = memory.upto[face, top] if whole else memory.slipping[face] + 1
-    memory.way[face] = way
-    if memory.slipping[face] == memory.upto[face, top]:
-        memory.depth[face] = top
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def turn(face, memory):
-    """Stop all elements that slip: they stay one group, stretched to their yield slides."""
-    if memory.slipping[face] == 0:
-        return
-    top = memory.depth[face]
-    memory.upto[face, top] = memory.slipping[face]
-    memory.at[face, top] = memory.place[face]
-    memory.side[face, top] = memory.way[face]
-    memory.depth[face] = top + 1
-    memory.slipping[face] = 0
-    memory.way[face] = 0.0
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def holds(face, table, memory):
-    """Whether the rigid element of an interface holds its slide."""
-    return table.static[face] > 0.0 and memory.head[face] == 0.0
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def friction_force(face, table, memory):
-    """Friction [N] of the rigid element of an interface: kinetic in slip, static at the limit while others hold the
-    slide, 0 where it holds or is none."""
-    head = memory.head[face]
-    return head * table.kinetic[face] if abs(head) == 1.0 else 0.5 * head * table.static[face]
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def pulled(face, table, memory):
-    """Force [N] of an interface, without the reaction of a rigid element that holds."""
-    return friction_force(face, table, memory) + carried(face, table, memory)[0]
-
-
-@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def carried(face, table, memory):
-    """(force [N], elastic energy [J]) of the elements of an interface, group by group."""
-    first = memory.slipping[face]
-    place = memory.place[face]
-    force = memory.way[face] * table.limit[face, first]
-    energy = table.twice[face, first]
-    for top in range(memory.depth[face] - 1, -1, -1):
-        end = memory.upto[face, top]
-        side = memory.side[face, top]
-        far = place - memory.at[face, top]
-        stiff = table.stiff[face, end] - table.stiff[face, first]
-        limit = table.limit[face, end] - table.limit[face, first]
-        force += side * limit + far * stiff
-        energy += side * side * (table.twice[face, end] - table.twice[face, first]) + far * (
-            2 * side * limit + far * stiff
-        )
+def find_force_and_energy(interface, table, memory):
+    """Return force [N] and elastic energy [J] of the elastic-plastic elements, added group by group."""
+    first = memory.n_slipping[interface]
+    slide = memory.slide[interface]
+    force = memory.direction[interface] * table.limit_sum[interface, first]
+    energy = table.energy_sum[interface, first]
+    for group in range(memory.n_groups[interface] - 1, -1, -1):
+        end = memory.group_end[interface, group]
+        sign = memory.group_sign[interface, group]
+        distance = slide - memory.group_slide[interface, group]
+        stiffness = table.stiffness_sum[interface, end] - table.stiffness_sum[interface, first]
+        limit = table.limit_sum[interface, end] - table.limit_sum[interface, first]
+        stretched = table.energy_sum[interface, end] - table.energy_sum[interface, first]
+        force += sign * limit + distance * stiffness
+        energy += sign * sign * stretched + distance * (2 * sign * limit + distance * stiffness)
         first = end
     return force, 0.5 * energy
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def tangent(face, table, memory):
-    """(stiffness [N/m] of the elements that hold, share of the friction limit of those that slip, their limit [N]); of
-    a rigid element that holds the stiffness is infinite. What has no elements slips freely."""
-    first = memory.slipping[face]
-    all_of = table.count[face]
-    limit = table.limit[face, first]
-    whole = table.limit[face, all_of]
-    stiff = max(table.stiff[face, all_of] - table.stiff[face, first], 0.0)
-    slips = 1.0 if all_of == 0 else 0.0
-    if table.static[face] > 0.0:
-        if memory.head[face] == 0.0:
-            return RIGID, 0.0, 0.0
-        slips = 1.0 if abs(memory.head[face]) == 1.0 else 0.0
-        limit = limit + slips * table.kinetic[face]
-        whole = whole + table.kinetic[face]
-    return stiff, limit / whole if whole > 0 else slips, limit
+def find_tangent(interface, table, memory):
+    """Return the Tangent of an interface."""
+    first = memory.n_slipping[interface]
+    n_elements = table.n_elements[interface]
+    limit = table.limit_sum[interface, first]
+    total_limit = table.limit_sum[interface, n_elements]
+    total_stiffness = table.stiffness_sum[interface, n_elements]
+    stiffness = max(total_stiffness - table.stiffness_sum[interface, first], 0.0)
+    slipping = 1.0 if n_elements == 0 else 0.0
+    if table.static_limit[interface] > 0.0:
+        if memory.rigid_state[interface] == 0.0:
+            return Tangent(RIGID_STIFFNESS, 0.0, 0.0)
+        slipping = 1.0 if abs(memory.rigid_state[interface]) == 1.0 else 0.0
+        limit = limit + slipping * table.kinetic_limit[interface]
+        total_limit = total_limit + table.kinetic_limit[interface]
+    if total_limit > 0:
+        slipping = limit / total_limit
+    return Tangent(stiffness, slipping, limit)

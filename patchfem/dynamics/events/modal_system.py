@@ -1,4 +1,4 @@
-"""Arrays of the compiled loop: modes, drive, room and books."""
+"""Arrays that the compiled event engine works in: modes, time, sums and workspace."""
 
 from typing import NamedTuple
 
@@ -6,306 +6,427 @@ import numpy as np
 
 from ...compiled import kernels
 from ...core import ModalBasis, PatchfemError
-from .elements import Memory, Table, virgin
+from .elements import ElementTable, Memory, unstretched_memory
+from .positions_kernels import HOLD, KIND, LEDGER, LIMIT, PREVIOUS, SEGMENT, TIME
 
-SLOW = 0.02  # of the slowest rate of the modes
-kinds = kernels("dynamics.events.drive_kernels")
+# rate of the drive over the slowest rate of the modes; a slower drive is followed quasi-statically (`slow_kernels`)
+MAX_SLOW_RATE_RATIO = 0.02
+# revolutions per cycle closer to a whole number than this many times their size count as that number [1]
+WHOLE_TOL = 4e-15
+# positions of the first part of the revolutions per cycle, so that its product with a number of cycles is exact [bits]
+TURN_BITS = 24
+
 series = kernels("dynamics.events.series_kernels")
 
 
 class ModalSystem(NamedTuple):
-    """Modes as the loop takes them.
+    """The modes as the kernels take them.
 
-    The loop asks `square` how many modes there are and `reach` how many interfaces. Of one mode behind one interface
-    both are tuples: their length is then part of their type, so that the same text is compiled for one of each, three
-    times as fast.
+    The kernels take the number of modes from the length of `omega_squared`, and that of interfaces from `inverse_mass`.
+    Of one mode behind one interface both are tuples: their length is then part of their type, and the same text is
+    compiled for one of each, which is three times as fast.
 
-    square: (n,) omega^2 [1/s2]; damping: (n, n) D [1/s], coupled: whether it is more than its diagonal; base, output:
-    (n,); faces: (i, n); mass [kg]; reach: (i,) |face|^2/mass [1/kg], how much a spring there adds to a square of a
-    rate; square_most, damping_most: norms of the modes' own; along: number of an interface that
-    moves as the output does, -1 where none does; slow: rate [1/s] of a drive up to which the modes, once they do not
-    ring, follow it in a series of its own (`slow_kernels`), 0 where one has no stiffness or no damper.
+    - omega_squared: (n,) squares of the natural frequencies [1/s2]
+    - damping: (n, n) damping matrix D [1/s]; is_coupled: whether it is more than its diagonal
+    - base, output: (n,) excitation by the base, and participation of the output [1]
+    - interfaces: (i, n) relative displacement of every interface per modal coordinate [1]
+    - inverse_mass: (i,) |row of interfaces|^2/mass [1/kg]; a spring there adds it times its stiffness to a squared rate
+    - mass: modal mass [kg]
+    - max_omega_squared, damping_norm: norms of the stiffness [1/s2] and of the damping [1/s] of the modes
+    - output_interface: number of an interface that moves as the output does, -1 where none does
+    - slow_rate: largest rate [1/s] of a drive that the modes follow quasi-statically, 0 where they never do
     """
 
-    square: np.ndarray
+    omega_squared: np.ndarray
     damping: np.ndarray
     base: np.ndarray
-    faces: np.ndarray
+    interfaces: np.ndarray
     output: np.ndarray
-    reach: np.ndarray
+    inverse_mass: np.ndarray
     mass: float
-    square_most: float
-    damping_most: float
-    coupled: int
-    along: int
-    slow: float
+    max_omega_squared: float
+    damping_norm: float
+    is_coupled: int
+    output_interface: int
+    slow_rate: float
 
 
-def plant_of(modes: ModalBasis) -> ModalSystem:
-    """The Plant of a basis."""
+def make_modal_system(modes: ModalBasis) -> ModalSystem:
+    """Return the arrays of a modal basis."""
     damping = np.array(modes.damping_matrix, float)
-    faces = np.array(modes.interfaces, float)
+    interfaces = np.array(modes.interfaces, float)
     output = np.array(modes.output, float)
-    along = next(
-        (
-            k
-            for k, face in enumerate(faces)
-            if len(face) == 1 or not np.any(np.outer(face, output) - np.outer(output, face))
-        ),
-        -1,
-    )
-    coupled = len(damping) > 1 and bool(np.any(damping != np.diag(np.diag(damping))))
-    most = np.linalg.norm(damping, 2) if coupled else np.abs(damping).max()
-    square = np.array(modes.omega, float) ** 2
-    reach = (faces**2).sum(axis=1) / modes.mass
-    least = float(square.min())
-    slow = SLOW * min(np.sqrt(least), least / max(most, 1e-300)) if np.diag(damping).all() else 0.0
-    if faces.shape == (1, 1):
-        square = tuple(square.tolist())
-        reach = tuple(reach.tolist())
+    output_interface = -1
+    for k, row in enumerate(interfaces):
+        if len(row) == 1 or not np.any(np.outer(row, output) - np.outer(output, row)):
+            output_interface = k
+            break
+    is_coupled = len(damping) > 1 and bool(np.any(damping != np.diag(np.diag(damping))))
+    damping_norm = np.linalg.norm(damping, 2) if is_coupled else np.abs(damping).max()
+    omega_squared = np.array(modes.omega, float) ** 2
+    inverse_mass = (interfaces**2).sum(axis=1) / modes.mass
+    slow_rate = 0.0
+    if np.diag(damping).all():
+        lowest = float(omega_squared.min())
+        slow_rate = MAX_SLOW_RATE_RATIO * min(np.sqrt(lowest), lowest / max(damping_norm, 1e-300))
+    if interfaces.shape == (1, 1):
+        omega_squared = tuple(omega_squared.tolist())
+        inverse_mass = tuple(inverse_mass.tolist())
     return ModalSystem(
-        square,
+        omega_squared,
         np.ascontiguousarray(damping),
         np.array(modes.base, float),
-        np.ascontiguousarray(faces),
+        np.ascontiguousarray(interfaces),
         output,
-        reach,
+        inverse_mass,
         float(modes.mass),
         float(modes.omega.max() ** 2),
-        float(most),
-        int(coupled),
-        along,
-        float(slow),
+        float(damping_norm),
+        int(is_coupled),
+        output_interface,
+        float(slow_rate),
     )
 
 
-class Clock(NamedTuple):
-    """Time of a run: now (6,) cycle, offset in it [s], segment of the drive, what begins the next row, pieces since the
-    last event, and 1 where the loop stopped for want of rows; segments (p, 12) rows of `drive_kernels`; period (1,)
-    [s]; rest (i + 1,) 1 where a slide, or last the output, stands still at a turning point."""
+class TimeState(NamedTuple):
+    """Time of a run.
+
+    - now: (6,) time and what the march notes of it, see `TimePositions`
+    - segments: (p, 12) segments of the drive, see `SegmentColumns`
+    - period: (1,) duration of a cycle [s]
+    - is_at_turn: (i + 1,) 1 where an interface, or last the output, is at rest at a turning point
+    """
 
     now: np.ndarray
     segments: np.ndarray
     period: np.ndarray
-    rest: np.ndarray
+    is_at_turn: np.ndarray
 
 
-def clock_of(drive, faces: int) -> Clock:
-    """The Clock of a drive of `core` or `structure.drives` at t = 0. PatchfemError where it begins later."""
-    segments = segments_of(drive)
+def start_time_state(drive, n_interfaces: int) -> TimeState:
+    """Return the TimeState of a drive at t = 0.
+
+    Parameters
+    ----------
+    drive
+        A drive of `core` or `structure.drives`.
+    n_interfaces : int
+
+    Returns
+    -------
+    TimeState
+
+    Raises
+    ------
+    PatchfemError
+        If the drive begins later.
+    """
+    segments = drive_segments(drive)
     if segments[0, :2].any():
         raise PatchfemError("drive: the first segment of the drive must start at 0 s")
-    return Clock(np.zeros(6), segments, np.array([drive.period]), np.zeros(faces + 1))
-
-
-def segments_of(drive) -> np.ndarray:
-    """The segments of a drive of `core` or `structure.drives` as rows (p, 12) of `drive_kernels`."""
-    period = drive.period
-    if drive.segments:
-        rows = [_sine(part, period) for part in drive.segments]
-    else:
-        rows = (_swept if hasattr(drive, "low") else _lines)(drive)
-    out = np.zeros((len(rows), 12))
-    for row, (start, *numbers) in zip(out, rows):
-        row[:2] = place(start, period)
-        row[2 : 2 + len(numbers)] = numbers
-    return out
-
-
-def place(time: float, period: float) -> tuple:
-    """(cycle, offset [s]) of a time [s]; within a last digit of a whole cycle it is that one."""
-    share = time / period
-    near = round(share)
-    if abs(share - near) <= 4e-15 * max(1.0, abs(share)):
-        return float(near), 0.0
-    return float(int(share)), max(time - int(share) * period, 0.0)
-
-
-def _sine(part, period: float) -> tuple:
-    omega = part.omega if part.amplitude else 0.0
-    turns = omega * period / (2 * np.pi)
-    more = 0.0 if abs(turns - round(turns)) < 4e-15 * max(1.0, turns) else turns - int(turns)
-    coarse = round(more * 2**24) / 2**24
-    steady = part.constant + (0.0 if omega else part.amplitude * np.sin(part.phase))
-    phase = part.phase - omega * place(part.start, period)[1]
-    return (
-        part.start,
-        kinds.SINE,
-        steady,
-        part.amplitude if omega else 0.0,
-        omega,
-        phase,
-        0.0,
-        0.0,
-        omega,
-        coarse,
-        more - coarse,
+    return TimeState(
+        np.zeros(len(TIME)), segments, np.array([drive.period]), np.zeros(n_interfaces + 1)
     )
 
 
-def _swept(sweep) -> list:
-    """The sweep, then the sine at its last frequency."""
+def drive_segments(drive) -> np.ndarray:
+    """Return the segments (p, 12) of a drive of `core` or `structure.drives`, see `SegmentColumns`."""
+    if drive.segments:
+        return np.array([_sine_segment(part, drive.period) for part in drive.segments])
+    return np.array(_sweep_segments(drive) if hasattr(drive, "low") else _record_segments(drive))
+
+
+def split_time(time: float, period: float) -> tuple:
+    """Return the cycle in which a time [s] lies and the time [s] since that cycle began.
+
+    A time within a last digit of the end of a cycle is that end.
+    """
+    cycles = time / period
+    nearest = round(cycles)
+    if abs(cycles - nearest) <= WHOLE_TOL * max(1.0, abs(cycles)):
+        return float(nearest), 0.0
+    return float(int(cycles)), max(time - int(cycles) * period, 0.0)
+
+
+def _make_segment(start: float, period: float, kind: float, **columns) -> np.ndarray:
+    """Return one segment (12,) that starts at a time [s]; columns: values by the names of `SegmentColumns`."""
+    segment = np.zeros(len(SEGMENT))
+    segment[: SEGMENT.kind] = split_time(start, period)
+    segment[SEGMENT.kind] = kind
+    for name, value in columns.items():
+        segment[getattr(SEGMENT, name)] = value
+    return segment
+
+
+def _sine_segment(part, period: float) -> np.ndarray:
+    """Return the segment of a sine, or of a constant where its amplitude or frequency is 0."""
+    omega = part.omega if part.amplitude else 0.0
+    constant = part.constant + (0.0 if omega else part.amplitude * np.sin(part.phase))
+    revolutions = omega * period / (2 * np.pi)
+    is_whole = abs(revolutions - round(revolutions)) < WHOLE_TOL * max(1.0, revolutions)
+    excess = 0.0 if is_whole else revolutions - int(revolutions)
+    rounded = round(excess * 2**TURN_BITS) / 2**TURN_BITS
+    return _make_segment(
+        part.start,
+        period,
+        KIND.sine,
+        constant=constant,
+        amplitude=part.amplitude if omega else 0.0,
+        omega=omega,
+        phase=part.phase - omega * split_time(part.start, period)[1],
+        rate=omega,
+        turns=rounded,
+        turns_remainder=excess - rounded,
+    )
+
+
+def _sweep_segments(sweep) -> list:
+    """Return the segments of a sweep: the sweep itself, then a sine at its last frequency."""
     low = 2 * np.pi * sweep.low
     high = 2 * np.pi * sweep.high
-    span = sweep.duration
-    log = sweep.logarithmic and high != low
-    slope = np.log(high / low) / span if log else (high - low) / span
-    moved = sweep.displacement is not None
-    size = sweep.displacement if moved else sweep.acceleration
-    last = float(sweep.phase(span)) - high * place(span, sweep.period)[1]
+    duration = sweep.duration
+    is_logarithmic = sweep.logarithmic and high != low
+    slope = np.log(high / low) / duration if is_logarithmic else (high - low) / duration
+    is_displacement = sweep.displacement is not None
+    amplitude = sweep.displacement if is_displacement else sweep.acceleration
+    last_phase = float(sweep.phase(duration)) - high * split_time(duration, sweep.period)[1]
     return [
-        (
+        _make_segment(
             0.0,
-            kinds.LOG_CHIRP if log else kinds.CHIRP,
-            0.0,
-            size,
-            low,
-            0.0,
-            slope,
-            float(moved),
-            sweep.rate,
+            sweep.period,
+            KIND.log_chirp if is_logarithmic else KIND.chirp,
+            amplitude=amplitude,
+            omega=low,
+            slope=slope,
+            is_displacement=is_displacement,
+            rate=sweep.rate,
         ),
-        (span, kinds.SINE, 0.0, size * high**2 if moved else size, high, last, 0.0, 0.0, high),
+        _make_segment(
+            duration,
+            sweep.period,
+            KIND.sine,
+            amplitude=amplitude * high**2 if is_displacement else amplitude,
+            omega=high,
+            phase=last_phase,
+            rate=high,
+        ),
     ]
 
 
-def _lines(record) -> list:
-    """Straight lines between the rows of a record, then nothing."""
-    slopes = np.diff(record.value) / np.diff(record.time)
-    rows = [
-        (float(t), kinds.LINE, float(y), 0.0, 0.0, 0.0, float(s), 0.0, 0.0)
-        for t, y, s in zip(record.time, record.value, slopes)
-    ]
-    return [*rows, (float(record.time[-1]), kinds.LINE, *[0.0] * 7)]
+def _record_segments(record) -> np.ndarray:
+    """Return the segments (p, 12) of a record: straight lines between its rows, then nothing."""
+    segments = np.zeros((len(record.time), len(SEGMENT)))
+    segments[:, : SEGMENT.kind] = [split_time(float(time), record.period) for time in record.time]
+    segments[:, SEGMENT.kind] = KIND.line
+    segments[:-1, SEGMENT.constant] = record.value[:-1]
+    segments[:-1, SEGMENT.slope] = np.diff(record.value) / np.diff(record.time)
+    return segments
 
 
-def into(old, new):
-    """A tuple of arrays, or of such tuples, in the arrays of another: compiled code knows where these are, which takes
-    most of the time of a short call. `new` itself where `old` is None or has other shapes."""
-    if old is None or not _fits(old, new):
+def copy_into(old, new):
+    """Copy a tuple of arrays, or of such tuples, into the arrays of another one.
+
+    Compiled code knows where the old arrays are, which takes most of the time of a short call.
+
+    Parameters
+    ----------
+    old, new : tuple
+        Tuples of arrays; `old` may be None.
+
+    Returns
+    -------
+    tuple
+        `old` with the values of `new`, or `new` itself where `old` is None or has other shapes.
+    """
+    if old is None or not _has_same_shapes(old, new):
         return new
-    for mine, given in zip(old, new):
-        if isinstance(mine, tuple):
-            into(mine, given)
+    for old_part, new_part in zip(old, new):
+        if isinstance(old_part, tuple):
+            copy_into(old_part, new_part)
         else:
-            mine[...] = given
+            old_part[...] = new_part
     return old
 
 
-def _fits(old, new) -> bool:
-    """Whether two tuples of arrays have the same shapes."""
+def _has_same_shapes(old, new) -> bool:
+    """Return whether two tuples of arrays have the same shapes."""
     return all(
-        _fits(mine, given) if isinstance(mine, tuple) else mine.shape == given.shape
-        for mine, given in zip(old, new)
+        _has_same_shapes(a, b) if isinstance(a, tuple) else a.shape == b.shape
+        for a, b in zip(old, new)
     )
 
 
-class Past(NamedTuple):
-    """State at the last border of a cycle, by which `repeat_kernels` knows a motion that repeats.
+class PreviousCycle(NamedTuple):
+    """State at the last end of a cycle, by which `repeat_kernels` recognises a motion that repeats.
 
-    about (3,): segment of the drive then, -1 before there is a state; cycle up to which states lay far apart; 1 where
-    the motion repeats to the last bit. motion (2, n); memory: of the elements.
+    - status: (3,) see `PreviousPositions`
+    - motion: (2, n) modal coordinates [m] and rates [m/s]
+    - memory: of the elements
     """
 
-    about: np.ndarray
+    status: np.ndarray
     motion: np.ndarray
     memory: Memory
 
 
-def past_of(modal_system: ModalSystem, table: Table) -> Past:
-    """The Past of a run that begins."""
-    return Past(
-        np.array([-1.0, 0.0, 0.0]),
-        np.zeros((2, len(modal_system.square))),
-        virgin(table, np.zeros(len(modal_system.reach))),
+def start_previous_cycle(modal_system: ModalSystem, table: ElementTable) -> PreviousCycle:
+    """Return the PreviousCycle of a run that begins, which holds no state."""
+    status = np.zeros(len(PREVIOUS))
+    status[PREVIOUS.segment] = -1.0
+    return PreviousCycle(
+        status,
+        np.zeros((2, len(modal_system.omega_squared))),
+        unstretched_memory(table, np.zeros(len(modal_system.inverse_mass))),
     )
 
 
-class Room(NamedTuple):
-    """Room of the loop: coefs (terms, n), waves (3, terms) of the drive, polys (i + 3, terms), pull and springs (i,),
-    nodes (n, 4) of the sums, hulls of the search for roots.
+class Constraint(NamedTuple):
+    """Interfaces whose rigid elements stick, as a constraint on the modes (`stick_kernels.constrain_slides`).
 
-    Of slides that rigid elements hold (`stick_kernels`): mask (i,) which, held (2,) how many and whether nothing can
-    move, react (i, n) and tied (i,) as `constrain` leaves them, reactions (i, terms) [N] over a piece; orders (i, 2) of
-    the terms that vanish where a piece begins after an event, -1 before the first choice; resting, signs, guess (i,) of
-    a choice, scales (terms, n) and spans (i, terms) of its round-off, turned (i, n), mix and gram (i, i), row (2, i).
+    - is_held: (i,) 1 where the relative displacement is held
+    - status: (2,) see `HoldPositions`
+    - basis: (i, n) orthogonal rows that span those of the held interfaces, 0 in the dependent ones
+    - inverse: (i, n) transposed pseudo-inverse of the held rows, 0 in the others
+    - is_tied: (i,) 1 where the held rows hold this interface too
+    - reactions: (i, terms) series of the reactions [N] over a piece
+    - matrix: (i, i) the transformation to `basis`, or a matrix to solve with
+    - scratch: (2, i)
     """
 
-    coefs: np.ndarray
-    waves: np.ndarray
-    polys: np.ndarray
-    pull: np.ndarray
-    springs: np.ndarray
-    nodes: np.ndarray
-    hulls: np.ndarray
-    mask: np.ndarray
-    held: np.ndarray
-    react: np.ndarray
-    tied: np.ndarray
+    is_held: np.ndarray
+    status: np.ndarray
+    basis: np.ndarray
+    inverse: np.ndarray
+    is_tied: np.ndarray
     reactions: np.ndarray
-    orders: np.ndarray
-    resting: np.ndarray
-    signs: np.ndarray
+    matrix: np.ndarray
+    scratch: np.ndarray
+
+
+class Choice(NamedTuple):
+    """The choice between stick and slip after an event (`stick_kernels.choose_sticks`).
+
+    - is_resting: (i,) 1 where an interface with a rigid element has no velocity
+    - slip_signs, guess: (i,) directions of slip, 0 in stick, at first and as they are tried
+    - orders: (i, 2) orders of the terms that vanish where the next piece begins, -1 before the first choice
+    - motion_sizes, reaction_sizes: (terms, n), (i, terms) magnitudes that the terms of motion and reactions are added
+      from, the scale of their round-off
+    """
+
+    is_resting: np.ndarray
+    slip_signs: np.ndarray
     guess: np.ndarray
-    scales: np.ndarray
-    spans: np.ndarray
-    turned: np.ndarray
-    mix: np.ndarray
-    gram: np.ndarray
-    row: np.ndarray
+    orders: np.ndarray
+    motion_sizes: np.ndarray
+    reaction_sizes: np.ndarray
 
 
-def room_of(modal_system: ModalSystem) -> Room:
-    """Fresh Room for a Plant."""
-    faces, n = modal_system.faces.shape
-    wide = series.MOST + 5
-    fields = {
-        "coefs": (wide, n),
-        "waves": (3, wide),
-        "polys": (faces + 3, wide),
-        "nodes": (n, 4),
-        "hulls": (series.DEEP + 2, series.WIDE),
-        "held": (2,),
-        "react": (faces, n),
-        "reactions": (faces, wide),
-        "orders": (faces, 2),
-        "scales": (wide, n),
-        "spans": (faces, wide),
-        "turned": (faces, n),
-        "mix": (faces, faces),
-        "gram": (faces, faces),
-        "row": (2, faces),
-    }
-    return cleared(Room(*(np.empty(fields.get(name, (faces,))) for name in Room._fields)))
+class Workspace(NamedTuple):
+    """Workspace of the kernels for one piece.
+
+    - coefficients: (terms, n) series of the modal coordinates [m]
+    - drive: (3, terms) series of the drive [m s-2], and workspace for it
+    - polynomials: (i + 3, terms) series of the speeds of the interfaces, and workspace
+    - pull, stiffness: (i,) forces over the mass [m s-2], and stiffness [N/m] of the interfaces
+    - rates: (n, 4) modal rates at four Gauss points
+    - hulls: Bernstein coefficients of the intervals in which a root is searched for
+    - constraint, choice
+    """
+
+    coefficients: np.ndarray
+    drive: np.ndarray
+    polynomials: np.ndarray
+    pull: np.ndarray
+    stiffness: np.ndarray
+    rates: np.ndarray
+    hulls: np.ndarray
+    constraint: Constraint
+    choice: Choice
 
 
-def cleared(workspace: Room) -> Room:
-    """A Room as it is before a run."""
-    for part in workspace:
+def make_workspace(modal_system: ModalSystem) -> Workspace:
+    """Return a cleared workspace for a modal system."""
+    i, n = modal_system.interfaces.shape
+    n_terms = series.MAX_POWER + 5
+    constraint = Constraint(
+        is_held=np.empty(i),
+        status=np.empty(len(HOLD)),
+        basis=np.empty((i, n)),
+        inverse=np.empty((i, n)),
+        is_tied=np.empty(i),
+        reactions=np.empty((i, n_terms)),
+        matrix=np.empty((i, i)),
+        scratch=np.empty((2, i)),
+    )
+    choice = Choice(
+        is_resting=np.empty(i),
+        slip_signs=np.empty(i),
+        guess=np.empty(i),
+        orders=np.empty((i, 2)),
+        motion_sizes=np.empty((n_terms, n)),
+        reaction_sizes=np.empty((i, n_terms)),
+    )
+    workspace = Workspace(
+        coefficients=np.empty((n_terms, n)),
+        drive=np.empty((3, n_terms)),
+        polynomials=np.empty((i + 3, n_terms)),
+        pull=np.empty(i),
+        stiffness=np.empty(i),
+        rates=np.empty((n, 4)),
+        hulls=np.empty((series.MAX_HALVINGS + 2, series.HULL_WIDTH)),
+        constraint=constraint,
+        choice=choice,
+    )
+    return clear_workspace(workspace)
+
+
+def clear_workspace(workspace: Workspace) -> Workspace:
+    """Set a workspace to what it is before a run, and return it."""
+    for part in (*workspace[:-2], *workspace.constraint, *workspace.choice):
         part.fill(0.0)
-    workspace.orders.fill(-1.0)
+    workspace.choice.orders.fill(-1.0)
     return workspace
 
 
-class Books(NamedTuple):
-    """What a run sums: ledger (8,) work of the drive, viscous loss, integral of its |power|, friction work, energy
-    dissipated, largest energy stored [J], pieces, 1 where an interface slipped by half or more; extremes (c, 2) [m] of
-    the output per cycle; phasors (c, 2) of its drive-frequency part, real and imaginary, in the cycles where wanted
-    (c,) is 1; limits (2,): travel [m], idle events."""
+class RunSums(NamedTuple):
+    """What a run sums up.
+
+    - ledger: (8,) energies and counts, see `LedgerPositions`
+    - extremes: (c, 2) smallest and largest output [m] of every cycle
+    - phasors: (c, 2) real and imaginary part of the output [m] at the frequency of the cycle
+    - is_phasor_wanted: (c,) 1 in the cycles whose phasor is computed
+    - limits: (2,) see `LimitPositions`
+    """
 
     ledger: np.ndarray
     extremes: np.ndarray
     phasors: np.ndarray
-    wanted: np.ndarray
+    is_phasor_wanted: np.ndarray
     limits: np.ndarray
 
 
-def books_of(cycles: int, wanted, travel: float = np.inf) -> Books:
-    """Empty Books of a run of so many cycles."""
-    return Books(
-        np.zeros(8),
-        np.tile([np.inf, -np.inf], (cycles, 1)),
-        np.zeros((cycles, 2)),
-        np.array(wanted, float),
-        np.array([travel, 0.0]),
+def start_sums(n_cycles: int, is_phasor_wanted, travel: float = np.inf) -> RunSums:
+    """Return the sums of a run that begins.
+
+    Parameters
+    ----------
+    n_cycles : int
+        Cycles of the run.
+    is_phasor_wanted : array_like
+        (n_cycles,) 1 in the cycles whose phasor is computed.
+    travel : float, optional
+        Travel of the output [m], at which the run ends.
+
+    Returns
+    -------
+    RunSums
+    """
+    limits = np.zeros(len(LIMIT))
+    limits[LIMIT.travel] = travel
+    return RunSums(
+        np.zeros(len(LEDGER)),
+        np.tile([np.inf, -np.inf], (n_cycles, 1)),
+        np.zeros((n_cycles, 2)),
+        np.array(is_phasor_wanted, float),
+        limits,
     )

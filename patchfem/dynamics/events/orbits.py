@@ -1,4 +1,4 @@
-"""Periodic motions at one drive after another, and what instruments see of them."""
+"""Periodic motions under one sine after another, and what instruments measure of them."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -10,16 +10,23 @@ from ...core import InitialState, ModalBasis, NotConverged, Response
 from ...cost_model import PYTHON_READ_FRACTION
 from . import histories
 from .elements import Memory
-from .modal_system import books_of, past_of, plant_of
+from .modal_system import make_modal_system, start_previous_cycle, start_sums
 from .period import PeriodMap, Point
-from .steady import turning
+from .positions_kernels import LIMIT, N_COLUMNS, ROW, STATUS
+from .steady import find_antisymmetric_motion
 
-ROWS = 256  # pieces of half a period for which there is room at first
+# rows for the pieces of half a period; their number is doubled where it does not suffice
+INITIAL_ROWS = 256
 
 
-class Seen(NamedTuple):
-    """A motion that repeats: point at phase 0 of the drive; largest absolute acceleration [m s-2] at the output and its
-    first harmonic [m s-2]; displacement [m]: half the range of the gauge."""
+class PeriodicMotion(NamedTuple):
+    """A periodic motion as instruments measure it.
+
+    - point: state at phase 0 of the drive
+    - acceleration: largest absolute acceleration of the output [m s-2]
+    - fundamental: its first harmonic [m s-2]
+    - displacement: half the range of the gauge [m]
+    """
 
     point: Point
     acceleration: float
@@ -28,90 +35,102 @@ class Seen(NamedTuple):
 
 
 class Orbits:
-    """Motions of modes behind Elements of every interface, `groups`, that repeat under one sine after another and turn
-    over after half a period.
+    """Periodic motions of modes behind elements that change sign after half a period.
 
-    A call with a drive (core.SineDrive) and a Point near its motion, or None for rest, gives Seen; errors as
-    `steady.steady`. A Point of other elements counts as none.
+    A call with a drive (core.SineDrive) and a Point near its motion, or None for rest, returns a
+    PeriodicMotion; it raises as `steady.solve_steady`. A Point of other elements is ignored.
     """
 
     def __init__(self, modes: ModalBasis, groups):
         self.kernels = load("dynamics.events.march_kernels")
-        self.one = PeriodMap(modes, groups)
+        self.period_map = PeriodMap(modes, groups)
         self.march = self.kernels.march
-        self.peak = load("dynamics.events.dense_kernels").peak
-        self.wide = self.kernels.HEAD + 2 * modes.omega.size + self.kernels.EACH * len(groups)
-        self.rows = np.zeros((ROWS, self.wide))
-        self.books = books_of(1, np.ones(1))
+        self.peak = load("dynamics.events.dense_kernels").find_peaks
+        self.wide = ROW.motion + 2 * modes.omega.size + N_COLUMNS * len(groups)
+        self.rows = np.zeros((INITIAL_ROWS, self.wide))
+        self.run_sums = start_sums(1, np.ones(1))
         self.forces = np.zeros(len(groups))
-        self.past = past_of(self.one.modal_system, self.one.table)
-        self._given(modes)
+        self.past = start_previous_cycle(self.period_map.modal_system, self.period_map.table)
+        self._set_system(modes)
 
-    def _given(self, modes: ModalBasis) -> None:
+    def _set_system(self, modes: ModalBasis) -> None:
+        """Take modes."""
         self.modes = modes
         self.held = {}
-        self.gauge = None if modes.gauge is None else plant_of(replace(modes, output=modes.gauge))
+        self.gauge = (
+            None if modes.gauge is None else make_modal_system(replace(modes, output=modes.gauge))
+        )
 
-    def renewed(self, modes: ModalBasis, groups) -> bool:
-        """Take other modes and elements in the same workspace; False, and nothing is taken, where it does not fit."""
-        same = self.one.renewed(modes, groups)
+    def replace_system(self, modes: ModalBasis, groups) -> bool:
+        """Take other modes and elements in the same workspace.
+
+        Returns False where they do not fit.
+        """
+        same = self.period_map.replace_system(modes, groups)
         if same:
-            self._given(modes)
+            self._set_system(modes)
         return same
 
-    def __call__(self, drive, near: Point | None = None) -> Seen:
-        one = self.one
-        point = turning(one, drive, near if self._fits(near) else None)[0].point
-        used, swing = self._half(drive, point, one.modal_system)
-        self.peak.expect(PYTHON_READ_FRACTION * one.seconds / 2)
+    def __call__(self, drive, near: Point | None = None) -> PeriodicMotion:
+        period_map = self.period_map
+        point = find_antisymmetric_motion(
+            period_map, drive, near if self._is_compatible(near) else None
+        )[0].point
+        used, swing = self._march_half_period(drive, point, period_map.modal_system)
+        self.peak.expect(PYTHON_READ_FRACTION * period_map.seconds / 2)
         high = self.peak.call_with_bound_args(
-            self._held("peak", one.modal_system, float(drive.moving)), self.rows[:used]
+            self._bound_arguments("peak", period_map.modal_system, float(drive.moving)),
+            self.rows[:used],
         )
         first = (
-            -2 * drive.omega**2 * complex(*self.books.phasors[0])
+            -2 * drive.omega**2 * complex(*self.run_sums.phasors[0])
             - 1j * drive.acceleration * drive.moving
         )
         if self.gauge is not None:
-            swing = self._half(drive, point, self.gauge)[1]
-        return Seen(point, float(high), first, swing)
+            swing = self._march_half_period(drive, point, self.gauge)[1]
+        return PeriodicMotion(point, float(high), first, swing)
 
     def window(self, drive, point: Point) -> Response:
-        """Histories of the period from a Point on."""
-        n = self.one.n
-        memory = self.one.placed(point)
+        """Return the histories of the period that begins at a Point."""
+        n = self.period_map.n
+        memory = self.period_map.complete_memory(point)
         start = InitialState(point.motion[:n], point.motion[n:])
         return histories.simulate(
-            self.modes, drive, self.one.groups, 1.0, 1, np.inf, 0, None, start, memory
+            self.modes, drive, self.period_map.groups, 1.0, 1, np.inf, 0, None, start, memory
         ).window
 
-    def _fits(self, near: Point | None) -> bool:
-        """Whether a Point is one of these modes and elements."""
-        still = self.one.still
-        count = self.one.table.count
+    def _is_compatible(self, near: Point | None) -> bool:
+        """Return whether a Point belongs to these modes and elements."""
+        still = self.period_map.still
+        count = self.period_map.table.n_elements
         return (
             near is not None
-            and near.motion.size == 2 * self.one.n
-            and near.memory.at.shape == still.at.shape
-            and np.array_equal(_all_of(near.memory), count)
+            and near.motion.size == 2 * self.period_map.n
+            and near.memory.group_slide.shape == still.group_slide.shape
+            and np.array_equal(_count_elements(near.memory), count)
         )
 
-    def _half(self, drive, point: Point, modal_system) -> tuple:
-        """(pieces, largest output [m]) of half a period from a Point, the pieces in `rows`; the other half turns
-        over."""
-        one = self.one
-        books = self.books
+    def _march_half_period(self, drive, point: Point, modal_system) -> tuple:
+        """March half a period; returns the number of pieces and the peak output [m].
+
+        The pieces are left in `rows`; the other half of the period changes sign.
+        """
+        period_map = self.period_map
+        run_sums = self.run_sums
         stop = (0.0, drive.period / 2)
         while True:
-            one.begin(drive, point)
-            self.march.expect(one.seconds / 2)
-            books.ledger[:] = 0.0
-            books.phasors[:] = 0.0
-            books.limits[1] = 0.0
-            books.extremes[:] = (np.inf, -np.inf)
-            code, used = self.march.call_with_bound_args(self._held("march", modal_system), stop)
-            if code == self.kernels.DONE:
-                return used, float(max(books.extremes[0, 1], -books.extremes[0, 0]))
-            if code != self.kernels.FULL:
+            period_map.start_period(drive, point)
+            self.march.expect(period_map.seconds / 2)
+            run_sums.ledger[:] = 0.0
+            run_sums.phasors[:] = 0.0
+            run_sums.limits[LIMIT.n_idle] = 0.0
+            run_sums.extremes[:] = (np.inf, -np.inf)
+            code, used = self.march.call_with_bound_args(
+                self._bound_arguments("march", modal_system), stop
+            )
+            if code == STATUS.done:
+                return used, float(max(run_sums.extremes[0, 1], -run_sums.extremes[0, 0]))
+            if code != STATUS.full:
                 raise NotConverged(
                     "dynamics: within a period the contact changes between stick and slip again and "
                     "again without time passing"
@@ -119,29 +138,31 @@ class Orbits:
             self.rows = np.zeros((2 * len(self.rows), self.wide))
             self.held = {}
 
-    def _held(self, name: str, modal_system, moving: float = 0.0) -> tuple:
-        """What a compiled function is called with."""
-        one = self.one
+    def _bound_arguments(self, name: str, modal_system, moving: float = 0.0) -> tuple:
+        """Return the arguments that a compiled function is bound to."""
+        period_map = self.period_map
         key = (name, id(modal_system), moving)
         if key not in self.held:
             self.held[key] = (
-                self.peak.held(modal_system, one.time_state, moving, one.workspace, self.forces)
+                self.peak.held(
+                    modal_system, period_map.time_state, moving, period_map.workspace, self.forces
+                )
                 if name == "peak"
                 else self.march.held(
-                    one.motion,
+                    period_map.motion,
                     modal_system,
-                    one.table,
-                    one.memory,
+                    period_map.table,
+                    period_map.memory,
                     self.past,
-                    one.time_state,
-                    self.books,
-                    one.workspace,
+                    period_map.time_state,
+                    self.run_sums,
+                    period_map.workspace,
                     self.rows,
                 )
             )
         return self.held[key]
 
 
-def _all_of(memory: Memory) -> np.ndarray:
-    """Elements (i,) that a memory speaks of: those of its outermost group, or all where all slip."""
-    return np.where(memory.depth > 0, memory.upto[:, 0], memory.slipping)
+def _count_elements(memory: Memory) -> np.ndarray:
+    """Return the number (i,) of elements that a memory belongs to."""
+    return np.where(memory.n_groups > 0, memory.group_end[:, 0], memory.n_slipping)

@@ -1,4 +1,7 @@
-"""The map of a motion over one period of a sine, or over half of one turned over, and its exact derivative."""
+"""Map of a motion over a period of a sine, or half of one, and its exact derivative.
+
+The sign of the motion is changed after half a period.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -8,95 +11,113 @@ import numpy as np
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, PatchfemError
 from .cost import python_seconds
-from .elements import Memory, sorted_stretches, table_of, virgin
-from .modal_system import Clock, books_of, clock_of, place, plant_of, room_of
-
-SLOPES = 2.0  # times as long a map takes as Python where it carries its slopes
-DRIVES = 256  # sines whose clocks are remembered
-# what of a memory turns over with the motion
-SIGNED = (
-    "place",
-    "way",
-    "at",
-    "side",
-    "force",
-    "slip",
+from .elements import Memory, make_table, sorted_stretches, unstretched_memory
+from .modal_system import (
+    TimeState,
+    make_modal_system,
+    make_workspace,
+    split_time,
+    start_sums,
+    start_time_state,
 )
+from .positions_kernels import LIMIT
+
+# computing time of a map with slopes over that of a map without them, both as interpreted Python
+SLOPE_COST_FACTOR = 2.0
+# drives whose segments are kept
+MAX_KEPT_DRIVES = 256
+# fields of a memory that change sign with the motion
+ODD_FIELDS = ("slide", "direction", "group_slide", "group_sign", "force", "slip")
 
 
 class Point(NamedTuple):
-    """State at phase 0 of the drive: motion (2 n,) coordinates [m] and rates [m/s], and memory of the elements."""
+    """State at phase 0 of the drive.
+
+    - motion: (2 n,) modal coordinates [m] and rates [m/s]
+    - memory: of the elements
+    - known: turning places, where they are known
+    """
 
     motion: np.ndarray
     memory: Memory
-    known: tuple | None = None  # `turned` of a Point that another one was moved to
+    known: tuple | None = None  # turning places, where they are known
 
     @property
-    def turned(self) -> tuple:
-        """(interfaces (d,), groups (d,)) of the turning places that the memory holds."""
-        return self.known or turned_of(self.memory)
+    def turning_places(self) -> tuple:
+        """Interfaces (d,) and groups (d,) of the turning places in the memory."""
+        return self.known or find_turning_places(self.memory)
 
     @property
     def numbers(self) -> np.ndarray:
-        """Motion and turning places (2 n + d,) in a row."""
-        return np.concatenate([self.motion, self.memory.at[self.turned]])
+        """Motion and relative displacements of the turning places (2 n + d,)."""
+        return np.concatenate([self.motion, self.memory.group_slide[self.turning_places]])
 
     def moved(self, numbers) -> "Point":
-        """The Point of other numbers in a row, the same elements in every group."""
-        memory = copied(self.memory)
+        """Return the Point with other numbers and the same elements in every group."""
+        memory = copy_memory(self.memory)
         count = self.motion.size
-        turned = self.turned
-        memory.at[turned] = numbers[count:]
+        turned = self.turning_places
+        memory.group_slide[turned] = numbers[count:]
         return Point(np.array(numbers[:count]), memory, turned)
 
 
-def turned_of(memory: Memory) -> tuple:
-    """(interfaces (d,), groups (d,)) of the turning places that a memory holds."""
-    found = [row[:deep].nonzero()[0] for row, deep in zip(memory.side, memory.depth.tolist())]
+def find_turning_places(memory: Memory) -> tuple:
+    """Return interfaces (d,) and groups (d,) of the turning places in a memory."""
+    found = [
+        row[:deep].nonzero()[0] for row, deep in zip(memory.group_sign, memory.n_groups.tolist())
+    ]
     if len(found) == 1:
         return np.zeros_like(found[0]), found[0]
     return np.repeat(np.arange(len(found)), [part.size for part in found]), np.concatenate(found)
 
 
-def copied(memory: Memory) -> Memory:
-    """A Memory of its own."""
+def copy_memory(memory: Memory) -> Memory:
+    """Return a copy of a memory."""
     return Memory(*(part.copy() for part in memory))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Map:
-    """A Point after a period, or turned over after half of one, `end`; slope (its numbers, those of the start): its
-    derivative; kept (k,): numbers, of start and end, of the turning places that nothing slipped past.
+class PeriodMapping:
+    """Image of a Point under the map.
 
-    most (i,): elements that slip at once at most; least (i,): groups that stayed; extremes (2,): of the output [m];
-    pieces of the motion.
+    - end: the Point after a period, or after half of one with the sign changed
+    - slope: derivative of the numbers of `end` with respect to those of the start
+    - kept: (k,) numbers, of start and end, of turning places that no slip has passed
+    - max_slipping: (i,) largest number of elements that slip at once
+    - min_groups: (i,) smallest number of groups
+    - extremes: (2,) of the output [m]
+    - pieces: number of pieces
     """
 
     end: Point
     slope: np.ndarray
     kept: np.ndarray
-    most: np.ndarray
-    least: np.ndarray
+    max_slipping: np.ndarray
+    min_groups: np.ndarray
     extremes: np.ndarray
     pieces: int
 
 
 class PeriodMap:
-    """The map of modes behind Elements of every interface, `groups`.
+    """Map over a period of modes behind elements.
 
-    What the compiled run works in is made once and filled for each map.
+    Its arrays are reused for each call.
     """
 
     def __init__(self, modes: ModalBasis, groups):
-        self.follow = load("dynamics.events.slope_kernels").follow
+        self.follow = load("dynamics.events.slope_kernels").march_with_slopes
         self.n = modes.omega.size
-        self._given(modes, groups)
+        self._set_system(modes, groups)
         faces = len(self.groups)
-        self.workspace = room_of(self.modal_system)
-        self.books = books_of(2, np.zeros(2))
-        self.scratch = np.zeros((2, self.n)), np.zeros(faces), np.zeros_like(self.workspace.coefs)
+        self.workspace = make_workspace(self.modal_system)
+        self.run_sums = start_sums(2, np.zeros(2))
+        self.scratch = (
+            np.zeros((2, self.n)),
+            np.zeros(faces),
+            np.zeros_like(self.workspace.coefficients),
+        )
         self.motion = np.zeros((2, self.n))
-        self.memory = copied(self.still)
+        self.memory = copy_memory(self.still)
         self.seen = np.zeros((2, faces), np.int64)
         self.carried = {}
         self.drive = None
@@ -104,102 +125,127 @@ class PeriodMap:
         self.clocks = {}
         self.seconds = 0.0
 
-    def _given(self, modes: ModalBasis, groups) -> None:
+    def _set_system(self, modes: ModalBasis, groups) -> None:
         """Take modes and elements."""
         self.modes = modes
         self.groups = tuple(groups)
-        self.modal_system = plant_of(modes)
-        self.table = table_of(groups)
-        self.faces = self.modal_system.faces
+        self.modal_system = make_modal_system(modes)
+        self.table = make_table(groups)
+        self.faces = self.modal_system.interfaces
         self.held = {}
-        self.still = virgin(self.table, np.zeros(len(self.groups)))
+        self.still = unstretched_memory(self.table, np.zeros(len(self.groups)))
 
-    def renewed(self, modes: ModalBasis, groups) -> bool:
-        """Take other modes and elements in place of the first; False, and nothing is taken, where their numbers differ,
-        which asks for other room."""
+    def replace_system(self, modes: ModalBasis, groups) -> bool:
+        """Take other modes and elements.
+
+        Returns False where their numbers differ from the present ones.
+        """
         same = (
             modes.omega.size == self.n
-            and [one.stiffness.size for one in groups] == self.table.count.tolist()
+            and [one.stiffness.size for one in groups] == self.table.n_elements.tolist()
         )
         if same:
-            self._given(modes, groups)
+            self._set_system(modes, groups)
         return same
 
-    def rest(self) -> Point:
-        """The Point at rest, no element stretched."""
-        return Point(np.zeros(2 * self.n), copied(self.still))
+    def make_rest_point(self) -> Point:
+        """Return the Point at rest with unstretched elements."""
+        return Point(np.zeros(2 * self.n), copy_memory(self.still))
 
-    def placed(self, point: Point) -> Memory:
-        """The memory of a Point with its place and slip as they follow from the motion."""
-        memory = copied(point.memory)
-        memory.place[:] = self.faces @ point.motion[: self.n]
+    def complete_memory(self, point: Point) -> Memory:
+        """Return the memory of a Point with displacement and slip as the motion gives them."""
+        memory = copy_memory(point.memory)
+        memory.slide[:] = self.faces @ point.motion[: self.n]
         for f, one in enumerate(self.groups):
             share = one.stiffness * one.yield_displacement
             memory.slip[f] = (
                 share
-                @ (memory.place[f] - sorted_stretches(one, memory, f))
+                @ (memory.slide[f] - sorted_stretches(one, memory, f))
                 / max(share.sum(), 1e-300)
             )
         return memory
 
-    def begin(self, drive, point: Point) -> None:
-        """Put clock, books, motion and memory to the start of a period of a sine, in a Point.
+    def start_period(self, drive, point: Point) -> None:
+        """Set time, sums, motion and memory to the start of a period of a sine at a Point.
 
-        PatchfemError for a drive that does not repeat.
+        Raises
+        ------
+        PatchfemError
+            If the drive does not repeat.
         """
         if drive is not self.drive:
-            self._under(drive)
+            self._set_drive(drive)
         time_state = self.time_state
-        books = self.books
+        run_sums = self.run_sums
         self.motion[:] = point.motion.reshape(2, self.n)
         for mine, given in zip(self.memory, point.memory):
             mine[...] = given
-        self.memory.place[:] = self.faces @ self.motion[0]
+        self.memory.slide[:] = self.faces @ self.motion[0]
         time_state.now[:] = 0.0
-        time_state.rest[:] = 0.0
-        books.ledger[:] = 0.0
-        books.limits[1] = 0.0
-        books.extremes[:] = (np.inf, -np.inf)
-        self.workspace.orders[:] = -1.0
+        time_state.is_at_turn[:] = 0.0
+        run_sums.ledger[:] = 0.0
+        run_sums.limits[LIMIT.n_idle] = 0.0
+        run_sums.extremes[:] = (np.inf, -np.inf)
+        self.workspace.choice.orders[:] = -1.0
 
-    def _under(self, drive) -> None:
-        """Set the clock to a sine; it is made once for each of the last drives."""
+    def _set_drive(self, drive) -> None:
+        """Set the time to the start of a sine; its segments are kept for the next call."""
         if id(drive) not in self.clocks:
             if len(drive.segments) != 1:
                 raise PatchfemError(
                     "drive: a periodic motion can be computed only if the drive is a single sine "
                     'without end; for this drive use accuracy.method = "march"'
                 )
-            if len(self.clocks) >= DRIVES:
+            if len(self.clocks) >= MAX_KEPT_DRIVES:
                 self.clocks.clear()
             stiff = max(float(one.stiffness.sum()) for one in self.groups)
-            seconds = python_seconds(self.modes, drive, stiff, int(self.table.count.sum()))
-            self.clocks[id(drive)] = drive, clock_of(drive, len(self.groups)), seconds
+            seconds = python_seconds(self.modes, drive, stiff, int(self.table.n_elements.sum()))
+            self.clocks[id(drive)] = drive, start_time_state(drive, len(self.groups)), seconds
         _, time_state, self.seconds = self.clocks[id(drive)]
         if self.time_state is None:
-            self.time_state = Clock(*(part.copy() for part in time_state))
+            self.time_state = TimeState(*(part.copy() for part in time_state))
         self.drive = drive
         self.time_state.segments[:] = time_state.segments
         self.time_state.period[:] = time_state.period
 
-    def __call__(self, drive, point: Point, half: bool, slopes: bool = True) -> Map:
-        """The Map of a Point over a period of a sine, or over half of one. NotConverged where events pile up,
-        PatchfemError for a drive that does not repeat; without `slopes` that of the Map is empty."""
-        self.begin(drive, point)
+    def __call__(self, drive, point: Point, half: bool, slopes: bool = True) -> PeriodMapping:
+        """Map a Point over a period of a sine.
+
+        Parameters
+        ----------
+        drive
+        point : Point
+        half : bool
+            Whether half a period is mapped and the sign changed.
+        slopes : bool, optional
+            Whether the derivative is computed.
+
+        Returns
+        -------
+        PeriodMapping
+
+        Raises
+        ------
+        NotConverged
+            If events follow each other without progress in time.
+        PatchfemError
+            If the drive does not repeat.
+        """
+        self.start_period(drive, point)
         n = self.n
         memory = self.memory
         seen = self.seen
         period = drive.period
-        face, group = point.turned
+        face, group = point.turning_places
         size = 2 * n + face.size if slopes else 0
-        slope, marks, unit = self._carried(size)
+        slope, marks, unit = self._slope_arrays(size)
         if slopes:
             slope[:] = unit
-            marks[:, : memory.depth.max(initial=0)] = 0.0
+            marks[:, : memory.n_groups.max(initial=0)] = 0.0
             marks[face, group, np.arange(2 * n, size)] = 1.0
-        seen[0] = memory.slipping
-        seen[1] = memory.depth
-        self.follow.expect(self.seconds * (SLOPES if slopes else 1.0) / (1 + half))
+        seen[0] = memory.n_slipping
+        seen[1] = memory.n_groups
+        self.follow.expect(self.seconds * (SLOPE_COST_FACTOR if slopes else 1.0) / (1 + half))
         if size not in self.held:
             self.held[size] = self.follow.held(
                 self.motion,
@@ -209,35 +255,40 @@ class PeriodMap:
                 self.table,
                 memory,
                 self.time_state,
-                self.books,
+                self.run_sums,
                 self.workspace,
                 self.scratch,
                 seen,
             )
         pieces = self.follow.call_with_bound_args(
-            self.held[size], place(period / 2 if half else period, period)
+            self.held[size], split_time(period / 2 if half else period, period)
         )
         if pieces < 0:
             raise NotConverged(
                 "dynamics: within one period the contact changes between stick and slip more often than "
                 "can be computed"
             )
-        rows, columns = turned = turned_of(memory)
-        end = Point(self.motion.ravel().copy(), copied(memory), turned)
+        rows, columns = turned = find_turning_places(memory)
+        end = Point(self.motion.ravel().copy(), copy_memory(memory), turned)
         kept = 2 * n + (columns < seen[1, rows]).nonzero()[0]
         out = np.concatenate([slope.reshape(2 * n, size), marks[rows, columns]])
         if half:
-            for part in (end.motion, out, *(getattr(end.memory, name) for name in SIGNED)):
+            for part in (end.motion, out, *(getattr(end.memory, name) for name in ODD_FIELDS)):
                 np.negative(part, out=part)
-        return Map(end, out, kept, *seen.copy(), self.books.extremes[0].copy(), int(pieces))
+        return PeriodMapping(
+            end, out, kept, *seen.copy(), self.run_sums.extremes[0].copy(), int(pieces)
+        )
 
-    def _carried(self, size: int) -> tuple:
-        """Room for the slopes of so many numbers, of the motion (2, n, size) and of turning places (i, t + 1, size),
-        and the former at the start."""
+    def _slope_arrays(self, size: int) -> tuple:
+        """Return arrays for derivatives with respect to so many numbers.
+
+        They are those of the motion (2, n, size) and of turning places (i, t + 2, size), and the
+        former at the start.
+        """
         if size not in self.carried:
             self.carried[size] = (
                 np.zeros((2, self.n, size)),
-                np.zeros((*self.memory.at.shape, size)),
+                np.zeros((*self.memory.group_slide.shape, size)),
                 np.eye(2 * self.n, size).reshape(2, self.n, size),
             )
         return self.carried[size]

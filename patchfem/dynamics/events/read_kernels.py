@@ -1,390 +1,465 @@
-"""Compiled reading of the last cycles of a run off its pieces: ranges, loops, harmonics, peaks, releases.
+"""Measures of the last cycles of a run, from its pieces (compiled).
 
-Everything is an integral or an extreme of the series of the pieces themselves; nothing is sampled.
+Every measure is an integral or an extremum of the series of the pieces; nothing is sampled.
 """
 
 from math import cos, inf, nan, pi, sin, sqrt
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .dense_kernels import unfold
-from .drive_kernels import AMPLITUDE, CONSTANT, OMEGA, RATE
-from .march_kernels import EACH, HEAD
-from .memory_kernels import RIGID
-from .names_kernels import (
-    A3_COS,
-    A3_SIN,
-    A_COS,
-    A_SIN,
-    ACCELERATION,
-    BEGIN,
-    END,
-    F_COS,
-    F_FIRST,
-    F_LAST,
-    F_SIN,
-    FIRST,
-    FORCE,
-    HIGH,
-    LAST,
-    LOW,
-    OUT_HIGH,
-    OUT_LOW,
-    PASSED,
-    Q_COS,
-    Q_SIN,
-    RANGE,
-    REACH,
-    RING,
-    SECANT,
-    SLIP_HIGH,
-    SLIP_LOW,
-    START_COS,
-    START_SIN,
-    STARTS,
-    STUCK,
-    SWING,
-    TURNED,
-    WORK,
+from .dense_kernels import expand_row
+from .memory_kernels import RIGID_STIFFNESS
+from .positions_kernels import COLUMN, HOLD, INTERFACE, N_COLUMNS, ROW, RUN, SEGMENT
+from .search_kernels import displacement_at
+from .series_kernels import (
+    GAUSS_POINTS,
+    GAUSS_WEIGHTS,
+    bound_modal_rate,
+    count_gauss_points,
+    evaluate_polynomial,
+    find_largest_magnitude,
 )
-from .search_kernels import moved
-from .series_kernels import _PLACE, _WEIGHT, fastest, largest, points, value
 
-SLIPS = 0.5  # share of the slide that is irreversible from which an interface slips
-LASTS = 1e-9  # of a period: a shorter slip is none
-RESTS = 1e-9  # of the largest rate: slower is at rest
-MOVES = 1e-13  # of the range: a piece with less motion is a rest
-NEAR = 0.003  # of a period, in which a turn beyond the border of a cycle counts for it
-# columns of an interface in a row, behind its force
-SPRING = 1
-SHARE = 2
-SLIP = 4
-WORKED = 5
-WAY = 7
-PLACE = 8
+# fraction of the friction limit; where more of it slips, the interface slips
+SLIP_FRACTION = 0.5
+# fraction of a cycle: a shorter slip does not count as one, it is round-off of a stop
+MIN_SLIP_DURATION = 1e-9
+# fraction of the largest rate of an interface, below which it is at rest
+REST_RATE_RATIO = 1e-9
+# fraction of the range of an interface: a piece with less motion is a rest
+MIN_MOTION_RATIO = 1e-13
+# fraction of a cycle after its border within which a turn still counts for it
+MAX_TURN_DELAY = 0.003
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def first_of(face, modal_system):
-    """Column of the force of an interface in a row."""
-    return HEAD + 2 * len(modal_system.square) + EACH * face
+def force_column(interface, modal_system):
+    """Return the first column of an interface in a row."""
+    return ROW.motion + 2 * len(modal_system.omega_squared) + N_COLUMNS * interface
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def slide_of(row, face, modal_system):
-    """Slide [m] of an interface where a row begins."""
-    return row[first_of(face, modal_system) + PLACE]
+def row_slide(row, interface, modal_system):
+    """Return the relative displacement [m] of an interface where a row begins."""
+    return row[force_column(interface, modal_system) + COLUMN.slide]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rate_of(row, face, modal_system):
-    """Rate [m/s] of an interface where a row begins."""
-    out = 0.0
-    for i in range(len(modal_system.square)):
-        out += modal_system.faces[face, i] * row[HEAD + len(modal_system.square) + i]
-    return out
+def row_rate(row, interface, modal_system):
+    """Return the relative velocity [m/s] of an interface where a row begins."""
+    n = len(modal_system.omega_squared)
+    rate = 0.0
+    for i in range(n):
+        rate += modal_system.interfaces[interface, i] * row[ROW.motion + n + i]
+    return rate
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def closing_force(rows, j, face, modal_system):
-    """Force [N] of an interface at the end of the row j, in which no rigid element holds it."""
-    at = first_of(face, modal_system)
-    step = slide_of(rows[j + 1], face, modal_system) - slide_of(rows[j], face, modal_system)
-    return rows[j, at] + rows[j, at + SPRING] * step
+def end_force(rows, j, interface, modal_system):
+    """Return the force [N] of a free interface at the end of row j."""
+    at = force_column(interface, modal_system)
+    step = row_slide(rows[j + 1], interface, modal_system) - row_slide(
+        rows[j], interface, modal_system
+    )
+    return rows[j, at + COLUMN.force] + rows[j, at + COLUMN.stiffness] * step
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def acceleration(top, h, modal_system, moving, workspace, best):
-    """The larger of `best` and the largest |acceleration| [m s-2] of the output over the piece in the workspace, whose
-    series is left in the last row but one of workspace.polys; moving: 1 where the base moves."""
-    poly = workspace.polys[len(modal_system.reach) + 1]
-    whole = 0.0
+def peak_acceleration(top, h, modal_system, base_moves, workspace, largest):
+    """Return the larger of `largest` and the peak acceleration [m s-2] of the piece.
+
+    Its series is left in the last but one of workspace.polynomials; base_moves: 1 where the base
+    moves, else 0.
+    """
+    poly = workspace.polynomials[len(modal_system.inverse_mass) + 1]
+    bound = 0.0
     for k in range(top - 1):
         part = 0.0
-        for i in range(len(modal_system.square)):
-            part += modal_system.output[i] * workspace.coefs[k + 2, i]
-        poly[k] = part * (k + 1) * (k + 2) / (h * h) + moving * workspace.waves[0, k]
-        whole += abs(poly[k])
-    return best if whole <= best else largest(poly, top - 2, best, workspace.hulls)
+        for i in range(len(modal_system.omega_squared)):
+            part += modal_system.output[i] * workspace.coefficients[k + 2, i]
+        poly[k] = part * (k + 1) * (k + 2) / (h * h) + base_moves * workspace.drive[0, k]
+        bound += abs(poly[k])
+    return (
+        largest
+        if bound <= largest
+        else find_largest_magnitude(poly, top - 2, largest, workspace.hulls)
+    )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def integrals(row, h, top, border, modal_system, time_state, workspace, run, faces):
-    """Add the integrals over the piece of a row, in the workspace, to the numbers; border: (whether it lies in the first
-    cycle, in the last)."""
+def add_integrals(
+    row, h, top, border, modal_system, time_state, workspace, run_values, interface_values
+):
+    """Add the integrals over the piece in the workspace to the measures.
+
+    border: whether the piece lies in the first cycle, and whether it lies in the last.
+    """
+    n_interfaces = len(modal_system.inverse_mass)
     omega = 2 * pi / time_state.period[0]
-    own = fastest(modal_system, workspace.springs) if workspace.held[1] == 0.0 else 0.0
-    count = points(0.5 * h * (max(own, time_state.segments[int(row[3]), RATE]) + 3 * omega))
-    friction_force = workspace.polys[len(modal_system.reach) + 1]
+    modal_rate = bound_modal_rate(modal_system, workspace)
+    count = count_gauss_points(
+        0.5
+        * h
+        * (max(modal_rate, time_state.segments[int(row[ROW.segment]), SEGMENT.rate]) + 3 * omega)
+    )
+    acceleration = workspace.polynomials[n_interfaces + 1]
     for g in range(count):
-        u = _PLACE[count, g]
-        w = h * _WEIGHT[count, g]
-        angle = omega * (row[6] + h * u)
+        u = GAUSS_POINTS[count, g]
+        w = h * GAUSS_WEIGHTS[count, g]
+        angle = omega * (row[ROW.offset] + h * u)
         cosine = cos(angle)
         sine = sin(angle)
-        gain = w * value(friction_force, 0, top - 2, u)
-        run[A_COS] += gain * cosine
-        run[A_SIN] += gain * sine
-        run[A3_COS] += gain * cosine * (4 * cosine * cosine - 3)
-        run[A3_SIN] += gain * sine * (3 - 4 * sine * sine)
-        for f in range(len(modal_system.reach)):
-            at = first_of(f, modal_system)
-            out = faces[f]
-            slide = w * slide_of(row, f, modal_system)
-            pull = 0.0
-            if workspace.springs[f] == RIGID:
-                pull = w * value(workspace.reactions[f], 0, top - 2, u)
+        gain = w * evaluate_polynomial(acceleration, 0, top - 2, u)
+        run_values[RUN.cos_1] += gain * cosine
+        run_values[RUN.sin_1] += gain * sine
+        run_values[RUN.cos_3] += gain * cosine * (4 * cosine * cosine - 3)
+        run_values[RUN.sin_3] += gain * sine * (3 - 4 * sine * sine)
+        for f in range(n_interfaces):
+            at = force_column(f, modal_system)
+            values = interface_values[f]
+            slide = w * row_slide(row, f, modal_system)
+            force = 0.0
+            if workspace.stiffness[f] == RIGID_STIFFNESS:
+                force = w * evaluate_polynomial(workspace.constraint.reactions[f], 0, top - 2, u)
             else:
-                step = moved(workspace.polys[f], top, u)
+                step = displacement_at(workspace.polynomials[f], top, u)
                 slide = slide + w * step
-                pull = w * (row[at] + row[at + SPRING] * step)
-                out[PASSED] += abs(pull * value(workspace.polys[f], 0, top - 1, u)) / h
-            out[Q_COS] += slide * cosine
-            out[Q_SIN] += slide * sine
-            out[F_COS] += pull * cosine
-            out[F_SIN] += pull * sine
+                force = w * (row[at + COLUMN.force] + row[at + COLUMN.stiffness] * step)
+                values[INTERFACE.path_work] += (
+                    abs(force * evaluate_polynomial(workspace.polynomials[f], 0, top - 1, u)) / h
+                )
+            values[INTERFACE.slide_cos] += slide * cosine
+            values[INTERFACE.slide_sin] += slide * sine
+            values[INTERFACE.force_cos] += force * cosine
+            values[INTERFACE.force_sin] += force * sine
             if border[0]:
-                out[FIRST] += slide
-                out[F_FIRST] += pull
+                values[INTERFACE.first_slide] += slide
+                values[INTERFACE.first_force] += force
             if border[1]:
-                out[LAST] += slide
-                out[F_LAST] += pull
+                values[INTERFACE.last_slide] += slide
+                values[INTERFACE.last_force] += force
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def ends(row, modal_system, run, faces):
-    """Take the state where a row begins, or the run ends, into the ranges."""
-    out = 0.0
-    for i in range(len(modal_system.square)):
-        out += modal_system.output[i] * row[HEAD + i]
-        run[REACH] = max(run[REACH], abs(row[HEAD + i]))
-    run[OUT_LOW], run[OUT_HIGH] = min(run[OUT_LOW], out), max(run[OUT_HIGH], out)
-    for f in range(len(modal_system.reach)):
-        one = faces[f]
-        at = first_of(f, modal_system)
-        slide = slide_of(row, f, modal_system)
-        one[LOW], one[HIGH] = min(one[LOW], slide), max(one[HIGH], slide)
-        one[SLIP_LOW], one[SLIP_HIGH] = (
-            min(one[SLIP_LOW], row[at + SLIP]),
-            max(one[SLIP_HIGH], row[at + SLIP]),
+def add_row_state(row, modal_system, run_values, interface_values):
+    """Widen the ranges by the state where a row begins."""
+    output = 0.0
+    for i in range(len(modal_system.omega_squared)):
+        output += modal_system.output[i] * row[ROW.motion + i]
+        run_values[RUN.max_coordinate] = max(
+            run_values[RUN.max_coordinate], abs(row[ROW.motion + i])
         )
+    run_values[RUN.min_output] = min(run_values[RUN.min_output], output)
+    run_values[RUN.max_output] = max(run_values[RUN.max_output], output)
+    for f in range(len(modal_system.inverse_mass)):
+        values = interface_values[f]
+        at = force_column(f, modal_system)
+        slide = row_slide(row, f, modal_system)
+        values[INTERFACE.min_slide] = min(values[INTERFACE.min_slide], slide)
+        values[INTERFACE.max_slide] = max(values[INTERFACE.max_slide], slide)
+        values[INTERFACE.min_slip] = min(values[INTERFACE.min_slip], row[at + COLUMN.slip])
+        values[INTERFACE.max_slip] = max(values[INTERFACE.max_slip], row[at + COLUMN.slip])
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def forces(rows, j, top, modal_system, workspace, faces):
-    """Take the forces over the row j, whose piece is in the workspace, and the work by its ends."""
-    for f in range(len(modal_system.reach)):
-        one = faces[f]
-        at = first_of(f, modal_system)
-        if rows[j, at + SHARE] < SLIPS:
-            one[STUCK] += rows[j, 1]
-        if workspace.springs[f] == RIGID:
-            one[FORCE] = largest(workspace.reactions[f], top - 2, one[FORCE], workspace.hulls)
+def add_forces(rows, j, top, modal_system, workspace, interface_values):
+    """Widen the ranges of the forces by the piece of row j, and add the work by its ends."""
+    for f in range(len(modal_system.inverse_mass)):
+        values = interface_values[f]
+        at = force_column(f, modal_system)
+        if rows[j, at + COLUMN.slipping] < SLIP_FRACTION:
+            values[INTERFACE.stuck_time] += rows[j, ROW.duration]
+        if workspace.stiffness[f] == RIGID_STIFFNESS:
+            values[INTERFACE.max_force] = find_largest_magnitude(
+                workspace.constraint.reactions[f],
+                top - 2,
+                values[INTERFACE.max_force],
+                workspace.hulls,
+            )
             continue
-        force = rows[j, at]
-        last = closing_force(rows, j, f, modal_system)
-        one[FORCE] = max(one[FORCE], abs(force), abs(last))
-        one[TURNED] += (
+        force = rows[j, at + COLUMN.force]
+        last = end_force(rows, j, f, modal_system)
+        values[INTERFACE.max_force] = max(values[INTERFACE.max_force], abs(force), abs(last))
+        values[INTERFACE.end_work] += (
             0.5
             * (force + last)
-            * (slide_of(rows[j + 1], f, modal_system) - slide_of(rows[j], f, modal_system))
+            * (row_slide(rows[j + 1], f, modal_system) - row_slide(rows[j], f, modal_system))
         )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def force_at(rows, j, used, face, modal_system, least):
-    """Force [N] of an interface at a turn where the row j begins: the mean of what it is before and after the slide
-    rests there, NaN where it jumps and one of both is not known; least [m]: less is no motion."""
+def turning_force(rows, j, n_rows, interface, modal_system, min_motion):
+    """Return the force [N] of an interface at a turn where row j begins.
+
+    It is the mean of the forces before and after the rest there, and NaN where the force jumps and
+    one of both is unknown. min_motion: a piece with a smaller change of the relative displacement
+    [m] is a rest.
+    """
     back = j - 1
     on = j
     while (
         back >= 0
         and abs(
-            slide_of(rows[back + 1], face, modal_system) - slide_of(rows[back], face, modal_system)
+            row_slide(rows[back + 1], interface, modal_system)
+            - row_slide(rows[back], interface, modal_system)
         )
-        <= least
+        <= min_motion
     ):
         back -= 1
     while (
-        on < used
-        and abs(slide_of(rows[on + 1], face, modal_system) - slide_of(rows[on], face, modal_system))
-        <= least
+        on < n_rows
+        and abs(
+            row_slide(rows[on + 1], interface, modal_system)
+            - row_slide(rows[on], interface, modal_system)
+        )
+        <= min_motion
     ):
         on += 1
-    at = first_of(face, modal_system)
-    if back >= 0 and on < used:
-        return 0.5 * (closing_force(rows, back, face, modal_system) + rows[on, at])
-    here = rows[on if on < used else back if back >= 0 else j, at + SPRING]
-    if here == 0.0 or here == RIGID or (back < 0 and on == used):
+    at = force_column(interface, modal_system)
+    if back >= 0 and on < n_rows:
+        return 0.5 * (end_force(rows, back, interface, modal_system) + rows[on, at + COLUMN.force])
+    near = j
+    if on < n_rows:
+        near = on
+    elif back >= 0:
+        near = back
+    here = rows[near, at + COLUMN.stiffness]
+    if here == 0.0 or here == RIGID_STIFFNESS or (back < 0 and on == n_rows):
         return nan
-    return rows[on, at] if on < used else closing_force(rows, back, face, modal_system)
+    if on < n_rows:
+        return rows[on, at + COLUMN.force]
+    return end_force(rows, back, interface, modal_system)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def turn_near(rows, j, used, forward, face, modal_system, period, slow):
-    """Number of the row at whose begin a slide turns, next to the border of a cycle where the row j begins, in which it
-    does not; -1 where there is none near."""
+def find_turn_near_border(rows, j, n_rows, forward, interface, modal_system, period, rest_rate):
+    """Return the row near a border of a cycle at which an interface turns, -1 if none."""
     k = j
-    while 0 <= k <= used and abs(rows[k, 0] - rows[j, 0]) <= NEAR * period:
-        if abs(rate_of(rows[k], face, modal_system)) <= slow:
+    while (
+        0 <= k <= n_rows and abs(rows[k, ROW.time] - rows[j, ROW.time]) <= MAX_TURN_DELAY * period
+    ):
+        if abs(row_rate(rows[k], interface, modal_system)) <= rest_rate:
             return k
         k += 1 if forward else -1
     return -1
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def turns(rows, used, cycles, face, modal_system, period, out):
-    """Mean range [m] and secant stiffness [N/m] of the cycles of an interface."""
+def measure_cycles(rows, n_rows, cycles, interface, modal_system, period, values):
+    """Measure the mean range [m] and secant stiffness [N/m] of the cycles of an interface."""
     fast = 0.0
-    seen = 0
+    n_secants = 0
     low = 0
-    begun = rows[0, 0]
-    for j in range(used + 1):
-        fast = max(fast, abs(rate_of(rows[j], face, modal_system)))
-    least = MOVES * (out[HIGH] - out[LOW])
+    begun = rows[0, ROW.time]
+    for j in range(n_rows + 1):
+        fast = max(fast, abs(row_rate(rows[j], interface, modal_system)))
+    min_motion = MIN_MOTION_RATIO * (values[INTERFACE.max_slide] - values[INTERFACE.min_slide])
     for k in range(cycles):
         top = low
         bottom = low
         high = low
-        while high < used and rows[high, 0] + 0.5 * rows[high, 1] < begun + (k + 1) * period:
+        while (
+            high < n_rows
+            and rows[high, ROW.time] + 0.5 * rows[high, ROW.duration] < begun + (k + 1) * period
+        ):
             high += 1
-            slide = slide_of(rows[high], face, modal_system)
-            top = high if slide > slide_of(rows[top], face, modal_system) else top
-            bottom = high if slide < slide_of(rows[bottom], face, modal_system) else bottom
-        size = slide_of(rows[top], face, modal_system) - slide_of(rows[bottom], face, modal_system)
-        out[RANGE] += size / cycles
+            slide = row_slide(rows[high], interface, modal_system)
+            top = high if slide > row_slide(rows[top], interface, modal_system) else top
+            bottom = high if slide < row_slide(rows[bottom], interface, modal_system) else bottom
+        size = row_slide(rows[top], interface, modal_system) - row_slide(
+            rows[bottom], interface, modal_system
+        )
+        values[INTERFACE.mean_range] += size / cycles
         if top == low or top == high:
-            top = turn_near(rows, top, used, top == high, face, modal_system, period, RESTS * fast)
+            top = find_turn_near_border(
+                rows,
+                top,
+                n_rows,
+                top == high,
+                interface,
+                modal_system,
+                period,
+                REST_RATE_RATIO * fast,
+            )
         if bottom == low or bottom == high:
-            bottom = turn_near(
-                rows, bottom, used, bottom == high, face, modal_system, period, RESTS * fast
+            bottom = find_turn_near_border(
+                rows,
+                bottom,
+                n_rows,
+                bottom == high,
+                interface,
+                modal_system,
+                period,
+                REST_RATE_RATIO * fast,
             )
         if size > 0.0 and top >= 0 and bottom >= 0:
             secant = (
-                force_at(rows, top, used, face, modal_system, least)
-                - force_at(rows, bottom, used, face, modal_system, least)
+                turning_force(rows, top, n_rows, interface, modal_system, min_motion)
+                - turning_force(rows, bottom, n_rows, interface, modal_system, min_motion)
             ) / size
             if secant == secant:
-                seen += 1
-                out[SECANT] += secant
+                n_secants += 1
+                values[INTERFACE.secant] += secant
         low = high
-    out[SECANT] = out[SECANT] / seen if seen > 0 else nan
+    values[INTERFACE.secant] = values[INTERFACE.secant] / n_secants if n_secants > 0 else nan
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rung(rows, first, last, modal_system, segment, out):
-    """Note what rings over the rows first to last - 1, a stick of one mode behind one interface: the angle by which
-    free motion turns, and by the rule of `response.ringing` its largest acceleration."""
+def measure_ringing(rows, first, last, modal_system, segment, values):
+    """Measure the free vibration in a stick, rows first to last - 1, of one mode.
+
+    It takes the angle by which the vibration turns, and its largest acceleration by the rule of
+    `response.ringing`.
+    """
     swing = 0.0
     row = rows[first]
     damp = modal_system.damping[0, 0]
-    spring = first_of(0, modal_system) + SPRING
+    spring = force_column(0, modal_system) + COLUMN.stiffness
     for j in range(first, last):
         swing += (
             sqrt(
                 max(
-                    modal_system.square[0]
-                    + rows[j, spring] * modal_system.reach[0]
+                    modal_system.omega_squared[0]
+                    + rows[j, spring] * modal_system.inverse_mass[0]
                     - 0.25 * damp * damp,
                     0.0,
                 )
             )
-            * rows[j, 1]
+            * rows[j, ROW.duration]
         )
-    out[SWING] = max(out[SWING], swing)
-    beta = modal_system.square[0] + row[spring] * modal_system.reach[0]
-    omega = segment[OMEGA]
-    own = beta - 0.25 * damp * damp
+    values[RUN.ring_angle] = max(values[RUN.ring_angle], swing)
+    beta = modal_system.omega_squared[0] + row[spring] * modal_system.inverse_mass[0]
+    omega = segment[SEGMENT.omega]
+    modal_rate = beta - 0.25 * damp * damp
     far = beta - omega * omega
     side = damp * omega
-    whole = far * far + side * side
-    if own <= 0.0 or whole <= 1e-18 * beta * beta:
+    bound = far * far + side * side
+    if modal_rate <= 0.0 or bound <= 1e-18 * beta * beta:
         return
-    own = sqrt(own)
-    push = modal_system.base[0] * segment[AMPLITUDE]
-    pull = modal_system.faces[0, 0] * row[spring - 1] / modal_system.mass
-    sine = -push * sin(row[2])
-    cosine = -push * cos(row[2])
-    rest = -modal_system.base[0] * segment[CONSTANT] - modal_system.square[0] * row[HEAD] - pull
-    z = -rest / beta - (far * sine - side * cosine) / whole
-    v = row[HEAD + 1] - omega * (far * cosine + side * sine) / whole
-    other = (v + 0.5 * damp * z) / own
-    ratio = own / omega
-    span = rows[last, 0] - row[0]
+    modal_rate = sqrt(modal_rate)
+    push = modal_system.base[0] * segment[SEGMENT.amplitude]
+    force = modal_system.interfaces[0, 0] * row[spring - 1] / modal_system.mass
+    sine = -push * sin(row[ROW.phase])
+    cosine = -push * cos(row[ROW.phase])
+    rest = (
+        -modal_system.base[0] * segment[SEGMENT.constant]
+        - modal_system.omega_squared[0] * row[ROW.motion]
+        - force
+    )
+    z = -rest / beta - (far * sine - side * cosine) / bound
+    v = row[ROW.motion + 1] - omega * (far * cosine + side * sine) / bound
+    other = (v + 0.5 * damp * z) / modal_rate
+    ratio = modal_rate / omega
+    span = rows[last, ROW.time] - row[ROW.time]
     damping = 0.5 * damp / sqrt(beta)
     forced = span * omega > 3 * pi and damping < 1e-3 and abs(ratio - round(ratio)) < 1e-2
-    if span * own >= 3 * pi and damping < 0.5 and not forced:
-        out[RING] = max(out[RING], abs(modal_system.output[0]) * beta * sqrt(z * z + other * other))
+    if span * modal_rate >= 3 * pi and damping < 0.5 and not forced:
+        values[RUN.ring] = max(
+            values[RUN.ring], abs(modal_system.output[0]) * beta * sqrt(z * z + other * other)
+        )
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def changes(rows, used, modal_system, time_state, out):
-    """Releases and sticks of the first interface."""
-    begun = rows[0, 0]
+def measure_sticks_and_releases(rows, n_rows, modal_system, time_state, values):
+    """Count the releases of the first interface, and measure the vibration in its sticks."""
+    begun = rows[0, ROW.time]
     period = time_state.period[0]
-    at = first_of(0, modal_system)
-    alone = len(modal_system.square) == 1 and len(modal_system.reach) == 1
+    at = force_column(0, modal_system)
+    is_single = len(modal_system.omega_squared) == 1 and len(modal_system.inverse_mass) == 1
     waits = False
     phase = 0.0
     begun_at = begun
-    segment = time_state.segments[int(rows[0, 3])]
-    last = rows[0, at + WAY] if rows[0, at + SHARE] >= SLIPS else 0.0
+    segment = time_state.segments[int(rows[0, ROW.segment])]
+    last = rows[0, at + COLUMN.direction] if rows[0, at + COLUMN.slipping] >= SLIP_FRACTION else 0.0
     held = 0 if last == 0.0 else -1
-    for j in range(used + 1):
-        way = last if j == used else rows[j, at + WAY] if rows[j, at + SHARE] >= SLIPS else 0.0
-        if way == last and j < used:
-            continue
-        if waits and (j == used or rows[j, 0] - begun_at > LASTS * period):
-            out[STARTS] += 1.0
-            out[START_COS] += cos(2 * phase)
-            out[START_SIN] += sin(2 * phase)
-        waits = last == 0.0 and way != 0.0 and rows[j, 0] > begun
-        phase = rows[j, 2]
-        begun_at = rows[j, 0]
-        if held >= 0 and (way != 0.0 or j == used):
-            if alone and rows[held, at + SPRING] < RIGID:
-                rung(rows, held, j, modal_system, segment, out)
+    for j in range(n_rows + 1):
+        direction = last
+        if j < n_rows:
+            slips = rows[j, at + COLUMN.slipping] >= SLIP_FRACTION
+            direction = rows[j, at + COLUMN.direction] if slips else 0.0
+            if direction == last:
+                continue
+        if waits and (j == n_rows or rows[j, ROW.time] - begun_at > MIN_SLIP_DURATION * period):
+            values[RUN.n_releases] += 1.0
+            values[RUN.release_cos] += cos(2 * phase)
+            values[RUN.release_sin] += sin(2 * phase)
+        waits = last == 0.0 and direction != 0.0 and rows[j, ROW.time] > begun
+        phase = rows[j, ROW.phase]
+        begun_at = rows[j, ROW.time]
+        if held >= 0 and (direction != 0.0 or j == n_rows):
+            if is_single and rows[held, at + COLUMN.stiffness] < RIGID_STIFFNESS:
+                measure_ringing(rows, held, j, modal_system, segment, values)
             held = -1
-        elif way == 0.0 and held < 0:
+        elif direction == 0.0 and held < 0:
             held = j
-        last = way
+        last = direction
 
 
 @njit(error_model="numpy", cache=True, nogil=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def read(rows, cycles, modal_system, time_state, moving, workspace, run, faces):
-    """Numbers of the last cycles by the places of `names_kernels`: run (OF_RUN,) and faces (i, OF_FACE).
+def read_rows(
+    rows, cycles, modal_system, time_state, base_moves, workspace, run_values, interface_values
+):
+    """Measure the last cycles of a run.
 
-    rows (k + 1, w): as `march_kernels.march` writes them, and one of no length for the end; cycles: whole ones among
-    them, each of which ends with a piece; moving: 1 where the base moves. Cost: 1 us a piece of one mode.
+    Parameters
+    ----------
+    rows : ndarray
+        (k + 1, w) as `march_kernels.march` writes them, and one without duration for the end.
+    cycles : int
+        Whole cycles among them; each ends with a piece.
+    modal_system, time_state, workspace
+    base_moves : float
+        1 where the acceleration of the base counts, else 0.
+    run_values : ndarray
+        (13,) see `RunMeasures`.
+    interface_values : ndarray
+        (i, 21) see `InterfaceMeasures`.
+
+    Notes
+    -----
+    Cost: 1 us per piece of one mode.
     """
-    used = rows.shape[0] - 1
+    n_interfaces = len(modal_system.inverse_mass)
+    n_rows = rows.shape[0] - 1
     period = time_state.period[0]
-    run[:] = 0.0
-    faces[:] = 0.0
-    workspace.held[0] = -1.0
-    run[OUT_LOW] = inf
-    run[OUT_HIGH] = -inf
-    for f in range(len(modal_system.reach)):
-        one = faces[f]
-        at = first_of(f, modal_system)
-        one[LOW] = inf
-        one[HIGH] = -inf
-        one[SLIP_LOW] = inf
-        one[SLIP_HIGH] = -inf
-        one[BEGIN] = slide_of(rows[0], f, modal_system)
-        one[END] = slide_of(rows[used], f, modal_system)
-        one[WORK] = rows[used, at + WORKED] - rows[0, at + WORKED]
-    for j in range(used + 1):
-        ends(rows[j], modal_system, run, faces)
-        h = rows[j, 1]
-        if j == used or h <= 0.0:
+    run_values[:] = 0.0
+    interface_values[:] = 0.0
+    workspace.constraint.status[HOLD.n_held] = -1.0
+    run_values[RUN.min_output] = inf
+    run_values[RUN.max_output] = -inf
+    for f in range(n_interfaces):
+        values = interface_values[f]
+        at = force_column(f, modal_system)
+        values[INTERFACE.min_slide] = inf
+        values[INTERFACE.max_slide] = -inf
+        values[INTERFACE.min_slip] = inf
+        values[INTERFACE.max_slip] = -inf
+        values[INTERFACE.start_slide] = row_slide(rows[0], f, modal_system)
+        values[INTERFACE.end_slide] = row_slide(rows[n_rows], f, modal_system)
+        values[INTERFACE.work] = rows[n_rows, at + COLUMN.work] - rows[0, at + COLUMN.work]
+    for j in range(n_rows + 1):
+        add_row_state(rows[j], modal_system, run_values, interface_values)
+        h = rows[j, ROW.duration]
+        if j == n_rows or h <= 0.0:
             continue
-        top = unfold(rows[j], h, modal_system, time_state, workspace)
-        run[ACCELERATION] = acceleration(top, h, modal_system, moving, workspace, run[ACCELERATION])
-        forces(rows, j, top, modal_system, workspace, faces)
-        middle = rows[j, 0] + 0.5 * h
-        border = middle < rows[0, 0] + period, middle > rows[used, 0] - period
-        integrals(rows[j], h, top, border, modal_system, time_state, workspace, run, faces)
-    for f in range(len(modal_system.reach)):
-        turns(rows, used, cycles, f, modal_system, period, faces[f])
-    changes(rows, used, modal_system, time_state, run)
+        top = expand_row(rows[j], h, modal_system, time_state, workspace)
+        run_values[RUN.max_acceleration] = peak_acceleration(
+            top, h, modal_system, base_moves, workspace, run_values[RUN.max_acceleration]
+        )
+        add_forces(rows, j, top, modal_system, workspace, interface_values)
+        middle = rows[j, ROW.time] + 0.5 * h
+        border = middle < rows[0, ROW.time] + period, middle > rows[n_rows, ROW.time] - period
+        add_integrals(
+            rows[j],
+            h,
+            top,
+            border,
+            modal_system,
+            time_state,
+            workspace,
+            run_values,
+            interface_values,
+        )
+    for f in range(n_interfaces):
+        measure_cycles(rows, n_rows, cycles, f, modal_system, period, interface_values[f])
+    measure_sticks_and_releases(rows, n_rows, modal_system, time_state, run_values)

@@ -1,101 +1,121 @@
-"""Compiled end of a transient: a motion that comes back to itself within round-off is let repeat to the last bit.
+"""End of a transient: a motion that returns to itself repeats bit by bit (compiled).
 
-A run that has settled would go on to differ from cycle to cycle by rounding alone. Where the state at a border of a
-cycle is that at the border before it within a few last digits, it takes the digits of that state: from there on every
-cycle is the last one, bit by bit, so whoever counts many of them may copy. What a run has still to go is known by how
-fast it came: states that fell from FAR to NEAR of each other in so many cycles have at most as much of NEAR before them
-as those cycles over ln(FAR/NEAR).
+A settled motion would go on to differ from cycle to cycle by rounding alone. Where the state at
+the end of a cycle equals that of the cycle before within REPEAT_TOL, it takes the digits of that
+state. From there on every cycle is the same bit by bit, so a caller may count cycles instead of
+computing them. How fast the motion approached bounds what it would still change by: states that
+came from APPROACH_TOL to REPEAT_TOL of each other in n cycles change by at most REPEAT_TOL
+n/ln(APPROACH_TOL/REPEAT_TOL) more.
 """
 
 from math import pi, sqrt
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .drive_kernels import KIND, SINE
+from .positions_kernels import KIND, PREVIOUS, SEGMENT, TIME
 
-# of the size of the motion
-NEAR = 1e-14
-FAR = 1e-10
-SOON = 9000.0  # cycles from FAR to NEAR at most: what is left is then below 1000 NEAR, 1e-11 of the motion
-SEGMENT, APART, REPEATS = range(3)  # of `Past.about`
+# change of the state in a cycle over the size of the motion, below which the motion repeats
+REPEAT_TOL = 1e-14
+# the same ratio, at which the count of the cycles of approach begins
+APPROACH_TOL = 1e-10
+# cycles of approach at most; what the motion would still change by is then below 1e-11 of its size
+MAX_APPROACH_CYCLES = 9000.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def apart(motion, modal_system, memory, time_state, past):
-    """(largest difference of the state from that one period before, size of the motion), both [m]; the difference is
-    endless where other elements slip or stay, or where the drive is no sine."""
+def measure_change(motion, modal_system, memory, time_state, previous):
+    """Return the change of the state since the last cycle and the size of the motion [m].
+
+    The change is 1e300 where other elements slip, or where the drive is no sine.
+    """
     omega = 2 * pi / time_state.period[0]
-    most = 0.0
+    change = 0.0
     size = 0.0
-    segment = int(time_state.now[2])
-    for i in range(len(modal_system.square)):
-        rate = max(omega, sqrt(modal_system.square[i]))
-        z = past.motion[0, i]
-        v = past.motion[1, i]
+    segment = int(time_state.now[TIME.segment])
+    for i in range(len(modal_system.omega_squared)):
+        rate = max(omega, sqrt(modal_system.omega_squared[i]))
+        z = previous.motion[0, i]
+        v = previous.motion[1, i]
         size = max(size, max(abs(z), abs(motion[0, i])), max(abs(v), abs(motion[1, i])) / rate)
-        most = max(most, abs(motion[0, i] - z), abs(motion[1, i] - v) / rate)
-    if past.about[SEGMENT] != segment or time_state.segments[segment, KIND] != SINE:
+        change = max(change, abs(motion[0, i] - z), abs(motion[1, i] - v) / rate)
+    if (
+        previous.status[PREVIOUS.segment] != segment
+        or time_state.segments[segment, SEGMENT.kind] != KIND.sine
+    ):
         return 1e300, size
-    old = past.memory
-    for f in range(len(modal_system.reach)):
+    previous_memory = previous.memory
+    for f in range(len(modal_system.inverse_mass)):
         if (
-            old.slipping[f] != memory.slipping[f]
-            or old.way[f] != memory.way[f]
-            or old.depth[f] != memory.depth[f]
-            or old.head[f] != memory.head[f]
-            or time_state.rest[f] == 1.0
+            previous_memory.n_slipping[f] != memory.n_slipping[f]
+            or previous_memory.direction[f] != memory.direction[f]
+            or previous_memory.n_groups[f] != memory.n_groups[f]
+            or previous_memory.rigid_state[f] != memory.rigid_state[f]
+            or time_state.is_at_turn[f] == 1.0
         ):
             return 1e300, size
-        scale = sqrt(modal_system.reach[f] * modal_system.mass)  # of the slide in the coordinates
-        for k in range(memory.depth[f]):
-            if old.upto[f, k] != memory.upto[f, k] or old.side[f, k] != memory.side[f, k]:
+        row_norm = sqrt(
+            modal_system.inverse_mass[f] * modal_system.mass
+        )  # of the slide in the coordinates
+        for k in range(memory.n_groups[f]):
+            if (
+                previous_memory.group_end[f, k] != memory.group_end[f, k]
+                or previous_memory.group_sign[f, k] != memory.group_sign[f, k]
+            ):
                 return 1e300, size
-            most = max(most, abs(memory.at[f, k] - old.at[f, k]) / scale)
-    return most, size
+            change = max(
+                change, abs(memory.group_slide[f, k] - previous_memory.group_slide[f, k]) / row_norm
+            )
+    return change, size
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def forget(past):
-    """Let no state be noted."""
-    past.about[SEGMENT] = -1.0
-    past.about[REPEATS] = 0.0
+def forget_previous(previous):
+    """Forget the state at the end of the cycle before."""
+    previous.status[PREVIOUS.segment] = -1.0
+    previous.status[PREVIOUS.repeats] = 0.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def come_back(motion, modal_system, memory, time_state, past):
-    """Whether the state at a border of a cycle is the first one that is that of the border before to round-off.
+def detect_repeat(motion, modal_system, memory, time_state, previous):
+    """Return whether the state equals the previous one to round-off for the first time.
 
-    Then, and at all borders from there on, it takes the digits of that state; else it is noted in past.
+    There and at all later ends of cycles the state takes the digits of the previous one; elsewhere
+    the state is stored.
     """
-    about = past.about
-    old = past.memory
-    most, size = apart(motion, modal_system, memory, time_state, past)
-    if most > FAR * size:
-        about[APART] = time_state.now[0]
-    if most <= NEAR * size and (about[REPEATS] == 1.0 or time_state.now[0] - about[APART] <= SOON):
-        for i in range(len(modal_system.square)):
-            motion[0, i] = past.motion[0, i]
-            motion[1, i] = past.motion[1, i]
-        for f in range(len(modal_system.reach)):
-            memory.place[f] = old.place[f]
-            for k in range(memory.depth[f]):
-                memory.at[f, k] = old.at[f, k]
-        first = about[REPEATS] == 0.0
-        about[REPEATS] = 1.0
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
+    status = previous.status
+    previous_memory = previous.memory
+    change, size = measure_change(motion, modal_system, memory, time_state, previous)
+    if change > APPROACH_TOL * size:
+        status[PREVIOUS.last_distant] = time_state.now[TIME.cycle]
+    if change <= REPEAT_TOL * size and (
+        status[PREVIOUS.repeats] == 1.0
+        or time_state.now[TIME.cycle] - status[PREVIOUS.last_distant] <= MAX_APPROACH_CYCLES
+    ):
+        for i in range(n):
+            motion[0, i] = previous.motion[0, i]
+            motion[1, i] = previous.motion[1, i]
+        for f in range(n_interfaces):
+            memory.slide[f] = previous_memory.slide[f]
+            for k in range(memory.n_groups[f]):
+                memory.group_slide[f, k] = previous_memory.group_slide[f, k]
+        first = status[PREVIOUS.repeats] == 0.0
+        status[PREVIOUS.repeats] = 1.0
         return first
-    about[SEGMENT] = time_state.now[2]
-    about[REPEATS] = 0.0
-    for i in range(len(modal_system.square)):
-        past.motion[0, i] = motion[0, i]
-        past.motion[1, i] = motion[1, i]
-    for f in range(len(modal_system.reach)):
-        old.place[f] = memory.place[f]
-        old.slipping[f] = memory.slipping[f]
-        old.way[f] = memory.way[f]
-        old.depth[f] = memory.depth[f]
-        old.head[f] = memory.head[f]
-        for k in range(memory.depth[f]):
-            old.upto[f, k] = memory.upto[f, k]
-            old.at[f, k] = memory.at[f, k]
-            old.side[f, k] = memory.side[f, k]
+    status[PREVIOUS.segment] = time_state.now[TIME.segment]
+    status[PREVIOUS.repeats] = 0.0
+    for i in range(n):
+        previous.motion[0, i] = motion[0, i]
+        previous.motion[1, i] = motion[1, i]
+    for f in range(n_interfaces):
+        previous_memory.slide[f] = memory.slide[f]
+        previous_memory.n_slipping[f] = memory.n_slipping[f]
+        previous_memory.direction[f] = memory.direction[f]
+        previous_memory.n_groups[f] = memory.n_groups[f]
+        previous_memory.rigid_state[f] = memory.rigid_state[f]
+        for k in range(memory.n_groups[f]):
+            previous_memory.group_end[f, k] = memory.group_end[f, k]
+            previous_memory.group_slide[f, k] = memory.group_slide[f, k]
+            previous_memory.group_sign[f, k] = memory.group_sign[f, k]
     return False

@@ -1,44 +1,45 @@
-"""Compiled search for the first event of a piece: a yield, the release of a slide that a rigid element holds, or a
-turning point of a slide or of the output.
+"""Search for the first event of a piece (compiled).
 
-Up to the first turning point of a slide, whose speed is proved free of roots before it, the slide is monotone, so a
-yield before it is one root of a monotone function: no event can be missed.
+An event is a yield, the release of an interface that a rigid element holds, or a turning point of
+an interface or of the output. Up to the first turning point, which the Bernstein coefficients of
+the speed prove, the relative displacement is monotone, so a yield before it is the one root of a
+monotone function: no event can be missed.
 """
 
 from math import sqrt
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .memory_kernels import holds, threshold
-from .series_kernels import EPS, NONE, OVER, first_root, polish
+from .memory_kernels import is_held, next_yield_slide
 
 # what ends a piece
-NOTHING = 0
-YIELDS = 1
-TURNS = 2
-OUTPUT_TURNS = 3
-STOPS = 4
-RELEASES = 5
-TINY = 1e-14  # of the terms of a speed: below it a slide at a turning point has no acceleration
+from .positions_kernels import EVENT
+from .series_kernels import EPS, NO_ROOT, SINGLE_INTEGRAL, find_first_root, refine_root
+
+# fraction of the sum of the terms of a speed: a smaller term is round-off and gives no direction
+ACCELERATION_TOL = 1e-14
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def heading(poly, top, rests):
-    """(order of the first term of a speed that counts, its sign); poly: its series; rests: it is zero at first."""
+def initial_direction(poly, top, rests):
+    """Return the order of the first term of a speed that is not round-off, and its sign.
+
+    rests: whether the speed is zero at the start, so that the term of order 0 does not count.
+    """
     if not rests and poly[0] != 0.0:
         return 0, 1.0 if poly[0] > 0 else -1.0
     size = 0.0
     for k in range(top):
         size += abs(poly[k])
     for k in range(1, min(top, 4)):
-        if abs(poly[k]) > TINY * size:
+        if abs(poly[k]) > ACCELERATION_TOL * size:
             return k, 1.0 if poly[k] > 0 else -1.0
     return 0, 0.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def speed_series(row, count, coefs, top, poly):
-    """Fill poly (top,) with the series of the rate over u of row (n,) times the coordinates, `count` of them."""
+def expand_speed(row, count, coefs, top, poly):
+    """Write the series over u of the speed along a row (n,) into poly (top,)."""
     for k in range(top):
         part = 0.0
         for i in range(count):
@@ -47,145 +48,192 @@ def speed_series(row, count, coefs, top, poly):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def moved(poly, top, u):
-    """Integral from 0 to u of a speed whose series is poly (top,)."""
-    out = poly[top - 1] * OVER[top]
+def displacement_at(poly, top, u):
+    """Return the integral from 0 to u of a speed with the series poly (top,)."""
+    out = poly[top - 1] * SINGLE_INTEGRAL[top]
     for k in range(top - 2, -1, -1):
-        out = out * u + poly[k] * OVER[k + 1]
+        out = out * u + poly[k] * SINGLE_INTEGRAL[k + 1]
     return out * u
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def crossing(poly, top, distance, limit, scratch):
-    """Return u in (0, limit] at which a slide with the speed series `poly` has moved by `distance`; NONE if never.
+def find_crossing(poly, top, distance, limit, scratch):
+    """Return u in (0, limit] at which an interface has moved by a distance, else NO_ROOT.
 
-    The slide is monotone up to the limit. distance: signed [m]; scratch: workspace for a polynomial.
+    Parameters
+    ----------
+    poly : ndarray
+        (top,) series of the speed; the motion is monotone up to the limit.
+    top : int
+    distance : float
+        With its sign [m].
+    limit : float
+        Largest u.
+    scratch : ndarray
+        Workspace for a polynomial.
+
+    Returns
+    -------
+    float
     """
-    end = moved(poly, top, limit)
-    way = 1.0 if distance > 0 else -1.0
-    if way * end < way * distance:
-        return NONE
-    scratch[0] = way * distance
+    end = displacement_at(poly, top, limit)
+    direction = 1.0 if distance > 0 else -1.0
+    if direction * end < direction * distance:
+        return NO_ROOT
+    scratch[0] = direction * distance
     for k in range(top):
-        scratch[k + 1] = -way * poly[k] * OVER[k + 1]
+        scratch[k + 1] = -direction * poly[k] * SINGLE_INTEGRAL[k + 1]
     start = limit * distance / end
     square = scratch[1] * scratch[1] - 4 * scratch[0] * scratch[2]
     # the root of the first three terms
     if square > 0 and 2 * scratch[0] < limit * (sqrt(square) - scratch[1]):
         start = 2 * scratch[0] / (sqrt(square) - scratch[1])
-    return polish(scratch, 0, top, 0.0, limit, start)
+    return refine_root(scratch, 0, top, 0.0, limit, start)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def released(face, top, limit, workspace):
-    """(u, side) at which the reaction of a slide that is held first passes its limit [N], +1 or -1; NONE for u if it
-    does not."""
-    react = workspace.reactions[face]
-    scratch = workspace.polys[workspace.react.shape[0]]
+def find_release(interface, top, limit, workspace):
+    """Return u and sign where the reaction of a held interface first exceeds its limit [N].
+
+    u is NO_ROOT where it does not.
+    """
+    choice = workspace.choice
+    reaction = workspace.constraint.reactions[interface]
+    scratch = workspace.polynomials[workspace.constraint.inverse.shape[0]]
     size = limit
     for k in range(top - 1):
-        size += abs(react[k])
-    best = NONE
-    to = 0.0
-    if size < 2 * limit and workspace.orders[face, 0] == 0.0 and workspace.orders[face, 1] == 0.0:
-        return best, to
+        size += abs(reaction[k])
+    best = NO_ROOT
+    release_sign = 0.0
+    if (
+        size < 2 * limit
+        and choice.orders[interface, 0] == 0.0
+        and choice.orders[interface, 1] == 0.0
+    ):
+        return best, release_sign
     for side in (1, -1):
-        order = int(workspace.orders[face, (1 - side) // 2])
+        order = int(choice.orders[interface, (1 - side) // 2])
         for k in range(order, top - 1):
-            scratch[k] = -side * react[k]
+            scratch[k] = -side * reaction[k]
         if order == 0:
             scratch[0] += limit
             if scratch[0] <= 4 * EPS * size:
                 scratch[0] = max(scratch[0], 0.0)
-        root = first_root(scratch, order, top - 2, workspace.hulls) if order < top - 1 else NONE
+        root = (
+            find_first_root(scratch, order, top - 2, workspace.hulls)
+            if order < top - 1
+            else NO_ROOT
+        )
         if root < best:
             best = root
-            to = float(side)
-    return best, to
+            release_sign = float(side)
+    return best, release_sign
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rest(face, head, poly, top, workspace):
-    """u at which the slip of a rigid element first rests; NONE if it does not. poly: series of its speed."""
-    scratch = workspace.polys[workspace.react.shape[0]]
-    order = int(workspace.orders[face, 0])
-    if order == 0 and head * poly[0] <= 0.0:
+def find_stop(interface, direction, poly, top, workspace):
+    """Return u at which the slip of a rigid element first comes to rest; NO_ROOT if it does not.
+
+    direction: sign of the slip; poly: series of its speed.
+    """
+    scratch = workspace.polynomials[workspace.constraint.inverse.shape[0]]
+    order = int(workspace.choice.orders[interface, 0])
+    if order == 0 and direction * poly[0] <= 0.0:
         return 0.0
     for k in range(order, top):
-        scratch[k] = head * poly[k]
-    return first_root(scratch, order, top - 1, workspace.hulls) if order < top else NONE
+        scratch[k] = direction * poly[k]
+    return find_first_root(scratch, order, top - 1, workspace.hulls) if order < top else NO_ROOT
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def next_event(top, modal_system, table, memory, time_state, workspace):
-    """(u, what, face, sign) of the first event of a piece; u = 1 and NOTHING where none ends it.
+def find_next_event(top, modal_system, table, memory, time_state, workspace):
+    """Return the first event of a piece.
 
-    u = 0: the state changes before anything moves.
+    Returns
+    -------
+    u : float
+        1 where no event ends the piece; 0 where the state changes before anything moves.
+    kind : int
+        A number of `EventKinds`.
+    interface : int
+    sign : float
+        Sign of the slip that follows.
     """
-    faces = len(modal_system.reach)
-    polys = workspace.polys
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
+    polynomials = workspace.polynomials
     u = 1.0
-    what = NOTHING
-    face = 0
+    kind = EVENT.none
+    interface = 0
     sign = 0.0
-    for f in range(faces):
-        poly = polys[f]
-        speed_series(modal_system.faces[f], len(modal_system.square), workspace.coefs, top, poly)
-        if holds(f, table, memory):
-            root, way = released(f, top, table.static[f], workspace)
+    for f in range(n_interfaces):
+        poly = polynomials[f]
+        expand_speed(
+            modal_system.interfaces[f],
+            n,
+            workspace.coefficients,
+            top,
+            poly,
+        )
+        if is_held(f, table, memory):
+            root, direction = find_release(f, top, table.static_limit[f], workspace)
             if root <= u:
                 u = root
-                what = RELEASES
-                face = f
-                sign = way
+                kind = EVENT.release
+                interface = f
+                sign = direction
             continue
-        if table.static[f] > 0.0:
-            way = memory.head[f]
-            if abs(way) == 2.0:
+        if table.static_limit[f] > 0.0:
+            direction = memory.rigid_state[f]
+            if abs(direction) == 2.0:
                 continue
-            root = rest(f, way, poly, top, workspace)
+            root = find_stop(f, direction, poly, top, workspace)
             if root <= u:
                 u = root
-                what = TURNS
-                face = f
-                sign = -way
-            if table.count[f] == 0 or u == 0.0:
+                kind = EVENT.reversal
+                interface = f
+                sign = -direction
+            if table.n_elements[f] == 0 or u == 0.0:
                 continue
         else:
-            order, way = heading(poly, top, time_state.rest[f] == 1.0)
-            if way == 0.0:
+            order, direction = initial_direction(poly, top, time_state.is_at_turn[f] == 1.0)
+            if direction == 0.0:
                 continue
-            if memory.slipping[f] > 0 and way != memory.way[f]:
-                return 0.0, TURNS, f, way
-            scratch = polys[faces]
+            if memory.n_slipping[f] > 0 and direction != memory.direction[f]:
+                return 0.0, EVENT.reversal, f, direction
+            scratch = polynomials[n_interfaces]
             for k in range(order, top):
-                scratch[k] = way * poly[k]
-            root = first_root(scratch, order, top - 1, workspace.hulls)
+                scratch[k] = direction * poly[k]
+            root = find_first_root(scratch, order, top - 1, workspace.hulls)
             if root < u:
                 u = root
-                what = TURNS
-                face = f
-                sign = -way
-        gap = threshold(f, way, table, memory) - memory.place[f]
-        if way * gap <= 0:
-            return 0.0, YIELDS, f, way
-        root = crossing(poly, top, gap, u, polys[faces])
+                kind = EVENT.reversal
+                interface = f
+                sign = -direction
+        gap = next_yield_slide(f, direction, table, memory) - memory.slide[f]
+        if direction * gap <= 0:
+            return 0.0, EVENT.yielding, f, direction
+        root = find_crossing(poly, top, gap, u, polynomials[n_interfaces])
         if root <= u:
             u = root
-            what = YIELDS
-            face = f
-            sign = way
-    if modal_system.along < 0:
-        poly = polys[faces + 1]
-        scratch = polys[faces]
-        speed_series(modal_system.output, len(modal_system.square), workspace.coefs, top, poly)
-        order, way = heading(poly, top, time_state.rest[faces] == 1.0)
+            kind = EVENT.yielding
+            interface = f
+            sign = direction
+    if modal_system.output_interface < 0:
+        poly = polynomials[n_interfaces + 1]
+        scratch = polynomials[n_interfaces]
+        expand_speed(modal_system.output, n, workspace.coefficients, top, poly)
+        order, direction = initial_direction(poly, top, time_state.is_at_turn[n_interfaces] == 1.0)
         for k in range(order, top):
-            scratch[k] = way * poly[k]
-        root = first_root(scratch, order, top - 1, workspace.hulls) if way != 0.0 else NONE
+            scratch[k] = direction * poly[k]
+        root = (
+            find_first_root(scratch, order, top - 1, workspace.hulls)
+            if direction != 0.0
+            else NO_ROOT
+        )
         if root < u:
             u = root
-            what = OUTPUT_TURNS
-            face = faces
-            sign = -way
-    return u, what, face, sign
+            kind = EVENT.output_reversal
+            interface = n_interfaces
+            sign = -direction
+    return u, kind, interface, sign

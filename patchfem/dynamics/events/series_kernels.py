@@ -1,9 +1,10 @@
-"""Compiled series of a linear motion over a short piece, its roots proved and found.
+"""Power series of a linear motion over a short piece, and roots of polynomials (compiled).
 
-Over u = t/h in [0, 1] every coordinate is sum c_k u^k. With h at most REACH over the fastest rate of the system the
-terms fall as REACH^k/k!, so a few dozen are exact to round-off, whatever the rates are: rigid, overdamped, coupled,
-equal. All coefficients of the Bernstein form above zero prove that there is no root; one change of their sign proves
-that there is exactly one (Descartes).
+Over u = t/h in [0, 1] every coordinate is sum c_k u^k. If h is at most MAX_RATE_TIME over the
+fastest rate of the system, the terms decrease as MAX_RATE_TIME^k/k!, so a few dozen are exact to
+round-off for any rates: rigid, overdamped, coupled or equal. A polynomial whose Bernstein
+coefficients are all positive has no root; if their sign changes once, it has exactly one root
+(Descartes).
 """
 
 from math import comb, factorial, sqrt
@@ -12,84 +13,119 @@ import numpy as np
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .memory_kernels import RIGID
+from .memory_kernels import RIGID_STIFFNESS
+from .positions_kernels import HOLD
 
-REACH = 2.0  # longest piece times the fastest rate
-MOST = 28  # highest power of a series
+# longest piece times the fastest rate of the system [1]; 28 powers are then exact to round-off
+MAX_RATE_TIME = 2.0
+# highest power of a series
+MAX_POWER = 28
+# unit round-off of doubles
 EPS = 2.0**-52
-NONE = 2.0  # a root beyond the piece
-DEEP = 52  # halvings of a piece
-WIDE = MOST + 5  # columns of the room for them; the last one tells a second half
-# largest piece times rate for which powers up to k suffice: rate^k/k! of the last one below a quarter of EPS
-_ROOM = np.array([0.0, 0.0] + [(EPS / 4 * factorial(k)) ** (1 / k) for k in range(2, MOST + 1)])
-# of two integrations
-TWICE = np.array([0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MOST + 2)])
-OVER = np.array([0.0] + [1 / k for k in range(1, MOST + 3)])  # of one integration
-FEW = 9  # highest power of a first look
-# Bernstein coefficient i of u^k at the degree d
-_HULL = np.array(
-    [
-        [
-            [comb(i, k) / comb(d, k) if k <= i <= d else 0.0 for i in range(MOST + 4)]
-            for k in range(MOST + 1)
-        ]
-        for d in range(MOST + 1)
-    ]
+# place of a root that lies after the end of the piece
+NO_ROOT = 2.0
+# halvings of a piece in the search for a root; the last interval is as long as the round-off of its place
+MAX_HALVINGS = 52
+# columns for the Bernstein coefficients of an interval; the last one is 1 in a right half
+HULL_WIDTH = MAX_POWER + 5
+# highest power of the terms that the first search for a root evaluates
+FIRST_LOOK_POWER = 9
+# Gauss points of a piece
+MAX_GAUSS_POINTS = 16
+# relative error of the integral of a squared motion by Gauss points
+GAUSS_TOL = 1e-13
+
+# largest rate times duration for which powers up to k suffice: the last term is below EPS/4
+_RATE_TIME_LIMITS = np.array(
+    [0.0, 0.0] + [(EPS / 4 * factorial(k)) ** (1 / k) for k in range(2, MAX_POWER + 1)]
 )
-_NODES = 16
-# largest piece times rate for which g Gauss points integrate a square of the motion to 1e-13
-_GAUSS = np.array(
-    [0.0]
-    + [
-        0.5 * (1e-13 * (2 * g + 1) * factorial(2 * g) ** 3 / factorial(g) ** 4) ** (1 / (2 * g))
-        for g in range(1, _NODES + 1)
-    ]
+# factors of u^k in the second and in the first integral of u^(k - 2) and u^(k - 1)
+DOUBLE_INTEGRAL = np.array([0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MAX_POWER + 2)])
+SINGLE_INTEGRAL = np.array([0.0] + [1 / k for k in range(1, MAX_POWER + 3)])
+
+
+def _bernstein_row(degree: int, power: int) -> list:
+    """Return the Bernstein coefficients of u^power at a degree, filled up with zeros."""
+    row = [0.0] * (MAX_POWER + 4)
+    for i in range(power, degree + 1):
+        row[i] = comb(i, power) / comb(degree, power)
+    return row
+
+
+# Bernstein coefficient i of u^k at degree d, [d, k, i]
+_BERNSTEIN = np.array(
+    [[_bernstein_row(d, k) for k in range(MAX_POWER + 1)] for d in range(MAX_POWER + 1)]
 )
-_PLACE, _WEIGHT = np.zeros((2, _NODES + 1, _NODES))
-for _g in range(1, _NODES + 1):
-    _x, _w = np.polynomial.legendre.leggauss(_g)
-    _PLACE[_g, :_g] = (1 + _x) / 2
-    _WEIGHT[_g, :_g] = _w / 2
+
+
+def _gauss_limit(n_points: int) -> float:
+    """Return the largest rate times duration at which so many Gauss points meet GAUSS_TOL."""
+    constant = (2 * n_points + 1) * factorial(2 * n_points) ** 3 / factorial(n_points) ** 4
+    return 0.5 * (GAUSS_TOL * constant) ** (1 / (2 * n_points))
+
+
+_GAUSS_RATE_TIME_LIMITS = np.array(
+    [0.0] + [_gauss_limit(g) for g in range(1, MAX_GAUSS_POINTS + 1)]
+)
+# points and weights on [0, 1] of Gauss rules of g points, [g, point]
+GAUSS_POINTS, GAUSS_WEIGHTS = np.zeros((2, MAX_GAUSS_POINTS + 1, MAX_GAUSS_POINTS))
+for _g in range(1, MAX_GAUSS_POINTS + 1):
+    _points, _weights = np.polynomial.legendre.leggauss(_g)
+    GAUSS_POINTS[_g, :_g] = (1 + _points) / 2
+    GAUSS_WEIGHTS[_g, :_g] = _weights / 2
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def powers(x):
-    """Highest power that a piece of x times the fastest rate needs."""
+def find_highest_power(x):
+    """Return the highest power that a piece needs; x: its duration times the fastest rate."""
     k = 4
-    while k < MOST and _ROOM[k] < x:
+    while k < MAX_POWER and _RATE_TIME_LIMITS[k] < x:
         k += 1
     return k
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def points(x):
-    """Gauss points that integrate squares of the motion over a piece of x times the fastest rate."""
+def count_gauss_points(x):
+    """Return the number of Gauss points that integrate squares of the motion over a piece.
+
+    x: duration of the piece times the fastest rate.
+    """
     g = 2
-    while g < _NODES and _GAUSS[g] < x:
+    while g < MAX_GAUSS_POINTS and _GAUSS_RATE_TIME_LIMITS[g] < x:
         g += 1
     return g
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def fastest(modal_system, springs):
-    """Bound [1/s] of the rates of the modes with springs (i,) [N/m] between the interfaces; those that hold a
-    slide only take motions away."""
-    square = modal_system.square_most
-    for f in range(len(modal_system.reach)):
-        if springs[f] < RIGID:
-            square += springs[f] * modal_system.reach[f]
-    return 0.5 * modal_system.damping_most + sqrt(0.25 * modal_system.damping_most**2 + square)
+def bound_fastest_rate(modal_system, springs):
+    """Return an upper bound [1/s] of the rates of modes with springs (i,) [N/m].
+
+    Interfaces that are held only remove motions, so they do not count.
+    """
+    square = modal_system.max_omega_squared
+    for f in range(len(modal_system.inverse_mass)):
+        if springs[f] < RIGID_STIFFNESS:
+            square += springs[f] * modal_system.inverse_mass[f]
+    return 0.5 * modal_system.damping_norm + sqrt(0.25 * modal_system.damping_norm**2 + square)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def single_series(place, rate, force, spring, modal_system, wave, h, top, coefs):
-    """`motion_series` of one mode with one interface, three times as fast."""
-    face = modal_system.faces[0, 0] / modal_system.mass
-    squared = h * h
+def bound_modal_rate(modal_system, workspace):
+    """Return the bound of `bound_fastest_rate` for workspace.stiffness, 0 where nothing can move."""
+    if workspace.constraint.status[HOLD.is_immobile] == 1.0:
+        return 0.0
+    return bound_fastest_rate(modal_system, workspace.stiffness)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def expand_single_mode(coordinates, rate, force, spring, modal_system, drive, h, top, coefs):
+    """Write the series of one mode with one interface, as `expand_motion`, three times as fast."""
+    row = modal_system.interfaces[0, 0] / modal_system.mass
+    h_squared = h * h
     base = modal_system.base[0]
-    stiff = squared * (modal_system.square[0] + spring * modal_system.reach[0])
+    stiff = h_squared * (modal_system.omega_squared[0] + spring * modal_system.inverse_mass[0])
     damp = h * modal_system.damping[0, 0]
-    here = place[0]
+    here = coordinates[0]
     after = h * rate[0]
     coefs[0, 0] = here
     coefs[1, 0] = after
@@ -97,36 +133,38 @@ def single_series(place, rate, force, spring, modal_system, wave, h, top, coefs)
         after,
         -0.5
         * (
-            squared * (modal_system.square[0] * here + base * wave[0] + face * force) + damp * after
+            h_squared * (modal_system.omega_squared[0] * here + base * drive[0] + row * force)
+            + damp * after
         ),
     )
     coefs[2, 0] = after
     for k in range(1, top - 1):
         here, after = (
             after,
-            -TWICE[k + 2] * (stiff * here + squared * base * wave[k] + damp * (k + 1) * after),
+            -DOUBLE_INTEGRAL[k + 2]
+            * (stiff * here + h_squared * base * drive[k] + damp * (k + 1) * after),
         )
         coefs[k + 2, 0] = after
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def double_series(place, rate, force, spring, modal_system, wave, h, top, coefs):
-    """`motion_series` of two modes with one interface and dampers of their own, all in registers."""
-    squared = h * h
-    face_1 = modal_system.faces[0, 0]
-    face_2 = modal_system.faces[0, 1]
+def expand_two_modes(coordinates, rate, force, spring, modal_system, drive, h, top, coefs):
+    """Write the series of two uncoupled modes with one interface, as `expand_motion`."""
+    h_squared = h * h
+    face_1 = modal_system.interfaces[0, 0]
+    face_2 = modal_system.interfaces[0, 1]
     base_1 = modal_system.base[0]
     base_2 = modal_system.base[1]
     # no constant: of one mode, where nothing comes here, it would not compile
-    second = len(modal_system.square) - 1
-    stiff_1 = squared * modal_system.square[0]
-    stiff_2 = squared * modal_system.square[second]
-    stiff = squared * spring / modal_system.mass
+    second = len(modal_system.omega_squared) - 1
+    stiff_1 = h_squared * modal_system.omega_squared[0]
+    stiff_2 = h_squared * modal_system.omega_squared[second]
+    stiff = h_squared * spring / modal_system.mass
     damp_1 = h * modal_system.damping[0, 0]
     damp_2 = h * modal_system.damping[1, 1]
-    pull = squared * force / modal_system.mass
-    here_1 = place[0]
-    here_2 = place[1]
+    pulls = h_squared * force / modal_system.mass
+    here_1 = coordinates[0]
+    here_2 = coordinates[1]
     after_1 = h * rate[0]
     after_2 = h * rate[1]
     coefs[0, 0] = here_1
@@ -134,15 +172,15 @@ def double_series(place, rate, force, spring, modal_system, wave, h, top, coefs)
     coefs[1, 0] = after_1
     coefs[1, 1] = after_2
     for k in range(top - 1):
-        push = squared * wave[k]
+        push = h_squared * drive[k]
         count = k + 1
-        new_1 = -TWICE[k + 2] * (
-            stiff_1 * here_1 + base_1 * push + face_1 * pull + damp_1 * count * after_1
+        new_1 = -DOUBLE_INTEGRAL[k + 2] * (
+            stiff_1 * here_1 + base_1 * push + face_1 * pulls + damp_1 * count * after_1
         )
-        new_2 = -TWICE[k + 2] * (
-            stiff_2 * here_2 + base_2 * push + face_2 * pull + damp_2 * count * after_2
+        new_2 = -DOUBLE_INTEGRAL[k + 2] * (
+            stiff_2 * here_2 + base_2 * push + face_2 * pulls + damp_2 * count * after_2
         )
-        pull = stiff * (face_1 * after_1 + face_2 * after_2)
+        pulls = stiff * (face_1 * after_1 + face_2 * after_2)
         here_1 = after_1
         here_2 = after_2
         after_1 = new_1
@@ -152,96 +190,135 @@ def double_series(place, rate, force, spring, modal_system, wave, h, top, coefs)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def still_series(place, force, modal_system, wave, top, coefs, workspace):
-    """`motion_series` where what is held lets nothing move: the reactions alone."""
-    n = len(modal_system.square)
+def expand_immobile(coordinates, force, modal_system, drive, top, coefs, workspace):
+    """Write the series of `expand_motion` where the held interfaces stop all motion.
+
+    Only the reactions depend on time.
+    """
+    constraint = workspace.constraint
+    n_interfaces = len(modal_system.inverse_mass)
+    n = len(modal_system.omega_squared)
     for k in range(top + 1):
         for i in range(n):
-            coefs[k, i] = place[i] if k == 0 else 0.0
-    for f in range(len(modal_system.reach)):
+            coefs[k, i] = coordinates[i] if k == 0 else 0.0
+    for f in range(n_interfaces):
         level = 0.0
         share = 0.0
         for i in range(n):
-            part = modal_system.square[i] * place[i]
-            for g in range(len(modal_system.reach)):
-                if workspace.springs[g] < RIGID:
-                    part += modal_system.faces[g, i] * force[g] / modal_system.mass
-            level -= workspace.react[f, i] * part
-            share -= workspace.react[f, i] * modal_system.base[i]
+            part = modal_system.omega_squared[i] * coordinates[i]
+            for g in range(n_interfaces):
+                if workspace.stiffness[g] < RIGID_STIFFNESS:
+                    part += modal_system.interfaces[g, i] * force[g] / modal_system.mass
+            level -= constraint.inverse[f, i] * part
+            share -= constraint.inverse[f, i] * modal_system.base[i]
         for k in range(top - 1):
-            workspace.reactions[f, k] = modal_system.mass * share * wave[k]
-        workspace.reactions[f, 0] += modal_system.mass * level
+            constraint.reactions[f, k] = modal_system.mass * share * drive[k]
+        constraint.reactions[f, 0] += modal_system.mass * level
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def constrained(k, scale, modal_system, coefs, workspace):
-    """Take from the coefficients k + 2 what moves a slide that is held, and note the reaction [N] that does:
-    a - slide^T r/mass with r = mass (slide slide^T)^+ slide a."""
-    for f in range(len(modal_system.reach)):
-        part = 0.0
-        for i in range(len(modal_system.square)):
-            part += workspace.react[f, i] * coefs[k + 2, i]
-        workspace.reactions[f, k] = part
-    for f in range(len(modal_system.reach)):
-        for i in range(len(modal_system.square)):
-            coefs[k + 2, i] -= modal_system.faces[f, i] * workspace.reactions[f, k]
-        workspace.reactions[f, k] *= modal_system.mass / scale
+def remove_held_motion(k, scale, modal_system, coefs, workspace):
+    """Remove what moves held interfaces from coefficients k + 2, and store the reactions [N].
 
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def motion_series(place, rate, force, springs, modal_system, wave, h, top, coefs, workspace):
-    """Fill coefs (>= top + 1, n) with the series of z'' = -D z' - w^2 z - base a - slide^T (force + springs
-    slide)/mass; slides of infinite springs are held, and workspace.reactions (i, >= top - 1) are the forces [N] that do it.
-
-    place, rate (n,): coordinates [m] and rates [m/s] at first; force (i,) [N] there; springs (i,) [N/m]; wave: series
-    of a; workspace: with react and held as `stick_kernels.constrain` leaves them.
+    The remaining acceleration is a - interfaces^T r/mass with r = mass (interfaces interfaces^T)^+
+    interfaces a.
     """
-    n = len(modal_system.square)
-    faces = modal_system.faces
-    squared = h * h
-    pull = workspace.pull
-    held = workspace.held[0] > 0.0
-    if workspace.held[1] == 1.0:
-        still_series(place, force, modal_system, wave, top, coefs, workspace)
+    constraint = workspace.constraint
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
+    for f in range(n_interfaces):
+        part = 0.0
+        for i in range(n):
+            part += constraint.inverse[f, i] * coefs[k + 2, i]
+        constraint.reactions[f, k] = part
+    for f in range(n_interfaces):
+        for i in range(n):
+            coefs[k + 2, i] -= modal_system.interfaces[f, i] * constraint.reactions[f, k]
+        constraint.reactions[f, k] *= modal_system.mass / scale
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def expand_motion(coordinates, rate, force, springs, modal_system, drive, h, top, coefs, workspace):
+    """Write the power series of the modes over a piece, and the reactions of held interfaces.
+
+    The equation is z'' = -D z' - omega^2 z - base a - interfaces^T (force + springs slide)/mass.
+    Interfaces with infinite springs are held; workspace.constraint.reactions (i, >= top - 1) are
+    the forces [N] that hold them.
+
+    Parameters
+    ----------
+    coordinates, rate : ndarray
+        (n,) modal coordinates [m] and rates [m/s] at the start.
+    force, springs : ndarray
+        (i,) forces at the start [N] and stiffness [N/m] of the interfaces.
+    modal_system : ModalSystem
+    drive : ndarray
+        Series of the drive a [m s-2].
+    h : float
+        Duration of the piece [s].
+    top : int
+        Highest power.
+    coefs : ndarray
+        (>= top + 1, n) output.
+    workspace : Workspace
+        Its constraint is as `stick_kernels.constrain_slides` leaves it.
+    """
+    n_interfaces = len(modal_system.inverse_mass)
+    n = len(modal_system.omega_squared)
+    faces = modal_system.interfaces
+    h_squared = h * h
+    pulls = workspace.pull
+    held = workspace.constraint.status[HOLD.n_held] > 0.0
+    if workspace.constraint.status[HOLD.is_immobile] == 1.0:
+        expand_immobile(coordinates, force, modal_system, drive, top, coefs, workspace)
         return
-    if n == 1 and len(modal_system.reach) == 1:
-        single_series(place, rate, force[0], springs[0], modal_system, wave, h, top, coefs)
+    if n == 1 and n_interfaces == 1:
+        expand_single_mode(
+            coordinates, rate, force[0], springs[0], modal_system, drive, h, top, coefs
+        )
         return
-    if n == 2 and len(modal_system.reach) == 1 and not modal_system.coupled and not held:
-        double_series(place, rate, force[0], springs[0], modal_system, wave, h, top, coefs)
+    if n == 2 and n_interfaces == 1 and not modal_system.is_coupled and not held:
+        expand_two_modes(
+            coordinates, rate, force[0], springs[0], modal_system, drive, h, top, coefs
+        )
         return
     for i in range(n):
-        coefs[0, i] = place[i]
+        coefs[0, i] = coordinates[i]
         coefs[1, i] = h * rate[i]
-    for f in range(len(modal_system.reach)):
-        pull[f] = force[f] / modal_system.mass if springs[f] < RIGID else 0.0
+    for f in range(n_interfaces):
+        pulls[f] = force[f] / modal_system.mass if springs[f] < RIGID_STIFFNESS else 0.0
     for k in range(top - 1):
-        scale = TWICE[k + 2] * squared
-        damp = TWICE[k + 2] * h * (k + 1)
+        scale = DOUBLE_INTEGRAL[k + 2] * h_squared
+        damp = DOUBLE_INTEGRAL[k + 2] * h * (k + 1)
         if k > 0:
-            for f in range(len(modal_system.reach)):
+            for f in range(n_interfaces):
                 part = 0.0
                 for i in range(n):
                     part += faces[f, i] * coefs[k, i]
-                pull[f] = part * springs[f] / modal_system.mass if springs[f] < RIGID else 0.0
+                pulls[f] = (
+                    part * springs[f] / modal_system.mass if springs[f] < RIGID_STIFFNESS else 0.0
+                )
         for i in range(n):
-            part = -modal_system.square[i] * coefs[k, i] - modal_system.base[i] * wave[k]
-            for f in range(len(modal_system.reach)):
-                part -= faces[f, i] * pull[f]
-            lost = 0.0
-            if modal_system.coupled:
+            part = -modal_system.omega_squared[i] * coefs[k, i] - modal_system.base[i] * drive[k]
+            for f in range(n_interfaces):
+                part -= faces[f, i] * pulls[f]
+            damped = 0.0
+            if modal_system.is_coupled:
                 for j in range(n):
-                    lost += modal_system.damping[i, j] * coefs[k + 1, j]
+                    damped += modal_system.damping[i, j] * coefs[k + 1, j]
             else:
-                lost = modal_system.damping[i, i] * coefs[k + 1, i]
-            coefs[k + 2, i] = scale * part - damp * lost
+                damped = modal_system.damping[i, i] * coefs[k + 1, i]
+            coefs[k + 2, i] = scale * part - damp * damped
         if held:
-            constrained(k, scale, modal_system, coefs, workspace)
+            remove_held_motion(k, scale, modal_system, coefs, workspace)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def value(poly, low, top, u):
-    """Sum of poly[k] u^(k - low) for k from low to top."""
+def evaluate_polynomial(poly, low, top, u):
+    """Return the sum of poly[k] u^(k - low) for k from low to top.
+
+    Even and odd powers are added apart, which halves the length of the dependency chain.
+    """
     # two chains of half the length
     square = u * u
     even = poly[top]
@@ -255,8 +332,8 @@ def value(poly, low, top, u):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def value_and_slope(poly, low, top, u):
-    """The sum of `value` and its derivative over u."""
+def evaluate_with_slope(poly, low, top, u):
+    """Return the sum of `evaluate_polynomial` and its derivative."""
     square = u * u
     k = top - 1
     # slopes over u^2
@@ -278,11 +355,14 @@ def value_and_slope(poly, low, top, u):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def polish(poly, low, top, left, right, u):
-    """The root in [left, right] of a polynomial that falls there from above zero to below, by guarded Newton from u."""
+def refine_root(poly, low, top, left, right, u):
+    """Return the root in [left, right] of a polynomial that decreases through zero there.
+
+    Newton's method from u, guarded by bisection. poly, low, top: as of `evaluate_polynomial`.
+    """
     last = right - left
     for _ in range(100):
-        here, slope = value_and_slope(poly, low, top, u)
+        here, slope = evaluate_with_slope(poly, low, top, u)
         if here > 0:
             left = u
         elif here < 0:
@@ -304,8 +384,8 @@ def polish(poly, low, top, left, right, u):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bernstein(poly, low, top, hull):
-    """Fill hull (top - low + 1,) with the Bernstein coefficients of poly[low] ... poly[top] on [0, 1]."""
+def fill_bernstein(poly, low, top, hull):
+    """Write the Bernstein coefficients on [0, 1] of poly[low] ... poly[top] into hull."""
     # whole registers
     degree = top - low
     wide = (top - low) // 4 * 4 + 4
@@ -314,49 +394,54 @@ def bernstein(poly, low, top, hull):
     for k in range(1, degree + 1):
         part = poly[low + k]
         for i in range(wide):
-            hull[i] += part * _HULL[degree, k, i]
+            hull[i] += part * _BERNSTEIN[degree, k, i]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def first_look(poly, low, top, hull):
-    """u near which the Bernstein coefficients of the first FEW + 1 terms, in hull, come down to what all others can
-    add; NONE where they stay above it, so that there is no root."""
-    rest = 0.0
-    wide = FEW // 4 * 4 + 4
-    for k in range(low + FEW + 1, top + 1):
-        rest += abs(poly[k])
+def find_possible_root(poly, low, top, hull):
+    """Return a place near which the first root may lie; NO_ROOT where there is none.
+
+    The Bernstein coefficients of the first terms are compared with the sum of the magnitudes of
+    the other terms.
+    """
+    remainder = 0.0
+    wide = FIRST_LOOK_POWER // 4 * 4 + 4
+    for k in range(low + FIRST_LOOK_POWER + 1, top + 1):
+        remainder += abs(poly[k])
     for i in range(wide):
         hull[i] = poly[low]
-    for k in range(1, FEW + 1):
+    for k in range(1, FIRST_LOOK_POWER + 1):
         part = poly[low + k]
         for i in range(wide):
-            hull[i] += part * _HULL[FEW, k, i]
-    for i in range(FEW + 1):
-        if hull[i] <= rest:
+            hull[i] += part * _BERNSTEIN[FIRST_LOOK_POWER, k, i]
+    for i in range(FIRST_LOOK_POWER + 1):
+        if hull[i] <= remainder:
             return (
                 i - hull[i] / (hull[i] - hull[i - 1]) if 0 < i and hull[i] < hull[i - 1] else i
-            ) / FEW
-    return NONE
+            ) / FIRST_LOOK_POWER
+    return NO_ROOT
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def lone_root(poly, low, top, u, workspace):
-    """The root that Newton's method finds from u, in (0, 1], where it is proved to be the first one; NONE where not.
+def prove_first_root(poly, low, top, u, workspace):
+    """Return the root near u if it is proved to be the first one, else NO_ROOT.
 
-    p(r s) with p(r) = 0 is (1 - s) q(s), where the coefficients of q are sums of the last ones of p(r s): as long as q
-    has no root in [0, 1], p has none before r. workspace: two rows.
+    Newton's method finds it.
+
+    With p(r) = 0, p(r s) is (1 - s) q(s), and the coefficients of q are sums of the last ones of
+    p(r s). If q has no root in [0, 1], then p has none before r. workspace: two rows.
     """
     last = 1.0
     for _ in range(9):
-        here, slope = value_and_slope(poly, low, top, u)
+        here, slope = evaluate_with_slope(poly, low, top, u)
         if not slope < 0.0:
-            return NONE
+            return NO_ROOT
         step = here / slope
         u -= step
         step = abs(step)
         if not 0.0 < u <= 1.0:
-            return NONE
-        # as `polish`
+            return NO_ROOT
+        # as `refine_root`
         done = step <= 2 * EPS * u or (
             step < 0.01 * last and step * (step / last) ** 2 <= 0.1 * EPS * u
         )
@@ -373,69 +458,88 @@ def lone_root(poly, low, top, u, workspace):
                 rows[k] = total
             for k in range(top - low):
                 rows[k] = rows[k + 1]
-            return u if first_look(rows, 0, top - low - 1, workspace[1]) == NONE else NONE
-    return NONE
+            return (
+                u
+                if find_possible_root(rows, 0, top - low - 1, workspace[1]) == NO_ROOT
+                else NO_ROOT
+            )
+    return NO_ROOT
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def first_root(poly, low, top, hulls):
-    """First u in (0, 1] at which sum poly[k] u^(k - low), positive just after 0, is no longer so; NONE if none.
+def find_first_root(poly, low, top, hulls):
+    """Return the first u in (0, 1] at which a polynomial is no longer positive.
 
-    A dip of round-off below zero is passed over. hulls: workspace (DEEP + 2, WIDE).
+    It is positive just after 0.
+
+    A dip below zero of the size of round-off is ignored.
+
+    Parameters
+    ----------
+    poly : ndarray
+    low, top : int
+        The polynomial is the sum of poly[k] u^(k - low) for k from low to top.
+    hulls : ndarray
+        (MAX_HALVINGS + 2, HULL_WIDTH) workspace.
+
+    Returns
+    -------
+    float
+        NO_ROOT if there is none.
     """
     # as they are: the compiler then knows that no index is negative
-    rest = 0.0
+    remainder = 0.0
     low = low & 31
     top = top & 31
     for k in range(low + 1, top + 1):
-        rest += abs(poly[k])
-    if poly[low] > rest:
-        return NONE
-    if top - low > FEW + 2:
-        u = first_look(poly, low, top, hulls[0])
-        if u < NONE:
-            u = lone_root(poly, low, top, u, hulls)
+        remainder += abs(poly[k])
+    if poly[low] > remainder:
+        return NO_ROOT
+    if top - low > FIRST_LOOK_POWER + 2:
+        u = find_possible_root(poly, low, top, hulls[0])
+        if u < NO_ROOT:
+            u = prove_first_root(poly, low, top, u, hulls)
         else:
-            return NONE
-        if u < NONE:
+            return NO_ROOT
+        if u < NO_ROOT:
             return u
-    noise = 4 * EPS * (rest + abs(poly[low]))
+    noise = 4 * EPS * (remainder + abs(poly[low]))
     degree = top - low
-    bernstein(poly, low, top, hulls[0])
+    fill_bernstein(poly, low, top, hulls[0])
     left = 0.0
     width = 1.0
     depth = 0
     while True:
         hull = hulls[depth]
-        least = 0.0
+        lowest = 0.0
         changes = 0
         at = 0
         for k in range(degree + 1):
-            least = min(least, hull[k])
+            lowest = min(lowest, hull[k])
             if k > 0 and (hull[k] < 0) != (hull[k - 1] < 0):
                 changes += 1
                 at = k
         # free of roots: on with the part to the right, which an outer halving left
-        if least >= -noise:
+        if lowest >= -noise:
             left += width
-            depth, width = _to_the_right(hulls, depth, width, degree)
+            depth, width = _take_right_half(hulls, depth, width, degree)
             if depth == 0:
-                return NONE
+                return NO_ROOT
             continue
         if hull[0] > 0 and changes == 1:
             share = (at - 1 + hull[at - 1] / (hull[at - 1] - hull[at])) / degree
-            return polish(poly, low, top, left, left + width, left + width * share)
-        if depth == DEEP:
+            return refine_root(poly, low, top, left, left + width, left + width * share)
+        if depth == MAX_HALVINGS:
             return left
-        _halve(hull, hulls[depth + 1], degree, True)
+        _halve_interval(hull, hulls[depth + 1], degree, True)
         depth = depth + 1
         width = width / 2
-        hulls[depth, WIDE - 1] = 0.0
+        hulls[depth, HULL_WIDTH - 1] = 0.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _halve(hull, half, degree, first):
-    """Bernstein coefficients of the first or the second half of an interval (de Casteljau)."""
+def _halve_interval(hull, half, degree, first):
+    """Write the Bernstein coefficients of one half of an interval (de Casteljau)."""
     for k in range(degree + 1):
         half[k] = hull[k]
     if first:
@@ -449,38 +553,41 @@ def _halve(hull, half, degree, first):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _to_the_right(hulls, depth, width, degree):
-    """Go on with the part to the right that an outer halving left: its depth and width; depth 0 where none is left."""
-    while depth > 0 and hulls[depth, WIDE - 1] == 1.0:
+def _take_right_half(hulls, depth, width, degree):
+    """Return depth and width of the next right half; depth 0 where none is left."""
+    while depth > 0 and hulls[depth, HULL_WIDTH - 1] == 1.0:
         depth -= 1
         width *= 2
     if depth > 0:
-        _halve(hulls[depth - 1], hulls[depth], degree, False)
-        hulls[depth, WIDE - 1] = 1.0
+        _halve_interval(hulls[depth - 1], hulls[depth], degree, False)
+        hulls[depth, HULL_WIDTH - 1] = 1.0
     return depth, width
 
 
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def largest(poly, top, best, hulls):
-    """The larger of `best` and max |sum poly[k] u^k| over [0, 1], to 1e-14 of it: halves whose hull cannot pass it are
-    left out, and of one that turns once that turn is what counts."""
-    best = max(best, abs(poly[0]), abs(value(poly, 0, top, 1.0)))
-    bernstein(poly, 0, top, hulls[0])
+def find_largest_magnitude(poly, top, best, hulls):
+    """Return the larger of `best` and max |sum poly[k] u^k| over [0, 1], to 1e-14 of it.
+
+    Intervals are halved until their Bernstein coefficients do not exceed the best value, or show
+    at most one extremum, which Newton's method finds.
+    """
+    best = max(best, abs(poly[0]), abs(evaluate_polynomial(poly, 0, top, 1.0)))
+    fill_bernstein(poly, 0, top, hulls[0])
     depth = 0
     left = 0.0
     width = 1.0
-    rate = hulls[DEEP + 1]
+    rate = hulls[MAX_HALVINGS + 1]
     while True:
         hull = hulls[depth]
-        most = abs(hulls[depth, 0])
+        largest = abs(hulls[depth, 0])
         turns = 0
         at = 0
         for k in range(1, top + 1):
-            most = max(most, abs(hull[k]))
+            largest = max(largest, abs(hull[k]))
             if k > 1 and (hull[k] < hull[k - 1]) != (hull[k - 1] < hull[k - 2]):
                 turns += 1
                 at = k
-        known = most <= best * (1 + 1e-14) or depth == DEEP
+        known = largest <= best * (1 + 1e-14) or depth == MAX_HALVINGS
         if not known and turns < 2:  # Descartes: one turn at most; the ends have been looked at
             if turns == 1:
                 sense = 1.0 if hull[1] > hull[0] else -1.0
@@ -489,17 +596,17 @@ def largest(poly, top, best, hulls):
                 for k in range(top):
                     rate[k] = sense * (k + 1) * poly[k + 1]
                 share = (at - 2 + before / (before - after)) / (top - 1)
-                u = polish(rate, 0, top - 1, left, left + width, left + width * share)
-                best = max(best, abs(value(poly, 0, top, u)))
+                u = refine_root(rate, 0, top - 1, left, left + width, left + width * share)
+                best = max(best, abs(evaluate_polynomial(poly, 0, top, u)))
             known = True
         if known:
             left += width
-            depth, width = _to_the_right(hulls, depth, width, top)
+            depth, width = _take_right_half(hulls, depth, width, top)
             if depth == 0:
                 return best
             continue
-        _halve(hull, hulls[depth + 1], top, True)
+        _halve_interval(hull, hulls[depth + 1], top, True)
         depth = depth + 1
         width = width / 2
-        hulls[depth, WIDE - 1] = 0.0
+        hulls[depth, HULL_WIDTH - 1] = 0.0
         best = max(best, abs(hulls[depth, top]))

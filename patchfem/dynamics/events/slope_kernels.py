@@ -1,57 +1,80 @@
-"""Compiled run from event to event that carries its derivative along.
+"""Run from event to event that carries its derivative along (compiled).
 
-What an interface remembers is where its slide turned. The force is continuous in those places and in the slide, so at a
-yield or a turning point nothing jumps, and the derivative over a run is the product of the linear flows of its pieces
-alone. A turning point may shift in time, but the slide is at rest there, so the derivative of the new turning place is
-that of the slide.
+An interface remembers where its relative displacement turned. The force is continuous in those
+places, so nothing jumps at a yield or a turning point, and the derivative over a run is the
+product of the linear flows of its pieces. A turning point may shift in time, but the interface is
+at rest there, so the derivative of the new turning place is that of the relative displacement.
 """
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .drive_kernels import drive_series, rate_of
+from .drive_kernels import expand_drive, fastest_drive_rate
 from .march_kernels import (
-    AT_ONCE,
-    MOST_IDLE,
-    advance,
-    arrive,
-    happen,
-    left_of,
-    output_of,
-    wait,
-    widen,
+    apply_event,
+    choose_length,
+    clear_rests,
+    is_before,
+    is_idle,
+    move_state,
+    output_displacement,
+    step_to_border,
+    time_to_border,
+    widen_extremes,
 )
-from .memory_kernels import pulled, tangent
-from .search_kernels import TURNS, next_event
-from .series_kernels import REACH, fastest, motion_series, powers
+from .memory_kernels import find_tangent, interface_force
+from .positions_kernels import EVENT, TIME
+from .search_kernels import find_next_event
+from .series_kernels import bound_fastest_rate, expand_motion, find_highest_power
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def carry(u, h, top, slopes, marks, modal_system, table, memory, workspace, scratch):
-    """Move slopes (2, n, s) of coordinates and rates over a piece up to u; marks (i, t + 2, s): those of the turning
-    places.
+def move_slopes(u, h, top, slopes, turning_slopes, modal_system, table, memory, workspace, scratch):
+    """Move the derivatives of coordinates and rates over a piece up to u.
 
-    scratch: the slopes of one number (2, n), the force on them (i,), their series (terms, n).
+    Parameters
+    ----------
+    u, h, top
+        Fraction and duration [s] of the piece, and highest power.
+    slopes : ndarray
+        (2, n, s) derivatives of coordinates and rates with respect to s numbers.
+    turning_slopes : ndarray
+        (i, t + 2, s) derivatives of the turning places.
+    modal_system, table, memory, workspace
+    scratch : tuple
+        Workspace: derivatives with respect to one number (2, n), the force on them (i,), their
+        series (terms, n).
     """
-    one, force, coefs = scratch
-    n = len(modal_system.square)
-    faces = len(modal_system.reach)
-    zero = workspace.waves[1]
+    slope, force, coefs = scratch
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
+    no_drive = workspace.drive[1]
     for s in range(slopes.shape[2]):
         for i in range(n):
-            one[0, i] = slopes[0, i, s]
-            one[1, i] = slopes[1, i, s]
-        for f in range(faces):
-            first = memory.slipping[f]
+            slope[0, i] = slopes[0, i, s]
+            slope[1, i] = slopes[1, i, s]
+        for f in range(n_interfaces):
+            first = memory.n_slipping[f]
             moved = 0.0
             for i in range(n):
-                moved += modal_system.faces[f, i] * one[0, i]
-            force[f] = workspace.springs[f] * moved
-            for k in range(memory.depth[f] - 1, -1, -1):
-                end = memory.upto[f, k]
-                force[f] -= (table.stiff[f, end] - table.stiff[f, first]) * marks[f, k, s]
+                moved += modal_system.interfaces[f, i] * slope[0, i]
+            force[f] = workspace.stiffness[f] * moved
+            for k in range(memory.n_groups[f] - 1, -1, -1):
+                end = memory.group_end[f, k]
+                force[f] -= (
+                    table.stiffness_sum[f, end] - table.stiffness_sum[f, first]
+                ) * turning_slopes[f, k, s]
                 first = end
-        motion_series(
-            one[0], one[1], force, workspace.springs, modal_system, zero, h, top, coefs, workspace
+        expand_motion(
+            slope[0],
+            slope[1],
+            force,
+            workspace.stiffness,
+            modal_system,
+            no_drive,
+            h,
+            top,
+            coefs,
+            workspace,
         )
         for i in range(n):
             place = coefs[top, i]
@@ -64,85 +87,115 @@ def carry(u, h, top, slopes, marks, modal_system, table, memory, workspace, scra
 
 
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def follow(
+def march_with_slopes(
     stop,
     motion,
     slopes,
-    marks,
+    turning_slopes,
     modal_system,
     table,
     memory,
     time_state,
-    books,
+    run_sums,
     workspace,
     scratch,
-    seen,
+    counts,
 ):
-    """`march_kernels.march` without rows and energies, with the derivative: pieces, -1 where events pile up.
+    """March from event to event without rows and energies, and carry the derivative along.
 
-    slopes (2, n, s) of the motion and marks (i, t + 2, s) of the memory's turning places, to s numbers, move along;
-    scratch: room as `carry` has it; seen (2, i): most elements that slip, fewest groups that stay.
+    Parameters
+    ----------
+    stop : tuple
+        Cycle and offset [s] at which the run ends.
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    slopes, turning_slopes : ndarray
+        (2, n, s), (i, t + 2, s) derivatives of the motion and of the turning places with respect
+        to s numbers.
+    modal_system, table, memory, time_state, run_sums, workspace
+    scratch : tuple
+        As of `move_slopes`.
+    counts : ndarray
+        (2, i) becomes the largest number of slipping elements and the smallest number of groups.
+
+    Returns
+    -------
+    int
+        Number of pieces, -1 where events follow each other without progress.
     """
-    for f in range(len(modal_system.reach)):
-        memory.force[f] = pulled(f, table, memory)
+    n_interfaces = len(modal_system.inverse_mass)
+    for f in range(n_interfaces):
+        memory.force[f] = interface_force(f, table, memory)
     now = time_state.now
-    faces = len(modal_system.reach)
-    n = len(modal_system.square)
+    n = len(modal_system.omega_squared)
     pieces = 0
-    for k in range(workspace.waves.shape[1]):
-        workspace.waves[1, k] = 0.0
-    while now[0] < stop[0] or (now[0] == stop[0] and now[1] < stop[1]):
-        left = left_of(time_state, stop)
-        segment = time_state.segments[int(now[2])]
-        for f in range(faces):
-            workspace.springs[f] = tangent(f, table, memory)[0]
-            seen[0, f] = max(seen[0, f], memory.slipping[f])
-            seen[1, f] = min(seen[1, f], memory.depth[f])
-        rate = max(fastest(modal_system, workspace.springs), rate_of(segment, time_state.period[0]))
-        h = min(
-            REACH / rate * min(1.0, max(rate * wait(motion, modal_system, table, memory), 0.02)),
-            left,
+    for k in range(workspace.drive.shape[1]):
+        workspace.drive[1, k] = 0.0
+    while is_before(now, stop):
+        remaining = time_to_border(time_state, stop)
+        segment = time_state.segments[int(now[TIME.segment])]
+        for f in range(n_interfaces):
+            workspace.stiffness[f] = find_tangent(f, table, memory).stiffness
+            counts[0, f] = max(counts[0, f], memory.n_slipping[f])
+            counts[1, f] = min(counts[1, f], memory.n_groups[f])
+        rate = max(
+            bound_fastest_rate(modal_system, workspace.stiffness),
+            fastest_drive_rate(segment, time_state.period[0]),
         )
-        whole = h == left
-        top = powers(rate * h)
-        drive_series(segment, now[0], now[1], time_state.period[0], h, top, workspace.waves)
-        motion_series(
+        h = choose_length(rate, remaining, motion, modal_system, table, memory)
+        is_to_border = h == remaining
+        top = find_highest_power(rate * h)
+        expand_drive(
+            segment,
+            now[TIME.cycle],
+            now[TIME.offset],
+            time_state.period[0],
+            h,
+            top,
+            workspace.drive,
+        )
+        expand_motion(
             motion[0],
             motion[1],
             memory.force,
-            workspace.springs,
+            workspace.stiffness,
             modal_system,
-            workspace.waves[0],
+            workspace.drive[0],
             h,
             top,
-            workspace.coefs,
+            workspace.coefficients,
             workspace,
         )
-        u, what, face, sign = next_event(top, modal_system, table, memory, time_state, workspace)
+        u, kind, interface, sign = find_next_event(
+            top, modal_system, table, memory, time_state, workspace
+        )
         if u > 0:
-            if now[1] == 0.0:
-                widen(output_of(motion, modal_system), time_state, books)
-            carry(u, h, top, slopes, marks, modal_system, table, memory, workspace, scratch)
-            if u > AT_ONCE:
-                for f in range(faces + 1):
-                    time_state.rest[f] = 0.0
-            advance(u, h, top, motion, modal_system, table, memory, time_state, books, workspace)
-            if whole and (u == 1.0 or now[1] + u * h >= now[1] + left):
-                arrive(time_state, stop, left)
+            if now[TIME.offset] == 0.0:
+                widen_extremes(output_displacement(motion, modal_system), time_state, run_sums)
+            move_slopes(
+                u, h, top, slopes, turning_slopes, modal_system, table, memory, workspace, scratch
+            )
+            clear_rests(u, time_state)
+            move_state(
+                u, h, top, motion, modal_system, table, memory, time_state, run_sums, workspace
+            )
+            if is_to_border and (
+                u == 1.0 or now[TIME.offset] + u * h >= now[TIME.offset] + remaining
+            ):
+                step_to_border(time_state, stop, remaining)
             else:
-                now[1] += u * h
+                now[TIME.offset] += u * h
             pieces += 1
-        books.limits[1] = books.limits[1] + 1 if u * h < 1e-13 * time_state.period[0] else 0.0
-        if books.limits[1] > MOST_IDLE:
+        if is_idle(u * h, time_state, run_sums):
             return -1
-        if what == TURNS and memory.slipping[face] > 0:
+        if kind == EVENT.reversal and memory.n_slipping[interface] > 0:
             for s in range(slopes.shape[2]):
                 moved = 0.0
                 for i in range(n):
-                    moved += modal_system.faces[face, i] * slopes[0, i, s]
-                marks[face, memory.depth[face], s] = moved
-        happen(what, face, sign, modal_system, table, memory, time_state)
-    for f in range(faces):
-        seen[0, f] = max(seen[0, f], memory.slipping[f])
-        seen[1, f] = min(seen[1, f], memory.depth[f])
+                    moved += modal_system.interfaces[interface, i] * slopes[0, i, s]
+                turning_slopes[interface, memory.n_groups[interface], s] = moved
+        apply_event(kind, interface, sign, modal_system, table, memory, time_state)
+    for f in range(n_interfaces):
+        counts[0, f] = max(counts[0, f], memory.n_slipping[f])
+        counts[1, f] = min(counts[1, f], memory.n_groups[f])
     return pieces

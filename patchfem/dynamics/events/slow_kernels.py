@@ -1,8 +1,10 @@
-"""Compiled series of a motion that merely follows a drive far below the modes, over pieces as long as the drive allows.
+"""Series of a motion that follows a slow drive quasi-statically (compiled).
 
-After an event the modes ring; once that has died out, what is left varies as slowly as the drive. Its series solves
-K c_k = -base a_k - D (k + 1) c_(k+1)/h - (k + 1) (k + 2) c_(k+2)/h^2 from the highest power down, K of the modes and
-of the springs between. h is many radians of every mode there, so what the higher powers add is small.
+After an event the modes vibrate freely; once that has decayed, the motion varies as slowly as the
+drive. Its series solves K c_k = -base a_k - D (k + 1) c_(k+1)/h - (k + 1)(k + 2) c_(k+2)/h^2 from
+the highest power down, with K of the modes and of the springs at the interfaces. The piece is many
+radians of every mode long, so the higher powers add little. Cost: a quasi-static cycle of 10 Hz
+under modes of 20 kHz takes a tenth of the time of short pieces.
 """
 
 from math import sqrt
@@ -10,174 +12,226 @@ from math import sqrt
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..dense_kernels import factor, solve
-from .drive_kernels import drive_series, rate_of
-from .memory_kernels import RIGID
-from .series_kernels import EPS, REACH, powers
+from .drive_kernels import expand_drive, fastest_drive_rate
+from .memory_kernels import RIGID_STIFFNESS
+from .positions_kernels import TIME
+from .series_kernels import EPS, MAX_RATE_TIME, find_highest_power
 
-DEAD = 64 * EPS  # of the motion that follows: less that rings is round-off
-LATER = 16.0  # short pieces before it is looked again whether what rings has died out
+# free vibration over the motion, below which it is round-off
+RINGING_TOL = 64 * EPS
+# short pieces after which the march looks again whether the free vibration has decayed
+MIN_SHORT_PIECES = 16.0
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def compliances(springs, modal_system, workspace):
-    """Factor slide w^-2 slide^T/mass + 1/spring of the interfaces into workspace.gram (i, i), 1 for one without force.
+def factor_compliance(springs, modal_system, workspace):
+    """Factorise the compliance at the interfaces into constraint.matrix (i, i).
 
-    The rows workspace.turned stand for the slides: of those that are held as `constrain` leaves them, 0 without force.
+    It is row omega^-2 row^T/mass + 1/spring.
+
+    The rows are left in constraint.basis: those of held interfaces as `constrain_slides` leaves
+    them, 0 without force.
     """
-    n = len(modal_system.square)
-    faces = len(modal_system.reach)
-    for f in range(faces):
+    constraint = workspace.constraint
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
+    for f in range(n_interfaces):
         size = 0.0
         for i in range(n):
-            if springs[f] < RIGID:
-                workspace.turned[f, i] = modal_system.faces[f, i] if springs[f] > 0.0 else 0.0
-            size += workspace.turned[f, i] ** 2
+            if springs[f] < RIGID_STIFFNESS:
+                constraint.basis[f, i] = modal_system.interfaces[f, i] if springs[f] > 0.0 else 0.0
+            size += constraint.basis[f, i] ** 2
         for g in range(f + 1):
             part = 0.0
             for i in range(n):
-                part += workspace.turned[f, i] * workspace.turned[g, i] / modal_system.square[i]
-            workspace.gram[f, g] = part / modal_system.mass
-        workspace.gram[f, f] = workspace.gram[f, f] + 1 / springs[f] if size > 0.0 else 1.0
-    factor(workspace.gram)
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def unbalanced(force, place, springs, modal_system, left):
-    """Fill left (n,) [m s-2] with force (n,) less what modes and springs of the places (n,) [m] pull."""
-    for i in range(len(modal_system.square)):
-        left[i] = force[i] - modal_system.square[i] * place[i]
-    for f in range(len(modal_system.reach)):
-        pull = 0.0
-        for i in range(len(modal_system.square)):
-            pull += modal_system.faces[f, i] * place[i]
-        pull = pull * springs[f] / modal_system.mass if springs[f] < RIGID else 0.0
-        for i in range(len(modal_system.square)):
-            left[i] -= modal_system.faces[f, i] * pull
-
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def balance(force, place, springs, modal_system, left, workspace):
-    """Fill place (n,) [m] with K^-1 force (n,) [m s-2] among the motions that leave the held slides alone, left (n,)
-    with what those hold."""
-    for i in range(len(modal_system.square)):
-        place[i] = 0.0
-    for _ in range(2):  # the second time for the round-off of the first
-        unbalanced(force, place, springs, modal_system, left)
-        for f in range(len(modal_system.reach)):
-            workspace.row[1, f] = 0.0
-            for i in range(len(modal_system.square)):
-                off = place[i] if springs[f] == RIGID else 0.0
-                workspace.row[1, f] += workspace.turned[f, i] * (
-                    left[i] / modal_system.square[i] + off
+                part += (
+                    constraint.basis[f, i] * constraint.basis[g, i] / modal_system.omega_squared[i]
                 )
-        solve(workspace.gram, workspace.row[1])
-        for i in range(len(modal_system.square)):
-            for f in range(len(modal_system.reach)):
-                left[i] -= workspace.turned[f, i] * workspace.row[1, f] / modal_system.mass
-            place[i] += left[i] / modal_system.square[i]
-    unbalanced(force, place, springs, modal_system, left)
+            constraint.matrix[f, g] = part / modal_system.mass
+        constraint.matrix[f, f] = constraint.matrix[f, f] + 1 / springs[f] if size > 0.0 else 1.0
+    factor(constraint.matrix)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def slow_series(place, rate, force, springs, modal_system, h, top, workspace):
-    """Fill workspace.coefs, and workspace.reactions of slides that are held, as `motion_series`
-    does but with the motion that
-    follows the drive alone; what rings besides, as a share of it. place, rate (n,): the motion at first; the others as
-    there; workspace.waves[0]: series of the drive over h [s]."""
-    n = len(modal_system.square)
-    faces = len(modal_system.reach)
-    coefs = workspace.coefs
-    wave = workspace.waves[0]
-    pull = workspace.scales[0]
-    compliances(springs, modal_system, workspace)
+def find_imbalance(force, coordinates, springs, modal_system, imbalance):
+    """Write a force (n,) [m s-2] minus that of modes and springs into imbalance (n,)."""
+    n = len(modal_system.omega_squared)
+    for i in range(n):
+        imbalance[i] = force[i] - modal_system.omega_squared[i] * coordinates[i]
+    for f in range(len(modal_system.inverse_mass)):
+        pull = 0.0
+        for i in range(n):
+            pull += modal_system.interfaces[f, i] * coordinates[i]
+        pull = pull * springs[f] / modal_system.mass if springs[f] < RIGID_STIFFNESS else 0.0
+        for i in range(n):
+            imbalance[i] -= modal_system.interfaces[f, i] * pull
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def solve_equilibrium(force, coordinates, springs, modal_system, imbalance, workspace):
+    """Write K^-1 force into coordinates (n,) [m]; held interfaces do not move.
+
+    imbalance (n,) [m s-2] becomes what the held interfaces carry.
+    """
+    constraint = workspace.constraint
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
+    for i in range(n):
+        coordinates[i] = 0.0
+    for _ in range(2):  # the second time for the round-off of the first
+        find_imbalance(force, coordinates, springs, modal_system, imbalance)
+        for f in range(n_interfaces):
+            constraint.scratch[1, f] = 0.0
+            for i in range(n):
+                off = coordinates[i] if springs[f] == RIGID_STIFFNESS else 0.0
+                constraint.scratch[1, f] += constraint.basis[f, i] * (
+                    imbalance[i] / modal_system.omega_squared[i] + off
+                )
+        solve(constraint.matrix, constraint.scratch[1])
+        for i in range(n):
+            for f in range(n_interfaces):
+                imbalance[i] -= (
+                    constraint.basis[f, i] * constraint.scratch[1, f] / modal_system.mass
+                )
+            coordinates[i] += imbalance[i] / modal_system.omega_squared[i]
+    find_imbalance(force, coordinates, springs, modal_system, imbalance)
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def expand_slow_motion(coordinates, rate, force, springs, modal_system, h, top, workspace):
+    """Write the series of a motion that follows the drive.
+
+    Returns the fraction that vibrates freely besides.
+
+    Parameters
+    ----------
+    place, rate : ndarray
+        (n,) coordinates [m] and rates [m/s] at the start.
+    force, springs, modal_system, h, top, workspace
+        As of `expand_motion`; workspace.drive[0] is the series of the drive.
+
+    Returns
+    -------
+    float
+        Free vibration over the motion.
+    """
+    choice = workspace.choice
+    constraint = workspace.constraint
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
+    coefs = workspace.coefficients
+    drive = workspace.drive[0]
+    pull = choice.motion_sizes[0]
+    factor_compliance(springs, modal_system, workspace)
     for i in range(n):
         coefs[top + 1, i] = 0.0
         coefs[top + 2, i] = 0.0
     for k in range(top, -1, -1):
         for i in range(n):
-            pull[i] = -modal_system.base[i] * wave[k] - (k + 1) * (k + 2) * coefs[k + 2, i] / (
+            pull[i] = -modal_system.base[i] * drive[k] - (k + 1) * (k + 2) * coefs[k + 2, i] / (
                 h * h
             )
             for j in range(n):
                 pull[i] -= modal_system.damping[i, j] * (k + 1) * coefs[k + 1, j] / h
             if k == 0:
-                pull[i] -= modal_system.square[i] * place[i]
-                for f in range(faces):
+                pull[i] -= modal_system.omega_squared[i] * coordinates[i]
+                for f in range(n_interfaces):
                     pull[i] -= (
-                        modal_system.faces[f, i] * force[f] / modal_system.mass
-                        if springs[f] < RIGID
+                        modal_system.interfaces[f, i] * force[f] / modal_system.mass
+                        if springs[f] < RIGID_STIFFNESS
                         else 0.0
                     )
-        balance(pull, coefs[k], springs, modal_system, workspace.scales[1], workspace)
-        for f in range(faces):
-            workspace.reactions[f, k] = 0.0
+        solve_equilibrium(pull, coefs[k], springs, modal_system, choice.motion_sizes[1], workspace)
+        for f in range(n_interfaces):
+            constraint.reactions[f, k] = 0.0
             for i in range(n):
-                workspace.reactions[f, k] += (
-                    modal_system.mass * workspace.react[f, i] * workspace.scales[1, i]
+                constraint.reactions[f, k] += (
+                    modal_system.mass * constraint.inverse[f, i] * choice.motion_sizes[1, i]
                 )
-    rings = 0.0
-    follows = 0.0
+    ringing = 0.0
+    following = 0.0
     for i in range(n):
-        size = abs(place[i]) + abs(modal_system.base[i] * wave[0]) / modal_system.square[i]
+        size = (
+            abs(coordinates[i])
+            + abs(modal_system.base[i] * drive[0]) / modal_system.omega_squared[i]
+        )
         for k in range(1, top + 1):
             size += abs(coefs[k, i])
-        for f in range(faces):
+        for f in range(n_interfaces):
             size += (
-                abs(modal_system.faces[f, i] * force[f])
+                abs(modal_system.interfaces[f, i] * force[f])
                 / modal_system.mass
-                / modal_system.square[i]
-                if springs[f] < RIGID
+                / modal_system.omega_squared[i]
+                if springs[f] < RIGID_STIFFNESS
                 else 0.0
             )
-        rings += modal_system.square[i] * coefs[0, i] ** 2 + (coefs[1, i] / h - rate[i]) ** 2
-        follows += modal_system.square[i] * size**2
-        coefs[0, i] = place[i]
-    return sqrt(rings / max(follows, 1e-300))
+        ringing += (
+            modal_system.omega_squared[i] * coefs[0, i] ** 2 + (coefs[1, i] / h - rate[i]) ** 2
+        )
+        following += modal_system.omega_squared[i] * size**2
+        coefs[0, i] = coordinates[i]
+    return sqrt(ringing / max(following, 1e-300))
 
 
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def at_reach(segment, cycle, offset, period, place, rate, force, modal_system, workspace):
-    """Share of the motion that rings, of a piece as long as the drive allows, whose `slow_series` is left in the workspace.
+def expand_slow_piece(
+    segment, cycle, offset, period, coordinates, rate, force, modal_system, workspace
+):
+    """Expand a piece as long as the drive allows.
 
-    Kept for itself and called: it is rare, and compiled once for all that read pieces.
+    Returns the fraction of the motion that vibrates freely.
+
+    It is compiled once for all callers, because it runs rarely.
     """
-    h = REACH / rate_of(segment, period)
-    top = powers(REACH)
-    drive_series(segment, cycle, offset, period, h, top, workspace.waves)
-    return slow_series(place, rate, force, workspace.springs, modal_system, h, top, workspace)
+    h = MAX_RATE_TIME / fastest_drive_rate(segment, period)
+    top = find_highest_power(MAX_RATE_TIME)
+    expand_drive(segment, cycle, offset, period, h, top, workspace.drive)
+    return expand_slow_motion(
+        coordinates, rate, force, workspace.stiffness, modal_system, h, top, workspace
+    )
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def followed(motion, force, modal_system, time_state, workspace):
-    """Rate [1/s] of the drive where the motion merely follows it, its series in the workspace as `at_reach` leaves it; 0
-    elsewhere. now[4]: pieces since the last event or look."""
+def find_slow_rate(motion, force, modal_system, time_state, workspace):
+    """Return the rate of the drive [1/s] where the motion follows it quasi-statically, else 0.
+
+    The series is then in the workspace as `expand_slow_piece` leaves it.
+    """
     now = time_state.now
-    segment = time_state.segments[int(time_state.now[2])]
+    segment = time_state.segments[int(time_state.now[TIME.segment])]
     period = time_state.period[0]
-    if rate_of(segment, period) > modal_system.slow:
+    if fastest_drive_rate(segment, period) > modal_system.slow_rate:
         return 0.0
-    now[4] += 1
-    if now[4] < LATER:
+    now[TIME.n_quiet] += 1
+    if now[TIME.n_quiet] < MIN_SHORT_PIECES:
         return 0.0
     if (
-        at_reach(
-            segment, now[0], now[1], period, motion[0], motion[1], force, modal_system, workspace
+        expand_slow_piece(
+            segment,
+            now[TIME.cycle],
+            now[TIME.offset],
+            period,
+            motion[0],
+            motion[1],
+            force,
+            modal_system,
+            workspace,
         )
-        <= DEAD
+        <= RINGING_TOL
     ):
-        return rate_of(segment, period)
-    now[4] = 0.0
+        return fastest_drive_rate(segment, period)
+    now[TIME.n_quiet] = 0.0
     return 0.0
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def shortened(share, top, faces, workspace):
-    """Turn the series of a piece in the workspace into those over a share of it."""
+def shorten_series(fraction, top, n_interfaces, workspace):
+    """Rescale the series of a piece in the workspace to a fraction of the piece."""
     power = 1.0
     for k in range(top + 1):
-        for i in range(workspace.coefs.shape[1]):
-            workspace.coefs[k, i] *= power
-        workspace.waves[0, k] *= power
-        for f in range(faces):
-            workspace.reactions[f, k] *= power
-        power *= share
+        for i in range(workspace.coefficients.shape[1]):
+            workspace.coefficients[k, i] *= power
+        workspace.drive[0, k] *= power
+        for f in range(n_interfaces):
+            workspace.constraint.reactions[f, k] *= power
+        power *= fraction

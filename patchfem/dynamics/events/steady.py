@@ -1,9 +1,12 @@
-"""Periodic motion of modes behind elastic-plastic elements, by Newton's method on the map from event to event.
+"""Periodic motion of modes behind elastic-plastic elements, by shooting.
 
-The law is odd and a sine turns over after half a period, so there is a motion that does: it is the fixed point of half
-a period turned over, its elements are those that a slowly rising drive leaves behind, and its multipliers are the
-squares of those of the half. Elements that never slip within a cycle are springs; their own memory, an offset that no
-cycle changes (multiplier 1), is no number of the state and is left out.
+Newton's method finds the fixed point of the map over a period.
+
+The law is odd and a sine changes sign after half a period, so there is a motion that does so too.
+It is the fixed point of the map over half a period with the sign changed; its elements are those
+that a slowly increasing drive leaves behind, and its multipliers are the squares of those of the
+half. Elements that never slip within a cycle are springs: their own memory, an offset that no
+cycle changes (multiplier 1), is not part of the state.
 """
 
 from dataclasses import dataclass
@@ -13,19 +16,26 @@ import numpy as np
 from ...core import InitialState, ModalBasis, frozen_array
 from ..periodic import Mapped, Shooting, bound
 from .elements import Memory
-from .period import Map, PeriodMap, Point, copied
+from .period import PeriodMap, PeriodMapping, Point, copy_memory
 
-EARLY = 4  # periods of the run that brings Newton's method near
+# periods of the run that leads to the start of Newton's method
+N_APPROACH_PERIODS = 4
+# fraction of the friction limit that may stick, by round-off, where all interfaces slide
+WHOLE_SLIP_TOL = 1e-12
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Steady:
-    """A motion that repeats from period to period.
+class SteadyState:
+    """A periodic motion of elastic-plastic elements.
 
-    point, start, memory: state at phase 0 of the drive; residual: |state after a period - start| over the size of the
-    motion; multipliers (m,) complex, largest first, of motion and turning places over a period: stable where all are <
-    1 in magnitude; amplitude [m]: half the peak-to-peak output; slipping: share of the friction limit of all interfaces
-    that slips within a cycle; symmetric: it turns over after half a period; iterations of Newton's method.
+    - point, start, memory: state at phase 0 of the drive
+    - residual: |state after a period - start| over the size of the motion
+    - multipliers: (m,) complex Floquet multipliers of motion and turning places, the largest
+      first; the motion is stable where all magnitudes are below 1
+    - amplitude: half the range of the output [m]
+    - slipping: fraction of the friction limit of all interfaces that slips within a cycle
+    - symmetric: whether it changes sign after half a period
+    - iterations: of Newton's method
     """
 
     point: Point
@@ -40,75 +50,131 @@ class Steady:
 
     @property
     def error(self) -> float:
-        """Relative error that the residual leaves in the motion: over how far the multipliers are from 1."""
+        """Relative error that the residual leaves in the motion, see `periodic.bound`."""
         return bound(self.residual, self.multipliers)
 
     @property
     def regime(self) -> str:
-        """How the interfaces move: stuck, in partial slip, or all of them slide."""
-        return (
-            "stuck"
-            if self.slipping == 0
-            else "slides"
-            if self.slipping > 1 - 1e-12
-            else "partial slip"
-        )
+        """State of the interfaces: "stuck", "partial slip", or "slides" where all of them slip."""
+        if self.slipping == 0:
+            return "stuck"
+        return "slides" if self.slipping > 1 - WHOLE_SLIP_TOL else "partial slip"
 
 
-def steady(modes: ModalBasis, drive, groups, near: Point | None = None) -> Steady:
-    """The periodic response to a sine that turns over after half a period, from a Point `near` it or from rest.
+def solve_steady(modes: ModalBasis, drive, groups, near: Point | None = None) -> SteadyState:
+    """Find the periodic response to a sine that changes sign after half a period.
 
-    drive: one Segment of a sine; groups: Elements of every interface. NotConverged as `periodic.Shooting.repeating`,
-    PatchfemError for a drive that does not repeat.
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive
+        One segment, a sine.
+    groups : sequence of Elements
+        One for every interface.
+    near : Point, optional
+        Start of the search, rest by default.
+
+    Returns
+    -------
+    SteadyState
+
+    Raises
+    ------
+    NotConverged
+        As `periodic.Shooting.repeating`.
+    PatchfemError
+        If the drive does not repeat.
     """
-    one = PeriodMap(modes, groups)
-    return _result(one, *turning(one, drive, near), True)
+    period_map = PeriodMap(modes, groups)
+    return _make_steady(period_map, *find_antisymmetric_motion(period_map, drive, near), True)
 
 
-def settled(modes: ModalBasis, drive, groups, start: InitialState, memory: Memory) -> Steady:
-    """The periodic motion that the run from a state at phase 0 of the drive settles to, as far as its elements have
-    slipped for the last time. NotConverged as in `steady`."""
-    one = PeriodMap(modes, groups)
-    shooting = Yields(one, drive, False)
+def find_steady_state_from(
+    modes: ModalBasis, drive, groups, start: InitialState, memory: Memory
+) -> SteadyState:
+    """Find the periodic motion that a run from a given state approaches.
+
+    It is that motion if the elements have slipped for the last time.
+
+    Parameters
+    ----------
+    modes, drive, groups
+        As of `solve_steady`.
+    start : InitialState
+        State at phase 0 of the drive.
+    memory : Memory
+
+    Returns
+    -------
+    SteadyState
+
+    Raises
+    ------
+    NotConverged
+        As `solve_steady`.
+    """
+    period_map = PeriodMap(modes, groups)
+    shooting = YieldShooting(period_map, drive, False)
     point = Point(np.concatenate([start.z, start.v]), memory)
-    return _result(one, *shooting.repeating(point), False)
+    return _make_steady(period_map, *shooting.repeating(point), False)
 
 
-def turning(one: PeriodMap, drive, near: Point | None = None) -> tuple:
-    """(the map of the motion that turns over, steps of Newton's method); arguments and errors as `steady`."""
-    shooting = Yields(one, drive, True)
-    return shooting.repeating(near or shooting.run(one.rest(), EARLY))
+def find_antisymmetric_motion(period_map: PeriodMap, drive, near: Point | None = None) -> tuple:
+    """Find the motion that changes sign after half a period.
+
+    Returns its map and the Newton steps.
+
+    Parameters
+    ----------
+    period_map : PeriodMap
+    drive
+    near : Point, optional
+        Start of the search, rest by default.
+
+    Returns
+    -------
+    MappedPoint, int
+    """
+    shooting = YieldShooting(period_map, drive, True)
+    return shooting.repeating(
+        near or shooting.run(period_map.make_rest_point(), N_APPROACH_PERIODS)
+    )
 
 
-class Yields(Shooting):
-    """The map from yield to yield over a period of a drive, or over half of one turned over.
+class YieldShooting(Shooting):
+    """Shooting with the map from yield to yield over a period.
 
-    The numbers of a Point are its motion and its turning places; they are alike where the turning places are of the
-    same kind. The elements of every group are those at the end of the run: they follow the motion.
+    Where `half` is set, it is the map over half of one with the sign changed.
+
+    The numbers of a Point are its motion and its turning places; they match those of another one
+    whose turning places are of the same kind. Every group has the elements that it has at the end
+    of the run: they follow from the motion.
     """
 
-    def __init__(self, one: PeriodMap, drive, half: bool):
+    def __init__(self, period_map: PeriodMap, drive, half: bool):
         part = drive.segments[0]
-        moved = abs(part.amplitude) / part.omega**2 * float(np.abs(one.modal_system.base).max())
-        self.one = one
+        moved = (
+            abs(part.amplitude) / part.omega**2 * float(np.abs(period_map.modal_system.base).max())
+        )
+        self.period_map = period_map
         self.drive = drive
         self.half = half
         self.moved_by = max(moved, 1e-300)
-        self.rows = np.maximum(np.abs(one.faces).sum(axis=1), 1e-300)
+        self.rows = np.maximum(np.abs(period_map.faces).sum(axis=1), 1e-300)
 
     def mapped(self, point: Point) -> Mapped:
         """The map of a Point. NotConverged where events pile up."""
-        found = self.one(self.drive, point, self.half)
-        n = self.one.n
+        found = self.period_map(self.drive, point, self.half)
+        n = self.period_map.n
         omega = self.drive.segments[0].omega
         a = point.motion
         b = found.end.motion
         both = np.abs([a, b])
         width = max(float(both[:, :n].max()), float(both[:, n:].max()) / omega, 1e-300)
         scale = np.repeat([width, width * omega], n)
-        alike = _alike(point, found.end)
+        alike = _have_same_numbers(point, found.end)
         if alike:
-            scale = np.concatenate([scale, width * self.rows[point.turned[0]]])
+            scale = np.concatenate([scale, width * self.rows[point.turning_places[0]]])
             a = point.numbers
             b = found.end.numbers
         return Mapped(
@@ -119,7 +185,7 @@ class Yields(Shooting):
             (a - b) / scale,
             width / self.moved_by,
             alike,
-            alike and _same(point, found.end),
+            alike and _have_same_elements(point, found.end),
             found.kept,
         )
 
@@ -132,66 +198,72 @@ class Yields(Shooting):
         return self.run(self._next(mapped.found), periods)
 
     def run(self, point: Point, periods: int) -> Point:
-        """The Point after some periods of the run."""
+        """Return the Point after some periods."""
         for _ in range(2 * periods if self.half else periods):
-            point = self._next(self.one(self.drive, point, self.half, False))
+            point = self._next(self.period_map(self.drive, point, self.half, False))
         return point
 
-    def _next(self, found: Map) -> Point:
-        """The end of a Map; of a motion that turns over without the turning places that nothing slipped past, as if
-        these elements had never slipped."""
-        if not self.half or not found.least.any():
+    def _next(self, found: PeriodMapping) -> Point:
+        """Return the end of a map as the start of the next one.
+
+        For a motion that changes sign, the turning places that no slip has passed are left out, as
+        if their elements had never slipped.
+        """
+        if not self.half or not found.min_groups.any():
             return found.end
-        memory = copied(found.end.memory)
-        for f, least in enumerate(found.least):
+        memory = copy_memory(found.end.memory)
+        for f, least in enumerate(found.min_groups):
             if least:
-                for part in (memory.upto, memory.at, memory.side):
-                    part[f, 1 : 1 + memory.depth[f] - least] = part[
-                        f, least : memory.depth[f]
+                for part in (memory.group_end, memory.group_slide, memory.group_sign):
+                    part[f, 1 : 1 + memory.n_groups[f] - least] = part[
+                        f, least : memory.n_groups[f]
                     ].copy()
-                memory.upto[f, 0] = self.one.table.count[f]
-                memory.at[f, 0] = 0.0
-                memory.side[f, 0] = 0.0
-                memory.depth[f] += 1 - least
+                memory.group_end[f, 0] = self.period_map.table.n_elements[f]
+                memory.group_slide[f, 0] = 0.0
+                memory.group_sign[f, 0] = 0.0
+                memory.n_groups[f] += 1 - least
         return Point(found.end.motion, memory)
 
 
-def _alike(point: Point, end: Point) -> bool:
-    """Whether two Points have the same numbers: turning places of the same kind."""
+def _have_same_numbers(point: Point, end: Point) -> bool:
+    """Return whether two Points have the same numbers: turning places of the same kind."""
     a = point.memory
     b = end.memory
-    deep = a.depth.tolist()
-    return deep == b.depth.tolist() and all(
-        x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.side, b.side, deep)
+    deep = a.n_groups.tolist()
+    return deep == b.n_groups.tolist() and all(
+        x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.group_sign, b.group_sign, deep)
     )
 
 
-def _same(point: Point, end: Point) -> bool:
-    """Whether two Points that are alike hold the same elements in every group, and let the same ones slip."""
+def _have_same_elements(point: Point, end: Point) -> bool:
+    """Return whether two Points have equal groups and let the same elements slip."""
     a = point.memory
     b = end.memory
     return (
-        a.slipping.tolist() == b.slipping.tolist()
-        and a.way.tolist() == b.way.tolist()
+        a.n_slipping.tolist() == b.n_slipping.tolist()
+        and a.direction.tolist() == b.direction.tolist()
         and all(
-            x[:d].tolist() == y[:d].tolist() for x, y, d in zip(a.upto, b.upto, a.depth.tolist())
+            x[:d].tolist() == y[:d].tolist()
+            for x, y, d in zip(a.group_end, b.group_end, a.n_groups.tolist())
         )
     )
 
 
-def _result(one: PeriodMap, mapped: Mapped, used: int, half: bool) -> Steady:
+def _make_steady(period_map: PeriodMap, mapped: Mapped, used: int, half: bool) -> SteadyState:
     point = mapped.point
     found = mapped.found
     values = mapped.multipliers()
     low, high = found.extremes
-    limit = one.table.limit
-    n = one.n
-    share = sum(row[k] for row, k in zip(limit, found.most)) / max(limit[:, -1].sum(), 1e-300)
+    limit = period_map.table.limit_sum
+    n = period_map.n
+    share = sum(row[k] for row, k in zip(limit, found.max_slipping)) / max(
+        limit[:, -1].sum(), 1e-300
+    )
     start = InitialState(frozen_array(point.motion[:n]), frozen_array(point.motion[n:]))
-    return Steady(
+    return SteadyState(
         point,
         start,
-        one.placed(point),
+        period_map.complete_memory(point),
         mapped.miss,
         frozen_array(values**2 if half else values, complex),
         float(max(high, -low) if half else (high - low) / 2),

@@ -1,50 +1,75 @@
-"""Compiled choice of the interfaces that hold after an event: Coulomb friction at several interfaces at once.
+"""Choice of the interfaces that stick after an event, Coulomb friction (compiled).
 
-Slides that are held give z'' = P a, with a the acceleration without their friction and P the projector on the motions
-that leave them alone; their reactions are what the projection takes. Dependent ones (1-0, 2-0 and 1-2) share it by
-least squares: the motion is unique, the split between them is not, and one that this split would overload while the
-others hold it carries its limit and leaves the rest to them. A choice holds when every held slide is below its limit,
-or at it and going back, and every other one starts to move its own way, told by the first term that is not zero.
+With some interfaces held, the acceleration is z'' = P a: a is that without their friction, and P
+projects onto motions that leave them alone; the reactions are what the projection takes away.
+Dependent interfaces (1-0, 2-0 and 1-2) share it by least squares: the motion is unique, the split
+between them is not. An interface that this split would overload while the others hold it carries
+its limit and leaves the rest to them.
+
+A choice obeys the law if every held interface is below its limit, or at it with a decreasing
+reaction, and every other one starts to move in the direction of its slip. The first term of the
+power series that is not round-off decides. `choose_sticks` tries the guess, then exchanges single
+interfaces by the rule of least index (Murty 1974), and tries all choices of up to eight
+interfaces.
 """
 
 from math import sqrt
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .memory_kernels import RIGID, holds, pulled, tangent
-from .series_kernels import EPS, TWICE, motion_series
+from .memory_kernels import RIGID_STIFFNESS, find_tangent, interface_force, is_held
+from .positions_kernels import HOLD
+from .series_kernels import DOUBLE_INTEGRAL, EPS, expand_motion
 
-NOISE = 64 * EPS
-LOOSER = 1e4  # times that for sets of badly conditioned slides
-LAST = 8  # order of the terms that are looked at
-# slides at rest up to which all choices are tried without an exchange: 81 at most
+# fraction of the sum of magnitudes of a term, below which the term counts as round-off
+NOISE_TOL = 64 * EPS
+# times NOISE_TOL for a second try, which badly conditioned rows of interfaces need
+LOOSE_NOISE_FACTOR = 1e4
+# order of the terms that decide a choice; higher ones are taken for round-off
+MAX_ORDER = 8
+# interfaces at rest up to which all choices (at most 81) are tried without an exchange
 MAX_ENUMERATED_FIRST = 4
-MAX_ENUMERATED = 8  # slides at rest up to which all choices are tried where the exchange finds none: 6561 at most
-EXCHANGES = 8  # exchanges for each slide, after which a choice by exchange is given up
+# interfaces at rest up to which all choices (at most 6561) are tried where the exchange finds none
+MAX_ENUMERATED = 8
+# exchanges per interface, after which a choice by exchange is given up
+MAX_EXCHANGES_PER_SLIDE = 8
+# sweeps of Jacobi rotations; a handful suffices
+MAX_SWEEPS = 40
+# length of an orthogonal row over the longest one, below which the row depends on the others
+DEPENDENT_TOL = 1e-10
+# what a projection leaves of a row over the row itself, below which the row is held too
+TIED_TOL = 1e-9
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def turned_rows(modal_system, workspace):
-    """Turn the rows of the masked slides until they are orthogonal (one-sided Jacobi), workspace.turned = mix slide; the
-    length of the longest."""
-    n = len(modal_system.square)
-    faces = len(modal_system.reach)
-    for f in range(faces):
+def orthogonalise_rows(modal_system, workspace):
+    """Transform the rows of the held interfaces until they are orthogonal.
+
+    Returns the length of the longest.
+
+    One-sided Jacobi rotations; constraint.basis = matrix interfaces.
+    """
+    constraint = workspace.constraint
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
+    for f in range(n_interfaces):
         for i in range(n):
-            workspace.turned[f, i] = modal_system.faces[f, i] if workspace.mask[f] == 1.0 else 0.0
-        for g in range(faces):
-            workspace.mix[f, g] = 1.0 if f == g else 0.0
-    for _ in range(40 if workspace.held[0] > 1.0 else 0):
+            constraint.basis[f, i] = (
+                modal_system.interfaces[f, i] if constraint.is_held[f] == 1.0 else 0.0
+            )
+        for g in range(n_interfaces):
+            constraint.matrix[f, g] = 1.0 if f == g else 0.0
+    for _ in range(MAX_SWEEPS if constraint.status[HOLD.n_held] > 1.0 else 0):
         quiet = True
-        for f in range(faces):
-            for g in range(f + 1, faces):
+        for f in range(n_interfaces):
+            for g in range(f + 1, n_interfaces):
                 a = 0.0
                 b = 0.0
                 c = 0.0
                 for i in range(n):
-                    a += workspace.turned[f, i] ** 2
-                    b += workspace.turned[g, i] ** 2
-                    c += workspace.turned[f, i] * workspace.turned[g, i]
+                    a += constraint.basis[f, i] ** 2
+                    b += constraint.basis[g, i] ** 2
+                    c += constraint.basis[f, i] * constraint.basis[g, i]
                 if abs(c) <= EPS * sqrt(a * b):
                     continue
                 quiet = False
@@ -52,324 +77,383 @@ def turned_rows(modal_system, workspace):
                 slope = (1.0 if steep >= 0 else -1.0) / (abs(steep) + sqrt(1 + steep * steep))
                 cosine = 1 / sqrt(1 + slope * slope)
                 for i in range(n):
-                    p = workspace.turned[f, i]
-                    q = workspace.turned[g, i]
-                    workspace.turned[f, i] = cosine * (p - slope * q)
-                    workspace.turned[g, i] = cosine * (slope * p + q)
-                for h in range(faces):
-                    p = workspace.mix[f, h]
-                    q = workspace.mix[g, h]
-                    workspace.mix[f, h] = cosine * (p - slope * q)
-                    workspace.mix[g, h] = cosine * (slope * p + q)
+                    p = constraint.basis[f, i]
+                    q = constraint.basis[g, i]
+                    constraint.basis[f, i] = cosine * (p - slope * q)
+                    constraint.basis[g, i] = cosine * (slope * p + q)
+                for h in range(n_interfaces):
+                    p = constraint.matrix[f, h]
+                    q = constraint.matrix[g, h]
+                    constraint.matrix[f, h] = cosine * (p - slope * q)
+                    constraint.matrix[g, h] = cosine * (slope * p + q)
         if quiet:
             break
     most = 0.0
-    for f in range(faces):
+    for f in range(n_interfaces):
         size = 0.0
         for i in range(n):
-            size += workspace.turned[f, i] ** 2
+            size += constraint.basis[f, i] ** 2
         most = max(most, size)
     return sqrt(most)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def constrain(modal_system, workspace):
-    """Hold the slides of workspace.mask (i,).
+def constrain_slides(modal_system, workspace):
+    """Build the constraint of the interfaces in constraint.is_held (i,).
 
-    Fills turned (i, n), orthogonal rows that span theirs (0 in those too many), react (i, n), the pseudo-inverse of
-    their rows turned over (0 in those of the others), tied (i,) 1 where they hold a slide, and held: (how many there
-    are, whether nothing can move).
+    It fills basis, inverse, is_tied and status of `modal_system.Constraint`.
     """
-    n = len(modal_system.square)
-    faces = len(modal_system.reach)
+    constraint = workspace.constraint
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
     count = 0.0
-    for f in range(faces):
-        count += workspace.mask[f]
-        workspace.tied[f] = 0.0
+    for f in range(n_interfaces):
+        count += constraint.is_held[f]
+        constraint.is_tied[f] = 0.0
         for i in range(n):
-            workspace.react[f, i] = 0.0
-    workspace.held[0] = count
-    workspace.held[1] = 0.0
+            constraint.inverse[f, i] = 0.0
+    constraint.status[HOLD.n_held] = count
+    constraint.status[HOLD.is_immobile] = 0.0
     if count == 0.0:
         return
-    most = turned_rows(modal_system, workspace)
-    for p in range(faces):
+    most = orthogonalise_rows(modal_system, workspace)
+    for p in range(n_interfaces):
         size = 0.0
         for i in range(n):
-            size += workspace.turned[p, i] ** 2
-        if sqrt(size) <= 1e-10 * most:
+            size += constraint.basis[p, i] ** 2
+        if sqrt(size) <= DEPENDENT_TOL * most:
             for i in range(n):
-                workspace.turned[p, i] = 0.0
+                constraint.basis[p, i] = 0.0
             continue
-        for q in range(faces):
-            if workspace.mask[q] == 1.0:
+        for q in range(n_interfaces):
+            if constraint.is_held[q] == 1.0:
                 for i in range(n):
-                    workspace.react[q, i] += workspace.mix[p, q] * workspace.turned[p, i] / size
-    frees = 0.0 if count >= n else 1.0
+                    constraint.inverse[q, i] += (
+                        constraint.matrix[p, q] * constraint.basis[p, i] / size
+                    )
+    mobility = 0.0 if count >= n else 1.0
     if count >= n:
         for i in range(n):
             for j in range(n):
                 part = 1.0 if i == j else 0.0
-                for f in range(faces):
-                    part -= workspace.react[f, i] * modal_system.faces[f, j]
-                frees = max(frees, abs(part))
-    if frees < 1e-9:
-        workspace.held[1] = 1.0
-    for f in range(faces):
-        left = 0.0
+                for f in range(n_interfaces):
+                    part -= constraint.inverse[f, i] * modal_system.interfaces[f, j]
+                mobility = max(mobility, abs(part))
+    if mobility < TIED_TOL:
+        constraint.status[HOLD.is_immobile] = 1.0
+    for f in range(n_interfaces):
+        gap = 0.0
         size = 0.0
         for j in range(n):
-            part = modal_system.faces[f, j]
-            for g in range(faces):
+            part = modal_system.interfaces[f, j]
+            for g in range(n_interfaces):
                 along = 0.0
                 for i in range(n):
-                    along += modal_system.faces[f, i] * workspace.react[g, i]
-                part -= along * modal_system.faces[g, j]
-            left += part * part
-            size += modal_system.faces[f, j] ** 2
-        if workspace.held[1] == 1.0 or left < 1e-18 * size:
-            workspace.tied[f] = 1.0
+                    along += modal_system.interfaces[f, i] * constraint.inverse[g, i]
+                part -= along * modal_system.interfaces[g, j]
+            gap += part * part
+            size += modal_system.interfaces[f, j] ** 2
+        if constraint.status[HOLD.is_immobile] == 1.0 or gap < TIED_TOL**2 * size:
+            constraint.is_tied[f] = 1.0
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def remove_held_slides(rates, modal_system, workspace):
-    """Take from rates (n,) what moves the slides that are held."""
-    n = len(modal_system.square)
-    if workspace.held[1] == 1.0:
+def remove_held_rates(rates, modal_system, workspace):
+    """Remove from rates (n,) what moves the held interfaces."""
+    constraint = workspace.constraint
+    n_interfaces = len(modal_system.inverse_mass)
+    n = len(modal_system.omega_squared)
+    if constraint.status[HOLD.is_immobile] == 1.0:
         for i in range(n):
             rates[i] = 0.0
         return
-    for f in range(len(modal_system.reach)):
-        workspace.row[0, f] = 0.0
+    for f in range(n_interfaces):
+        constraint.scratch[0, f] = 0.0
         for i in range(n):
-            workspace.row[0, f] += modal_system.faces[f, i] * rates[i]
-    for f in range(len(modal_system.reach)):
+            constraint.scratch[0, f] += modal_system.interfaces[f, i] * rates[i]
+    for f in range(n_interfaces):
         for i in range(n):
-            rates[i] -= workspace.react[f, i] * workspace.row[0, f]
+            rates[i] -= constraint.inverse[f, i] * constraint.scratch[0, f]
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def keep(motion, modal_system, memory, workspace):
-    """Take the round-off of slides that are held out of coordinates and rates."""
-    if workspace.held[0] == 0.0 or workspace.held[1] == 1.0:
+def correct_held_slides(motion, modal_system, memory, workspace):
+    """Remove the round-off of held interfaces from coordinates and rates."""
+    constraint = workspace.constraint
+    n_interfaces = len(modal_system.inverse_mass)
+    if constraint.status[HOLD.n_held] == 0.0 or constraint.status[HOLD.is_immobile] == 1.0:
         return
-    n = len(modal_system.square)
-    remove_held_slides(motion[1], modal_system, workspace)
-    for f in range(len(modal_system.reach)):
-        workspace.row[0, f] = memory.place[f]
+    n = len(modal_system.omega_squared)
+    remove_held_rates(motion[1], modal_system, workspace)
+    for f in range(n_interfaces):
+        constraint.scratch[0, f] = memory.slide[f]
         for i in range(n):
-            workspace.row[0, f] -= modal_system.faces[f, i] * motion[0, i]
-    for f in range(len(modal_system.reach)):
+            constraint.scratch[0, f] -= modal_system.interfaces[f, i] * motion[0, i]
+    for f in range(n_interfaces):
         for i in range(n):
-            motion[0, i] += workspace.react[f, i] * workspace.row[0, f]
+            motion[0, i] += constraint.inverse[f, i] * constraint.scratch[0, f]
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def round_off(motion, force, springs, modal_system, h, workspace):
-    """Fill scales (LAST + 2, n) with the magnitudes that the terms of a motion are added from, spans (i, LAST) with
-    those of the reactions [N]; arguments as of `motion_series`."""
-    n = len(modal_system.square)
-    faces = modal_system.faces
+def estimate_round_off(motion, force, springs, modal_system, h, workspace):
+    """Write the sizes that terms of motion and reactions are added from.
+
+    Parameters
+    ----------
+    motion, force, springs, modal_system, h
+        As of `expand_motion`.
+    workspace : Workspace
+        choice.motion_sizes (MAX_ORDER + 2, n) and choice.reaction_sizes (i, MAX_ORDER) are
+        written.
+    """
+    choice = workspace.choice
+    n = len(modal_system.omega_squared)
+    n_interfaces = len(modal_system.inverse_mass)
+    interfaces = modal_system.interfaces
     squared = h * h
-    wave = workspace.waves[0]
+    wave = workspace.drive[0]
     for i in range(n):
-        workspace.scales[0, i] = abs(motion[0, i])
-        workspace.scales[1, i] = abs(h * motion[1, i])
-    for k in range(LAST):
-        scale = TWICE[k + 2] * squared
-        damp = TWICE[k + 2] * h * (k + 1)
-        for f in range(len(modal_system.reach)):
+        choice.motion_sizes[0, i] = abs(motion[0, i])
+        choice.motion_sizes[1, i] = abs(h * motion[1, i])
+    for k in range(MAX_ORDER):
+        scale = DOUBLE_INTEGRAL[k + 2] * squared
+        damp = DOUBLE_INTEGRAL[k + 2] * h * (k + 1)
+        for f in range(n_interfaces):
             workspace.pull[f] = 0.0
-            if springs[f] < RIGID and k == 0:
+            if springs[f] < RIGID_STIFFNESS and k == 0:
                 workspace.pull[f] = abs(force[f]) / modal_system.mass
-            elif springs[f] < RIGID:
+            elif springs[f] < RIGID_STIFFNESS:
                 for i in range(n):
                     workspace.pull[f] += (
-                        abs(faces[f, i]) * workspace.scales[k, i] * springs[f] / modal_system.mass
+                        abs(interfaces[f, i])
+                        * choice.motion_sizes[k, i]
+                        * springs[f]
+                        / modal_system.mass
                     )
         for i in range(n):
-            part = modal_system.square[i] * workspace.scales[k, i] + abs(
+            part = modal_system.omega_squared[i] * choice.motion_sizes[k, i] + abs(
                 modal_system.base[i] * wave[k]
             )
-            lost = 0.0
-            for f in range(len(modal_system.reach)):
-                part += abs(faces[f, i]) * workspace.pull[f]
+            damped = 0.0
+            for f in range(n_interfaces):
+                part += abs(interfaces[f, i]) * workspace.pull[f]
             for j in range(n):
-                lost += abs(modal_system.damping[i, j]) * workspace.scales[k + 1, j]
-            workspace.scales[k + 2, i] = scale * part + damp * lost
-        if workspace.held[0] == 0.0:
+                damped += abs(modal_system.damping[i, j]) * choice.motion_sizes[k + 1, j]
+            choice.motion_sizes[k + 2, i] = scale * part + damp * damped
+        if workspace.constraint.status[HOLD.n_held] == 0.0:
             continue
-        for f in range(len(modal_system.reach)):
-            workspace.spans[f, k] = 0.0
+        for f in range(n_interfaces):
+            choice.reaction_sizes[f, k] = 0.0
             for i in range(n):
-                workspace.spans[f, k] += abs(workspace.react[f, i]) * workspace.scales[k + 2, i]
-        for f in range(len(modal_system.reach)):
+                choice.reaction_sizes[f, k] += (
+                    abs(workspace.constraint.inverse[f, i]) * choice.motion_sizes[k + 2, i]
+                )
+        for f in range(n_interfaces):
             for i in range(n):
-                workspace.scales[k + 2, i] += abs(faces[f, i]) * workspace.spans[f, k]
-            workspace.spans[f, k] *= modal_system.mass / scale
+                choice.motion_sizes[k + 2, i] += abs(interfaces[f, i]) * choice.reaction_sizes[f, k]
+            choice.reaction_sizes[f, k] *= modal_system.mass / scale
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def leaves(face, sign, noise, modal_system, workspace):
-    """(order, sign) of the first term of sign * speed of a slide that is above its round-off; (LAST, 0) without."""
-    for k in range(1, LAST):
+def leading_slip_term(interface, sign, noise, modal_system, workspace):
+    """Return order and sign of the first term of the slip speed above round-off.
+
+    They are (MAX_ORDER, 0) where there is none.
+    """
+    for k in range(1, MAX_ORDER):
         rate = 0.0
         size = 0.0
-        for i in range(len(modal_system.square)):
-            rate += modal_system.faces[face, i] * workspace.coefs[k + 1, i]
-            size += abs(modal_system.faces[face, i]) * workspace.scales[k + 1, i]
+        for i in range(len(modal_system.omega_squared)):
+            rate += modal_system.interfaces[interface, i] * workspace.coefficients[k + 1, i]
+            size += (
+                abs(modal_system.interfaces[interface, i]) * workspace.choice.motion_sizes[k + 1, i]
+            )
         if abs(rate) > noise * size:
             return float(k), 1.0 if sign * rate > 0 else -1.0
-    return float(LAST), 0.0
+    return float(MAX_ORDER), 0.0
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def margin(face, side, noise, limit, workspace):
-    """(order, sign) of the first term of limit - side * reaction of a slide that is above its round-off; (LAST, 0)
-    without."""
-    for k in range(LAST):
-        left = -side * workspace.reactions[face, k]
-        size = workspace.spans[face, k]
-        if k == 0:
-            left = left + limit
-            size = size + limit
-        if abs(left) > noise * size:
-            return float(k), 1.0 if left > 0 else -1.0
-    return float(LAST), 0.0
+def leading_margin_term(interface, side, noise, limit, workspace):
+    """Return order and sign of the first term of limit - side reaction above round-off.
 
-
-@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def judge(noise, motion, modal_system, table, memory, h, workspace):
-    """(slide, side) of the first one for which the signs of slip in workspace.guess (i,), 0 of slides that hold, break the
-    law just after an event, those of workspace.resting having no speed: overloaded on a side, 1 or -1, or 0 where it does
-    not go the way of its slip; (-1, 0) where all obey.
-
-    memory.head, force, springs and what holds are left as they are under the guess, orders as the search for the next
-    event takes them.
+    They are (MAX_ORDER, 0) where there is none.
     """
-    faces = len(modal_system.reach)
-    for f in range(faces):
-        workspace.mask[f] = 1.0 if table.static[f] > 0.0 and workspace.guess[f] == 0.0 else 0.0
-    constrain(modal_system, workspace)
-    for f in range(faces):
-        if table.static[f] > 0.0:
+    for k in range(MAX_ORDER):
+        gap = -side * workspace.constraint.reactions[interface, k]
+        size = workspace.choice.reaction_sizes[interface, k]
+        if k == 0:
+            gap = gap + limit
+            size = size + limit
+        if abs(gap) > noise * size:
+            return float(k), 1.0 if gap > 0 else -1.0
+    return float(MAX_ORDER), 0.0
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def find_violation(noise, motion, modal_system, table, memory, h, workspace):
+    """Return the first interface that breaks the law under the guess, and how.
+
+    Interfaces in choice.is_resting have no velocity. The memory, force and stiffness are left as
+    they are under the guess, and choice.orders as the search for the next event needs them.
+
+    Returns
+    -------
+    interface : int
+        -1 where all interfaces obey.
+    side : int
+        1 or -1: overloaded in this direction; 0: it does not move in the direction of its slip.
+    """
+    choice = workspace.choice
+    n_interfaces = len(modal_system.inverse_mass)
+    for f in range(n_interfaces):
+        workspace.constraint.is_held[f] = (
+            1.0 if table.static_limit[f] > 0.0 and choice.guess[f] == 0.0 else 0.0
+        )
+    constrain_slides(modal_system, workspace)
+    for f in range(n_interfaces):
+        if table.static_limit[f] > 0.0:
             others = (
-                workspace.guess[f] != 0.0
-                and workspace.tied[f] == 1.0
-                and workspace.resting[f] == 1.0
+                choice.guess[f] != 0.0
+                and workspace.constraint.is_tied[f] == 1.0
+                and choice.is_resting[f] == 1.0
             )
-            memory.head[f] = 2.0 * workspace.guess[f] if others else workspace.guess[f]
-        memory.force[f] = pulled(f, table, memory)
-        workspace.springs[f] = tangent(f, table, memory)[0]
-        workspace.orders[f, 0] = 0.0
-        workspace.orders[f, 1] = 0.0
-    motion_series(
+            memory.rigid_state[f] = 2.0 * choice.guess[f] if others else choice.guess[f]
+        memory.force[f] = interface_force(f, table, memory)
+        workspace.stiffness[f] = find_tangent(f, table, memory).stiffness
+        choice.orders[f, 0] = 0.0
+        choice.orders[f, 1] = 0.0
+    expand_motion(
         motion[0],
         motion[1],
         memory.force,
-        workspace.springs,
+        workspace.stiffness,
         modal_system,
-        workspace.waves[0],
+        workspace.drive[0],
         h,
-        LAST + 1,
-        workspace.coefs,
+        MAX_ORDER + 1,
+        workspace.coefficients,
         workspace,
     )
-    round_off(motion, memory.force, workspace.springs, modal_system, h, workspace)
-    for f in range(faces):
-        if workspace.resting[f] == 0.0 or table.static[f] == 0.0 or abs(memory.head[f]) == 2.0:
+    estimate_round_off(motion, memory.force, workspace.stiffness, modal_system, h, workspace)
+    for f in range(n_interfaces):
+        if (
+            choice.is_resting[f] == 0.0
+            or table.static_limit[f] == 0.0
+            or abs(memory.rigid_state[f]) == 2.0
+        ):
             continue
-        if memory.head[f] != 0.0:
-            order, lead = leaves(f, memory.head[f], noise, modal_system, workspace)
-            if lead <= 0.0:
+        if memory.rigid_state[f] != 0.0:
+            order, sign = leading_slip_term(
+                f, memory.rigid_state[f], noise, modal_system, workspace
+            )
+            if sign <= 0.0:
                 return f, 0
-            workspace.orders[f, 0] = order
+            choice.orders[f, 0] = order
             continue
         for side in (1, -1):
-            order, lead = margin(f, side, noise, table.static[f], workspace)
-            if lead < 0.0:
+            order, sign = leading_margin_term(f, side, noise, table.static_limit[f], workspace)
+            if sign < 0.0:
                 return f, side
-            if lead > 0.0:
-                workspace.orders[f, (1 - side) // 2] = order
+            if sign > 0.0:
+                choice.orders[f, (1 - side) // 2] = order
     return -1, 0
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def exchanged(noise, motion, modal_system, table, memory, h, workspace):
-    """Exchange the first slide that breaks the law, from workspace.guess (i,) on; whether a choice is found.
+def choose_by_exchange(noise, motion, modal_system, table, memory, h, workspace):
+    """Exchange the first interface that breaks the law, again and again.
 
-    This is the rule of least index (Murty, Opsearch 11, 148, 1974). It ends with the only solution wherever the
-    complementarity problem has a P-matrix, also over power series in time, which are ordered by their first term; that
-    is the case for slides that are independent and break at their kinetic limit. Of 1800 random choices among 5 to 16
-    slides at rest it and `every` together missed 26, all of more than eight slides of fewer modes.
+    Returns whether a choice is found.
+
+    This is the rule of least index (Murty, Opsearch 11, 148, 1974). It ends with the only solution
+    wherever the complementarity problem has a P-matrix, also over power series in time, which are
+    ordered by their first term. That is the case for independent interfaces that break at their
+    kinetic limit. Of 1800 random choices among 5 to 16 interfaces at rest, it and
+    `choose_by_enumeration` together missed 26, all of more than eight interfaces of fewer modes.
     """
-    for _ in range(EXCHANGES * len(modal_system.reach)):
-        slide, side = judge(noise, motion, modal_system, table, memory, h, workspace)
+    for _ in range(MAX_EXCHANGES_PER_SLIDE * len(modal_system.inverse_mass)):
+        slide, side = find_violation(noise, motion, modal_system, table, memory, h, workspace)
         if slide < 0:
             return True
-        workspace.guess[slide] = float(side)
+        workspace.choice.guess[slide] = float(side)
     return False
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def every(noise, motion, modal_system, table, memory, h, workspace):
-    """Whether one of all choices of the slides at rest holds, those with few that slip first."""
-    faces = len(modal_system.reach)
+def choose_by_enumeration(noise, motion, modal_system, table, memory, h, workspace):
+    """Try all choices of the interfaces at rest, those with few slipping first.
+
+    Returns whether one obeys.
+    """
+    choice = workspace.choice
+    n_interfaces = len(modal_system.inverse_mass)
     count = 0
     codes = 1
-    for f in range(faces):
-        if workspace.resting[f] == 1.0:
+    for f in range(n_interfaces):
+        if choice.is_resting[f] == 1.0:
             count = count + 1
             codes = codes * 3
     for slips in range(count + 1):
         for code in range(codes):
-            left = code
+            gap = code
             found = 0
-            for f in range(faces - 1, -1, -1):
-                workspace.guess[f] = workspace.signs[f]
-                if workspace.resting[f] == 1.0:
-                    digit = left % 3
-                    workspace.guess[f] = -1.0 if digit == 2 else float(digit)
-                    left = left // 3
+            for f in range(n_interfaces - 1, -1, -1):
+                choice.guess[f] = choice.slip_signs[f]
+                if choice.is_resting[f] == 1.0:
+                    digit = gap % 3
+                    choice.guess[f] = -1.0 if digit == 2 else float(digit)
+                    gap = gap // 3
                     found = found + (digit > 0)
             if (
                 found == slips
-                and judge(noise, motion, modal_system, table, memory, h, workspace)[0] < 0
+                and find_violation(noise, motion, modal_system, table, memory, h, workspace)[0] < 0
             ):
                 return True
     return False
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def settle(motion, modal_system, table, memory, h, workspace):
-    """Choose which rigid elements hold just after an event, and which way the others slip; whether a choice was found.
+def choose_sticks(motion, modal_system, table, memory, h, workspace):
+    """Choose which interfaces stick and which slip just after an event.
 
-    The first guess is judged, then slides are exchanged, then all choices of a few slides are tried.
-    workspace.signs (i,): the first guess; of slides outside of workspace.resting (i,) their slip.
-    workspace.waves[0]: series of the drive over h [s]. Rates of the resting slides are taken out of
-    the motion.
+    Parameters
+    ----------
+    motion, modal_system, table, memory
+    h : float
+        Duration [s] of the piece whose drive is in workspace.drive[0].
+    workspace : Workspace
+        choice.slip_signs (i,) is the first guess, and the slip of interfaces outside
+        choice.is_resting.
+
+    Returns
+    -------
+    bool
+        Whether a choice was found. The rates of held interfaces are removed from the motion.
     """
-    faces = len(modal_system.reach)
+    choice = workspace.choice
+    constraint = workspace.constraint
+    n_interfaces = len(modal_system.inverse_mass)
     count = 0
-    for f in range(faces):
-        workspace.mask[f] = workspace.resting[f]
-    constrain(modal_system, workspace)
-    if workspace.held[0] > 0.0:
-        remove_held_slides(motion[1], modal_system, workspace)
-    for f in range(faces):
-        if table.static[f] > 0.0 and workspace.tied[f] == 1.0:
-            workspace.resting[f] = 1.0
-        count += int(workspace.resting[f])
-    for noise in (NOISE, LOOSER * NOISE):
-        for f in range(faces):
-            workspace.guess[f] = workspace.signs[f]
-        if judge(noise, motion, modal_system, table, memory, h, workspace)[0] < 0:
+    for f in range(n_interfaces):
+        constraint.is_held[f] = choice.is_resting[f]
+    constrain_slides(modal_system, workspace)
+    if constraint.status[HOLD.n_held] > 0.0:
+        remove_held_rates(motion[1], modal_system, workspace)
+    for f in range(n_interfaces):
+        if table.static_limit[f] > 0.0 and constraint.is_tied[f] == 1.0:
+            choice.is_resting[f] = 1.0
+        count += int(choice.is_resting[f])
+    for noise in (NOISE_TOL, LOOSE_NOISE_FACTOR * NOISE_TOL):
+        for f in range(n_interfaces):
+            choice.guess[f] = choice.slip_signs[f]
+        if find_violation(noise, motion, modal_system, table, memory, h, workspace)[0] < 0:
             return True
-        if count > MAX_ENUMERATED_FIRST and exchanged(
+        if count > MAX_ENUMERATED_FIRST and choose_by_exchange(
             noise, motion, modal_system, table, memory, h, workspace
         ):
             return True
-        if count <= MAX_ENUMERATED and every(
+        if count <= MAX_ENUMERATED and choose_by_enumeration(
             noise, motion, modal_system, table, memory, h, workspace
         ):
             return True
@@ -377,23 +461,27 @@ def settle(motion, modal_system, table, memory, h, workspace):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def at_rest(u, h, top, modal_system, table, memory, workspace):
-    """Note in workspace.resting (i,) which slides of rigid elements have no speed at u of a piece: those held, and those
-    whose speed is round-off; workspace.signs are those of their slip."""
-    for f in range(len(modal_system.reach)):
-        head = memory.head[f]
-        workspace.signs[f] = 0.0 if head == 0.0 else 1.0 if head > 0 else -1.0
-        workspace.resting[f] = 1.0 if table.static[f] > 0.0 else 0.0
-        if holds(f, table, memory) or table.static[f] == 0.0 or abs(head) == 2.0:
+def find_resting_slides(u, h, top, modal_system, table, memory, workspace):
+    """Find the interfaces with rigid elements that have no velocity at u of a piece.
+
+    They are the held ones and those whose speed is round-off; choice.is_resting and
+    choice.slip_signs are written.
+    """
+    choice = workspace.choice
+    for f in range(len(modal_system.inverse_mass)):
+        head = memory.rigid_state[f]
+        choice.slip_signs[f] = min(max(head, -1.0), 1.0)
+        choice.is_resting[f] = 1.0 if table.static_limit[f] > 0.0 else 0.0
+        if is_held(f, table, memory) or table.static_limit[f] == 0.0 or abs(head) == 2.0:
             continue
         speed = 0.0
         size = 0.0
         power = 1.0
         for k in range(1, top + 1):
-            for i in range(len(modal_system.square)):
-                part = modal_system.faces[f, i] * workspace.coefs[k, i] * (k * power)
+            for i in range(len(modal_system.omega_squared)):
+                part = modal_system.interfaces[f, i] * workspace.coefficients[k, i] * (k * power)
                 speed += part
                 size += abs(part)
             power *= u
-        if workspace.signs[f] * speed > NOISE * size:
-            workspace.resting[f] = 0.0
+        if choice.slip_signs[f] * speed > NOISE_TOL * size:
+            choice.is_resting[f] = 0.0

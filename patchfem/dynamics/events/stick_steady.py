@@ -1,9 +1,12 @@
-"""Periodic motion behind rigid elements (Coulomb friction), or none, by Newton's method on the map from event to event.
+"""Periodic motion behind rigid elements (Coulomb friction), or none, by shooting.
 
-Between two events the motion is linear, so its derivative is the exponential of its system with the held slides taken
-out. A perturbation dx moves an event by dt = -(grad e . dx)/e', so dx+ = R (dx + f- dt) - f+ dt with the motions f
-before and after and R taking the rates of stopped slides out (saltation; Leine and Nijmeijer 2004, ch. 7). The
-eigenvalues of the product are the Floquet multipliers.
+Newton's method finds the fixed point of the map over a period.
+
+Between two events the motion is linear, so its derivative is the exponential of its system without
+the held interfaces. A perturbation dx moves an event with the condition e by dt = -(grad e .
+dx)/e', so dx+ = R (dx + f- dt) - f+ dt with the motions f before and after and R removing the
+rates of stopped interfaces (saltation matrix; Leine and Nijmeijer 2004, ch. 7). The eigenvalues of
+the product are the Floquet multipliers.
 """
 
 from dataclasses import dataclass
@@ -15,20 +18,27 @@ import numpy as np
 from ...core import InitialState, ModalBasis, PatchfemError, frozen_array
 from ..periodic import Grows, Mapped, Shooting
 from . import histories
+from .positions_kernels import BEGIN, COLUMN, N_COLUMNS, ROW
 
-LONGEST = 400  # cycles of a run where Newton's method leads away
+# periods of a run where Newton's method leads away from the periodic motion
+MAX_APPROACH_PERIODS = 400
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Steady:
-    """A motion that repeats from period to period.
+class SteadyState:
+    """A periodic motion under Coulomb friction.
 
-    start: state at phase 0 of the drive; residual: |state after a period - start| over the size of the motion;
-    multipliers (2n,) complex, largest first: stable where all are < 1 in magnitude (a stuck slide that may rest
-    anywhere in a range keeps a 1); amplitude [m]: half the peak-to-peak output; regime: "stuck", "sliding" (no stop
-    lasts), "n stops" per period of the interface with the most, or "unbounded"; stops (i,) that last, per period;
-    alone: no two events coincide, else the multipliers hold for one order of them; iterations of Newton's method.
-    Unbounded: start is the last state of the run, residual and multipliers are those there.
+    - start: state at phase 0 of the drive
+    - residual: |state after a period - start| over the size of the motion
+    - multipliers: (2n,) complex Floquet multipliers, the largest first; the motion is stable where
+      all magnitudes are below 1; a stuck interface that may rest anywhere in a range keeps a 1
+    - amplitude: half the range of the output [m]
+    - regime: "stuck", "sliding" (no stop lasts), "n stops" per period of the interface with the
+      most, or "unbounded"; start, residual and multipliers of an unbounded motion are those of the
+      last period
+    - stops: (i,) stops per period that last
+    - alone: whether no two events coincide; else the multipliers hold for one order of them
+    - iterations: of Newton's method
     """
 
     start: InitialState
@@ -41,10 +51,18 @@ class Steady:
     iterations: int
 
 
-class Map(NamedTuple):
-    """Map of the state x = (z, v) (2n,) over some periods: its end, its derivative slope (2n, 2n), signs of slip (k, i)
-    in its pieces, which of them rub (i,), half the peak-to-peak output [m], sizes (2n,) of the state on the way, first
-    (n, n): projector of its first piece, and alone as in Steady."""
+class PeriodMapping(NamedTuple):
+    """Image of a state (2n,) under the map over some periods.
+
+    - end: the state at the end
+    - slope: (2n, 2n) derivative of the map
+    - signs: (k, i) signs of slip in the phases between events
+    - rubs: (i,) whether the interface has friction
+    - swing: half the range of the output [m]
+    - sizes: (2n,) sizes of the state on the way
+    - first: (n, n) projector of the first phase onto motions that leave the held interfaces alone
+    - alone: as of `SteadyState`
+    """
 
     end: np.ndarray
     slope: np.ndarray
@@ -56,10 +74,11 @@ class Map(NamedTuple):
     alone: bool
 
 
-class Stretch:
-    """Motion from one event to the next: the slides that are held, and the forces of the others.
+class LinearPhase:
+    """Motion from one event to the next, in which the same interfaces are held.
 
-    run: the run; row, after: its first row and the first one behind it, None at the end; span [s].
+    run: the run; row, after: first row of the phase and of the next one, None at the end; span:
+    duration [s].
     """
 
     def __init__(self, run, row, after, span: float):
@@ -70,58 +89,64 @@ class Stretch:
         self.row = row
         self.after = after
         self.span = span
-        at = run._at(0, 0)
-        columns = row[at:].reshape(len(run.groups), run.kernels.EACH)
-        self.held = np.isinf(columns[:, 1])
-        self.signs = columns[:, 7]
-        rows = modal_system.faces[self.held]
+        at = run._column(0, 0)
+        columns = row[at:].reshape(len(run.groups), N_COLUMNS)
+        self.held = np.isinf(columns[:, COLUMN.stiffness])
+        self.signs = columns[:, COLUMN.direction]
+        rows = modal_system.interfaces[self.held]
         self.pinv = np.linalg.pinv(rows, rcond=1e-10)
         self.project = np.eye(n) - self.pinv @ rows
         if len(rows) and np.abs(self.project).max() < 1e-9:
             self.project = np.zeros((n, n))
-        self.given = np.where(self.held, 0.0, columns[:, 0]) @ modal_system.faces / modes.mass
+        self.given = (
+            np.where(self.held, 0.0, columns[:, COLUMN.force])
+            @ modal_system.interfaces
+            / modes.mass
+        )
         self.square = np.diag(modes.omega**2)
         self.dampers = np.asarray(modes.damping_matrix, float)
 
     def slope(self) -> np.ndarray:
-        """Derivative (2n, 2n) of the state at the end to that at the start."""
+        """Return the derivative (2n, 2n) of the end state with respect to the start state."""
         n = len(self.square)
         p = self.project
         left = np.block([[np.zeros((n, n)), p], [-p @ self.square, -p @ self.dampers]])
-        return exponential(left * self.span) @ self.taken_out()
+        return matrix_exponential(left * self.span) @ self.taken_out()
 
     def taken_out(self) -> np.ndarray:
-        """Derivative (2n, 2n) of a state whose held slides come to rest to what it was."""
+        """Return the derivative (2n, 2n) of a state whose held interfaces come to rest."""
         out = np.eye(2 * len(self.square))
         out[len(self.square) :, len(self.square) :] = self.project
         return out
 
     def acceleration(self, z, v, push: float) -> tuple:
-        """(acceleration (n,) [m s-2], that without the reactions) at a state under a drive [m s-2]."""
+        """Return accelerations (n,) [m s-2] with and without the reactions."""
         pull = -self.square @ z - self.dampers @ v - self.run.modes.base * push - self.given
         return self.project @ pull, pull
 
-    def saltation(self, later: "Stretch") -> tuple:
-        """(derivative (2n, 2n) of the state after the event at the end to that before it, whether only one slide
-        changed by itself)."""
+    def saltation(self, later: "LinearPhase") -> tuple:
+        """Return the saltation matrix of the event at the end.
+
+        The second value tells whether only one interface changed.
+        """
         run = self.run
         modes = self.run.modes
         n = len(self.square)
         row = later.row
-        z = row[run.kernels.HEAD : run.kernels.HEAD + n]
-        v = row[run.kernels.HEAD + n : run.kernels.HEAD + 2 * n]
+        z = row[ROW.motion : ROW.motion + n]
+        v = row[ROW.motion + n : ROW.motion + 2 * n]
         part = run.drive.segments[0]
-        push = part.constant + part.amplitude * np.sin(row[2])
-        rise = part.amplitude * part.omega * np.cos(row[2])
+        push = part.constant + part.amplitude * np.sin(row[ROW.phase])
+        rise = part.amplitude * part.omega * np.cos(row[ROW.phase])
         before, pull = self.acceleration(z, v, push)
         changed = self.signs != later.signs
-        face, stops = _what_happened(self, later, changed, modes.mass * pull @ self.pinv)
+        face, stops = _identify_event(self, later, changed, modes.mass * pull @ self.pinv)
         gradient = np.zeros(2 * n)
-        static = run.table.static[face]
-        kinetic = run.table.kinetic[face]
+        static = run.table.static_limit[face]
+        kinetic = run.table.kinetic_limit[face]
         if stops:
-            gradient[n:] = run.modal_system.faces[face]
-            speed = float(run.modal_system.faces[face] @ before)
+            gradient[n:] = run.modal_system.interfaces[face]
+            speed = float(run.modal_system.interfaces[face] @ before)
         else:
             react = self.pinv[:, np.flatnonzero(self.held) == face][:, 0]
             gradient[:n] = -react @ self.square
@@ -139,10 +164,11 @@ class Stretch:
         return out, not any(others)
 
 
-def exponential(left) -> np.ndarray:
-    """Exponential of a small matrix (2n, 2n) of coordinates and rates: Taylor's series of 2^-s of it, squared s times.
+def matrix_exponential(left) -> np.ndarray:
+    """Return the exponential of a small matrix (2n, 2n) of coordinates and rates.
 
-    That of SciPy wakes the threads of its linear algebra, which takes up to milliseconds for two rows.
+    Taylor's series of 2^-s of the matrix, squared s times. SciPy's function starts the threads of
+    its linear algebra, which takes up to milliseconds for two rows.
     """
     half = len(left) // 2
     sizes = np.abs(left)
@@ -160,34 +186,49 @@ def exponential(left) -> np.ndarray:
     return out * (weight / weight[:, None])
 
 
-def _what_happened(one: Stretch, later: Stretch, changed, reactions) -> tuple:
-    """(interface of the event between two stretches, whether its slip came to rest); reactions (h,) [N] of the held
-    ones."""
+def _identify_event(one: LinearPhase, later: LinearPhase, changed, reactions) -> tuple:
+    """Return the interface of the event between two phases and whether its slip stopped.
+
+    reactions: (h,) [N] of the held interfaces.
+    """
     turned = np.flatnonzero(changed & (one.signs != 0))
     if turned.size:
         return int(turned[0]), True
-    limits = one.run.table.static[one.held]
+    limits = one.run.table.static_limit[one.held]
     near = np.abs(np.abs(reactions) / np.maximum(limits, 1e-300) - 1)
     near[~changed[one.held]] = np.inf
     return int(np.flatnonzero(one.held)[int(np.argmin(near))]), False
 
 
-def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map:
-    """The map of a state (2n,) over whole drive periods, with its slope (2n, 2n).
+def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> PeriodMapping:
+    """Map a state over whole periods of the drive, with the derivative.
 
-    state: modal displacements and velocities where the drive begins; groups: Elements of every interface, rigid ones
-    alone. The slope is that of the stretches between events times the jump at each (saltation matrices).
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive
+    groups : sequence of Elements
+        One for every interface, rigid elements alone.
+    state : ndarray
+        (2n,) modal coordinates [m] and rates [m/s] at the start of the drive.
+    periods : int, optional
+
+    Returns
+    -------
+    PeriodMapping
+        Its slope is the product of those of the phases and of the saltation matrices of the
+        events.
     """
     n = modes.omega.size
-    run = histories.started(
+    run = histories.start_run(
         modes, drive, groups, periods, periods, start=InitialState(state[:n], state[n:])
     )
     kept = []
-    run.until(periods, lambda done: kept.append(done.copy()))
+    run.run_to(periods, lambda done: kept.append(done.copy()))
     rows = np.concatenate(kept)
-    begins = [0, *(k for k in np.flatnonzero(rows[:, 4] >= run.kernels.SWITCHED) if k)]
+    begins = [0, *(k for k in np.flatnonzero(rows[:, ROW.begin] >= BEGIN.stick_or_slip) if k)]
     parts = [
-        Stretch(run, rows[a], None, float(rows[a:b, 1].sum()))
+        LinearPhase(run, rows[a], None, float(rows[a:b, ROW.duration].sum()))
         for a, b in zip(begins, [*begins[1:], len(rows)])
     ]
     slope = parts[0].slope()
@@ -199,15 +240,17 @@ def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map
             alone = alone and own
         slope = after.slope() @ slope
     owner = np.repeat(np.arange(len(rows)), 3)
-    dense = run.dense_values(rows, owner, np.tile([0.0, 0.5, 1.0], len(rows)) * rows[owner, 1])
+    dense = run.evaluate_rows(
+        rows, owner, np.tile([0.0, 0.5, 1.0], len(rows)) * rows[owner, ROW.duration]
+    )
     sizes = [max(float(np.abs(part).max()), 1e-300) for part in (dense[:, :n], dense[:, n : 2 * n])]
-    low = run.books.extremes[:, 0].min()
-    high = run.books.extremes[:, 1].max()
-    return Map(
+    low = run.run_sums.extremes[:, 0].min()
+    high = run.run_sums.extremes[:, 1].max()
+    return PeriodMapping(
         run.motion.ravel().copy(),
         slope,
         np.array([part.signs for part in parts]),
-        run.table.static > 0,
+        run.table.static_limit > 0,
         float(high - low) / 2,
         np.repeat(sizes, n),
         parts[0].project,
@@ -215,18 +258,40 @@ def period_map(modes: ModalBasis, drive, groups, state, periods: int = 1) -> Map
     )
 
 
-def steady(
+def solve_steady(
     modes: ModalBasis,
     drive,
     groups,
     start: InitialState | None = None,
     cycles: int = 30,
     periods: int = 1,
-) -> Steady:
-    """Periodic response to a sine from rest or `start`, after `cycles` of a run that bring it near.
+) -> SteadyState:
+    """Find the periodic response to a sine under Coulomb friction.
 
-    drive: one Segment of a sine; groups: as of `period_map`. NotConverged as `periodic.Shooting.repeating`,
-    PatchfemError for a drive that does not repeat.
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive
+        One segment, a sine.
+    groups : sequence of Elements
+        As of `map_period`.
+    start : InitialState, optional
+        At rest by default.
+    cycles : int, optional
+        Periods of the run that leads to the start of Newton's method.
+    periods : int, optional
+        Periods of the drive after which the motion repeats.
+
+    Returns
+    -------
+    SteadyState
+
+    Raises
+    ------
+    NotConverged
+        As `periodic.Shooting.repeating`.
+    PatchfemError
+        If the drive does not repeat.
     """
     if len(drive.segments) != 1:
         raise PatchfemError(
@@ -235,16 +300,18 @@ def steady(
         )
     n = modes.omega.size
     begin = np.zeros(2 * n) if start is None else np.concatenate([start.z, start.v])
-    shooting = Slips(modes, drive, groups, periods)
+    shooting = CoulombShooting(modes, drive, groups, periods)
     try:
-        mapped, used = shooting.repeating(shooting.run(begin, cycles), (2 * cycles, LONGEST))
+        mapped, used = shooting.repeating(
+            shooting.run(begin, cycles), (2 * cycles, MAX_APPROACH_PERIODS)
+        )
     except Grows as found:
-        return _result(found.mapped, n, "unbounded", found.steps)
-    return _result(mapped, n, None, used)
+        return _make_steady(found.mapped, n, "unbounded", found.steps)
+    return _make_steady(mapped, n, None, used)
 
 
-class Slips(Shooting):
-    """The map from event to event over whole periods of a drive; arguments as `steady`."""
+class CoulombShooting(Shooting):
+    """Shooting with the map from event to event over periods, as `solve_steady`."""
 
     def __init__(self, modes: ModalBasis, drive, groups, periods: int = 1):
         self.modes = modes
@@ -258,7 +325,7 @@ class Slips(Shooting):
 
     def mapped(self, point) -> Mapped:
         """The map of a state (2n,)."""
-        found = period_map(self.modes, self.drive, self.groups, point, self.periods)
+        found = map_period(self.modes, self.drive, self.groups, point, self.periods)
         return Mapped(
             point,
             found,
@@ -280,16 +347,16 @@ class Slips(Shooting):
         return self.run(mapped.point, periods)
 
     def run(self, state, periods: int):
-        """The state after some periods of the run."""
+        """Return the state after some periods."""
         n = self.modes.omega.size
-        run = histories.started(
+        run = histories.start_run(
             self.modes, self.drive, self.groups, periods, start=InitialState(state[:n], state[n:])
         )
-        run.until(periods)
+        run.run_to(periods)
         return run.motion.ravel().copy()
 
 
-def _result(mapped: Mapped, n: int, regime, used: int) -> Steady:
+def _make_steady(mapped: Mapped, n: int, regime, used: int) -> SteadyState:
     one = mapped.found
     state = mapped.point
     stops = tuple(
@@ -300,14 +367,13 @@ def _result(mapped: Mapped, n: int, regime, used: int) -> Steady:
         most = max(stops)
         slips = bool(np.any(signs != 0)) or signs.shape[1] == 0
         rests = bool(np.any(signs == 0))
-        regime = (
-            "stuck"
-            if not slips
-            else "sliding"
-            if not rests
-            else f"{most} stop{'s' if most != 1 else ''}"
-        )
-    return Steady(
+        if not slips:
+            regime = "stuck"
+        elif not rests:
+            regime = "sliding"
+        else:
+            regime = f"{most} stop{'s' if most != 1 else ''}"
+    return SteadyState(
         InitialState(frozen_array(state[:n]), frozen_array(state[n:])),
         mapped.miss,
         frozen_array(mapped.multipliers(), complex),

@@ -1,15 +1,16 @@
-"""Compiled sums over a piece of the motion: work of the drive, viscous loss, phasors."""
+"""Energies and phasor of a piece of the motion, summed by Gauss points (compiled)."""
 
 from math import cos, pi, sin
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .series_kernels import _PLACE, _WEIGHT, points, value
+from .positions_kernels import LEDGER, TIME
+from .series_kernels import GAUSS_POINTS, GAUSS_WEIGHTS, count_gauss_points, evaluate_polynomial
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def at_four(poly, low, top, u):
-    """Values of a polynomial as in `value` at four places."""
+def evaluate_at_four(poly, low, top, u):
+    """Return the values of a polynomial, as `evaluate_polynomial`, at four places."""
     a = b = c = d = poly[top]
     for k in range(top - 1, low - 1, -1):
         part = poly[k]
@@ -21,8 +22,8 @@ def at_four(poly, low, top, u):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def rates_at_four(coefs, i, top, u):
-    """Rates over u of the coordinate i at four places."""
+def evaluate_rates_at_four(coefs, i, top, u):
+    """Return the rates over u of the coordinate i at four places."""
     a = b = c = d = top * coefs[top, i]
     for k in range(top - 1, 0, -1):
         part = k * coefs[k, i]
@@ -34,66 +35,72 @@ def rates_at_four(coefs, i, top, u):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def sums(x, u, h, top, modal_system, time_state, books, workspace):
-    """Add the work of the drive, the viscous loss and the phasor of a piece up to u to the books, by Gauss points."""
-    n = len(modal_system.square)
-    count = points(x * u)
-    ledger = books.ledger
-    nodes = workspace.nodes
+def add_piece_sums(x, u, h, top, modal_system, time_state, run_sums, workspace):
+    """Add drive work, viscous loss and output phasor of a piece up to u to the sums.
+
+    x: duration of the piece times the fastest rate. Four points are evaluated at a time, in
+    registers.
+    """
+    n = len(modal_system.omega_squared)
+    count = count_gauss_points(x * u)
+    ledger = run_sums.ledger
+    nodes = workspace.rates
     work = 0.0
-    lost = 0.0
-    passed_by = 0.0
+    loss = 0.0
+    power_size = 0.0
     for g in range(0, count, 4):  # four points at a time in registers
         place = (
-            u * _PLACE[count, g],
-            u * _PLACE[count, g + 1],
-            u * _PLACE[count, g + 2],
-            u * _PLACE[count, g + 3],
+            u * GAUSS_POINTS[count, g],
+            u * GAUSS_POINTS[count, g + 1],
+            u * GAUSS_POINTS[count, g + 2],
+            u * GAUSS_POINTS[count, g + 3],
         )
-        weight = _WEIGHT[count, g : g + 4]
-        wave = at_four(workspace.waves[0], 0, top, place)
-        push = (0.0, 0.0, 0.0, 0.0)
+        weight = GAUSS_WEIGHTS[count, g : g + 4]
+        drive = evaluate_at_four(workspace.drive[0], 0, top, place)
+        base_rate = (0.0, 0.0, 0.0, 0.0)
         for i in range(n):
-            rate = rates_at_four(workspace.coefs, i, top, place)
-            push = (
-                push[0] - modal_system.base[i] * rate[0],
-                push[1] - modal_system.base[i] * rate[1],
-                push[2] - modal_system.base[i] * rate[2],
-                push[3] - modal_system.base[i] * rate[3],
+            rate = evaluate_rates_at_four(workspace.coefficients, i, top, place)
+            base_rate = (
+                base_rate[0] - modal_system.base[i] * rate[0],
+                base_rate[1] - modal_system.base[i] * rate[1],
+                base_rate[2] - modal_system.base[i] * rate[2],
+                base_rate[3] - modal_system.base[i] * rate[3],
             )
             nodes[i, 0], nodes[i, 1], nodes[i, 2], nodes[i, 3] = rate
-            if not modal_system.coupled:
-                lost += modal_system.damping[i, i] * (
+            if not modal_system.is_coupled:
+                loss += modal_system.damping[i, i] * (
                     weight[0] * rate[0] ** 2
                     + weight[1] * rate[1] ** 2
                     + weight[2] * rate[2] ** 2
                     + weight[3] * rate[3] ** 2
                 )
-        if modal_system.coupled:
+        if modal_system.is_coupled:
             for i in range(n):
                 for j in range(n):
                     for k in range(4):
-                        lost += weight[k] * nodes[i, k] * modal_system.damping[i, j] * nodes[j, k]
+                        loss += weight[k] * nodes[i, k] * modal_system.damping[i, j] * nodes[j, k]
         power = (
-            weight[0] * push[0] * wave[0],
-            weight[1] * push[1] * wave[1],
-            weight[2] * push[2] * wave[2],
-            weight[3] * push[3] * wave[3],
+            weight[0] * base_rate[0] * drive[0],
+            weight[1] * base_rate[1] * drive[1],
+            weight[2] * base_rate[2] * drive[2],
+            weight[3] * base_rate[3] * drive[3],
         )
         work += power[0] + power[1] + power[2] + power[3]
-        passed_by += abs(power[0]) + abs(power[1]) + abs(power[2]) + abs(power[3])
-    ledger[0] += modal_system.mass * u * work
-    ledger[1] += modal_system.mass * u * lost / h
-    ledger[2] += modal_system.mass * u * passed_by
-    cycle = int(time_state.now[0])
-    if books.wanted[cycle] == 1.0:
+        power_size += abs(power[0]) + abs(power[1]) + abs(power[2]) + abs(power[3])
+    ledger[LEDGER.drive_work] += modal_system.mass * u * work
+    ledger[LEDGER.viscous_loss] += modal_system.mass * u * loss / h
+    ledger[LEDGER.drive_power] += modal_system.mass * u * power_size
+    cycle = int(time_state.now[TIME.cycle])
+    if run_sums.is_phasor_wanted[cycle] == 1.0:
         for g in range(count):
-            share = u * _PLACE[count, g]
-            at = time_state.now[1] + h * share
+            share = u * GAUSS_POINTS[count, g]
+            at = time_state.now[TIME.offset] + h * share
             out = 0.0
             angle = 2 * pi * at / time_state.period[0]
             for i in range(n):
-                out += modal_system.output[i] * value(workspace.coefs[:, i], 0, top, share)
-            out *= 2 * u * h * _WEIGHT[count, g] / time_state.period[0]
-            books.phasors[cycle, 0] += out * cos(angle)
-            books.phasors[cycle, 1] -= out * sin(angle)
+                out += modal_system.output[i] * evaluate_polynomial(
+                    workspace.coefficients[:, i], 0, top, share
+                )
+            out *= 2 * u * h * GAUSS_WEIGHTS[count, g] / time_state.period[0]
+            run_sums.phasors[cycle, 0] += out * cos(angle)
+            run_sums.phasors[cycle, 1] -= out * sin(angle)

@@ -1,8 +1,25 @@
 """A rig whose load climbs the flanks of matched grooves as it slides (`friction.grooves`).
 
-In: `core.ModalBasis`, a drive, grooves under their load, a law of friction. Out: a `MarchResult`, as the march gives
-it. Under Coulomb's law, or a force that follows the speed, the motion between a stop and the next release is smooth:
-eq. 3.4 with the force of the flank, by the integrator of `dynamics.smooth`. Read `flank_kernels`, the force as a law
-that holds; `run`, which samples the motion. Laws with memory are a contact of the march, `climbing` and
-`contact_kernels`, of points (`points_kernels`).
+Equation. On a flank of slope t(q) the lifted mass m rises with t q', so with the vertical force V
+= N + m (t q')' the force against the relative displacement is
+
+    F = V (t + phi)/(1 - phi t),    phi = +-mu_k in slip, between -mu_s and mu_s in stick,
+
+and the energy goes into the height of the load, the lifted mass and friction along the flank.
+
+Under Coulomb's law, or a force that follows the speed, the motion between a stop and the next
+release is smooth: the integrator of `dynamics.smooth` finds stops, releases and loss of contact as
+events (`flank_kernels`, `run`). Laws with memory act over the path along the flank, as a contact
+of the march (`climbing`, `contact_kernels`, `points_kernels`).
+
+In: `core.ModalBasis`, a drive, grooves under their load, a friction law. Out: a `MarchResult`. It
+refuses a lifted mass whose friction exceeds the inertia of the sliding mass, where the motion is
+not determined. Cost: that of the smooth engine, or one Newton iteration more per step than that of
+the march.
+
+| to read | module |
+|---|---|
+| first: the force of the flank | `flank_kernels` |
+| a run under Coulomb's law | `run` |
+| a step under a law with memory | `contact_kernels`, then `points_kernels` |
 """

@@ -1,4 +1,4 @@
-"""Contacts of laws with memory along the flanks of grooves, for marches and for prescribed slides."""
+"""Contacts of laws with memory along flanks, for marches and prescribed slides."""
 
 from dataclasses import dataclass, replace
 
@@ -12,21 +12,29 @@ from ..integrated import accelerations
 from ..interfaces.arrays import Climbing
 from ..march.march import Run
 from ..march.varying_load import PLASTIC, Rubbing, plastic, rub_of
+from .arrays import CLIMB
 
 HERE = "dynamics.grooves.contact_kernels"
-STIFF = 0.1  # of tolerance times the slide at which pieces let go: a bond length that is 1.7 of it off in force at most
-SHORT = 1e-3  # of that slide: the shortest bonds by which shear modes are chosen
-# of Climbing.now_at
-RISE = 0
-VERTICAL = 1
-LIFTS = 4
-BEFORE = 12
-NORMAL = 13
+# bond length of points of Coulomb's law over the tolerance times the slide at which pieces slip as a whole; the force is
+# then wrong by at most 0.17 of the tolerance
+COULOMB_LENGTH_RATIO = 0.1
+# shortest bond length over that slide by which shear modes are chosen
+MIN_LENGTH_RATIO = 1e-3
 
 
-def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
-    """Raise PatchfemError where friction under the lifted mass takes all of the mass that slides, 1 + m s t (t - mu)/(1
-    + mu t) <= 0 on some flank, s [1/kg] the slide's acceleration per newton."""
+def check_lifted_mass(grooves: Grooves, static: float, modes) -> None:
+    """Raise PatchfemError where friction takes all inertia of the sliding mass.
+
+    That is the case where 1 + m s t (t - mu)/(1 + mu t) <= 0 on some flank, with s [1/kg] the
+    acceleration of the relative displacement per newton.
+
+    Parameters
+    ----------
+    grooves : Grooves
+    static : float
+        Coefficient of friction.
+    modes : ModalBasis
+    """
     own = modes.mass / float(modes.slide @ modes.slide)
     taken = -grooves.lifted_mass * grooves.min_mass_ratio(static)
     if taken >= own:
@@ -39,32 +47,65 @@ def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
         )
 
 
-def lifts(grooves: Grooves, time: float) -> str:
-    """The sentence on a lifted mass that leaves its grooves at a time [s]."""
+def lift_message(grooves: Grooves, time: float) -> str:
+    """Return the sentence on a lifted mass that leaves its grooves at a time [s]."""
     return (
         f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: the inertia of this "
         f"mass takes all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load"
     )
 
 
-def model_of(grooves: Grooves, load: float, law: Rubbing, modes) -> "ClimbingModel":
-    """Return the model of a law with memory (`march.varying_load.plastic` or `bonds`) under a load [N].
+def make_model(grooves: Grooves, load: float, law: Rubbing, modes) -> "ClimbingModel":
+    """Return the model of a law with memory along flanks.
 
-    Coulomb's law at the points of pieces that give way is plastic of the length 0, which `giving` makes anew.
-    modes: of the rig, None of a bench; PatchfemError as of `refuse_heavy`.
+    Coulomb's law at the points of pieces that deform in shear is elastic-plastic with length 0;
+    `with_shear_modes` gives it a length.
+
+    Parameters
+    ----------
+    grooves : Grooves
+    load : float
+        [N].
+    law : Rubbing
+        Of `march.varying_load.plastic` or `bonds`.
+    modes : ModalBasis or None
+        None for a bench, where no mass is checked.
+
+    Returns
+    -------
+    ClimbingModel
+
+    Raises
+    ------
+    PatchfemError
+        As `check_lifted_mass`.
     """
     if modes is not None:
-        refuse_heavy(grooves, law.static, modes)
+        check_lifted_mass(grooves, law.static, modes)
     return ClimbingModel(grooves, load, law)
 
 
-def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -> "ClimbingModel":
-    """The model whose points are those of a solved Patch, behind the shear modes of its pieces: `count` of them, or as
-    many as the tolerance asks for.
+def with_shear_modes(
+    model: "ClimbingModel", patch, count: int | None, tolerance: float
+) -> "ClimbingModel":
+    """Return the model with the points of a solved patch, behind the shear modes of its pieces.
 
-    Points of Coulomb's law behind pieces of the stiffness K_t are elastic-plastic ones whose springs are 1/(STIFF
-    tolerance) times as stiff, a bond length STIFF tolerance mu N/K_t: on flat ground the force is then off by at most
-    0.17 of the tolerance, over the friction limit, from the exact elements (`slip.shear_modes.jenkins_set`).
+    Points of Coulomb's law behind pieces of the shear stiffness K_t become elastic-plastic ones
+    with a bond length COULOMB_LENGTH_RATIO tolerance mu N/K_t: on flat ground the force is then
+    wrong by at most 0.17 of the tolerance, over the friction limit, compared with exact elements
+    (`slip.shear_modes.jenkins_set`).
+
+    Parameters
+    ----------
+    model : ClimbingModel
+    patch : Patch
+    count : int or None
+        Number of shear modes; None for as many as the tolerance needs.
+    tolerance : float
+
+    Returns
+    -------
+    ClimbingModel
     """
     law = model.law
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
@@ -73,8 +114,8 @@ def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -
     length = law.length
     if not length:
         reach = limit.sum() / tangential_stiffness(patch.giving, force > 0)
-        law = plastic(law.static, STIFF * tolerance * reach)
-        length = max(STIFF * tolerance, SHORT) * reach
+        law = plastic(law.static, COULOMB_LENGTH_RATIO * tolerance * reach)
+        length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * reach
     if law.growth[0] >= 0:
         weakening = law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf
     found = (
@@ -86,8 +127,10 @@ def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -
 
 
 class FlankModel:
-    """What `march.march` asks of a contact along the flanks of `grooves`, under a `load` [N], of the coefficient
-    `static` [1]."""
+    """What `march.march` needs to know of a contact along the flanks of `grooves`.
+
+    It is under a `load` [N] and has the coefficient of friction `static` [1].
+    """
 
     __slots__ = ()
     # nothing beside it, and the loop knows of a load that stays
@@ -97,16 +140,16 @@ class FlankModel:
 
     @property
     def limit(self) -> float:
-        """Scale of the residuals [N]: the largest force of the steepest flank."""
+        """Largest force of the steepest flank [N], the scale of the residuals."""
         return self.grooves.max_force(self.load, self.static)
 
     @property
     def reduction(self):
-        """ShearModes behind the contact, None of pieces that are rigid in shear."""
+        """ShearModes behind the contact, None for pieces that are rigid in shear."""
 
     @property
     def set_valued(self) -> bool:
-        """Whether the law holds without any stretch: it stretches."""
+        """Whether the law holds without any stretch; it does not."""
         return False
 
     def shown(self, contact) -> dict:
@@ -116,11 +159,14 @@ class FlankModel:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ClimbingModel(FlankModel):
-    """A law with memory, as under a load that changes.
+    """A law with memory along flanks.
 
-    shear: ShearModes on the points under load where the pieces give way, share (a,): those of the points in the load.
-    The pieces climb as one: the height and the slope are those at the slide of the holder, and the points share the
-    normal force as they share the load.
+    - grooves, load [N], law
+    - shear: ShearModes on the points under load where the pieces deform in shear, else None
+    - share: (a,) fractions of the load that the points carry
+
+    The pieces climb as one: height and slope are those at the relative displacement of the holder,
+    and the points carry the same fractions of the normal force as of the load.
     """
 
     grooves: Grooves
@@ -131,7 +177,7 @@ class ClimbingModel(FlankModel):
 
     @property
     def kind(self) -> tuple:
-        """(contact, law): what `march.instances` takes an instance of its loop for."""
+        """Contact and law of which `march.instances` makes a loop."""
         return HERE, ""
 
     @property
@@ -146,26 +192,33 @@ class ClimbingModel(FlankModel):
 
     @property
     def runner(self):
-        """The class that marches it."""
+        """Class that marches this contact."""
         return ClimbingRun
 
     def build(self) -> Climbing:
-        """The Climbing with arrays of its own, at rest at the slide 0."""
+        """Return the arrays of the contact at rest at the relative displacement 0."""
         g = self.grooves
         share = np.array(self.share, float)
         flank = np.array(
             [self.load, g.wave_number, g.amplitude, g.phase, g.lifted_mass, self.law.kind]
         )
         normal = self.load * np.hypot(1.0, float(g.slope(0.0)))
-        now_at = np.zeros(14)
-        now_at[[VERTICAL, BEFORE, NORMAL]] = self.load, normal, normal
+        climb = np.zeros(len(CLIMB))
+        climb[[CLIMB.vertical_force, CLIMB.start_normal, CLIMB.end_normal]] = (
+            self.load,
+            normal,
+            normal,
+        )
         return Climbing(
-            flank, now_at, share, *rub_of(self.law, normal * share, self.shear, self.limit)
+            flank, climb, share, *rub_of(self.law, normal * share, self.shear, self.limit)
         )
 
     def shown(self, contact) -> dict:
-        """Of pieces that give way the points' friction along the flank [N], what is elastic there [m] and their share
-        of the vertical force [N], (3, a); nothing of one point, which has no field."""
+        """Return fields of the points (3, a), nothing for one point.
+
+        They are friction along the flank [N], elastic stretch [m] and the fraction of the vertical
+        force [N].
+        """
         if self.shear is None:
             return {}
         top = contact.memory[0]
@@ -180,16 +233,20 @@ class ClimbingModel(FlankModel):
             over = np.divide(bottom, top, where=top > 0, out=np.zeros_like(top))
         return {
             "nodes": np.stack(
-                [force, over + contact.b @ contact.modes, contact.share * contact.now_at[VERTICAL]]
+                [
+                    force,
+                    over + contact.b @ contact.modes,
+                    contact.share * contact.climb[CLIMB.vertical_force],
+                ]
             )
         }
 
 
 class GroovesRun(Run):
-    """The arrays of a march over grooves, and its clock."""
+    """Arrays and time of a march over grooves."""
 
     def response(self, rows, number) -> Response:
-        """Histories; with a lifted mass `extra` has normal_load [N], the vertical force N + m (t q'' + t' q'^2)."""
+        """Return histories; with a lifted mass `extra` has normal_load [N], the vertical force."""
         out = super().response(rows, number)
         g = self.model.grooves
         modes = self.modes
@@ -211,13 +268,13 @@ class GroovesRun(Run):
         )
 
     def _leaves(self) -> None:
-        """Mark the run as one whose lifted mass has left the grooves."""
+        """Set the outcome of a run whose lifted mass has left the grooves."""
         self.outcome = Outcome.LEAVES_GROOVES
-        self.message = lifts(self.model.grooves, self.done * self.prop.dt)
+        self.message = lift_message(self.model.grooves, self.done * self.prop.dt)
 
 
 class ClimbingRun(GroovesRun):
-    """The arrays of a march whose points have a memory of their loads, and its clock."""
+    """Arrays and time of a march whose points remember their loads."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
@@ -225,21 +282,21 @@ class ClimbingRun(GroovesRun):
         v = self.modes.slide @ self.state[1]
         slope = float(model.grooves.slope(q))
         contact = self.contact
-        now_at = self.contact.now_at
+        climb = self.contact.climb
         normal = model.load * np.hypot(1.0, slope)
-        contact.memory[:] *= normal / now_at[NORMAL]
-        contact.pressed[:] *= normal / now_at[NORMAL]
-        now_at[[RISE, BEFORE, NORMAL]] = slope * v, normal, normal
+        contact.memory[:] *= normal / climb[CLIMB.end_normal]
+        contact.pressed[:] *= normal / climb[CLIMB.end_normal]
+        climb[[CLIMB.rise_speed, CLIMB.start_normal, CLIMB.end_normal]] = slope * v, normal, normal
         self.ledger[0] += self.strained()
 
     def placed(self, place, rate) -> None:
-        """As of a Run; what rises has the speed of the flank there."""
+        """Set the state as a Run does; the lifted mass has the velocity of the flank there."""
         super().placed(place, rate)
-        self.contact.now_at[RISE] = (
+        self.contact.climb[CLIMB.rise_speed] = (
             float(self.model.grooves.slope(self.modes.slide @ place)) * self.modes.slide @ rate
         )
 
     def _judge(self, status: int) -> None:
         super()._judge(status)
-        if self.contact.now_at[LIFTS] and self.outcome is None:
+        if self.contact.climb[CLIMB.has_lifted] and self.outcome is None:
             self._leaves()

@@ -1,104 +1,138 @@
-"""Coulomb's law, or a force that follows the speed, along the flanks of grooves that the load climbs: a law of
-`dynamics.smooth` that holds the slide at rest.
+"""Friction along flanks that the load climbs, as a law of the smooth engine (compiled).
 
-numbers: free, load [N], wave number [rad/m], amplitude [m], phase of the grooves, lifted mass [kg], mu_s, mu_k, and v_0
-[m/s] of a law of the speed or 0; memory: the last force [N] of `state_rates`. The states y are friction's own loss
-along the flank [J] and two whose rates alone count: what is left of the hold and of the load [N]. turn:
-`smooth.arrays.Moving`; the slide sticks where the direction is 0.
+It is Coulomb's law, or a force that follows the speed.
+
+It is a law of `dynamics.smooth` that holds the interface at rest; its numbers are `LawNumbers`,
+its memory the last force [N]. Its states are the friction loss along the flank [J], and two whose
+rates alone count: what remains of the hold and of the normal force [N]. In stick,
+turn[TURN.direction] is 0.
 """
 
 from math import cos, inf, nan, sin, sqrt, tanh
+from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
-from ..smooth.arrays import EASE, FREE, PLACE, PULL, RELEASE_DIRECTION, UPRIGHT
+from ..smooth.arrays import TURN
 
+# the law holds the relative displacement at rest
 IS_SET_VALUED = True
-LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, STATIC, KINETIC, SPEED = range(1, 9)  # of numbers
+
+
+class LawNumbers(NamedTuple):
+    """Positions in the numbers of the law; the first one is free.
+
+    - load, lifted_mass: [N], [kg]
+    - wave_number, amplitude, phase: of the grooves [rad/m], [m], [rad]
+    - static, kinetic: coefficients of friction
+    - speed: v_0 [m/s] of a force that follows the speed, else 0
+    """
+
+    load: int = 1
+    wave_number: int = 2
+    amplitude: int = 3
+    phase: int = 4
+    lifted_mass: int = 5
+    static: int = 6
+    kinetic: int = 7
+    speed: int = 8
+
+
+LAW = LawNumbers()
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def flank(numbers, q):
-    """(slope t of the flank [1], its rate t' over the slide [1/m]) at the slide q [m]."""
-    steep = numbers[AMPLITUDE] * numbers[WAVE]
-    turn = numbers[WAVE] * q - numbers[PHASE]
-    return steep * sin(turn), steep * numbers[WAVE] * cos(turn)
+def find_flank_slope(numbers, q):
+    """Return the slope t [1] of the flank at q [m] and its derivative [1/m]."""
+    steep = numbers[LAW.amplitude] * numbers[LAW.wave_number]
+    turn = numbers[LAW.wave_number] * q - numbers[LAW.phase]
+    return steep * sin(turn), steep * numbers[LAW.wave_number] * cos(turn)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def holds(numbers, turn):
-    """(smallest, largest) force [N] with which the flank holds the slide at rest, as `turn` has it."""
-    t = flank(numbers, turn[PLACE])[0]
-    mu = numbers[STATIC]
-    load = numbers[LOAD]
+def find_hold_range(numbers, turn):
+    """Return the smallest and largest force [N] with which the flank holds at rest."""
+    t = find_flank_slope(numbers, turn[TURN.slide])[0]
+    mu = numbers[LAW.static]
+    load = numbers[LAW.load]
     return load * (t - mu) / (1 + mu * t), load * (t + mu) / (1 - mu * t)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def release_direction(numbers, turn):
-    """Direction in which it lets go of the slide at rest, 0 where it holds; a force of the speed never holds."""
-    if numbers[SPEED] > 0:
-        return 1.0 if turn[FREE] >= turn[EASE] * turn[PULL] else -1.0
-    low, high = holds(numbers, turn)
-    return 1.0 if turn[PULL] > high else -1.0 if turn[PULL] < low else 0.0
+    """Return the direction in which the law lets go of the interface at rest, 0 where it holds.
+
+    A force that follows the speed never holds.
+    """
+    if numbers[LAW.speed] > 0:
+        return (
+            1.0
+            if turn[TURN.free_acceleration] >= turn[TURN.inverse_mass] * turn[TURN.force]
+            else -1.0
+        )
+    low, high = find_hold_range(numbers, turn)
+    return 1.0 if turn[TURN.force] > high else -1.0 if turn[TURN.force] < low else 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_motion(numbers, memory, way, y):
-    """Return that the rates have no kink; there is no state to set."""
+    """Return the distance and the speed of the next kink of the rates: they have none."""
     return inf, 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state_rates(numbers, memory, turn, dq, v, y, out):
-    """Force F [N] against the slide; writes the rates of y into out, F and the vertical force V [N] into turn.
+    """Return the force F [N]; write the rates of the states into out.
 
-    With the slide's acceleration q'' = a - F s, a without the force, s [1/kg] per newton, V = N + m_l (t q'' + t' q'^2)
-    and F = V c are linear in F, c = (t + phi)/(1 - phi t): F (1 + m_l t c s) = c (N + m_l (t' q'^2 + t a)).
+    F and the normal force are written into turn.
+
+    With the acceleration q'' = a - F s, where a is that without F, V = N + m (t q'' + t' q'^2) and
+    F = V c are linear in F with c = (t + phi)/(1 - phi t): F (1 + m t c s) = c (N + m (t' q'^2 + t
+    a)).
     """
-    steep, bend = flank(numbers, turn[PLACE])
-    load = numbers[LOAD]
-    free = turn[FREE]
-    share = turn[EASE]
-    heavy = numbers[LIFTED]
+    steep, bend = find_flank_slope(numbers, turn[TURN.slide])
+    load = numbers[LAW.load]
+    free = turn[TURN.free_acceleration]
+    share = turn[TURN.inverse_mass]
+    heavy = numbers[LAW.lifted_mass]
     out[1] = 1.0
     normal = load
-    if turn[0] == 0.0 and numbers[SPEED] == 0.0:
-        turn[PULL] = free / share
+    if turn[TURN.direction] == 0.0 and numbers[LAW.speed] == 0.0:
+        turn[TURN.force] = free / share
         out[0] = 0.0
-        low, high = holds(numbers, turn)
-        out[1] = min(high - turn[PULL], turn[PULL] - low)
+        low, high = find_hold_range(numbers, turn)
+        out[1] = min(high - turn[TURN.force], turn[TURN.force] - low)
     else:
-        phi = turn[0] * numbers[KINETIC]
-        if numbers[SPEED] > 0:
-            phi = numbers[STATIC] * tanh(sqrt(1 + steep * steep) * v / numbers[SPEED])
+        phi = turn[TURN.direction] * numbers[LAW.kinetic]
+        if numbers[LAW.speed] > 0:
+            phi = numbers[LAW.static] * tanh(sqrt(1 + steep * steep) * v / numbers[LAW.speed])
         ratio = (steep + phi) / (1 - phi * steep)
-        turn[PULL] = (
+        turn[TURN.force] = (
             ratio
             * (load + heavy * (bend * v * v + steep * free))
             / (1 + heavy * steep * ratio * share)
         )
-        normal += heavy * (steep * (free - share * turn[PULL]) + bend * v * v)
+        normal += heavy * (steep * (free - share * turn[TURN.force]) + bend * v * v)
         out[0] = phi * (1 + steep * steep) / (1 - phi * steep) * normal * v
     out[2] = normal
-    turn[UPRIGHT] = normal
-    if turn[0] == 0.0:
-        turn[RELEASE_DIRECTION] = release_direction(numbers, turn)
-    memory[0] = turn[PULL]
-    return turn[PULL]
+    turn[TURN.normal_force] = normal
+    if turn[TURN.direction] == 0.0:
+        turn[TURN.release_direction] = release_direction(numbers, turn)
+    memory[0] = turn[TURN.force]
+    return turn[TURN.force]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_memory(numbers, memory, q, v):
-    """Return the last force, the energy of the load's height and of the mass that rises, and the slide q."""
-    half = sin(0.5 * (numbers[WAVE] * q - numbers[PHASE]))
-    rise = flank(numbers, q)[0] * v
-    height = 2 * numbers[LOAD] * numbers[AMPLITUDE] * half * half
-    return Reading(memory[0], height + 0.5 * numbers[LIFTED] * rise * rise, q)
+    """Return the last force, the energy of height and lifted mass, and q."""
+    half = sin(0.5 * (numbers[LAW.wave_number] * q - numbers[LAW.phase]))
+    rise = find_flank_slope(numbers, q)[0] * v
+    height = 2 * numbers[LAW.load] * numbers[LAW.amplitude] * half * half
+    return Reading(memory[0], height + 0.5 * numbers[LAW.lifted_mass] * rise * rise, q)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, turn, dq, v, y):
-    """Return nan: the dissipated energy follows from the work."""
+    """Return nan: the energy dissipated follows from the work."""
     return nan

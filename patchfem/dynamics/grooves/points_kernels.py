@@ -1,8 +1,7 @@
-"""The points of a contact that climbs flanks under a law with memory, loaded by the normal force of the flank.
+"""Points of a contact that climbs flanks, under a law with memory (compiled).
 
-The points are those of `contacts.arrays.Climbing`: one of rigid pieces, or those behind shear modes, which share the
-normal force and slide along the flank, as in `contacts.shear_solve_kernels`. `contact_kernels` asks for begun, drag,
-commit and state.
+They carry the normal force of the flank and slide along it: one point for rigid pieces, or those
+behind shear modes as in `interfaces.shear_solve_kernels`.
 """
 
 from ...compiled.jit import njit
@@ -19,44 +18,60 @@ from ..interfaces.pressed_points_kernels import (
 from ..interfaces.shear_points_kernels import SLOPE
 from ..interfaces.shear_solve_kernels import GRADIENT, STEP, descend, halfway, hessian
 from ..interfaces.shear_solve_kernels import pulled as drawn
+from .arrays import CLIMB, FLANK
 
-# of contacts.arrays.Climbing.flank, as in `contact_kernels`
-LOAD = 0
-KIND = 5
-# of now_at
-PLACE = 11
-NORMAL = 13
-TINY = 1e-13  # of the friction limit, to which pieces that give way are solved
+# residual over the friction limit, to which pieces that deform in shear are solved
+SHEAR_GOAL = 1e-13
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def begun(c, v, dt):
-    """Begin a step of dt [s] at the speed v [m/s] along the flank."""
+def start_step(c, v, dt):
+    """Start a step of dt [s] at the velocity v [m/s] along the flank."""
     halfway(v, dt, c)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def drag(ds, flat, end, dt, c):
-    """(mean force [N] along the flank over the path ds [m] in dt [s], its slope [N/m]); c.pressed become shares of the
-    normal force flat + f end at the end, on a slope `end`, where f is the force there."""
-    kind = int(c.flank[KIND])
+def solve_friction(ds, flat, end, dt, c):
+    """Solve for the friction over the path ds [m] in dt [s].
+
+    c.pressed become the loads at the end of the step.
+
+    The normal force at the end is flat + f end, where f is the force there; secant steps find it.
+
+    Parameters
+    ----------
+    ds : float
+    flat, end : float
+        Normal force without friction [N], and slope at the end [1].
+    dt, c
+
+    Returns
+    -------
+    force : float
+        Mean along the flank [N].
+    stiffness : float
+        Its derivative [N/m].
+    """
+    kind = int(c.flank[FLANK.kind])
     pulled = 0.0
     gain = 0.0
-    at = c.now_at
+    at = c.climb
     gives = c.kappa.size > 0
-    close = (1e-12 if gives else 1e-14) * c.flank[LOAD]
+    close = (1e-12 if gives else 1e-14) * c.flank[FLANK.load]
     tried = 0.0
     missed = 0.0
     for count in range(60):
-        before = at[NORMAL]
+        before = at[CLIMB.end_normal]
         press_all(kind, c)
         if gives:
             c.y[0, 0] = ds
-            pulled = descend(ds, 0.0, kind, False, c, TINY * c.force[0] * c.flank[LOAD])[0]
+            pulled = descend(
+                ds, 0.0, kind, False, c, SHEAR_GOAL * c.force[0] * c.flank[FLANK.load]
+            )[0]
         else:
             pulled, gain = rub_force(ds, kind, c)
         bound = c.force[0] * before
-        after = min(max(2 * pulled - at[PLACE], -bound), bound)
+        after = min(max(2 * pulled - at[CLIMB.start_force], -bound), bound)
         now = max(flat + after * end, 0.0)
         miss = now - before
         if (
@@ -66,27 +81,27 @@ def drag(ds, flat, end, dt, c):
             and abs(missed - miss) > 0.1 * abs(before - tried)
         ):
             # secant: a solve is dear
-            load(c, max(before - miss * (before - tried) / (miss - missed), 0.0))
+            set_normal_force(c, max(before - miss * (before - tried) / (miss - missed), 0.0))
         else:
-            load(c, now)
+            set_normal_force(c, now)
         tried = before
         missed = miss
         if abs(miss) <= close:
             break
-    return pulled, stiff(c) if gives else gain
+    return pulled, find_stiffness(c) if gives else gain
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def load(c, normal):
-    """Put the normal force [N] on the points."""
-    c.now_at[NORMAL] = normal
+def set_normal_force(c, normal):
+    """Distribute a normal force [N] over the points."""
+    c.climb[CLIMB.end_normal] = normal
     for j in range(c.pressed.shape[1]):
         c.pressed[1, j] = c.share[j] * normal
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def stiff(c):
-    """Slope [N/m] of the force over the slide of the holder, of points behind shear modes that have been solved for."""
+def find_stiffness(c):
+    """Return the derivative [N/m] of the force over the slide of the holder."""
     hess = c.hess[0]
     p = c.workspace[STEP]
     total = 0.0
@@ -99,12 +114,12 @@ def stiff(c):
         c.ready[0] = 1.0
     drawn(SLOPE, c.psi, c.points, int(c.count[0]), p)
     p[0] = 0.0
-    return max(total - bent(hess, p, c.workspace[GRADIENT]), 0.01 * total)
+    return max(total - inverse_form(hess, p, c.workspace[GRADIENT]), 0.01 * total)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def bent(hess, p, workspace):
-    """p . hess^-1 p (n,) of a factor."""
+def inverse_form(hess, p, workspace):
+    """Return p . hess^-1 p for p (n,) and a factorised matrix."""
     for k in range(p.size):
         workspace[k] = p[k]
     return solve_factored(hess, workspace)
@@ -112,13 +127,22 @@ def bent(hess, p, workspace):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(ds, along, v0, v1, dt, c):
-    """Keep the step over the path ds [m] under the mean force `along` [N] between the speeds v0, v1 [m/s] along the
-    flank; (energy dissipated [J], whether points and pieces agree)."""
-    kind = int(c.flank[KIND])
+    """Keep a step over the path ds [m] under a mean force [N].
+
+    v0, v1: velocities along the flank [m/s].
+
+    Returns
+    -------
+    lost : float
+        Energy dissipated [J].
+    is_solved : bool
+        Whether points and pieces agree.
+    """
+    kind = int(c.flank[FLANK.kind])
     fine = True
     lost = rub_commit(ds, along, v0, v1, dt, kind, c)
     if c.kappa.size:
-        more, count = spring_back(kind, c, c.force[0] * c.flank[LOAD] * 1e-11)
+        more, count = spring_back(kind, c, c.force[0] * c.flank[FLANK.load] * 1e-11)
         lost = lost + more
         fine = count > 0
     for j in range(c.pressed.shape[1]):
@@ -128,5 +152,5 @@ def commit(ds, along, v0, v1, dt, c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(c, q):
-    """(force along the flank [N], energy stored in the law [J], irreversible slip [m]) at the slide q [m]."""
-    return rub_state(int(c.flank[KIND]), c, q)
+    """Return force along the flank [N], energy of the law [J] and slip [m] at q [m]."""
+    return rub_state(int(c.flank[FLANK.kind]), c, q)

@@ -1,5 +1,9 @@
-"""Modes whose load climbs grooves, under Coulomb's law or a force that follows the speed: by `dynamics.smooth`, with
-the samples of a march."""
+"""Run of modes whose load climbs grooves, under a law without memory.
+
+The law is Coulomb's, or a force that follows the speed.
+
+`dynamics.smooth` integrates the motion, which is sampled as a march samples it.
+"""
 
 from dataclasses import dataclass
 
@@ -11,19 +15,26 @@ from ...friction.path_work import sampled_work
 from ...friction.protocol import Element
 from ..march.models import coulomb_model
 from ..smooth import run as smooth
-from ..smooth.arrays import DONE, PACE, POWER, STORED
-from .climbing import FlankModel, GroovesRun, refuse_heavy
+from ..smooth.arrays import COUNT, NOW, WORK
+from .climbing import FlankModel, GroovesRun, check_lifted_mass
 
-TOLERANCE = 1e-11  # relative error of a step
-REST = 1e-6  # of wavelength/(2 pi), below which a motion is at rest to the choice of the step
+# relative tolerance of a step
+TOLERANCE = 1e-11
+# motion over wavelength/(2 pi), below which the choice of the step takes it for rest
+REST_RATIO = 1e-6
 HERE = "dynamics.grooves.flank_kernels"
-ENDS = {Outcome.LEAVES_GROOVES: 5, Outcome.NOT_CONVERGED: 3}  # status of a march
+# status of a march by the outcome of the motion
+STATUS_OF_OUTCOME = {Outcome.LEAVES_GROOVES: 5, Outcome.NOT_CONVERGED: 3}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GroovesModel(FlankModel):
-    """A law without memory: static and kinetic coefficient [1] under a load [N]; speed: v_0 [m/s] of eq. 2.4, static
-    tanh(v/v_0) along the flank, or None for Coulomb's law."""
+    """A law without memory along flanks.
+
+    - grooves, load [N]
+    - static, kinetic: coefficients of friction [1]
+    - speed: v_0 [m/s] of eq. 2.4, static tanh(v/v_0) along the flank; None for Coulomb's law
+    """
 
     grooves: Grooves
     load: float
@@ -33,7 +44,7 @@ class GroovesModel(FlankModel):
 
     @property
     def length(self) -> float:
-        """Bond length [m]: none."""
+        """Bond length [m], none."""
         return 0.0
 
     @property
@@ -43,28 +54,45 @@ class GroovesModel(FlankModel):
 
     @property
     def runner(self):
-        """The class that marches it."""
+        """Class that marches this contact."""
         return SampledRun
 
     def build(self):
-        """A contact that nothing uses."""
+        """Return a contact that nothing uses."""
         return coulomb_model(0.0, 0.0).build()
 
 
-def model_of(
+def make_model(
     grooves: Grooves, load: float, static: float, kinetic: float, speed: float | None, modes
 ) -> GroovesModel:
-    """The model of grooves below these modes.
+    """Return the model of grooves below these modes.
 
-    load [N]: mean of the load; static, kinetic [1]: coefficients of friction on the flanks; speed [m/s]: v_0 of the
-    tanh law, None for Coulomb friction. PatchfemError as of `refuse_heavy`.
+    Parameters
+    ----------
+    grooves : Grooves
+    load : float
+        Mean of the load [N].
+    static, kinetic : float
+        Coefficients of friction on the flanks [1].
+    speed : float or None
+        v_0 [m/s] of the tanh law, None for Coulomb friction.
+    modes : ModalBasis
+
+    Returns
+    -------
+    GroovesModel
+
+    Raises
+    ------
+    PatchfemError
+        As `climbing.check_lifted_mass`.
     """
-    refuse_heavy(grooves, static, modes)
+    check_lifted_mass(grooves, static, modes)
     return GroovesModel(grooves, load, static, kinetic, speed)
 
 
 class SampledRun(GroovesRun):
-    """The arrays of a march over grooves, its clock, and the motion that is sampled."""
+    """Arrays and time of a march over grooves, and the motion that is sampled."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
@@ -73,7 +101,7 @@ class SampledRun(GroovesRun):
         self.ledger[0] += self.strained()
 
     def _begin(self) -> None:
-        """Begin the motion from the state as it stands, at the start of the drive."""
+        """Start the motion from the present state, at the start of the drive."""
         g = self.model.grooves
         model = self.model
         numbers = [
@@ -90,56 +118,66 @@ class SampledRun(GroovesRun):
         element = Element(
             HERE, np.array(numbers), np.zeros(1), model.limit, state_scales=(np.inf,) * 3
         )
-        self.motion_of = smooth.Motion(
+        self.smooth_motion = smooth.Motion(
             self.modes, self.drive, element, 1.0, TOLERANCE, start=InitialState(*self.state)
         )
-        self.motion_of.ends_only(1)
+        self.smooth_motion.request_last_phasors(1)
         n = self.modes.omega.size
-        least = self.motion_of.moving.work[24]
-        least[:n] = REST / g.wave_number
-        least[n : 2 * n] = REST / g.wave_number * self.motion_of.moving.now[PACE]
-        self.booked = self._sums_of()
+        least = self.smooth_motion.arrays.work[WORK.sizes]
+        least[:n] = REST_RATIO / g.wave_number
+        least[n : 2 * n] = (
+            REST_RATIO / g.wave_number * self.smooth_motion.arrays.now[NOW.fastest_rate]
+        )
+        self.booked = self._read_sums()
 
-    def _sums_of(self) -> np.ndarray:
-        """Work of the drive, viscous loss, its |work|, friction's own loss, steps and work of the slide [J]."""
-        y = self.motion_of.moving.y
-        own = self.motion_of.kept.counters
+    def _read_sums(self) -> np.ndarray:
+        """Return the sums of the motion, six energies and counts.
+
+        They are work of the drive, viscous loss, its |work|, friction loss [J], steps, and friction work [J].
+        """
+        y = self.smooth_motion.arrays.state
+        own = self.smooth_motion.record.counters
         n = 2 * self.modes.omega.size
-        return np.array([y[-3], y[-2], own[POWER], y[n], own[DONE], y[-1]])
+        return np.array([y[-3], y[-2], own[COUNT.drive_power], y[n], own[COUNT.accepted], y[-1]])
 
     def fork(self, drive):
-        """As of a Run."""
+        """Return a copy that goes on by itself, as a Run does."""
         twin = super().fork(drive)
-        twin.motion_of = self.motion_of.fork(drive)
+        twin.smooth_motion = self.smooth_motion.fork(drive)
         return twin
 
     def _slid(self, path) -> None:
-        """Nothing: there is no memory."""
+        """Do nothing: there is no memory."""
 
     def _steps(self, count: int, rows) -> tuple:
-        """As of a Run: the motion is sampled; rows have friction's own loss in the step besides."""
+        """Fill rows as a Run does, from samples of the motion.
+
+        They also have the friction loss of each step.
+        """
         n = self.modes.omega.size
         dt = float(self.prop.dt)
         times = (self.done + np.arange(count + 1)) * dt
-        motion = self.motion_of
+        motion = self.smooth_motion
         if motion.time != times[0] or not np.array_equal(
-            motion.moving.y[: 2 * n], self.state.ravel()
+            motion.arrays.state[: 2 * n], self.state.ravel()
         ):
             self._begin()
-            motion = self.motion_of
+            motion = self.smooth_motion
         begun = motion.fork(self.drive)
-        seen = motion.until(times[-1], times)
+        seen = motion.run_to(times[-1], times)
         # where it ends, at the sample that follows
         if motion.outcome is not None and len(seen) <= count:
-            seen = np.concatenate([seen, motion.settled()[0][None]])
+            seen = np.concatenate([seen, motion.read_state()[0][None]])
         out = seen[:, 1 : 1 + n] @ self.modes.output
         beyond = np.flatnonzero(np.abs(out) > self.travel)
         last, status = (
-            (int(beyond[0]), 1) if beyond.size else (len(seen) - 1, ENDS.get(motion.outcome, 0))
+            (int(beyond[0]), 1)
+            if beyond.size
+            else (len(seen) - 1, STATUS_OF_OUTCOME.get(motion.outcome, 0))
         )
         if 0 < last < len(seen) - 1:  # the sums and the state are those of the last sample
-            motion = self.motion_of = begun
-            motion.until(times[last], times[: last + 1])
+            motion = self.smooth_motion = begun
+            motion.run_to(times[last], times[: last + 1])
         seen = seen[: last + 1]
         work = np.diff(seen[:, -1])
         slip_path = np.diff(seen[:, 2 * n + 1])
@@ -154,10 +192,10 @@ class SampledRun(GroovesRun):
         )
         part[:-1, 2 * n + 6] = work
         part[:-1, 2 * n + 7] = work - np.diff(seen[:, 2 * n + 5])
-        self.state[:] = motion.moving.y[: 2 * n].reshape(2, n)
-        sums = self._sums_of()
+        self.state[:] = motion.arrays.state[: 2 * n].reshape(2, n)
+        sums = self._read_sums()
         self.ledger[[0, 1, 2, 3, 5, 8]] += sums - self.booked
-        self.ledger[4] = max(self.ledger[4], motion.kept.counters[STORED])
+        self.ledger[4] = max(self.ledger[4], motion.record.counters[COUNT.max_stored])
         self.booked = sums
         return last, status
 
@@ -167,7 +205,10 @@ class SampledRun(GroovesRun):
         return sampled_work(rows[:, n], rows[:, n + 2], after)
 
     def _parts(self, rows) -> np.ndarray:
-        """As of a Run; what is dissipated is friction's own work along the flank."""
+        """Return the energies of the steps as a Run does.
+
+        Friction dissipates its own work along the flank.
+        """
         n = 2 * self.modes.omega.size
         return np.stack([self._works(rows), rows[:-1, n + 7], np.zeros(len(rows) - 1)])
 
@@ -177,7 +218,7 @@ class SampledRun(GroovesRun):
             self._leaves()
 
     def check(self) -> None:
-        """Mark the run not_converged when steps did not meet their error; what was computed is kept."""
+        """Set the outcome not_converged where steps did not meet their error."""
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
@@ -186,7 +227,7 @@ class SampledRun(GroovesRun):
             )
 
     def strained(self) -> float:
-        """Energy of the height of the load and of the speed of what rises [J]."""
+        """Return the energy of the height of the load and of the lifted mass [J]."""
         g = self.model.grooves
         z, v = self.state
         q = float(self.modes.slide @ z)

@@ -13,14 +13,20 @@ import numpy as np
 
 from ...core import NotConverged
 from ...formatting import format_length
-from .harmonic import Balance, LinearPart, System, damped, pack, unpack
+from .harmonic import Balance, LinearPart, System, pack, solve_damped, unpack
 
-STEPS = 6  # halvings of the way from one amplitude to the next
+# amplitudes that are tried between two given ones where the motion is not found
+MAX_HALVINGS = 6
 
 
-class Free(NamedTuple):
-    """A free motion of `amplitude` [m] of the mode's coordinate: omega [rad/s], zeta [1], slides (i, H + 1) [m], forces
-    (i, H + 1) [N], modal (H + 1, n) [m]."""
+class FreeMotion(NamedTuple):
+    """A free motion of one mode.
+
+    - amplitude: of the coordinate of the mode [m]
+    - omega, zeta: frequency [rad/s] and damping ratio
+    - slides, forces: (i, H + 1) [m], [N]
+    - modal: (H + 1, n) [m]
+    """
 
     amplitude: float
     omega: float
@@ -33,9 +39,12 @@ class Free(NamedTuple):
 class FreeBalance:
     """Equations of the free motion of one mode that a negative damping keeps up.
 
-    balance: Balance of the rows; mode: number of the coordinate whose amplitude is given; scale [rad/s]. Unknowns:
-    packed slides of `Balance` over the amplitude, omega/scale and zeta. The given coordinate is one without receptance,
-    whose two equations stand for omega and zeta.
+    - balance: Balance of the rows
+    - mode: coordinate whose amplitude is given
+    - h: harmonics; scale: of the frequency [rad/s]
+
+    The unknowns are the packed slides of `Balance` over the amplitude, omega/scale and zeta. The
+    given coordinate has no receptance; its two equations determine omega and zeta.
     """
 
     def __init__(self, balance: Balance, mode: int, harmonics: int, scale: float):
@@ -45,7 +54,10 @@ class FreeBalance:
         self.scale = scale
 
     def linear(self, omega: float, zeta: float) -> LinearPart:
-        """The modes at omega [rad/s] with the damping -2 zeta omega besides, the given coordinate free."""
+        """Return the linear part at omega [rad/s] with the damping -2 zeta omega added.
+
+        The given coordinate is free.
+        """
         m = self.balance.modes
         k = np.arange(self.h + 1)[:, None, None]
         eye = np.eye(m.omega.size)
@@ -58,7 +70,7 @@ class FreeBalance:
         inverse = np.zeros_like(p)
         right = eye[self.mode] + 0j
         left = eye[self.mode] + 0j
-        inverse[np.arange(self.h + 1) != 1] = _inverse(p[np.arange(self.h + 1) != 1])
+        inverse[np.arange(self.h + 1) != 1] = _invert(p[np.arange(self.h + 1) != 1])
         inverse[np.ix_([1], keep, keep)] = np.linalg.inv(p[1][np.ix_(keep, keep)])
         right -= inverse[1] @ p[1][:, self.mode]
         left -= p[1][self.mode] @ inverse[1]
@@ -66,7 +78,7 @@ class FreeBalance:
         return LinearPart(inverse, slope, ((1, right, left, left @ p[1][:, self.mode]),))
 
     def system(self, x, amplitude: float) -> System:
-        """The equations at unknowns x (N,) and the amplitude of the mode's coordinate [m], lengths over it."""
+        """Return the equations at unknowns x (N,) and an amplitude [m], lengths over it."""
         omega = x[-2] * self.scale
         zeta = x[-1]
         balance = self.balance
@@ -86,9 +98,19 @@ class FreeBalance:
         return one._replace(residual=one.residual / amplitude, jacobian=jacobian)
 
     def solve(self, x, amplitude: float) -> tuple:
-        """(unknowns (N,), Free) from x (N,), at an amplitude [m] of the mode's coordinate. NotConverged where there is
-        none near."""
-        found = damped(
+        """Solve at an amplitude [m] from unknowns x (N,).
+
+        Returns
+        -------
+        unknowns : ndarray
+        motion : FreeMotion
+
+        Raises
+        ------
+        NotConverged
+            If there is no motion near x.
+        """
+        found = solve_damped(
             lambda v: self.system(v, amplitude),
             x,
             lambda _, left, size: np.linalg.norm(left) < 1e-7,
@@ -101,25 +123,32 @@ class FreeBalance:
         x = found[0]
         one = self.system(found[0], amplitude)
         slides = self.balance.lift @ unpack(x[:-2] * amplitude, self.balance.lift.shape[1])
-        return x, Free(amplitude, x[-2] * self.scale, x[-1], slides, one.fold.force, one.modal)
+        return x, FreeMotion(
+            amplitude, x[-2] * self.scale, x[-1], slides, one.fold.force, one.modal
+        )
 
     def towards(self, x, done: float, target: float) -> np.ndarray:
-        """Unknowns (N,) near those at an amplitude `target` [m] from x (N,) at `done`, by steps in between where it is
-        too far. NotConverged where STEPS of them in a row are too."""
+        """Return unknowns (N,) at an amplitude `target` [m] from x (N,) at `done`.
+
+        Raises
+        ------
+        NotConverged
+            If MAX_HALVINGS steps in a row are too long.
+        """
         stops = [float(target)]
         while stops:
             try:
                 x = self.solve(x, stops[-1])[0]
                 done = stops.pop()
             except NotConverged:
-                if len(stops) > STEPS:
+                if len(stops) > MAX_HALVINGS:
                     raise
                 stops.append(float(np.sqrt(done * stops[-1])))
         return x
 
 
-def _inverse(p) -> np.ndarray:
-    """Inverses (k, n, n); a coordinate that nothing holds at rest keeps its mean."""
+def _invert(p) -> np.ndarray:
+    """Return inverses (k, n, n); a coordinate that nothing holds at rest keeps its mean."""
     try:
         found = np.linalg.inv(p)
         if np.isfinite(found).all():
@@ -130,8 +159,21 @@ def _inverse(p) -> np.ndarray:
 
 
 def trace(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
-    """Free motions along rising amplitudes (k,) [m] from a linear mode (omega, shape (n,)); steps in between where one
-    is too wide."""
+    """Return the free motions at increasing amplitudes (k,) [m], from a linear mode.
+
+    Parameters
+    ----------
+    equations : FreeBalance
+    amplitudes : array_like
+    omega : float
+        [rad/s].
+    shape : ndarray
+        (n,).
+
+    Returns
+    -------
+    list of FreeMotion
+    """
     balance = equations.balance
     h = equations.h
     y = np.zeros((balance.lift.shape[1], h + 1), complex)

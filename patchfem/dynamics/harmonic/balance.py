@@ -1,7 +1,8 @@
-"""The page where modes, drive and laws meet in harmonic balance: what to call, and a steady motion as histories.
+"""Entry to harmonic balance, and a steady motion as histories and energies.
 
-`point` one steady motion, `branches` all of them at a drive, `response` and `levels` over frequency and drive through
-folds, `with_stability` the multipliers, `backbone` frequency and damping over amplitude. Laws and rows: `Group`.
+`point` finds one steady motion, `branches` all of them at a drive, `response` and `levels` curves
+over frequency and drive through folds, `with_stability` the multipliers, `backbone` frequency and
+damping over amplitude.
 """
 
 import numpy as np
@@ -10,8 +11,8 @@ from ...core import Response
 from ..integrated import accelerations
 from .branch import Backbone, Branch, backbone, branches, levels, response
 from .forces import Group
-from .laws import Flow, Interlock, Jenkins, OfSpeed, Spring, Track, law_of_model, synthesis
-from .point import Periodic, friction_force, point, slip_of
+from .laws import Flow, Interlock, Jenkins, SpeedLaw, Spring, Track, make_law, synthesis
+from .point import Periodic, find_slip, friction_force, point
 from .stability import with_stability
 
 __all__ = [
@@ -21,30 +22,32 @@ __all__ = [
     "Group",
     "Interlock",
     "Jenkins",
-    "OfSpeed",
     "Periodic",
+    "SpeedLaw",
     "Spring",
     "backbone",
     "branches",
     "cycle_energy",
-    "law_of_model",
+    "find_regime",
     "levels",
+    "make_law",
     "periodic_response",
     "point",
-    "regime",
     "response",
     "with_stability",
 ]
 
 
-STUCK = 1e-3  # bond lengths of slide below which bonds count as stuck
+# slip over the bond length, below which bonds count as stuck
+STUCK_SLIDE_RATIO = 1e-3
 
 
-def regime(periodic: Periodic) -> tuple:
-    """(name, share of the friction limit that slips within a cycle): "stuck", "partial slip", "slides", "no friction".
+def find_regime(periodic: Periodic) -> tuple:
+    """Return the regime of a motion and the fraction of the friction limit that slips.
 
-    An elastic-plastic element slips where the slide's swing exceeds twice its limit slide, bonds where their slip does
-    STUCK bond lengths; a law of the speed always slides.
+    The regimes are "stuck", "partial slip", "slides" and "no friction". An elastic-plastic element
+    slips where the range of its slide exceeds twice its yield slide, bonds where their slip
+    exceeds STUCK_SLIDE_RATIO bond lengths; a law of the velocity always slides.
     """
     slips = whole = 0.0
     for track, laws in zip(
@@ -59,7 +62,7 @@ def regime(periodic: Periodic) -> tuple:
                 slips += float(law.stiffness @ (law.limit_slide * (2 * law.limit_slide < swing)))
             elif found.limit:
                 length = getattr(law, "length", 0.0)
-                held = np.ptp(track.q - found.stretch / found.limit) < STUCK * length
+                held = np.ptp(track.q - found.stretch / found.limit) < STUCK_SLIDE_RATIO * length
                 slips += 0.0 if held else found.limit
     share = slips / whole if whole else 0.0
     return (
@@ -74,8 +77,11 @@ def regime(periodic: Periodic) -> tuple:
 
 
 def cycle_energy(periodic: Periodic, modes) -> dict:
-    """Work of the drive, viscous loss and work of the rows' laws in a cycle [J], by Parseval; `balance` [1]: what is
-    missing, over the work of the drive. A spring among the laws adds nothing."""
+    """Return work of the drive, viscous loss and work of the laws in a cycle [J], by Parseval.
+
+    `balance` is what is missing over the work of the drive [1]. A spring among the laws adds
+    nothing.
+    """
     k = np.arange(periodic.modal.shape[0])
     speed = 1j * (k * periodic.omega)[:, None] * periodic.modal
     half = np.pi / periodic.omega
@@ -95,9 +101,22 @@ def cycle_energy(periodic: Periodic, modes) -> dict:
 
 
 def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> Response:
-    """One cycle of a steady motion on `samples` + 1 equal times, for measures; slide, friction force and slip of row 0.
+    """Return one cycle of a steady motion as histories of the first row.
 
-    The forces are the laws' own at each instant, so the accelerations have no ringing of cut-off harmonics.
+    The forces are those of the laws at each instant, so the accelerations do not oscillate as a
+    truncated series.
+
+    Parameters
+    ----------
+    periodic : Periodic
+    modes : ModalBasis
+    drive
+    samples : int, optional
+        Equal steps of the cycle.
+
+    Returns
+    -------
+    Response
     """
     omega = periodic.omega
     group = periodic.group
@@ -127,5 +146,5 @@ def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> 
         cycle(modes.output @ accel + floor),
         cycle(floor),
         cycle(friction_force(group.laws[0], found)),
-        cycle(slip_of(track, found)),
+        cycle(find_slip(track, found)),
     )

@@ -1,4 +1,4 @@
-"""Curves of steady motions: over frequency or drive level through folds, every motion at one drive, the backbone."""
+"""Curves of steady motions, all motions at one drive, and the backbone."""
 
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -7,18 +7,32 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError, SineDrive
 from .backbone import FreeBalance, trace
-from .continuation import GOAL, correct, follow
+from .continuation import NEWTON_TOL, correct_point, follow
 from .laws import synthesis
-from .point import LADDER, Periodic, balance_of, by_level, by_omega, cut, group_of, plain, point
+from .point import (
+    HARMONIC_COUNTS,
+    Periodic,
+    balance_of,
+    by_level,
+    by_omega,
+    group_of,
+    make_point,
+    point,
+    with_harmonics,
+)
 from .stability import with_stability
-from .starts import one_harmonic
+from .starts import find_one_harmonic_roots
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Branch:
-    """Points in the order of the curve; parameter: "frequency" [Hz] or "level" [m s-2]; folds and crossings: its values
-    there (crossings: another branch meets); ended: "end", "start" (back through where it came from), "points", "step",
-    or "listed" for given values."""
+    """Points of a curve in order.
+
+    - points: tuple of Periodic
+    - parameter: "frequency" [Hz] or "level" [m s-2]
+    - folds, crossings: values of the parameter there; at a crossing another branch meets
+    - ended: as of `continuation.Path`, or "listed" for given values
+    """
 
     points: tuple
     parameter: str
@@ -28,7 +42,7 @@ class Branch:
 
     @property
     def values(self) -> np.ndarray:
-        """The parameter at every point (k,), [Hz] or [m s-2]."""
+        """Value of the parameter at every point (k,) [Hz] or [m s-2]."""
         return np.array(
             [
                 p.omega / (2 * np.pi) if self.parameter == "frequency" else p.level
@@ -37,36 +51,68 @@ class Branch:
         )
 
     def amplitudes(self, row) -> np.ndarray:
-        """(max - min)/2 [m] of row @ coordinates at every point (k,)."""
+        """Return half the range [m] of row @ coordinates at every point (k,)."""
         return np.array([p.amplitude(row) for p in self.points])
 
 
 def response(modes, drive: SineDrive, group, frequencies, stability: bool = False, **how) -> Branch:
-    """Steady motions over frequency [Hz] at the drive's amplitude.
+    """Find steady motions over frequency at the amplitude of the drive.
 
-    frequencies: (first, last), followed from the first through folds, or more than two: a point at each, started from
-    the one before. stability: multipliers at every point. how: `How`.
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : SineDrive
+    group : Group, or what `point.group_of` takes
+    frequencies : sequence of float
+        First and last [Hz], between which the curve is followed through folds; or more than two,
+        at each of which a point is solved from the one before.
+    stability : bool, optional
+        Whether multipliers are computed.
+    **how
+        Fields of `Numerics`.
+
+    Returns
+    -------
+    Branch
     """
     drives = [
         replace(drive, omega=2 * np.pi * f)
-        for f in _values(frequencies, "drive.frequency: a frequency response", "frequencies")
+        for f in _check_values(frequencies, "drive.frequency: a frequency response", "frequencies")
     ]
-    return _along("frequency", modes, drives, group, How(**how), stability)
+    return _follow("frequency", modes, drives, group, Numerics(**how), stability)
 
 
 def levels(modes, drive: SineDrive, group, accelerations, stability: bool = False, **how) -> Branch:
-    """Steady motions over the drive's amplitude [m s-2] at its frequency; arguments as in `response`."""
+    """Find steady motions over the amplitude of the drive [m s-2] at its frequency.
+
+    Parameters
+    ----------
+    modes, drive, group, stability, **how
+        As of `response`.
+    accelerations : sequence of float
+        As `frequencies` there [m s-2].
+
+    Returns
+    -------
+    Branch
+    """
     drives = [
         replace(drive, acceleration=float(a))
-        for a in _values(
+        for a in _check_values(
             accelerations, "drive.acceleration: a sweep of the drive level", "amplitudes"
         )
     ]
-    return _along("level", modes, drives, group, How(**how), stability)
+    return _follow("level", modes, drives, group, Numerics(**how), stability)
 
 
-class How(NamedTuple):
-    """harmonics: exactly so many, None: as many as tolerance wants; start: as of `point`; longest: step of the arc."""
+class Numerics(NamedTuple):
+    """Numerical settings of a curve.
+
+    - harmonics: exactly so many; None for as many as the tolerance needs
+    - tolerance
+    - start: as of `point.point`
+    - longest: longest step of the arc
+    """
 
     harmonics: int | None = None
     tolerance: float = 1e-3
@@ -74,15 +120,15 @@ class How(NamedTuple):
     longest: float = 0.05
 
 
-def _values(given, what: str, noun: str) -> np.ndarray:
+def _check_values(given, what: str, noun: str) -> np.ndarray:
     values = np.asarray(given, float)
     if values.size < 2 or not (np.isfinite(values).all() and values.min() > 0):
         raise PatchfemError(f"{what} needs two or more positive {noun}")
     return values
 
 
-def _along(parameter: str, modes, drives, group, how: How, stability: bool) -> Branch:
-    found = (_curve if len(drives) == 2 else _listed)(
+def _follow(parameter: str, modes, drives, group, how: Numerics, stability: bool) -> Branch:
+    found = (_solve_curve if len(drives) == 2 else _solve_each)(
         modes, drives, group_of(modes, group), parameter, how
     )
     return (
@@ -92,7 +138,7 @@ def _along(parameter: str, modes, drives, group, how: How, stability: bool) -> B
     )
 
 
-def _listed(modes, drives, group, parameter, how: How) -> Branch:
+def _solve_each(modes, drives, group, parameter, how: Numerics) -> Branch:
     points = []
     last = how.start
     for drive in drives:
@@ -101,12 +147,17 @@ def _listed(modes, drives, group, parameter, how: How) -> Branch:
     return Branch(tuple(points), parameter)
 
 
-def _curve(modes, drives, group, parameter, how: How) -> Branch:
-    """By arc length with as many harmonics everywhere; more where what follows above them is not small."""
+def _solve_curve(modes, drives, group, parameter, how: Numerics) -> Branch:
+    """Follow a curve by arc length with the same number of harmonics everywhere.
+
+    It is raised where the harmonics above are not small.
+    """
     harmonics, tolerance, start, longest = how
     first = point(modes, drives[0], group, harmonics, tolerance, start)
-    for h in [harmonics] if harmonics else [h for h in LADDER if h >= first.harmonics]:
-        points, above, path, scale = _followed(modes, drives, group, parameter, h, first, longest)
+    for h in [harmonics] if harmonics else [h for h in HARMONIC_COUNTS if h >= first.harmonics]:
+        points, above, path, scale = _follow_harmonics(
+            modes, drives, group, parameter, h, first, longest
+        )
         if harmonics or above <= tolerance / 4:
             return Branch(
                 points,
@@ -116,19 +167,23 @@ def _curve(modes, drives, group, parameter, how: How) -> Branch:
                 path.ended,
             )
     raise NotConverged(
-        f"harmonic balance with {LADDER[-1]} harmonics leaves out {above:.1e} of the motion, more than "
+        f"harmonic balance with {HARMONIC_COUNTS[-1]} harmonics leaves out {above:.1e} of the motion, more than "
         f"the limit of {tolerance / 4:g}; raise the tolerance"
     )
 
 
-def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:
-    """(points, largest share of the motion above h, Path, unit) with enough samples for the widest slide."""
+def _follow_harmonics(modes, drives, group, parameter, h, first, longest) -> tuple:
+    """Follow a curve with h harmonics and enough samples for the widest slide.
+
+    Returns the points, the largest part of a motion above h, the Path and the unit of its
+    parameter.
+    """
     samples = max(first.samples // 2, group.samples or group.samples_for(h))
     frequency = parameter == "frequency"
     ends = [d.omega if frequency else d.acceleration for d in drives]
     for _ in range(3):
         balance = balance_of(modes, group, samples)
-        x = cut(balance, first.coefficients, first.unknowns, first.harmonics, h)
+        x = with_harmonics(balance, first.coefficients, first.unknowns, first.harmonics, h)
 
         def system(v, p, balance=balance):
             if frequency:
@@ -139,7 +194,7 @@ def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:
             system, x, ends[0], (min(ends), max(ends)), ends[1] > ends[0], longest / 4, longest
         )
         made = [
-            plain(
+            make_point(
                 balance,
                 v,
                 replace(drives[0], **{"omega" if frequency else "acceleration": float(p)}),
@@ -161,30 +216,59 @@ def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:
     return tuple(p for p, _ in made), max(a for _, a in made), path, 2 * np.pi if frequency else 1.0
 
 
-def way(one: Periodic, other: Periodic, width: float) -> float:
-    """Way from one Periodic of a branch to another, over the size of the motion and the `width` [rad/s]."""
+def distance(one: Periodic, other: Periodic, width: float) -> float:
+    """Return the distance between two points of a branch over the size of the motion.
+
+    Parameters
+    ----------
+    one, other : Periodic
+    width : float
+
+    Returns
+    -------
+    float
+    """
     return float(np.linalg.norm(_step(one, other, width)[0]))
 
 
 def _step(one: Periodic, other: Periodic, width: float) -> tuple:
-    """((N + 1,) from the unknowns and omega of one Periodic to those of another, over their size; that size)."""
+    """Return the scaled step (N + 1,) between two points, and the size of the motion."""
     size = max(float(np.linalg.norm(one.unknowns)), float(np.linalg.norm(other.unknowns))) or 1.0
     return np.append(
         (other.unknowns - one.unknowns) / size, (other.omega - one.omega) / width
     ), size
 
 
-def between(modes, drive, one: Periodic, other: Periodic, share: float, width: float) -> Periodic:
-    """The Periodic of a branch over frequency at a share of the way from one of its points to another.
+def point_between(
+    modes, drive, one: Periodic, other: Periodic, share: float, width: float
+) -> Periodic:
+    """Find the point of a frequency branch at a fraction of the way between two of its points.
 
-    Newton goes across the straight line that joins them, so folds are no obstacle; width: as of `way`. NotConverged
-    where it leads elsewhere.
+    Newton's method goes across the straight line that joins them, so folds are no obstacle.
+
+    Parameters
+    ----------
+    modes, drive
+    one, other : Periodic
+    share : float
+        Fraction of the way.
+    width : float
+        As of `distance`.
+
+    Returns
+    -------
+    Periodic
+
+    Raises
+    ------
+    NotConverged
+        If it leads elsewhere.
     """
     balance = balance_of(modes, one.group, one.base_samples)
     step, size = _step(one, other, width)
     h = one.harmonics
     length = float(np.linalg.norm(step))
-    found = correct(
+    found = correct_point(
         lambda x, p: by_omega(balance, x, p, drive.acceleration, h),
         one.unknowns + share * size * step[:-1],
         one.omega + share * width * step[-1],
@@ -192,35 +276,47 @@ def between(modes, drive, one: Periodic, other: Periodic, share: float, width: f
         step[-1] / length,
         size,
         width,
-        GOAL,
+        NEWTON_TOL,
     )
     if found is None:
         raise NotConverged(
             "accuracy.method: no steady motion was found between two neighbouring points of the curve"
         )
-    return plain(balance, found[0], replace(drive, omega=float(found[1])), h)[0]
+    return make_point(balance, found[0], replace(drive, omega=float(found[1])), h)[0]
 
 
 def branches(
     modes, drive: SineDrive, group, tolerance: float = 1e-3, stability: bool = True
 ) -> list:
-    """Every steady motion at a drive that starts from the roots of the one-harmonic balance reach, smallest first.
+    """Find all steady motions at a drive that the roots of the one-harmonic balance lead to.
 
-    The one-harmonic balance is scanned over the amplitude along the free linear motion: exact for one row, a start for
-    more. A motion that no such root leads to (an isola of a higher harmonic) is not found.
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : SineDrive
+    group : Group, or what `point.group_of` takes
+    tolerance : float, optional
+    stability : bool, optional
+        Whether multipliers are computed.
+
+    Returns
+    -------
+    list of Periodic
+        In increasing size. A motion that no such root leads to (an isola of a higher harmonic) is
+        not found.
     """
     group = group_of(modes, group)
     found = []
     for start in [
         None,
-        *one_harmonic(balance_of(modes, group, 512), drive.omega, drive.acceleration),
+        *find_one_harmonic_roots(balance_of(modes, group, 512), drive.omega, drive.acceleration),
     ]:
         try:
             new = point(modes, drive, group, None, tolerance, start)
         except NotConverged:
             continue
         size = max(np.abs(new.coefficients).max(), 1e-300)
-        if not any(_apart(new, old) < 10 * tolerance * size for old in found):
+        if not any(_difference(new, old) < 10 * tolerance * size for old in found):
             found.append(new)
     if not found:
         raise NotConverged(
@@ -230,15 +326,20 @@ def branches(
     return [with_stability(p, modes) for p in found] if stability else found
 
 
-def _apart(a: Periodic, b: Periodic) -> float:
+def _difference(a: Periodic, b: Periodic) -> float:
     k = min(a.coefficients.shape[1], b.coefficients.shape[1])
     return float(np.abs(a.coefficients[:, :k] - b.coefficients[:, :k]).max())
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Backbone:
-    """amplitude (k,) [m] of the mode's coordinate, frequency (k,) [Hz], damping (k,) [1], slide (k,) [m]: amplitude of
-    the first row, loss (k,) [J] of the contact per cycle."""
+    """Backbone of a mode.
+
+    - amplitude: (k,) of the coordinate of the mode [m]
+    - frequency, damping: (k,) [Hz], [1]
+    - slide: (k,) amplitude of the first row [m]
+    - loss: (k,) of the contact per cycle [J]
+    """
 
     amplitude: np.ndarray
     frequency: np.ndarray
@@ -248,9 +349,26 @@ class Backbone:
 
 
 def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Backbone:
-    """Frequency and damping of a mode over its amplitude (k,) [m], rising, as dynamics.backbone defines them.
+    """Find frequency and damping of a mode over its amplitude, see `harmonic.backbone`.
 
-    It starts from the mode of the held contact of the same number. PatchfemError for amplitudes that do not rise.
+    Parameters
+    ----------
+    modes : ModalBasis
+    group : Group, or what `point.group_of` takes
+    amplitudes : array_like
+        (k,) of the coordinate of the mode, increasing [m].
+    mode : int, optional
+        Mode of the stuck contact from which the path starts.
+    harmonics : int, optional
+
+    Returns
+    -------
+    Backbone
+
+    Raises
+    ------
+    PatchfemError
+        If the amplitudes do not increase.
     """
     group = group_of(modes, group)
     wanted = np.asarray(amplitudes, float)

@@ -1,8 +1,9 @@
-"""Following a curve of solutions r(x, p) = 0 through its folds: pseudo-arc-length, tangent predictor, step control.
+"""Curves of solutions r(x, p) = 0 through folds: pseudo-arc-length continuation.
 
-The arc is measured in motions and parameter scaled to the same size, so that neither hides the other; a fold is where
-the parameter turns, a crossing where the determinant of the bordered system changes sign (another branch meets).
-Method: Keller 1977; Seydel, Practical Bifurcation and Stability Analysis, 2010, ch. 4.
+The arc is measured in motion and parameter scaled to the same size, so that neither hides the
+other. At a fold the parameter turns; at a crossing the determinant of the bordered system changes
+sign, and another branch meets. Method: Keller 1977; Seydel, Practical Bifurcation and Stability
+Analysis, 2010, ch. 4.
 """
 
 from dataclasses import dataclass
@@ -13,14 +14,21 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ...core import NotConverged
 
-GOAL = 1e-9  # change of a motion over its size at which Newton's steps end
+# change of a motion over its size, below which Newton's method ends
+NEWTON_TOL = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Path:
-    """Points x (k, N) and parameters p (k,) in order, dp/ds (k,) per arc, the scaled arc s (k,); folds: parameters
-    where the curve turns back (from a cubic through the neighbours); crossings: parameters where a branch meets; ended:
-    "end", "start" (it came back through the other bound), "points" or "step" (no step was short enough)."""
+    """Points of a curve in order.
+
+    - x, p: (k, N), (k,) solutions and parameters
+    - turn, arc: (k,) dp/ds, and arc s
+    - folds: parameters where the curve turns back, from a cubic through the neighbours
+    - crossings: parameters where a branch meets
+    - ended: "end"; "start" where it came back through the other bound; "points"; "step" where no
+      step was short enough
+    """
 
     x: np.ndarray
     p: np.ndarray
@@ -40,27 +48,53 @@ def follow(
     step: float = 0.02,
     longest: float = 0.1,
     most: int = 2000,
-    goal: float = GOAL,
+    goal: float = NEWTON_TOL,
     scale: float = 0.0,
 ) -> Path:
-    """The curve through (x, p), a solution to be polished, until p leaves bounds = (low, high).
+    """Follow the curve through (x, p) until p leaves the bounds.
 
-    system(x, p) -> (residual (N,), d/dx (N, N), d/dp (N,)). step, longest: of the scaled arc, in which the width of the
-    bounds and the size of the motion (`scale`, 0: the larger of that at the start and half of the largest so far)
-    count 1. The last point lies on the bound. NotConverged where the first point cannot be reached.
+    Parameters
+    ----------
+    system : callable
+        system(x, p) -> residual (N,), d/dx (N, N), d/dp (N,).
+    x : array_like
+    p : float
+        Start, which is corrected first.
+    bounds : tuple
+        Lowest and highest p; the last point lies on one of them.
+    forward : bool, optional
+        Whether p increases at first.
+    step, longest : float, optional
+        First and longest step of the arc, in which the width of the bounds and the size of the
+        motion count 1.
+    most : int, optional
+        Points.
+    goal : float, optional
+        Change of the motion over its size at which Newton's steps end.
+    scale : float, optional
+        Size of the motion; 0 for the larger of that at the start and half of the largest so far.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    NotConverged
+        If the first point is not reached.
     """
     width = bounds[1] - bounds[0]
     x = np.array(x, float)
     p = float(p)
     size = scale or float(np.linalg.norm(x)) or 1.0
-    x = correct(system, x, p, np.zeros(x.size), 1.0, size, width, goal, p)
+    x = correct_point(system, x, p, np.zeros(x.size), 1.0, size, width, goal, p)
     if x is None:
         raise NotConverged(
             "accuracy.method: the first point of the curve was not found near the given start"
         )
     p = x[1]
     x = x[0]
-    tangent = _tangent(system, x, p, None, size, width, forward)
+    tangent = _find_tangent(system, x, p, None, size, width, forward)
     found = [(x, p, tangent[1], 0.0)]
     signs = [tangent[0]]
     ended = "points"
@@ -70,8 +104,8 @@ def follow(
             size = max(size, 0.5 * float(np.linalg.norm(x)))
         t = tangent[1]
         guess = (x + step * size * t[:-1], p + step * width * t[-1])
-        new = correct(system, *guess, t[:-1], t[-1], size, width, goal)
-        if new is not None and not _alike(new, x, p, t, size, width, step):
+        new = correct_point(system, *guess, t[:-1], t[-1], size, width, goal)
+        if new is not None and not _keeps_direction(new, x, p, t, size, width, step):
             new = None
         if new is None:
             step /= 2
@@ -82,7 +116,7 @@ def follow(
         if not bounds[0] <= new[1] <= bounds[1]:
             at = bounds[1] if new[1] > bounds[1] else bounds[0]
             share = (at - p) / (new[1] - p)
-            last = correct(
+            last = correct_point(
                 system, x + share * (new[0] - x), at, np.zeros(x.size), 1.0, size, width, goal, at
             )
             if last is not None:
@@ -91,7 +125,7 @@ def follow(
             break
         arc += step
         x, p, count = new
-        tangent = _tangent(system, x, p, t, size, width, forward)
+        tangent = _find_tangent(system, x, p, t, size, width, forward)
         found.append((x, p, tangent[1], arc))
         signs.append(tangent[0])
         # few iterations: the curve is straight here
@@ -101,7 +135,7 @@ def follow(
         np.array([f[1] for f in found]),
         np.array([f[2][-1] for f in found]),
         np.array([f[3] for f in found]),
-        _folds(found, width),
+        _find_folds(found, width),
         tuple(
             0.5 * (found[k][1] + found[k + 1][1])
             for k in range(len(signs) - 1)
@@ -111,7 +145,7 @@ def follow(
     )
 
 
-def _bordered(jacobian, by_p, t, size, width) -> np.ndarray:
+def _border(jacobian, by_p, t, size, width) -> np.ndarray:
     n = by_p.size
     matrix = np.empty((n + 1, n + 1))
     matrix[:n, :n] = jacobian
@@ -120,15 +154,34 @@ def _bordered(jacobian, by_p, t, size, width) -> np.ndarray:
     return matrix
 
 
-def correct(system, x, p, tx, tp, size, width, goal, fixed=None):
-    """Newton across the tangent from a guess: (x, p, iterations) or None; fixed: the parameter stays there."""
+def correct_point(system, x, p, tx, tp, size, width, goal, fixed=None):
+    """Correct a guess by Newton's method across the tangent.
+
+    Returns x, p and iterations, or None.
+
+    Parameters
+    ----------
+    system, x, p
+        As of `follow`.
+    tx, tp : ndarray, float
+        Tangent.
+    size, width : float
+        Of the motion and of the bounds.
+    goal : float
+    fixed : float, optional
+        Value at which the parameter stays.
+
+    Returns
+    -------
+    tuple or None
+    """
     t = np.append(tx, tp)
     before = np.inf
     for count in range(1, 13):
         residual, jacobian, by_p = system(x, p)
         if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
             return None
-        factors, pivots, _ = dgetrf(_bordered(jacobian, by_p, t, size, width))
+        factors, pivots, _ = dgetrf(_border(jacobian, by_p, t, size, width))
         step = dgetrs(factors, pivots, -np.append(residual / size, 0.0))[0]
         length = float(np.linalg.norm(step))
         if not np.isfinite(length) or (fixed is None and (length > 2 * before or length > 1.0)):
@@ -141,12 +194,12 @@ def correct(system, x, p, tx, tp, size, width, goal, fixed=None):
     return None
 
 
-def _tangent(system, x, p, last, size, width, forward) -> tuple:
-    """(sign of the bordered determinant, unit tangent (N + 1,)) pointing on."""
+def _find_tangent(system, x, p, last, size, width, forward) -> tuple:
+    """Return the sign of the bordered determinant and the unit tangent (N + 1,)."""
     _, jacobian, by_p = system(x, p)
     n = x.size
     guide = np.append(np.zeros(n), 1.0) if last is None else last
-    factors, pivots, _ = dgetrf(_bordered(jacobian, by_p, guide, size, width))
+    factors, pivots, _ = dgetrf(_border(jacobian, by_p, guide, size, width))
     t = dgetrs(factors, pivots, np.append(np.zeros(n), 1.0))[0]
     t /= np.linalg.norm(t)
     swaps = np.sum(pivots != np.arange(n + 1))
@@ -156,15 +209,18 @@ def _tangent(system, x, p, last, size, width, forward) -> tuple:
     return sign, t
 
 
-def _alike(new, x, p, t, size, width, step) -> bool:
-    """Whether the step went where the tangent points and not to another part of the curve."""
+def _keeps_direction(new, x, p, t, size, width, step) -> bool:
+    """Return whether a step went where the tangent points, and not to another part of the curve."""
     move = np.append((new[0] - x) / size, (new[1] - p) / width)
     return float(move @ t) > 0.7 * float(np.linalg.norm(move))  # within 45 degrees of the tangent
 
 
-def _folds(found, width) -> tuple:
-    """Extremes of p between points whose dp/ds differ in sign, of the cubic through values and slopes over the way
-    along the first one's tangent, which a step covers exactly: the corrector goes across it."""
+def _find_folds(found, width) -> tuple:
+    """Return the folds: extremes of p between points whose dp/ds differ in sign.
+
+    The cubic takes values and slopes over the way along the first tangent, which a step covers
+    exactly.
+    """
     out = []
     for (_, p0, t0, s0), (_, p1, t1, s1) in pairwise(found):
         if t0[-1] * t1[-1] >= 0:

@@ -1,8 +1,8 @@
-"""Compiled turning points of a periodic slide, and parallel Jenkins elements along one cycle of it.
+"""Turning points of a periodic slide, and Jenkins elements along one cycle of it (compiled).
 
-A rate-free law is followed from turning point to turning point, which are found where the harmonics have them and not
-at the samples, so the memory is that of the continuous motion; the cost of a sample is a few ns whatever the number of
-elements. Plain twins are in the tests.
+A rate-independent law is followed from turning point to turning point, which are those of the
+harmonics and not samples. So the memory is that of the continuous motion; a sample takes a few ns
+for any number of elements.
 """
 
 import numpy as np
@@ -12,8 +12,8 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def slide_at(re, im, angle):
-    """(value, first and second derivative) of Re sum X_k exp(i k angle)."""
+def evaluate_slide(re, im, angle):
+    """Return value, first and second derivative of Re sum X_k exp(i k angle)."""
     c = np.cos(angle)
     s = np.sin(angle)
     value = re[0]
@@ -32,11 +32,24 @@ def slide_at(re, im, angle):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def turning_points(re, im, rate, angle, place, cell):
-    """Turning points of the slide with harmonics re + i im (H + 1,) whose rate at N uniform angles is known.
+def find_turning_points(re, im, rate, angle, place, cell):
+    """Find the turning points of a slide whose rate at N equal angles is known.
 
-    Fills angle, place (N,) and cell (N,), the sample before each, in order; returns their number and the direction at
-    the first sample. A rate within rounding of zero has no direction of its own.
+    Parameters
+    ----------
+    re, im : ndarray
+        (H + 1,) harmonics of the slide [m].
+    rate : ndarray
+        (N,) dq/dtheta [m].
+    angle, place, cell : ndarray
+        (N,) become angle, slide and the sample before each turning point.
+
+    Returns
+    -------
+    count : int
+        Number of turning points.
+    start : float
+        Direction at the first sample.
     """
     n = rate.size
     count = 0
@@ -67,7 +80,7 @@ def turning_points(re, im, rate, angle, place, cell):
         a = rate[i]
         at = low + width * (a / (a - b) if a * b < 0 else 0.0)
         for _ in range(60):
-            _, v, bend = slide_at(re, im, at)
+            _, v, bend = evaluate_slide(re, im, at)
             if v * sign > 0:
                 low = at
             else:
@@ -80,7 +93,7 @@ def turning_points(re, im, rate, angle, place, cell):
                 break
             at = new
         angle[count] = at
-        place[count] = slide_at(re, im, at)[0]
+        place[count] = evaluate_slide(re, im, at)[0]
         cell[count] = i
         count += 1
         sign = after
@@ -88,15 +101,29 @@ def turning_points(re, im, rate, angle, place, cell):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def jenkins_cycle(
+def sample_jenkins(
     q, start, cells, turns, limit, stiff, full, square, workspace, force, slope, hold, stretch
 ):
-    """Steady loop of t parallel Jenkins elements, limit (t,) rising, along samples q (N,) of one cycle.
+    """Follow parallel Jenkins elements along the samples of a cycle.
 
-    turns, cells (R,): places of the turning points and the sample before each; stiff, full, square (t + 1,): running
-    sums of k, k limit, k limit^2. workspace: (whole numbers (2, 2 R + 3), numbers (2, 2 R + 3)) to work in. Out: force (N,),
-    slope (N,) of the elements that stick, hold (R, N): minus the stiffness that hangs on each turning point, stretch
-    (N,): sum of k limit stretch. Two turns from the virgin state: the second is periodic.
+    They start from the virgin state; the second of two cycles is periodic.
+
+    Parameters
+    ----------
+    q : ndarray
+        (N,) slide [m].
+    start : float
+        Direction at the first sample.
+    cells, turns : ndarray
+        (R,) sample before each turning point, and its slide [m].
+    limit, stiff, full, square : ndarray
+        (t,) yield slides in increasing order [m], (t + 1,) running sums of k, k limit and k
+        limit^2.
+    workspace : tuple
+        (2, 2 R + 3) integers and (2, 2 R + 3) numbers.
+    force, slope, hold, stretch : ndarray
+        Become force (N,) [N], slope (N,) of the elements that stick [N/m], minus the stiffness
+        that belongs to each turning point (R, N), and the sum of k limit stretch (N,).
     """
     t = limit.size
     n = q.size
@@ -112,14 +139,14 @@ def jenkins_cycle(
     base[0] = 0.0
     p = 0
     g = 1.0 if q[0] > 0 else -1.0
-    depth, p = _slide(q[0], g, p, depth, end, sign, base, limit)
+    depth, p = _slip_elements(q[0], g, p, depth, end, sign, base, limit)
     if g != start:
-        depth, p = _turn(q[0], g, p, depth, end, sign, base, mark, -1)
+        depth, p = _store_turning_point(q[0], g, p, depth, end, sign, base, mark, -1)
     g = start
     for turn in range(2):
         at = 0
         for i in range(n):
-            depth, p = _slide(q[i], g, p, depth, end, sign, base, limit)
+            depth, p = _slip_elements(q[i], g, p, depth, end, sign, base, limit)
             if turn:
                 f = g * full[p]
                 s = g * square[p]
@@ -136,15 +163,18 @@ def jenkins_cycle(
                 stretch[i] = s
                 slope[i] = stiff[t] - stiff[p]
             while at < r and cells[at] == i:
-                depth, p = _slide(turns[at], g, p, depth, end, sign, base, limit)
-                depth, p = _turn(turns[at], g, p, depth, end, sign, base, mark, at)
+                depth, p = _slip_elements(turns[at], g, p, depth, end, sign, base, limit)
+                depth, p = _store_turning_point(turns[at], g, p, depth, end, sign, base, mark, at)
                 g = -g
                 at += 1
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _slide(q, g, p, depth, end, sign, base, limit):
-    """Let the elements slip that must at slide q in direction g: (depth of the memory, number that slip)."""
+def _slip_elements(q, g, p, depth, end, sign, base, limit):
+    """Let the elements slip that must at slide q in direction g.
+
+    Returns groups and slipping elements.
+    """
     while depth > 0:
         d = depth - 1
         while p < end[d] and g * (sign[d] * limit[p] + q - base[d]) >= limit[p]:
@@ -156,8 +186,8 @@ def _slide(q, g, p, depth, end, sign, base, limit):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _turn(q, g, p, depth, end, sign, base, mark, number):
-    """Hang the slipping elements on a turning point."""
+def _store_turning_point(q, g, p, depth, end, sign, base, mark, number):
+    """Store the slipping elements as a group at a turning point."""
     if p > 0:
         end[depth] = p
         sign[depth] = g

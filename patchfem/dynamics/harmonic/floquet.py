@@ -1,15 +1,16 @@
 """Floquet multipliers of a steady motion: what one cycle makes of a small disturbance.
 
-The state is the motion of the modes and what the contacts remember. A law without memory gives a slope over the slide
-and over its rate. A set of elastic-plastic elements remembers, for each turning point of the slide, where it was: the
-disturbance of the slide there is kept as a state and hangs on the stiffness that sticks since then. The force is
-continuous in time, so nothing jumps; a turning point may shift, but the slide is at rest there, so its shift does not
-count. Every element that slips forgets, so the memory of t elements has t - R multipliers that are zero, which are left
-out, and those of the R turning points, most of them zero too. An element that never slips within the cycle is a spring:
-its own memory, an offset that no cycle changes (multiplier 1), is left out as well. Bonds remember one number per row.
+The state is the motion of the modes and what the contacts remember. A law without memory gives a
+slope over the slide and over its rate. Elastic-plastic elements remember, for each turning point,
+where the slide was: the disturbance there is a state, and the stiffness that sticks since then
+acts on it. The force is continuous, so nothing jumps; a turning point may shift, but the slide is
+at rest there, so its shift does not count. Elements that slip forget, so t elements have t - R
+multipliers that are zero and are left out. An element that never slips within the cycle is a
+spring; its offset, which no cycle changes (multiplier 1), is left out too. Bonds remember one
+number per row.
 
-Cells of constant coefficients, each by its matrix exponential: order 2 in the width of the cells for corners in time.
-Neighbours with the same coefficients, as elements that stick or slip have for most of a cycle, are one wide cell.
+Every cell of constant coefficients is a matrix exponential: order 2 in the width of the cells for
+corners in time. Neighbours with equal coefficients become one wide cell.
 """
 
 from dataclasses import dataclass
@@ -22,8 +23,11 @@ from ..propagator import exponentials
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TurningPoint:
-    """Memory of a turning point: row, cell in which it lies and its place [0, 1] there, hold (N,) [N/m] per cell: the
-    force per disturbance of the slide at that turning."""
+    """Memory of a turning point.
+
+    - row, cell, share: its row, its cell and its place [0, 1] there
+    - hold: (N,) force per disturbance of the slide at the turn [N/m], per cell
+    """
 
     row: int
     cell: int
@@ -33,8 +37,12 @@ class TurningPoint:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fading:
-    """Memory u of bonds or of a flow: u' = gain q' - loss u per cell (N,), per slide and per angle [1]; force limit u,
-    limit [N] one number or per cell (N,)."""
+    """Memory u of bonds or of a flow: u' = gain q' - loss u, with the force limit u.
+
+    - row
+    - gain, loss: (N,) per slide and per angle [1], per cell
+    - limit: [N], one number or per cell (N,)
+    """
 
     row: int
     gain: np.ndarray
@@ -45,16 +53,29 @@ class Fading:
 def monodromy(
     modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=()
 ) -> np.ndarray:
-    """Map over one cycle of (z, dz/dtheta, memories), theta = omega t from 0.
+    """Return the map over one cycle of (z, dz/dtheta, memories), theta = omega t from 0.
 
-    rows (i, n); slope, by_rate (i, N): means per cell of the local stiffness [N/m] and damping [N s/m] of every row.
+    Parameters
+    ----------
+    modes : ModalBasis
+    rows : ndarray
+        (i, n) rows of the interfaces.
+    omega : float
+    slope, by_rate : ndarray
+        (i, N) means per cell of the local stiffness [N/m] and damping [N s/m].
+    marks, fading : sequence, optional
+        TurningPoints and Fading memories.
+
+    Returns
+    -------
+    ndarray
     """
     n = modes.omega.size
     count = slope.shape[1]
     remembered = [
         np.broadcast_to(part, count) for one in fading for part in (one.gain, one.loss, one.limit)
     ]
-    first = _runs([slope, by_rate, *(mark.hold for mark in marks), *remembered], marks)
+    first = _find_equal_cells([slope, by_rate, *(mark.hold for mark in marks), *remembered], marks)
     width = np.diff(first, append=count) * (2 * np.pi / count)
     cells = first.size
     slope = slope[:, first]
@@ -83,12 +104,14 @@ def monodromy(
         across[:n] = rows[mark.row]
         cell = np.searchsorted(first, mark.cell)
         steps[cell, k] = (1 - mark.share) * across + mark.share * (across @ steps[cell])
-    return product(steps)
+    return multiply_pairwise(steps)
 
 
-def _runs(coefficients: list, marks) -> np.ndarray:
-    """First cells (r,) of the runs of neighbours whose coefficients, (..., N) each, are the same; a cell with a turning
-    point is one of its own."""
+def _find_equal_cells(coefficients: list, marks) -> np.ndarray:
+    """Return the first cells (r,) of runs of neighbours with equal coefficients (..., N).
+
+    A cell with a turning point is a run of its own.
+    """
     table = np.concatenate([one.reshape(-1, one.shape[-1]) for one in coefficients])
     new = np.append(True, (table[:, 1:] != table[:, :-1]).any(axis=0))
     for mark in marks:
@@ -96,8 +119,8 @@ def _runs(coefficients: list, marks) -> np.ndarray:
     return np.flatnonzero(new)
 
 
-def product(steps) -> np.ndarray:
-    """Product steps[N - 1] ... steps[1] steps[0] of matrices (N, s, s), by pairs."""
+def multiply_pairwise(steps) -> np.ndarray:
+    """Return steps[N - 1] ... steps[1] steps[0] of matrices (N, s, s), by pairs."""
     while len(steps) > 1:
         rest = steps[-1:] if len(steps) % 2 else steps[:0]
         steps = np.concatenate([steps[1::2] @ steps[0 : len(steps) - len(rest) : 2], rest])

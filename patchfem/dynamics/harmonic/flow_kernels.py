@@ -1,7 +1,7 @@
-"""A compiled law whose memory is one number z along the samples of a cycle; the text runs with any such law.
+"""A law whose memory is one number z, along the samples of a cycle (compiled).
 
-The samples and the turning points between them are the nodes of the cycle. To the next one the slide moves straight,
-at the speed of the step; forces are those at the nodes, at their speed.
+The samples and the turning points between them are the nodes of the cycle. From one node to the
+next the slide changes linearly; forces are those at the nodes, at their velocity.
 """
 
 from math import inf
@@ -10,17 +10,31 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import stretch_kernels as law
 
-TURNS = 60  # of the cycle until its end meets its start
+# cycles that are computed until the end of one meets its start
+MAX_CYCLES = 60
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def cycle(num, q, speed, dt, z, steps, force, slopes):
-    """Periodic state of the law with numbers num (1, k) along slides q [m] and speeds [m/s] of M nodes, each dt (M,)
-    [s] before the next.
+def solve_cycle(num, q, speed, dt, z, steps, force, slopes):
+    """Solve for the periodic state of a law along a cycle of M nodes.
 
-    Out: z (M,), slopes of the step that follows every node over z, over its slide and over its time, steps (3, M);
-    force (M,) [N] and its slopes over z and the speed (2, M). The first cycle is that of a virgin contact; Newton's
-    steps on the memory at the first node follow, where a cycle forgets any of it.
+    The first cycle is that of a virgin contact; Newton's steps on the memory at the first node
+    follow, if a cycle forgets any of it.
+
+    Parameters
+    ----------
+    num : ndarray
+        (1, k) numbers of the law.
+    q, speed, dt : ndarray
+        (M,) slides [m], velocities [m/s] and times [s] to the next node.
+    z : ndarray
+        (M,) becomes the memory.
+    steps : ndarray
+        (3, M) becomes the derivatives of the next z with respect to z, slide and time.
+    force : ndarray
+        (M,) becomes the force [N].
+    slopes : ndarray
+        (2, M) becomes the derivatives of the force with respect to z and velocity.
     """
     n = q.size
     whole = 0.0
@@ -28,7 +42,7 @@ def cycle(num, q, speed, dt, z, steps, force, slopes):
         whole += dt[i]
     start = law.relax_stretch(num[0], 0.0, q[0], whole).stretch
     last = inf
-    for turn in range(TURNS):
+    for turn in range(MAX_CYCLES):
         now = start
         kept = 1.0
         largest = abs(start)
@@ -54,9 +68,12 @@ def cycle(num, q, speed, dt, z, steps, force, slopes):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def tangents(steps, out):
-    """Derivatives (M, p) of z at the nodes of the periodic state to p parameters, in place of what every step takes of
-    them: the increment of the slide, in the last column that of the time; steps as of `cycle`."""
+def solve_tangents(steps, out):
+    """Solve for the derivatives (M, p) of z in the periodic state with respect to p parameters.
+
+    out: at first what every step takes of the parameters: the increment of the slide, in the last
+    column that of the time.
+    """
     n, p = out.shape
     for k in range(p):
         by = 2 if k == p - 1 else 1

@@ -1,25 +1,25 @@
-"""From the harmonics of the slides to those of the forces and back: alternating frequency and time over all rows."""
+"""Forces of laws on rows as harmonics of a cycle (alternating frequency and time)."""
 
 from functools import lru_cache
 
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
-from .harmonic import Fold
-from .laws import Jenkins, Track, analysis, law_of_model, synthesis
+from .harmonic import ContactResponse
+from .laws import Jenkins, Track, analysis, make_law, synthesis
 
-# samples of a cycle
-FEWEST = 256
-MOST = 65536
+# bounds of the samples of a cycle
+MIN_SAMPLES = 256
+MAX_SAMPLES = 65536
 
 
 class Group:
     """Laws on rows: a law, a pair (row, law) or a list of them.
 
-    A row is a number of an interface of `modes` or participations (n,) of its own; a law alone sits on interface 0; a
-    dynamics.march.march.ContactModel becomes its law.
-    rows (i, n), laws: a tuple of laws per row. Calling it with the harmonics (i, H + 1) of the slides and omega gives a
-    dynamics.harmonic.Fold.
+    A row is the number of an interface of `modes` or participations (n,); a law alone sits on
+    interface 0; a ContactModel becomes its law. rows: (i, n); laws: a tuple of laws for every row.
+    A call with the harmonics (i, H + 1) of the slides and omega returns a
+    `harmonic.ContactResponse`.
     """
 
     def __init__(self, modes, parts, samples: int = 0):
@@ -27,7 +27,7 @@ class Group:
         laws = {}
         for part in parts if isinstance(parts, list) else [parts]:
             row, law = part if isinstance(part, tuple) else (0, part)
-            law = law_of_model(law) if hasattr(law, "fields") else law
+            law = make_law(law) if hasattr(law, "fields") else law
             faces = modes.interfaces
             if np.ndim(row) == 0 and not 0 <= row < len(faces):
                 raise PatchfemError(
@@ -44,15 +44,18 @@ class Group:
         self.samples = samples
 
     def with_samples(self, samples: int) -> "Group":
-        """The same laws on the same rows, on a grid of `samples` per cycle."""
+        """Return the same laws on the same rows with `samples` per cycle."""
         other = object.__new__(Group)
         other.rows = self.rows
         other.laws = self.laws
         other.samples = samples
         return other
 
-    def remade(self, change) -> "Group":
-        """The same with other elements: change(stiffness (t,) [N/m], yield slide (t,) [m]) -> both."""
+    def with_elements(self, change) -> "Group":
+        """Return the same laws with other elements.
+
+        change: (stiffness (t,) [N/m], yield slide (t,) [m]) -> the same of other elements.
+        """
         other = self.with_samples(self.samples)
         other.laws = [
             tuple(
@@ -66,11 +69,14 @@ class Group:
         return other
 
     def samples_for(self, harmonics: int, amplitudes=None) -> int:
-        """A power of two that holds the products of H harmonics and the sharpest stick at the amplitudes (i,) [m].
+        """Return the samples, a power of two, for H harmonics and the shortest stick.
 
-        What aliases is the corner of a law, so a law counts by the root of its share of all corners.
+        amplitudes: (i,) of the slides [m].
+
+        What aliases is the corner of a law, so a law counts by the root of its fraction of all
+        corners.
         """
-        want = max(FEWEST, 12 * harmonics)
+        want = max(MIN_SAMPLES, 12 * harmonics)
         if amplitudes is not None:
             found = [
                 (law.total * a, law.sharpness(a))
@@ -88,16 +94,16 @@ class Group:
                     ),
                 ]
             )
-        return int(min(2 ** int(np.ceil(np.log2(want))), MOST))
+        return int(min(2 ** int(np.ceil(np.log2(want))), MAX_SAMPLES))
 
     def stiffness(self) -> np.ndarray:
-        """Tangent stiffness of every row at rest (i,) [N/m]."""
+        """Return the tangent stiffness of every row at rest (i,) [N/m]."""
         return np.array([sum(law.total for law in laws) for laws in self.laws])
 
     def tracks(self, q, omega: float, samples: int = 0) -> list:
-        """Track of every row, a list of i, from the harmonics q (i, H + 1) [m] of the slides.
+        """Return the Track of every row from the harmonics (i, H + 1) [m] of the slides.
 
-        samples: per cycle, 0: those of the group or as many as H asks for.
+        samples: per cycle; 0 for those of the group, or as many as H needs.
         """
         n = samples or self.samples or self.samples_for(q.shape[1] - 1)
         values = synthesis(q, n)
@@ -105,7 +111,19 @@ class Group:
         return [Track(x, omega, n, v, r) for x, v, r in zip(q, values, rates)]
 
     def forces(self, q, omega: float, samples: int = 0) -> np.ndarray:
-        """Forces (i, N) [N] at the samples of one cycle, from the harmonics q (i, H + 1) [m] of the slides."""
+        """Return the forces (i, N) [N] at the samples of a cycle.
+
+        Parameters
+        ----------
+        q : ndarray
+            (i, H + 1) harmonics of the slides [m].
+        omega : float
+        samples : int, optional
+
+        Returns
+        -------
+        ndarray
+        """
         return np.array(
             [
                 sum(law.sample(track).force for law in laws)
@@ -114,21 +132,33 @@ class Group:
         )
 
     def force(self, q, omega: float, harmonics: int, samples: int) -> np.ndarray:
-        """Harmonics (i, harmonics + 1) [N] of the forces from those of the slides, q (i, H + 1) [m]."""
+        """Return harmonics (i, harmonics + 1) of the forces [N] from those of the slides.
+
+        Parameters
+        ----------
+        q : ndarray
+        omega : float
+        harmonics, samples : int
+
+        Returns
+        -------
+        ndarray
+        """
         return analysis(self.forces(q, omega, samples), harmonics)
 
-    def __call__(self, q, omega: float) -> Fold:
+    def __call__(self, q, omega: float) -> ContactResponse:
         tracks = self.tracks(q, omega)
-        return fold(
+        return find_response(
             tracks, [[law.sample(track) for law in laws] for track, laws in zip(tracks, self.laws)]
         )
 
 
-def fold(tracks: list, sampled: list) -> Fold:
-    """Harmonics of the forces and of their slopes from the laws sampled along the tracks of i rows.
+def find_response(tracks: list, sampled: list) -> ContactResponse:
+    """Return harmonics of forces and slopes from laws sampled along tracks of i rows.
 
-    The local slope K(theta) enters by its harmonics up to 2 H, a Toeplitz and a Hankel part; a turning point s by the
-    harmonics of its share and the basis at its angle: no product over the samples, one transform for all rows.
+    The local slope K(theta) enters by its harmonics up to 2 H, as a Toeplitz and a Hankel part; a
+    turning point by the harmonics of its fraction and the basis at its angle. One transform serves
+    all rows.
     """
     x = np.array([t.x for t in tracks])
     samples = tracks[0].samples
@@ -138,7 +168,7 @@ def fold(tracks: list, sampled: list) -> Fold:
 
     def added(name):
         return [
-            _sum(
+            _add_arrays(
                 [
                     getattr(s, name)
                     for s in laws
@@ -156,7 +186,7 @@ def fold(tracks: list, sampled: list) -> Fold:
     found = analysis(
         np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h
     )
-    slope = local(found[rows : 2 * rows])
+    slope = local_jacobians(found[rows : 2 * rows])
     rate = np.zeros((rows, h + 1), complex)
     turns = moving or any(s.tangent is not None for laws in sampled for s in laws)
     at = 2 * rows
@@ -167,7 +197,7 @@ def fold(tracks: list, sampled: list) -> Fold:
         return np.einsum("ikl,il->ik", turned, parts)
 
     if moving:
-        turned = local(found[at : at + rows])
+        turned = local_jacobians(found[at : at + rows])
         at = at + rows
         slope[..., 1 : h + 1] += turned[..., h + 1 :] * (k * omega)
         slope[..., h + 1 :] -= turned[..., 1 : h + 1] * (k * omega)
@@ -184,26 +214,29 @@ def fold(tracks: list, sampled: list) -> Fold:
                 to_slide, to_omega = one.tangent()
                 slope[i] += analysis(to_slide.T, h).T
                 rate[i] += analysis(to_omega, h)
-    return Fold(found[:rows, : h + 1], slope, rate if turns else None)
+    return ContactResponse(found[:rows, : h + 1], slope, rate if turns else None)
 
 
-def _sum(arrays: list):
+def _add_arrays(arrays: list):
     return None if not arrays else arrays[0] if len(arrays) == 1 else sum(arrays)
 
 
 @lru_cache(maxsize=16)
-def _places(h: int) -> tuple:
+def _coefficient_positions(h: int) -> tuple:
     row = np.arange(h + 1)[:, None]
     column = np.arange(h + 1)[None, :]
     return row - column + 2 * h, row + column + 2 * h
 
 
-def local(k) -> np.ndarray:
-    """Jacobians (i, H + 1, 2 H + 1) of the harmonics of K(theta) q(theta) to those of q; k (i, 2 H + 1) those of K."""
+def local_jacobians(k) -> np.ndarray:
+    """Return the Jacobians (i, H + 1, 2 H + 1) of the harmonics of K(theta) q(theta).
+
+    k: (i, 2 H + 1) harmonics of K.
+    """
     h = k.shape[1] // 2
     # of exp(i m theta), m = -2 H..2 H
     two = np.concatenate([k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1)
-    less, more = (two[:, place] for place in _places(h))
+    less, more = (two[:, place] for place in _coefficient_positions(h))
     out = np.empty((len(k), h + 1, 2 * h + 1), complex)
     out[..., : h + 1] = less + more
     out[..., h + 1 :] = 1j * (less - more)[..., 1:]

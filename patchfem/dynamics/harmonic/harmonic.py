@@ -20,13 +20,18 @@ import numpy as np
 from ...core import ModalBasis, NotConverged, PatchfemError
 from ..periodic import solve_linear
 
-# stiffness of a mode over its scale below which a harmonic finds nothing that holds it
-SINGULAR = 1e-10
+# dynamic stiffness of a mode over its scale, below which the mode has no receptance at a harmonic
+SINGULAR_RATIO = 1e-10
 
 
-class Fold(NamedTuple):
-    """What a contact answers. force (i, K + 1) complex [N], K >= H; slope (i, H + 1, 2 H + 1) complex [N/m], d force
-    over d (Re q_0..Re q_H, Im q_1..Im q_H) of the same row; rate (i, H + 1) [N s], d force/d omega, or None."""
+class ContactResponse(NamedTuple):
+    """Forces of the laws along a cycle, as harmonics.
+
+    - force: (i, K + 1) complex [N], K >= H
+    - slope: (i, H + 1, 2 H + 1) complex [N/m], derivative with respect to Re q_0..Re q_H, Im
+      q_1..Im q_H of the same row
+    - rate: (i, H + 1) [N s], derivative with respect to omega, or None
+    """
 
     force: np.ndarray
     slope: np.ndarray | None = None
@@ -34,15 +39,15 @@ class Fold(NamedTuple):
 
 
 def pack(x) -> np.ndarray:
-    """Complex harmonics (r, H + 1) as reals (r (2 H + 1),).
+    """Return complex harmonics (r, H + 1) as real numbers (r (2 H + 1),).
 
-    Row by row the real parts of k = 0..H, then the imaginary ones of k = 1..H.
+    Each row has the real parts of k = 0 to H, then the imaginary ones of k = 1 to H.
     """
     return np.concatenate([x.real, x.imag[:, 1:]], axis=1).ravel()
 
 
 def unpack(v, rows: int) -> np.ndarray:
-    """Inverse of `pack`."""
+    """Return complex harmonics (rows, H + 1) from the real numbers of `pack`."""
     v = v.reshape(rows, -1)
     h = v.shape[1] // 2
     x = v[:, : h + 1].astype(complex)
@@ -51,14 +56,17 @@ def unpack(v, rows: int) -> np.ndarray:
 
 
 def _real(c) -> np.ndarray:
-    """Rows of complex equations (H + 1, ...) as real ones (2 H + 1, ...)."""
+    """Return complex equations (H + 1, ...) as real ones (2 H + 1, ...)."""
     return np.concatenate([c.real, c.imag[1:]], axis=0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LinearPart:
-    """The modes at one frequency. inverse, slope (H + 1, n, n): R_k and d(R_k^-1)/d omega; free: for every coordinate
-    without receptance (k, right (n,), left (n,), stiffness)."""
+    """The modes at one frequency.
+
+    - inverse, slope: (H + 1, n, n) R_k and d(R_k^-1)/d omega
+    - free: of every coordinate without receptance (k, right (n,), left (n,), stiffness)
+    """
 
     inverse: np.ndarray
     slope: np.ndarray
@@ -66,7 +74,19 @@ class LinearPart:
 
 
 def linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
-    """The linear part (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0..harmonics at omega [rad/s]."""
+    """Return the linear part (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0 to `harmonics`.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    omega : float
+        [rad/s].
+    harmonics : int
+
+    Returns
+    -------
+    LinearPart
+    """
     n = modes.omega.size
     k = np.arange(harmonics + 1)
     around = k * omega
@@ -78,7 +98,7 @@ def linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
             modes.omega**2 - around[:, None] ** 2 + 2j * around[:, None] * modes.zeta * modes.omega
         )
         scale = np.maximum(modes.omega**2 + around[:, None] ** 2, omega**2)
-        bad = np.abs(along) < SINGULAR * scale
+        bad = np.abs(along) < SINGULAR_RATIO * scale
         inverse = np.zeros((k.size, n, n), complex)
         inverse[:, np.arange(n), np.arange(n)] = np.where(bad, 0.0, 1 / np.where(bad, 1.0, along))
         unit = np.eye(n)
@@ -93,7 +113,7 @@ def linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
         + 1j * around[:, None, None] * modes.damping_matrix
     )
     u, s, vh = np.linalg.svd(p)
-    bad = s < SINGULAR * np.maximum(np.max(modes.omega) ** 2 + around[:, None] ** 2, omega**2)
+    bad = s < SINGULAR_RATIO * np.maximum(np.max(modes.omega) ** 2 + around[:, None] ** 2, omega**2)
     inverse = (
         vh.conj().transpose(0, 2, 1) * np.where(bad, 0.0, 1 / np.where(bad, 1.0, s))[:, None, :]
     ) @ u.conj().transpose(0, 2, 1)
@@ -105,26 +125,30 @@ def linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
 
 
 class System(NamedTuple):
-    """The equations at one point.
+    """Equations of the balance at one point.
 
-    residual (N,), its Jacobian (N, N), its slopes over omega and over the drive level (N,), the contact's Fold and the
-    modal harmonics (H + 1, n) [m].
+    - residual: (N,), jacobian: (N, N)
+    - by_omega, by_level: (N,) derivatives with respect to omega and to the amplitude of the drive
+    - fold: response of the contact
+    - modal: (H + 1, n) modal harmonics [m]
     """
 
     residual: np.ndarray
     jacobian: np.ndarray
     by_omega: np.ndarray
     by_level: np.ndarray
-    fold: Fold
+    fold: ContactResponse
     modal: np.ndarray | None = None
 
 
 class Balance:
-    """The equations of the interface rows for a ModalBasis, rows (i, n) and a contact(q (i, H + 1), omega) -> Fold.
+    """Equations of the rows (i, n) of interfaces of a ModalBasis.
 
-    More rows than modes lie in the space of the modes: the unknowns are then `rank` combinations of them, q = lift y.
-    Unknowns: `pack`ed harmonics of y, then the coordinates without receptance. PatchfemError where no mode moves the
-    rows.
+    contact: (q (i, H + 1), omega) -> ContactResponse.
+
+    More rows than modes lie in the space of the modes; the unknowns are then `rank` combinations
+    of them, q = lift y. The unknowns are the packed harmonics of y, then the coordinates without
+    receptance. PatchfemError is raised where no mode moves the rows.
     """
 
     def __init__(self, modes: ModalBasis, rows, contact):
@@ -145,14 +169,14 @@ class Balance:
         self.faces = rows if full else s[:rank, None] * vt[:rank]
         self._linear = {}
 
-    def on(self, contact) -> "Balance":
-        """The same rows and modes with another contact on them."""
+    def with_contact(self, contact) -> "Balance":
+        """Return the same rows and modes with another contact."""
         other = object.__new__(Balance)
         other.__dict__.update(self.__dict__, contact=contact)
         return other
 
     def linear(self, omega: float, harmonics: int) -> LinearPart:
-        """`linear_part` at omega [rad/s], kept for up to nine frequencies, then all forgotten."""
+        """Return `linear_part` at omega [rad/s]; up to nine frequencies are kept."""
         key = (omega, harmonics)
         if key not in self._linear:
             if len(self._linear) > 8:
@@ -161,19 +185,42 @@ class Balance:
         return self._linear[key]
 
     def size(self, omega: float, harmonics: int) -> int:
-        """Number N of real unknowns at omega [rad/s]."""
+        """Return the number N of real unknowns at omega [rad/s]."""
         free = self.linear(omega, harmonics).free
         return self.lift.shape[1] * (2 * harmonics + 1) + sum(1 if k == 0 else 2 for k, *_ in free)
 
     def slides(self, x, omega: float, harmonics: int) -> np.ndarray:
-        """Slides (i, H + 1) [m], complex harmonics of the interface rows, of unknowns x (N,)."""
+        """Return the slides (i, H + 1) [m] of unknowns (N,).
+
+        Parameters
+        ----------
+        x : ndarray
+        omega : float
+        harmonics : int
+
+        Returns
+        -------
+        ndarray
+        """
         r = self.lift.shape[1]
         return self.lift @ unpack(x[: r * (2 * harmonics + 1)], r)
 
     def motion(self, x, omega: float, level: float, harmonics: int, force) -> np.ndarray:
-        """Modal harmonics (K + 1, n) [m] under the force (i, K + 1) [N] and the drive of amplitude level [m s-2].
+        """Return the modal harmonics (K + 1, n) [m] under a force (i, K + 1) [N] and a drive.
 
-        K may exceed H: what the balance leaves out then takes part.
+        Parameters
+        ----------
+        x : ndarray
+            (N,) unknowns.
+        omega, level : float
+            Frequency [rad/s] and amplitude [m s-2] of the drive.
+        harmonics : int
+            H of the unknowns; K may be larger.
+        force : ndarray
+
+        Returns
+        -------
+        ndarray
         """
         top = force.shape[1] - 1
         return self._motion(
@@ -204,8 +251,21 @@ class Balance:
     def system(
         self, x, omega: float, level: float, harmonics: int, here: LinearPart | None = None
     ) -> System:
-        """Residual [m] and derivatives at unknowns x, frequency omega [rad/s] and drive amplitude level [m s-2]; here:
-        a linear part other than that of the modes."""
+        """Return the equations at unknowns x (N,).
+
+        Parameters
+        ----------
+        x : ndarray
+        omega, level : float
+            Frequency [rad/s] and amplitude [m s-2] of the drive.
+        harmonics : int
+        here : LinearPart, optional
+            A linear part other than that of the modes.
+
+        Returns
+        -------
+        System
+        """
         h = harmonics
         r = self.lift.shape[1]
         mass = self.modes.mass
@@ -217,7 +277,7 @@ class Balance:
         through = -np.einsum("ra,kab->krb", self.faces, here.inverse)  # -faces R_k
         miss = y - (z @ self.faces.T).T
         receptance = -through @ self.faces.T / mass  # (H + 1, r, r)
-        linked = self.gathered(fold.slope)
+        linked = self.combine_slopes(fold.slope)
         block = (receptance @ linked).reshape(h + 1, r, r, 2 * h + 1)
         size = r * (2 * h + 1)
         jacobian = np.eye(x.size)
@@ -240,8 +300,11 @@ class Balance:
             z,
         )
 
-    def free_miss(self, free, c, omega: float, level: float, force) -> complex:
-        """What the coordinate c [m] without receptance, (k, left, stiffness), misses of its balance, over omega^2."""
+    def free_residual(self, free, c, omega: float, level: float, force) -> complex:
+        """Return the residual of a coordinate c [m] without receptance, over omega^2.
+
+        free: (k, left, stiffness) of the coordinate.
+        """
         k, left, stiffness = free
         drive = left @ self.modes.base if k == 1 else 0.0
         return (
@@ -250,19 +313,24 @@ class Balance:
             - 1j * level * drive
         ) / omega**2
 
-    def gathered(self, slope) -> np.ndarray:
-        """Slopes (i, H + 1, 2 H + 1) of the rows' forces as those of the forces on y to y, (H + 1, r, r (2 H + 1))."""
+    def combine_slopes(self, slope) -> np.ndarray:
+        """Return the slopes of the rows as those of the forces on y with respect to y.
+
+        They are (i, H + 1, 2 H + 1) and (H + 1, r, r (2 H + 1)).
+        """
         count, r = self.lift.shape
         h = slope.shape[1] - 1
         pairs = (self.lift[:, :, None] * self.lift[:, None, :]).reshape(count, r * r)
         both = (pairs.T @ np.ascontiguousarray(slope).reshape(count, -1).view(float)).view(complex)
         return both.reshape(r, r, h + 1, 2 * h + 1).transpose(2, 0, 1, 3).reshape(h + 1, r, -1)
 
-    def met(
+    def is_rounding(
         self, here: System, left, omega: float, level: float, harmonics: int, size: float
     ) -> bool:
-        """Whether what a step leaves of the residual (N,) is rounding: a least-squares step can vanish where nothing
-        balances. size: of the unknowns [m]."""
+        """Return whether what a step leaves of the residual is round-off.
+
+        A least-squares step can vanish where nothing balances. size: of the unknowns [m].
+        """
         low = self.lift.shape[1] * (2 * harmonics + 1)
         push = float(np.linalg.norm(here.fold.force) * np.linalg.norm(self.rows)) / (
             self.modes.mass * omega**2
@@ -275,14 +343,17 @@ class Balance:
         return True
 
     def _free(self, here, coordinates, jacobian, parts, fold, z, level, linked, omega, size):
-        """Rows and columns of the coordinates without receptance, equations over omega^2 [m]."""
+        """Add rows and columns of the coordinates without receptance.
+
+        Their equations are over omega^2 [m].
+        """
         h = z.shape[0] - 1
         r = self.lift.shape[1]
         at = size
         for (k, right, left, stiffness), c in zip(here.free, coordinates):
             w = left @ self.rows.T / self.modes.mass / omega**2
             drive = left @ self.modes.base / omega**2 if k == 1 else 0.0
-            miss = self.free_miss((k, left, stiffness), c, omega, level, fold.force)
+            miss = self.free_residual((k, left, stiffness), c, omega, level, fold.force)
             by_omega = left @ here.slope[k] @ z[k] / omega**2 - 2 * miss / omega
             if fold.rate is not None:
                 by_omega = by_omega + w @ fold.rate[:, k]
@@ -302,11 +373,27 @@ class Balance:
             at += count
 
 
-def damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple | None:
-    """(unknowns, System one last step before, iterations) by Newton's method damped by the natural monotonicity test.
+def solve_damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple | None:
+    """Solve equations by Newton's method with the natural monotonicity test.
 
-    system(x) -> System; met(System, what its last step leaves of the residual (N,), size of x) -> whether that is
-    rounding. It ends when a step is below `goal` of x; None where that is not so after `most` steps.
+    Parameters
+    ----------
+    system : callable
+        system(x) -> System.
+    x : ndarray
+        (N,) start.
+    met : callable
+        met(System, what its last step leaves of the residual, size of x) -> whether that is
+        round-off.
+    goal : float, optional
+        Step over x, below which it ends.
+    most : int, optional
+        Steps.
+
+    Returns
+    -------
+    tuple or None
+        Unknowns, System before the last step, and steps; None where it does not end.
     """
     here = system(x)
     for count in range(1, most + 1):
@@ -339,17 +426,35 @@ def damped(system, x, met, goal: float = 1e-10, most: int = 40) -> tuple | None:
     return None
 
 
-def newton(balance: Balance, x, omega: float, level: float, harmonics: int, most: int = 40):
-    """(unknowns, System one last step before, iterations) of a balance by `damped`.
+def solve_newton(balance: Balance, x, omega: float, level: float, harmonics: int, most: int = 40):
+    """Solve a balance by `solve_damped`.
 
-    x (N,): unknowns to begin from; omega [rad/s] and level [m s-2] of the drive; most: steps. NotConverged where the
-    residual is not rounding by then.
+    Parameters
+    ----------
+    balance : Balance
+    x : ndarray
+        (N,) start.
+    omega, level : float
+        Frequency [rad/s] and amplitude [m s-2] of the drive.
+    harmonics : int
+    most : int, optional
+        Steps.
+
+    Returns
+    -------
+    tuple
+        Unknowns, System before the last step, and steps.
+
+    Raises
+    ------
+    NotConverged
+        If the residual is not round-off by then.
     """
 
     def met(here, left, size) -> bool:
-        return balance.met(here, left, omega, level, harmonics, size)
+        return balance.is_rounding(here, left, omega, level, harmonics, size)
 
-    found = damped(lambda v: balance.system(v, omega, level, harmonics), x, met, most=most)
+    found = solve_damped(lambda v: balance.system(v, omega, level, harmonics), x, met, most=most)
     if found is None:
         at = f"{harmonics} harmonics at {omega / (2 * np.pi):.6g} Hz"
         raise NotConverged(

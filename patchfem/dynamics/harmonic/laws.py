@@ -1,8 +1,9 @@
-"""Laws of an interface row for the harmonic balance, each sampled along one cycle of a periodic slide.
+"""Laws of an interface row, each sampled along one cycle of a periodic slide.
 
-Endpoint values are taken, not path means: the mean of a trigonometric polynomial over equal samples is exact up to
-their number, so what aliases is only the corners of the force, (slope jump)(2 pi/N)^2/12, while a path mean over a step
-damps every harmonic by (k pi/N)^2/6 besides. Turning points lie where the harmonics have them, not at samples.
+Forces are taken at instants, not as means over steps: the mean of a trigonometric polynomial over
+equal samples is exact up to their number, so only the corners of the force alias, by (slope
+jump)(2 pi/N)^2/12, while a mean over a step damps every harmonic by (k pi/N)^2/6. Turning points
+lie where the harmonics have them, not at samples.
 """
 
 from collections.abc import Callable
@@ -16,32 +17,38 @@ from ...compiled import instance, load
 from ...core import PatchfemError, frozen_array
 from ...friction.protocol import Element
 
-SHARPEST = 48  # samples while an element goes from one limit to the other
+# samples of a cycle while an element goes from one limit to the other
+SAMPLES_PER_STICK = 48
 
 
 @cache
-def kernels():
-    """The compiled loops over the samples of a cycle, `cycle_kernels`."""
+def load_cycle_kernels():
+    """Return the compiled loops over the samples of a cycle, `cycle_kernels`."""
     return load("dynamics.harmonic.cycle_kernels")
 
 
 @cache
-def speed_kernels(law: str):
-    """The loop over the samples of a compiled law without memory."""
+def load_speed_kernels(law: str):
+    """Return the loop over the samples for a compiled law without memory."""
     return instance("dynamics.harmonic.speed_kernels", {"law": load(law)})
 
 
 @cache
-def flow_kernels(law: str):
-    """The loop over the samples of a compiled law of one number of memory."""
+def load_flow_kernels(law: str):
+    """Return the loop over the samples for a compiled law with one number of memory."""
     return instance("dynamics.harmonic.flow_kernels", {"law": load(law)})
 
 
-class Sampled(NamedTuple):
-    """Along N samples: force [N], slope over the slide [N/m], over the rate of the slide [N s/m], derivatives (R, N) to
-    the places of the R turning points, friction limit [N] and limit-weighted elastic stretch [N m]; tangent() of a law
-    whose memory is not that of turning points: derivatives (N, 2 H + 1) of the force to the harmonics of the slide,
-    real parts and then imaginary ones, and (N,) to the frequency of the cycle."""
+class SampledForce(NamedTuple):
+    """Force of a law along N samples of a cycle.
+
+    - force, slope, by_rate: [N], derivative over the slide [N/m] and over its velocity [N s/m]
+    - hold: (R, N) derivatives with respect to the slides of R turning points [N/m]
+    - limit, stretch: friction limit [N], and elastic stretch times it (N,) [N m]
+    - tangent: of a law whose memory is not that of turning points, a function that returns the
+      derivatives of the force with respect to the harmonics of the slide (N, 2 H + 1), real parts
+      first, and to the frequency (N,)
+    """
 
     force: np.ndarray
     slope: np.ndarray | None = None
@@ -53,10 +60,10 @@ class Sampled(NamedTuple):
 
 
 class Track:
-    """A periodic slide on uniform samples of the cycle.
+    """A periodic slide on equal samples of the cycle.
 
-    x: harmonics (H + 1,) [m]; omega [rad/s]; samples: N; q (N,) [m] and rate (N,), dq/d(omega t) [m]: where they are
-    known.
+    - x: (H + 1,) harmonics [m]; omega [rad/s]; samples: N
+    - q, rate: (N,) slide and dq/d(omega t) [m]
     """
 
     def __init__(self, x, omega: float, samples: int, q=None, rate=None):
@@ -68,19 +75,21 @@ class Track:
 
     @cached_property
     def turning(self) -> tuple:
-        """(angles, places, sample before each, direction at the first sample)."""
+        """Angles, slides and cells of the turning points, and the first direction."""
         n = self.samples
         angle = np.empty(n)
         place = np.empty(n)
         cell = np.empty(n, np.int64)
         re = np.ascontiguousarray(self.x.real)
         im = np.ascontiguousarray(self.x.imag)
-        count, start = kernels().turning_points(re, im, self.rate, angle, place, cell)
+        count, start = load_cycle_kernels().find_turning_points(
+            re, im, self.rate, angle, place, cell
+        )
         return angle[:count], place[:count], cell[:count], start
 
 
 def synthesis(x, samples: int) -> np.ndarray:
-    """Samples (..., N) over one cycle of Re sum X_k exp(i k theta) from harmonics x (..., H + 1); N may be small."""
+    """Return samples (..., N) of a cycle of Re sum X_k exp(i k theta)."""
     if 2 * x.shape[-1] > samples:
         every = -(-2 * x.shape[-1] // samples)
         return synthesis(x, samples * every)[..., ::every]
@@ -91,7 +100,7 @@ def synthesis(x, samples: int) -> np.ndarray:
 
 
 def analysis(values, harmonics: int) -> np.ndarray:
-    """Harmonics (..., H + 1) of samples (..., N) over one cycle, H <= N/2; inverse of `synthesis`."""
+    """Return harmonics (..., H + 1) of samples (..., N) of a cycle, H <= N/2."""
     n = values.shape[-1]
     out = np.fft.rfft(values, axis=-1)[..., : harmonics + 1] * (2 / n)
     out[..., 0] /= 2
@@ -99,23 +108,29 @@ def analysis(values, harmonics: int) -> np.ndarray:
 
 
 class Law:
-    """A law of a row. total: tangent stiffness at rest [N/m], 0 of one that creeps under any force."""
+    """A law of a row.
+
+    total: tangent stiffness at rest [N/m], 0 of one that creeps under any force.
+    """
 
     __slots__ = ()
     total = 0.0
 
     def sharpness(self, amplitude: float) -> int:
-        """Samples of a cycle that resolve its corners at a slide amplitude [m]; 0 of one that has none."""
+        """Return the samples of a cycle that resolve the corners at an amplitude [m], or 0."""
         return 0
 
-    def sample(self, track: "Track") -> "Sampled":
-        """Its periodic state along a slide, that of a virgin contact where several are."""
+    def sample(self, track: "Track") -> "SampledForce":
+        """Return its periodic state along a slide, that of a virgin contact where there are several."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Jenkins(Law):
-    """Parallel elastic-plastic elements: stiffness (t,) [N/m] > 0, limit_slide (t,) [m] >= 0."""
+    """Parallel elastic-plastic elements.
+
+    stiffness: (t,) [N/m] > 0; limit_slide: (t,) yield slides [m] >= 0.
+    """
 
     stiffness: np.ndarray
     limit_slide: np.ndarray
@@ -149,12 +164,12 @@ class Jenkins(Law):
         return float(self.sums[0][-1])
 
     def sharpness(self, amplitude: float) -> int:
-        """Samples of a cycle that resolve a stick at a slide amplitude [m]."""
+        """Return the samples of a cycle that resolve a stick at an amplitude [m]."""
         share = float(self.sums[1][-1]) / self.total / max(amplitude, 1e-300)
-        return _samples(share)
+        return _count_samples(share)
 
-    def sample(self, track: Track) -> Sampled:
-        """The periodic steady state that a virgin contact reaches."""
+    def sample(self, track: Track) -> SampledForce:
+        """Return the periodic state that a virgin contact reaches."""
         _, places, cells, start = track.turning
         n = track.samples
         stiff, full, square = self.sums
@@ -163,7 +178,7 @@ class Jenkins(Law):
         stretch = np.empty(n)
         hold = np.zeros((places.size, n))
         workspace = np.empty((2, 2 * places.size + 3), np.int64), np.empty((2, 2 * places.size + 3))
-        kernels().jenkins_cycle(
+        load_cycle_kernels().sample_jenkins(
             track.q,
             start,
             cells,
@@ -178,12 +193,12 @@ class Jenkins(Law):
             hold,
             stretch,
         )
-        return Sampled(force, slope, None, hold, float(full[-1]), stretch)
+        return SampledForce(force, slope, None, hold, float(full[-1]), stretch)
 
 
 @dataclass(frozen=True, slots=True)
 class Spring(Law):
-    """Bonded spring: stiffness [N/m], cubic [N/m3] q^3 besides."""
+    """Bonded spring with stiffness [N/m] and a cubic part [N/m3] q^3."""
 
     stiffness: float = 0.0
     cubic: float = 0.0
@@ -193,17 +208,17 @@ class Spring(Law):
         """Tangent stiffness at rest [N/m]."""
         return self.stiffness
 
-    def sample(self, track: Track) -> Sampled:
+    def sample(self, track: Track) -> SampledForce:
         """Force and slope at the samples."""
         q = track.q
-        return Sampled(
+        return SampledForce(
             q * (self.stiffness + self.cubic * q * q), self.stiffness + 3 * self.cubic * q * q
         )
 
 
 @dataclass(frozen=True, slots=True)
 class Interlock(Law):
-    """Interlocking of wavelength [m]: stiffness wavelength/(2 pi) sin(2 pi q/wavelength), stiffness [N/m] at rest."""
+    """Interlocking peaks: stiffness wavelength/(2 pi) sin(2 pi q/wavelength), [N/m] and [m]."""
 
     stiffness: float
     wavelength: float
@@ -214,37 +229,37 @@ class Interlock(Law):
         return self.stiffness
 
     def sharpness(self, amplitude: float) -> int:
-        """Samples for the waves that a cycle passes."""
+        """Return the samples for the wavelengths that a cycle passes."""
         return int(16 * min(2 * np.pi * amplitude / self.wavelength, 1000.0))
 
-    def sample(self, track: Track) -> Sampled:
+    def sample(self, track: Track) -> SampledForce:
         """Force and slope at the samples."""
         angle = 2 * np.pi / self.wavelength * track.q
-        return Sampled(
+        return SampledForce(
             self.stiffness * self.wavelength / (2 * np.pi) * np.sin(angle),
             self.stiffness * np.cos(angle),
         )
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class OfSpeed(Law):
-    """A law without memory, whose force follows the speed of the slide alone: its Element of form "speed"."""
+class SpeedLaw(Law):
+    """A law without memory, whose force follows the velocity: its Element of form "speed"."""
 
     element: Element
 
-    def sample(self, track: Track) -> Sampled:
+    def sample(self, track: Track) -> SampledForce:
         """Force and slope at the samples."""
         force = np.empty(track.samples)
         slope = np.empty(track.samples)
-        speed_kernels(self.element.kernels).along(
+        load_speed_kernels(self.element.kernels).sample_forces(
             self.element.numbers[None], track.omega * track.rate, force, slope
         )
-        return Sampled(force, None, slope, None, self.element.limit, np.zeros(track.samples))
+        return SampledForce(force, None, slope, None, self.element.limit, np.zeros(track.samples))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Flow(Law):
-    """A law whose memory is its stretch alone, which flows along the slide: its Element of form "flow"."""
+    """A law whose memory is its stretch alone: its Element of form "flow"."""
 
     element: Element
 
@@ -260,10 +275,10 @@ class Flow(Law):
 
     def sharpness(self, amplitude: float) -> int:
         """Samples of a cycle that resolve a reversal at a slide amplitude [m]."""
-        return _samples(self.length / max(amplitude, 1e-300))
+        return _count_samples(self.length / max(amplitude, 1e-300))
 
     def along(self, track: Track) -> "Nodes":
-        """The periodic state, that of a virgin contact where several are, at samples and turning points."""
+        """Return the periodic state at samples and turning points."""
         angles, places, cells, _ = track.turning
         n = track.samples
         own = np.ones(track.samples + len(cells), bool)
@@ -279,20 +294,23 @@ class Flow(Law):
         steps = np.empty((3, q.size))
         force = np.empty(q.size)
         slopes = np.empty((2, q.size))
-        flow_kernels(self.element.kernels).cycle(
+        load_flow_kernels(self.element.kernels).solve_cycle(
             self.element.numbers[None], q, speed, dt, z, steps, force, slopes
         )
         return Nodes(angle, own, dt, z, steps, force, slopes)
 
-    def sample(self, track: Track) -> Sampled:
-        """Force at the samples of the periodic state. Where the law knows no time its slopes are those over the slide
-        and the turning places, else those over the harmonics."""
+    def sample(self, track: Track) -> SampledForce:
+        """Return the force at the samples of the periodic state.
+
+        Where the law does not depend on time, the slopes are those over the slide and the turning
+        points, else those over the harmonics.
+        """
         one = self.along(track)
         own = one.own
         force = one.force[one.own]
         stretch = self.element.limit * one.z[one.own]
         if one.steps[2].any() or one.slopes[1].any():
-            return Sampled(
+            return SampledForce(
                 force,
                 limit=self.element.limit,
                 stretch=stretch,
@@ -302,7 +320,7 @@ class Flow(Law):
         before = np.roll(one.steps[1], 1)
         after = one.steps[1] / np.maximum(one.steps[0], 1e-300)
         hold = one.kept_from(np.flatnonzero(~own)) * (before - after)[~own, None]
-        return Sampled(
+        return SampledForce(
             force,
             (one.slopes[0] * before)[own],
             None,
@@ -312,7 +330,7 @@ class Flow(Law):
         )
 
     def _tangent(self, track: Track, one: "Nodes") -> tuple:
-        """Derivatives of the force at the samples as of `Sampled.tangent`."""
+        """Return the derivatives of the force at the samples, as `SampledForce.tangent`."""
         k = np.arange(track.x.size)
         own = one.own
         turned = np.exp(1j * np.outer(one.angle, k))
@@ -322,7 +340,7 @@ class Flow(Law):
         out = np.empty((one.angle.size, wave.shape[1] + 1))
         out[:, :-1] = np.roll(wave, -1, axis=0) - wave
         out[:, -1] = -one.dt / track.omega
-        flow_kernels(self.element.kernels).tangents(one.steps, out)
+        load_flow_kernels(self.element.kernels).solve_tangents(one.steps, out)
         out = out[own] * one.slopes[0, own, None]
         out[:, :-1] += one.slopes[1, own, None] * track.omega * rate[own]
         out[:, -1] += one.slopes[1, own] * track.rate
@@ -330,9 +348,13 @@ class Flow(Law):
 
 
 class Nodes(NamedTuple):
-    """A Flow at the M samples and turning points of a cycle: angle (M,), which are samples (M,) bool, the time dt (M,)
-    [s] to the next, stretch z (M,) [m], slopes (3, M) of the steps that follow over the stretch, slide and time,
-    force (M,) [N] and its slopes (2, M) over the stretch and the speed."""
+    """A Flow at the M samples and turning points of a cycle.
+
+    - angle: (M,); own: (M,) which are samples; dt: (M,) time to the next [s]
+    - z: (M,) stretch [m]
+    - steps: (3, M) derivatives of the next stretch over stretch, slide and time
+    - force, slopes: (M,) [N], (2, M) its derivatives over stretch and velocity
+    """
 
     angle: np.ndarray
     own: np.ndarray
@@ -343,8 +365,10 @@ class Nodes(NamedTuple):
     slopes: np.ndarray
 
     def kept_from(self, places) -> np.ndarray:
-        """What is left of a disturbance of z at nodes `places` (r,) at every node, (r, M), periodic; 0 of one that
-        nothing forgets."""
+        """Return what remains at every node of a disturbance of z at nodes `places`, (r, M).
+
+        It is 0 for a law that forgets nothing.
+        """
         fall = np.append(0.0, np.cumsum(np.log(np.maximum(self.steps[0], 1e-300))))
         since = (
             fall[:-1]
@@ -355,7 +379,7 @@ class Nodes(NamedTuple):
         return np.exp(since) / forgets if forgets > 1e-12 else np.zeros_like(since)
 
     def by_cell(self) -> tuple:
-        """(what a cell from sample to sample keeps of the stretch, its slope over an even slide), both (N,)."""
+        """Return what every cell keeps of the stretch, and its slope over the slide, (N,)."""
         kept, by_slide, _ = self.steps
         first = np.flatnonzero(self.own)
         turns = ~self.own
@@ -367,21 +391,30 @@ class Nodes(NamedTuple):
         return np.multiply.reduceat(kept, first), np.add.reduceat(by_slide * share * later, first)
 
 
-def _samples(share: float) -> int:
-    """Samples of a cycle for a stick over `share` of the amplitude: it takes the angle acos(1 - 2 share)."""
+def _count_samples(share: float) -> int:
+    """Return the samples of a cycle for a stick over a fraction of the amplitude.
+
+    The stick takes the angle acos(1 - 2 share).
+    """
     angle = np.arccos(max(1 - 2 * share, -1.0))
-    return int(min(SHARPEST * 2 * np.pi / max(angle, 1e-9), 65536))
+    return int(min(SAMPLES_PER_STICK * 2 * np.pi / max(angle, 1e-9), 65536))
 
 
-def law_of_model(model):
-    """The law of a dynamics.march.models.ContactModel; PatchfemError names what cannot be balanced and what to do."""
+def make_law(model):
+    """Return the law of a dynamics.march.models.ContactModel.
+
+    Raises
+    ------
+    PatchfemError
+        If harmonic balance cannot treat it; the message says what to do.
+    """
     one = model.element
     form = one.form if one is not None else ""
     if form == "parallel":
         count = int(one.numbers[1])
         return Jenkins(one.numbers[2 : 2 + count], one.numbers[2 + count :])
     if form == "speed":
-        return OfSpeed(one)
+        return SpeedLaw(one)
     # points of bonds that do not grow and break at once remember one stretch
     if form == "flow" or (form == "points" and one.numbers[3] < 0 and not one.numbers[8]):
         return Flow(one)

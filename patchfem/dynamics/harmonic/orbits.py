@@ -1,49 +1,61 @@
-"""Motions that a march repeats with its drive: brought there, shown over a cycle, disturbed.
+"""Periodic motions by a march: found by extrapolation, shown over a cycle, disturbed.
 
-A motion is marched until it settles, and every few cycles the limit of its states is guessed from their differences:
-reduced rank extrapolation, which is exact where a disturbance dies out linearly (Sidi, J. Comput. Appl. Math. 36, 305,
-1991). What the contact remembers follows by itself in the cycles between. Elements that slip a little further in every
-cycle come to rest by themselves and start anew after every guess: one that did not help has the next one wait.
+A motion is marched, and every few cycles the limit of its states is extrapolated from their
+differences: reduced rank extrapolation, which is exact where a disturbance dies out linearly
+(Sidi, J. Comput. Appl. Math. 36, 305, 1991). The memory of the contact follows in the cycles
+between. Elements that slip a little further in every cycle come to rest by themselves; after an
+extrapolation that did not help, the next one waits.
 """
 
 import numpy as np
 
 from ..march.march import ends_of, mark_of
 
-LEAD = 6  # cycles from the start to the first guess
-REST = 2  # cycles after a guess that the memory of the contact takes
-MOST = 600  # cycles
-HELPED = 0.1  # of the change of the state before a guess: where it is more after it, twice the cycles pass to the next
-CLOSE = 1e-8  # of the largest state, to which a motion repeats
-STILL = 1e-9  # of what the drive moves a free mass by: a smaller motion is none
-NUDGE = 1e-6  # of the largest state: a small disturbance
-# cycles in which the contact takes up a disturbance, and those that are seen in all
-TAKEN_UP = 2
-SEEN = 8
-FORGOTTEN = 1e-3  # of the largest disturbances, on the root mean square: what is smaller is not told from none
-NOTHING = 1e-5  # of a disturbance, which then has died out
+# cycles from the start to the first extrapolation
+FIRST_CYCLES = 6
+# cycles after an extrapolation in which the memory of the contact follows
+MEMORY_CYCLES = 2
+# cycles that are marched at most
+MAX_CYCLES = 600
+# change of the state after an extrapolation over that before; if it is larger, the next one waits twice as long
+MIN_GAIN = 0.1
+# change of the state in a cycle over the largest state, below which the motion repeats
+PERIODIC_TOL = 1e-8
+# motion over that of a free mass under the drive, below which nothing moves
+REST_RATIO = 1e-9
+# disturbance over the largest state, by which multipliers are measured
+DISTURBANCE = 1e-6
+# cycles in which the contact takes up a disturbance
+SETTLING_CYCLES = 2
+# cycles that are marched with a disturbance
+N_DISTURBED_CYCLES = 8
+# singular value of the disturbances over the largest one, below which it is round-off
+MIN_SINGULAR_RATIO = 1e-3
+# disturbance over its start, below which it has died out
+MIN_DISTURBANCE = 1e-5
 
 
-def settled(run) -> float:
-    """March a Run until it repeats; the change of the state over the last cycle, over the largest state.
+def march_to_periodic(run) -> float:
+    """March a Run until it repeats; returns the change in the last cycle over the largest state.
 
-    It is more than CLOSE where no motion repeats within MOST cycles; `run.outcome` is set where the march ended.
+    It is more than PERIODIC_TOL where no motion repeats within MAX_CYCLES; `run.outcome` is set
+    where the march ended.
     """
     size = 2 * run.state.shape[1] + 2
     done = 0
     before = _state(run)
     least = (
-        STILL
+        REST_RATIO
         * float(np.abs(run.drive.values(np.linspace(0, run.drive.period, 9))).max())
-        / _pace(run) ** 2
+        / _fastest_rate(run) ** 2
     )
     least = max(least * _size(run.modes.base), 1e-300)
     change = np.inf
     misses = 0
-    still = 0
-    while done < MOST and run.outcome is None:
+    waiting = 0
+    while done < MAX_CYCLES and run.outcome is None:
         kept = [before]
-        for _ in range((LEAD if done == 0 else REST) + size):
+        for _ in range((FIRST_CYCLES if done == 0 else MEMORY_CYCLES) + size):
             run.cycle(run.prop.steps, 0, [])
             done += 1
             kept.append(_state(run))
@@ -51,22 +63,25 @@ def settled(run) -> float:
                 break
         last = change
         change = _size(kept[-1] - kept[-2]) / max(_size(kept[-1]), least)
-        if change <= CLOSE or run.outcome is not None:
+        if change <= PERIODIC_TOL or run.outcome is not None:
             break
-        if still == 0:  # the cycles since the last guess
-            misses = 0 if change < HELPED * last else misses + 1
-            still = 2**misses
-        still -= 1
-        before = _limit(kept[-size:]) if still == 0 else None
+        if waiting == 0:  # the cycles since the last guess
+            misses = 0 if change < MIN_GAIN * last else misses + 1
+            waiting = 2**misses
+        waiting -= 1
+        before = _extrapolate(kept[-size:]) if waiting == 0 else None
         if before is None:
             before = kept[-1]
         else:
-            run.placed(*_apart(run, before))
+            run.placed(*_split_state(run, before))
     return float(change)
 
 
-def shown(run, frames: int = 0) -> tuple:
-    """(Mark of one more cycle of a Run, snapshots of the interface in it); its energies are those of this cycle."""
+def march_cycle(run, frames: int = 0) -> tuple:
+    """March one more cycle of a Run; returns its Mark and snapshots of the interface.
+
+    The energies of the Mark are those of this cycle.
+    """
     run.books_anew()
     snapshots = []
     part = run.cycle(run.prop.steps, frames, snapshots)
@@ -74,31 +89,34 @@ def shown(run, frames: int = 0) -> tuple:
     return mark_of(run, [part], ends_of([part], run)), snapshots
 
 
-def multipliers(run) -> np.ndarray:
-    """Floquet multipliers (2 n,), the largest first: what a cycle makes of small disturbances of the modes.
+def estimate_multipliers(run) -> np.ndarray:
+    """Estimate the Floquet multipliers (2 n,) of a Run, the largest first.
 
-    Every one is disturbed in a march of its own from the state as it stands. In the first TAKEN_UP cycles the contact
-    takes up the disturbance; the map of a cycle is that which fits those that follow, SEEN in all, in least squares.
-    Memories that fade slowly bend the fit: none counts as larger than 1 that was not seen to grow so.
+    Every mode is disturbed in a march of its own from the present state. In the first
+    SETTLING_CYCLES the contact takes up the disturbance; the map of a cycle fits the cycles that
+    follow in least squares. Memories that fade slowly bend the fit: no multiplier counts as larger
+    than 1 unless the disturbance grew so.
     """
     here = _state(run)
     found = []
-    nudge = NUDGE * max(_size(here), 1e-300)
+    nudge = DISTURBANCE * max(_size(here), 1e-300)
     for k in range(-1, here.size):
         twin = run.fork(run.drive)
         there = here.copy()
         there[k] += nudge if k >= 0 else 0.0
-        twin.placed(*_apart(run, there))
+        twin.placed(*_split_state(run, there))
         states = []
-        for _ in range(SEEN):
+        for _ in range(N_DISTURBED_CYCLES):
             twin.cycle(twin.prop.steps, 0, [])
             states.append(_state(twin))
         found.append(states)
     # (cycles, 2 n, 2 n)
     after = np.moveaxis(np.array(found[1:]) - np.array(found[0]), 0, 2) / nudge
     sizes = np.abs(after).max(axis=(1, 2))
-    last = TAKEN_UP + int(np.argmax(np.append(sizes[TAKEN_UP:] < NOTHING, True)))
-    first = min(TAKEN_UP, last) - 1
+    last = SETTLING_CYCLES + int(
+        np.argmax(np.append(sizes[SETTLING_CYCLES:] < MIN_DISTURBANCE, True))
+    )
+    first = min(SETTLING_CYCLES, last) - 1
     if last - first < 2:
         first = 0
         last = 2
@@ -110,7 +128,7 @@ def multipliers(run) -> np.ndarray:
     if not pairs:
         return np.zeros(here.size)
     now, then = (np.concatenate(part, axis=1) for part in zip(*pairs))
-    values = np.linalg.eigvals(then @ np.linalg.pinv(now, rcond=FORGOTTEN))
+    values = np.linalg.eigvals(then @ np.linalg.pinv(now, rcond=MIN_SINGULAR_RATIO))
     grown = (
         (sizes[last - 1] / sizes[first]) ** (1 / max(last - 1 - first, 1))
         if sizes[first] > 0
@@ -121,27 +139,29 @@ def multipliers(run) -> np.ndarray:
 
 
 def _state(run) -> np.ndarray:
-    """Coordinates [m] and rates over the largest pace of modes and drive [m] (2 n,)."""
-    return np.concatenate([run.state[0], run.state[1] / _pace(run)])
+    """Return coordinates [m] and rates over the fastest rate [m] (2 n,)."""
+    return np.concatenate([run.state[0], run.state[1] / _fastest_rate(run)])
 
 
-def _pace(run) -> float:
+def _fastest_rate(run) -> float:
     return max(float(run.modes.omega.max()), 2 * np.pi / run.drive.period)
 
 
-def _apart(run, state) -> tuple:
-    """(coordinates, rates) (n,) of a state."""
+def _split_state(run, state) -> tuple:
+    """Return coordinates and rates (n,) of a state."""
     n = run.state.shape[1]
-    return state[:n], state[n:] * _pace(run)
+    return state[:n], state[n:] * _fastest_rate(run)
 
 
 def _size(state) -> float:
     return float(np.abs(state).max(initial=0.0))
 
 
-def _limit(kept):
-    """Limit of states (k, 2 n) that follow each other: their mean of the weights that make its change least; None where
-    nothing is gained."""
+def _extrapolate(kept):
+    """Return the limit of successive states (k, 2 n), None where nothing is gained.
+
+    It is the mean with the weights that make its change smallest.
+    """
     states = np.array(kept)
     changes = np.diff(states, axis=0)
     rise = np.diff(changes, axis=0)

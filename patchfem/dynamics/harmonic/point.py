@@ -1,8 +1,9 @@
-"""One steady motion by harmonic balance.
+"""One steady motion by harmonic balance, with its error.
 
-`point` chooses its harmonics by an estimate of the error: the balance is solved for H harmonics, the higher ones follow
-from the force that those leave over (q_k = -G_k F_k, a contraction once the inertia of k > H outweighs the contact's
-stiffness), and what that changes below H tells what H had missed.
+The balance is solved for H harmonics. Those above H follow from the force that they leave over
+(q_k = -G_k F_k, a contraction once the inertia of k > H outweighs the stiffness of the contact),
+and what that changes below H shows what H has missed. `point` raises H until this error meets the
+tolerance.
 """
 
 from dataclasses import dataclass
@@ -13,16 +14,22 @@ import numpy as np
 from ...core import NotConverged
 from .continuation import follow
 from .forces import Group
-from .harmonic import Balance, System, newton, pack, solve_linear, unpack
+from .harmonic import Balance, System, pack, solve_linear, solve_newton, unpack
 from .laws import Interlock, Track, synthesis
-from .starts import one_harmonic
+from .starts import find_one_harmonic_roots
 
-LADDER = (7, 15, 31, 63, 127, 255)  # harmonics that are tried
-WIDER = 4  # harmonics that follow, over those that are solved for
-CLIMB = (11, 15, 23, 31, 47, 63, 95, 127, 191)  # on the way from few
-SWEEPS = 40
-CLOSED = 1e-5  # of the tolerance, what the last sweep may change
-TOLERANCE = 1e-3  # where none is given
+# numbers of harmonics that are tried
+HARMONIC_COUNTS = (7, 15, 31, 63, 127, 255)
+# harmonics that follow from the force over those that are solved for
+FOLLOWING_RATIO = 4
+# numbers of harmonics on the way from few to many
+CLIMB_COUNTS = (11, 15, 23, 31, 47, 63, 95, 127, 191)
+# sweeps of the harmonics that follow
+MAX_SWEEPS = 40
+# change in the last sweep over the tolerance
+SWEEP_TOL_RATIO = 1e-5
+# tolerance of the harmonics that follow where the caller gives none
+DEFAULT_TOLERANCE = 1e-3
 
 
 class _Unbounded(NotConverged):
@@ -31,13 +38,20 @@ class _Unbounded(NotConverged):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Periodic:
-    """A steady motion at omega [rad/s] under the drive amplitude level [m s-2].
+    """A steady motion.
 
-    coefficients (i, K + 1) complex: slides [m] of the rows of `group`, x = Re sum X_k exp(i k omega t); forces (i, K +
-    1) [N], modal (K + 1, n) [m]; harmonics H solved for (K >= H). residual: rms of the force that the motion does not
-    balance in time, on twice the samples, over the rms of the force; error: estimate for the motion, relative to it;
-    left: what the sweeps of the higher harmonics still change of it;
-    stable and multipliers None until asked for; unknowns: those of the balance, a start for a neighbour.
+    - omega, level: frequency [rad/s] and amplitude [m s-2] of the drive
+    - coefficients, forces: (i, K + 1) harmonics of the slides [m] and forces [N] of the rows of
+      `group`
+    - modal: (K + 1, n) modal harmonics [m]
+    - harmonics, samples: H solved for (K >= H), and samples of the cycle
+    - residual: rms of the force that is not balanced in time, on twice the samples, over the rms
+      of the force
+    - error: of the motion, relative
+    - iterations
+    - unknowns: (N,) of the balance, a start for a neighbour
+    - left: relative change that sweeps of the higher harmonics would still make
+    - stable, multipliers: None until they are computed
     """
 
     omega: float
@@ -64,13 +78,15 @@ class Periodic:
         )
 
     def amplitude(self, row, samples: int = 4096) -> float:
-        """(max - min)/2 [m] of row @ coordinates, row (n,), between the samples by parabolas."""
+        """Return half the range [m] of row @ coordinates, row (n,), between samples by parabolas."""
         y = synthesis(self.modal @ np.asarray(row, float), samples)
-        return (top(y) + top(-y)) / 2
+        return (find_peak(y) + find_peak(-y)) / 2
 
     def turns(self) -> tuple:
-        """(slide [m], force [N], slip [m]) of the first row where its slide is smallest and where it is largest;
-        () of one that rests."""
+        """Return slide [m], force [N] and slip [m] of the first row at both turns.
+
+        It is () for a row at rest.
+        """
         angles, places, _, _ = Track(self.coefficients[0], self.omega, self.samples).turning
         if not angles.size:
             return ()
@@ -88,7 +104,7 @@ class Periodic:
                 (
                     float(places[at]),
                     float(friction_force(self.group.laws[0], found)[0]),
-                    float(slip_of(track, found)[0]),
+                    float(find_slip(track, found)[0]),
                 )
             )
         return tuple(out)
@@ -103,16 +119,18 @@ def friction_force(laws: tuple, sampled: list) -> np.ndarray:
     return sum(friction or [one.force for one in sampled])
 
 
-def slip_of(track: Track, found: list) -> np.ndarray:
-    """Irreversible part (N,) [m] of a slide from the laws sampled along it; 0 where nothing rubs."""
+def find_slip(track: Track, found: list) -> np.ndarray:
+    """Return the slip (N,) [m] of a row from the laws sampled along it; 0 where nothing rubs."""
     limit = sum(one.limit for one in found)
     stretch = sum(one.stretch for one in found if one.stretch is not None)
     return track.q - stretch / limit if limit > 0 else np.zeros(track.samples)
 
 
-def top(y) -> float:
-    """Largest value of a cycle y (N,), between the samples by a parabola: the largest of 4096 samples of a sine can be
-    (pi/4096)^2/2 = 3e-7 of it smaller."""
+def find_peak(y) -> float:
+    """Return the largest value of a cycle (N,), between samples by a parabola.
+
+    The largest of 4096 samples of a sine can be (pi/4096)^2/2 = 3e-7 too small.
+    """
     k = int(np.argmax(y))
     a = y[k - 1]
     b = y[k]
@@ -122,12 +140,23 @@ def top(y) -> float:
 
 
 def group_of(modes, group) -> Group:
-    """A Group of laws given as such, as a law, as a contact model, or as (row, law) pairs."""
+    """Return a Group of laws given as such, as a law, a model, or (row, law) pairs."""
     return group if isinstance(group, Group) else Group(modes, group)
 
 
 def balance_of(modes, group: Group, samples: int) -> Balance:
-    """The equations of the rows of `group` on `samples` of a cycle."""
+    """Return the balance of the rows of `group` on `samples` of a cycle.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    group : Group
+    samples : int
+
+    Returns
+    -------
+    Balance
+    """
     gridded = group.with_samples(samples)
     return Balance(modes, gridded.rows, gridded)
 
@@ -135,52 +164,87 @@ def balance_of(modes, group: Group, samples: int) -> Balance:
 def point(
     modes, drive, group, harmonics: int | None = None, tolerance: float = 1e-3, start=None
 ) -> Periodic:
-    """The steady motion under a core.SineDrive. harmonics: exactly so many; None: as many as `tolerance` wants.
+    """Find a steady motion under a sine.
 
-    start: a Periodic or unknowns nearby; else the held contact, what one harmonic would do, weaker drives.
-    NotConverged where no balance is found or LADDER ends before the tolerance.
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : core.SineDrive
+    group : Group, or what `group_of` takes
+    harmonics : int, optional
+        Exactly so many; as many as the tolerance needs by default.
+    tolerance : float, optional
+    start : Periodic or ndarray, optional
+        A motion nearby; else the stuck contact, the motions of one harmonic, and weaker drives are
+        tried.
+
+    Returns
+    -------
+    Periodic
+
+    Raises
+    ------
+    NotConverged
+        If no balance is found, or no number of harmonics meets the tolerance.
     """
     group = group_of(modes, group)
     x, near = (start.unknowns, start.base_samples) if isinstance(start, Periodic) else (start, 0)
     if harmonics is not None:
-        return _solved(modes, drive, group, harmonics, x, 1, near=near)
+        return _solve_harmonics(modes, drive, group, harmonics, x, 1, near=near)
     found = None
-    least = start.harmonics if isinstance(start, Periodic) else _least(modes, drive, group)
-    for h in [h for h in LADDER if h >= least] or LADDER[-1:]:
+    least = start.harmonics if isinstance(start, Periodic) else _min_harmonics(modes, drive, group)
+    for h in [h for h in HARMONIC_COUNTS if h >= least] or HARMONIC_COUNTS[-1:]:
         try:
-            found = _solved(modes, drive, group, h, x, WIDER, tolerance, near)
+            found = _solve_harmonics(modes, drive, group, h, x, FOLLOWING_RATIO, tolerance, near)
         except _Unbounded:
             raise
         except NotConverged:
-            if h == LADDER[-1]:
+            if h == HARMONIC_COUNTS[-1]:
                 raise
             continue
         if found.error <= tolerance:
             return found
-        x = cut(balance_of(modes, group, 0), found.coefficients, found.unknowns, h, _next(h))
+        x = with_harmonics(
+            balance_of(modes, group, 0), found.coefficients, found.unknowns, h, _next_harmonics(h)
+        )
     if found is None or found.error > tolerance:
         raise NotConverged(
-            f"accuracy.tolerance: with {LADDER[-1]} harmonics the motion still has an error of "
+            f"accuracy.tolerance: with {HARMONIC_COUNTS[-1]} harmonics the motion still has an error of "
             f"{found.error if found else np.inf:.1e}, more than {tolerance:g}; raise the tolerance, or "
             'use accuracy.method = "march"'
         )
     return found
 
 
-def _least(modes, drive, group) -> float:
-    """Harmonics (63 at most) from which inertia outweighs the contact's stiffness, so that the higher ones follow."""
+def _min_harmonics(modes, drive, group) -> float:
+    """Return the harmonics (<= 63) from which inertia outweighs the contact stiffness."""
     stiff = float(np.sum(group.stiffness() * np.sum(group.rows**2, axis=1))) / modes.mass
     return min(np.sqrt(stiff) / drive.omega, 63)
 
 
-def _next(h: int) -> int:
-    return LADDER[min(LADDER.index(h) + 1, len(LADDER) - 1)] if h in LADDER else 2 * h + 1
+def _next_harmonics(h: int) -> int:
+    return (
+        HARMONIC_COUNTS[min(HARMONIC_COUNTS.index(h) + 1, len(HARMONIC_COUNTS) - 1)]
+        if h in HARMONIC_COUNTS
+        else 2 * h + 1
+    )
 
 
-def cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
-    """Unknowns for `harmonics` harmonics from those for h: the slides' harmonics (i, K + 1) [m], cut or with zeros.
+def with_harmonics(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
+    """Return unknowns for `harmonics` harmonics from those for h.
 
-    What stands behind the slides' harmonics in the unknowns, other numbers of the balance, is kept.
+    Parameters
+    ----------
+    balance : Balance
+    slides : ndarray
+        (i, K + 1) harmonics of the slides [m]; they are cut or filled up with zeros.
+    unknowns : ndarray
+        (N,); what follows the slides in them is kept.
+    h, harmonics : int
+
+    Returns
+    -------
+    ndarray
     """
     y = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
     keep = min(harmonics, slides.shape[1] - 1) + 1
@@ -188,25 +252,50 @@ def cut(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
     return np.concatenate([pack(y), unknowns[y.shape[0] * (2 * h + 1) :]])
 
 
-def finer(found: Periodic, modes, drive) -> Periodic:
-    """The same motion with twice its harmonics, three of one (a law alike both ways has no even ones), and twice its
-    samples, those above following where they do. NotConverged where it is not found."""
+def refine_point(found: Periodic, modes, drive) -> Periodic:
+    """Return the same motion with twice its harmonics and samples.
+
+    From one harmonic they become three, as a symmetric law has no even ones. NotConverged where it
+    is not found.
+
+    Parameters
+    ----------
+    found : Periodic
+    modes : ModalBasis
+    drive
+
+    Returns
+    -------
+    Periodic
+    """
     h = found.harmonics
     x = found.unknowns
     top = max(2 * (found.coefficients.shape[1] - 1), 3)
     balance = balance_of(modes, found.group, 2 * found.base_samples)
     here = balance.system(x, drive.omega, drive.acceleration, h)
-    one = _widened(balance, Reached(x, here, 0, found.coefficients), drive, h, top // h, TOLERANCE)
-    return one if np.isfinite(one.error) else _solved(modes, drive, balance.contact, top, x, 1)
+    one = _add_harmonics(
+        balance, SweepStart(x, here, 0, found.coefficients), drive, h, top // h, DEFAULT_TOLERANCE
+    )
+    return (
+        one
+        if np.isfinite(one.error)
+        else _solve_harmonics(modes, drive, balance.contact, top, x, 1)
+    )
 
 
-def _solved(modes, drive, group, h, x, wider, tolerance=TOLERANCE, near=0) -> Periodic:
-    """The balance with h harmonics, those above up to wider h following, on samples sharp enough for its slides; near:
-    samples that a neighbour took."""
+def _solve_harmonics(
+    modes, drive, group, h, x, wider, tolerance=DEFAULT_TOLERANCE, near=0
+) -> Periodic:
+    """Solve the balance with h harmonics; those up to wider h follow.
+
+    The samples resolve the shortest stick.
+
+    near: samples that a neighbour took.
+    """
     samples = group.samples or max(group.samples_for(h * wider), near)
     balance = balance_of(modes, group, samples)
     for _ in range(3):
-        x, here, count = _reach(balance, x, drive, h)
+        x, here, count = _solve_balance(balance, x, drive, h)
         swing = (
             np.ptp(synthesis(balance.slides(x, drive.omega, h), 2 ** (h + 64).bit_length()), axis=1)
             / 2
@@ -214,55 +303,56 @@ def _solved(modes, drive, group, h, x, wider, tolerance=TOLERANCE, near=0) -> Pe
         want = group.samples or group.samples_for(h * wider, swing)
         if want <= balance.contact.samples:
             break
-        balance = balance.on(balance.contact.with_samples(want))
-    return _widened(balance, Reached(x, here, count), drive, h, wider, tolerance)
+        balance = balance.with_contact(balance.contact.with_samples(want))
+    return _add_harmonics(balance, SweepStart(x, here, count), drive, h, wider, tolerance)
 
 
-def _reach(balance, x, drive, h: int):
-    """`newton` from a start of any number of harmonics, from the held contact, what one harmonic would do, or along
-    weaker drives."""
+def _solve_balance(balance, x, drive, h: int):
+    """Solve by `solve_newton` from each start in turn, and last along weaker drives."""
     omega = drive.omega
     level = drive.acceleration
     for start in _starts(balance, x, omega, level, h):
         try:
-            return newton(balance, start, omega, level, h)
+            return solve_newton(balance, start, omega, level, h)
         except NotConverged:
             pass
-    return newton(balance, _climbed(balance, omega, level, h), omega, level, h)
+    return solve_newton(balance, _climb_harmonics(balance, omega, level, h), omega, level, h)
 
 
 def _starts(balance, x, omega, level, h: int):
-    """Unknowns from which Newton's method may lead to a motion, the likeliest first."""
+    """Yield unknowns from which Newton's method may lead to a motion, the likeliest first."""
     r = balance.lift.shape[1]
     if x is not None:
         free = sum(1 if k == 0 else 2 for k, *_ in balance.linear(omega, h).free)
         have, rest = divmod(x.size - free - r, 2 * r)
         if have >= 0 and not rest:
-            yield cut(balance, balance.lift @ unpack(x[: r * (2 * have + 1)], r), x, have, h)
-    yield _held(balance, omega, level, h)
-    for one in one_harmonic(balance, omega, level):
-        yield cut(balance, balance.slides(one, omega, 1), one, 1, h)
+            yield with_harmonics(
+                balance, balance.lift @ unpack(x[: r * (2 * have + 1)], r), x, have, h
+            )
+    yield _solve_stuck(balance, omega, level, h)
+    for one in find_one_harmonic_roots(balance, omega, level):
+        yield with_harmonics(balance, balance.slides(one, omega, 1), one, 1, h)
 
 
-def _climbed(balance, omega, level, h: int) -> np.ndarray:
-    """Unknowns by way of few harmonics, which are cheap to follow from weaker drives, to more of them."""
-    below = min(LADDER[0], h)
-    x = _along_levels(balance, omega, level, below)
-    for more in [k for k in CLIMB if below < k < h] + [h] * (h > below):
+def _climb_harmonics(balance, omega, level, h: int) -> np.ndarray:
+    """Return unknowns by way of few harmonics, which are cheap to follow from weaker drives."""
+    below = min(HARMONIC_COUNTS[0], h)
+    x = _follow_levels(balance, omega, level, below)
+    for more in [k for k in CLIMB_COUNTS if below < k < h] + [h] * (h > below):
         try:
-            start = cut(balance, balance.slides(x, omega, below), x, below, more)
-            x = newton(balance, start, omega, level, more)[0]
+            start = with_harmonics(balance, balance.slides(x, omega, below), x, below, more)
+            x = solve_newton(balance, start, omega, level, more)[0]
             below = more
         except NotConverged:
             pass
-    return x if below == h else _along_levels(balance, omega, level, h)
+    return x if below == h else _follow_levels(balance, omega, level, h)
 
 
-def _along_levels(balance, omega, level, h: int) -> np.ndarray:
-    """Unknowns by following the motion from a thousandth of the drive amplitude."""
+def _follow_levels(balance, omega, level, h: int) -> np.ndarray:
+    """Return unknowns by following the motion from a thousandth of the amplitude of the drive."""
     path = follow(
         lambda v, p: by_level(balance, v, omega, p, h),
-        _held(balance, omega, level, h) * 1e-3,
+        _solve_stuck(balance, omega, level, h) * 1e-3,
         1e-3 * level,
         (0.0, level),
         True,
@@ -289,37 +379,72 @@ def _along_levels(balance, omega, level, h: int) -> np.ndarray:
 
 
 def by_level(balance, x, omega, level, h) -> tuple:
-    """(residual, Jacobian, slope over the level) for `continuation`; level: acceleration of the drive [m s-2]."""
+    """Return residual, Jacobian and derivative over the drive level, for `continuation`.
+
+    Parameters
+    ----------
+    balance, x, omega, level, h
+        As of `Balance.system`.
+
+    Returns
+    -------
+    tuple
+    """
     s = balance.system(x, omega, level, h)
     return s.residual, s.jacobian, s.by_level
 
 
 def by_omega(balance, x, omega, level, h) -> tuple:
-    """(residual, Jacobian, slope over omega) for `continuation`; omega [rad/s] of the drive."""
+    """Return residual, Jacobian and derivative over omega, for `continuation`.
+
+    Parameters
+    ----------
+    balance, x, omega, level, h
+        As of `Balance.system`.
+
+    Returns
+    -------
+    tuple
+    """
     s = balance.system(x, omega, level, h)
     return s.residual, s.jacobian, s.by_omega
 
 
-def plain(balance, x, drive, h: int) -> tuple:
-    """(Periodic of solved unknowns, share of the motion that the next h harmonics would add) without more of them."""
+def make_point(balance, x, drive, h: int) -> tuple:
+    """Return the Periodic of solved unknowns, and what h more harmonics would add.
+
+    Parameters
+    ----------
+    balance : Balance
+    x : ndarray
+    drive
+    h : int
+
+    Returns
+    -------
+    Periodic, float
+    """
     here = balance.system(x, drive.omega, drive.acceleration, h)
-    found = _widened(balance, Reached(x, here), drive, h, 1, 1.0)
+    found = _add_harmonics(balance, SweepStart(x, here), drive, h, 1, 1.0)
     force = balance.contact.force(found.coefficients, drive.omega, 2 * h, balance.contact.samples)
     z = balance.motion(x, drive.omega, drive.acceleration, h, force)
     above = float(np.linalg.norm(z[h + 1 :] @ balance.rows.T))
     return found, above / max(float(np.linalg.norm(found.coefficients)), 1e-300)
 
 
-def _held(balance, omega, level, h: int) -> np.ndarray:
-    """Unknowns with every contact at its stiffness at rest: one linear step from zero."""
+def _solve_stuck(balance, omega, level, h: int) -> np.ndarray:
+    """Return unknowns with every contact at its stiffness at rest: one linear step from zero."""
     x = np.zeros(balance.size(omega, h))
     here = balance.system(x, omega, level, h)
     return -solve_linear(here.jacobian)(here.residual)
 
 
-class Reached(NamedTuple):
-    """Where sweeps begin: unknowns (N,), their System, iterations so far, and slides (i, K + 1) [m] that know harmonics
-    above those of the unknowns."""
+class SweepStart(NamedTuple):
+    """Start of the sweeps of the higher harmonics.
+
+    - x, system, count: unknowns (N,), their equations, and iterations so far
+    - slides: (i, K + 1) [m] with harmonics above those of the unknowns, or None
+    """
 
     x: np.ndarray
     system: System
@@ -327,10 +452,10 @@ class Reached(NamedTuple):
     slides: np.ndarray | None = None
 
 
-def _widened(balance, start: Reached, drive, h, wider, tolerance) -> Periodic:
-    """Harmonics above h by sweeps with the Jacobian of those below; the error they leave.
+def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> Periodic:
+    """Add harmonics above h by sweeps with the Jacobian of those below, and estimate the error.
 
-    The last sweep takes twice the samples. changes: of the slides per sweep [m], first those that follow alone.
+    The last sweep takes twice the samples.
     """
     x, here, count, known = start
     omega = drive.omega
@@ -345,10 +470,10 @@ def _widened(balance, start: Reached, drive, h, wider, tolerance) -> Periodic:
     samples = fine = balance.contact.samples
     size = float(np.linalg.norm(q))
     changes = []
-    for sweep in range(SWEEPS):
+    for sweep in range(MAX_SWEEPS):
         force = balance.contact.force(q, omega, probe, fine)
         z = balance.motion(x, omega, level, h, force)
-        moved = -solve(_missed(balance, x, omega, level, h, force, z))
+        moved = -solve(_find_residual(balance, x, omega, level, h, force, z))
         if sweep and wider > 1:
             x = x + moved
         new = (z @ balance.rows.T).T
@@ -359,15 +484,15 @@ def _widened(balance, start: Reached, drive, h, wider, tolerance) -> Periodic:
         q = new
         if fine > samples or (wider == 1 and sweep):
             break
-        if sweep and changes[-1] <= CLOSED * tolerance * size:
+        if sweep and changes[-1] <= SWEEP_TOL_RATIO * tolerance * size:
             fine = 2 * samples
         if sweep > 2 and (changes[-1] > changes[-2] > changes[-3] or changes[-1] > changes[1]):
-            return _diverged(balance, start, drive, h, samples)
-    return _periodic(balance, x, drive, h, top, fine, changes, size, count, q)
+            return _make_diverged(balance, start, drive, h, samples)
+    return _make_periodic(balance, x, drive, h, top, fine, changes, size, count, q)
 
 
-def _diverged(balance, start: Reached, drive, h, samples) -> Periodic:
-    """The plain balance, where the harmonics above h do not follow: nothing is known of its error."""
+def _make_diverged(balance, start: SweepStart, drive, h, samples) -> Periodic:
+    """Return the balance alone where the harmonics above h do not follow; its error is unknown."""
     x, here, count, _ = start
     q = balance.slides(x, drive.omega, h)
     z = balance.motion(x, drive.omega, drive.acceleration, h, here.fold.force)
@@ -387,21 +512,21 @@ def _diverged(balance, start: Reached, drive, h, samples) -> Periodic:
     )
 
 
-def _missed(balance, x, omega, level, h, force, z) -> np.ndarray:
-    """Residual (N,) under forces (i, K + 1) that come from more harmonics than the unknowns have."""
+def _find_residual(balance, x, omega, level, h, force, z) -> np.ndarray:
+    """Return the residual (N,) under forces with more harmonics than the unknowns."""
     low = balance.lift.shape[1] * (2 * h + 1)
     at = 0
     y = unpack(x[:low], balance.lift.shape[1])
     out = [pack(y - (z[: h + 1] @ balance.faces.T).T)]
     for k, _, left, stiffness in balance.linear(omega, h).free:
         parts = x[low + at : low + at + (2 if k else 1)]
-        miss = balance.free_miss((k, left, stiffness), complex(*parts), omega, level, force)
+        miss = balance.free_residual((k, left, stiffness), complex(*parts), omega, level, force)
         out.append(np.array([miss.real, miss.imag])[: parts.size])
         at += parts.size
     return np.concatenate(out)
 
 
-def _periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> Periodic:
+def _make_periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> Periodic:
     omega = drive.omega
     level = drive.acceleration
     group = balance.contact

@@ -1,10 +1,11 @@
-"""Backbone of a mode by statics: one force along the shape of the held mode, and the loops that the laws run through.
+"""Backbone of a mode by statics: a force along its shape, and the loops of the laws.
 
-A force alpha m phi along the shape phi of the mode with the contact held moves the coordinates to z:
-m omega_i^2 z_i + (rows^T F)_i = alpha m phi_i. The slides turn together, so each law runs through its own loop, whose
-tip is F. The frequency is omega^2 = alpha/q for the share q = phi z/(phi phi) of z along phi, and the damping what the
-loops lose of 2 pi alpha q m phi phi. Where a law follows Masing's rule the loop is its curve of first loading, twice as
-large: one static curve tells both (Festjens, Chevallier and Dion 2013; Lacayo and Allen 2019).
+A force alpha m phi along the shape phi of the mode with the contact stuck moves the coordinates to
+z: m omega_i^2 z_i + (rows^T F)_i = alpha m phi_i. The slides turn together, so each law runs
+through its own loop, whose tip is F. The frequency is omega^2 = alpha/q for the part q = phi
+z/(phi phi) of z along phi, and the damping is what the loops lose of 2 pi alpha q m phi phi. Where
+a law follows Masing's rule the loop is its curve of first loading, twice as large: one static
+curve gives both (Festjens, Chevallier and Dion 2013; Lacayo and Allen 2019).
 """
 
 from typing import NamedTuple
@@ -18,22 +19,30 @@ from ...friction.laws.elastic_plastic import masing_loop
 from .forces import Group
 from .laws import Jenkins, Track
 
-STEP = 1e-6  # of a slide, over which the slope of a tip is taken
-TURNS = 2.0  # ratio of two rates of a cycle whose forces are the same where a law knows no time
-SAME = 1e-9  # of a force, what round-off may change of it
-RATE = "a friction force that depends on the sliding speed has no static loop"
+# step over a slide, by which the slope of a tip is taken
+SLOPE_STEP = 1e-6
+# ratio of two rates of a cycle, by which a law is tested for a dependence on time
+RATE_RATIO = 2.0
+# change of a force over the force that round-off may cause
+FORCE_TOL = 1e-9
+SPEED_MESSAGE = "a friction force that depends on the sliding speed has no static loop"
 
 
 class Loops(NamedTuple):
-    """Loops of the laws of a row at slides of amplitude u: tip [N], area [J]."""
+    """Loops of the laws of a row at an amplitude of its slide: tip [N] and area [J]."""
 
     tip: float
     area: float
 
 
-class Static(NamedTuple):
-    """The static motion of a mode whose coordinate has a share q [m] of its shape: omega [rad/s], zeta [1], coordinates
-    z (n,) [m], loss of the laws per cycle [J]."""
+class StaticMotion(NamedTuple):
+    """Static motion of a mode.
+
+    - share: part of the motion along the shape of the stuck mode [m]
+    - omega, zeta: frequency [rad/s] and damping ratio
+    - z: (n,) coordinates [m]
+    - loss: of the laws per cycle [J]
+    """
 
     share: float
     omega: float
@@ -42,20 +51,22 @@ class Static(NamedTuple):
     loss: float
 
 
-def loops(laws, u: float, samples: int) -> Loops:
-    """Loops of the laws on one row at an amplitude u >= 0 [m] of its slide, those without a closed form on `samples` of
-    a cycle."""
+def find_loops(laws, u: float, samples: int) -> Loops:
+    """Return the loops of the laws on one row at an amplitude u >= 0 [m] of its slide.
+
+    samples: of a cycle, for laws without a closed form.
+    """
     found = [
         Loops(*map(float, masing_loop(law.stiffness, law.limit_slide, u)))
         if isinstance(law, Jenkins)
-        else _sampled(law, u, samples)
+        else _sample_loops(law, u, samples)
         for law in laws
     ]
     return Loops(sum(one.tip for one in found), sum(one.area for one in found))
 
 
-def _sampled(law, u: float, samples: int) -> Loops:
-    """Of any law whose force knows no time: (F_max - F_min)/2 at the turns, the area by the samples."""
+def _sample_loops(law, u: float, samples: int) -> Loops:
+    """Return tip and area of the loop of a law that does not depend on time, by samples."""
     if u == 0:
         return Loops(0.0, 0.0)
     track = Track(np.array([0.0, u], complex), 1.0, samples)
@@ -65,53 +76,94 @@ def _sampled(law, u: float, samples: int) -> Loops:
     )
 
 
-def follows_speed(group: Group, u: float) -> bool:
-    """Whether a force changes with the rate of a cycle of amplitude u [m]."""
+def depends_on_speed(group: Group, u: float) -> bool:
+    """Return whether a force changes with the rate of a cycle of amplitude u [m]."""
     for law in (one for laws in group.laws for one in laws if not isinstance(one, Jenkins)):
         slow, fast = (
-            law.sample(Track(np.array([0.0, u], complex), rate, 512)).force for rate in (1.0, TURNS)
+            law.sample(Track(np.array([0.0, u], complex), rate, 512)).force
+            for rate in (1.0, RATE_RATIO)
         )
-        if np.abs(fast - slow).max() > SAME * np.abs(slow).max(initial=1e-300):
+        if np.abs(fast - slow).max() > FORCE_TOL * np.abs(slow).max(initial=1e-300):
             return True
     return False
 
 
-def along(
+def static_motions(
     modes: ModalBasis, group: Group, shares, held: tuple, samples: int = 4096, of=None
 ) -> list:
-    """Static motions (k,) of a mode at shares (k,) [m] of its shape when the contact holds.
+    """Return the static motions (k,) of a mode at amplitudes (k,) [m].
 
-    modes: as they are without the contact; group: laws on the rows; held: (omega [rad/s], shape (n,)) of the mode;
-    samples: of a cycle, for laws without a closed form; of (n,): what the shares are given of, 1 for the shape itself,
-    such as the motion at the output; the part along the shape unless given. NaN where no equilibrium is found.
-    PatchfemError where a law follows the speed.
+    Parameters
+    ----------
+    modes : ModalBasis
+        Without the contact.
+    group : Group
+        Laws on the rows.
+    shares : array_like
+        (k,) parts of the motion along the shape, or of what `of` names [m].
+    held : tuple
+        Frequency [rad/s] and shape (n,) of the stuck mode.
+    samples : int, optional
+        Of a cycle, for laws without a closed form.
+    of : ndarray, optional
+        (n,) what the shares are parts of, such as the motion of the output; the part along the
+        shape by default.
+
+    Returns
+    -------
+    list of StaticMotion
+        With NaN where no equilibrium is found.
+
+    Raises
+    ------
+    PatchfemError
+        If a law depends on the velocity.
     """
-    if follows_speed(group, float(np.abs(group.rows).max()) * float(np.max(shares))):
-        raise PatchfemError(RATE)
+    if depends_on_speed(group, float(np.abs(group.rows).max()) * float(np.max(shares))):
+        raise PatchfemError(SPEED_MESSAGE)
     omega, shape = held
     out = []
     near = np.append(shape, 1.0)
     of = shape / (shape @ shape) if of is None else of
     for share in shares:
         try:
-            near = _balanced(modes, group, (*held, of), float(share), near, samples)
+            near = _solve_equilibrium(modes, group, (*held, of), float(share), near, samples)
         except NotConverged:
             out.append(
-                Static(float(share), np.nan, np.nan, np.full(modes.omega.size, np.nan), np.nan)
+                StaticMotion(
+                    float(share), np.nan, np.nan, np.full(modes.omega.size, np.nan), np.nan
+                )
             )
             continue
         z = near[:-1] * share
         alpha = float(near[-1]) * omega**2 * share
         loss = sum(
-            loops(laws, abs(one), samples).area for one, laws in zip(group.rows @ z, group.laws)
+            find_loops(laws, abs(one), samples).area
+            for one, laws in zip(group.rows @ z, group.laws)
         )
-        out.append(_read(modes, shape, (z, alpha, loss)))
+        out.append(_make_static(modes, shape, (z, alpha, loss)))
     return out
 
 
-def through(modes: ModalBasis, row, held: tuple, slides, found) -> list:
-    """Static motions of a mode whose one interface, of slide `row` (n,) per coordinate, runs through loops that are
-    known: slides (k,) [m], found: as many `Loops`. held as of `along`."""
+def static_motions_from_loops(modes: ModalBasis, row, held: tuple, slides, found) -> list:
+    """Return the static motions of a mode whose one interface runs through known loops.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    row : ndarray
+        (n,) slide per coordinate.
+    held : tuple
+        As of `static_motions`.
+    slides : array_like
+        (k,) [m].
+    found : sequence of Loops
+        (k,).
+
+    Returns
+    -------
+    list of StaticMotion
+    """
     shape = held[1]
     n = modes.omega.size
     out = []
@@ -121,12 +173,15 @@ def through(modes: ModalBasis, row, held: tuple, slides, found) -> list:
     matrix[n, :n] = row
     for slide, one in zip(slides, found):
         x = np.linalg.solve(matrix, np.append(-np.asarray(row) * one.tip / modes.mass, slide))
-        out.append(_read(modes, shape, (x[:n], float(x[n]), one.area)))
+        out.append(_make_static(modes, shape, (x[:n], float(x[n]), one.area)))
     return out
 
 
-def _balanced(modes, group, held: tuple, share: float, near, samples: int) -> np.ndarray:
-    """(z/share, alpha/(omega^2 share)) of the equilibrium at a share [m], from one nearby; held: omega, shape, `of`."""
+def _solve_equilibrium(modes, group, held: tuple, share: float, near, samples: int) -> np.ndarray:
+    """Return z/share and alpha/(omega^2 share) of the equilibrium at a share [m].
+
+    held: frequency, shape and `of`.
+    """
     omega, shape, of = held
     m = modes.mass
     n = modes.omega.size
@@ -135,7 +190,10 @@ def _balanced(modes, group, held: tuple, share: float, near, samples: int) -> np
     def left(x):
         u = group.rows @ x[:n] * share
         force = np.array(
-            [np.sign(one) * loops(laws, abs(one), samples).tip for one, laws in zip(u, group.laws)]
+            [
+                np.sign(one) * find_loops(laws, abs(one), samples).tip
+                for one, laws in zip(u, group.laws)
+            ]
         )
         return np.append(
             stiff @ x[:n] + group.rows.T @ force / (m * omega**2 * share) - x[n] * shape,
@@ -158,16 +216,16 @@ def _balanced(modes, group, held: tuple, share: float, near, samples: int) -> np
 
 
 def _slope(laws, u: float, samples: int) -> float:
-    """Slope [N/m] of the tips of loops over the amplitude."""
-    step = max(STEP * u, 1e-30)
-    return (loops(laws, u + step, samples).tip - loops(laws, u, samples).tip) / step
+    """Return the slope [N/m] of the tips of loops over the amplitude."""
+    step = max(SLOPE_STEP * u, 1e-30)
+    return (find_loops(laws, u + step, samples).tip - find_loops(laws, u, samples).tip) / step
 
 
-def _read(modes, shape, motion: tuple) -> Static:
-    """The Static of (z (n,) [m], alpha [m s-2], loss [J])."""
+def _make_static(modes, shape, motion: tuple) -> StaticMotion:
+    """Return the StaticMotion of (z (n,) [m], alpha [m s-2], loss [J])."""
     z, alpha, loss = motion
     share = float(shape @ z / (shape @ shape))
     omega = float(np.sqrt(alpha / share)) if alpha * share > 0 else np.nan
     viscous = np.pi * omega * modes.mass * float(z @ modes.damping_matrix @ z)
     work = 2 * np.pi * alpha * share * modes.mass * float(shape @ shape)
-    return Static(share, omega, (loss + viscous) / work, z, float(loss))
+    return StaticMotion(share, omega, (loss + viscous) / work, z, float(loss))

@@ -1,4 +1,4 @@
-"""Multipliers of a steady motion of the balance: the laws' slopes and memories, cell by cell, for `floquet`."""
+"""Floquet multipliers of a steady motion, from the slopes and memories of its laws."""
 
 from dataclasses import replace
 
@@ -10,18 +10,35 @@ from .laws import Flow, Nodes
 
 
 def with_stability(periodic, modes, cells: int = 0):
-    """The Periodic with its Floquet multipliers and whether it is stable.
+    """Return the Periodic with its Floquet multipliers and whether it is stable.
 
-    cells: of the cycle, 0: 1024, or as many as it was sampled in.
+    Parameters
+    ----------
+    periodic : Periodic
+    modes : ModalBasis
+    cells : int, optional
+        Of the cycle; 0 for 1024, or as many as it was sampled in.
+
+    Returns
+    -------
+    Periodic
     """
     found = multipliers(monodromy_of(periodic, modes, cells))
     return replace(periodic, multipliers=found, stable=is_stable(found))
 
 
 def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
-    """The map (2n, 2n), or larger by the laws' memories, of a small change of a Periodic over one period of the drive.
+    """Return the map of a small change of a Periodic over one period of the drive.
 
-    cells: of the cycle, in each of which the slopes of the laws are constant; 0 as in `with_stability`.
+    Parameters
+    ----------
+    periodic, modes, cells
+        As of `with_stability`; the slopes of the laws are constant in a cell.
+
+    Returns
+    -------
+    ndarray
+        (2n, 2n), or larger by the memories of the laws.
     """
     group = periodic.group
     n = cells or max(1024, 2 ** (periodic.samples - 1).bit_length())
@@ -34,30 +51,33 @@ def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
         for law in laws:
             if isinstance(law, Flow):
                 one = law.along(track)
-                fading.append(_flow(i, one))
-                by_rate[i] += _mean(one.slopes[1, one.own], 0.5)
+                fading.append(_make_fading(i, one))
+                by_rate[i] += _average_cells(one.slopes[1, one.own], 0.5)
                 continue
             found = law.sample(track)
-            share = _weights(track, found)
-            slope[i] += _mean(found.slope, share) if found.slope is not None else 0.0
-            by_rate[i] += _mean(found.by_rate, 0.5) if found.by_rate is not None else 0.0
+            share = _weigh_samples(track, found)
+            slope[i] += _average_cells(found.slope, share) if found.slope is not None else 0.0
+            by_rate[i] += _average_cells(found.by_rate, 0.5) if found.by_rate is not None else 0.0
             if found.hold is not None:
-                marks += _marks(i, track, found.hold, share, slope[i])
+                marks += _make_turning_points(i, track, found.hold, share, slope[i])
     return monodromy(modes, group.rows, periodic.omega, slope, by_rate, marks, fading)
 
 
-def _mean(values, share) -> np.ndarray:
-    """Means per cell (..., N) of samples (..., N): share of that at its end, 1 - share of that at its start."""
+def _average_cells(values, share) -> np.ndarray:
+    """Return means per cell (..., N); share: weight of the value at its end."""
     return (1 - share) * values + share * np.roll(values, -1, axis=-1)
 
 
-def _weights(track, found):
-    """(N,) share of the later sample in the mean slope of a cell: by where a turning point lies in it, else such that
-    the mean is the secant of the force over the cell; half of a force that does not follow the slide alone."""
+def _weigh_samples(track, found):
+    """Return the weight (N,) of the later sample in the mean slope of a cell.
+
+    The mean is the secant of the force over the cell, or follows the place of a turning point in
+    it; it is half where the force does not follow the slide alone.
+    """
     if found.slope is None:
         return 0.5
     if found.by_rate is not None:
-        return 0.5 if found.hold is None else _turned(track, np.full(track.samples, 0.5))
+        return 0.5 if found.hold is None else _set_turning_cells(track, np.full(track.samples, 0.5))
     after = np.roll(found.slope, -1)
     rise = np.roll(track.q, -1) - track.q
     jump = after - found.slope
@@ -65,42 +85,45 @@ def _weights(track, found):
         np.abs(jump) > 1e-9 * np.abs(found.slope).max()
     )
     secant = (np.roll(found.force, -1) - found.force) / np.where(firm, rise, 1.0)
-    return _turned(
+    return _set_turning_cells(
         track,
         np.where(firm, np.clip((secant - found.slope) / np.where(firm, jump, 1.0), 0.0, 1.0), 0.5),
     )
 
 
-def _turned(track, share):
-    """Shares (N,) with those of the cells of the turning points set to what follows these."""
+def _set_turning_cells(track, share):
+    """Return the weights (N,) with those of the cells of the turning points set by their places."""
     cells = track.turning[2]
-    share[cells] = 1 - _inside(track)
+    share[cells] = 1 - _place_in_cell(track)
     return share
 
 
-def _inside(track) -> np.ndarray:
-    """Place [0, 1] of every turning point in its cell."""
+def _place_in_cell(track) -> np.ndarray:
+    """Return the place [0, 1] of every turning point in its cell."""
     return track.turning[0] * (track.samples / (2 * np.pi)) - track.turning[2]
 
 
-def _marks(row: int, track, hold, share, slope) -> list:
-    """The TurningPoints of a track; what hangs on one all the cycle long never slips and is no memory.
+def _make_turning_points(row: int, track, hold, share, slope) -> list:
+    """Return the TurningPoints of a track; one whose elements never slip is no memory.
 
-    In its own cell a turning point holds nothing yet: the slide has not left it by more than the square of the cell.
+    In its own cell a turning point holds nothing yet: the slide has not left it by more than the
+    square of the cell.
     """
     out = []
-    for cell, x, line in zip(track.turning[2], _inside(track), hold):
+    for cell, x, line in zip(track.turning[2], _place_in_cell(track), hold):
         if line.min() < line.max():
             line = line - line.max()
-            mean = _mean(line, share)
+            mean = _average_cells(line, share)
             mean[cell] = x * line[cell]
             slope[cell] += (1 - x) * line[(cell + 1) % line.size]
             out.append(TurningPoint(row, int(cell), float(x), mean))
     return out
 
 
-def _flow(row: int, one: Nodes) -> Fading:
+def _make_fading(row: int, one: Nodes) -> Fading:
     kept, by_slide = one.by_cell()
     loss = -np.log(np.maximum(kept, 1e-300))
     gain = by_slide * np.divide(loss, 1 - kept, out=np.ones_like(loss), where=loss > 1e-9)
-    return Fading(row, gain, loss * (kept.size / (2 * np.pi)), _mean(one.slopes[0, one.own], 0.5))
+    return Fading(
+        row, gain, loss * (kept.size / (2 * np.pi)), _average_cells(one.slopes[0, one.own], 0.5)
+    )

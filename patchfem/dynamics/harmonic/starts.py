@@ -1,18 +1,34 @@
-"""Starts for the balance: every motion that one harmonic would make."""
+"""Start values for harmonic balance: all motions of the balance of one harmonic."""
 
 from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-SAMPLES = 512  # of the cycle, enough for one harmonic
+# samples of a cycle, which suffice for one harmonic
+N_SAMPLES = 512
 
 
-def one_harmonic(balance, omega: float, level: float, count: int = 240) -> list:
-    """Unknowns of every root of the one-harmonic balance between 1e-7 and 1e4 of the free linear motion.
+def find_one_harmonic_roots(balance, omega: float, level: float, count: int = 240) -> list:
+    """Return the unknowns of all roots of the one-harmonic balance.
 
-    The balance is scanned over the amplitude along the free linear motion: exact for one row, a start for more. None is
-    found where a mode without receptance is driven at its own frequency.
+    They lie between 1e-7 and 1e4 of the free linear motion.
+
+    The balance is scanned over the amplitude along the free linear motion; that is exact for one
+    row and a start for more. None is found where a mode without receptance is driven at its own
+    frequency.
+
+    Parameters
+    ----------
+    balance : Balance
+    omega, level : float
+        Of the drive [rad/s], [m s-2].
+    count : int, optional
+        Amplitudes that are scanned.
+
+    Returns
+    -------
+    list of ndarray
     """
     here = balance.linear(omega, 1)
     if any(k == 1 for k, *_ in here.free):
@@ -28,7 +44,7 @@ def one_harmonic(balance, omega: float, level: float, count: int = 240) -> list:
     def left(log):
         q = np.zeros((balance.lift.shape[0], 2), complex)
         q[:, 1] = balance.lift @ along * np.exp(log)
-        force = balance.contact.force(q, omega, 1, SAMPLES)[:, 1]
+        force = balance.contact.force(q, omega, 1, N_SAMPLES)[:, 1]
         return np.exp(log) + along.conj() @ (receptance @ force)
 
     def miss(log):
@@ -37,7 +53,7 @@ def one_harmonic(balance, omega: float, level: float, count: int = 240) -> list:
     grid = np.log(size) + np.linspace(np.log(1e-7), np.log(1e4), count)
     values = [miss(g) for g in grid]
     out = []
-    for a, b in _brackets(miss, grid, values):
+    for a, b in _bracket_roots(miss, grid, values):
         log = brentq(miss, a, b, xtol=1e-10)
         turn = left(log)
         y = along * np.exp(log) * (turn.conjugate() / abs(turn))
@@ -45,9 +61,11 @@ def one_harmonic(balance, omega: float, level: float, count: int = 240) -> list:
     return out
 
 
-def _brackets(miss, grid, values) -> list:
-    """(a, b) around every change of sign of miss: between neighbours of the grid (k,), or two of them that a point
-    nearer to zero than its neighbours announces."""
+def _bracket_roots(miss, grid, values) -> list:
+    """Return intervals (a, b) around all changes of sign of a function on a grid (k,).
+
+    A value that is closer to zero than its neighbours announces two roots between them.
+    """
     points = list(zip(grid, values))
     for k in range(1, len(grid) - 1):
         sign = np.sign(values[k])

@@ -100,7 +100,7 @@ class Rub(namedtuple("Rub", ("force", "memory", "pressed", "modes", "under", *Sh
     __slots__ = ()
 
 
-class Climbing(namedtuple("Climbing", ("flank", "now_at", "share", *Rub._fields))):
+class Climbing(namedtuple("Climbing", ("flank", "climb", "share", *Rub._fields))):
     """A law with memory along flanks, `grooves.points_kernels`.
 
     flank (6,): load [N], wave number [rad/m], amplitude [m], phase [rad], lifted mass [kg], kind of the law as in

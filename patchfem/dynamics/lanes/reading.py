@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..events import names_kernels as of
+from ..events.positions_kernels import INTERFACE, RUN
 from ..events.reading import Reading
 from . import rows_kernels as rows
 from .run import MASING, Cases, Marched, has_one_stretch, law_kernels, law_state
@@ -15,23 +15,23 @@ from .run import MASING, Cases, Marched, has_one_stretch, law_kernels, law_state
 # Readings of the interface of `dynamics.events` and of the lanes, with the power of the energy and of the frequency by
 # which a lane's reading is multiplied.
 INTERFACE_READINGS = (
-    (of.SLIP_HIGH, "MAX_SLIP", 0, 0),
-    (of.SLIP_LOW, "MIN_SLIP", 0, 0),
-    (of.RANGE, "MEAN_RANGE", 0, 0),
-    (of.FORCE, "MAX_FORCE", 1, 0),
-    (of.TURNED, "LOOP_WORK", 1, 0),
-    (of.PASSED, "LOOP_WORK_SIZE", 1, 0),
-    (of.STUCK, "STICK_ANGLE", 0, -1),
-    (of.FIRST, "FIRST_MEAN_SLIDE", 0, -1),
-    (of.LAST, "LAST_MEAN_SLIDE", 0, -1),
-    (of.F_FIRST, "FIRST_MEAN_FORCE", 1, -1),
-    (of.F_LAST, "LAST_MEAN_FORCE", 1, -1),
+    (INTERFACE.max_slip, "MAX_SLIP", 0, 0),
+    (INTERFACE.min_slip, "MIN_SLIP", 0, 0),
+    (INTERFACE.mean_range, "MEAN_RANGE", 0, 0),
+    (INTERFACE.max_force, "MAX_FORCE", 1, 0),
+    (INTERFACE.end_work, "LOOP_WORK", 1, 0),
+    (INTERFACE.path_work, "LOOP_WORK_SIZE", 1, 0),
+    (INTERFACE.stuck_time, "STICK_ANGLE", 0, -1),
+    (INTERFACE.first_slide, "FIRST_MEAN_SLIDE", 0, -1),
+    (INTERFACE.last_slide, "LAST_MEAN_SLIDE", 0, -1),
+    (INTERFACE.first_force, "FIRST_MEAN_FORCE", 1, -1),
+    (INTERFACE.last_force, "LAST_MEAN_FORCE", 1, -1),
 )
 RUN_READINGS = (
-    (of.ACCELERATION, "MAX_ACCELERATION"),
-    (of.STARTS, "SLIP_STARTS"),
-    (of.START_COS, "START_COS"),
-    (of.START_SIN, "START_SIN"),
+    (RUN.max_acceleration, "MAX_ACCELERATION"),
+    (RUN.n_releases, "SLIP_STARTS"),
+    (RUN.release_cos, "START_COS"),
+    (RUN.release_sin, "START_SIN"),
 )
 
 
@@ -182,20 +182,20 @@ def reading_of_runs(law: str, cases: Cases, marched: Marched, energy, omega, ext
     n = len(omega)
     start = marched.observed_start
     end = marched.motion
-    run = np.zeros((n, of.OF_RUN))
-    face = np.zeros((n, of.OF_FACE))
+    run = np.zeros((n, len(RUN)))
+    face = np.zeros((n, len(INTERFACE)))
     angle = 2 * np.pi * marched.n_observed
     harmonics = integrate_harmonics(law, cases, marched, angle)
-    run[:, of.OUT_LOW] = extremes[:, :, 0].min(axis=1)
-    run[:, of.OUT_HIGH] = extremes[:, :, 1].max(axis=1)
-    run[:, of.REACH] = np.abs(extremes).max(axis=(1, 2))
+    run[:, RUN.min_output] = extremes[:, :, 0].min(axis=1)
+    run[:, RUN.max_output] = extremes[:, :, 1].max(axis=1)
+    run[:, RUN.max_coordinate] = np.abs(extremes).max(axis=(1, 2))
     accelerations = np.array([*harmonics.acceleration, *harmonics.third_acceleration])
-    run[:, [of.A_COS, of.A_SIN, of.A3_COS, of.A3_SIN]] = accelerations.T / omega[:, None]
+    run[:, [RUN.cos_1, RUN.sin_1, RUN.cos_3, RUN.sin_3]] = accelerations.T / omega[:, None]
     for column, name in RUN_READINGS:
         run[:, column] = marched.reading(name)
     last = marched.history[:, -extremes.shape[1] :]
-    face[:, of.LOW] = last[..., 0].min(axis=1)
-    face[:, of.HIGH] = last[..., 1].max(axis=1)
+    face[:, INTERFACE.min_slide] = last[..., 0].min(axis=1)
+    face[:, INTERFACE.max_slide] = last[..., 1].max(axis=1)
     for column, name, energy_power, frequency_power in INTERFACE_READINGS:
         unit = energy**energy_power * omega ** float(frequency_power)
         face[:, column] = unit * marched.reading(name)
@@ -205,14 +205,18 @@ def reading_of_runs(law: str, cases: Cases, marched: Marched, energy, omega, ext
     else:
         elastic = _elastic_energy(law, cases, end) - _elastic_energy(law, cases, start)
         work = cases.kinetic * path + elastic
-    face[:, of.WORK] = energy * work
-    face[:, [of.Q_COS, of.Q_SIN]] = np.array(harmonics.slide).T / omega[:, None]
-    face[:, [of.F_COS, of.F_SIN]] = np.array(harmonics.friction).T * (energy / omega)[:, None]
-    face[:, of.BEGIN] = start[:, rows.SLIDE]
-    face[:, of.END] = end[:, rows.SLIDE]
+    face[:, INTERFACE.work] = energy * work
+    face[:, [INTERFACE.slide_cos, INTERFACE.slide_sin]] = (
+        np.array(harmonics.slide).T / omega[:, None]
+    )
+    face[:, [INTERFACE.force_cos, INTERFACE.force_sin]] = (
+        np.array(harmonics.friction).T * (energy / omega)[:, None]
+    )
+    face[:, INTERFACE.start_slide] = start[:, rows.SLIDE]
+    face[:, INTERFACE.end_slide] = end[:, rows.SLIDE]
     n_secants = marched.reading("N_SECANTS")
     secant = marched.reading("SECANT_SUM") / np.where(n_secants > 0, n_secants, 1.0)
-    face[:, of.SECANT] = np.where(n_secants > 0, energy * secant, np.nan)
+    face[:, INTERFACE.secant] = np.where(n_secants > 0, energy * secant, np.nan)
     return Reading(run, face[:, None], angle / omega, 2 * np.pi / omega)
 
 

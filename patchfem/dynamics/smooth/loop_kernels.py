@@ -1,8 +1,8 @@
-"""Steps whose length the error chooses, from one reversal of the slide to the next.
+"""Loop over steps whose length the error chooses, with events (compiled).
 
-A step ends where the slide stops, where the law has a kink along its path or at a speed, and where the output passes
-its travel. Such an end is found by Newton's method on the length of the step, which is taken anew each time: it is as
-exact as the step itself and needs no extension.
+A step ends where the velocity vanishes, where the law has a kink along its path or at a speed, and
+where the output reaches its travel. Newton's method on the length of the step finds such an end;
+the step is taken anew each time, so the end is as exact as a step and needs no dense output.
 """
 
 from math import sqrt
@@ -13,123 +13,125 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INTERNAL, NJIT_NO_REFCOUNT
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
-from . import watch_kernels as watching
-from .arrays import (
-    BEGUN,
-    CREST,
-    CREST_SPEED,
-    DONE,
-    KNEE_VELOCITY,
-    LEFT,
-    LOST,
-    ORIGIN,
-    PACE,
-    PARTS,
-    PERIOD,
-    PIECE,
-    REFUSED,
-    RELEASE_DIRECTION,
-    SAMPLE,
-    STEP,
-    STOOD,
-    STORED,
-    TIME,
-    TURNED,
-    TURNS,
-)
+from . import watch_kernels as watch
+from .arrays import COUNT, END, MODE, NOW, STATUS, TURN, WORK
 
-NOTHING, STOP, KINK, KNEE, TRAVEL, RELEASE, LIFT = range(7)  # what ends a step
-FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED, LIFTED = range(7)  # how a call ends
-# bounds of the change of a step
-SLOWER = 0.2
-FASTER = 8.0
-TURNING = 2.0  # of now[BEGUN]: the motion was left at a reversal
-FORGET = 3.0  # cycles over which a largest value is forgotten
-CALL = 50_000  # tries of a call, a tenth of a second: no signal is heard inside compiled code
-GETS_ON = 1e-3  # of the time of the fastest motion: what CALL tries must come on by at least
-INSTANT = 1e-13  # of a period: what lies nearer together happens at once
-STUCK = 0.02  # of a period: longest step of what holds, as nothing else tells when it lets go
-# of a motion that has not moved on from a stop: it is there, it was found to go the other way
-STANDS = 1
+# bounds of the ratio of a step to the one before
+MIN_STEP_FACTOR = 0.2
+MAX_STEP_FACTOR = 8.0
+# safety factor of the length of the next step
+STEP_SAFETY = 0.9
+# value of now[NOW.stage] where the motion was left at a reversal
+AT_REVERSAL = 2.0
+# cycles over which a maximum of coordinates and rates fades
+FADING_CYCLES = 3.0
+# tried steps of a call; they take a tenth of a second, in which compiled code hears no signal
+MAX_TRIES = 50_000
+# progress in time that MAX_TRIES steps must make, over the time of the fastest motion
+MIN_PROGRESS = 1e-3
+# fraction of a period within which two events are at the same time
+INSTANT_FRACTION = 1e-13
+# fraction of a period that a step in stick may take, as nothing else tells when it ends
+MAX_STUCK_STEP = 0.02
+# a motion that has not moved on since a stop: it is at the stop, or was found to go in the other direction
+AT_STOP = 1
 FLIPPED = 2
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def left(m, what, y, slopes, travel):
-    """(what is left until an end, > 0 before it; its rate [1/s]; its round-off) in a state with its slopes."""
-    n = m.rows.shape[1]
-    way = m.turn[0]
-    q, v = steps.slide_of(m, y)
+def distance_to_end(motion, what, y, slopes, travel):
+    """Return the distance of a state to an end, > 0 before it, its rate [1/s] and its round-off.
+
+    what: a number of `StepEnds`; slopes: of the state y.
+    """
+    n = motion.modes.shape[1]
+    way = motion.turn[TURN.direction]
+    q, v = steps.find_slide(motion, y)
     gain = 0.0
     for i in range(n):
-        gain += m.rows[steps.SLIDE, i] * slopes[n + i]
-    if what == STOP:
-        return way * v, way * gain, still(m)
-    if what == KINK:
-        path = way * (q - m.now[ORIGIN])
-        return m.turn[1] - path, -way * v, 1e-15 * (m.now[CREST] + m.turn[1])
-    if what == KNEE:
-        side = 1.0 if m.turn[2] > 0 else -1.0
-        floor = m.turn[KNEE_VELOCITY]
+        gain += motion.modes[MODE.slide, i] * slopes[n + i]
+    if what == END.stop:
+        return way * v, way * gain, speed_round_off(motion)
+    if what == END.kink:
+        path = way * (q - motion.now[NOW.origin])
+        return (
+            motion.turn[TURN.kink_path] - path,
+            -way * v,
+            1e-15 * (motion.now[NOW.max_coordinate] + motion.turn[TURN.kink_path]),
+        )
+    if what == END.knee:
+        side = 1.0 if motion.turn[TURN.is_above_knee] > 0 else -1.0
+        floor = motion.turn[TURN.knee_velocity]
         return side * (way * v - floor), side * way * gain, 1e-12 * floor
     # a law that holds writes what is left of its hold and of the load behind its loss
-    if what >= RELEASE:
-        return slopes[2 * n + what - RELEASE + 1], 0.0, 0.0
-    x, w = watching.output_of(m, y)
+    if what >= END.release:
+        return slopes[2 * n + what - END.release + 1], 0.0, 0.0
+    x, w = watch.find_output(motion, y)
     return travel - abs(x), -w if x > 0 else w, 1e-13 * travel
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def possible(m, what, travel):
-    """Whether a motion can meet such an end at all."""
-    if what == KINK:
-        return m.turn[1] < np.inf
-    if what == KNEE:
-        return m.turn[KNEE_VELOCITY] > 0
-    if what >= RELEASE:
-        return law.IS_SET_VALUED and (what == LIFT or m.turn[0] == 0)
-    return m.turn[0] != 0 if what == STOP else travel < np.inf
+def can_end(motion, what, travel):
+    """Return whether a motion can meet such an end at all."""
+    if what == END.kink:
+        return motion.turn[TURN.kink_path] < np.inf
+    if what == END.knee:
+        return motion.turn[TURN.knee_velocity] > 0
+    if what >= END.release:
+        return law.IS_SET_VALUED and (what == END.lift or motion.turn[TURN.direction] == 0)
+    return motion.turn[TURN.direction] != 0 if what == END.stop else travel < np.inf
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def first_end(m, h, travel, skip):
-    """(what ends the step of h [s] first, guess of the share of it) by cubics through both ends; NOTHING, 1."""
-    found = NOTHING
+def find_first_end(motion, h, travel, skip):
+    """Return what ends a step of h [s] first, and a guess of its fraction.
+
+    Cubics through both ends of the step give the guess.
+
+    skip: an end that is left out. Without an end they are END.none and 1.
+    """
+    found = END.none
     where = 1.0
-    for what in range(STOP, LIFT + 1 if law.IS_SET_VALUED else TRAVEL + 1):
-        if what == skip or not possible(m, what, travel):
+    for what in range(END.stop, END.lift + 1 if law.IS_SET_VALUED else END.travel + 1):
+        if what == skip or not can_end(motion, what, travel):
             continue
-        b, rate_b, noise = left(m, what, m.work[steps.TRIAL], m.work[12], travel)
+        b, rate_b, noise = distance_to_end(
+            motion, what, motion.work[WORK.trial], motion.work[12], travel
+        )
         if b >= -noise:
             continue
-        a, rate_a, _ = left(m, what, m.y, m.work[0], travel)
+        a, rate_a, _ = distance_to_end(motion, what, motion.state, motion.work[0], travel)
         a = max(a, 0.0)
         low = 0.0
         high = 1.0
         p = rate_a * h
         r = rate_b * h
         if a == 0:
-            low = high = back_of(p, b, r)
+            low = high = find_return(p, b, r)
         for _ in range(40 if a > 0 else 0):
             s = 0.5 * (low + high)
-            rest = 1 - s
-            value = rest * rest * (a * (1 + 2 * s) + p * s) + s * s * (b * (3 - 2 * s) - r * rest)
+            remainder = 1 - s
+            value = remainder * remainder * (a * (1 + 2 * s) + p * s) + s * s * (
+                b * (3 - 2 * s) - r * remainder
+            )
             if value > 0:
                 low = s
             else:
                 high = s
-        if found == NOTHING or high < where:
+        if found == END.none or high < where:
             found = what
             where = high
     return found, where
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def back_of(p, b, r):
-    """Share of a step at which a cubic from 0 to b < 0 comes back to zero from above; 0 where it is nowhere above.
+def find_return(p, b, r):
+    """Return the fraction at which a cubic from 0 to b < 0 comes back to 0 from above.
 
-    p, r: its slopes at the ends over the step. Less the zero at the start it is p + mid s + big s^2; of the two
-    zeros of that it is the one where it falls.
+    It is 0 where the cubic is nowhere above.
+
+    p, r: its slopes at the ends over the step. Without the root at the start it is p + mid s + big
+    s^2; the root where that decreases counts.
     """
     mid = 3 * b - 2 * p - r
     big = p + r - 2 * b
@@ -142,14 +144,20 @@ def back_of(p, b, r):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def located(m, h, what, share, travel):
-    """Length [s] of the step that ends there, within a step of h [s]; m.work[steps.TRIAL] is the state at its end."""
+def locate_end(motion, h, what, share, travel):
+    """Return the length [s] of the step that ends at an event, by guarded Newton iterations.
+
+    h: length [s] of a step beyond the event; share: guess of its fraction. work[WORK.trial]
+    becomes the state there.
+    """
     low = 0.0
     high = h
     at = max(share, 1e-12) * h
     for turn in range(60):
-        steps.step(m, at)
-        value, rate, noise = left(m, what, m.work[steps.TRIAL], m.work[12], travel)
+        steps.take_step(motion, at)
+        value, rate, noise = distance_to_end(
+            motion, what, motion.work[WORK.trial], motion.work[12], travel
+        )
         if value > 0:
             low = at
         else:
@@ -157,30 +165,32 @@ def located(m, h, what, share, travel):
         new = at - value / rate if rate < 0 else 0.5 * (low + high)
         # what leaves its rest is within round-off of it too, but does not end there: it would stand for ever
         there = abs(value) <= noise and rate < 0
-        if there or abs(new - at) <= 2e-16 * (m.now[TIME] + at) or high - low <= 1e-15 * h:
+        if there or abs(new - at) <= 2e-16 * (motion.now[NOW.time] + at) or high - low <= 1e-15 * h:
             break
         at = new if low < new < high and turn < 20 else 0.5 * (low + high)
     return at
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def let_go(m, h, what, travel):
-    """Length [s] of the step that ends just beyond where a hold or a load is used up, within a step of h [s] whose end
-    is beyond it; m.work[steps.TRIAL] is the state at its end. Regula falsi with halved ends (Illinois), then halving.
+def locate_release(motion, h, what, travel):
+    """Return the length [s] of the step that ends just after a law lets go.
+
+    The distance at the end of a step of h [s] is negative. Method: regula falsi with halved ends
+    (Illinois), then bisection. work[WORK.trial] becomes the state there.
     """
-    a = max(left(m, what, m.y, m.work[0], travel)[0], 0.0)
-    b = left(m, what, m.work[steps.TRIAL], m.work[12], travel)[0]
+    a = max(distance_to_end(motion, what, motion.state, motion.work[0], travel)[0], 0.0)
+    b = distance_to_end(motion, what, motion.work[WORK.trial], motion.work[12], travel)[0]
     low = 0.0
     high = h
     for turn in range(80):
-        if high - low <= 1e-15 * (m.now[TIME] + high) or high - low <= 1e-13 * h:
+        if high - low <= 1e-15 * (motion.now[NOW.time] + high) or high - low <= 1e-13 * h:
             break
         at = low + (high - low) * a / (a - b) if turn < 25 and a > b else 0.5 * (low + high)
         at = min(max(at, low + 1e-3 * (high - low)), high - 1e-3 * (high - low)) if turn < 4 else at
         if not low < at < high:
             at = 0.5 * (low + high)
-        steps.step(m, at)
-        value = left(m, what, m.work[steps.TRIAL], m.work[12], travel)[0]
+        steps.take_step(motion, at)
+        value = distance_to_end(motion, what, motion.work[WORK.trial], motion.work[12], travel)[0]
         if value < 0:
             high = at
             b = value
@@ -189,27 +199,33 @@ def let_go(m, h, what, travel):
             low = at
             a = value
             b = 0.5 * b
-    steps.step(m, high)
+    steps.take_step(motion, high)
     return high
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def dips(m, h):
-    """Share [1] of the step of h [s] at which the speed, > 0 at both ends, may have a least value below zero; 0 for
-    none."""
-    if m.turn[0] == 0:
+def find_dip(motion, h):
+    """Return the fraction of a step of h [s] at which the speed may dip below zero.
+
+    It is 0 where it does not.
+
+    The speed is positive at both ends.
+    """
+    if motion.turn[TURN.direction] == 0:
         return 0.0
-    a, p, _ = left(m, STOP, m.y, m.work[0], np.inf)
-    b, r, _ = left(m, STOP, m.work[steps.TRIAL], m.work[12], np.inf)
-    return dip_of(a, p * h, b, r * h)
+    a, p, _ = distance_to_end(motion, END.stop, motion.state, motion.work[0], np.inf)
+    b, r, _ = distance_to_end(motion, END.stop, motion.work[WORK.trial], motion.work[12], np.inf)
+    return find_cubic_dip(a, p * h, b, r * h)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def dip_of(a, p, b, r):
-    """Share of a step at which a cubic from a to b, both > 0, has a least value below zero or so near to it that the
-    speed it stands for may have one; 0 for none.
+def find_cubic_dip(a, p, b, r):
+    """Return the fraction at which a positive cubic may dip below zero, 0 if none.
 
-    p, r: its slopes at the ends over the step. What it errs by is s^2 (1 - s)^2 of the fourth derivative/24.
+    a, b: its values at the ends, both > 0.
+
+    p, r: its slopes at the ends over the step. The cubic errs by s^2 (1 - s)^2 of the fourth
+    derivative/24, so a minimum near zero counts.
     """
     if p >= 0 or r <= 0 or a <= 0 or b <= 0:
         return 0.0
@@ -227,296 +243,368 @@ def dip_of(a, p, b, r):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def still(m):
-    """Round-off [m/s] of the speed of the slide, below which it rests."""
-    return 4e-16 * (m.now[CREST_SPEED] + m.now[PACE] * m.now[CREST])
+def speed_round_off(motion):
+    """Return the round-off of the velocity [m/s], below which the interface is at rest."""
+    return 4e-16 * (
+        motion.now[NOW.max_rate] + motion.now[NOW.fastest_rate] * motion.now[NOW.max_coordinate]
+    )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def enter(m, way):
-    """Begin a motion in the direction `way` from the state as it stands: the law's states, and the slopes there."""
-    n = m.rows.shape[1]
-    q, v = steps.slide_of(m, m.y)
-    m.now[ORIGIN] = q
-    m.turn[0] = way
-    states = m.y[2 * n : m.y.size - 3]
-    m.turn[1], floor = law.start_motion(m.num[0], m.mem[0], way, states)
-    m.turn[2] = 1.0 if way * v > floor else 0.0
-    m.turn[KNEE_VELOCITY] = floor
-    steps.slope(m, m.now[TIME], m.y, m.work[0])
+def start_direction(motion, way):
+    """Start the motion in a direction from the present state: states of the law, and slopes."""
+    n = motion.modes.shape[1]
+    q, v = steps.find_slide(motion, motion.state)
+    motion.now[NOW.origin] = q
+    motion.turn[TURN.direction] = way
+    states = motion.state[2 * n : motion.state.size - 3]
+    motion.turn[TURN.kink_path], floor = law.start_motion(
+        motion.numbers[0], motion.memory[0], way, states
+    )
+    motion.turn[TURN.is_above_knee] = 1.0 if way * v > floor else 0.0
+    motion.turn[TURN.knee_velocity] = floor
+    steps.write_slopes(motion, motion.now[NOW.time], motion.state, motion.work[0])
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def leave(m, k):
-    """End the motion in one direction: move the memory of the law and book what it dissipated."""
-    n = m.rows.shape[1]
-    size = m.y.size
-    q, v, _, before, _ = watching.state_of(m, m.y)
-    lost = law.end_motion(m.num[0], m.mem[0], m.turn, q - m.now[ORIGIN], v, m.y[2 * n : size - 3])
+def end_direction(motion, record):
+    """End the motion in one direction: update the memory of the law and add what it dissipated."""
+    n = motion.modes.shape[1]
+    size = motion.state.size
+    q, v, _, before, _ = watch.read_interface(motion, motion.state)
+    lost = law.end_motion(
+        motion.numbers[0],
+        motion.memory[0],
+        motion.turn,
+        q - motion.now[NOW.origin],
+        v,
+        motion.state[2 * n : size - 3],
+    )
     if np.isnan(lost):
-        lost = m.y[size - 1] - m.now[LEFT] - before
-        m.now[LEFT] = m.y[size - 1] - before
-    k.counters[LOST] += lost
+        lost = motion.state[size - 1] - motion.now[NOW.start_loss] - before
+        motion.now[NOW.start_loss] = motion.state[size - 1] - before
+    record.counters[COUNT.friction_loss] += lost
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def heading(m):
-    """Direction of a motion that starts: that of its speed, of its acceleration at rest, or of what comes next."""
-    n = m.rows.shape[1]
-    t = m.now[TIME]
-    v = steps.slide_of(m, m.y)[1]
+def choose_direction(motion):
+    """Return the direction of a motion that starts, by velocity, acceleration or what follows."""
+    n = motion.modes.shape[1]
+    t = motion.now[NOW.time]
+    v = steps.find_slide(motion, motion.state)[1]
     if v != 0:
         return 1.0 if v > 0 else -1.0
     if law.IS_SET_VALUED:
-        return lets_go(m)
-    steps.slope(m, t, m.y, m.work[0])
+        return find_release_direction(motion)
+    steps.write_slopes(motion, t, motion.state, motion.work[0])
     for look in range(2):
         gain = 0.0
         for i in range(n):
-            gain += m.rows[steps.SLIDE, i] * m.work[look, n + i]
+            gain += motion.modes[MODE.slide, i] * motion.work[look, n + i]
         if gain != 0:
             return 1.0 if gain > 0 else -1.0
         if look == 0:
-            steps.slope(m, t + m.now[STEP], m.y, m.work[1])
+            steps.write_slopes(motion, t + motion.now[NOW.step], motion.state, motion.work[1])
     return 1.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def lets_go(m):
-    """Direction in which a law that holds lets go of the slide at rest, as the motion stands; 0 where it holds."""
-    m.turn[0] = 0.0
-    steps.slope(m, m.now[TIME], m.y, m.work[0])
-    return m.turn[RELEASE_DIRECTION]
+def find_release_direction(motion):
+    """Return the direction in which a law lets go of the interface at rest, or 0."""
+    motion.turn[TURN.direction] = 0.0
+    steps.write_slopes(motion, motion.now[NOW.time], motion.state, motion.work[0])
+    return motion.turn[TURN.release_direction]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def rest(m):
-    """Take the last digits of the speed of a slide that has stopped from the rates."""
-    n = m.rows.shape[1]
-    v = steps.slide_of(m, m.y)[1]
+def stop_slide(motion):
+    """Remove the round-off of a velocity that has stopped from the rates."""
+    n = motion.modes.shape[1]
+    v = steps.find_slide(motion, motion.state)[1]
     size = 0.0
     for i in range(n):
-        size += m.rows[steps.SLIDE, i] * m.rows[steps.SLIDE, i]
+        size += motion.modes[MODE.slide, i] * motion.modes[MODE.slide, i]
     for i in range(n):
-        m.y[n + i] = 0.0 if n == 1 else m.y[n + i] - m.rows[steps.SLIDE, i] * v / size
+        motion.state[n + i] = (
+            0.0 if n == 1 else motion.state[n + i] - motion.modes[MODE.slide, i] * v / size
+        )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def turns_around(m, period):
-    """Begin the motion after a stop: whether it turns, else it goes on as before.
+def reverse_or_continue(motion, period):
+    """Start the motion after a stop.
 
-    Where speed and acceleration vanish together the next derivative decides: the motion has the direction of its speed
-    an INSTANT of the period [s] after the stop, v + a t + j t^2/2. What is opposed to that ends within the instant.
+    Returns whether it reverses, else it goes on in its direction.
+
+    Where velocity and acceleration vanish together the next derivative decides: the motion has the
+    direction of its velocity an instant after the stop, v + a t + j t^2/2.
     """
-    n = m.rows.shape[1]
-    t = m.now[TIME]
-    way = -m.turn[0]
-    enter(m, way)
-    ahead = INSTANT * period
-    near = 1e-3 * m.now[STEP]
+    n = motion.modes.shape[1]
+    t = motion.now[NOW.time]
+    way = -motion.turn[TURN.direction]
+    start_direction(motion, way)
+    ahead = INSTANT_FRACTION * period
+    near = 1e-3 * motion.now[NOW.step]
     gain = 0.0
     later = 0.0
-    for c in range(m.y.size):
-        m.work[steps.TRIAL, c] = m.y[c] + near * m.work[0, c]
-    steps.slope(m, t + near, m.work[steps.TRIAL], m.work[1])
+    for c in range(motion.state.size):
+        motion.work[WORK.trial, c] = motion.state[c] + near * motion.work[0, c]
+    steps.write_slopes(motion, t + near, motion.work[WORK.trial], motion.work[1])
     for i in range(n):
-        gain += m.rows[steps.SLIDE, i] * m.work[0, n + i]
-        later += m.rows[steps.SLIDE, i] * m.work[1, n + i]
-    v = steps.slide_of(m, m.y)[1]
+        gain += motion.modes[MODE.slide, i] * motion.work[0, n + i]
+        later += motion.modes[MODE.slide, i] * motion.work[1, n + i]
+    v = steps.find_slide(motion, motion.state)[1]
     jerk = (later - gain) / near
     if way * (v + ahead * (gain + 0.5 * ahead * jerk)) >= 0:
         return True
-    enter(m, -way)
+    start_direction(motion, -way)
     return False
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def accept(m, h, k):
-    """Move on by the step of h [s] that stands in m.work[steps.TRIAL]."""
-    n = m.rows.shape[1]
-    fade = 1 - min(h / (FORGET * k.counters[PERIOD]), 1.0)
-    m.now[CREST] *= fade
-    m.now[CREST_SPEED] *= fade
-    for c in range(m.y.size):
-        m.y[c] = m.work[steps.TRIAL, c]
-        m.work[0, c] = m.work[12, c]
-    if law.IS_SET_VALUED and m.turn[0] == 0:
-        rest(m)
+def accept_step(motion, h, record):
+    """Move on by the step of h [s] in work[WORK.trial]."""
+    n = motion.modes.shape[1]
+    fade = 1 - min(h / (FADING_CYCLES * record.counters[COUNT.period]), 1.0)
+    motion.now[NOW.max_coordinate] *= fade
+    motion.now[NOW.max_rate] *= fade
+    for c in range(motion.state.size):
+        motion.state[c] = motion.work[WORK.trial, c]
+        motion.work[0, c] = motion.work[12, c]
+    if law.IS_SET_VALUED and motion.turn[TURN.direction] == 0:
+        stop_slide(motion)
     for i in range(n):
-        m.now[CREST] = max(m.now[CREST], abs(m.y[i]))
-        m.now[CREST_SPEED] = max(m.now[CREST_SPEED], abs(m.y[n + i]))
-    m.now[TIME] += h
+        motion.now[NOW.max_coordinate] = max(motion.now[NOW.max_coordinate], abs(motion.state[i]))
+        motion.now[NOW.max_rate] = max(motion.now[NOW.max_rate], abs(motion.state[n + i]))
+    motion.now[NOW.time] += h
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def try_step(m, h, tolerance, k):
-    """Take a step of at most h [s] whose error meets the tolerance: (its length, the next length)."""
+def try_step(motion, h, tolerance, record):
+    """Take a step of at most h [s] whose error meets the tolerance.
+
+    Returns its length and the next one [s].
+    """
     if law.IS_SET_VALUED:
-        h = min(h, STUCK * k.counters[PERIOD] if m.turn[0] == 0 else np.inf)
+        h = min(
+            h,
+            MAX_STUCK_STEP * record.counters[COUNT.period]
+            if motion.turn[TURN.direction] == 0
+            else np.inf,
+        )
     for _ in range(60):
-        steps.step(m, h)
-        error = steps.missed(m, h, tolerance)
+        steps.take_step(motion, h)
+        error = steps.estimate_error(motion, h, tolerance)
         if error <= 1:
-            dip = dips(m, h)
+            dip = find_dip(motion, h)
             if dip == 0:
-                grow = FASTER if error == 0 else min(max(0.9 * error**-0.125, SLOWER), FASTER)
+                grow = (
+                    MAX_STEP_FACTOR
+                    if error == 0
+                    else min(max(STEP_SAFETY * error**-0.125, MIN_STEP_FACTOR), MAX_STEP_FACTOR)
+                )
                 return h, h * grow
             h *= dip
         else:
-            h *= max(0.9 * error**-0.125, SLOWER) if np.isfinite(error) else SLOWER
-        k.counters[REFUSED] += 1
+            h *= (
+                max(STEP_SAFETY * error**-0.125, MIN_STEP_FACTOR)
+                if np.isfinite(error)
+                else MIN_STEP_FACTOR
+            )
+        record.counters[COUNT.refused] += 1
     return 0.0, 0.0
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def pass_end(m, k, what):
-    """Go on beyond the end of a step: turn around, or into the next part of the law."""
-    n = m.rows.shape[1]
-    if law.IS_SET_VALUED and what in (STOP, RELEASE):
-        rest(m)
-        leave(m, k)
-        way = lets_go(m)
-        enter(m, way)
-        if way != 0 or what == STOP:
-            watching.write(m, m.now[TIME], m.y, k.turns[int(k.counters[TURNS])])
-            k.counters[TURNS] += 1
-    elif what == STOP:
+def pass_end(motion, record, what):
+    """Go on after the end of a step: in the other direction, or with the next branch of the law."""
+    n = motion.modes.shape[1]
+    if law.IS_SET_VALUED and what in (END.stop, END.release):
+        stop_slide(motion)
+        end_direction(motion, record)
+        way = find_release_direction(motion)
+        start_direction(motion, way)
+        if way != 0 or what == END.stop:
+            watch.write_sample(
+                motion,
+                motion.now[NOW.time],
+                motion.state,
+                record.turns[int(record.counters[COUNT.n_turns])],
+            )
+            record.counters[COUNT.n_turns] += 1
+    elif what == END.stop:
         if n == 1:
-            m.y[1] = 0.0  # to the last digit
-        leave(m, k)
-        if turns_around(m, k.counters[PERIOD]):
-            watching.write(m, m.now[TIME], m.y, k.turns[int(k.counters[TURNS])])
-            k.counters[TURNS] += 1
-    elif what == KINK:
-        leave(m, k)
-        enter(m, m.turn[0])
-    elif what == KNEE:
-        m.turn[2] = 1 - m.turn[2]
-        steps.slope(m, m.now[TIME], m.y, m.work[0])
+            motion.state[1] = 0.0  # to the last digit
+        end_direction(motion, record)
+        if reverse_or_continue(motion, record.counters[COUNT.period]):
+            watch.write_sample(
+                motion,
+                motion.now[NOW.time],
+                motion.state,
+                record.turns[int(record.counters[COUNT.n_turns])],
+            )
+            record.counters[COUNT.n_turns] += 1
+    elif what == END.kink:
+        end_direction(motion, record)
+        start_direction(motion, motion.turn[TURN.direction])
+    elif what == END.knee:
+        motion.turn[TURN.is_above_knee] = 1 - motion.turn[TURN.is_above_knee]
+        steps.write_slopes(motion, motion.now[NOW.time], motion.state, motion.work[0])
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def begin(m, k):
-    """Begin a motion from the state as it stands."""
-    n = m.rows.shape[1]
+def start_from_state(motion, record):
+    """Start a motion from the present state."""
+    n = motion.modes.shape[1]
     for i in range(n):
-        m.now[CREST] = max(m.now[CREST], abs(m.y[i]))
-        m.now[CREST_SPEED] = max(m.now[CREST_SPEED], abs(m.y[n + i]))
-    enter(m, heading(m))
-    k.counters[STORED] = watching.stored(m, m.y)
-    m.now[LEFT] = m.y[m.y.size - 1] - watching.state_of(m, m.y)[3]
-    m.now[BEGUN] = 1.0
+        motion.now[NOW.max_coordinate] = max(motion.now[NOW.max_coordinate], abs(motion.state[i]))
+        motion.now[NOW.max_rate] = max(motion.now[NOW.max_rate], abs(motion.state[n + i]))
+    start_direction(motion, choose_direction(motion))
+    record.counters[COUNT.max_stored] = watch.stored_energy(motion, motion.state)
+    motion.now[NOW.start_loss] = (
+        motion.state[motion.state.size - 1] - watch.read_interface(motion, motion.state)[3]
+    )
+    motion.now[NOW.stage] = 1.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def sampled(m, k):
-    """Take the samples that are asked for at the time as it stands."""
-    at = int(k.counters[SAMPLE])
-    while at < k.samples.shape[0] and k.samples[at, 0] <= m.now[TIME]:
-        watching.write(m, m.now[TIME], m.y, k.samples[at])
+def take_samples(motion, record):
+    """Write the samples that are due at the present time."""
+    at = int(record.counters[COUNT.next_sample])
+    while at < record.samples.shape[0] and record.samples[at, 0] <= motion.now[NOW.time]:
+        watch.write_sample(motion, motion.now[NOW.time], motion.state, record.samples[at])
         at += 1
-    k.counters[SAMPLE] = at
+    record.counters[COUNT.next_sample] = at
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def went_on(m):
-    """STANDS where a motion was left at a reversal, for lack of room, else 0: it goes on as if it had not been left."""
-    fresh = STANDS if m.now[BEGUN] == TURNING else 0
-    m.now[BEGUN] = 1.0
+def resume(motion):
+    """Return AT_STOP where the motion was left at a reversal because no row was free, else 0."""
+    fresh = AT_STOP if motion.now[NOW.stage] == AT_REVERSAL else 0
+    motion.now[NOW.stage] = 1.0
     return fresh
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def first_of_ends(m, taken, what, share, travel):
-    """(length [s] of the step that was tried up to the first end in it, what ends it); NOTHING as it is."""
-    while what != NOTHING:
+def locate_first_end(motion, taken, what, share, travel):
+    """Return the length [s] of a tried step up to the first end in it, and what ends it."""
+    while what != END.none:
         taken = (
-            located(m, taken, what, share, travel)
-            if what < RELEASE
-            else let_go(m, taken, what, travel)
+            locate_end(motion, taken, what, share, travel)
+            if what < END.release
+            else locate_release(motion, taken, what, travel)
         )
-        other, share = first_end(m, taken, travel, what)
-        if other == NOTHING:
+        other, share = find_first_end(motion, taken, travel, what)
+        if other == END.none:
             break
         what = other
     return taken, what
 
 
 @njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
-def advance(m, k, until, edge, tolerance, travel):
-    """Move on to the time `until` [s], or to the edge [s] of the piece of the drive: how it ended.
+def advance(motion, record, until, edge, tolerance, travel):
+    """Move on to a time, or to the end of a segment of the drive.
 
-    tolerance: of a step, relative; travel [m] of the output. FULL: the room for reversals or parts is used up; PAUSED:
-    CALL tries are made. The motion goes on from either to the last bit as if it had not been left.
+    Parameters
+    ----------
+    motion : MotionArrays
+    record : MotionRecord
+    until, edge : float
+        Time to reach, and end of the segment [s].
+    tolerance : float
+        Relative tolerance of a step.
+    travel : float
+        Of the output [m].
+
+    Returns
+    -------
+    int
+        A number of `CallStatus`. After `full` and `paused` the next call goes on as if the motion
+        had not been left.
     """
-    if m.now[BEGUN] == 0:
-        begin(m, k)
+    if motion.now[NOW.stage] == 0:
+        start_from_state(motion, record)
     end = min(until, edge)
-    fresh = went_on(m)
-    if m.now[STOOD] != m.now[PIECE]:  # the drive has changed
-        steps.slope(m, m.now[TIME], m.y, m.work[0])
-        m.now[STOOD] = m.now[PIECE]
-    sampled(m, k)
-    begun = m.now[TIME]
-    tried = k.counters[DONE] + k.counters[REFUSED]
-    while m.now[TIME] < end:
+    fresh = resume(motion)
+    if motion.now[NOW.slope_segment] != motion.now[NOW.segment]:  # the drive has changed
+        steps.write_slopes(motion, motion.now[NOW.time], motion.state, motion.work[0])
+        motion.now[NOW.slope_segment] = motion.now[NOW.segment]
+    take_samples(motion, record)
+    begun = motion.now[NOW.time]
+    tried = record.counters[COUNT.accepted] + record.counters[COUNT.refused]
+    while motion.now[NOW.time] < end:
         full = (
-            k.counters[TURNS] >= k.turns.shape[0]
-            or 0 < k.parts.shape[0] < k.counters[PARTS] + watching.MOST_PARTS
+            record.counters[COUNT.n_turns] >= record.turns.shape[0]
+            or 0 < record.parts.shape[0] < record.counters[COUNT.n_parts] + watch.MAX_PARTS
         )
-        spent = k.counters[DONE] + k.counters[REFUSED] - tried > CALL and fresh != FLIPPED
-        if spent and m.now[TIME] - begun < GETS_ON / m.now[PACE]:
-            return ENDLESS
+        spent = (
+            record.counters[COUNT.accepted] + record.counters[COUNT.refused] - tried > MAX_TRIES
+            and fresh != FLIPPED
+        )
+        if spent and motion.now[NOW.time] - begun < MIN_PROGRESS / motion.now[NOW.fastest_rate]:
+            return STATUS.no_step
         if full or spent:
-            m.now[BEGUN] = TURNING if fresh > 0 else 1.0
-            return FULL if full else PAUSED
-        remaining = end - m.now[TIME]
-        whole = m.now[STEP] >= remaining * (1 - 1e-9)
-        h, wanted = try_step(m, remaining if whole else m.now[STEP], tolerance, k)
+            motion.now[NOW.stage] = AT_REVERSAL if fresh > 0 else 1.0
+            return STATUS.full if full else STATUS.paused
+        remaining = end - motion.now[NOW.time]
+        whole = motion.now[NOW.step] >= remaining * (1 - 1e-9)
+        h, wanted = try_step(
+            motion, remaining if whole else motion.now[NOW.step], tolerance, record
+        )
         if h <= 1e-16 * end:
-            return ENDLESS
+            return STATUS.no_step
         taken = h
-        what, share = first_end(m, h, travel, NOTHING)
-        if what == STOP and fresh > 0 and share * h < INSTANT * k.counters[PERIOD]:
+        what, share = find_first_end(motion, h, travel, END.none)
+        if (
+            what == END.stop
+            and fresh > 0
+            and share * h < INSTANT_FRACTION * record.counters[COUNT.period]
+        ):
             if fresh == FLIPPED:  # neither way: no motion of a law that is smooth does so
-                return ENDLESS
-            enter(m, -m.turn[0])
+                return STATUS.no_step
+            start_direction(motion, -motion.turn[TURN.direction])
             fresh = FLIPPED
             continue
-        taken, what = first_of_ends(m, taken, what, share, travel)
+        taken, what = locate_first_end(motion, taken, what, share, travel)
         # the stages of the step that was tried may have passed by what bends beside its end
-        if what != NOTHING:
-            error = steps.missed(m, taken, tolerance)
+        if what != END.none:
+            error = steps.estimate_error(motion, taken, tolerance)
             if error > 1:
-                m.now[STEP] = taken * max(0.9 * error**-0.125, SLOWER)
-                k.counters[REFUSED] += 1
+                motion.now[NOW.step] = taken * max(STEP_SAFETY * error**-0.125, MIN_STEP_FACTOR)
+                record.counters[COUNT.refused] += 1
                 continue
-        watching.watch(m, taken, k)
-        accept(m, taken, k)
+        watch.record_step(motion, taken, record)
+        accept_step(motion, taken, record)
         if whole and taken == remaining:
-            m.now[TIME] = end
-        m.now[STEP] = max(wanted, m.now[STEP]) if whole and h == remaining else wanted
-        if fresh == STANDS:
-            m.now[TURNED] = wanted
+            motion.now[NOW.time] = end
+        motion.now[NOW.step] = (
+            max(wanted, motion.now[NOW.step]) if whole and h == remaining else wanted
+        )
+        if fresh == AT_STOP:
+            motion.now[NOW.first_step] = wanted
         fresh = 0
-        if not np.isfinite(m.y[0]):
-            return WILD
-        if what == TRAVEL or what == LIFT:
-            return TRAVELLED if what == TRAVEL else LIFTED
-        if what != NOTHING:
-            pass_end(m, k, what)
-            if what == STOP or what == RELEASE:
-                fresh = STANDS
-                m.now[STEP] = min(m.now[TURNED], m.now[STEP])
-    sampled(m, k)
-    return FINISHED
+        if not np.isfinite(motion.state[0]):
+            return STATUS.not_finite
+        if what == END.travel or what == END.lift:
+            return STATUS.travel if what == END.travel else STATUS.lifted
+        if what != END.none:
+            pass_end(motion, record, what)
+            if what == END.stop or what == END.release:
+                fresh = AT_STOP
+                motion.now[NOW.step] = min(motion.now[NOW.first_step], motion.now[NOW.step])
+    take_samples(motion, record)
+    return STATUS.finished
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def settled(m, k, row):
-    """Energy of modes and interface [J] as the motion stands; writes its sample into row, and moves the memory of the
-    law to there: for a copy of the motion."""
-    out = watching.stored(m, m.y)
-    watching.write(m, m.now[TIME], m.y, row)
-    leave(m, k)
+def read_state(motion, record, row):
+    """Write the sample of the present state into row.
+
+    Returns the energy of modes and interface [J].
+
+    The memory of the law moves to this state, so it is called on a copy of the motion.
+    """
+    out = watch.stored_energy(motion, motion.state)
+    watch.write_sample(motion, motion.now[NOW.time], motion.state, row)
+    end_direction(motion, record)
     return out

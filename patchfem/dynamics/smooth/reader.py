@@ -1,7 +1,8 @@
-"""What the last cycles of a motion show, read off its steps: each is a polynomial through its values at some places.
+"""Measures of the last cycles of a motion, from its steps as polynomials.
 
-The places are Chebyshev's, `arrays.ENDS`, so that a number which is smooth inside a step stands in its values to as
-many digits as the step itself. Peaks are the extremes of the polynomials, integrals those of the polynomials.
+Each part of a step is the polynomial through its samples at Chebyshev points
+(`arrays.NODE_PLACES`), so a number that is smooth inside the part is known to as many digits as
+the step itself. Peaks are the maxima of the polynomials, integrals those of the polynomials.
 Source: Trefethen, Approximation Theory and Approximation Practice (2013), ch. 5 and 19.
 """
 
@@ -12,77 +13,103 @@ from numpy.polynomial import chebyshev
 
 from ...core import IntegratedMeasures, InterfaceLoop
 from ...structure.drive_sizes import is_sinusoidal
-from .arrays import ENDS, NODES
+from .arrays import N_NODES, NODE_PLACES
 
-# places of a step between which slip may begin or end once: close to its ends, as a stick may last no longer
-FINER = np.sort(np.append((1 - np.cos(np.pi * np.arange(25) / 24)) / 2, [1e-3, 1 - 1e-3]))
-# among which its peaks are looked for: three make a parabola, to 1e-11 of its rise
-FINEST = np.linspace(0.0, 1.0, 257)
-BEST = 6  # steps with the largest values at FINER, which are looked at closely
-RISES = 0.5  # of what a number changes by in a step, by which it may rise above its places
-GAUSS, WEIGHTS = np.polynomial.legendre.leggauss(12)
-GAUSS = (1 + GAUSS) / 2
-WEIGHTS = WEIGHTS / 2
-HALVINGS = 30  # of the stretch of a step in which slip begins or ends
-SHARE = 0.5  # irreversible part of the slide from which an interface slips, as `response.measures` has it
-ROUND = 1e-13  # of the largest slide: round-off of what it changes by in a step, off its polynomial
-STILL = 1e-7  # of the largest speed in a step, below which a slide turns: there slip and slide stand still together
+# fractions of a step between which slip begins or ends at most once; two are close to the ends, as a stick may be short
+FINE_PLACES = np.sort(np.append((1 - np.cos(np.pi * np.arange(25) / 24)) / 2, [1e-3, 1 - 1e-3]))
+# fractions of a step among which a maximum is searched for; a parabola through three is right to 1e-11 of its rise
+FINEST_PLACES = np.linspace(0.0, 1.0, 257)
+# steps with the largest values at FINE_PLACES, in which a maximum is searched for
+MAX_CANDIDATES = 6
+# rise of a number above its values at the nodes over its range in the step, at most
+MAX_RISE_RATIO = 0.5
+# Gauss rule on [0, 1]
+GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
+GAUSS_POINTS = (1 + GAUSS_POINTS) / 2
+GAUSS_WEIGHTS = GAUSS_WEIGHTS / 2
+# bisections of the interval in which slip begins or ends
+N_BISECTIONS = 30
+# fraction of the velocity; where more of it is irreversible, the interface slips, as in `response.measures`
+SLIP_FRACTION = 0.5
+# round-off of the change of a relative displacement in a step, over the largest one
+SLIDE_TOL = 1e-13
+# velocity over the largest one in the step, below which the interface is at a turning point
+REST_SPEED_RATIO = 1e-7
 
 
-def onto(places) -> np.ndarray:
-    """Matrix (p, NODES) from the values of a polynomial at ENDS to those at other shares of the step (p,)."""
-    return chebyshev.chebvander(2 * np.asarray(places) - 1, NODES - 1) @ TERMS
+def interpolation_matrix(places) -> np.ndarray:
+    """Return the matrix (p, N_NODES) from values at NODE_PLACES to those elsewhere.
+
+    places: fractions (p,) of a step.
+    """
+    return chebyshev.chebvander(2 * np.asarray(places) - 1, N_NODES - 1) @ TO_CHEBYSHEV
 
 
-def along(terms, share):
-    """Values (k,) of k polynomials with terms (k, NODES) in the powers of 2 share - 1 at shares (k,) of their steps."""
+def evaluate_powers(terms, share):
+    """Evaluate k polynomials in powers of 2 fraction - 1 at fractions (k,).
+
+    terms: (k, N_NODES) coefficients.
+    """
     x = 2 * share - 1
     out = terms[:, -1]
-    for power in range(NODES - 2, -1, -1):
+    for power in range(N_NODES - 2, -1, -1):
         out = out * x + terms[:, power]
     return out
 
 
-def places_of(values, matrix) -> np.ndarray:
-    """Values (k, p) of k polynomials by a matrix (p, NODES); so many rows are slower by threads of a matrix product."""
+def apply_matrix(values, matrix) -> np.ndarray:
+    """Return values (k, p) of k polynomials by a matrix (p, N_NODES).
+
+    With so many rows a matrix product would be slower by the threads that it starts.
+    """
     return np.einsum("kj,pj->kp", values, matrix)
 
 
-# Chebyshev coefficients of values at ENDS
-TERMS = np.linalg.inv(chebyshev.chebvander(2 * ENDS - 1, NODES - 1))
-# values to slopes over a step
-SLOPES = chebyshev.chebvander(2 * ENDS - 1, NODES - 2) @ (2 * chebyshev.chebder(TERMS))
-# values to terms in powers of 2 share - 1
-POWERS = np.linalg.inv(np.vander(2 * ENDS - 1, NODES, increasing=True))
-CLOSE = onto(FINER)
-CLOSEST = onto(FINEST)
-INSIDE = onto(GAUSS)
+# matrix from values at NODE_PLACES to Chebyshev coefficients
+TO_CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(2 * NODE_PLACES - 1, N_NODES - 1))
+# matrix from values to slopes over a step
+TO_SLOPES = chebyshev.chebvander(2 * NODE_PLACES - 1, N_NODES - 2) @ (
+    2 * chebyshev.chebder(TO_CHEBYSHEV)
+)
+# matrix from values to coefficients of powers of 2 fraction - 1
+TO_POWERS = np.linalg.inv(np.vander(2 * NODE_PLACES - 1, N_NODES, increasing=True))
+TO_FINE = interpolation_matrix(FINE_PLACES)
+TO_FINEST = interpolation_matrix(FINEST_PLACES)
+TO_GAUSS = interpolation_matrix(GAUSS_POINTS)
 
 
-class Parts:
-    """The last cycles of a motion as steps: `response`, a Response of all its places one after the other."""
+class StepParts:
+    """The last cycles of a motion as parts of steps.
+
+    response: a Response at all their places in order.
+    """
 
     def __init__(self, response, period: float):
         self.period = period
         self.response = response
-        self.time = response.time.reshape(-1, NODES)
+        self.time = response.time.reshape(-1, N_NODES)
         self.begin = self.time[:, 0]
         self.length = np.diff(self.time[:, [0, -1]])[:, 0]
 
-    def of(self, name: str) -> np.ndarray:
-        """A number of the response at the places of every step (k, NODES)."""
-        return getattr(self.response, name).reshape(-1, NODES)
+    def values(self, name: str) -> np.ndarray:
+        """Return a number of the response at the places of every part (k, N_NODES)."""
+        return getattr(self.response, name).reshape(-1, N_NODES)
 
-    def largest(self, values) -> tuple:
-        """(largest of values (k, NODES) between the places, what the last terms of its polynomial leave open)."""
+    def find_maximum(self, values) -> tuple:
+        """Return the maximum of values (k, N_NODES) between the places, and its error.
+
+        The error is the size of the last two Chebyshev coefficients.
+        """
         top = values.max(axis=1)
         least = values.min(axis=1)
-        steps = np.flatnonzero(top + RISES * (top - least) >= top.max())
-        if steps.size > BEST:
-            steps = steps[np.argsort(places_of(values[steps], CLOSE).max(axis=1))[-BEST:]]
-        seen = places_of(values[steps], CLOSEST)
+        steps = np.flatnonzero(top + MAX_RISE_RATIO * (top - least) >= top.max())
+        if steps.size > MAX_CANDIDATES:
+            steps = steps[
+                np.argsort(apply_matrix(values[steps], TO_FINE).max(axis=1))[-MAX_CANDIDATES:]
+            ]
+        seen = apply_matrix(values[steps], TO_FINEST)
         every = np.arange(len(steps))
-        at = np.clip(np.argmax(seen, axis=1), 1, FINEST.size - 2)
+        at = np.clip(np.argmax(seen, axis=1), 1, FINEST_PLACES.size - 2)
         left, mid, right = (seen[every, at + side] for side in (-1, 0, 1))
         bend = np.minimum(left - 2 * mid + right, 0.0)
         rise = np.where(
@@ -92,45 +119,53 @@ class Parts:
         )
         found = np.maximum(mid + rise, seen.max(axis=1))
         best = int(np.argmax(found))
-        return float(found[best]), float(np.abs(TERMS[-2:] @ values[steps[best]]).sum())
+        return float(found[best]), float(np.abs(TO_CHEBYSHEV[-2:] @ values[steps[best]]).sum())
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """Weights (k, 12) [s] of the places of Gauss's rule."""
-        return self.length[:, None] * WEIGHTS
+        """Weights (k, 12) [s] of the points of Gauss's rule."""
+        return self.length[:, None] * GAUSS_WEIGHTS
 
     @cached_property
-    def turn(self) -> np.ndarray:
-        """exp(-i omega t) at these places."""
+    def carrier(self) -> np.ndarray:
+        """exp(-i omega t) at the points of Gauss's rule."""
         return np.exp(
-            -2j * np.pi / self.period * (self.begin[:, None] + self.length[:, None] * GAUSS)
+            -2j * np.pi / self.period * (self.begin[:, None] + self.length[:, None] * GAUSS_POINTS)
         )
 
     def harmonic(self, name: str, number: int = 1) -> complex:
-        """Fourier coefficient 2/T int x exp(-i n omega t) dt of a number over all steps."""
-        values = self.weights * places_of(self.of(name), INSIDE)
-        return complex(2 / self.length.sum() * np.sum(values * self.turn**number))
+        """Return the Fourier coefficient 2/T int x exp(-i n omega t) dt of a number of the response."""
+        values = self.weights * apply_matrix(self.values(name), TO_GAUSS)
+        return complex(2 / self.length.sum() * np.sum(values * self.carrier**number))
 
     def mean(self, name: str, begin: float, end: float) -> float:
-        """Time mean of a number from `begin` to `end` [s]."""
+        """Return the time mean of a number from `begin` to `end` [s]."""
         length = np.maximum(self.length, 1e-300)  # of a step at an event, 0
         low, high = (np.clip((edge - self.begin) / length, 0.0, 1.0) for edge in (begin, end))
         part = np.flatnonzero(high > low)
         total = 0.0
         cut = part[(low[part] > 0) | (high[part] < 1)]
         whole = np.setdiff1d(part, cut)
-        total = float((self.weights[whole] * places_of(self.of(name)[whole], INSIDE)).sum())
+        total = float(
+            (self.weights[whole] * apply_matrix(self.values(name)[whole], TO_GAUSS)).sum()
+        )
         for k in cut:
             size = high[k] - low[k]
             total += (
                 size
                 * self.length[k]
-                * float(WEIGHTS @ (onto(low[k] + size * GAUSS) @ self.of(name)[k]))
+                * float(
+                    GAUSS_WEIGHTS
+                    @ (interpolation_matrix(low[k] + size * GAUSS_POINTS) @ self.values(name)[k])
+                )
             )
         return total / (end - begin)
 
     def drift(self) -> float | None:
-        """Time mean of the slide in the last cycle less that in the first, per cycle between them [m]."""
+        """Return the drift per cycle [m], None in fewer than 1.5 cycles.
+
+        It is the difference of the mean relative displacements of the last and the first cycle.
+        """
         begin = self.time[0, 0]
         end = self.time[-1, -1]
         cycles = (end - begin) / self.period
@@ -140,62 +175,78 @@ class Parts:
         last = self.mean("slide", end - self.period, end)
         return (last - first) / (cycles - 1)
 
-    def holds(self) -> tuple:
-        """(time [s] in which less than SHARE of the slide is irreversible, times [s] at which more of it begins to be).
+    def find_sticks(self) -> tuple:
+        """Return the time [s] in stick and the times [s] at which slip begins.
 
-        Where the slide turns neither moves, and what is computed of them is round-off: there the place beside it in the
-        step decides. A step that lies in such a place as a whole shows nothing.
+        The interface sticks where less than SLIP_FRACTION of its velocity is irreversible. At a
+        turning point both velocities vanish and what is computed of them is round-off; there the
+        place beside it in the part decides. A part that lies in such a place as a whole shows
+        nothing.
         """
-        slip, slide = (places_of(self.of(name), SLOPES) for name in ("slip", "slide"))
-        moves, slides = (np.abs(places_of(rates, CLOSE)) for rates in (slip, slide))
-        rest = STILL * slides.max(axis=1, keepdims=True) + ROUND * np.abs(self.response.slide).max(
-            initial=0.0
-        )
+        slip, slide = (apply_matrix(self.values(name), TO_SLOPES) for name in ("slip", "slide"))
+        moves, slides = (np.abs(apply_matrix(rates, TO_FINE)) for rates in (slip, slide))
+        rest = REST_SPEED_RATIO * slides.max(axis=1, keepdims=True) + SLIDE_TOL * np.abs(
+            self.response.slide
+        ).max(initial=0.0)
         still = slides <= rest
         shows = ~still.all(axis=1)
         still, slip, slide, begin, length = (
             one[shows] for one in (still, slip, slide, self.begin, self.length)
         )
-        last_moving = np.maximum.accumulate(np.where(still, 0, np.arange(FINER.size)), axis=1)
+        last_moving = np.maximum.accumulate(np.where(still, 0, np.arange(FINE_PLACES.size)), axis=1)
         beside = np.maximum(last_moving, np.argmin(still, axis=1)[:, None])
-        seen = np.take_along_axis((moves - SHARE * slides)[shows], beside, axis=1)
+        seen = np.take_along_axis((moves - SLIP_FRACTION * slides)[shows], beside, axis=1)
         before = seen[:, :-1]
         after = seen[:, 1:]
         turns = (before < 0) != (after < 0)
         steps, at = np.nonzero(turns)
-        low = FINER[at]
-        high = FINER[at + 1]
+        low = FINE_PLACES[at]
+        high = FINE_PLACES[at + 1]
         below = before[steps, at] < 0
-        one, other = (places_of(rates[steps], POWERS) for rates in (slip, slide))
-        for _ in range(HALVINGS):
+        one, other = (apply_matrix(rates[steps], TO_POWERS) for rates in (slip, slide))
+        for _ in range(N_BISECTIONS):
             middle = 0.5 * (low + high)
-            same = (np.abs(along(one, middle)) < SHARE * np.abs(along(other, middle))) == below
+            same = (
+                np.abs(evaluate_powers(one, middle))
+                < SLIP_FRACTION * np.abs(evaluate_powers(other, middle))
+            ) == below
             low = np.where(same, middle, low)
             high = np.where(same, high, middle)
-        part = (before < 0) * np.diff(FINER) * ~turns
-        part[steps, at] = np.where(below, low - FINER[at], FINER[at + 1] - low)
+        part = (before < 0) * np.diff(FINE_PLACES) * ~turns
+        part[steps, at] = np.where(below, low - FINE_PLACES[at], FINE_PLACES[at + 1] - low)
         times = begin[steps] + low * length[steps]
         between = np.flatnonzero((seen[:-1, -1] < 0) & (seen[1:, 0] >= 0))
         return float((part.sum(axis=1) * length).sum()), np.append(times[below], begin[between + 1])
 
 
-def integrated(response, drive, ends) -> tuple:
-    """(Integrated of the steps whose places are those of a Response, by measure what the last terms of the polynomials
-    make of a peak).
+def measure_parts(response, drive, ends) -> tuple:
+    """Measure the last cycles from the parts of their steps.
 
-    ends (2, 4): time [s], output [m], its rate [m/s] and friction work [J] where they begin and end.
+    Parameters
+    ----------
+    response : Response
+        At the places of all parts.
+    drive
+    ends : array_like
+        (2, 4) time [s], output [m], its rate [m/s] and friction work [J] where the cycles begin
+        and end.
+
+    Returns
+    -------
+    IntegratedMeasures dict
+        Errors of peaks by measure.
     """
     period = drive.period
-    parts = Parts(response, period)
+    parts = StepParts(response, period)
     before, after = ends
     peaks = {
-        name: [parts.largest(way * parts.of(name)) for way in (1, -1)]
+        name: [parts.find_maximum(way * parts.values(name)) for way in (1, -1)]
         for name in ("acceleration", "force", "slip", "output")
     }
     gain, unsure = max(peaks["acceleration"])
     pull, loose = max(peaks["force"])
     slip, swing = ((up + down) / 2 for (up, _), (down, _) in (peaks["slip"], peaks["output"]))
-    held, starts = parts.holds()
+    held, starts = parts.find_sticks()
     loop = InterfaceLoop(
         parts.harmonic("slide"),
         parts.harmonic("force"),
@@ -206,17 +257,18 @@ def integrated(response, drive, ends) -> tuple:
     )
     phases = 2 * np.pi * starts / period % np.pi
     return IntegratedMeasures(
-        swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), phases
+        swing, gain, parts.drift(), _acceleration_harmonics(parts, drive, ends), (loop,), phases
     ), {
         "absolute_acceleration_peak": unsure,
         "friction_force_peak": loose,
     }
 
 
-def _waves(parts: Parts, drive, ends) -> tuple | None:
-    """Sizes [m s-2] of the first and the third harmonic of the absolute acceleration at the output under a sine.
+def _acceleration_harmonics(parts: StepParts, drive, ends) -> tuple | None:
+    """Return the first and third harmonic [m s-2] of the acceleration of the output.
 
-    That of the output relative to the base is that of the motion by parts.
+    That of the output relative to the base is that of the displacement, integrated by parts. None
+    where the drive is no sine.
     """
     if not is_sinusoidal(drive):
         return None

@@ -1,4 +1,4 @@
-"""A motion of modes under a smooth law from its start to its result, with what the kernels leave behind."""
+"""Run of modes under a smooth law, from its start to its result."""
 
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -12,84 +12,87 @@ from ...core import IntegratedMeasures, ModalBasis, Outcome, Response
 from ...friction.laws.stretch import unpack_bonds
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import stored_samples_per_cycle
-from ..events.modal_system import segments_of
+from ..events.modal_system import drive_segments
+from ..events.positions_kernels import KIND, SEGMENT
 from ..integrated import histories
 from ..march.march import MarchResult
 from ..periodicity import APART, ahead
-from .arrays import (
-    CREST,
-    CREST_SPEED,
-    DONE,
-    DRIVEN,
-    LEFT,
-    LOST,
-    MASS,
-    MOVES,
-    NODES,
-    PACE,
-    PARTS,
-    PERIOD,
-    PIECE,
-    POWER,
-    REFUSED,
-    SAMPLE,
-    STEP,
-    STIFF,
-    STORED,
-    TIME,
-    TURNED,
-    TURNS,
-    Kept,
-    Moving,
-)
-from .reader import integrated
+from .arrays import COUNT, N_NODES, NOW, STATUS, WORK, MotionArrays, MotionRecord
+from .reader import measure_parts
 
-SAMPLES = 400  # per drive cycle in the kept window
-LEAST = 101  # samples of a run that has no cycles
-ROOM = 4096  # reversals kept in one call
-STEPS = 1024  # steps of the last cycles kept in one call
-MOST_KEPT = 400_000  # reversals kept outside the last cycles
-# of the tolerance, that of the last cycles, which are read between the ends of the steps
-CLOSER = 0.01
-TAIL = 8  # windows whose phasors are kept: a steady amplitude takes five (`response.settling.extrapolate_steady_amplitudes`)
-FIRST = 1e-3  # length of the first step over the shortest time of the rig
-REPEATS = 10.0  # tolerances of a step by which a motion that repeats may still change in all that is left of it
-ALIKE = 10.0  # times as much, by which cycles differ whose steps stand elsewhere
-FINISHED, TRAVELLED, FULL, WILD, ENDLESS, PAUSED, LIFTED = range(7)  # how a call ends
+# samples of a cycle in the window
+SAMPLES_PER_CYCLE = 400
+# samples of the window of a run that is shorter than a cycle
+MIN_SAMPLES = 101
+# rows for reversals that one call of the loop fills
+TURNS_PER_CALL = 4096
+# rows for parts of steps that one call of the loop fills
+PARTS_PER_CALL = 1024
+# reversals that are kept from before the window
+MAX_KEPT_TURNS = 400_000
+# tolerance of the last cycles over that of the run, as they are read inside the steps, where the error is larger
+LAST_TOLERANCE_RATIO = 0.01
+# windows whose phasors are kept; a steady amplitude takes five (`response.settling.extrapolate_steady_amplitudes`)
+N_PHASOR_WINDOWS = 8
+# length of the first step over the shortest time of modes and drive
+FIRST_STEP_RATIO = 1e-3
+# change that a motion that repeats may still make, in tolerances of a step
+MAX_REPEAT_CHANGE = 10.0
+# change of the extremes between two cycles over MAX_REPEAT_CHANGE, as their steps lie at other times
+MAX_CYCLE_RATIO = 10.0
 HERE = "dynamics.smooth"
-# names of the numbers of a piece of the drive
-of = compiled.kernels("dynamics.events.drive_kernels")
 
 
 @cache
-def loops_of(law: str, say=None):
-    """The compiled loop for the law of a module of kernels; say: told before it is compiled."""
+def load_loop(law: str, say=None):
+    """Return the compiled loop for the law of a module of kernels.
+
+    say: is called before it is compiled.
+    """
     law = compiled.load(law, say)
     steps = compiled.instance(f"{HERE}.step_kernels", {"law": law})
-    watching = compiled.instance(f"{HERE}.watch_kernels", {"law": law, "steps": steps})
-    return compiled.instance(
-        f"{HERE}.loop_kernels", {"law": law, "steps": steps, "watching": watching}
-    )
+    watch = compiled.instance(f"{HERE}.watch_kernels", {"law": law, "steps": steps})
+    return compiled.instance(f"{HERE}.loop_kernels", {"law": law, "steps": steps, "watch": watch})
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SmoothResult(MarchResult):
-    """A MarchResult, what the integrator knows besides, the last cycles with the samples at reversals among the others
-    (`turned`), and what the motion still changes by, over its size, where its last cycles stand for others
-    (`unlike`); unsure: errors of peaks by measure; tolerance: of its steps."""
+    """Result of the smooth engine: that of a march, and what the integrator knows besides.
+
+    - fine: measures of the last cycles, integrated over their steps
+    - unsure: errors of peaks [unit of the measure] by measure
+    - turned: the last cycles with samples at reversals
+    - repeat_change: change that the motion would still make, over its size, where its last cycles
+      stand for others
+    - tolerance: relative tolerance of its steps
+    """
 
     fine: IntegratedMeasures | None = None
     unsure: dict = field(default_factory=dict)
     turned: Response | None = None
-    unlike: float = 0.0
+    repeat_change: float = 0.0
     tolerance: float = 0.0
 
 
-def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tuple:
-    """(Moving, Kept) of a motion before it begins: the arrays of the kernels, named in `arrays`.
+def start_arrays(modes: ModalBasis, drive, element, cycles: float, start=None) -> tuple:
+    """Return the arrays of a motion before it begins.
 
-    element: the law with its numbers and the sizes of its memory; start: core.InitialState, at rest without.
-    The first step is FIRST over the fastest rate of modes and drive.
+    The first step is FIRST_STEP_RATIO over the fastest rate of modes and drive.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive
+    element : Element
+        The law with its numbers and the sizes of its memory.
+    cycles : float
+        Cycles of the run.
+    start : InitialState, optional
+        At rest by default.
+
+    Returns
+    -------
+    MotionArrays, MotionRecord
     """
     n = modes.omega.size
     l = len(element.state_scales)
@@ -103,36 +106,54 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
         float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)),
         2 * np.pi / drive.period,
     )
-    now = np.zeros(15)
-    counters = np.zeros(10)
+    now = np.zeros(len(NOW))
+    counters = np.zeros(len(COUNT))
     work = np.zeros((26, size))
-    now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
-    now[STIFF] = element.limit / element.length if element.length else 0.0
-    now[[DRIVEN, MOVES]] = (drive.period, drive.moving)
-    counters[PERIOD] = drive.period
-    work[24, 2 * n : -3] = element.state_scales
+    now[[NOW.step, NOW.first_step, NOW.fastest_rate, NOW.mass]] = (
+        FIRST_STEP_RATIO / pace,
+        FIRST_STEP_RATIO / pace,
+        pace,
+        modes.mass,
+    )
+    now[NOW.stiffness] = element.limit / element.length if element.length else 0.0
+    now[[NOW.period, NOW.base_moves]] = (drive.period, drive.moving)
+    counters[COUNT.period] = drive.period
+    work[WORK.sizes, 2 * n : -3] = element.state_scales
     rows = np.stack(
         [modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output]
     )
     law = element.numbers[None], [element.memory] * 2, [1.0, np.inf, 1.0, *np.zeros(7)]
-    own = (rows, damping, segments_of(drive), *law, state, work, now)
-    moving = Moving(*(np.array(part, float, order="C") for part in own))
+    own = (rows, damping, drive_segments(drive), *law, state, work, now)
+    moving = MotionArrays(*(np.array(part, float, order="C") for part in own))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
     cycles[0] = np.inf
     cycles[1] = -np.inf
     width = 2 * n + 7
-    return moving, Kept(
+    return moving, MotionRecord(
         cycles,
         np.zeros((0, width)),
-        np.zeros((ROOM, width)),
-        np.zeros((0, NODES, width)),
+        np.zeros((TURNS_PER_CALL, width)),
+        np.zeros((0, N_NODES, width)),
         counters,
         np.zeros(size),
     )
 
 
-def response_of(modes, drive, rows, stored: float) -> Response:
-    """Histories of sample rows (k, 2 n + 7) of a motion; stored: its largest stored energy [J]."""
+def make_response(modes, drive, rows, stored: float) -> Response:
+    """Return histories from sample rows of a motion.
+
+    Parameters
+    ----------
+    modes, drive
+    rows : ndarray
+        (k, 2 n + 7) see `MotionRecord`.
+    stored : float
+        Largest stored energy [J].
+
+    Returns
+    -------
+    Response
+    """
     n = modes.omega.size
     time = rows[:, 0]
     z = rows[:, 1 : 1 + n]
@@ -153,16 +174,17 @@ def response_of(modes, drive, rows, stored: float) -> Response:
     )
 
 
-def asked(count: int, window: int) -> np.ndarray:
-    """Whether the phasor of each of `count` cycles is asked for: of the last one and of the TAIL windows before."""
+def select_phasor_cycles(count: int, window: int) -> np.ndarray:
+    """Return which of `count` cycles need a phasor: the last one of each of the last windows."""
     back = np.arange(count)[::-1]
-    return (back % window == 0) & (back < TAIL * window)
+    return (back % window == 0) & (back < N_PHASOR_WINDOWS * window)
 
 
 class Motion:
-    """A motion as it stands: the arrays that its loops move, and what was read off it.
+    """A motion in progress: the arrays that its loop moves, and what was read from it.
 
-    unlike: what it still changed by, over its size, where cycles were left out as it repeats.
+    repeat_change: change that it would still make, over its size, where cycles were skipped as it
+    repeats.
     """
 
     def __init__(
@@ -181,238 +203,282 @@ class Motion:
         self.tolerance = tolerance
         self.travel = travel
         self.cycles = cycles
-        self.loops = loops_of(element.kernels)
-        self.moving, self.kept = started(modes, drive, element, cycles, start)
+        self.loops = load_loop(element.kernels)
+        self.arrays, self.record = start_arrays(modes, drive, element, cycles, start)
         self.turns = []
         self.parts = []
         self.begun = 0.0
-        self.unlike = 0.0
+        self.repeat_change = 0.0
         self.outcome = None
         self.message = ""
         self.progress = None
-        self.until(0.0)
-        self.first = self.settled()[0]
-        self.begun = float(self.kept.counters[STORED])
+        self.run_to(0.0)
+        self.first = self.read_state()[0]
+        self.begun = float(self.record.counters[COUNT.max_stored])
 
     def fork(self, drive):
-        """A copy of the motion as it stands that goes on by itself, under another drive."""
+        """Return a copy of the motion that goes on by itself, under another drive."""
         twin = copy(self)
         twin.progress = None
-        twin.moving = type(self.moving)(*(array.copy() for array in self.moving))
-        twin.kept = type(self.kept)(*(array.copy() for array in self.kept))
+        twin.arrays = type(self.arrays)(*(array.copy() for array in self.arrays))
+        twin.record = type(self.record)(*(array.copy() for array in self.record))
         twin.turns = list(self.turns)
         if drive is not self.drive:
-            twin.moving = twin.moving._replace(pieces=segments_of(drive))
+            twin.arrays = twin.arrays._replace(segments=drive_segments(drive))
             twin.drive = drive
-            twin._enter(int(np.searchsorted(twin._starts(), twin.time, side="right")) - 1)
+            twin._enter_segment(
+                int(np.searchsorted(twin._segment_starts(), twin.time, side="right")) - 1
+            )
         return twin
 
-    def ends_only(self, window: int) -> None:
-        """Ask for the phasors of the last cycle and of the TAIL windows of `window` cycles before alone, at the start
-        of a run."""
-        self.kept.cycles[2:, ~asked(self.kept.cycles.shape[1], window)] = np.nan
+    def request_last_phasors(self, window: int) -> None:
+        """Request only the phasors of the last cycle and of the windows before it."""
+        self.record.cycles[2:, ~select_phasor_cycles(self.record.cycles.shape[1], window)] = np.nan
 
     def extremes(self, count: int) -> np.ndarray:
-        """Smallest and largest output (c, 2) [m] of the first `count` cycles."""
-        return self.kept.cycles[:2, :count].T.copy()
+        """Return smallest and largest output (count, 2) [m] of the first cycles."""
+        return self.record.cycles[:2, :count].T.copy()
 
     @property
     def time(self) -> float:
-        """Time [s] that is reached."""
-        return float(self.moving.now[TIME])
+        """Time that is reached [s]."""
+        return float(self.arrays.now[NOW.time])
 
-    def _starts(self) -> np.ndarray:
-        """Times (p,) [s] at which the pieces of the drive begin."""
-        return self.moving.pieces[:, [of.CYCLE, of.OFFSET]] @ [self.drive.period, 1.0]
+    def _segment_starts(self) -> np.ndarray:
+        """Return the times (p,) [s] at which the segments of the drive begin."""
+        return self.arrays.segments[:, [SEGMENT.cycle, SEGMENT.offset]] @ [self.drive.period, 1.0]
 
-    def _enter(self, piece: int) -> None:
-        self.moving.now[PIECE] = piece
+    def _enter_segment(self, piece: int) -> None:
+        self.arrays.now[NOW.segment] = piece
 
-    def until(self, time: float, times=(), whole: bool = False) -> np.ndarray:
-        """Move on to a time [s]; rows (s, 2 n + 7) of the samples at `times` (s,) on the way, fewer where it ends
+    def run_to(self, time: float, times=(), whole: bool = False) -> np.ndarray:
+        """Run to a time [s]; returns the rows (s, 2 n + 7) of samples at `times` (s,) on the way.
+
+        whole: whether all steps are kept in `parts`. There are fewer rows where the run ends
         before.
-
-        whole: all steps are kept in `parts`.
         """
         times = np.asarray(times, float)
-        width = self.kept.turns.shape[1]
+        width = self.record.turns.shape[1]
         samples = np.zeros((times.size, width))
-        parts = np.zeros((STEPS if whole else 0, NODES, width))
+        parts = np.zeros((PARTS_PER_CALL if whole else 0, N_NODES, width))
         samples[:, 0] = times
-        self.kept = self.kept._replace(samples=samples, parts=parts)
-        self.kept.counters[SAMPLE] = 0
-        ends = np.append(self._starts()[1:], np.inf)
+        self.record = self.record._replace(samples=samples, parts=parts)
+        self.record.counters[COUNT.next_sample] = 0
+        ends = np.append(self._segment_starts()[1:], np.inf)
         while self.outcome is None:
-            end = float(ends[int(self.moving.now[PIECE])])
+            end = float(ends[int(self.arrays.now[NOW.segment])])
             if self.time >= end:
-                self._enter(int(self.moving.now[PIECE]) + 1)
+                self._enter_segment(int(self.arrays.now[NOW.segment]) + 1)
                 continue
             status = self.loops.advance(
-                self.moving, self.kept, float(time), end, self.tolerance, float(self.travel)
+                self.arrays, self.record, float(time), end, self.tolerance, float(self.travel)
             )
-            self._judge(status)
+            self._collect(status)
             # here alone, for a step cut for its sake would change the motion
             if self.progress is not None:
                 self.progress(min(self.time / (self.cycles * self.drive.period), 1.0))
-            if status == FINISHED and self.time >= time:
+            if status == STATUS.finished and self.time >= time:
                 break
-        return self.kept.samples[: int(self.kept.counters[SAMPLE])]
+        return self.record.samples[: int(self.record.counters[COUNT.next_sample])]
 
-    def onward(self, time: float) -> None:
-        """Move on to a time [s], where the motion repeats under a sine without an end by many cycles at once.
+    def run_ahead_to(self, time: float) -> None:
+        """Run to a time [s], skipping cycles where the motion repeats under a sine without end.
 
-        `repeats` says when it is looked at, and what it will change by yet. Its books go on as in the last quarter of
-        these cycles, so that change itself has to be as small. The last cycle has to be as the one before it.
+        `periodicity` says when the motion is looked at and what it would still change by. The
+        energies go on as in the last quarter of the cycles between two looks, so their change must
+        be as small. The last cycle must equal the one before it.
         """
         period = self.drive.period
         far = 2 * APART
         before = None
-        first = ceil(max(self.time, self._starts()[-1]) / period - 1e-9)
-        if not self._swings() or (first + far) * period >= time:
-            self.until(time)
+        first = ceil(max(self.time, self._segment_starts()[-1]) / period - 1e-9)
+        if not self._has_final_sine() or (first + far) * period >= time:
+            self.run_to(time)
             return
-        self.until((first + APART) * period)
-        last = self.moving.y.copy()
+        self.run_to((first + APART) * period)
+        last = self.arrays.state.copy()
         while self.outcome is None and (first + far) * period < time:
-            self.kept.cycles[2:, first + far - 1] = 0.0  # its phasor is asked for
-            self.until((first + far - far // 4) * period)
-            books = self._sums()
-            self.until((first + far) * period)
-            change = self._changed(last)
+            self.record.cycles[2:, first + far - 1] = 0.0  # its phasor is asked for
+            self.run_to((first + far - far // 4) * period)
+            books = self._read_sums()
+            self.run_to((first + far) * period)
+            change = self._measure_change(last)
             left = int(time / period + 1e-9) - first - far
             if before is not None and self.outcome is None and left > 0:
                 unlike = ahead(change, before, left, far)
-                if unlike <= REPEATS * self.tolerance and self._alike(first + far):
-                    self._leave_out(left, (self._sums() - books) / (far // 4))
-                    self.unlike = unlike
+                if unlike <= MAX_REPEAT_CHANGE * self.tolerance and self._has_equal_cycles(
+                    first + far
+                ):
+                    self._skip_cycles(left, (self._read_sums() - books) / (far // 4))
+                    self.repeat_change = unlike
                     break
-            last = self.moving.y.copy()
+            last = self.arrays.state.copy()
             before = change
             far = 2 * far
-        self.until(time)
+        self.run_to(time)
 
-    def _swings(self) -> bool:
-        """Whether the drive ends in a sine of its own period."""
-        last = self.moving.pieces[-1]
-        own = abs(last[of.OMEGA] * self.drive.period / (2 * np.pi) - 1) < 1e-12
-        return last[of.KIND] == of.SINE and last[of.AMPLITUDE] != 0 and own
+    def _has_final_sine(self) -> bool:
+        """Return whether the drive ends in a sine of its own period."""
+        last = self.arrays.segments[-1]
+        own = abs(last[SEGMENT.omega] * self.drive.period / (2 * np.pi) - 1) < 1e-12
+        return last[SEGMENT.kind] == KIND.sine and last[SEGMENT.amplitude] != 0 and own
 
-    def _changed(self, last) -> float:
-        """Largest change [1] since the state `last` (N,): of coordinates and rates over the largest of late, of states
-        of the law over their sizes; the tolerance at least, as more is round-off."""
-        now = self.moving.now
+    def _measure_change(self, last) -> float:
+        """Return the largest relative change since the state `last` (N,), at least the tolerance.
+
+        Coordinates and rates count relative to their recent maximum, states of the law relative to
+        their sizes.
+        """
+        now = self.arrays.now
         n = self.modes.omega.size
-        sizes = self.moving.work[24]
-        scale = np.concatenate([np.repeat(now[[CREST, CREST_SPEED]], n), sizes[2 * n : -3]])
+        sizes = self.arrays.work[WORK.sizes]
+        scale = np.concatenate(
+            [np.repeat(now[[NOW.max_coordinate, NOW.max_rate]], n), sizes[2 * n : -3]]
+        )
         return max(
-            float(np.max(np.abs(self.moving.y - last)[:-3] / np.maximum(scale, 1e-300))),
+            float(np.max(np.abs(self.arrays.state - last)[:-3] / np.maximum(scale, 1e-300))),
             self.tolerance,
         )
 
-    def _alike(self, count: int) -> bool:
-        """Whether the last two of `count` cycles have the same extremes, but for what the steps in them may miss."""
-        before, last = self.kept.cycles[:2, count - 2 : count].T
-        return np.abs(last - before).max() <= ALIKE * REPEATS * self.tolerance * np.ptp(last)
+    def _has_equal_cycles(self, count: int) -> bool:
+        """Return whether the last two of `count` cycles have equal extremes.
 
-    def _sums(self) -> np.ndarray:
-        """Work of the drive less what is stored, viscous loss, friction work, |work| of the drive and energy lost to
-        friction [J]."""
+        They may differ by the error of their steps.
+        """
+        before, last = self.record.cycles[:2, count - 2 : count].T
+        return np.abs(
+            last - before
+        ).max() <= MAX_CYCLE_RATIO * MAX_REPEAT_CHANGE * self.tolerance * np.ptp(last)
+
+    def _read_sums(self) -> np.ndarray:
+        """Return the energies (5,) [J] that grow with the cycles.
+
+        They are the work of the drive minus the stored energy, viscous loss, friction work, the
+        magnitude of the work of the drive, and friction loss.
+        """
         return np.append(
-            self.moving.y[-3:] - [self.settled()[3], 0.0, 0.0], self.kept.counters[[POWER, LOST]]
+            self.arrays.state[-3:] - [self.read_state()[3], 0.0, 0.0],
+            self.record.counters[[COUNT.drive_power, COUNT.friction_loss]],
         )
 
-    def _leave_out(self, count: int, sums) -> None:
-        """Go on by `count` cycles that are as the last one; sums (5,): what `_sums` grows by in one."""
+    def _skip_cycles(self, count: int, sums) -> None:
+        """Skip `count` cycles that equal the last one.
+
+        sums: (5,) growth of `_read_sums` per cycle [J].
+        """
         period = self.drive.period
         at = round(self.time / period)
-        turns = np.concatenate([self.kept.turns[:0], *self.turns[-2:]])
-        self.moving.y[-3:] += count * sums[:3]
-        self.moving.now[LEFT] += count * sums[2]
-        self.kept.counters[[POWER, LOST]] += count * sums[3:]
-        self.kept.cycles[:, at : at + count] = self.kept.cycles[:, at - 1 : at]
+        turns = np.concatenate([self.record.turns[:0], *self.turns[-2:]])
+        self.arrays.state[-3:] += count * sums[:3]
+        self.arrays.now[NOW.start_loss] += count * sums[2]
+        self.record.counters[[COUNT.drive_power, COUNT.friction_loss]] += count * sums[3:]
+        self.record.cycles[:, at : at + count] = self.record.cycles[:, at - 1 : at]
         turns = turns[turns[:, 0] > self.time - period * (1 - 1e-9)]
-        shown = min(count, max(0, MOST_KEPT - sum(map(len, self.turns))) // max(1, len(turns)))
+        shown = min(count, max(0, MAX_KEPT_TURNS - sum(map(len, self.turns))) // max(1, len(turns)))
         later = np.zeros((shown, 1, turns.shape[1]))
         later[:, 0, 0] = period * np.arange(1, shown + 1)
         later[:, 0, -1] = sums[2] * np.arange(1, shown + 1)
         self.turns.append((turns + later).reshape(-1, turns.shape[1]))
-        self.moving.now[TIME] = (at + count) * period
+        self.arrays.now[NOW.time] = (at + count) * period
 
-    def _judge(self, status: int) -> None:
-        count = int(self.kept.counters[TURNS])
-        if count and sum(map(len, self.turns)) < MOST_KEPT:
-            self.turns.append(self.kept.turns[:count].copy())
-        if self.kept.counters[PARTS]:
-            self.parts.append(self.kept.parts[: int(self.kept.counters[PARTS])].copy())
-        self.kept.counters[[TURNS, PARTS]] = 0
-        if status == TRAVELLED:
+    def _collect(self, status: int) -> None:
+        """Collect what a call of the loop recorded, and set the outcome that its status means."""
+        count = int(self.record.counters[COUNT.n_turns])
+        if count and sum(map(len, self.turns)) < MAX_KEPT_TURNS:
+            self.turns.append(self.record.turns[:count].copy())
+        if self.record.counters[COUNT.n_parts]:
+            self.parts.append(self.record.parts[: int(self.record.counters[COUNT.n_parts])].copy())
+        self.record.counters[[COUNT.n_turns, COUNT.n_parts]] = 0
+        if status == STATUS.travel:
             self.outcome = Outcome.EXCEEDS_TRAVEL
-        elif status == LIFTED:
+        elif status == STATUS.lifted:
             self.outcome = Outcome.LEAVES_GROOVES
-        elif status in (WILD, ENDLESS):
+        elif status in (STATUS.not_finite, STATUS.no_step):
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
                 f"at {self.time:.6g} s no time step, however small, meets the tolerance; use "
                 'accuracy.method = "march"'
             )
 
-    def book(self) -> dict:
-        """The energy ledger [J] as the motion stands, and the steps taken."""
-        _, own, _, stored = self.settled()
-        energies = self.moving.y[-3:]
+    def energy_ledger(self) -> dict:
+        """Return the energies [J] up to the present time, and the steps taken."""
+        _, own, _, stored = self.read_state()
+        energies = self.arrays.state[-3:]
         return {
             "work_in": float(energies[0]) + self.begun,
             "viscous": float(energies[1]),
-            "power": float(own[POWER]) + self.begun,
-            "friction": float(own[LOST]),
-            "peak_stored": float(own[STORED]),
+            "power": float(own[COUNT.drive_power]) + self.begun,
+            "friction": float(own[COUNT.friction_loss]),
+            "peak_stored": float(own[COUNT.max_stored]),
             "stored": stored,
-            "iterations": float(own[DONE] + own[REFUSED]),
+            "iterations": float(own[COUNT.accepted] + own[COUNT.refused]),
             "worst_iterations": 1.0,
-            "steps": float(own[DONE]),
+            "steps": float(own[COUNT.accepted]),
         }
 
-    def settled(self) -> tuple:
-        """As the motion stands: sample (2 n + 7,), Kept.counters, memory of the law, energy of modes and interface [J]."""
-        kept = self.kept._replace(counters=self.kept.counters.copy())
-        twin = self.moving._replace(mem=self.moving.mem.copy(), now=self.moving.now.copy())
+    def read_state(self) -> tuple:
+        """Return the present sample (2 n + 7,), counters, memory of the law, and stored energy [J]."""
+        kept = self.record._replace(counters=self.record.counters.copy())
+        twin = self.arrays._replace(memory=self.arrays.memory.copy(), now=self.arrays.now.copy())
         row = np.zeros(kept.turns.shape[1])
-        stored = float(self.loops.settled(twin, kept, row))
-        return row, kept.counters, twin.mem[0], stored
+        stored = float(self.loops.read_state(twin, kept, row))
+        return row, kept.counters, twin.memory[0], stored
 
     def response(self, rows) -> Response:
-        """Histories of sample rows (k, 2 n + 7). No force passes the limit of its law; the extension of a step may."""
+        """Return histories of sample rows (k, 2 n + 7), with forces clipped to their limit.
+
+        The dense output of a step may exceed that limit.
+        """
         if self.element.is_bounded:
             rows = rows.copy()
             force = 2 * self.modes.omega.size + 3
             np.clip(rows[:, force], -self.element.limit, self.element.limit, out=rows[:, force])
-        return response_of(self.modes, self.drive, rows, float(self.kept.counters[STORED]))
+        return make_response(
+            self.modes, self.drive, rows, float(self.record.counters[COUNT.max_stored])
+        )
 
-    def ends(self) -> np.ndarray:
-        """Where the motion stands: time [s], output [m], its rate [m/s], friction work [J]."""
+    def end_state(self) -> np.ndarray:
+        """Return the present time [s], output [m], its rate [m/s] and friction work [J]."""
         n = self.modes.omega.size
-        y = self.moving.y
+        y = self.arrays.state
         output = self.modes.output
         return np.array([self.time, y[:n] @ output, y[n : 2 * n] @ output, y[-1]])
 
-    def last(self, end: float, window: float, shots=(), seen: list | None = None) -> tuple:
-        """Move on to the time `end` [s] and keep the last `window` [s]: (rows, what `reader.integrated` gives).
+    def run_last_cycles(
+        self, end: float, window: float, shots=(), seen: list | None = None
+    ) -> tuple:
+        """Run to the time `end` [s] and keep the last `window` [s].
 
-        shots: times [s] of snapshots of the interface, which are added to `seen`.
+        Parameters
+        ----------
+        end, window : float
+            [s].
+        shots : sequence of float, optional
+            Times [s] of snapshots of the interface, which are appended to `seen`.
+        seen : list, optional
+
+        Returns
+        -------
+        rows : ndarray
+            (k, 2 n + 7) samples.
+        measures : tuple
+            As of `reader.measure_parts`.
         """
         begin = max(end - window, self.time)
-        self.onward(begin)
-        since = self.ends()
+        self.run_ahead_to(begin)
+        since = self.end_state()
         tolerance = self.tolerance
         self.parts = []
-        self.tolerance *= CLOSER  # the extension of a step errs more than the step does
-        self.moving.now[STEP] *= CLOSER**0.125
-        count = max(LEAST, round((end - begin) / self.drive.period * SAMPLES) + 1)
+        self.tolerance *= (
+            LAST_TOLERANCE_RATIO  # the extension of a step errs more than the step does
+        )
+        self.arrays.now[NOW.step] *= LAST_TOLERANCE_RATIO**0.125
+        count = max(MIN_SAMPLES, round((end - begin) / self.drive.period * SAMPLES_PER_CYCLE) + 1)
         times = np.linspace(begin, end, count)
         rows = []
         after = -np.inf
         for shot in [*[t for t in shots if begin <= t < end], end]:
-            rows.append(self.until(shot, times[(times > after) & (times <= shot)], True))
+            rows.append(self.run_to(shot, times[(times > after) & (times <= shot)], True))
             after = shot
             if seen is not None and shot in shots:
                 seen.append(self._snapshot())
@@ -423,14 +489,14 @@ class Motion:
         if not self.parts:
             return rows, (None, {})
         places = np.concatenate(self.parts)
-        return rows, integrated(
+        return rows, measure_parts(
             self.response(places.reshape(-1, places.shape[2])),
             self.drive,
-            np.array([since, self.ends()]),
+            np.array([since, self.end_state()]),
         )
 
     def _snapshot(self) -> dict:
-        row, _, memory, _ = self.settled()
+        row, _, memory, _ = self.read_state()
         slide, rate, force, slip = row[-6:-2]
         out = {"time": self.time, "slide": slide, "rate": rate, "force": force, "slip": slip}
         points = self.element.form == "points"
@@ -451,17 +517,41 @@ def simulate(
     *,
     even: bool = False,
 ) -> SmoothResult:
-    """Run `cycles` drive cycles from rest or from `start` (core.InitialState) with steps that meet a relative tolerance.
+    """Run the drive from rest or from a given state, with steps that meet a relative tolerance.
 
-    element: a law with its rate form (`friction.protocol.Element`) on the one interface of the modes; window: whole
-    cycles kept at the end; travel [m]: of the output, where the run ends; frames: snapshots of the interface in the
-    last cycle; progress(share): called where the run comes back for other reasons, so it changes nothing; even: as
-    `wanted` of `stored_samples_per_cycle`. The outcome is set for travel and where no step meets the
-    tolerance (not_converged, `message` says where).
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive
+    element : friction.protocol.Element
+        Law with its rates, on the one interface of the modes.
+    cycles : float
+        Cycles of the drive.
+    tolerance : float
+        Relative tolerance of a step.
+    window : int, optional
+        Cycles at the end whose samples are kept.
+    travel : float, optional
+        Displacement of the output [m] at which the run ends.
+    frames : int, optional
+        Snapshots of the interface in the last cycle.
+    start : InitialState, optional
+        At rest by default.
+    progress : callable, optional
+        Is called with the fraction of the run that is done, whenever the loop returns.
+    even : bool, optional
+        Whether equally spaced samples of all cycles are kept, as `wanted` of
+        `stored_samples_per_cycle`.
+
+    Returns
+    -------
+    SmoothResult
+        Its outcome is set where the output passed the travel, and where no step meets the
+        tolerance.
     """
     run = Motion(modes, drive, element, cycles, tolerance, travel, start)
     period = drive.period
-    run.ends_only(window)
+    run.request_last_phasors(window)
     end = cycles * period
     kept = []
     shots = []
@@ -470,17 +560,19 @@ def simulate(
     even = stored_samples_per_cycle(drive, cycles, wanted=even)
     if even:
         begin = end - max(whole, window * period)
-        kept.append(run.until(begin, np.arange(0, begin, period / even)))
+        kept.append(run.run_to(begin, np.arange(0, begin, period / even)))
     if window * period < whole:
-        run.onward(end - whole)
-        count = max(2, round((whole - window * period) / period * SAMPLES) + 1)
+        run.run_ahead_to(end - whole)
+        count = max(2, round((whole - window * period) / period * SAMPLES_PER_CYCLE) + 1)
         kept.append(
-            run.until(
+            run.run_to(
                 end - window * period, np.linspace(end - whole, end - window * period, count)
             )[:-1]
         )
     at = end - np.linspace(min(1.0, cycles), 0.0, frames + 1)[1:] * period if frames else []
-    rows, (fine, unsure) = run.last(end, window * period, [float(min(t, end)) for t in at], shots)
+    rows, (fine, unsure) = run.run_last_cycles(
+        end, window * period, [float(min(t, end)) for t in at], shots
+    )
     # its last cycles were not known before: once more to where it ended
     if run.outcome is not None and run.time > 0:
         done = simulate(
@@ -497,15 +589,15 @@ def simulate(
         )
         return replace(done, outcome=run.outcome, message=run.message)
     last = run.response(rows)
-    turned = run.response(_merged(rows, run, rows[0, 0]))
+    turned = run.response(_merge_reversals(rows, run, rows[0, 0]))
     rows = np.concatenate(
-        [*_early(run, kept[0][0, 0] if kept and not even else rows[0, 0]), *kept, rows]
+        [*_early_rows(run, kept[0][0, 0] if kept and not even else rows[0, 0]), *kept, rows]
     )
     if even:
         rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
     done = max(1, ceil(run.time / period - 1e-9))
-    phasors = np.array([1, 1j]) @ run.kept.cycles[2:, :done]
-    book = run.book() | _work_check(turned)
+    phasors = np.array([1, 1j]) @ run.record.cycles[2:, :done]
+    book = run.energy_ledger() | _work_check(turned)
     return SmoothResult(
         run.response(rows),
         last,
@@ -522,13 +614,13 @@ def simulate(
         fine,
         unsure,
         turned,
-        run.unlike,
+        run.repeat_change,
         tolerance,
     )
 
 
 def _work_check(turned) -> dict:
-    """Friction work [J] off samples, that of the ledger between them, and the sum of its sizes."""
+    """Return the friction work [J] by samples and by the ledger, and its magnitude."""
     parts = np.diff(turned.extra["ledger"][0])
     return {
         "sampled": float(sampled_work(turned.slide, turned.force).sum()),
@@ -537,16 +629,16 @@ def _work_check(turned) -> dict:
     }
 
 
-def _merged(rows, run, begin: float) -> np.ndarray:
-    """Sample rows and those at the reversals since a time [s], in order."""
+def _merge_reversals(rows, run, begin: float) -> np.ndarray:
+    """Return sample rows and those at the reversals since a time [s], in order."""
     turns = np.concatenate(run.turns) if run.turns else rows[:0]
     every = np.concatenate([rows, turns[(turns[:, 0] > begin) & (turns[:, 0] < rows[-1, 0])]])
     every = every[np.argsort(every[:, 0], kind="stable")]
     return every[np.append(True, np.diff(every[:, 0]) > 1e-9 * run.drive.period)]
 
 
-def _early(run, begin: float) -> list:
-    """Sample rows at the start and at the reversals before a time [s]."""
+def _early_rows(run, begin: float) -> list:
+    """Return the sample rows at the start and at the reversals before a time [s]."""
     if run.first[0] >= begin:
         return []
     turns = np.concatenate(run.turns) if run.turns else np.zeros((0, run.first.size))

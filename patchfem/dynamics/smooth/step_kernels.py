@@ -1,8 +1,9 @@
-"""One Runge-Kutta step of order 8 of the modes, the states of a law and the energies that pass, and its extension.
+"""One Runge-Kutta step of order 8, its error and its dense output (compiled).
 
-The state y (n + n + l + 3,) holds coordinates and rates of the modes, the states of the law, and work of the drive,
-viscous loss and friction work [J]. The energies feed nothing and take no part in the choice of the step. The text runs
-with any law that offers its rates (`friction.protocol`).
+The state (2 n + l + 3,) has coordinates and rates of the modes, the states of the law, and work of
+the drive, viscous loss and friction work [J]. The energies feed nothing and do not take part in
+the choice of the step. The text is compiled for every law that offers its rates
+(`friction.protocol`).
 """
 
 from math import sqrt
@@ -12,98 +13,115 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_INTERNAL
 from ...friction.laws import stretch_kernels as law
-from ..events.drive_kernels import value_now
+from ..events.drive_kernels import drive_value
 from ..tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD
-from .arrays import CREST, CREST_SPEED, DRIVEN, EASE, FREE, MASS, ORIGIN, PIECE, PLACE, STIFF, TIME
+from .arrays import MODE, NOW, TURN, WORK
 
-OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
-# of Moving.work, whose first rows are the slopes
-EXTENSION = 16
-SIZES = 24
-TRIAL = 25
-LEAST = 1e-30  # of a size: at rest everything is as large as this
-NOISE = 2e-15  # of the forces of a mode's stiffness and of the law's: round-off of the acceleration where they balance
+# smallest size of a number, by which the error of a state at rest is measured
+MIN_SIZE = 1e-30
+# round-off of an acceleration over the forces per mass of mode and law that balance in it
+ROUND_OFF_RATIO = 2e-15
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def push(m, t):
-    """Drive [m s-2] at the time t [s], by the numbers of its piece as it stands, continued beyond its ends."""
-    return value_now(m.pieces[int(m.now[PIECE])], 0.0, t, m.now[DRIVEN])
+def evaluate_drive(motion, t):
+    """Return the drive [m s-2] at a time [s] by its present segment.
+
+    The segment is continued beyond its ends.
+    """
+    return drive_value(
+        motion.segments[int(motion.now[NOW.segment])], 0.0, t, motion.now[NOW.period]
+    )
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def slide_of(m, y):
-    """(slide [m], its speed [m/s]) of a state."""
-    n = m.rows.shape[1]
-    q = m.rows[SLIDE, 0] * y[0]
-    v = m.rows[SLIDE, 0] * y[n]
+def find_slide(motion, y):
+    """Return relative displacement [m] and velocity [m/s] of a state."""
+    n = motion.modes.shape[1]
+    q = motion.modes[MODE.slide, 0] * y[0]
+    v = motion.modes[MODE.slide, 0] * y[n]
     for i in range(1, n):
-        q += m.rows[SLIDE, i] * y[i]
-        v += m.rows[SLIDE, i] * y[n + i]
+        q += motion.modes[MODE.slide, i] * y[i]
+        v += motion.modes[MODE.slide, i] * y[n + i]
     return q, v
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def of_mode(m, i, y, out, drive, pull):
-    """Write the slopes of a mode into out; (power of the drive, viscous power) [m2 s-3]; pull: force/mass [m s-2]."""
-    n = m.rows.shape[1]
-    rate = y[m.rows.shape[1] + i]
-    damped = m.rows[DAMP, i] * rate
-    if m.damping.size > 0:
+def write_mode_slopes(motion, i, y, out, drive, pull):
+    """Write the slopes of a mode into out.
+
+    Returns the power of the drive and the viscous power [m2 s-3].
+
+    pull: friction force over the modal mass [m s-2].
+    """
+    n = motion.modes.shape[1]
+    rate = y[motion.modes.shape[1] + i]
+    damped = motion.modes[MODE.damping, i] * rate
+    if motion.damping.size > 0:
         damped = 0.0
         for j in range(n):
-            damped += m.damping[i, j] * y[n + j]
+            damped += motion.damping[i, j] * y[n + j]
     out[i] = rate
     out[n + i] = (
         -damped
-        - (m.rows[OMEGA, i] * m.rows[OMEGA, i] * y[i] + m.rows[SLIDE, i] * pull)
-        - m.rows[BASE, i] * drive
+        - (
+            motion.modes[MODE.omega, i] * motion.modes[MODE.omega, i] * y[i]
+            + motion.modes[MODE.slide, i] * pull
+        )
+        - motion.modes[MODE.base, i] * drive
     )
-    return -m.rows[BASE, i] * rate, damped * rate
+    return -motion.modes[MODE.base, i] * rate, damped * rate
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def offered(m, q, y, drive):
-    """Write what a law that holds has to know into m.turn: acceleration [m s-2] that the slide has without the force
-    and what a newton takes of it [1/kg], slide [m]."""
-    n = m.rows.shape[1]
+def write_free_motion(motion, q, y, drive):
+    """Write into motion.turn what a law that holds must know, see `TurnPositions`."""
+    n = motion.modes.shape[1]
     free = 0.0
     ease = 0.0
     for i in range(n):
-        damped = m.rows[DAMP, i] * y[n + i]
-        if m.damping.size > 0:
+        damped = motion.modes[MODE.damping, i] * y[n + i]
+        if motion.damping.size > 0:
             damped = 0.0
             for j in range(n):
-                damped += m.damping[i, j] * y[n + j]
-        free -= m.rows[SLIDE, i] * (
-            damped + m.rows[OMEGA, i] * m.rows[OMEGA, i] * y[i] + m.rows[BASE, i] * drive
+                damped += motion.damping[i, j] * y[n + j]
+        free -= motion.modes[MODE.slide, i] * (
+            damped
+            + motion.modes[MODE.omega, i] * motion.modes[MODE.omega, i] * y[i]
+            + motion.modes[MODE.base, i] * drive
         )
-        ease += m.rows[SLIDE, i] * m.rows[SLIDE, i] / m.now[MASS]
-    m.turn[FREE] = free
-    m.turn[EASE] = ease
-    m.turn[PLACE] = q
+        ease += motion.modes[MODE.slide, i] * motion.modes[MODE.slide, i] / motion.now[NOW.mass]
+    motion.turn[TURN.free_acceleration] = free
+    motion.turn[TURN.inverse_mass] = ease
+    motion.turn[TURN.slide] = q
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def slope(m, t, y, out):
-    """Write the slopes of the state y at the time t [s] into out: eq. 3.4 and the rates of the law.
+def write_slopes(motion, t, y, out):
+    """Write the slopes of a state at a time t [s] into out: motion, law and energies.
 
-    The first mode stands before the loop over the others, which a machine sets out to take several at a time: with one
-    mode that is 16 ns for 53.
+    The first mode stands before the loop over the others, because the compiler vectorises that
+    loop; with one mode this takes 16 ns instead of 53.
     """
-    n = m.rows.shape[1]
+    n = motion.modes.shape[1]
     energies = y.size - 3
-    drive = push(m, t)
-    mass = m.now[MASS]
-    q, v = slide_of(m, y)
+    drive = evaluate_drive(motion, t)
+    mass = motion.now[NOW.mass]
+    q, v = find_slide(motion, y)
     if law.IS_SET_VALUED:
-        offered(m, q, y, drive)
+        write_free_motion(motion, q, y, drive)
     force = law.state_rates(
-        m.num[0], m.mem[0], m.turn, q - m.now[ORIGIN], v, y[2 * n : energies], out[2 * n : energies]
+        motion.numbers[0],
+        motion.memory[0],
+        motion.turn,
+        q - motion.now[NOW.origin],
+        v,
+        y[2 * n : energies],
+        out[2 * n : energies],
     )
-    work, lost = of_mode(m, 0, y, out, drive, force / mass)
+    work, lost = write_mode_slopes(motion, 0, y, out, drive, force / mass)
     for i in range(1, n):
-        more, other = of_mode(m, i, y, out, drive, force / mass)
+        more, other = write_mode_slopes(motion, i, y, out, drive, force / mass)
         work = work + more
         lost = lost + other
     out[energies] = mass * drive * work
@@ -112,55 +130,71 @@ def slope(m, t, y, out):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_INTERNAL)
-def gathered(m, stage, h, size):
-    """Write the state at a stage of a step of h [s] into m.work[TRIAL], its first `size` entries."""
+def write_stage(motion, stage, h, size):
+    """Write the state at a stage of a step of h [s] into work[WORK.trial]."""
     first = SHARES[stage, 0]
     share = SHARES[stage]
     for c in range(size):
-        part = first * m.work[0, c]
+        part = first * motion.work[0, c]
         for j in range(BEFORE[stage], stage):
-            part += share[j] * m.work[j, c]
-        m.work[TRIAL, c] = m.y[c] + h * part
+            part += share[j] * motion.work[j, c]
+        motion.work[WORK.trial, c] = motion.state[c] + h * part
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def step(m, h):
-    """Write the state after a step of h [s] into m.work[TRIAL], with the slopes on the way; m.work[0] is that at the
-    start."""
-    t = m.now[TIME]
-    size = m.y.size
-    last = m.work.shape[0] - 14
+def take_step(motion, h):
+    """Write the state after a step of h [s] into work[WORK.trial], with all slopes.
+
+    work[0] holds the slopes at the start.
+    """
+    t = motion.now[NOW.time]
+    size = motion.state.size
+    last = motion.work.shape[0] - 14
     for stage in range(1, last + 1):
-        gathered(m, stage, h, size if stage == last else size - 3)
-        slope(m, t + PLACES[stage] * h, m.work[TRIAL], m.work[stage])
+        write_stage(motion, stage, h, size if stage == last else size - 3)
+        write_slopes(motion, t + PLACES[stage] * h, motion.work[WORK.trial], motion.work[stage])
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def missed(m, h, tolerance):
-    """Estimate of the error of a step of h [s] over what the tolerance allows, by its estimates of order 5 and 3.
+def estimate_error(motion, h, tolerance):
+    """Return the estimated error of a step of h [s] over the tolerance.
 
-    Coordinates count relative to the largest of late, rates to the fastest, states of the law to their sizes. A rate
-    counts no less than what the step makes of round-off: held at a distance, it decays to that, and it is no error.
+    Coordinates count relative to their recent maximum, rates likewise, and states of the law
+    relative to their sizes. A rate counts no less than what round-off of the forces makes of it in
+    the step: a rate that decays to round-off while the forces balance is no error.
     """
-    n = m.rows.shape[1]
-    size = m.y.size - 3
+    n = motion.modes.shape[1]
+    size = motion.state.size - 3
     fifth = 0.0
     third = 0.0
-    pull = m.now[STIFF] * abs(slide_of(m, m.y)[0]) / m.now[MASS]
+    pull = (
+        motion.now[NOW.stiffness] * abs(find_slide(motion, motion.state)[0]) / motion.now[NOW.mass]
+    )
     for c in range(size):
-        scale = m.now[CREST] if c < n else m.now[CREST_SPEED] if c < 2 * n else m.work[SIZES, c]
+        scale = (
+            motion.now[NOW.max_coordinate]
+            if c < n
+            else motion.now[NOW.max_rate]
+            if c < 2 * n
+            else motion.work[WORK.sizes, c]
+        )
         high = 0.0
         low = 0.0
         for j in range(12):
-            high += FIFTH[j] * m.work[j, c]
-            low += THIRD[j] * m.work[j, c]
-        top = max(abs(m.y[c]), abs(m.work[TRIAL, c]), m.work[SIZES, c]) if c < 2 * n else 0.0
+            high += FIFTH[j] * motion.work[j, c]
+            low += THIRD[j] * motion.work[j, c]
+        top = (
+            max(abs(motion.state[c]), abs(motion.work[WORK.trial, c]), motion.work[WORK.sizes, c])
+            if c < 2 * n
+            else 0.0
+        )
         if n <= c < 2 * n:
             force_size = (
-                abs(m.y[c - n]) * m.rows[OMEGA, c - n] ** 2 + abs(m.rows[SLIDE, c - n]) * pull
+                abs(motion.state[c - n]) * motion.modes[MODE.omega, c - n] ** 2
+                + abs(motion.modes[MODE.slide, c - n]) * pull
             )
-            top = max(top, NOISE * abs(h) * force_size / tolerance)
-        scale = max(scale, top, LEAST)
+            top = max(top, ROUND_OFF_RATIO * abs(h) * force_size / tolerance)
+        scale = max(scale, top, MIN_SIZE)
         fifth += (high / scale) ** 2
         third += (low / scale) ** 2
     if not np.isfinite(fifth):
@@ -171,33 +205,35 @@ def missed(m, h, tolerance):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
-def extended(m, h):
-    """Write the extension of a step of h [s], taken by `step`, beside the slopes; the state at its end stays."""
-    t = m.now[TIME]
-    size = m.y.size
+def extend_step(motion, h):
+    """Write the dense output of a step of h [s], after `take_step`, into work[WORK.extension]."""
+    t = motion.now[NOW.time]
+    size = motion.state.size
     for c in range(size):  # the stages overwrite it
-        m.work[EXTENSION + 7, c] = m.work[TRIAL, c]
+        motion.work[WORK.extension + 7, c] = motion.work[WORK.trial, c]
     for stage in range(13, STAGES):
-        gathered(m, stage, h, size - 3)
-        slope(m, t + PLACES[stage] * h, m.work[TRIAL], m.work[stage])
+        write_stage(motion, stage, h, size - 3)
+        write_slopes(motion, t + PLACES[stage] * h, motion.work[WORK.trial], motion.work[stage])
     for c in range(size):
-        m.work[TRIAL, c] = m.work[EXTENSION + 7, c]
-        rise = m.work[TRIAL, c] - m.y[c]
-        m.work[EXTENSION, c] = rise
-        m.work[EXTENSION + 1, c] = h * m.work[0, c] - rise
-        m.work[EXTENSION + 2, c] = 2 * rise - h * (m.work[12, c] + m.work[0, c])
+        motion.work[WORK.trial, c] = motion.work[WORK.extension + 7, c]
+        rise = motion.work[WORK.trial, c] - motion.state[c]
+        motion.work[WORK.extension, c] = rise
+        motion.work[WORK.extension + 1, c] = h * motion.work[0, c] - rise
+        motion.work[WORK.extension + 2, c] = 2 * rise - h * (motion.work[12, c] + motion.work[0, c])
         for k in range(4):
-            part = INSIDE[k, 0] * m.work[0, c]
+            part = INSIDE[k, 0] * motion.work[0, c]
             for j in range(5, STAGES):
-                part += INSIDE[k, j] * m.work[j, c]
-            m.work[EXTENSION + 3 + k, c] = h * part
+                part += INSIDE[k, j] * motion.work[j, c]
+            motion.work[WORK.extension + 3 + k, c] = h * part
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
-def between(m, share, out, size):
-    """Write the first `size` entries of the state at a share [1] of the step into out, by its extension."""
+def evaluate_inside(motion, share, out, size):
+    """Write the state at a fraction of the step into out, by its dense output."""
     for c in range(size):
-        value = m.work[EXTENSION + 6, c] * share
+        value = motion.work[WORK.extension + 6, c] * share
         for k in range(5, -1, -1):
-            value = (value + m.work[EXTENSION + k, c]) * (share if k % 2 == 0 else 1 - share)
-        out[c] = m.y[c] + value
+            value = (value + motion.work[WORK.extension + k, c]) * (
+                share if k % 2 == 0 else 1 - share
+            )
+        out[c] = motion.state[c] + value

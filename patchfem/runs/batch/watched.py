@@ -163,7 +163,7 @@ class Watcher:
         found = self.before.pop("yields", None)
         return (
             found
-            if found is not None and found.renewed(modes, groups)
+            if found is not None and found.replace_system(modes, groups)
             else event_orbits.Orbits(modes, groups)
         )
 

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from ...dynamics.events.elements import JOINED, cells_joined
+from ...dynamics.events.elements import CELL_MERGES, join_cells
 from ...dynamics.grooves import climbing as flank_climbing
 from ...dynamics.march import varying_load
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
@@ -87,11 +87,11 @@ def climbing(model, load: float, patch=None, count: int | None = None):
     else:
         law = varying_load.plastic(f.static, f.bond_length or 0.0)
     if model.rig is None:
-        found = flank_climbing.model_of(replace(model.grooves, lifted_mass=0.0), load, law, None)
+        found = flank_climbing.make_model(replace(model.grooves, lifted_mass=0.0), load, law, None)
     else:
-        found = flank_climbing.model_of(model.grooves, load, law, model.rig.modes)
+        found = flank_climbing.make_model(model.grooves, load, law, model.rig.modes)
     return (
-        flank_climbing.giving(found, patch, count, model.accuracy.tolerance)
+        flank_climbing.with_shear_modes(found, patch, count, model.accuracy.tolerance)
         if model.partial_slip
         else found
     )
@@ -128,5 +128,5 @@ def coarser_cells(few) -> CoarserRuns:
 
     few: the Pass with which they are compared.
     """
-    runs = tuple(few._replace(springs=partial(cells_joined, *one)) for one in JOINED)
+    runs = tuple(few._replace(springs=partial(join_cells, *one)) for one in CELL_MERGES)
     return CoarserRuns(runs, merged_cell_errors, few, "cells")

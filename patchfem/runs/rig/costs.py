@@ -169,10 +169,10 @@ def pieces_per_cycle(model: Model) -> float:
 def ringing_and_events(model: Model) -> tuple:
     """Return the pieces per cycle of a motion in permanent stick, and those of events and rows."""
     modes, drive = model.rig.modes, model.rig.drive.signal
-    (count, stiff), made = expected_elements(model), modal_system.plant_of(modes)
-    faces, damping = len(made.faces), made.damping_most
+    (count, stiff), made = expected_elements(model), modal_system.make_modal_system(modes)
+    faces, damping = len(made.interfaces), made.damping_norm
     rate = damping / 2 + sqrt(
-        damping**2 / 4 + made.square_most + stiff * max(made.reach, default=0.0)
+        damping**2 / 4 + made.max_omega_squared + stiff * max(made.inverse_mass, default=0.0)
     )
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
     ringing, quick = (
@@ -180,7 +180,7 @@ def ringing_and_events(model: Model) -> tuple:
         max_frequency_ratio(drive),
     )
     events = 2 * max(count, faces) * quick + 2 + rows
-    if 2 * pi * quick <= made.slow * drive.period:
+    if 2 * pi * quick <= made.slow_rate * drive.period:
         dying = DYING / min(min_decay_rate(modes), float(modes.omega.min()) ** 2 / damping)
         # events per cycle after which a mode rings
         times = (

@@ -157,14 +157,14 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
     moved = float(modes.output @ held[1])
     return rows_of(
         modes,
-        quasi_static.along(
+        quasi_static.static_motions(
             modes, laws, amplitudes / abs(moved), held, samples, modes.output / moved
         ),
     )
 
 
 def rows_of(modes, found: list) -> np.ndarray:
-    """Return output amplitude [m], frequency [Hz], damping and loss [J] (4, k) of `Static`s."""
+    """Return output amplitude [m], frequency [Hz], damping and loss [J] (4, k) of `StaticMotion`s."""
     return np.array(
         [
             (abs(float(modes.output @ one.z)), one.omega / (2 * np.pi), one.zeta, one.loss)
@@ -192,7 +192,7 @@ def mesh_error(fine, rough, read) -> np.ndarray:
     best = read(fine)
     changes = (read(other) - best for other in rough)
     by_meshes = sum(error_of_change(one, order=MAX_ORDER) for one in changes)
-    return np.fmax(SPREAD_FACTOR * np.abs(read(fine.remade(_spread)) - best), by_meshes)
+    return np.fmax(SPREAD_FACTOR * np.abs(read(fine.with_elements(_spread)) - best), by_meshes)
 
 
 def _spread(stiffness, slide) -> tuple:

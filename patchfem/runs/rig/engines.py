@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...dynamics.events.elements import JOINED
+from ...dynamics.events.elements import CELL_MERGES
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
 from ...response.coarser import CoarserRuns, make_coarser_space
@@ -270,7 +270,7 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     cells = any(law_has_trait(one.numbers.law, "cells") for one in model.rig.friction.interfaces)
     if not cells:
         return out
-    merged = tuple(Variant(replace(numerics, joined=one), patch) for one in JOINED)
+    merged = tuple(Variant(replace(numerics, joined=one), patch) for one in CELL_MERGES)
     return [*out, CoarserRuns(merged, merged_cell_errors, of="cells")]
 
 

@@ -112,7 +112,7 @@ def _climbing(model: Model, patch, count: int | None = None):
 
     speed = None if law_has_trait(f.law, "set-valued") else f.reference_speed
     kinetic = f.static if f.kinetic is None else f.kinetic
-    return run.model_of(model.grooves, load, f.static, kinetic, speed, model.rig.modes)
+    return run.make_model(model.grooves, load, f.static, kinetic, speed, model.rig.modes)
 
 
 def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...core import IntegratedMeasures, InterfaceLoop, NotConverged, SineDrive
 from ...dynamics.events import elements, histories
-from ...dynamics.events import names_kernels as at
 from ...dynamics.events import steady as steady_events
+from ...dynamics.events.positions_kernels import INTERFACE
 from ...dynamics.events.reading import Reading
 from ...effects import law_has_trait
 from ...response import run_events
@@ -101,7 +101,7 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
 def _run(reader, frames: int, say, progress) -> Solution:
     """Run the drive of a rig, level by level if it has levels, and return the Solution."""
     rig, numerics, begin, more = reader.model.rig, reader.numerics, perf_counter(), {}
-    histories.warm_up(say)
+    histories.load_kernels(say)
     prepare = {"reduce": reader.reduced, "compiled_code": perf_counter() - begin}
     begin = perf_counter()
 
@@ -135,7 +135,9 @@ class Pieces(Reader):
     """Reader of a finished run from event to event; found: RigidElements or YieldingElements."""
 
     def __init__(self, model, numerics, patch, found):
-        super().__init__(model, numerics, patch, found.contact, found.held, histories.SAMPLES)
+        super().__init__(
+            model, numerics, patch, found.contact, found.held, histories.SAMPLES_PER_CYCLE
+        )
         self.groups, self.rigid, self.reduced = found.groups, found.rigid, found.seconds
         self.apart = found.rigid and model.rig.friction.strips_slide_apart
 
@@ -359,7 +361,7 @@ def settles(modes, drive, groups, done) -> tuple | None:
         return None
     sine = SineDrive(last.amplitude, last.omega, drive.moving)
     try:
-        one = steady_events.settled(modes, sine, groups, *done.end)
+        one = steady_events.find_steady_state_from(modes, sine, groups, *done.end)
     except NotConverged:
         return None
     amplitude, error = settled_of(one.amplitude, one.residual, one.multipliers)
@@ -406,10 +408,10 @@ class YieldingElements:
         self.held = 1e-3 * min((one.length for one in parts if one.limit > 0), default=0.0)
         self.groups = tuple(elements_of_law(one) for one in parts)
         for _ in range(numerics.pairs):
-            self.groups = tuple(map(elements.merged, self.groups))
+            self.groups = tuple(map(elements.merge_elements, self.groups))
         if numerics.joined:
             self.groups = tuple(
-                elements.merged(one, *numerics.joined)
+                elements.merge_elements(one, *numerics.joined)
                 if law_has_trait(law.numbers.law, "cells")
                 else one
                 for one, law in zip(self.groups, rig.friction.interfaces)
@@ -451,7 +453,7 @@ def coulomb_limits(model, patch) -> list:
 def elements_of_law(element) -> elements.Elements:
     """Return the Elements of an Element of form "parallel"."""
     count = int(element.numbers[1])
-    return elements.elements_of(
+    return elements.make_elements(
         element.numbers[2 : 2 + count], element.numbers[2 + count : 2 + 2 * count]
     )
 
@@ -500,10 +502,13 @@ def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, s
 def _loop(reading: Reading, sine: bool, stiffness) -> dict:
     """Return the measures of the loop of the first interface by name."""
     one = reading.loop()
-    moves = (reading.of(at.HIGH) - reading.of(at.LOW) > MIN_SLIDE_RANGE) & sine
-    half = np.where(moves, reading.of(at.RANGE) / 2, 0.0)[()]
+    moves = (
+        reading.interface_value(INTERFACE.max_slide) - reading.interface_value(INTERFACE.min_slide)
+        > MIN_SLIDE_RANGE
+    ) & sine
+    half = np.where(moves, reading.interface_value(INTERFACE.mean_range) / 2, 0.0)[()]
     work = one.work * reading.period / reading.span
-    secant = np.where(moves, reading.of(at.SECANT), np.nan)[()]
+    secant = np.where(moves, reading.interface_value(INTERFACE.secant), np.nan)[()]
     return interface_loops(half, one.displacement_harmonic, one.force_harmonic, work, stiffness) | {
         "secant_stiffness": secant
     }
@@ -515,6 +520,7 @@ def _work_check(reading: Reading, book: dict):
     The samples are the ends of the pieces, with the trapezoidal rule.
     """
     turned, booked, passed = (
-        reading.faces[..., place].sum(axis=-1) for place in (at.TURNED, at.WORK, at.PASSED)
+        reading.faces[..., place].sum(axis=-1)
+        for place in (INTERFACE.end_work, INTERFACE.work, INTERFACE.path_work)
     )
     return relative_gap(turned, booked, passed, book["power"] + book["peak_stored"])

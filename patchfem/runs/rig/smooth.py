@@ -46,7 +46,7 @@ def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None)
     """
     rig, begin = model.rig, perf_counter()
     contact = contact_of(model, numerics, patch)
-    engine.loops_of(contact.element.kernels, say)
+    engine.load_loop(contact.element.kernels, say)
     loaded = perf_counter() - begin
     begin = perf_counter()
     done = engine.simulate(
@@ -79,7 +79,9 @@ class SmoothReader(Reader):
     """Reader of a finished run of high order; values of the integrator precede those of samples."""
 
     def __init__(self, model, numerics, patch, contact):
-        super().__init__(model, numerics, patch, contact, 1e-3 * contact.length, engine.SAMPLES)
+        super().__init__(
+            model, numerics, patch, contact, 1e-3 * contact.length, engine.SAMPLES_PER_CYCLE
+        )
 
     def integrated(self, run, drive) -> IntegratedMeasures:
         """Return the measures from the polynomials of the steps."""
@@ -115,7 +117,7 @@ class SmoothReader(Reader):
         return {
             name: found.get(name, 0.0)
             + run.unsure.get(name, 0.0)
-            + run.unlike * (size if name == "drift_per_cycle" else abs(value))
+            + run.repeat_change * (size if name == "drift_per_cycle" else abs(value))
             for name, value in values.items()
         }
 

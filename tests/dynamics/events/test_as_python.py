@@ -12,7 +12,7 @@ from event_reference import random_basis
 
 from patchfem.core import SineDrive
 from patchfem.dynamics.events import cost, histories
-from patchfem.dynamics.events.elements import coulomb, elements_of
+from patchfem.dynamics.events.elements import coulomb, make_elements
 from patchfem.structure import drives
 
 SINE = SineDrive(1.0, 1.2)
@@ -44,7 +44,7 @@ def interface_of(rng, kind: str):
     if kind == "none":
         return coulomb(0.0)
     if kind == "springs":
-        return elements_of(rng.uniform(0.2, 1.0, 5), rng.uniform(0.05, 1.0, 5))
+        return make_elements(rng.uniform(0.2, 1.0, 5), rng.uniform(0.05, 1.0, 5))
     return coulomb(*sorted(rng.uniform(0.2, 0.6, 2), reverse=True))
 
 

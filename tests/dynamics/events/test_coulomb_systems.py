@@ -19,6 +19,7 @@ from patchfem.core import (
     SineDrive,
 )
 from patchfem.dynamics.events.event_list import BORDER, RELEASE, STOP
+from patchfem.dynamics.events.positions_kernels import COLUMN, N_COLUMNS, ROW
 from patchfem.response.measures import energy_balance
 from patchfem.structure import drives
 
@@ -248,7 +249,7 @@ def choice_at_rest(seed, n, faces, ratio):
     z, v, rows = rng.normal(size=n), np.zeros(n), np.asarray(modes.interfaces)
     drive = drives.Piecewise((DriveSegment(0.0, 0.7, 0.5, 1.0, 0.64),), 2 * pi)
     one, first = rows_of(modes, drive, static, ratio * static, 1e-3, InitialState(z, v))
-    out = one.dense_values(first, np.zeros(1, np.int64), np.zeros(1))[0]
+    out = one.evaluate_rows(first, np.zeros(1, np.int64), np.zeros(1))[0]
     forces = out[2 * n + 3 :: 6]
     pull = (
         -(modes.omega**2) * out[:n]
@@ -257,7 +258,7 @@ def choice_at_rest(seed, n, faces, ratio):
     )
     accel = rows @ (pull - forces @ rows / modes.mass)
     assert np.all(np.abs(forces) <= static * (1 + 1e-9))
-    ways = first[0, one._at(0, 7) :: one.kernels.EACH]
+    ways = first[0, one._column(0, COLUMN.direction) :: N_COLUMNS]
     for c, sign in enumerate(ways):
         if sign:
             assert sign * accel[c] > 0 and forces[c] == pytest.approx(
@@ -403,11 +404,11 @@ def test_exact_coordinates_stay_on_the_stuck_slide():
     h = sqrt(0.5)
     modes = basis_of([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
     one, rows = rows_of(modes, drives.levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)
-    rows = rows[rows[:, 5] >= 20]
-    held, z = rows[0, one._at(0, 8)], rows[:, one.kernels.HEAD : one.kernels.HEAD + 2]
+    rows = rows[rows[:, ROW.cycle] >= 20]
+    held, z = rows[0, one._column(0, COLUMN.slide)], rows[:, ROW.motion : ROW.motion + 2]
     assert (
-        not rows[:, one._at(0, 7)].any()
-        and np.all(rows[:, one._at(0, 8)] == held)
+        not rows[:, one._column(0, COLUMN.direction)].any()
+        and np.all(rows[:, one._column(0, COLUMN.slide)] == held)
         and abs(held) > 0.1
     )
     assert np.abs(z @ modes.interfaces[0] - held).max() < 4e-16 * np.abs(z).max()

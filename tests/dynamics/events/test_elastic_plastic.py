@@ -5,7 +5,7 @@ import pytest
 from support.jenkins_reference import Reference
 
 from patchfem.core import ModalBasis, Outcome, SineDrive
-from patchfem.dynamics.events.elements import elements_of
+from patchfem.dynamics.events.elements import make_elements
 from patchfem.dynamics.events.histories import simulate
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Recorded, Sweep
@@ -48,7 +48,7 @@ def random_rig(seed, most):
 )
 def test_exact_random_rigs_against_dop853(seed, most):
     modes, drive, k, y = random_rig(seed, most)
-    done = simulate(modes, drive, [elements_of(k, y)], 2, window=1)
+    done = simulate(modes, drive, [make_elements(k, y)], 2, window=1)
     want = Reference(modes, drive, [(k, y)]).go(2 * drive.period)
     found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
     assert np.abs(found - want).max() <= 1e-9 * np.abs(want).max()
@@ -60,7 +60,7 @@ def test_exact_random_rigs_against_dop853(seed, most):
 )
 def test_exact_amplitude_at_resonance(stiffness, amplitude):
     """H13: printed to nine digits, found by DOP853 at 1e-12."""
-    done = simulate(ONE, SineDrive(1.0, 1.0), [elements_of([stiffness], [0.8 / stiffness])], 400)
+    done = simulate(ONE, SineDrive(1.0, 1.0), [make_elements([stiffness], [0.8 / stiffness])], 400)
     assert done.swing == pytest.approx(amplitude, abs=6e-10)
     assert energy_balance(done.ledger) <= 1e-11
     # it slips, so the force is its limit
@@ -71,7 +71,7 @@ def test_exact_two_interfaces_against_dop853():
     faces = np.array([[1.0, 0.4], [0.3, -1.0]])
     modes = basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], [1.0, 0.2], None, faces)
     drive, elements = SineDrive(1.0, 1.4), [([2.0, 1.0], [0.1, 0.3]), ([1.5], [0.12])]
-    done = simulate(modes, drive, [elements_of(*one) for one in elements], 4, window=2)
+    done = simulate(modes, drive, [make_elements(*one) for one in elements], 4, window=2)
     want = Reference(modes, drive, elements).go(4 * drive.period)
     found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
     assert np.abs(found - want).max() <= 1e-10 * np.abs(want).max()
@@ -81,7 +81,7 @@ def test_exact_two_interfaces_against_dop853():
 def test_exact_an_output_that_turns_with_a_slide():
     """Two interfaces, the output on one of them: both turn at one instant, again and again."""
     faces = np.array([[1.0, 0.4], [0.3, -1.0]])
-    drive, groups = SineDrive(1.0, 1.4), [elements_of([2.0], [0.1]), elements_of([1.5], [0.12])]
+    drive, groups = SineDrive(1.0, 1.4), [make_elements([2.0], [0.1]), make_elements([1.5], [0.12])]
     runs = [
         simulate(
             basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], output, None, faces),
@@ -102,19 +102,19 @@ def test_exact_grazing_yield():
     held = basis([2.0], [zeta / 2], [1.0], [1.0], [1.0])
     drive = SineDrive(1.0, 0.9)
     peak = np.abs(
-        simulate(held, drive, [elements_of([0.0], [1.0])], 40, window=40).window.modal
+        simulate(held, drive, [make_elements([0.0], [1.0])], 40, window=40).window.modal
     ).max()
     modes = basis([1.0], [zeta], [1.0], [1.0], [1.0])
-    exact = simulate(held, drive, [elements_of([0.0], [1.0])], 40).amplitudes
+    exact = simulate(held, drive, [make_elements([0.0], [1.0])], 40).amplitudes
     peak = max(peak, np.abs(exact).max())
     for share, slips in ((1 + 1e-12, False), (1 - 1e-9, True), (1 - 1e-4, True)):
-        done = simulate(modes, drive, [elements_of([stiff], [share * peak])], 40, window=40)
+        done = simulate(modes, drive, [make_elements([stiff], [share * peak])], 40, window=40)
         assert bool(done.loops[0].slip_range > 0) is slips
         assert energy_balance(done.ledger) < 1e-12
 
 
 def test_exact_travel_ends_the_run_where_it_is_passed():
-    done = simulate(ONE, SineDrive(1.0, 1.0), [elements_of([1.0], [0.02])], 50, travel=1.5)
+    done = simulate(ONE, SineDrive(1.0, 1.0), [make_elements([1.0], [0.02])], 50, travel=1.5)
     assert done.outcome is Outcome.EXCEEDS_TRAVEL
     assert abs(done.response.output[-1]) == pytest.approx(1.5, rel=1e-12)
     assert np.abs(done.response.output).max() <= 1.5 * (1 + 1e-12)
@@ -122,7 +122,7 @@ def test_exact_travel_ends_the_run_where_it_is_passed():
 
 def test_exact_snapshots_carry_the_force():
     k, y = np.array([1.0, 3.0, 2.0]), np.array([0.2, 0.05, 0.1])
-    done = simulate(ONE, SineDrive(1.0, 0.8), [elements_of(k, y)], 5.5, window=2, frames=8)
+    done = simulate(ONE, SineDrive(1.0, 0.8), [make_elements(k, y)], 5.5, window=2, frames=8)
     assert len(done.snapshots) == 8
     for shot in done.snapshots:
         assert k @ shot["stretch"] == pytest.approx(shot["force"], abs=1e-13)
@@ -133,7 +133,9 @@ def test_exact_snapshots_carry_the_force():
 
 
 def test_exact_window_of_samples_agrees_with_the_sums():
-    done = simulate(ONE, SineDrive(1.0, 1.0), [elements_of([6.0, 2.0], [0.05, 0.25])], 30, window=4)
+    done = simulate(
+        ONE, SineDrive(1.0, 1.0), [make_elements([6.0, 2.0], [0.05, 0.25])], 30, window=4
+    )
     window, (q, pull, work, slip, _, force) = done.window, done.loops[0]
     for end in (
         np.argmax(window.slide),
@@ -180,7 +182,7 @@ def test_exact_sweeps_and_records_against_dop853(drive):
         [0.1, 0.3],
     )
     end = 1.1 * drive.duration
-    done = simulate(modes, drive, [elements_of(k, y)], end / drive.period, window=2)
+    done = simulate(modes, drive, [make_elements(k, y)], end / drive.period, window=2)
     reference = Reference(modes, drive, [(k, y)])
     breaks = drive.breaks if isinstance(drive, Recorded) else [drive.duration]
     for stop in (*breaks, end):  # the integrator is stopped where the formula of the drive changes
@@ -211,8 +213,8 @@ def test_exact_elements_that_yield_at_one_instant_yield_in_any_order(mirrored):
     )
     alone = ModalBasis(("with",), *(np.array([x]) for x in (1.0, 0.02, h, 1.0, h)), 1.0)
     k, y = np.array([0.4, 1.0, 0.3]), np.array([0.1, 0.3, 0.8])
-    one = simulate(alone, SineDrive(1.5, 1.1), [elements_of(2 * k, y)], 40, 5)
-    two = simulate(both, SineDrive(1.5, 1.1), [elements_of(k, y)] * 2, 40, 5)
+    one = simulate(alone, SineDrive(1.5, 1.1), [make_elements(2 * k, y)], 40, 5)
+    two = simulate(both, SineDrive(1.5, 1.1), [make_elements(k, y)] * 2, 40, 5)
     np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=1e-11)
     assert np.abs(two.response.modal[:, 1]).max() < 1e-11
     assert two.ledger["friction"] == pytest.approx(one.ledger["friction"], rel=1e-11)

@@ -9,15 +9,16 @@ from scipy.optimize import fsolve
 from test_elastic_plastic import ONE, basis, random_rig
 
 from patchfem.core import NotConverged, PatchfemError, SineDrive
-from patchfem.dynamics.events.elements import elements_of
+from patchfem.dynamics.events.elements import make_elements
 from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.events.period import PeriodMap
-from patchfem.dynamics.events.steady import settled, steady
+from patchfem.dynamics.events.steady import find_steady_state_from as settled
+from patchfem.dynamics.events.steady import solve_steady as steady
 from patchfem.structure.drives import levels
 
 FACES = np.array([[1.0, 0.4], [0.3, -1.0]])
 PAIR = basis([1.0, 2.3], [0.01, 0.02], FACES[0], [1.0, 0.5], [1.0, 0.2], None, FACES)
-TWO = [elements_of([2.0, 1.0], [0.1, 0.3]), elements_of([1.5], [0.12])]
+TWO = [make_elements([2.0, 1.0], [0.1, 0.3]), make_elements([1.5], [0.12])]
 
 
 def jenkins_amplitude(stiffness, limit, zeta, ratio, guess):
@@ -50,7 +51,7 @@ def jenkins_amplitude(stiffness, limit, zeta, ratio, guess):
     ("stiffness", "printed"), [(10, 0.249538145), (100, 0.285786312), (1000, 0.288449682)]
 )
 def test_exact_printed_amplitudes_at_resonance(stiffness, printed):
-    found = steady(ONE, SineDrive(1.0, 1.0), [elements_of([stiffness], [0.8 / stiffness])])
+    found = steady(ONE, SineDrive(1.0, 1.0), [make_elements([stiffness], [0.8 / stiffness])])
     assert found.amplitude == pytest.approx(printed, abs=6e-10)
     assert (found.regime, found.symmetric) == ("slides", True) and found.residual < 1e-13
     assert np.abs(found.multipliers).max() < 1
@@ -58,7 +59,7 @@ def test_exact_printed_amplitudes_at_resonance(stiffness, printed):
 
 @pytest.mark.parametrize(("ratio", "limit"), [(1.0, 0.5), (1.2, 0.3), (0.7, 0.2), (1.4, 0.6)])
 def test_exact_one_element_in_closed_form(ratio, limit):
-    modes, group = basis([1.0], [0.05], [1.0], [1.0], [1.0]), [elements_of([3.0], [limit / 3])]
+    modes, group = basis([1.0], [0.05], [1.0], [1.0], [1.0]), [make_elements([3.0], [limit / 3])]
     drive = SineDrive(1.0, ratio)
     found = steady(modes, drive, group)
     run = simulate(
@@ -86,7 +87,7 @@ def test_exact_one_element_in_closed_form(ratio, limit):
 def test_exact_random_rigs_against_long_runs(seed, cycles):
     """The symmetric motion has the amplitude and the rates of a long run, also if it starts from an early cycle."""
     modes, drive, k, y = random_rig(seed, 200)
-    group = [elements_of(k, y)]
+    group = [make_elements(k, y)]
     found, run = steady(modes, drive, group), simulate(modes, drive, group, 60, window=1)
     mine, long = (
         settled(modes, drive, group, *run.end),
@@ -136,7 +137,7 @@ def test_order_the_derivative_is_that_of_finite_differences(rig, half):
     modes, drive, groups = PAIR, SineDrive(1.0, 0.7), TWO
     if rig == "elements":
         modes, drive, k, y = random_rig(104, 200)
-        groups = [elements_of(k, y)]
+        groups = [make_elements(k, y)]
     one, found = PeriodMap(modes, groups), steady(modes, drive, groups)
     slope = one(drive, found.point, half).slope
     assert slope.shape == (found.point.numbers.size,) * 2 and slope.shape[0] > 2 * modes.omega.size
@@ -150,9 +151,9 @@ def test_order_the_derivative_is_that_of_finite_differences(rig, half):
 @pytest.mark.parametrize("seed", [100, 105, 109])
 def test_exact_work_in_is_what_a_cycle_dissipates(seed):
     modes, drive, k, y = random_rig(seed, 200)
-    found = steady(modes, drive, [elements_of(k, y)])
+    found = steady(modes, drive, [make_elements(k, y)])
     book = simulate(
-        modes, drive, [elements_of(k, y)], 1, window=1, start=found.start, memory=found.memory
+        modes, drive, [make_elements(k, y)], 1, window=1, start=found.start, memory=found.memory
     ).ledger
     assert book["work_in"] == pytest.approx(
         book["viscous"] + book["friction"], abs=1e-12 * book["power"]
@@ -177,7 +178,7 @@ def linear_amplitude(modes, drive, stiffness):
 def test_exact_limits_are_the_linear_response(seed, held):
     """Elements that never yield are a spring, and elements without strength are nothing."""
     modes, drive, k, y = random_rig(seed, 50)
-    found = steady(modes, drive, [elements_of(k, y * 1e6 if held else y * 0)])
+    found = steady(modes, drive, [make_elements(k, y * 1e6 if held else y * 0)])
     assert found.regime == "stuck" and found.multipliers.size == 2 * modes.omega.size
     assert found.amplitude == pytest.approx(
         linear_amplitude(modes, drive, k.sum() if held else 0.0), rel=1e-12
@@ -185,12 +186,12 @@ def test_exact_limits_are_the_linear_response(seed, held):
 
 
 def test_refuses_what_does_not_repeat():
-    group = [elements_of([4.0], [0.05])]
+    group = [make_elements([4.0], [0.05])]
     with pytest.raises(PatchfemError, match="a single sine without end"):
         steady(ONE, levels([1.0, 2.0], 1.0, 5), group)
     free = basis([1.0], [0.0], [1.0], [1.0], [1.0])
     with pytest.raises(NotConverged, match="grows from period to period"):  # 0.7 is below pi/4
-        steady(free, SineDrive(1.0, 1.0), [elements_of([20.0], [0.7 / 20])])
+        steady(free, SineDrive(1.0, 1.0), [make_elements([20.0], [0.7 / 20])])
 
 
 def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
@@ -205,7 +206,7 @@ def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
     modes = replace(basis([omega], [zeta], *([one] for one in shares)), mass=mass)
     y, k = np.exp(r.uniform(-3, 0, count)), np.exp(r.uniform(-1, 2, count))
     k *= mass * np.exp(r.uniform(-2, 0.3)) / (k @ y)
-    drive, groups = SineDrive(1.0, float(np.exp(r.uniform(-1, 1)))), [elements_of(k, y)]
+    drive, groups = SineDrive(1.0, float(np.exp(r.uniform(-1, 1)))), [make_elements(k, y)]
     done = simulate(modes, drive, groups, 40, window=4)
     one = settled(modes, drive, groups, *done.end)
     on = simulate(modes, drive, groups, 2, window=1, start=one.start, memory=one.memory)

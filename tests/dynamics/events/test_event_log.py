@@ -57,10 +57,12 @@ def test_exact_levels_of_a_scene_are_those_of_one_run():
 def test_exact_the_last_events_are_kept_and_all_counted():
     """Four events in each cycle of a motion that slides both ways."""
     modes, drive = one_mode(), SineDrive(1.0, 1.0)
-    cycles = event_list.ROOM // 4 + 20_000
+    cycles = event_list.MAX_EVENTS // 4 + 20_000
     log = event_run.simulate(modes, drive, 0.8, 0.8, cycles, 2).log
-    assert log.count == pytest.approx(4 * cycles, abs=200) and len(log.time) == event_list.ROOM
-    first_kept = log.count - event_list.ROOM
+    assert (
+        log.count == pytest.approx(4 * cycles, abs=200) and len(log.time) == event_list.MAX_EVENTS
+    )
+    first_kept = log.count - event_list.MAX_EVENTS
     assert log.time[0] == pytest.approx(drive.period * first_kept / 4, abs=50 * drive.period)
     assert cycles - 1 < log.time[-1] / drive.period <= cycles
     np.testing.assert_array_equal(log.what[-4:], log.what[-8:-4])

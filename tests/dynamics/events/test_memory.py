@@ -5,7 +5,12 @@ import pytest
 
 from patchfem.core import PatchfemError
 from patchfem.dynamics.events import memory_kernels as kernels
-from patchfem.dynamics.events.elements import elements_of, stretches, table_of, virgin
+from patchfem.dynamics.events.elements import (
+    element_stretches,
+    make_elements,
+    make_table,
+    unstretched_memory,
+)
 
 
 class Follower:
@@ -13,31 +18,34 @@ class Follower:
 
     def __init__(self, stiffness, yield_displacement):
         self.k, self.y = np.asarray(stiffness, float), np.asarray(yield_displacement, float)
-        self.group = elements_of(self.k, self.y)
-        self.table = table_of([self.group])
-        self.memory = virgin(self.table, [0.0])
+        self.group = make_elements(self.k, self.y)
+        self.table = make_table([self.group])
+        self.memory = unstretched_memory(self.table, [0.0])
         self.stretch, self.lost, self.depth = np.zeros(self.k.size), 0.0, 0
 
     def to(self, slide: float) -> float:
         """Slide straight to a place [m]; the force [N] there."""
-        memory, way = self.memory, 1.0 if slide > self.memory.place[0] else -1.0
-        if memory.slipping[0] and memory.way[0] != way:
-            kernels.turn.py_func(0, memory)
-        while way * (at := kernels.threshold.py_func(0, way, self.table, memory)) <= way * slide:
-            self.lost += self.limit * abs(at - memory.place[0])
-            memory.place[0] = at
-            kernels.give_way.py_func(0, way, self.table, memory)
-        self.lost += self.limit * abs(slide - memory.place[0])
+        memory, way = self.memory, 1.0 if slide > self.memory.slide[0] else -1.0
+        if memory.n_slipping[0] and memory.direction[0] != way:
+            kernels.store_turning_point.py_func(0, memory)
+        while (
+            way * (at := kernels.next_yield_slide.py_func(0, way, self.table, memory))
+            <= way * slide
+        ):
+            self.lost += self.limit * abs(at - memory.slide[0])
+            memory.slide[0] = at
+            kernels.release_next_element.py_func(0, way, self.table, memory)
+        self.lost += self.limit * abs(slide - memory.slide[0])
         self.stretch = np.clip(self.stretch + slide - self.before, -self.y, self.y)
-        memory.place[0] = self.before = slide
-        self.depth = max(self.depth, int(memory.depth[0]))
-        return kernels.carried.py_func(0, self.table, memory)[0]
+        memory.slide[0] = self.before = slide
+        self.depth = max(self.depth, int(memory.n_groups[0]))
+        return kernels.find_force_and_energy.py_func(0, self.table, memory)[0]
 
     before = 0.0
 
     @property
     def limit(self) -> float:
-        return kernels.tangent.py_func(0, self.table, self.memory)[2]
+        return kernels.find_tangent.py_func(0, self.table, self.memory)[2]
 
 
 @pytest.mark.share(0, 4, 8, 11)
@@ -52,10 +60,10 @@ def test_exact_memory_is_that_of_elements_one_by_one(seed):
     for slide in np.cumsum(random.normal(0.0, 0.6, 300) * random.random(300) ** 2):
         force = one.to(slide)
         assert force == pytest.approx(k @ one.stretch, abs=1e-12 * (k @ y))
-        energy = kernels.carried.py_func(0, one.table, one.memory)[1]
+        energy = kernels.find_force_and_energy.py_func(0, one.table, one.memory)[1]
         assert energy == pytest.approx(0.5 * k @ one.stretch**2, rel=1e-10, abs=1e-12)
         np.testing.assert_allclose(
-            k * stretches(one.group, one.memory, 0), k * one.stretch, atol=1e-12
+            k * element_stretches(one.group, one.memory, 0), k * one.stretch, atol=1e-12
         )
     # a turning point that says nothing more is forgotten
     assert one.depth <= one.group.yield_displacement.size + 1
@@ -63,6 +71,6 @@ def test_exact_memory_is_that_of_elements_one_by_one(seed):
 
 def test_refuses_elements_that_are_none():
     with pytest.raises(PatchfemError, match="finite"):
-        elements_of([1.0, -1.0], [1.0, 1.0])
+        make_elements([1.0, -1.0], [1.0, 1.0])
     with pytest.raises(PatchfemError, match="finite"):
-        elements_of([1.0], [np.inf])
+        make_elements([1.0], [np.inf])

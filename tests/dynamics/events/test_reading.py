@@ -6,8 +6,8 @@ import pytest
 from patchfem.compiled.no_jit import plain
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import histories
-from patchfem.dynamics.events import names_kernels as at
-from patchfem.dynamics.events.elements import elements_of
+from patchfem.dynamics.events.elements import make_elements
+from patchfem.dynamics.events.positions_kernels import INTERFACE, RUN
 from patchfem.response.loops import find_reversals, mean_half_range, secant_stiffness
 from patchfem.response.run_events import measure_rings
 
@@ -34,15 +34,15 @@ def several() -> tuple:
         1.3,
         faces=faces,
     )
-    return modes, [elements_of([0.5, 1.0, 0.4], [0.1, 0.4, 0.2]), elements_of([2.0], [0.15])]
+    return modes, [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2]), make_elements([2.0], [0.15])]
 
 
 def run_of(modes, drive, groups, cycles=24, window=5) -> tuple:
     """(the run, its rows in the window, what it shows)."""
-    run, kept = histories.started(modes, drive, groups, cycles, window), []
-    ended = run._ended
-    run._ended = lambda late: kept.append(ended(late)) or kept[-1]
-    done = run.go(0, None)
+    run, kept = histories.start_run(modes, drive, groups, cycles, window), []
+    ended = run._close_rows
+    run._close_rows = lambda late: kept.append(ended(late)) or kept[-1]
+    done = run.run(0, None)
     return run, kept[0][:-1], done
 
 
@@ -50,29 +50,35 @@ def run_of(modes, drive, groups, cycles=24, window=5) -> tuple:
 def test_exact_secant_stiffness_where_the_slide_turns_at_the_border_of_a_cycle(omega):
     """Near resonance the largest slide is reached within a thousandth of a period of the border."""
     drive = SineDrive(1.5, omega)
-    _, _, done = run_of(basis(1.0, 0.05), drive, [elements_of([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])])
+    _, _, done = run_of(basis(1.0, 0.05), drive, [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])])
     ends = done.window
     phase = ends.time[np.argmax(ends.slide[:-1])] / drive.period
     assert abs(phase - round(phase)) < 2e-3
     turns = find_reversals(
         ends.time, ends.slide, ends.slide_rate, ends.force, drive.period, "slide"
     )
-    assert done.reading.of(at.SECANT, 0) == pytest.approx(secant_stiffness(turns), rel=1e-9)
+    assert done.reading.interface_value(INTERFACE.secant, 0) == pytest.approx(
+        secant_stiffness(turns), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("drive", [SineDrive(1.5, 1.3), SineDrive(1.5, 0.4)])
 @pytest.mark.parametrize("many", [False, True])
 def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
-    """Integrals, harmonics, drift and ranges off `dense_kernels.evaluate` at 16 Gauss points of every piece."""
+    """Integrals, harmonics, drift and ranges off `dense_kernels.evaluate_rows` at 16 Gauss points of every piece."""
     modes, groups = (
-        several() if many else (basis(1.0, 0.05), [elements_of([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])])
+        several() if many else (basis(1.0, 0.05), [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])])
     )
     run, rows, done = run_of(modes, drive, groups)
     n, half = modes.omega.size, rows[:, 1:2] / 2
     owner = np.repeat(np.arange(len(rows)), PLACE.size)
     tau, weight = (half * (1 + PLACE)).ravel(), (half * WEIGHT).ravel()
-    out, time, ends = run.dense_values(rows, owner, tau), rows[owner, 0] + tau, done.window
-    friction_force, span, x = run._as_response(out, time).acceleration, weight.sum(), done.reading
+    out, time, ends = run.evaluate_rows(rows, owner, tau), rows[owner, 0] + tau, done.window
+    friction_force, span, x = (
+        run._response_from_columns(out, time).acceleration,
+        weight.sum(),
+        done.reading,
+    )
     assert x.span == pytest.approx(span, rel=1e-13) and x.period == drive.period
     turn = np.exp(-1j * drive.omega * time) * weight
     size = np.abs(friction_force).max()
@@ -95,20 +101,27 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
         )
         assert abs(one.displacement_harmonic) == pytest.approx(abs(q), rel=1e-11)
         assert one.work == pytest.approx(np.sum(weight * force * rate), rel=1e-10)
-        assert x.of(at.TURNED, f) == pytest.approx(one.work, rel=1e-10)
-        assert x.of(at.PASSED, f) == pytest.approx(np.sum(weight * np.abs(force * rate)), rel=0.05)
+        assert x.interface_value(INTERFACE.end_work, f) == pytest.approx(one.work, rel=1e-10)
+        assert x.interface_value(INTERFACE.path_work, f) == pytest.approx(
+            np.sum(weight * np.abs(force * rate)), rel=0.05
+        )
         places, forces = (
             ends.extra[name][:, f] if many else getattr(ends, one_name)
             for name, one_name in (("slides", "slide"), ("forces", "force"))
         )
         rates = ends.extra["slide_rates"][:, f] if many else ends.slide_rate
-        assert (x.of(at.LOW, f), x.of(at.HIGH, f)) == pytest.approx(
-            (places.min(), places.max()), rel=1e-12
-        )
+        assert (
+            x.interface_value(INTERFACE.min_slide, f),
+            x.interface_value(INTERFACE.max_slide, f),
+        ) == pytest.approx((places.min(), places.max()), rel=1e-12)
         assert one.max_force == pytest.approx(np.abs(forces).max(), rel=1e-12)
         turns = find_reversals(ends.time, places, rates, forces, drive.period, "slide")
-        assert x.of(at.RANGE, f) / 2 == pytest.approx(mean_half_range(turns), rel=1e-9)
-        assert x.of(at.SECANT, f) == pytest.approx(secant_stiffness(turns), rel=1e-9)
+        assert x.interface_value(INTERFACE.mean_range, f) / 2 == pytest.approx(
+            mean_half_range(turns), rel=1e-9
+        )
+        assert x.interface_value(INTERFACE.secant, f) == pytest.approx(
+            secant_stiffness(turns), rel=1e-9
+        )
     slide, end = out[:, 2 * n + 1], rows[-1, 0] + rows[-1, 1]
     means = [
         np.sum((weight * slide)[part])
@@ -119,22 +132,22 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
 
 def test_exact_releases_are_those_of_the_log():
     """Mean phase modulo pi of the releases of the first interface within the window."""
-    modes, groups = basis(1.0, 0.05), [elements_of([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])]
+    modes, groups = basis(1.0, 0.05), [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])]
     _, rows, done = run_of(modes, SineDrive(1.5, 1.3), groups)
     late = (done.log.time > rows[0, 0]) & (np.abs(done.log.what) == 1)
-    assert late.sum() == done.reading.run[at.STARTS] > 4
+    assert late.sum() == done.reading.run[RUN.n_releases] > 4
     wanted = np.angle(np.mean(np.exp(2j * done.log.phase[late]))) / 2 % np.pi
     assert done.reading.start == pytest.approx(wanted, abs=1e-12)
 
 
 def test_exact_a_run_in_brief_shows_what_the_run_shows():
     """One that has not settled to the last bit; one that repeats, of which few cycles are read, to round-off."""
-    for modes, groups in (several(), (basis(1.0, 0.05), [elements_of([1.0], [0.3])])):
+    for modes, groups in (several(), (basis(1.0, 0.05), [make_elements([1.0], [0.3])])):
         for cycles, same in ((24, 0.0), (400, 1e-12)):
             drive = SineDrive(1.5, 1.3)
             whole = histories.simulate(modes, drive, groups, cycles, 5)
             # in the arrays of the first
-            one, two = histories.briefly([(modes, drive, groups, None)] * 2, cycles, 5)
+            one, two = histories.simulate_batch([(modes, drive, groups, None)] * 2, cycles, 5)
             assert whole.repeats == one.repeats == (cycles == 400)
             np.testing.assert_array_equal(one.amplitudes, whole.amplitudes)
             np.testing.assert_array_equal(two.amplitudes, whole.amplitudes)
@@ -158,7 +171,7 @@ def test_exact_a_run_in_brief_shows_what_the_run_shows():
 def test_exact_ring_of_an_element_that_holds():
     """In closed form, as a fit to the samples finds it, at the frequency of mode and element together."""
     modes, drive = basis(1.0, 0.02), SineDrive(1.0, 0.31)
-    done = histories.simulate(modes, drive, [elements_of([60.0], [0.02])], 20, window=4)
+    done = histories.simulate(modes, drive, [make_elements([60.0], [0.02])], 20, window=4)
     amplitude, own, damping = done.ring
     assert own == pytest.approx(np.sqrt(61.0 - 0.02**2)) and damping == pytest.approx(
         0.02 / np.sqrt(61.0)
@@ -173,6 +186,6 @@ def test_exact_ring_of_an_element_that_holds():
 
 def test_exact_nothing_rings_where_sticks_are_short():
     done = histories.simulate(
-        basis(1.0, 0.02), SineDrive(1.0, 1.0), [elements_of([3.0], [0.1])], 20, window=4
+        basis(1.0, 0.02), SineDrive(1.0, 1.0), [make_elements([3.0], [0.1])], 20, window=4
     )
     assert done.ring[0] == 0.0

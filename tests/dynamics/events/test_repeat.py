@@ -5,7 +5,7 @@ import pytest
 
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import histories
-from patchfem.dynamics.events.elements import elements_of
+from patchfem.dynamics.events.elements import make_elements
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import levels
 
@@ -26,7 +26,7 @@ def case(modes: int, faces: int, elements: int) -> tuple:
     )
     y = np.linspace(0.1, 0.5, elements)
     groups = [
-        elements_of(np.full(elements, 1.0 / elements), y * (1 + 0.3 * k)) for k in range(faces)
+        make_elements(np.full(elements, 1.0 / elements), y * (1 + 0.3 * k)) for k in range(faces)
     ]
     return basis, SineDrive(1.5, 1.3), groups
 
@@ -117,7 +117,7 @@ def test_exact_a_run_that_stops_for_want_of_rows_is_the_run(monkeypatch):
         modes, drive, groups = case(*shape)
         whole = histories.simulate(modes, drive, groups, 13, window=4)
         for rows in (3, 7, 64):
-            monkeypatch.setattr(histories, "CHUNK", rows)
+            monkeypatch.setattr(histories, "ROWS_PER_CALL", rows)
             parts = histories.simulate(modes, drive, groups, 13, window=4)
             np.testing.assert_array_equal(parts.amplitudes, whole.amplitudes)
             np.testing.assert_array_equal(parts.phasors, whole.phasors)

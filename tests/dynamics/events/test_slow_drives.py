@@ -8,8 +8,8 @@ from event_reference import basis_of, random_basis
 
 from patchfem.core import DriveSegment, ModalBasis, SineDrive
 from patchfem.dynamics.events import histories
-from patchfem.dynamics.events.elements import elements_of
-from patchfem.dynamics.events.modal_system import plant_of
+from patchfem.dynamics.events.elements import make_elements
+from patchfem.dynamics.events.modal_system import make_modal_system
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Piecewise, Recorded, Sweep
 
@@ -20,7 +20,11 @@ def both(monkeypatch, *given):
     """A run, and the same in short pieces alone."""
     long = histories.simulate(*given)
     with monkeypatch.context() as patch:
-        patch.setattr(histories, "plant_of", lambda modes: plant_of(modes)._replace(slow=0.0))
+        patch.setattr(
+            histories,
+            "make_modal_system",
+            lambda modes: make_modal_system(modes)._replace(slow_rate=0.0),
+        )
         return long, histories.simulate(*given)
 
 
@@ -88,7 +92,7 @@ def test_exact_long_pieces_of_elements_are_the_short_ones(monkeypatch, drive, st
     cycles = (
         2 if drive.segments else drive.duration / drive.period if hasattr(drive, "duration") else 1
     )
-    same(*both(monkeypatch, TWO, drive, [elements_of(stiffness, limit / stiffness)], cycles, 1))
+    same(*both(monkeypatch, TWO, drive, [make_elements(stiffness, limit / stiffness)], cycles, 1))
 
 
 @pytest.mark.parametrize("zeta", [0.003, 0.5, 1.0, 4.0])
@@ -103,7 +107,7 @@ def test_always_pieces_do_not_grow_with_the_cycles_of_the_mode(zeta):
 
 def test_always_what_does_not_die_out_is_not_left_out():
     for modes in (basis_of([1.0, 2.0], 0.0, [[1.0, 1.0]]), basis_of([0.0, 2.0], 0.1, [[1.0, 1.0]])):
-        assert plant_of(modes).slow == 0.0
+        assert make_modal_system(modes).slow_rate == 0.0
 
 
 @pytest.mark.parametrize("zeta", [0.01, 1.0, 5.0])
@@ -127,7 +131,7 @@ def test_exact_the_limit_of_slow_motion_of_elements_is_statics():
     """Three elements beside a spring, all in statics: the loop is that of Masing's rule, force by force."""
     modes = ModalBasis(("m",), *(np.array([x]) for x in (1.0, 0.05, 1.0, 1.0, 1.0)), 1.0)
     k, y = np.array([0.5, 1.0, 0.4]), np.array([0.1, 0.2, 0.4])
-    (loop,) = histories.simulate(modes, SineDrive(1.0, 1e-7), [elements_of(k, y)], 3, 1).loops
+    (loop,) = histories.simulate(modes, SineDrive(1.0, 1e-7), [make_elements(k, y)], 3, 1).loops
     slide = 1.0 - np.sum(k * y)  # all slip at the peak
     assert abs(loop.displacement_harmonic) == pytest.approx(slide, rel=0.1) and slide > 0.4
     assert loop.work == pytest.approx(np.sum(4 * k * y * (slide - y)), rel=1e-11)

@@ -7,7 +7,7 @@ import pytest
 
 from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
 from patchfem.dynamics.grooves.climbing import ClimbingModel
-from patchfem.dynamics.grooves.run import model_of
+from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.march.instances import follow_path
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import element_model, points_model
@@ -84,7 +84,7 @@ def test_always_short_bonds_are_coulombs_law_on_the_flank(law):
     """The amplitude goes to that of the exact stops and releases; what rings on the bonds dies out with them."""
     grooves = Grooves(80e-6, 7.5e-6, 0.3)
     true = march(
-        BASIS, DRIVE, model_of(grooves, LOAD, MU, MU, None, BASIS), 6, 100, window=3
+        BASIS, DRIVE, make_model(grooves, LOAD, MU, MU, None, BASIS), 6, 100, window=3
     ).amplitudes[-1, 1]
     far, near, last = (
         abs(marched(LAWS[law][0](length), grooves, steps) - true)
@@ -129,7 +129,7 @@ def test_order_two_a_lifted_mass_that_starts_with_a_speed():
     )
     still = SineDrive(0.0, DRIVE.omega)
     true = march(
-        BASIS, still, model_of(grooves, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start
+        BASIS, still, make_model(grooves, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start
     ).response.slide
     coarse, fine = (
         np.abs(

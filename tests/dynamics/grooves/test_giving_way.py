@@ -103,8 +103,8 @@ def coulomb(grooves, tolerance, compliance=GIVING):
     patch = SimpleNamespace(
         pressure=SimpleNamespace(sigma_n=LOAD * SHARE), pieces=ones, giving=compliance
     )
-    return climbing.giving(
-        climbing.model_of(grooves, LOAD, plastic(MU, 0.0), None), patch, None, tolerance
+    return climbing.with_shear_modes(
+        climbing.make_model(grooves, LOAD, plastic(MU, 0.0), None), patch, None, tolerance
     )
 
 

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import InitialState, ModalBasis, Outcome, PatchfemError, SineDrive
-from patchfem.dynamics.grooves.run import model_of
+from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.march.march import fresh, march
 from patchfem.friction.grooves import Grooves
 from patchfem.response.measures import energy_balance
@@ -24,7 +24,7 @@ def modes(omega, zeta=0.0, mass=1.0):
 def marched(case, cycles: int, steps: int):
     basis = modes(case.omega, case.zeta, case.mass)
     grooves = Grooves(case.wavelength, case.amplitude, case.phase, case.lifted)
-    model = model_of(grooves, case.load, case.static, case.kinetic, None, basis)
+    model = make_model(grooves, case.load, case.static, case.kinetic, None, basis)
     return march(
         basis, SineDrive(case.acceleration, case.drive), model, cycles, steps, window=cycles
     )
@@ -40,7 +40,7 @@ def test_exact_without_friction_it_is_a_pendulum(angle):
     done = march(
         basis,
         SineDrive(0.0, 2 * np.pi / period),
-        model_of(grooves, 115.0, 0.0, 0.0, None, basis),
+        make_model(grooves, 115.0, 0.0, 0.0, None, basis),
         3,
         50,
         start=InitialState(np.array([place]), np.zeros(1)),
@@ -121,7 +121,7 @@ def test_exact_it_breaks_away_at_the_limits_of_the_flank(place):
     for way, limit in ((1, load * (t + mu) / (1 - mu * t)), (-1, load * (t - mu) / (1 + mu * t))):
         for share, moves in ((-1e-6, False), (1e-6, True)):
             push = limit + way * share * load
-            model = model_of(grooves, load, mu, mu, None, basis)
+            model = make_model(grooves, load, mu, mu, None, basis)
             done = march(
                 basis,
                 step(-push, 0.01),
@@ -136,7 +136,7 @@ def test_exact_it_breaks_away_at_the_limits_of_the_flank(place):
 
 def test_refuses_a_lifted_mass_that_takes_the_whole_inertia():
     with pytest.raises(PatchfemError, match=r"must be below [\d.]+ kg"):
-        model_of(Grooves(80e-6, 8e-6, 0.0, 100.0), 100.0, 0.6, 0.6, None, modes(900.0))
+        make_model(Grooves(80e-6, 8e-6, 0.0, 100.0), 100.0, 0.6, 0.6, None, modes(900.0))
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 6, 9))])
@@ -165,7 +165,7 @@ def test_always_a_rig_of_80_um_grooves_runs_away_from_rest_at_8_g(frequency, sta
         np.array([1.0, 0.0]),
         mass,
     )
-    model = model_of(
+    model = make_model(
         Grooves(80e-6, 0.51 * 80e-6 / (2 * np.pi), 0.0, mass), load, 0.4, 0.4, None, basis
     )
     for level, outcome in ((stays, None), (leaves, Outcome.EXCEEDS_TRAVEL)):
@@ -185,7 +185,7 @@ def test_exact_a_force_that_follows_the_speed_along_the_flank(lifted):
     done = march(
         basis,
         SineDrive(case.acceleration, case.drive),
-        model_of(grooves, case.load, case.static, case.static, speed, basis),
+        make_model(grooves, case.load, case.static, case.static, speed, basis),
         3,
         100,
     )
@@ -209,7 +209,7 @@ def test_always_a_fork_goes_on_as_the_march_does():
         modes(case.omega, case.zeta, case.mass),
         levels([case.acceleration, 0.0], case.drive, 2),
     )
-    model = model_of(
+    model = make_model(
         Grooves(case.wavelength, case.amplitude, case.phase, case.lifted),
         case.load,
         case.static,
@@ -241,7 +241,7 @@ def test_exact_two_modes_on_flat_grooves_by_the_exact_engine(kinetic):
     done = march(
         basis,
         drive,
-        model_of(Grooves(80e-6, 1e-17), 115.0, 0.4, kinetic, None, basis),
+        make_model(Grooves(80e-6, 1e-17), 115.0, 0.4, kinetic, None, basis),
         8,
         100,
         window=4,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from patchfem.core import ModalBasis, NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics.harmonic.balance import cycle_energy, periodic_response
 from patchfem.dynamics.harmonic.forces import Group
-from patchfem.dynamics.harmonic.harmonic import Balance, newton, pack, unpack
+from patchfem.dynamics.harmonic.harmonic import Balance, pack, solve_newton, unpack
 from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, Spring, Track, synthesis
 from patchfem.dynamics.harmonic.point import balance_of, group_of, point
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model
@@ -330,4 +330,4 @@ def test_refuses_to_call_an_unbalanced_motion_steady():
     group = Group(modes, Jenkins([10.0], [0.08]), 256)
     balance = balance_of(modes, group, 256)
     with pytest.raises(NotConverged, match="did not converge in"):
-        newton(balance, np.full(15, 3.0), 1.0, 1.0, 7, most=2)
+        solve_newton(balance, np.full(15, 3.0), 1.0, 1.0, 7, most=2)

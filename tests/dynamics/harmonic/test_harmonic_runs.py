@@ -7,7 +7,7 @@ from scene_texts import NONLOCAL, POINT, STRUCTURE
 
 from patchfem import plan
 from patchfem.core import ModalBasis, NotConverged, SineDrive
-from patchfem.dynamics.harmonic.balance import periodic_response, regime
+from patchfem.dynamics.harmonic.balance import find_regime, periodic_response
 from patchfem.dynamics.harmonic.branch import response
 from patchfem.dynamics.harmonic.laws import Jenkins, Spring, synthesis
 from patchfem.dynamics.harmonic.point import group_of, point
@@ -122,11 +122,15 @@ def test_exact_regimes():
     ):
         # swing amplitude*2 without dynamics: far below resonance with a stiff spring the slide is level/stiffness
         p = point(modes, SineDrive(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7)
-        name, share = regime(p)
+        name, share = find_regime(p)
         assert (name, share) == (want[0], pytest.approx(want[1]))
-    assert regime(point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
-    assert regime(point(modes, SineDrive(1e-4, 0.5), bonds(1.0, 1.0), harmonics=3))[0] == "stuck"
-    assert regime(point(modes, SineDrive(1.0, 0.5), bonds(0.1, 0.1), harmonics=7))[0] == "slides"
+    assert find_regime(point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
+    assert (
+        find_regime(point(modes, SineDrive(1e-4, 0.5), bonds(1.0, 1.0), harmonics=3))[0] == "stuck"
+    )
+    assert (
+        find_regime(point(modes, SineDrive(1.0, 0.5), bonds(0.1, 0.1), harmonics=7))[0] == "slides"
+    )
 
 
 @pytest.mark.parametrize("limit, bounded", [(0.9, True), (0.7, False)])

@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 from test_smooth import MASS
 
 from patchfem.core import InitialState, Response, SineDrive
-from patchfem.dynamics.smooth.arrays import ENDS
-from patchfem.dynamics.smooth.reader import Parts
+from patchfem.dynamics.smooth.arrays import NODE_PLACES
+from patchfem.dynamics.smooth.reader import StepParts
 from patchfem.dynamics.smooth.run import Motion
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.stretch import points_element
@@ -20,11 +20,11 @@ PERIOD, CYCLES = 0.7, 3
 
 
 def parts(slide, slip=None, count: int = 61):
-    """Parts of functions of time [s], in `count` steps of uneven length."""
+    """StepParts of functions of time [s], in `count` steps of uneven length."""
     edges = PERIOD * CYCLES * np.linspace(0, 1, count + 1) ** 1.2
-    time = (edges[:-1, None] + np.diff(edges)[:, None] * ENDS).ravel()
+    time = (edges[:-1, None] + np.diff(edges)[:, None] * NODE_PLACES).ravel()
     none, one = np.zeros((time.size, 1)), slide(time)
-    return Parts(
+    return StepParts(
         Response(
             time,
             none,
@@ -48,7 +48,7 @@ def test_exact_integrals_and_peaks_of_known_histories():
     seen = parts(lambda t: 3 * np.cos(omega * t - 0.4) + np.sin(3 * omega * t) + 0.2 * t)
     dense = np.linspace(0, PERIOD * CYCLES, 2_000_001)
     curve = 3 * np.cos(omega * dense - 0.4) + np.sin(3 * omega * dense) + 0.2 * dense
-    peak, unsure = seen.largest(seen.of("slide"))
+    peak, unsure = seen.find_maximum(seen.values("slide"))
     assert peak == pytest.approx(curve.max(), rel=1e-9) and unsure < 1e-5
     # of 0.2 t over whole cycles
     line = 0.2 * 2 / (CYCLES * PERIOD) * CYCLES * PERIOD / (-1j * omega)
@@ -68,7 +68,7 @@ def test_exact_time_of_stick_and_starts_of_slip_are_where_half_of_the_slide_is_i
 
     slide = np.polynomial.Polynomial([0.0, 1.0])
     seen = parts(slide, lambda t: 0.5 * t - 0.2 * np.cos(2 * omega * t + 0.3) / omega)
-    held, starts = seen.holds()
+    held, starts = seen.find_sticks()
     assert held == pytest.approx(PERIOD * CYCLES / 2, rel=1e-6)
     at = np.arange(-0.15, 2 * CYCLES * np.pi, np.pi) / omega
     wanted = [
@@ -110,10 +110,10 @@ def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
     modes = one_mode(OMEGA, zeta, MASS)
     run, close = (Motion(modes, drive, element(law, load), 40, 1e-9, start=start) for _ in range(2))
     end, begin = 40 * drive.period, 30 * drive.period
-    fine, _ = run.last(end, end - begin)[1]
-    close.until(begin)
+    fine, _ = run.run_last_cycles(end, end - begin)[1]
+    close.run_to(begin)
     close.tolerance *= 1e-2
-    seen = close.response(close.until(end, np.linspace(begin, end, 100001)))
+    seen = close.response(close.run_to(end, np.linspace(begin, end, 100001)))
     for found, values in (
         (fine.acceleration_peak, np.abs(seen.acceleration)),
         (fine.loops[0].max_force, np.abs(seen.force)),
@@ -127,6 +127,6 @@ def test_exact_peaks_are_those_of_the_motion_seen_closely(name):
 def test_exact_a_step_of_no_length_adds_nothing_to_a_mean(recwarn):
     """As an event at the end of a step leaves one: the mean of x = t over [0.5, 1.5] is 1, and nothing is warned of."""
     edges = [(0.0, 1.0), (1.0, 1.0), (1.0, 2.0)]
-    time = np.concatenate([begin + (end - begin) * ENDS for begin, end in edges])
-    found = Parts(SimpleNamespace(time=time, slide=time), 1.0)
+    time = np.concatenate([begin + (end - begin) * NODE_PLACES for begin, end in edges])
+    found = StepParts(SimpleNamespace(time=time, slide=time), 1.0)
     assert found.mean("slide", 0.5, 1.5) == pytest.approx(1.0, rel=1e-14) and not recwarn.list

@@ -6,8 +6,8 @@ from march_paths import OMEGA, one_mode
 from test_smooth import MASS, element
 
 from patchfem.core import SineDrive
-from patchfem.dynamics.smooth.arrays import DONE
-from patchfem.dynamics.smooth.run import REPEATS, Motion, simulate
+from patchfem.dynamics.smooth.arrays import COUNT
+from patchfem.dynamics.smooth.run import MAX_REPEAT_CHANGE, Motion, simulate
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
 from patchfem.friction.laws.tanh import TanhLaw
@@ -24,18 +24,18 @@ def law_of(name):
 @pytest.mark.parametrize("name", LAWS)
 def test_exact_cycles_that_are_left_out_are_as_the_last_one(name):
     left, whole = (Motion(MODES, SINE, law_of(name), 400, 1e-9) for _ in range(2))
-    left.onward(400 * SINE.period)
-    whole.until(400 * SINE.period)
-    size = abs(whole.kept.cycles[:2]).max()
+    left.run_ahead_to(400 * SINE.period)
+    whole.run_to(400 * SINE.period)
+    size = abs(whole.record.cycles[:2]).max()
     assert (
-        0 < left.unlike <= REPEATS * 1e-9
-        and left.kept.counters[DONE] < 0.5 * whole.kept.counters[DONE]
+        0 < left.repeat_change <= MAX_REPEAT_CHANGE * 1e-9
+        and left.record.counters[COUNT.accepted] < 0.5 * whole.record.counters[COUNT.accepted]
     )
     assert left.time == pytest.approx(whole.time, rel=1e-14)
     scale = [size, size * OMEGA]
-    assert left.moving.y[:2] / scale == pytest.approx(whole.moving.y[:2] / scale, abs=1e-7)
-    assert left.kept.cycles[:2] / size == pytest.approx(whole.kept.cycles[:2] / size, abs=1e-7)
-    one, other = left.book(), whole.book()
+    assert left.arrays.state[:2] / scale == pytest.approx(whole.arrays.state[:2] / scale, abs=1e-7)
+    assert left.record.cycles[:2] / size == pytest.approx(whole.record.cycles[:2] / size, abs=1e-7)
+    one, other = left.energy_ledger(), whole.energy_ledger()
     for key in ("work_in", "viscous", "friction"):
         assert one[key] == pytest.approx(other[key], rel=1e-7), key
     # a sum of |work| over steps, which may differ
@@ -58,5 +58,5 @@ def test_exact_the_last_cycles_after_a_million_others():
 
 def test_always_a_motion_that_still_grows_is_not_carried_on():
     run = Motion(one_mode(OMEGA, 1e-5, MASS), SineDrive(49.0, OMEGA), law_of("tanh"), 300, 1e-9)
-    run.onward(300 * 2 * np.pi / OMEGA)
-    assert run.unlike == 0 and run.time == 300 * 2 * np.pi / OMEGA
+    run.run_ahead_to(300 * 2 * np.pi / OMEGA)
+    assert run.repeat_change == 0 and run.time == 300 * 2 * np.pi / OMEGA

@@ -9,7 +9,7 @@ from scipy.integrate import simpson
 from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
-from patchfem.dynamics.smooth.arrays import DONE
+from patchfem.dynamics.smooth.arrays import COUNT
 from patchfem.dynamics.smooth.run import Motion, simulate
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.bouc_wen import BoucWen
@@ -46,7 +46,7 @@ def compared(modes, law, form, cycles=3, drive=SINE, kink=None, start=None, tole
         cycles * drive.period,
     )
     times, n = np.linspace(0, end, 50 * cycles + 1), modes.omega.size
-    rows = run.until(end, times)
+    rows = run.run_to(end, times)
     z, force = ref.integrate(modes, drive, form(law, LOAD), end, times, start, kink)
     return (
         abs(rows[:, 1 : 1 + n].T - z).max() / abs(z).max(),
@@ -177,36 +177,36 @@ def test_exact_travel_ends_a_run_where_the_output_passes_it():
     assert done.outcome is Outcome.EXCEEDS_TRAVEL
     assert abs(done.window.output[-1]) <= 2e-5 and done.cycles_done < 20
     row = Motion(ONE, SINE, element(SHORT), 20, 1e-9, 2e-5)
-    row.until(1.0)
-    assert abs(row.moving.y[0]) == pytest.approx(2e-5, rel=1e-11)
+    row.run_to(1.0)
+    assert abs(row.arrays.state[0]) == pytest.approx(2e-5, rel=1e-11)
 
 
 def test_exact_a_fork_goes_on_as_the_run_would():
     run = Motion(ONE, SINE, element(SHORT), 4, 1e-10)
-    run.until(1.3 * SINE.period)
+    run.run_to(1.3 * SINE.period)
     twin = run.fork(SINE)
-    run.until(3 * SINE.period)
-    twin.until(3 * SINE.period)
+    run.run_to(3 * SINE.period)
+    twin.run_to(3 * SINE.period)
     assert (
-        np.array_equal(run.moving.y, twin.moving.y)
-        and twin.kept.counters[DONE] == run.kept.counters[DONE]
+        np.array_equal(run.arrays.state, twin.arrays.state)
+        and twin.record.counters[COUNT.accepted] == run.record.counters[COUNT.accepted]
     )
 
 
 def test_exact_phasors_of_chosen_cycles_are_those_of_every_cycle():
     every, chosen = (Motion(THREE, SINE, element(SHORT), 8, 1e-9) for _ in range(2))
-    chosen.ends_only(3)
+    chosen.request_last_phasors(3)
     count = 1024
-    rows = every.until(8 * SINE.period, np.arange(8 * count + 1) / count * SINE.period)
-    chosen.until(8 * SINE.period)
+    rows = every.run_to(8 * SINE.period, np.arange(8 * count + 1) / count * SINE.period)
+    chosen.run_to(8 * SINE.period)
     kept = np.array([False, True, False, False, True, False, False, True])
-    assert np.array_equal(chosen.kept.cycles[2:, kept], every.kept.cycles[2:, kept])
-    assert np.isnan(chosen.kept.cycles[2:, ~kept]).all() and np.array_equal(
-        chosen.moving.y, every.moving.y
+    assert np.array_equal(chosen.record.cycles[2:, kept], every.record.cycles[2:, kept])
+    assert np.isnan(chosen.record.cycles[2:, ~kept]).all() and np.array_equal(
+        chosen.arrays.state, every.arrays.state
     )
     output = rows[:, 1:4] @ THREE.output * np.exp(-2j * np.pi * np.arange(8 * count + 1) / count)
     turned = [2 / count * simpson(output[k * count : (k + 1) * count + 1]) for k in range(8)]
-    assert every.kept.cycles[2] + 1j * every.kept.cycles[3] == pytest.approx(
+    assert every.record.cycles[2] + 1j * every.record.cycles[3] == pytest.approx(
         np.array(turned), rel=1e-8
     )
 
@@ -230,7 +230,7 @@ def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
     )
     run, end = Motion(ONE, drive, element(SHORT), 4, 1e-11, start=start), 4 / 143
     times = np.linspace(0, end, 201)
-    rows, stiff = run.until(end, times), 0.3 * LOAD / SHORT.length / MASS
+    rows, stiff = run.run_to(end, times), 0.3 * LOAD / SHORT.length / MASS
     free = np.sqrt(OMEGA**2 + stiff - (0.003 * OMEGA) ** 2)
     if start is not None:
         # the bonds are unstretched at the start
@@ -241,7 +241,7 @@ def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
         sway = np.exp(-decay * times) * (np.cos(free * times) + decay / free * np.sin(free * times))
         want = rest + (1e-14 - rest) * sway
         assert rows[:, 1] == pytest.approx(want, abs=1e-7 * 1e-14)
-    assert run.kept.counters[DONE] < 1500
+    assert run.record.counters[COUNT.accepted] < 1500
 
 
 @pytest.mark.parametrize("share", [0.33, 0.348, 0.385])

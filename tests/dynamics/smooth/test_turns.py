@@ -6,7 +6,7 @@ from march_paths import OMEGA, one_mode
 from test_smooth import ONE, element
 
 from patchfem.core import InitialState, Outcome, SineDrive
-from patchfem.dynamics.smooth.arrays import DONE, REFUSED
+from patchfem.dynamics.smooth.arrays import COUNT
 from patchfem.dynamics.smooth.run import Motion
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws.stretch import points_element
@@ -20,7 +20,7 @@ PERIOD = 2 * np.pi / OMEGA
 def moved(law, push: float, cycles: float) -> tuple:
     """(Motion, times of its reversals [s]) of a motion under a sine of `push` [m s-2]."""
     run = Motion(ONE, SineDrive(push, OMEGA), law, 20, 1e-9)
-    run.until(cycles * PERIOD)
+    run.run_to(cycles * PERIOD)
     return run, np.concatenate(run.turns)[:, 0]
 
 
@@ -45,7 +45,7 @@ def test_exact_a_motion_that_touches_its_rest_is_that_which_turns_there_twice(fe
     (one, _), (other, times) = (moved(law, push, 1) for push in (few, many))
     assert times.size == count + 2 and np.diff(times).min() > 0
     size = [1e-6, 1e-6 * OMEGA]  # of the motion and its rate
-    assert abs(one.moving.y[:2] - other.moving.y[:2]) / size == pytest.approx(0, abs=1e-8)
+    assert abs(one.arrays.state[:2] - other.arrays.state[:2]) / size == pytest.approx(0, abs=1e-8)
 
 
 def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
@@ -62,16 +62,16 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
         start=InitialState(np.array([4.631e-5]), np.zeros(1)),
     )
     for cycle in range(105):
-        run.until(cycle / 162.4)
+        run.run_to(cycle / 162.4)
     z, v, done = (
-        abs(run.moving.y[0]),
-        abs(run.moving.y[1]),
-        run.kept.counters[DONE : REFUSED + 1].sum(),
+        abs(run.arrays.state[0]),
+        abs(run.arrays.state[1]),
+        run.record.counters[COUNT.accepted : COUNT.refused + 1].sum(),
     )
     assert run.outcome is None and done < 2000
     assert z < 1e-25 * 4.631e-5 and v < 1e-25 * 4.631e-5 * omega
     # what friction and damping took is the energy of the start
-    assert run.moving.y[3] + run.moving.y[4] == pytest.approx(
+    assert run.arrays.state[3] + run.arrays.state[4] == pytest.approx(
         0.5 * 0.7626 * (omega * 4.631e-5) ** 2, rel=1e-8
     )
 
@@ -91,9 +91,12 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
     run = Motion(
         one_mode(omega, 0.05, 0.4143), drives.release(1 / 62.86), law, 108, tolerance, start=start
     )
-    run.until(108 / 62.86)
-    y, force = run.moving.y, run.settled()[0][5]
-    assert run.outcome is None and run.kept.counters[DONE : REFUSED + 1].sum() < 40_000
+    run.run_to(108 / 62.86)
+    y, force = run.arrays.state, run.read_state()[0][5]
+    assert (
+        run.outcome is None
+        and run.record.counters[COUNT.accepted : COUNT.refused + 1].sum() < 40_000
+    )
     assert abs(y[1]) < 1e-9 * omega * abs(y[0])
     # the bonds balance the spring
     assert force == pytest.approx(-0.4143 * omega**2 * y[0], rel=1e-8)
@@ -103,10 +106,10 @@ def test_exact_a_long_call_is_left_now_and_then_and_goes_on_to_the_last_bit():
     """So a signal is heard. The room for turns ends calls elsewhere; neither changes the motion."""
     law, told = element(Bonds(0.3, 5e-6)), []
     often, long = (Motion(ONE, SineDrive(49.0, OMEGA), law, 2500, 1e-9) for _ in range(2))
-    long.kept = long.kept._replace(turns=np.zeros((9000, 9)))
+    long.record = long.record._replace(turns=np.zeros((9000, 9)))
     long.progress = told.append
     for run in (often, long):
-        run.until(2500 * PERIOD)
+        run.run_to(2500 * PERIOD)
     assert run.outcome is not Outcome.NOT_CONVERGED and len(told) > 1
-    np.testing.assert_array_equal(long.moving.y, often.moving.y)
+    np.testing.assert_array_equal(long.arrays.state, often.arrays.state)
     np.testing.assert_array_equal(np.concatenate(long.turns), np.concatenate(often.turns))

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ....dynamics.events import histories
-from ....dynamics.events.elements import JOINED, merged
-from ....dynamics.events.names_kernels import FORCE, HIGH, LOW, REACH
-from ....dynamics.events.reading import joined
+from ....dynamics.events.elements import CELL_MERGES, merge_elements
+from ....dynamics.events.positions_kernels import INTERFACE, RUN
+from ....dynamics.events.reading import join_readings
 from ....effects import law_has_trait
 from ....friction.record import make_law
 from ....response import run_events
@@ -80,7 +80,7 @@ def case_of(model, pairs: int = 0) -> Case:
     element = make_law(model.friction, model.point.load).element(model.point.load)
     group = elements_of_law(element)
     for _ in range(pairs):
-        group = merged(group)
+        group = merge_elements(group)
     return Case(model, (group,), 1e-3 * element.length, model.point.load)
 
 
@@ -106,10 +106,10 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     if law_has_trait(models[0].friction.law, "cells"):
         fewer = [
             [
-                case._replace(groups=tuple(merged(part, *joined) for part in case.groups))
+                case._replace(groups=tuple(merge_elements(part, *merge) for part in case.groups))
                 for case in cases
             ]
-            for joined in JOINED
+            for merge in CELL_MERGES
         ]
         return with_coarser_errors(
             out,
@@ -140,15 +140,17 @@ def runs_of_cases(
     -------
     Runs
     """
-    histories.warm_up(say)
+    histories.load_kernels(say)
     rig = cases[0].model.rig
-    histories.expect(rig.modes, rig.drive.signal, cases[0].groups, cycles, window, len(cases))
+    histories.announce_runs(
+        rig.modes, rig.drive.signal, cases[0].groups, cycles, window, len(cases)
+    )
     done = [None] * len(cases)
 
     def go(part: slice) -> None:
         """Run a part of the cases."""
         rigs = [(one.model.rig, one.groups) for one in cases[part]]
-        done[part] = histories.briefly(
+        done[part] = histories.simulate_batch(
             ((rig.modes, rig.drive.signal, groups, rig.start) for rig, groups in rigs),
             cycles,
             window,
@@ -164,7 +166,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
     Work on rigid elements is all dissipated. They keep a single mode at rest during stick, so that
     nothing rings, and their drift has the round-off of two means.
     """
-    reading, models = joined([one.reading for one in done]), [case.model for case in cases]
+    reading, models = join_readings([one.reading for one in done]), [case.model for case in cases]
     book = {name: np.array([one.ledger[name] for one in done]) for name in done[0].ledger}
     stiffness, size, held, load, tolerance = (
         np.array(column)
@@ -182,7 +184,9 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         )
     )
     loop, rigid = reading.loop(), cases[0].groups[0].static > 0
-    stuck = loop.slip_range / 2 <= np.maximum(held, COORDINATE_ROUND_OFF * reading.run[:, REACH])
+    stuck = loop.slip_range / 2 <= np.maximum(
+        held, COORDINATE_ROUND_OFF * reading.run[:, RUN.max_coordinate]
+    )
     lost, rings = (
         np.zeros(len(done), bool),
         {name: np.full(len(done), np.nan) for name in ("ring_frequency", "ring_damping")},
@@ -225,10 +229,11 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
     errors = {name: np.zeros(len(done)) for name in values}
     if rigid:
         errors["drift_per_cycle"] = 1e-14 * np.maximum(
-            np.abs(reading.of(LOW)), np.abs(reading.of(HIGH))
+            np.abs(reading.interface_value(INTERFACE.min_slide)),
+            np.abs(reading.interface_value(INTERFACE.max_slide)),
         )
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
-    loads = stuck & (reading.rise > tolerance * reading.of(FORCE))
+    loads = stuck & (reading.rise > tolerance * reading.interface_value(INTERFACE.max_force))
     return Runs(
         cycles,
         window,

@@ -13,11 +13,11 @@ from ....compiled import load
 from ....core import IntegratedMeasures, NotConverged, Outcome, SineDrive
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.balance import cycle_energy, periodic_response
-from ....dynamics.harmonic.balance import regime as balanced_regime
+from ....dynamics.harmonic.balance import find_regime as balanced_regime
 from ....dynamics.harmonic.forces import Group
 from ....dynamics.harmonic.laws import Interlock, Spring
-from ....dynamics.harmonic.point import finer
 from ....dynamics.harmonic.point import point as periodic_point
+from ....dynamics.harmonic.point import refine_point
 from ....dynamics.harmonic.stability import with_stability
 from ....dynamics.integrated import Run
 from ....formatting import format_length
@@ -162,7 +162,7 @@ class BalanceFinder:
         """
         out = {name: abs(v) * min(found.error, 1.0) for name, v in values.items()}
         try:
-            better = finer(found, self.modes, drive)
+            better = refine_point(found, self.modes, drive)
         except NotConverged:
             return out
         left = max(found.left, better.left)
@@ -268,7 +268,7 @@ class BalanceFinder:
 
         The frequency is scaled by the swept range.
         """
-        return branches.way(one.near, other.near, self._range)
+        return branches.distance(one.near, other.near, self._range)
 
     def between(self, one: Shown, other: Shown, share: float) -> Shown:
         """Return the point of a curve at a fraction of the arc length between two of its points.
@@ -277,7 +277,8 @@ class BalanceFinder:
         """
         drive = replace(one.drive, omega=one.near.omega)
         return self._of_branch(
-            branches.between(self.modes, drive, one.near, other.near, share, self._range), drive
+            branches.point_between(self.modes, drive, one.near, other.near, share, self._range),
+            drive,
         )
 
     @property

@@ -70,7 +70,7 @@ class Maps(Followed):
     name, elements, tries_another = "", None, False
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
-        histories.warm_up(say)
+        histories.load_kernels(say)
         self.model, self.numerics, self.modes, self.patch, self.frames = (
             model,
             numerics,
@@ -193,11 +193,11 @@ class YieldFinder(Maps):
 
     def begun(self, memory):
         """Return the memory with energies counted from the start (see `Maps.begun`)."""
-        return event_elements.books_begin(memory)
+        return event_elements.reset_work(memory)
 
     def repeating(self, drive, near) -> Repeating:
         """Return the motion that repeats, started from the Point `near` or from rest."""
-        one = steady.steady(self.modes, drive, self.groups, near)
+        one = steady.solve_steady(self.modes, drive, self.groups, near)
         return Repeating(
             one.start,
             one.memory,
@@ -230,7 +230,9 @@ class EventFinder(Maps):
         they are not used.
         """
         falls = bool(np.any(self.forces[0] > self.forces[1]))
-        one = stick_steady.steady(self.modes, drive, self.groups, start=near if falls else None)
+        one = stick_steady.solve_steady(
+            self.modes, drive, self.groups, start=near if falls else None
+        )
         bounded = one.regime != "unbounded"
         return Repeating(
             one.start,

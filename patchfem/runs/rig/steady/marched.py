@@ -88,12 +88,12 @@ class MarchFinder(Followed):
             run.contact = type(near.contact)(*(array.copy() for array in near.contact))
             run.state[:] = near.state
             run.placed(*near.state)
-        left = orbits.settled(run)
+        left = orbits.march_to_periodic(run)
         if run.outcome is not None and run.outcome is not Outcome.EXCEEDS_TRAVEL:
             raise NotConverged(run.message)
         if run.outcome is None and left > LOOSE:
             raise NotConverged(
-                f"no periodic motion was found within {orbits.MOST} cycles: "
+                f"no periodic motion was found within {orbits.MAX_CYCLES} cycles: "
                 f"the motion still changes by {left:.2g} of its amplitude from one cycle to the next; "
                 'use accuracy.method = "march"'
             )
@@ -101,7 +101,7 @@ class MarchFinder(Followed):
 
     def _read(self, run, steps: int, frames: int = 0) -> tuple:
         """Return the measures, the Mark of a cycle, snapshots, and whether the interface sticks."""
-        mark, snapshots = orbits.shown(run, frames)
+        mark, snapshots = orbits.march_cycle(run, frames)
         read = MarchReader(
             self.model, replace(self.numerics, steps=steps), self.patch, self.contact
         )
@@ -138,7 +138,7 @@ class MarchFinder(Followed):
             read = self._read(run, steps, self.frames)
         values, mark, snapshots, stuck = read
         between = peak_sampling_errors(mark.window, True)
-        found = orbits.multipliers(run) if run.outcome is None else np.zeros(0)
+        found = orbits.estimate_multipliers(run) if run.outcome is None else np.zeros(0)
         regime = "stuck" if stuck else "stick-slip" if values.get("stick_fraction") else "sliding"
         outcome, message = run.outcome or (Outcome.STUCK if stuck else Outcome.STEADY), run.message
         if not stuck and np.abs(found).max(initial=0.0) > 1 + ROUGH:
