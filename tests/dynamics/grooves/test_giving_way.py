@@ -154,7 +154,7 @@ def test_exact_coulombs_points_on_the_flank_by_least_energy():
     true = coulombs_points(GROOVES, slide, soft)
     here = march_slides(coulomb(GROOVES, 1e-3, soft), slide)[0][:, 0]
     np.testing.assert_allclose(here[:-1], true[:-1], rtol=0, atol=2e-3 * np.abs(true).max())
-    rigid = LOAD * GROOVES.ratio(slide[1:-1], np.sign(np.diff(slide)[1:]), MU)
+    rigid = LOAD * GROOVES.force_ratio(slide[1:-1], np.sign(np.diff(slide)[1:]), MU)
     # far from pieces that are rigid
     assert np.abs(rigid - true[1:-1]).max() > 0.5 * np.abs(true).max()
 
