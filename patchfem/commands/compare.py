@@ -1,4 +1,4 @@
-"""The verb that sets two measured surfaces side by side, before and after."""
+"""The command that compares two measured surfaces, before and after wear."""
 
 import json
 from pathlib import Path
@@ -114,7 +114,7 @@ def compare(
         raise Refused("compare: give two files BEFORE and AFTER, or a table of pairs with --pairs")
     folders = before.is_dir(), after.is_dir()
     if any(folders) and len(files) == 2 and not all(folders):
-        worn_runs.compare_runs(before, after)  # which refuses a file beside a folder
+        worn_runs.compare_runs(before, after)  # this raises the error for a file next to a folder
     if any(folders):
         _no_traces(
             {
@@ -149,7 +149,20 @@ def compare(
 
 
 def _table(path: Path, direction: str, how: dict, target: Path, json_: bool, quiet: bool) -> None:
-    """All pairs of a table; exit code 3 where some fail, 2 where all of them do."""
+    """Compare all pairs of a table; exit code 3 if some fail, 2 if all of them do.
+
+    Parameters
+    ----------
+    path : Path
+        The table.
+    direction : str
+        Axis of the traces whose line in the table states none.
+    how : dict
+        Settings of `verdict.judge_files`.
+    target : Path
+        Folder of the results.
+    json_, quiet : bool
+    """
     asked = tables.read_pairs(path)
     with results.Folder(target) as folder:
         with progress_bar(quiet) as done:
@@ -175,7 +188,7 @@ def _table(path: Path, direction: str, how: dict, target: Path, json_: bool, qui
 
 
 def _no_traces(asked: dict):
-    """Refuse what belongs to files of traces, beside a results folder."""
+    """Refuse options for measured surfaces if results folders are compared."""
     for name, value in asked.items():
         if value:
             raise Refused(
@@ -185,7 +198,7 @@ def _no_traces(asked: dict):
 
 
 def _runs(before: Path, after: Path, out, json_: bool):
-    """What wore off between the runs in two results folders."""
+    """Compare the wear between the runs in two results folders."""
     lost = worn_runs.compare_runs(before, after)
     found = worn.verdict(lost)
     data, target = (
@@ -205,7 +218,7 @@ def _runs(before: Path, after: Path, out, json_: bool):
 
 
 def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
-    """The scene with each surface as its profile; the traces are written beside the page."""
+    """Run a scene with each surface as its profile; the traces are written into the folder."""
     if not isinstance(part.before, profile.Profile):
         raise Refused(
             "compare --scene: the contact can be computed only for traces; write one line of heights of "

@@ -1,4 +1,4 @@
-"""What an installation has and lacks, each with the line that cures it."""
+"""Check of an installation: what it has and lacks, with the command that adds it."""
 
 import os
 import re
@@ -17,8 +17,8 @@ plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))
 plotter.add_mesh(pyvista.Sphere())
 assert plotter.screenshot(None, return_img=True).std() > 0
 """
-SECONDS = 60  # for a first picture on a slow disk
-# what pyproject.toml names: an installation that was made from an older one does not say so itself
+SECONDS = 60  # [s] for a first picture from a slow disk
+# Packages that pyproject.toml requires; an older installation does not know of new ones.
 NEEDED = (
     "numpy",
     "scipy",
@@ -46,7 +46,7 @@ EXTRAS = {
 
 
 class Finding(NamedTuple):
-    """One thing looked at: its name, whether it is fine, what was found, what to do ("" where nothing)."""
+    """Result of one check: its name, whether it is fine, what was found, what to do or ""."""
 
     name: str
     fine: bool
@@ -55,12 +55,12 @@ class Finding(NamedTuple):
 
 
 def examined() -> list[Finding]:
-    """Everything that a run may need, looked at now; a picture is drawn in a process of its own."""
+    """Check everything that a run may need; a picture is drawn in a separate process."""
     return [*_packages(), _cache(), _threads(), _window(), _film(), *_extras()]
 
 
 def _packages() -> Iterator[Finding]:
-
+    """Check the required packages."""
     yield Finding("python", sys.version_info >= (3, 11), sys.version.split()[0], "")
     yield Finding("patchfem", True, __version__, "")
     for name in NEEDED:
@@ -71,6 +71,7 @@ def _packages() -> Iterator[Finding]:
 
 
 def _version(name: str) -> str:
+    """Return the version of a package; "" if it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:
@@ -78,7 +79,7 @@ def _version(name: str) -> str:
 
 
 def _cache() -> Finding:
-    """Compiled code: a folder that cannot be written makes every command compile anew."""
+    """Check the cache of compiled code; without it every command compiles again."""
     folder, why = compiled.cache_folder(), compiled.why_elsewhere()
     sizes = [one.stat().st_size for one in folder.rglob("*") if one.is_file()]
     return Finding(
@@ -90,9 +91,10 @@ def _cache() -> Finding:
 
 
 def _threads() -> Finding:
+    """Return the number of cores that can be used."""
     try:
         cores = len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
+    except AttributeError:  # not available on every system
         cores = os.cpu_count() or 1
     return Finding(
         "threads",
@@ -103,13 +105,13 @@ def _threads() -> Finding:
 
 
 def _window() -> Finding:
-    """Whether the window on the pieces can be drawn here (patchfem view)."""
+    """Check whether the window of patchfem view can be drawn."""
     try:
         done = subprocess.run(
             [sys.executable, "-P", "-c", PICTURE], capture_output=True, text=True, timeout=SECONDS
         )
         said = (done.stderr.strip().splitlines() or ["it crashed"])[-1]
-        why = re.sub(r"^.*\b(?:WARN|ERR)\| ", "", said)[:100]  # VTK puts its clock before it
+        why = re.sub(r"^.*\b(?:WARN|ERR)\| ", "", said)[:100]  # VTK begins the line with its time
         fine = done.returncode == 0
     except (OSError, subprocess.TimeoutExpired) as error:
         fine, why = False, str(error)[:100]
@@ -125,7 +127,7 @@ def _window() -> Finding:
 
 
 def _film() -> Finding:
-    """Whether a film of the last cycle can be written as .mp4 (patchfem view -o cycle.mp4)."""
+    """Check whether a film of the last cycle can be written as .mp4 (patchfem view)."""
     program = which("ffmpeg")
     found = (
         "by ffmpeg"
@@ -143,6 +145,7 @@ def _film() -> Finding:
 
 
 def _extras() -> Iterator[Finding]:
+    """Check the optional packages."""
     for name, (extra, what) in EXTRAS.items():
         found = _version(name)
         yield Finding(

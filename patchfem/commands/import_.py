@@ -1,4 +1,4 @@
-"""The verb that brings a laboratory's files into the forms that scenes and fits read."""
+"""The command that converts laboratory files into forms that scenes and fits read."""
 
 import json
 from dataclasses import dataclass

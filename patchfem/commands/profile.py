@@ -1,4 +1,4 @@
-"""The verb that reads a measured surface and prints its roughness."""
+"""The command that reads measured surfaces and prints their roughness."""
 
 import json
 from pathlib import Path
@@ -77,6 +77,7 @@ def profile(
 
 
 def _window(text: str) -> tuple:
+    """Read the positions of a window [m]; Refused unless there are two or four."""
     words = text.split(",")
     if len(words) not in (2, 4) or not all(map(str.strip, words)):
         raise Refused(

@@ -1,4 +1,4 @@
-"""The verb that runs a scene and writes its results folder."""
+"""The command that runs a scene and writes its results folder."""
 
 import json
 import shlex
@@ -93,13 +93,13 @@ def run(
         )
         raise Ended(130) from None
     if answer["outcome"] == "not_converged":
-        for text in answer["warnings"] if quiet else ():  # the faults that a quiet run says
+        for text in answer["warnings"] if quiet else ():  # a quiet run prints only these warnings
             say(f"warning: {text}")
         raise NotReached
 
 
 def _draw(written, target: Path) -> None:
-    """Draw the page last: whatever stops it, the results are in place and their place is said."""
+    """Write the page at the end, so that an error in it does not lose results or messages."""
     try:
         folder.write_page(written, target)
     except (OSError, MemoryError, atomic_write.WriteError) as error:
@@ -113,7 +113,7 @@ def _draw(written, target: Path) -> None:
 
 
 def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
-    """The verdict first, then what is known least well, every measure in its group, and where all of it is."""
+    """Print the verdict, then the tolerance, all measures in groups, notes, and the paths."""
     answer = written.summary
     if answer["title"]:
         sets = written.result.plan.model.source.sets

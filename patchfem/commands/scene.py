@@ -1,4 +1,4 @@
-"""Verbs that look at a scene without running it: its mistakes, its plan, its mesh."""
+"""Commands that examine a scene without running it: its mistakes, its plan, its mesh."""
 
 import json
 from pathlib import Path
@@ -57,13 +57,15 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
 
 
 def _swept(scene: Path, sets, what: Over) -> tuple:
-    """(what all cases share, the cases) of a sweep."""
+    """Return what the cases of a sweep share, and the cases."""
     return parse_request.asked_of(scene, sets, what.request())
 
 
 def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
-    """Faults of the files that a scene names, and into `notes` what a run would say of them; without such files
-    nothing is imported for them."""
+    """Return the mistakes of the files that a scene names, and add notes of a run to `notes`.
+
+    Without such files nothing is imported.
+    """
     if not list_named_files(tables):
         return []
     return model_files.faults(tables, folder, whole, notes)
@@ -115,7 +117,7 @@ def plan(
 
 
 def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> None:
-    """The plan of a sweep."""
+    """Print the plan of a sweep."""
     asked, cases = _swept(scene, sets, what)
     answer = estimate.estimate(asked, cases)
     if wrong := parse_request.contradictions(asked, cases):
@@ -139,7 +141,10 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> No
 
 
 def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
-    """What runs and costs, sentences, stiffnesses and groups; at last what the scene does not name."""
+    """Print a plan: effects, cost, sentences, stiffnesses and groups.
+
+    verbose: whether to list the effects that the scene does not have.
+    """
     print(f"kind     {answer['kind']}, engine {answer['engine']}")
     compiles = plans.compile_words(answer["compile_seconds"])
     print(
@@ -185,12 +190,15 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
 
 
 def _link(name: str, bonded: bool) -> str:
-    """The name of a link of the stiffness chain as words: bonds hold an interface where a law has them."""
+    """Return the name of a link of the stiffness chain as words.
+
+    It is "bonds" only for a law that has bonds.
+    """
     return _words(name if bonded else name.replace("bonds", "friction"))
 
 
 def _words(name: str) -> str:
-    """The name of a size or of a link as words: those that are foreseen say so."""
+    """Return the name of a size or of a link as words, with "(about)" for predicted ones."""
     return (
         f"{name.removesuffix('_about')} (about)".replace("_", " ")
         if name.endswith("_about")
@@ -199,7 +207,7 @@ def _words(name: str) -> str:
 
 
 def _group(value: float, name: str) -> str:
-    """A group of the plan with its value as people read it."""
+    """Return a dimensionless group of the plan with its value as text."""
     text, unit = plans.GROUPS.get(name, (_words(name), "1"))
     return f"{format_quantity(value, unit, 4):<10} {text}"
 

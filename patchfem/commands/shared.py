@@ -1,4 +1,4 @@
-"""What several verbs of the command line share: options, loading of a scene, a progress bar, two ways to end."""
+"""Common parts of the commands: options, loading of a scene, progress, and exit codes."""
 
 import sys
 from pathlib import Path
@@ -14,28 +14,31 @@ from .streams import plain
 
 
 def flag(text: str, *names: str) -> type:
-    """The type of an option that is named or not, with what it does in words."""
+    """Return the type of an option without a value; text: its help."""
     return Annotated[
         bool, Parameter(name=names or None, negative=(), help=text, show_default=False)
     ]
 
 
 def texts(text: str, name: str | None = None) -> type:
-    """The type of an option that may be repeated, each time with a text."""
+    """Return the type of an option that takes a text and may be repeated; text: its help."""
     return Annotated[
         tuple[str, ...], Parameter(name=name, negative=(), help=text, show_default=False)
     ]
 
 
 def word(text: str, name: str | None = None) -> type:
-    """The type of an option that is a text, empty unless given; it may begin with a hyphen, as a place below zero."""
+    """Return the type of an option that takes a text, "" by default; text: its help.
+
+    The value may begin with a hyphen, as a negative position does.
+    """
     return Annotated[
         str, Parameter(name=name, allow_leading_hyphen=True, help=text, show_default=False)
     ]
 
 
 def out_in(text: str) -> type:
-    """The type of the option -o of a verb, with what is written there."""
+    """Return the type of the option -o of a command; text: its help."""
     return Annotated[Path | None, Parameter(name=["-o", "--out"], help=text)]
 
 
@@ -51,12 +54,27 @@ NoPage = flag("leave out report.html", "--no-page")
 
 
 def placed(out: Path | None, name: str) -> Path:
-    """The folder of the results: the one that is named, else out/<name>."""
+    """Return the folder of the results: the given one, or else out/<name>."""
     return out if out is not None else Path("out") / name
 
 
 def quantity(text: str, kind: str, option: str) -> float | None:
-    """The words of an option as a quantity of this kind in SI, None where there are none."""
+    """Return the value of an option as a quantity in SI; None if it is "".
+
+    Parameters
+    ----------
+    text : str
+        Value of the option.
+    kind : str
+        Kind of quantity, as in `scene.keys.quantities`.
+    option : str
+        Name of the option, for the message.
+
+    Raises
+    ------
+    Refused
+        If the text is not such a quantity.
+    """
     try:
         return quantities.parse_quantity(text, kind) if text else None
     except ValueError as error:
@@ -64,12 +82,12 @@ def quantity(text: str, kind: str, option: str) -> float | None:
 
 
 def pair(units: str) -> tuple | None:
-    """The units of x and z that --units names, None where it is not given."""
+    """Return the units of x and z in --units; None if the option is not given."""
     return tuple(word.strip() for word in units.split(",")) if units else None
 
 
 class Ended(Exception):
-    """A verb has said all there is to say and ends with this exit code."""
+    """Raised when a command has reported everything and ends with an exit code."""
 
     def __init__(self, code: int):
         super().__init__(f"exit code {code}")
@@ -77,18 +95,18 @@ class Ended(Exception):
 
 
 class NotReached(Ended):
-    """The run is on disk and marked not_converged, exit code 3."""
+    """Raised if the results are written but marked not_converged: exit code 3."""
 
     def __init__(self):
         super().__init__(3)
 
 
 class Refused(Exception):
-    """A request that the command line itself turns down, exit code 2."""
+    """Raised for a request that the command line itself refuses: exit code 2."""
 
 
 def say(text: str) -> None:
-    """One line on stderr; a stream that takes none is left alone, as nothing else could be told of it."""
+    """Print a line on stderr; a stream that cannot be written is ignored."""
     try:
         print(text, file=sys.stderr, flush=True)
     except (OSError, ValueError):
@@ -96,25 +114,31 @@ def say(text: str) -> None:
 
 
 def note(text: str) -> None:
-    """A note on stderr; what files wrote into it moves no cursor."""
+    """Print a note on stderr, without characters from files that would move the cursor."""
     say(plain(f"note: {text}"))
 
 
 def scene_of(path: Path, sets, faults=None):
-    """The scene of a file with the words of --set put in; SceneError names every mistake.
+    """Load the scene in a file with --set strings; SceneError names every mistake.
 
-    faults: (tables, folder, whole) -> (key, message) of more mistakes.
+    Parameters
+    ----------
+    path : Path
+    sets : sequence of str
+        ``table.key=value`` strings.
+    faults : callable, optional
+        (tables, folder, whole) -> (key, message) of further mistakes.
     """
     return scene.load(path, sets, faults)
 
 
 def model_of(path: Path, sets):
-    """What the scene of a file means, built once; SceneError names every mistake."""
+    """Build the model of the scene in a file; SceneError names every mistake."""
     return model.build(scene_of(path, sets))
 
 
 def unswept_of(path: Path, sets):
-    """`model_of` with the scene's own values where [sweep] has others, which a note names."""
+    """Build the model of a scene without its table [sweep], which a note states."""
     found = scene_of(path, sets)
     if found.sweep:
         note(
@@ -125,8 +149,10 @@ def unswept_of(path: Path, sets):
 
 
 class progress_bar:
-    """A bar on a terminal; elsewhere a line every ten seconds; nothing where it is to be silent. The call takes the
-    done share."""
+    """Context of a progress bar on a terminal, or of a line every ten seconds elsewhere.
+
+    Its value is a function that takes the completed fraction; None if `silent`.
+    """
 
     def __init__(self, silent: bool):
         self.bar, self.silent = None, silent
@@ -151,9 +177,10 @@ class progress_bar:
 
 
 class Lines:
-    """Progress as lines: the share that is done and the time that is left, at most one in SECONDS.
+    """Progress as lines: the completed fraction and the remaining time, one per SECONDS at most.
 
-    The pace is that since the first call: what is compiled before it says nothing of the work.
+    The speed is measured from the first call, because compilation before this call says nothing
+    about the work.
     """
 
     SECONDS = 10.0

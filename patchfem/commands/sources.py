@@ -1,4 +1,4 @@
-"""What a paper that used this program should cite: the report, the program, and the sources of a scene's effects."""
+"""BibTeX entries to cite: the report, the program, and the sources of a scene's effects."""
 
 from collections.abc import Iterable
 
@@ -29,6 +29,7 @@ PROGRAM = (
 def _article(
     key: str, author: str, title: str, journal: str, where: str, year: int, doi: str = ""
 ) -> tuple:
+    """Return the entry of an article; where: "volume:pages"."""
     volume, pages = where.split(":")
     fields = {
         "author": author,
@@ -42,7 +43,8 @@ def _article(
 
 
 APPLIED = "Journal of Applied Mechanics"
-# effects, as `effects.EFFECTS` names them -> the source that they stand on; "friction.law=iwan" serves interfaces too
+# Effects, as in `effects.EFFECTS`, and their source; "friction.law=iwan" also counts for
+# interfaces.
 SOURCES = (
     (
         ("contact",),
@@ -181,7 +183,7 @@ SOURCES = (
 
 
 def bibtex(named: Iterable[str] = ()) -> str:
-    """Entries of the report, of this program and of the sources that the effects `named` stand on, as BibTeX."""
+    """Return BibTeX of the report, of this program and of the sources of some effects."""
     there = {name.replace("structure.interface.", "friction.") for name in named}
     entries = [
         REPORT,
@@ -192,5 +194,6 @@ def bibtex(named: Iterable[str] = ()) -> str:
 
 
 def _entry(kind: str, key: str, fields: dict) -> str:
+    """Return an entry as BibTeX."""
     lines = ",\n".join(f"  {name} = {{{text}}}" for name, text in fields.items())
     return f"@{kind}{{{key},\n{lines}\n}}\n"

@@ -1,4 +1,4 @@
-"""Verbs for the first hour: a scene to start from, a run to look at, help for editors, what to cite."""
+"""Commands for the first hour: a template scene, a demo run, editor support, citations."""
 
 import json
 from pathlib import Path

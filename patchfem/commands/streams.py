@@ -1,27 +1,28 @@
-"""The streams of a process, made fit for whatever the command line is started with: closed, full, or of few signs."""
+"""Standard streams that work even if they are closed, full or of a limited encoding."""
 
 import os
 import re
 import sys
 import warnings
 
-# longer than any path that a person reads; a key or a value may have megabytes
+# longer than any path that a person would read; a key or a value may have megabytes
 LONG = re.compile(r"\S{401,}")
 
 
 def ready() -> None:
-    """Give a closed stream a place to write to, let no sign fail an encoding, and keep libraries' warnings off stderr.
+    """Prepare the standard streams of the process.
 
-    A file that is opened while 0, 1 or 2 is closed takes its number, and what is printed then goes into that file.
-    A sign that the encoding of a stream has not is written as a backslash with its code. What a library warns of is
-    nothing that a user can act on: what matters is found in the numbers and said by the run. Python's own option -W and
-    PYTHONWARNINGS bring these warnings back.
+    A closed stream is connected to the null device, because a file that is opened while 0, 1 or 2
+    is closed would get its number and then everything that is printed. A character that the
+    encoding of a stream does not have is written as a backslash with its code. Warnings of
+    libraries are suppressed, because a user cannot act on them: what matters shows in the numbers
+    and is reported by the run. Python's option -W and PYTHONWARNINGS restore these warnings.
     """
     for number in (0, 1, 2):
         try:
             os.fstat(number)
         except OSError:
-            # it takes the lowest number that is free, which is this one
+            # it gets the lowest free number, which is this one
             os.open(os.devnull, os.O_RDWR)
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
@@ -31,12 +32,15 @@ def ready() -> None:
             stream.reconfigure(errors="backslashreplace")
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
-        os.environ["PYTHONWARNINGS"] = "ignore"  # of processes that a sweep starts
+        os.environ["PYTHONWARNINGS"] = "ignore"  # for processes that a sweep starts
 
 
 def plain(text: str) -> str:
-    """One line of a text in which no sign moves the cursor: what cannot be printed is a question mark, and of a word
-    beyond 400 letters the first and the last are shown."""
+    """Return a text as one line in which no character moves the cursor.
+
+    Characters that cannot be printed become question marks; of a word with more than 400 characters
+    only the first and last ones are shown.
+    """
     shown = LONG.sub(
         lambda found: f"{found[0][:60]}...{found[0][-20:]} ({len(found[0])} letters)", text
     )

@@ -1,4 +1,4 @@
-"""Verbs that run a scene many times: error against time, a mode over its amplitude, values fitted to measurements."""
+"""Commands that run a scene many times: error against time, backbone of a mode, fits."""
 
 import json
 from dataclasses import dataclass
@@ -75,7 +75,7 @@ def cost(
         print(json.dumps(answer))
 
 
-ALL = "all"  # of the ways of a backbone
+ALL = "all"  # name of all methods of a backbone
 
 
 def backbone(

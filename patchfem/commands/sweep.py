@@ -1,4 +1,4 @@
-"""The verb that runs a scene for many values of its keys."""
+"""The command that runs a scene for many values of its keys."""
 
 import json
 import shlex
@@ -80,11 +80,11 @@ class Over:
     ) = ""
 
     def given(self) -> bool:
-        """Whether any case is asked for."""
+        """Return whether any option selects cases."""
         return bool(self.over or self.cases or self.random or self.sobol)
 
     def words(self, *more: str) -> tuple:
-        """What asks for the same cases of the same scene, as words."""
+        """Return the options that select the cases, as words that identify them."""
         drawn = f"draw={self.random},{self.sobol},{self.seed}"
         return (
             *self.over,
@@ -95,7 +95,7 @@ class Over:
         )
 
     def request(self):
-        """The request; Refused where its parts do not stand together."""
+        """Return the request; Refused if options do not fit together."""
         if self.random and self.sobol:
             raise Refused("--random and --sobol: use only one of them")
         if min(self.random, self.sobol, self.seed) < 0:
@@ -132,7 +132,7 @@ class By:
     ) = False
 
     def part(self) -> tuple | None:
-        """(i, n) of a shard, None without one."""
+        """Return (i, n) of a shard; None if there is none."""
         if not self.shard:
             return None
         i, _, n = self.shard.partition("/")
@@ -229,8 +229,11 @@ def sweep(
 
 
 class Told(NamedTuple):
-    """How a sweep is told: its folder, whether it has a page, as "json", in "words" or by its "faults" alone, and the
-    clock at its begin [s]."""
+    """How the results of a sweep are printed.
+
+    target: its folder; page: whether it has one; tells: "json", "words", or only its "faults";
+    begin: time at its start [s].
+    """
 
     target: Path
     page: bool
@@ -239,8 +242,12 @@ class Told(NamedTuple):
 
 
 class Progress:
-    """Cases done and time left on stderr: a line that renews itself on a terminal, one every WAIT seconds elsewhere.
-    While no case is done, how long the sweep has run: after WAIT seconds, then after twice as long each time."""
+    """Completed cases and remaining time on stderr.
+
+    On a terminal it is a line that is updated, elsewhere a line every WAIT seconds. While no case
+    is complete, the elapsed time is shown after WAIT seconds and then after intervals of twice the
+    length each.
+    """
 
     WAIT = 10.0
 
@@ -264,6 +271,7 @@ class Progress:
             )
 
     def _waits(self) -> None:
+        """Show the elapsed time while no case is complete."""
         wait = self.WAIT
         while not self.over.wait(wait):
             if perf_counter() - self.said >= wait:
@@ -271,6 +279,7 @@ class Progress:
                 wait *= 2
 
     def _show(self, text: str) -> None:
+        """Show a line."""
         self.said = perf_counter()
         print(
             f"\r\x1b[K{text}" if self.open else text,
@@ -280,19 +289,30 @@ class Progress:
         )
 
     def end(self) -> None:
-        """Clear the line, and say no more."""
+        """Clear the line and show nothing more."""
         self.over.set()
         if self.open and not self.silent:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
 def _answered(found, told: Told) -> None:
-    """What came out, as its folder has it."""
+    """Print the results of a sweep from its folder."""
     _answer(len(found), found.messages, json.loads((told.target / "sweep.json").read_bytes()), told)
 
 
 def _answer(number: int, messages: dict, written: dict, told: Told) -> None:
-    """What came out of so many cases, the answer first, as sweep.json has it; messages: of those that failed."""
+    """Print the results of a sweep, with its answer first.
+
+    Parameters
+    ----------
+    number : int
+        Number of cases.
+    messages : dict
+        Messages of failed cases.
+    written : dict
+        Content of sweep.json.
+    told : Told
+    """
     target, failed, counts = told.target, sorted(messages), written["cases"]["outcomes"]
     if told.tells == "json":
         print(

@@ -1,4 +1,4 @@
-"""Verbs that show a results folder or write it in other formats."""
+"""Commands that show a results folder or write it in other formats."""
 
 from pathlib import Path
 from typing import Annotated
