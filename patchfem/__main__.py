@@ -346,7 +346,7 @@ def _interrupted() -> str:
             len(placed) > 3
         )
     return text + "".join(
-        f"; to continue {there.display_path(one)}, add --resume to the command" for one in kept
+        f"; to continue {there.format_path(one)}, add --resume to the command" for one in kept
     )
 
 

@@ -40,7 +40,7 @@ from .export.surfaces import roughness, worn, worn_runs
 from .export.sweeps import folder, page, tables
 from .export.sweeps import run as sweep_run
 from .mesh import files as mesh_files
-from .model.model import Model, build_unswept
+from .model.model import Model, build_without_sweep
 from .model.model import build as build_model
 from .runs import joint
 from .runs.batch import batches, meshes
@@ -588,7 +588,7 @@ def export(
     else:
         from .export.lab import structures  # its folder holds more than words
 
-        structures.export(build_unswept(load(folder)), out)
+        structures.export(build_without_sweep(load(folder)), out)
     return out
 
 

@@ -40,7 +40,7 @@ __all__ = [
     "PatchfemError",
     "Response",
     "SineDrive",
-    "allowed_error",
+    "compute_allowed_error",
     "frozen_array",
 ]
 
@@ -50,7 +50,7 @@ G_N = 9.80665  # standard gravity [m s-2]
 _STIFFENING_ROUND_OFF = (
     1e-9  # relative round-off of squared frequencies that a spring must not lower
 )
-_MIN_OVERLAP = 1e-30  # overlap of two shapes that counts as 0, so that its logarithm is finite
+_ZERO_OVERLAP = 1e-30  # overlap of two shapes that counts as 0, so that its logarithm is finite
 _FORBIDDEN_PAIR_COST = 1e6  # larger than the cost of any allowed pairing of modes
 
 
@@ -261,7 +261,7 @@ def _assign_modes(lower, values, overlap) -> np.ndarray:
     from scipy.optimize import linear_sum_assignment
 
     cost = np.where(
-        values >= lower[:, None], -np.log(np.maximum(overlap, _MIN_OVERLAP)), _FORBIDDEN_PAIR_COST
+        values >= lower[:, None], -np.log(np.maximum(overlap, _ZERO_OVERLAP)), _FORBIDDEN_PAIR_COST
     )
     return linear_sum_assignment(cost)[1]
 
@@ -356,7 +356,7 @@ class Measure:
         """Return the error over the allowed error; 0 without a value or an error."""
         if self.value is None or self.error is None:
             return 0.0
-        return self.error / max(allowed_error(tolerance, self.value, self.floor), 1e-300)
+        return self.error / max(compute_allowed_error(tolerance, self.value, self.floor), 1e-300)
 
     def __str__(self) -> str:
         if self.value is None and self.reason:
@@ -367,7 +367,7 @@ class Measure:
         return f"{self} ({self.text})" if self.text else str(self)
 
 
-def allowed_error(tolerance, value, floor):
+def compute_allowed_error(tolerance, value, floor):
     """Return the error that a tolerance allows: tolerance |value| + floor.
 
     Parameters

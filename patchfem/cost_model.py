@@ -1,6 +1,6 @@
 """CPU seconds that parts of a run take on one core, for plans, refusals and the choice of an engine.
 
-All constants were measured on one machine with plain scenes and compiled code; `machine_time_ratio` compares another
+All constants were measured on one machine with plain scenes and compiled code; `measure_machine_time_ratio` compares another
 machine with it. The modules that count the work define its units: `runs.rig.costs`, `runs.rig.lists`,
 `runs.bench.engine`, `friction.bonds.engines`, `runs.patch.plan` and `elasticity.grid_fronts`.
 """
@@ -19,8 +19,8 @@ PIECE_ELEMENT_SECONDS = 3e-9  # per piece and element
 MAX_PIECE_SECONDS = 1e-6  # upper bound per piece, used to choose the engine
 READ_PIECE_SECONDS = 4e-6  # per piece of the last cycles, whose histories are kept
 PYTHON_PIECE_SECONDS = 7e-5  # per piece without compilation, times (modes + 1)(interfaces + 1)
-PYTHON_SAMPLE_FRACTION = 0.1  # time of a sample without compilation / that of a piece
-PYTHON_READ_FRACTION = 0.5  # time of reading a piece without compilation / that of the piece
+PYTHON_SAMPLE_TIME_RATIO = 0.1  # time of a sample without compilation / that of a piece
+PYTHON_READ_TIME_RATIO = 0.5  # time of reading a piece without compilation / that of the piece
 
 # march in time
 CYCLE_SECONDS = 3e-4  # per cycle of a march with elements
@@ -28,8 +28,8 @@ STEP_SECONDS = 4.3e-7  # per step of a march with elements
 STEP_ELEMENT_SECONDS = 9e-10  # per step and element
 BOND_STEP_SECONDS = 7e-7  # per step of one mode with bonds
 STEP_MODE_SECONDS = 1e-7  # per step and further mode with bonds
-BOND_GROWTH_FACTOR = 3.0  # factor of a step in which bonds grow
-INTERFACE_FACTOR = 2.5  # factor of a step per interface, if there are several
+GROWING_BOND_STEP_FACTOR = 3.0  # factor of a step in which bonds grow
+INTERFACE_STEP_FACTOR = 2.5  # factor of a step per interface, if there are several
 GROOVE_STEP_SECONDS = 3e-6  # per step over grooves
 PRESSING_STEP_SECONDS = 4.5e-5  # per step of pieces that heave or pitch
 PRESSING_NODE_SECONDS = 1.7e-7  # per step and node of pieces that heave or pitch
@@ -86,10 +86,11 @@ OUTLINE_CONDENSING_FACTOR = 2.2  # the same for pieces with cells beyond the int
 FRAMES_SECONDS = 0.35  # frames of a patch that moves
 FRAME_NODE_SECONDS = 3e-5  # frames, per node of the finest grids
 
-REFERENCE_SPEED_WORK = 0.0214  # time of the work of `machine_time_ratio` on the reference machine
+# time of the work of `measure_machine_time_ratio` on the reference machine
+REFERENCE_WORK_SECONDS = 0.0214
 
 
-def shear_mode_step_seconds(points: int, modes: int, *, load_varies: bool = False) -> float:
+def predict_shear_mode_step(points: int, modes: int, *, load_varies: bool = False) -> float:
     """Return the seconds of a time step of bonds behind shear modes.
 
     Steps of the rig of the report and of its bench with 65 to 425 points took 0.7 to 1.5 of this.
@@ -112,7 +113,7 @@ def shear_mode_step_seconds(points: int, modes: int, *, load_varies: bool = Fals
     return 1e-6 + points * (1e-9 + 5e-10 * modes)
 
 
-def machine_time_ratio() -> float:
+def measure_machine_time_ratio() -> float:
     """Return the CPU seconds of this machine over those of the reference machine.
 
     The work is a loop, matrix products and linear solves, as in a run. The shortest of five timings counts.
@@ -125,4 +126,4 @@ def machine_time_ratio() -> float:
             np.linalg.solve(matrix, matrix @ matrix)
             sum(k * k for k in range(20000))
         shortest = min(shortest, process_time() - begin)
-    return shortest / REFERENCE_SPEED_WORK
+    return shortest / REFERENCE_WORK_SECONDS

@@ -31,7 +31,7 @@ Traits of laws:
 `runs.rig.varying_load` and `runs.batch.lumped.lanes` name the laws that they serve themselves.
 
 A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`. A waveform has a function in the table
-`BUILDERS` of its module; its traits are listed at `Waveform`.
+`DRIVE_BUILDERS` of its module; its traits are listed at `Waveform`.
 """
 
 from importlib import import_module
@@ -135,7 +135,8 @@ GAP_MODULE = (
 GROOVE_EQUATION = (
     "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
 )
-_SIZE_KEYS = "acceleration displacement force"  # keys of [drive] that give the size of a drive
+# keys of [drive] that give the size of a drive
+_DRIVE_SIZE_KEYS = "acceleration displacement force"
 
 
 def _law(module: str, equations: str, keys: tuple, supports: str, traits: str = "") -> Effect:
@@ -292,20 +293,20 @@ EFFECTS = {
     "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0"),
     "drive.waveform=sine": _waveform(
         "a(t) = a sin(2 pi f t)",
-        ("frequency", _SIZE_KEYS),
+        ("frequency", _DRIVE_SIZE_KEYS),
         "sine endless",
         "{what} of {level} at {frequency}{place}",
         "patchfem.structure.drive_sizes",
     ),
     "drive.waveform=step": _waveform(
         "a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X",
-        ("", _SIZE_KEYS),
+        ("", _DRIVE_SIZE_KEYS),
         "step endless",
         "a step of {level} in {what}{place}",
     ),
     "drive.waveform=sweep": _waveform(
         "a(t) = a sin(2 pi int f dt), f' or f'/f constant",
-        ("from to", f"rate log_rate {_SIZE_KEYS}"),
+        ("from to", f"rate log_rate {_DRIVE_SIZE_KEYS}"),
         "swept",
         "{what} of {level} swept from {from} to {to}{place}",
     ),
@@ -383,13 +384,13 @@ def import_effect(name: str):
     return import_module(EFFECTS[name].module)
 
 
-def absent_effects(names) -> list:
+def list_absent_effects(names) -> list:
     """Return the effects that are not among `names`, in the order of EFFECTS."""
     present = set(names)
     return [name for name in EFFECTS if name not in present]
 
 
-def displayed_absent_effects(names, engine: str | None) -> list:
+def list_displayed_absent_effects(names, engine: str | None) -> list:
     """Return the absent effects for display, without the engine that the program chose itself."""
     return [name for name in names if name != f"accuracy.method={engine}"]
 
@@ -461,7 +462,7 @@ def describe_law(friction) -> str:
     return f"law '{friction.law}' of order {friction.order:g}"
 
 
-def laws_with_key(key: str) -> str:
+def name_laws_with_key(key: str) -> str:
     """Name the laws that take a key: "coulomb and nonlocal"."""
     return join_words((name for name in LAWS if law_takes_key(name, key)), "and")
 
@@ -492,7 +493,7 @@ def suggest_laws(feature: str, other_features: str = "", friction=None) -> str:
     return f"use {instead}law {join_words(quoted, 'or')}"
 
 
-ALTERNATIVES = {  # word -> remedy for two effects that cannot be combined yet
+REMEDIES = {  # word -> remedy for two effects that cannot be combined yet
     "order": "use order = 1",
     "recursion": 'use reading = "stretch" with order = 1 and without breakaway',
     "elastic range": "set breakaway = 0",
@@ -507,9 +508,9 @@ ALTERNATIVES = {  # word -> remedy for two effects that cannot be combined yet
 }
 
 
-def not_supported_message(combination: str, alternative: str) -> str:
-    """Return the message for a combination that is not supported yet; `alternative` is a key of ALTERNATIVES or text."""
-    remedy = ALTERNATIVES.get(alternative, alternative)
+def describe_unsupported(combination: str, alternative: str) -> str:
+    """Return the message for a combination that is not supported yet; `alternative` is a key of REMEDIES or text."""
+    remedy = REMEDIES.get(alternative, alternative)
     if combination.startswith(("beside ", "with ", "in ")):
         return f"not supported yet {combination}; {remedy}"
     return f"{combination} is not supported yet; {remedy}"

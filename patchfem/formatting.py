@@ -1,7 +1,7 @@
 """Text of numbers: the unit by the size of the value, the number of digits by its numerical error.
 
 This is the only place where a value and its error become text. A number ends at the second digit of its error. A
-number whose first MAX_DIGITS digits are exact is shown without an error. A value within its floor is shown as 0.
+number whose first MAX_SIGNIFICANT_DIGITS digits are exact is shown without an error. A value within its floor is shown as 0.
 """
 
 import math
@@ -9,14 +9,14 @@ import re
 from itertools import pairwise
 from math import isfinite, log10
 
-MAX_DIGITS = 7  # significant digits of a value; nobody reads an error below the seventh
+MAX_SIGNIFICANT_DIGITS = 7  # significant digits of a value; nobody reads an error below the seventh
 DIGITS_WITHOUT_ERROR = 6  # significant digits of a value whose error is unknown
-ROUND_OFF_FRACTION = 1e-6  # of its floor, below which a number with a unit is round-off
-RATIO_ROUND_OFF_FRACTION = 0.1  # the same for a number without a unit
+MAX_ROUND_OFF_FRACTION = 1e-6  # of its floor, below which a number with a unit is round-off
+MAX_RATIO_ROUND_OFF = 0.1  # the same for a number without a unit
 MAX_RELATIVE_ERROR = 0.1  # error / value; above it a value below its floor may as well be 0
 MIN_PLAIN_POWER = -4  # smallest power of ten of a number that is written without an exponent
-END_PLAIN_POWER = 7  # numbers from this power of ten on are written with an exponent
-NO_ERROR_POWER = -400  # stands for the power of ten of an error of 0; below that of any float
+FIRST_EXPONENT_POWER = 7  # numbers from this power of ten on are written with an exponent
+ZERO_ERROR_POWER = -400  # stands for the power of ten of an error of 0; below that of any float
 
 UNIT_LADDERS = {  # SI unit: (unit shown, number of these in one SI unit), from small to large
     "m": (("nm", 1e9), ("um", 1e6), ("mm", 1e3), ("m", 1.0)),
@@ -36,8 +36,10 @@ UNIT_LADDERS = {  # SI unit: (unit shown, number of these in one SI unit), from 
 }
 # unit in a sentence: key of UNIT_LADDERS
 SENTENCE_UNITS = {unit: unit for unit in UNIT_LADDERS if "-" not in unit} | {"N/m": "N m-1"}
-_UNITS = "|".join(sorted(SENTENCE_UNITS, key=len, reverse=True))
-_POWER = re.compile(rf"(?<![\w./\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNITS})(?![\w/^]))?")
+_UNIT_PATTERN = "|".join(sorted(SENTENCE_UNITS, key=len, reverse=True))
+_POWER_PATTERN = re.compile(
+    rf"(?<![\w./\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNIT_PATTERN})(?![\w/^]))?"
+)
 
 
 def choose_unit(ladder: tuple, size: float) -> tuple:
@@ -62,7 +64,7 @@ def choose_unit(ladder: tuple, size: float) -> tuple:
     return ladder[-1]
 
 
-def axis_unit(values, unit: str) -> tuple:
+def choose_axis_unit(values, unit: str) -> tuple:
     """Return the unit (name, scale) of an axis that shows values [SI]; `unit` is a key of UNIT_LADDERS."""
     import numpy as np  # imported here because the messages of `check` need no arrays
 
@@ -111,10 +113,13 @@ def round_to_error(
     if value == 0:
         return "0", format_number(error, 2) if error else ""
     size = math.floor(log10(abs(value)))
-    last = _second_digit_power(error)
-    if last < size - MAX_DIGITS + 1:  # every digit shown is exact
-        exact = max(size - MAX_DIGITS + 1, math.ceil(log10(error)) if error else NO_ERROR_POWER)
-        return format_number(round(value, -exact), MAX_DIGITS), ""
+    last = _find_second_digit_power(error)
+    if last < size - MAX_SIGNIFICANT_DIGITS + 1:  # every digit shown is exact
+        exact = max(
+            size - MAX_SIGNIFICANT_DIGITS + 1,
+            math.ceil(log10(error)) if error else ZERO_ERROR_POWER,
+        )
+        return format_number(round(value, -exact), MAX_SIGNIFICANT_DIGITS), ""
     if _is_plain_power(size) or _is_plain_power(last + 1):
         return _format_to_digit(value, error, last)
     power = max(size, last + 1)
@@ -135,7 +140,7 @@ def format_number(value: float, digits: int) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def display_unit(value: float, unit: str, error: float | None = None) -> tuple:
+def choose_display_unit(value: float, unit: str, error: float | None = None) -> tuple:
     """Return the unit (name, scale) in which a value [SI] and its error are shown; the name is "" without a unit."""
     if unit not in UNIT_LADDERS:
         return ("" if unit == "1" else unit), 1.0
@@ -163,13 +168,13 @@ def format_value(
     """
     if value is None:
         return f"- {unit}".removesuffix(" 1")
-    name, scale = display_unit(value, unit, error)
+    name, scale = choose_display_unit(value, unit, error)
     scaled_error = None if error is None else error * scale
     texts = round_to_error(value * scale, scaled_error, floor * scale, is_ratio=unit == "1")
-    return join_error(*texts, name)
+    return format_with_error(*texts, name)
 
 
-def join_error(value: str, error: str, unit: str) -> str:
+def format_with_error(value: str, error: str, unit: str) -> str:
     """Join the texts of `round_to_error` and a unit; a common power of ten is written once: `(0.5 ± 1.0)e-8`."""
     if not error:
         return f"{value} {unit}".strip()
@@ -201,7 +206,7 @@ def format_quantity(value: float, unit: str, digits: int, floor: float = 0.0) ->
     """
     if not abs(value) > floor:
         return "0"
-    name, scale = display_unit(value, unit)
+    name, scale = choose_display_unit(value, unit)
     return f"{format_number(value * scale, digits)} {name}".strip()
 
 
@@ -223,25 +228,25 @@ def rewrite_powers_of_ten(text: str) -> str:
             return format_number(float(number), digits)
         return format_quantity(float(number), SENTENCE_UNITS[unit], digits)
 
-    return _POWER.sub(rewrite, text)
+    return _POWER_PATTERN.sub(rewrite, text)
 
 
 def _is_zero(value: float, error: float | None, floor: float, is_ratio: bool) -> bool:
     """Return whether a value and its error lie below the floor and the value is uncertain or round-off."""
     if abs(value) > floor or (error or 0.0) > floor:
         return False
-    round_off = (RATIO_ROUND_OFF_FRACTION if is_ratio else ROUND_OFF_FRACTION) * floor
+    round_off = (MAX_RATIO_ROUND_OFF if is_ratio else MAX_ROUND_OFF_FRACTION) * floor
     return error is None or error > MAX_RELATIVE_ERROR * abs(value) or abs(value) <= round_off
 
 
 def _is_plain_power(power: int) -> bool:
     """Return whether a number of this power of ten is written without an exponent."""
-    return MIN_PLAIN_POWER <= power < END_PLAIN_POWER
+    return MIN_PLAIN_POWER <= power < FIRST_EXPONENT_POWER
 
 
-def _second_digit_power(error: float) -> int:
+def _find_second_digit_power(error: float) -> int:
     """Return the power of ten of the second digit of an error."""
-    return int(f"{error:.1e}".split("e")[1]) - 1 if error else NO_ERROR_POWER
+    return int(f"{error:.1e}".split("e")[1]) - 1 if error else ZERO_ERROR_POWER
 
 
 def _format_to_digit(value: float, error: float, last: int) -> tuple:

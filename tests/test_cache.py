@@ -226,7 +226,7 @@ def test_exact_code_that_came_with_the_package_is_of_this_machine(tmp_path, monk
             (tmp_path / "generic" / prebuilt.key(compiled.sources)).mkdir(exist_ok=True)
             assert found() is None
     with monkeypatch.context() as more:
-        more.setattr(prebuilt, "package_version", lambda name: "0.0")
+        more.setattr(prebuilt, "find_package_version", lambda name: "0.0")
         assert found() is None
     (tmp_path / "machine.py").write_text("# edited")
     assert found() is None
@@ -409,7 +409,7 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
         else:
             monkeypatch.setattr(
                 user_cache,
-                "_reason_for_distrust",
+                "_find_distrust_reason",
                 lambda folder: (
                     "" if not folder.is_relative_to(base) else f"{folder} belongs to another user"
                 ),
@@ -421,7 +421,7 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
     assert found == tmp_path / "session" / "patchfem" / compiled.kernel_key() and found.is_dir()
     assert str(base) in compiled.why_elsewhere()
     monkeypatch.delenv("XDG_RUNTIME_DIR")
-    user_cache.process_folder.cache_clear()
+    user_cache.make_process_folder.cache_clear()
     try:
         first = compiled.cache_folder()
         assert (
@@ -429,15 +429,15 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
             and first.is_dir()
             and not (temporary / "patchfem").exists()
         )
-        assert os.stat(user_cache.process_folder()).st_mode & 0o77 == 0
+        assert os.stat(user_cache.make_process_folder()).st_mode & 0o77 == 0
         assert compiled.cache_folder() == first  # the same in one process
-        user_cache.process_folder.cache_clear()
+        user_cache.make_process_folder.cache_clear()
         assert compiled.cache_folder() != first  # another in the next
         monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
-        user_cache.process_folder.cache_clear()
+        user_cache.make_process_folder.cache_clear()
         assert not compiled.cache_folder().exists()  # nothing is kept, nothing fails
     finally:
-        user_cache.process_folder.cache_clear()
+        user_cache.make_process_folder.cache_clear()
 
 
 def test_exact_a_folder_is_made_the_user_s_own(tmp_path, monkeypatch):
@@ -450,7 +450,8 @@ def test_exact_a_folder_is_made_the_user_s_own(tmp_path, monkeypatch):
     monkeypatch.delenv("PATCHFEM_CACHE")
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(Path, "home", lambda: (_ for _ in ()).throw(RuntimeError("no home")))
-    assert user_cache.cache_base() == user_cache.process_folder()  # a number without a name
+    # a number without a name
+    assert user_cache.find_cache_base() == user_cache.make_process_folder()
 
 
 @pytest.fixture

@@ -63,7 +63,7 @@ FAULTY = """\
 from patchfem.__main__ import main
 from patchfem.structure import drive_sizes
 
-drive_sizes.first_period = lambda modes: {}["a key"]
+drive_sizes.find_first_period = lambda modes: {}["a key"]
 main()
 """
 RIG = """\
@@ -219,4 +219,4 @@ def test_always_an_internal_fault_names_file_and_line(tmp_path):
         .read_text("utf-8")
         .splitlines()[int(found[2]) - 1]
     )
-    assert "first_period(" in line
+    assert "find_first_period(" in line

@@ -12,9 +12,9 @@ from patchfem.scene.scene import loads
 def test_exact_a_machine_of_half_the_pace_takes_twice_as_long(monkeypatch):
     ticks = iter(range(0, 1000))
     monkeypatch.setattr(
-        cost_model, "process_time", lambda: cost_model.REFERENCE_SPEED_WORK * 2 * next(ticks)
+        cost_model, "process_time", lambda: cost_model.REFERENCE_WORK_SECONDS * 2 * next(ticks)
     )
-    assert cost_model.machine_time_ratio() == pytest.approx(2.0, rel=1e-12)
+    assert cost_model.measure_machine_time_ratio() == pytest.approx(2.0, rel=1e-12)
 
 
 def test_always_a_plan_counts_by_the_table():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.formatting import (
-    MAX_DIGITS,
+    MAX_SIGNIFICANT_DIGITS,
     UNIT_LADDERS,
     format_number,
     format_quantity,
@@ -62,14 +62,14 @@ def test_always_the_printed_value_lies_within_the_printed_bar(seed):
         else:
             assert bar <= 1.5e-5 * abs(value), (text, value, bar)
             digits = len(re.sub(r"e.*|\D", "", text.split(" ")[0]).lstrip("0"))
-            assert digits <= MAX_DIGITS and abs(said - value) <= max(
+            assert digits <= MAX_SIGNIFICANT_DIGITS and abs(said - value) <= max(
                 0.501 * last, 1e-13 * abs(value)
             ), (
                 text,
                 value,
                 bar,
             )
-            assert bar <= last or digits < MAX_DIGITS, (text, value, bar)
+            assert bar <= last or digits < MAX_SIGNIFICANT_DIGITS, (text, value, bar)
         assert unit == "1" or "e" not in text.split(" ")[0], text
     assert bars > 100
 

@@ -19,7 +19,7 @@ from time import perf_counter, process_time
 from typing import NamedTuple
 
 from ..compiled import cache_folder
-from ..core import NotConverged, PatchfemError, allowed_error
+from ..core import NotConverged, PatchfemError, compute_allowed_error
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
@@ -111,7 +111,7 @@ class Cost:
     def meets_tolerance(self) -> bool:
         """Return whether every stated error is within the tolerance that was set for the run."""
         return all(
-            error <= allowed_error(self.tolerance, self.values[name], self.floors[name])
+            error <= compute_allowed_error(self.tolerance, self.values[name], self.floors[name])
             for name, error in self.errors.items()
         )
 
@@ -137,7 +137,7 @@ class Cost:
     def within(self, name: str, tolerance: float) -> bool:
         """Return whether the error of a measure is at most tolerance * |value| + floor."""
         off = self.off(name)
-        return off is not None and off <= allowed_error(
+        return off is not None and off <= compute_allowed_error(
             tolerance, self.values[name], self.floors[name]
         )
 
@@ -516,7 +516,7 @@ def _effect(runs: list, tolerance: float) -> str:
     turned = turned_by(runs)
     if len(runs) < 2 or any(
         one.distances.get(name, 0.0)
-        > allowed_error(tolerance, abs(one.values[name]), one.floors[name])
+        > compute_allowed_error(tolerance, abs(one.values[name]), one.floors[name])
         for one in runs
         for name in turned
         if name in one.values

@@ -9,7 +9,7 @@ strain unless a foundation is named. Signs of the project: a rotation > 0 opens 
 import numpy as np
 
 
-def positive(**values) -> None:
+def require_positive(**values) -> None:
     """Raise ValueError, naming the first of `values` that is not positive throughout; numbers or arrays by name."""
     for name, value in values.items():
         if not np.all(np.asarray(value, float) > 0):
@@ -24,7 +24,7 @@ def combined_modulus(young, poisson, young_lower=None, poisson_lower=None) -> fl
     """
     young_lower = young if young_lower is None else young_lower
     poisson_lower = poisson if poisson_lower is None else poisson_lower
-    positive(young=young, young_lower=young_lower)
+    require_positive(young=young, young_lower=young_lower)
     return 1 / ((1 - poisson**2) / young + (1 - poisson_lower**2) / young_lower)
 
 
@@ -34,7 +34,7 @@ def hertz_half_width(line_load, radius, modulus):
     line_load P [N/m], radius R [m], modulus E* [Pa] of `combined_modulus`; bodies thick against a.
     ValueError unless all are positive.
     """
-    positive(line_load=line_load, radius=radius, modulus=modulus)
+    require_positive(line_load=line_load, radius=radius, modulus=modulus)
     return np.sqrt(4 * line_load * radius / (np.pi * modulus))
 
 
@@ -54,8 +54,8 @@ def hertz_pressure(x, line_load, radius, modulus):
 # ---- rigid punches
 
 
-def _offset(offset, half) -> None:
-    positive(half=half)
+def _check_offset(offset, half) -> None:
+    require_positive(half=half)
     if not abs(offset) < half:
         raise ValueError(
             f"the load line at {offset} lies outside the punch of half width {half}: the punch tips over"
@@ -68,7 +68,7 @@ def punch_contact(half, offset=0.0) -> tuple:
     The whole punch, |x| <= half, touches while |offset| <= half/2; beyond it a length 4 (half - |offset|) does, up to
     the loaded corner. ValueError unless half is positive and |offset| < half.
     """
-    _offset(offset, half)
+    _check_offset(offset, half)
     length = min(2 * half, 4 * (half - abs(offset)))
     return (half - length, half) if offset > 0 else (-half, length - half)
 
@@ -79,7 +79,7 @@ def punch_rotation(line_load, half, modulus, offset=0.0) -> float:
     Full contact: -4 P e/(pi E* b^2); partial: -2 P/(pi E* c) sign(e), c = 2 (b - |e|). line_load P [N/m], half b [m],
     modulus E* [Pa], offset e [m]. ValueError as in `punch_contact` and unless P and E* are positive.
     """
-    positive(line_load=line_load, modulus=modulus)
+    require_positive(line_load=line_load, modulus=modulus)
     left, right = punch_contact(half, offset)
     if abs(offset) <= half / 2:
         return -4 * line_load * offset / (np.pi * modulus * half**2)
@@ -92,7 +92,7 @@ def punch_pressure(x, line_load, half, offset=0.0):
     Full contact: P/pi (1 + 2 e x/b^2)/sqrt(b^2 - x^2). Partial, over 2 c with xi from its middle towards the corner:
     P/(pi c) sqrt((c + xi)/(c - xi)). 0 outside. Arguments and refusals as in `punch_rotation`.
     """
-    positive(line_load=line_load)
+    require_positive(line_load=line_load)
     left, right = punch_contact(half, offset)
     x = np.asarray(x, float)
     inside = (x >= left) & (x <= right)
@@ -107,7 +107,7 @@ def punch_pressure(x, line_load, half, offset=0.0):
     return np.where(inside, p, 0.0)[()]
 
 
-def _less_sine(x):
+def _subtract_sine(x):
     """x - sin x without cancellation."""
     return (
         x**3 / 6 * (1 - x**2 / 20 * (1 - x**2 / 42 * (1 - x**2 / 72))) if x < 0.1 else x - np.sin(x)
@@ -116,17 +116,21 @@ def _less_sine(x):
 
 def _rounded_angle(line_load, flat, radius, modulus) -> float:
     """pi/2 - phi_0 of the rounded punch, sin phi_0 = flat/(contact half width)."""
-    positive(line_load=line_load, flat=flat, radius=radius, modulus=modulus)
+    require_positive(line_load=line_load, flat=flat, radius=radius, modulus=modulus)
     want = 2 * line_load * radius / (flat**2 * modulus)
     top = np.pi / 2 - 1e-9
-    if want >= _less_sine(2 * top) / (2 * np.cos(top) ** 2):
+    if want >= _subtract_sine(2 * top) / (2 * np.cos(top) ** 2):
         raise ValueError(
             "under this load the flat part is too short to affect the pressure; use hertz_pressure"
         )
     from scipy.optimize import brentq
 
     return brentq(
-        lambda t: _less_sine(2 * t) / (2 * np.cos(t) ** 2) - want, 0.0, top, xtol=1e-18, rtol=1e-15
+        lambda t: _subtract_sine(2 * t) / (2 * np.cos(t) ** 2) - want,
+        0.0,
+        top,
+        xtol=1e-18,
+        rtol=1e-15,
     )
 
 
@@ -159,7 +163,12 @@ def rounded_punch_pressure(x, line_load, flat, radius, modulus):
         + xlogy(first - sine, np.abs(np.sin(phi - edge)))
         - 2 * first * np.log(np.cos(phi) + np.sin(small))
     )
-    p = 2 * line_load / (np.pi * half * _less_sine(2 * small)) * (2 * small * np.cos(phi) + logs)
+    p = (
+        2
+        * line_load
+        / (np.pi * half * _subtract_sine(2 * small))
+        * (2 * small * np.cos(phi) + logs)
+    )
     return np.where(np.abs(x) < half, p, 0.0)[()]
 
 
@@ -170,7 +179,7 @@ def rounded_corner(intensity, radius, modulus) -> tuple:
     limit of `rounded_punch_half_width` for a long flat: e = (3 sqrt(2) pi K R/E*)^(2/3)/2, peak 1.7995 K/sqrt(e), 0.305
     e beyond the end of the flat. ValueError unless all are positive.
     """
-    positive(intensity=intensity, radius=radius, modulus=modulus)
+    require_positive(intensity=intensity, radius=radius, modulus=modulus)
     reach = (3 * np.sqrt(2) * np.pi * intensity * radius / modulus) ** (2 / 3) / 2
     return float(reach), float(1.7995 * intensity / np.sqrt(reach))
 
@@ -184,12 +193,12 @@ def westergaard_full_pressure(wavelength, amplitude, modulus):
     wavelength lambda [m], amplitude A [m] (half of valley to peak), modulus E* [Pa] (Westergaard 1939).
     ValueError unless all are positive.
     """
-    positive(wavelength=wavelength, amplitude=amplitude, modulus=modulus)
+    require_positive(wavelength=wavelength, amplitude=amplitude, modulus=modulus)
     return np.pi * modulus * amplitude / wavelength
 
 
-def _wave_share(mean, wavelength, amplitude, modulus):
-    positive(mean=mean)
+def _find_load_fraction(mean, wavelength, amplitude, modulus):
+    require_positive(mean=mean)
     return np.asarray(mean, float) / westergaard_full_pressure(wavelength, amplitude, modulus)
 
 
@@ -198,7 +207,7 @@ def westergaard_half_width(mean, wavelength, amplitude, modulus):
 
     mean p [Pa] averaged over a wavelength; the rest as in `westergaard_full_pressure`.
     """
-    share = _wave_share(mean, wavelength, amplitude, modulus)
+    share = _find_load_fraction(mean, wavelength, amplitude, modulus)
     return wavelength / np.pi * np.arcsin(np.sqrt(np.minimum(share, 1)))
 
 
@@ -208,7 +217,7 @@ def westergaard_pressure(x, mean, wavelength, amplitude, modulus):
     With s = sin(pi a/lambda): 2 p cos(pi x/lambda)/s^2 sqrt(s^2 - sin^2(pi x/lambda)), 0 outside the contact; above
     full contact p + p* cos(2 pi x/lambda). Arguments as in `westergaard_half_width`.
     """
-    share = float(_wave_share(mean, wavelength, amplitude, modulus))
+    share = float(_find_load_fraction(mean, wavelength, amplitude, modulus))
     angle = np.pi * np.asarray(x, float) / wavelength
     if share >= 1:
         return mean + mean / share * np.cos(2 * angle)
@@ -226,7 +235,7 @@ def westergaard_approach(mean, wavelength, amplitude, modulus):
 
     Arguments and refusals as in `westergaard_half_width`.
     """
-    share = np.minimum(_wave_share(mean, wavelength, amplitude, modulus), 1)
+    share = np.minimum(_find_load_fraction(mean, wavelength, amplitude, modulus), 1)
     return amplitude * share * (1 - np.log(share))
 
 
@@ -235,7 +244,7 @@ def westergaard_stiffness(mean, wavelength, amplitude, modulus):
 
     Arguments and refusals as in `westergaard_half_width`.
     """
-    share = np.minimum(_wave_share(mean, wavelength, amplitude, modulus), 1)
+    share = np.minimum(_find_load_fraction(mean, wavelength, amplitude, modulus), 1)
     with np.errstate(divide="ignore"):
         return np.pi * modulus / (wavelength * np.log(1 / share))
 
@@ -249,7 +258,7 @@ def layered_compliance(k, coating, substrate, thickness):
     A pair of bodies has the sum of the two. ValueError unless k and the moduli are positive and h >= 0.
     """
     (e1, nu1), (e2, nu2) = coating, substrate
-    positive(k=k, coating=e1, substrate=e2)
+    require_positive(k=k, coating=e1, substrate=e2)
     if thickness < 0:
         raise ValueError(f"thickness must not be negative, got {thickness}")
     k = np.asarray(k, float)
@@ -277,7 +286,7 @@ def cattaneo_stick_half_width(shear_load, line_load, radius, modulus, friction):
     shear_load Q [N/m] of either sign, after the normal load P [N/m]; friction mu; alike bodies. Others as in
     `hertz_half_width`. ValueError where |Q| exceeds mu P.
     """
-    positive(friction=friction)
+    require_positive(friction=friction)
     half = hertz_half_width(line_load, radius, modulus)
     share = np.abs(shear_load) / (friction * line_load)
     if np.any(share > 1):
@@ -309,7 +318,7 @@ def wedge_opening(load, length, width, stiffness):
     load N [N], length L across the wedge and width b along it [m], stiffness k_n [Pa/m] of a linear foundation.
     ValueError unless all are positive.
     """
-    positive(load=load, length=length, width=width, stiffness=stiffness)
+    require_positive(load=load, length=length, width=width, stiffness=stiffness)
     return 2 * load / (stiffness * length**2 * width)
 
 
@@ -341,7 +350,7 @@ def wedge_skin(rotation, length, decay) -> tuple:
     (1/2 - 1/B + 1/(e^B - 1)) towards the closed edge. Neither depends on the load. rotation (any shape) [rad], length L
     [m], decay u_0 [m]. ValueError unless L, u_0 > 0.
     """
-    positive(length=length, decay=decay)
+    require_positive(length=length, decay=decay)
     b = np.abs(np.asarray(rotation, float)) * length / decay
     safe = np.maximum(b, 0.05)
     fraction = np.where(b > 0, -np.expm1(-b) / np.where(b > 0, b, 1), 1.0)
@@ -359,7 +368,7 @@ def wedge_loop(amplitude, friction, tangential, area, least, largest):
     4 mu N (U - 2 u_2/3) above u_2 and 4 k_t A U^3/(6 u_2) below; for least = largest `jenkins_loop`.
     ValueError unless the first four and `largest` are positive and 0 <= least <= largest.
     """
-    positive(
+    require_positive(
         amplitude=amplitude, friction=friction, tangential=tangential, area=area, largest=largest
     )
     if not 0 <= least <= largest:
@@ -377,7 +386,7 @@ def kern_fraction(offset, length):
 
     1 up to L/6 (the kern), then 3 (1/2 - |e|/L). ValueError unless length is positive and |e| < L/2 throughout.
     """
-    positive(length=length)
+    require_positive(length=length)
     share = np.abs(np.asarray(offset, float)) / length
     if np.any(share >= 1 / 2):
         raise ValueError(

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from .. import cost_model
 from ..campaigns.sweeps import estimate, parse_request
-from ..effects import displayed_absent_effects, law_has_trait
+from ..effects import law_has_trait, list_displayed_absent_effects
 from ..export.written import brief
 from ..formatting import format_quantity, rewrite_powers_of_ten
 from ..mesh import files as mesh_files
@@ -68,7 +68,7 @@ def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
     """
     if not list_named_files(tables):
         return []
-    return model_files.faults(tables, folder, whole, notes)
+    return model_files.find_file_faults(tables, folder, whole, notes)
 
 
 def plan(
@@ -101,7 +101,7 @@ def plan(
     found = plans.plan(read)
     answer = found.as_json()
     if probe:
-        answer["seconds"] = round(answer["seconds"] * cost_model.machine_time_ratio(), 2)
+        answer["seconds"] = round(answer["seconds"] * cost_model.measure_machine_time_ratio(), 2)
     if probe and (solved := faces.probed(found.model)):
         chain = answer["stiffness_chain"]
         chain |= {
@@ -185,7 +185,7 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
         print(f"group    {_group(value, name)}")
     if verbose:
         print(
-            f"absent   {', '.join(displayed_absent_effects(answer['not_in_scene'], answer['engine']))}"
+            f"absent   {', '.join(list_displayed_absent_effects(answer['not_in_scene'], answer['engine']))}"
         )
 
 

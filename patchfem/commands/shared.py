@@ -145,7 +145,7 @@ def unswept_of(path: Path, sets):
             f"[sweep] is left out: {', '.join(axis.key for axis in found.sweep)} as the scene gives "
             f"{'it' if len(found.sweep) == 1 else 'them'} (a key that only [sweep] has: its first value)"
         )
-    return model.build_unswept(found)
+    return model.build_without_sweep(found)
 
 
 class progress_bar:

@@ -38,8 +38,8 @@ from time import monotonic, sleep
 import numpy as np
 
 from ..disk import user_cache
-from ..disk.atomic_write import space_shortage
-from ..disk.installed import package_version
+from ..disk.atomic_write import describe_space_shortage
+from ..disk.installed import find_package_version
 from . import cache_limit, machine, prebuilt
 from .no_jit import plain
 
@@ -97,9 +97,7 @@ def kernel_key() -> str:
     """Return a hash of the kernels, of numba and llvmlite, and of the CPU with its instruction sets."""
     digest = sources()
     checked = os.environ.get("NUMBA_BOUNDSCHECK", "")
-    made_by = (
-        f"{package_version('numba')} {package_version('llvmlite')} {sys.version_info[:2]} {checked}"
-    )
+    made_by = f"{find_package_version('numba')} {find_package_version('llvmlite')} {sys.version_info[:2]} {checked}"
     digest.update(f"{made_by} {platform.machine()} {_cpu()}".encode())
     return digest.hexdigest()[:16]
 
@@ -140,13 +138,13 @@ def _placed() -> tuple[Path, str]:
 
 def _place() -> tuple[Path, str]:
     session, name = os.environ.get("XDG_RUNTIME_DIR"), Path("patchfem") / kernel_key()
-    first = user_cache.prepare_folder(user_cache.cache_base() / name)
+    first = user_cache.prepare_folder(user_cache.find_cache_base() / name)
     if not first:
-        return user_cache.cache_base() / name, ""
+        return user_cache.find_cache_base() / name, ""
     if session and not user_cache.prepare_folder(Path(session) / name):
         return Path(session) / name, first
-    user_cache.prepare_folder(user_cache.process_folder() / name)  # makes it where it can
-    return user_cache.process_folder() / name, first
+    user_cache.prepare_folder(user_cache.make_process_folder() / name)  # makes it where it can
+    return user_cache.make_process_folder() / name, first
 
 
 class Kernels:
@@ -461,7 +459,7 @@ def written(module: str, text: str, say=None, parts=()):
     """
     name = f"patchfem.{module}"
     path, data = _prepared(say) / "instances" / f"{module}.py", text.encode()
-    kept = _bytes_of(path) == data or user_cache.write_file(path, data)
+    kept = _bytes_of(path) == data or user_cache.write_cache_file(path, data)
 
     def bring():
         if name not in sys.modules:
@@ -481,7 +479,7 @@ def written(module: str, text: str, say=None, parts=()):
 def ran(kind: str) -> None:
     """Record that a run of this kind was completed, so that its compiled code is stored."""
     if not PLAIN:
-        user_cache.write_file(_folder() / "kinds" / digest(kind), kind.encode())
+        user_cache.write_cache_file(_folder() / "kinds" / digest(kind), kind.encode())
 
 
 def has_run(kind: str) -> bool:
@@ -544,7 +542,7 @@ def _told(say) -> None:
     if not PLAIN and not any(
         any(one.rglob(f"*.{ending}")) for one in _kept(_folder()) for ending in ("code", "nbi")
     ):
-        why = _placed()[1] or space_shortage(_folder() / "code", LEAST)
+        why = _placed()[1] or describe_space_shortage(_folder() / "code", LEAST)
         say(
             "compiling the code of the simulation for this machine, "
             + (

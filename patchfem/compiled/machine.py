@@ -170,7 +170,7 @@ def keep(path: Path, function, arguments: tuple) -> bool:
     """
     try:
         made = function.overloads[tuple(map(function.typeof_pyval, arguments))]
-        return user_cache.write_file(
+        return user_cache.write_cache_file(
             path, _content(path.name, function.targetctx, made, function.targetoptions)
         )
     except (
@@ -191,7 +191,7 @@ def make(path: Path, function, arguments: tuple, optimised) -> Code | None:
         content = _content(path.name, *optimised(function, arguments), function.targetoptions)
     except Exception:  # of their insides: what they refuse is told by the call itself
         return None
-    user_cache.write_file(path, content)
+    user_cache.write_cache_file(path, content)
     return loaded(content)
 
 

@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from ..disk.installed import package_version
+from ..disk.installed import find_package_version
 
 HERE = Path(__file__).parent
 
@@ -41,7 +41,7 @@ def key(sources) -> str:
     digest = sources()
     digest.update((HERE / "machine.py").read_bytes())
     digest.update(
-        f"{package_version('numba')} {package_version('llvmlite')} {sys.platform} {platform.machine()}".encode()
+        f"{find_package_version('numba')} {find_package_version('llvmlite')} {sys.platform} {platform.machine()}".encode()
     )
     return digest.hexdigest()[:16]
 

@@ -18,11 +18,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..core import Missing
-from .lock import HOST, is_running
+from .lock import HOST_HASH, is_running
 
 NO_SPACE_ERRNOS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 # bytes; numpy and HDF5 raise errors without a number, which mean a full disk if less than this is free
-MIN_SPACE = 65536
+MIN_FREE_BYTES = 65536
 PLACED_PATHS = deque(maxlen=100)  # last files put in place; the message on an interrupt names them
 RESUMABLE_FOLDERS = []  # folders in which this process left a checkpoint
 MAX_NAME_LENGTH = 150  # letters of a name kept in a partial name; file systems allow 255 bytes
@@ -65,7 +65,7 @@ def write_atomically(path, need: int | None = None) -> Iterator[Path]:
     path = Path(path)
     if os.path.isdir(path):
         raise WriteError(
-            f"{display_path(path)}: cannot be written, because this is a folder; name a file"
+            f"{format_path(path)}: cannot be written, because this is a folder; name a file"
         )
     if _is_special(path):
         try:
@@ -73,10 +73,10 @@ def write_atomically(path, need: int | None = None) -> Iterator[Path]:
         except OSError as error:
             raise explain_write_error(error, path, path, need) from None
         return
-    partial = partial_path(path)
+    partial = make_partial_path(path)
     try:
         _remove_stale_partials(path)
-        if need is not None and (shortage := space_shortage(path, need)):
+        if need is not None and (shortage := describe_space_shortage(path, need)):
             raise WriteError(shortage)
         yield partial
         os.replace(partial, path)
@@ -114,7 +114,7 @@ def write_in_partial_folder(path: Path, text: str) -> None:
     try:
         path.write_bytes(data)
     except OSError as error:
-        raise explain_write_error(error, path, partial_path(path), len(data)) from None
+        raise explain_write_error(error, path, make_partial_path(path), len(data)) from None
 
 
 def forget_placed_paths() -> None:
@@ -126,17 +126,17 @@ def forget_placed_paths() -> None:
 def list_placed_paths() -> list[str]:
     """List the files that this process put in place and that still exist."""
     return [
-        display_path(path)
+        format_path(path)
         for path in dict.fromkeys(PLACED_PATHS)
         if path.exists() and not path.parent.name.endswith(".partial")
     ]
 
 
-def partial_path(path: Path) -> Path:
+def make_partial_path(path: Path) -> Path:
     """Return the path of the partial file of `path`."""
     stem = path.stem[:MAX_NAME_LENGTH]
     suffix = path.suffix[:MAX_NAME_LENGTH]
-    return path.with_name(f".{stem}.{os.getpid()}-{HOST}.partial{suffix}")
+    return path.with_name(f".{stem}.{os.getpid()}-{HOST_HASH}.partial{suffix}")
 
 
 def is_partial_name(name: str) -> bool:
@@ -144,7 +144,7 @@ def is_partial_name(name: str) -> bool:
     return re.fullmatch(r"\..+\.\d+-[0-9a-f]{8}\.partial(\.[^.]*)?", name) is not None
 
 
-def free_space(path: Path) -> FreeSpace:
+def find_free_space(path: Path) -> FreeSpace:
     """Return the space for a file at `path`: the free space of its disk or the limit on file sizes."""
     folder = Path(os.path.abspath(path)).parent
     while not folder.exists():
@@ -154,19 +154,19 @@ def free_space(path: Path) -> FreeSpace:
         free = disk.f_bavail * disk.f_frsize
     else:
         free = shutil.disk_usage(folder).free
-    limit = _file_size_limit()
+    limit = _read_file_size_limit()
     if limit < free:
         return FreeSpace(limit, "is the limit on the size of a file (ulimit -f)", True)
     return FreeSpace(free, "is free on its disk", False)
 
 
-def space_shortage(path: Path, need: int) -> str:
+def describe_space_shortage(path: Path, need: int) -> str:
     """Return a message if `need` bytes do not fit at `path`, else ""."""
-    space = free_space(path)
+    space = find_free_space(path)
     if need <= space.size:
         return ""
     return (
-        f"{display_path(path)}: not enough space: {format_bytes(need)} needed, "
+        f"{format_path(path)}: not enough space: {format_bytes(need)} needed, "
         f"{format_bytes(space.size)} {space.limit}"
     )
 
@@ -191,12 +191,12 @@ def explain_write_error(
     WriteError
         States the path and the reason, and for a full disk the space that is needed and available.
     """
-    name = display_path(path)
+    name = format_path(path)
     # a device has its own size, which is not the free space of a disk
     if partial == path and error.errno in NO_SPACE_ERRNOS:
         return WriteError(f"{name}: not enough space ({error.strerror})")
     with suppress(OSError):
-        space = free_space(path)
+        space = find_free_space(path)
         written = partial.stat().st_size if partial != path and partial.exists() else 0
         # the partial file counts against a limit on file sizes; from the free space it is already subtracted
         remaining = space.size - written if space.is_file_limit else space.size
@@ -205,7 +205,7 @@ def explain_write_error(
                 f"{name}: not enough space: the disk has no free entries for new files (inodes); "
                 "remove files"
             )
-        if error.errno in NO_SPACE_ERRNOS or (error.errno is None and remaining < MIN_SPACE):
+        if error.errno in NO_SPACE_ERRNOS or (error.errno is None and remaining < MIN_FREE_BYTES):
             needed = f"more than {format_bytes(written)}" if need is None else format_bytes(need)
             reason = f" ({os.strerror(error.errno)})" if error.errno else ""
             size = space.size if space.is_file_limit else space.size + written
@@ -221,7 +221,7 @@ def explain_mkdir_error(error: OSError) -> str:
         return "the name of the folder is longer than the disk allows; give a shorter name with -o"
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         path = Path(error.filename or "")
-        files = [display_path(part) for part in (path, *path.parents) if part.is_file()]
+        files = [format_path(part) for part in (path, *path.parents) if part.is_file()]
         return f"{files[0]} is a file; choose another folder" if files else str(error.strerror)
     return str(error.strerror)
 
@@ -240,7 +240,7 @@ def format_bytes(count: float) -> str:
     return f"{count} bytes"
 
 
-def display_path(path: Path) -> str:
+def format_path(path: Path) -> str:
     """Return the path for display, relative to the working folder if it lies below it."""
     try:
         return str(Path(os.path.abspath(path)).relative_to(Path.cwd()))
@@ -302,7 +302,7 @@ def open_lossy(path) -> Iterator[LossyFile]:
             raise lossy.error
 
 
-def _file_size_limit() -> float:
+def _read_file_size_limit() -> float:
     """Return the limit of this process on the size of a file [bytes]."""
     try:
         import resource
@@ -325,7 +325,7 @@ def _remove_stale_partials(path: Path) -> None:
     """Remove the partial files of `path` whose processes have ended."""
     stem = re.escape(f".{path.stem[:MAX_NAME_LENGTH]}.")
     suffix = re.escape(path.suffix[:MAX_NAME_LENGTH])
-    pattern = re.compile(rf"{stem}(\d+)-{HOST}\.partial{suffix}")
+    pattern = re.compile(rf"{stem}(\d+)-{HOST_HASH}\.partial{suffix}")
     with suppress(OSError):
         for entry in os.scandir(path.parent):
             match = pattern.fullmatch(entry.name)

@@ -20,14 +20,14 @@ AT_FDCWD = -100  # stands for the working folder in renameat2(2)
 UNSUPPORTED_ERRNOS = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP)
 
 
-def old_folder_path(target: Path) -> Path:
+def make_old_folder_path(target: Path) -> Path:
     """Return the path to which the previous folder is renamed before it is removed."""
     return target.with_name(f".{target.name}.old")
 
 
 def replace_folder(new: Path, target: Path) -> None:
     """Rename the folder `new` to `target` and remove the previous folder."""
-    old = old_folder_path(target)
+    old = make_old_folder_path(target)
     with defer_signals():
         shutil.rmtree(old, ignore_errors=True)
         if not target.exists():
@@ -47,7 +47,7 @@ def replace_folder(new: Path, target: Path) -> None:
 
 def restore_folder(target: Path) -> None:
     """Restore the previous folder if a writer was killed between two renames, else remove its remains."""
-    old = old_folder_path(target)
+    old = make_old_folder_path(target)
     if old.is_dir() and not old.is_symlink():
         if target.exists():
             shutil.rmtree(old, ignore_errors=True)

@@ -10,8 +10,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-_SEPARATORS = re.compile(r"[,;=\[\]{}\"'\t\r\n]")
-_QUOTED = re.compile(r"\"([^\"\n]*)\"|'([^'\n]*)'")
+_SEPARATOR_PATTERN = re.compile(r"[,;=\[\]{}\"'\t\r\n]")
+_QUOTED_PATTERN = re.compile(r"\"([^\"\n]*)\"|'([^'\n]*)'")
 
 
 def iterate_texts(value: Any) -> Iterator[str]:
@@ -41,7 +41,7 @@ def hash_named_files(texts: Iterable[str], *folders: Path) -> list[list[str]]:
     OSError
         If a file cannot be read.
     """
-    names = dict.fromkeys(name for text in texts for name in _candidate_names(text))
+    names = dict.fromkeys(name for text in texts for name in _iterate_candidate_names(text))
     paths = ((name, os.path.join(folder, name)) for name in names for folder in folders)
     return [
         [name, sha256(Path(path).read_bytes()).hexdigest()]
@@ -50,13 +50,13 @@ def hash_named_files(texts: Iterable[str], *folders: Path) -> list[list[str]]:
     ]
 
 
-def _candidate_names(text: str) -> Iterator[str]:
+def _iterate_candidate_names(text: str) -> Iterator[str]:
     """Iterate over the parts of a text that may be names of files."""
     yield text
     yield text.partition("=")[2].strip()
-    for double_quoted, single_quoted in _QUOTED.findall(text):
+    for double_quoted, single_quoted in _QUOTED_PATTERN.findall(text):
         yield double_quoted or single_quoted
-    for part in _SEPARATORS.split(text):
+    for part in _SEPARATOR_PATTERN.split(text):
         yield part.strip()
 
 

@@ -8,16 +8,16 @@ import re
 import sys
 from functools import cache
 
-METADATA = re.compile(r"(.+?)-(\d[^-]*)(?:\.dist-info|(?:-py\d.*)?\.egg-info)")
+METADATA_PATTERN = re.compile(r"(.+?)-(\d[^-]*)(?:\.dist-info|(?:-py\d.*)?\.egg-info)")
 
 
-def package_version(name: str) -> str:
+def find_package_version(name: str) -> str:
     """Return the version of an installed package by its name in a package registry, "" if there is none."""
-    return installed_versions().get(_normalise(name), "")
+    return list_installed_versions().get(_normalise_name(name), "")
 
 
 @cache
-def installed_versions() -> dict:
+def list_installed_versions() -> dict:
     """Return the versions of the installed packages by their normalised names."""
     versions = {}
     for folder in sys.path:
@@ -26,12 +26,12 @@ def installed_versions() -> dict:
         except OSError:
             continue
         for name in names:
-            if match := METADATA.fullmatch(name):
+            if match := METADATA_PATTERN.fullmatch(name):
                 # Python imports the first package on the path
-                versions.setdefault(_normalise(match[1]), match[2])
+                versions.setdefault(_normalise_name(match[1]), match[2])
     return versions
 
 
-def _normalise(name: str) -> str:
+def _normalise_name(name: str) -> str:
     """Return the normalised name of a package (PEP 503)."""
     return re.sub("[-_.]+", "-", name).lower()

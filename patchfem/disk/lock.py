@@ -31,10 +31,10 @@ def _hash_host() -> str:
     return hashlib.sha256(" ".join(parts).encode()).hexdigest()[:8]
 
 
-HOST = _hash_host()
+HOST_HASH = _hash_host()
 
 
-def start_ticks(pid: int) -> str:
+def read_start_ticks(pid: int) -> str:
     """Return the start time of a process in ticks since the boot.
 
     "" if the system does not know it, "ended" for a dead process that its parent has not collected.
@@ -54,7 +54,7 @@ def is_running(pid: int, start: str = "") -> bool:
         pass  # the process runs and belongs to another user
     except (OSError, OverflowError):
         return False
-    ticks = start_ticks(pid)
+    ticks = read_start_ticks(pid)
     return ticks != "ended" and (not (start and ticks) or start == ticks)
 
 
@@ -75,7 +75,7 @@ class FolderLock:
         self.path = Path(path)
         self.folder = folder
         self.kind = kind
-        self.owner = f"{os.getpid()} {start_ticks(os.getpid()) or '-'} {HOST}"
+        self.owner = f"{os.getpid()} {read_start_ticks(os.getpid()) or '-'} {HOST_HASH}"
 
     def acquire(self) -> None:
         """Become the owner; raise Missing if another process is, or if the file cannot be written."""
@@ -83,7 +83,7 @@ class FolderLock:
             with _open_exclusively(self.path) as file:
                 owner = os.read(file, 200).decode("utf-8", "replace").split()
                 if self._is_active(owner):
-                    where = "" if len(owner) < 3 or owner[2] == HOST else " of another machine"
+                    where = "" if len(owner) < 3 or owner[2] == HOST_HASH else " of another machine"
                     raise Missing(
                         f"{self.folder}: another {self.kind} (process {owner[0]}{where}) is writing to this "
                         "folder; wait until that process ends, or name another folder with -o; if that "
@@ -118,7 +118,7 @@ class FolderLock:
         """Return whether the owner runs; a process of another machine is assumed to run."""
         if not owner or not owner[0].isdecimal():
             return False
-        if len(owner) > 2 and owner[2] != HOST:
+        if len(owner) > 2 and owner[2] != HOST_HASH:
             return True
         # the file is that of another thread, or remains from an earlier failure of this process
         if int(owner[0]) == os.getpid():
@@ -133,7 +133,7 @@ def _open_exclusively(path: Path) -> Iterator[int]:
         while True:
             file = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
             try:
-                _lock(file)
+                _lock_file(file)
                 with suppress(FileNotFoundError):
                     # if the path is another file now, the previous owner has removed this one
                     if os.path.samestat(os.fstat(file), os.stat(path)):
@@ -143,7 +143,7 @@ def _open_exclusively(path: Path) -> Iterator[int]:
                 os.close(file)
 
 
-def _lock(file: int) -> None:
+def _lock_file(file: int) -> None:
     """Take the kernel's lock on a file, where the system and the file system have locks."""
     try:
         import fcntl

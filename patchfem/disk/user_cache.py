@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 
 
-def cache_base() -> Path:
+def find_cache_base() -> Path:
     """Return the folder of the user's caches: PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache.
 
     A user without a home gets a folder of this process.
@@ -24,7 +24,7 @@ def cache_base() -> Path:
     try:
         return Path.home() / ".cache"
     except RuntimeError:  # user without a name, as in a container
-        return process_folder()
+        return make_process_folder()
 
 
 def prepare_folder(folder: Path) -> str:
@@ -37,7 +37,7 @@ def prepare_folder(folder: Path) -> str:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if os.name != "nt":
             for checked in (folder.parent, folder):
-                if reason := _reason_for_distrust(checked):
+                if reason := _find_distrust_reason(checked):
                     return reason
         if not os.access(folder, os.W_OK | os.X_OK) and not any(folder.iterdir()):
             return f"{folder} cannot be written"
@@ -46,7 +46,7 @@ def prepare_folder(folder: Path) -> str:
     return ""
 
 
-def _reason_for_distrust(folder: Path) -> str:
+def _find_distrust_reason(folder: Path) -> str:
     """Return why other users may have written to a folder; the group loses its permission to write."""
     status = os.stat(folder)
     if status.st_uid != os.geteuid():
@@ -59,7 +59,7 @@ def _reason_for_distrust(folder: Path) -> str:
 
 
 @cache
-def process_folder() -> Path:
+def make_process_folder() -> Path:
     """Return a folder of this process, removed at its end; a path that never exists if none can be made."""
     try:
         folder = Path(tempfile.mkdtemp(prefix="patchfem-"))
@@ -69,7 +69,7 @@ def process_folder() -> Path:
     return folder
 
 
-def write_file(path: Path, data: bytes) -> bool:
+def write_cache_file(path: Path, data: bytes) -> bool:
     """Write a file of a cache atomically, and make its folder; return False if it cannot be written."""
     partial = path.with_name(f".{path.name[:100]}.{os.getpid()}.partial")
     try:

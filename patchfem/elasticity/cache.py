@@ -30,7 +30,7 @@ def cache_folder() -> Path:
 
     It is patchfem/operators below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache.
     """
-    return user_cache.cache_base() / "patchfem" / "operators"
+    return user_cache.find_cache_base() / "patchfem" / "operators"
 
 
 def grid_key(x, depth, coating_rows: int, layers) -> str:
@@ -121,7 +121,7 @@ def store_arrays(key: str, arrays: dict) -> None:
         return
     content = BytesIO()
     np.savez(content, **arrays)
-    user_cache.write_file(cache_folder() / f"{key}.npz", content.getvalue())
+    user_cache.write_cache_file(cache_folder() / f"{key}.npz", content.getvalue())
     _delete_oldest_files()
 
 

@@ -136,7 +136,7 @@ def drawn(curves: dict) -> list:
     A frequency whose error is larger than itself would stretch the axis, so it is left out.
     """
     amplitudes = np.concatenate([curve.amplitude for curve in curves.values()])
-    unit, scale = formatting.axis_unit(amplitudes, "m")
+    unit, scale = formatting.choose_axis_unit(amplitudes, "m")
     along = charts.axis("amplitude at the output", unit, True)
     is_log = all((curve.damping > 0).all() for curve in curves.values())
     frequency = []

@@ -109,7 +109,7 @@ def histories(result: Result) -> tuple:
         # own.
         if not np.array_equal(r.slide, r.output):
             out["slide"] = r.slide
-    return out, (list(rig.modes.names), structure.named_motions(rig.modes, r.modal))
+    return out, (list(rig.modes.names), structure.compute_named_motions(rig.modes, r.modal))
 
 
 def _between(result: Result) -> dict:

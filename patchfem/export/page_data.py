@@ -10,7 +10,7 @@ from ..core import PatchfemError, SineDrive
 from ..inputs import loops, measured
 from ..response import spectrum
 from ..runs.results.result import Result, surface_of
-from ..structure.drive_sizes import max_acceleration
+from ..structure.drive_sizes import find_max_acceleration
 from .histories import largest_multiplier
 from .pages.driven import command, driven
 from .pages.released import released
@@ -347,7 +347,9 @@ def _measured(result: Result) -> Measured | None:
     rig = model.rig
     if rig is None:
         return found
-    found = replace(found, frequency=rig.drive.frequency, input=max_acceleration(rig.drive.signal))
+    found = replace(
+        found, frequency=rig.drive.frequency, input=find_max_acceleration(rig.drive.signal)
+    )
     acceleration = result.measures.get("absolute_acceleration_peak")
     if kind == "peak" or not isinstance(rig.drive.signal, SineDrive) or acceleration is None:
         return found

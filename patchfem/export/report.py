@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import formatting
-from ..effects import displayed_absent_effects
+from ..effects import list_displayed_absent_effects
 from ..runs.results.result import Result
 from .drawing import charts, pictures
 from .page_data import RunData, data_of
@@ -265,7 +265,7 @@ def _interface(data: RunData) -> Picture | None:
             "resultant force is in colour"
         )
     if charts.part_in_contact(data.patch.x, fields["normal_stress"][0]):
-        length, scale = formatting.axis_unit(data.patch.x, "m")
+        length, scale = formatting.choose_axis_unit(data.patch.x, "m")
         caption += (
             ". Only the part in contact is drawn; the whole length is "
             f"{(data.patch.x[-1] - data.patch.x[0]) * scale:.4g} {length}"
@@ -314,7 +314,7 @@ def _bodies(data: RunData) -> Picture | None:
     bodies = data.patch.bodies
     mises = bodies["mises"]
     largest = max(float(np.max(part)) for part in mises)
-    unit, scale = formatting.axis_unit([largest], "Pa")
+    unit, scale = formatting.choose_axis_unit([largest], "Pa")
     values = (bodies["x"], bodies["depth"], mises, bodies["pressure"])
     return Picture(
         charts.bodies,
@@ -329,7 +329,7 @@ def _of_mesh(data: RunData) -> str:
     sigma, mine = data.patch.fields["normal_stress"][0], data.patch.bodies["pressure"]
     if sigma.size == mine.size:
         return ""
-    unit, scale = formatting.axis_unit([sigma.max()], "Pa")
+    unit, scale = formatting.choose_axis_unit([sigma.max()], "Pa")
     return (
         f" The stress is computed on a mesh, on which the largest pressure is "
         f"{mine.max() * scale:.3g} {unit}; near the narrow pressure peaks of up to "
@@ -437,7 +437,7 @@ def _histories(data: RunData) -> Picture | None:
             else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
         )
         what = "turning points and stops were kept, joined by lines." if swings else what
-        unit, scale = formatting.axis_unit(history["time"], "s")
+        unit, scale = formatting.choose_axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
     # A decaying swing has no band per cycle: its reversals are stored, and the line through them
     # shows it.
@@ -662,7 +662,7 @@ def _cost(data: RunData) -> Section:
         if summary["kind"] == "rig"
         else ""
     )
-    absent = displayed_absent_effects(
+    absent = list_displayed_absent_effects(
         summary["not_in_scene"], summary.get("numerics", {}).get("engine")
     )
     text = (

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..core import Missing, PatchfemError
 from ..disk.atomic_write import RESUMABLE_FOLDERS, explain_mkdir_error, is_partial_name
-from ..disk.exchange import defer_signals, old_folder_path, replace_folder, restore_folder
+from ..disk.exchange import defer_signals, make_old_folder_path, replace_folder, restore_folder
 from ..disk.lock import FolderLock
 
 PAGE = "report.html"
@@ -140,7 +140,7 @@ class Folder:
 
     def _refuse_others(self) -> None:
         """Raise PatchfemError if the target, or its partial or old folder, contains other files."""
-        for place in (self.target, self.path, old_folder_path(self.target)):
+        for place in (self.target, self.path, make_old_folder_path(self.target)):
             refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
 
     def _told(self) -> str:

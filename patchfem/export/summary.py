@@ -10,7 +10,7 @@ from pathlib import Path
 from .. import __version__
 from ..core import Outcome
 from ..disk.atomic_write import write_text
-from ..disk.installed import installed_versions
+from ..disk.installed import list_installed_versions
 from ..effects import EFFECTS
 from ..runs.patch import values
 from ..runs.results.result import Result, choices, measure_engines
@@ -262,7 +262,7 @@ def effects_of(result: Result) -> list:
 
 def versions() -> dict:
     """Return the versions, by name, of the interpreter and of the packages that compute."""
-    found = installed_versions()
+    found = list_installed_versions()
     return {"python": ".".join(map(str, sys.version_info[:3]))} | {
         name: found[name] for name in PACKAGES if name in found
     }

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..core import allowed_error
+from ..core import compute_allowed_error
 from ..formatting import format_number, format_quantity
 from .written import label
 
@@ -37,7 +37,8 @@ def over(one: dict, tolerance) -> np.ndarray:
     values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(invalid="ignore"):
-        return errors > allowed_error(tolerance, values, floors)  # comparisons with NaN are False
+        # comparisons with NaN are False
+        return errors > compute_allowed_error(tolerance, values, floors)
 
 
 def by_floor(one: dict, tolerance) -> np.ndarray:
@@ -171,7 +172,7 @@ def _beyond(one: dict, tolerance) -> np.ndarray:
     """Return the error over the allowed error (n,)."""
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(one["errors"], float) / allowed_error(
+        return np.asarray(one["errors"], float) / compute_allowed_error(
             tolerance, np.asarray(one["values"], float), floors
         )
 

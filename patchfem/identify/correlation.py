@@ -3,11 +3,11 @@
 import numpy as np
 
 MIN_ROWS = 20  # number of rows; with fewer, correlation cannot be distinguished from chance
-CHANCE_CORRELATION = 2.0  # standard deviations 1/sqrt(rows); a smaller correlation is chance
+CHANCE_CORRELATION_FACTOR = 2.0  # standard deviations 1/sqrt(rows); a smaller correlation is chance
 MIN_REPEAT_CORRELATION = 0.5  # correlation of one cycle with the next; cycles with more are repeats
 
 
-def effective_rows(residual) -> float:
+def estimate_effective_rows(residual) -> float:
     """Return the number of independent rows that contain as much information as a residual.
 
     The number is n/tau with tau = 1 + 2 sum rho_k over the lags k before the first one without
@@ -29,16 +29,16 @@ def effective_rows(residual) -> float:
     r = r - r.mean()
     if n < MIN_ROWS or not np.ptp(r) > 0:
         return float(n)
-    rho = _correlations(r)
-    if rho[1] <= CHANCE_CORRELATION / np.sqrt(n):
+    rho = _compute_autocorrelation(r)
+    if rho[1] <= CHANCE_CORRELATION_FACTOR / np.sqrt(n):
         return float(n)
     # there is such a lag, because the correlations at all lags sum to -1/2
     first_lag = int(np.flatnonzero(rho[1:] <= 0)[0]) + 1
     tau = 1 + 2 * rho[1:first_lag].sum()
-    return float(np.clip(n / tau / _repetition_factor(rho, first_lag), 1.0, n))
+    return float(np.clip(n / tau / _compute_repetition_factor(rho, first_lag), 1.0, n))
 
 
-def _correlations(r) -> np.ndarray:
+def _compute_autocorrelation(r) -> np.ndarray:
     """Compute the autocorrelation (n,) of r at each lag.
 
     All products are divided by n, so that the sum over the lags stays finite.
@@ -48,7 +48,7 @@ def _correlations(r) -> np.ndarray:
     return products / products[0]
 
 
-def _repetition_factor(rho, first_lag: int) -> float:
+def _compute_repetition_factor(rho, first_lag: int) -> float:
     """Return the factor by which repeated cycles contain less information than independent ones.
 
     `first_lag` is the first lag without correlation of neighbours.

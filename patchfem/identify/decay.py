@@ -12,17 +12,17 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..core import PatchfemError
-from .variable_projection import Projection, project, standard_errors
+from .variable_projection import Projection, compute_standard_errors, project_data
 
 MIN_SAMPLES = 32  # smallest number of samples of a record
 MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
 # residual with / without a further sinusoid; above this ratio the sinusoid fits noise
-MAX_REMAINING = 0.8
+MAX_RESIDUAL_RATIO = 0.8
 MIN_MISFIT = 1e-9  # residual / record; a smaller residual is round-off
-MIN_DISTANCE = 3  # spectral lines, 1/T apart for a record of length T, between two sinusoids
-MIN_AMPLITUDE = 0.01  # amplitude / largest amplitude; weaker sinusoids are left out
+MIN_LINE_DISTANCE = 3  # spectral lines, 1/T apart for a record of length T, between two sinusoids
+MIN_AMPLITUDE_RATIO = 0.01  # amplitude / largest amplitude; weaker sinusoids are left out
 # decay rates at which the iteration starts, multiplied by the length of the record
-START_DECAYS = (0.3, 3.0, 30.0)
+START_DECAY_RATES = (0.3, 3.0, 30.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,7 +47,7 @@ class Decay:
         return 2 * np.pi * self.damping / np.sqrt(1 - self.damping**2)
 
 
-class _Refined(NamedTuple):
+class _RefinedPoles(NamedTuple):
     """Poles (2n,) w_1, s_1, w_2, ..., and the residual (k,) of the fit with them."""
 
     poles: np.ndarray
@@ -83,41 +83,44 @@ def fit_decay(time, value) -> Decay:
             f"the free decay has {time.size} samples; at least {MIN_SAMPLES} are needed"
         )
     time = time - time[0]
-    best = _Refined(np.empty(0), value - value.mean())
+    best = _RefinedPoles(np.empty(0), value - value.mean())
     size = best.rms
     while best.poles.size < 2 * MAX_SINUSOIDS and best.rms > MIN_MISFIT * size:
         attempts = [
-            _refine(time, value, np.append(best.poles, start)) for start in _find_starts(time, best)
+            _refine_poles(time, value, np.append(best.poles, start))
+            for start in _find_starts(time, best)
         ]
         attempts = [attempt for attempt in attempts if _are_distinct(time, attempt.poles)]
         if not attempts:
             break
         attempt = min(attempts, key=lambda attempt: np.linalg.norm(attempt.residual))
-        if attempt.rms > MAX_REMAINING * best.rms:
+        if attempt.rms > MAX_RESIDUAL_RATIO * best.rms:
             break
         best = attempt
     if not best.poles.size:
         raise PatchfemError("the record contains no decaying oscillation")
-    return _describe(time, value, best.poles, best.rms / size)
+    return _make_decay(time, value, best.poles, best.rms / size)
 
 
-def _describe(time, value, poles, misfit: float) -> Decay:
+def _make_decay(time, value, poles, misfit: float) -> Decay:
     """Turn poles into natural frequencies and damping ratios with their errors."""
     damped_omega = poles[0::2]
     rate = poles[1::2]
-    columns = _columns(time, poles)
-    linear = project(columns, value)
+    columns = _compute_columns(time, poles)
+    linear = project_data(columns, value)
     pairs = linear.coefficients[1:].reshape(-1, 2)
     motions = columns * linear.coefficients
     energy = np.sum((motions[:, 1::2] + motions[:, 2::2]) ** 2, axis=0)
-    is_kept = (rate > 0) & (energy > MIN_AMPLITUDE**2 * energy.max())
+    is_kept = (rate > 0) & (energy > MIN_AMPLITUDE_RATIO**2 * energy.max())
     if not is_kept.any():
         raise PatchfemError(
             "the oscillation in the record grows instead of decaying; begin the record after the drive "
             "has ended"
         )
     w = np.hypot(damped_omega, rate)
-    errors = standard_errors(_slopes(time, columns, linear), misfit * np.std(value))
+    errors = compute_standard_errors(
+        _compute_derivatives(time, columns, linear), misfit * np.std(value)
+    )
     order = np.flatnonzero(is_kept)[np.argsort(w[is_kept])]
     return Decay(
         frequency=(w / (2 * np.pi))[order],
@@ -132,11 +135,11 @@ def _are_distinct(time, poles) -> bool:
     """Return whether all sinusoids differ in frequency and oscillate faster than they decay."""
     damped_omega = poles[0::2]
     distances = np.diff(np.sort(damped_omega))
-    are_apart = (distances >= MIN_DISTANCE * 2 * np.pi / time[-1]).all()
+    are_apart = (distances >= MIN_LINE_DISTANCE * 2 * np.pi / time[-1]).all()
     return bool(are_apart and (np.abs(poles[1::2]) < damped_omega).all())
 
 
-def _columns(time, poles) -> np.ndarray:
+def _compute_columns(time, poles) -> np.ndarray:
     """Compute the columns (k, 1 + 2n) of the linear problem: 1, cosine and sine of each pole."""
     columns = [np.ones(time.size)]
     for omega, rate in poles.reshape(-1, 2):
@@ -145,7 +148,7 @@ def _columns(time, poles) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
-def _slopes(time, columns, linear: Projection) -> np.ndarray:
+def _compute_derivatives(time, columns, linear: Projection) -> np.ndarray:
     """Compute the derivatives (k, 2n) of the residual with respect to the poles."""
     slopes = []
     for k in range(1, columns.shape[1], 2):
@@ -155,15 +158,15 @@ def _slopes(time, columns, linear: Projection) -> np.ndarray:
     return linear.jacobian(np.stack(slopes, axis=1))
 
 
-def _refine(time, value, poles) -> _Refined:
+def _refine_poles(time, value, poles) -> _RefinedPoles:
     """Minimize the residual from a start."""
 
     def slopes(poles) -> np.ndarray:
-        columns = _columns(time, poles)
-        return _slopes(time, columns, project(columns, value))
+        columns = _compute_columns(time, poles)
+        return _compute_derivatives(time, columns, project_data(columns, value))
 
     result = least_squares(
-        lambda p: project(_columns(time, p), value).residual,
+        lambda p: project_data(_compute_columns(time, p), value).residual,
         poles,
         slopes,
         x_scale="jac",
@@ -172,10 +175,10 @@ def _refine(time, value, poles) -> _Refined:
         gtol=1e-15,
         max_nfev=60,
     )
-    return _Refined(result.x, -result.fun)
+    return _RefinedPoles(result.x, -result.fun)
 
 
-def _find_starts(time, best: _Refined) -> list:
+def _find_starts(time, best: _RefinedPoles) -> list:
     """Return starting poles (w_r, s_r) at the highest spectral line, with several decay rates.
 
     Lines near a known sinusoid are left out: what it leaves there is no further mode, but a decay that is
@@ -188,6 +191,6 @@ def _find_starts(time, best: _Refined) -> list:
     lines[:2] = 0.0
     frequency = np.arange(lines.size) / duration
     for known, rate in best.poles.reshape(-1, 2) / (2 * np.pi):
-        lines[np.abs(frequency - known) < max(MIN_DISTANCE / time[-1], rate)] = 0.0
+        lines[np.abs(frequency - known) < max(MIN_LINE_DISTANCE / time[-1], rate)] = 0.0
     omega = 2 * np.pi * int(np.argmax(lines)) / duration
-    return [np.array([omega, decay / time[-1]]) for decay in START_DECAYS]
+    return [np.array([omega, decay / time[-1]]) for decay in START_DECAY_RATES]

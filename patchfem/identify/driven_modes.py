@@ -18,22 +18,25 @@ from scipy.optimize import least_squares
 
 from ..core import PatchfemError
 from ..structure.modal_fit import ModalFit, add_mode
-from .frequency_response import MAX_FREQUENCY, Estimate, estimate_response
-from .variable_projection import Projection, project, standard_errors
+from .frequency_response import MAX_NYQUIST_FRACTION, Estimate, estimate_response
+from .variable_projection import Projection, compute_standard_errors, project_data
 
 # time derivative of the displacement
-DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
+DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 MAX_MODES = 12  # largest number of modes in one fit
-MIN_GAIN = 0.02  # fraction of the residual sum of squares that a further mode must remove
-MIN_AMPLITUDE = 3e-3  # root mean square of a mode / that of the response; weaker modes are left out
+# fraction of the residual sum of squares that a further mode must remove
+MIN_RESIDUAL_DECREASE = 0.02
+MIN_RMS_RATIO = 3e-3  # root mean square of a mode / that of the response; weaker modes are left out
 MIN_MISFIT = 1e-8  # residual / response; a smaller residual is round-off
 MAX_START_EVALUATIONS = 12  # evaluations from each start; only the best is refined further
 # samples at both ends that are not fitted, because the transform joins them by a jump
-EDGE_SAMPLES = 32
-MAX_SAMPLES = 2**16  # number of samples of a record that are fitted, counted from its beginning
+N_EDGE_SAMPLES = 32
+# number of samples of a record that are fitted, counted from its beginning
+MAX_FITTED_SAMPLES = 2**16
 MIN_ZETA = 1e-6  # smallest damping ratio
 MAX_ZETA = 0.5  # largest damping ratio
-START_WIDTHS = (0.1, 1.0, 5.0)  # widths of a peak at the starts, in spectral lines of a segment
+# widths of a peak at the starts, in spectral lines of a segment
+START_PEAK_WIDTHS = (0.1, 1.0, 5.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -71,7 +74,7 @@ class _Columns(NamedTuple):
     by_damping: list
 
 
-class _Fit(NamedTuple):
+class _ModeFit(NamedTuple):
     """Parameters theta (2n,): ln w_r, then ln zeta_r; and the residual (k,) of their fit."""
 
     theta: np.ndarray
@@ -83,11 +86,11 @@ class _Fit(NamedTuple):
         return self.residual @ self.residual
 
 
-class _Record:
+class _ModeProblem:
     """Separable least-squares problem of an input and its response."""
 
     def __init__(self, step: float, force, response, derivative: int):
-        self.inner = slice(EDGE_SAMPLES, force.size - EDGE_SAMPLES)
+        self.inner = slice(N_EDGE_SAMPLES, force.size - N_EDGE_SAMPLES)
         self.step = step
         self.samples = force.size
         self.force = force
@@ -142,12 +145,12 @@ class _Record:
 
     def solve(self, theta) -> Projection:
         """Solve the linear problem for given modes."""
-        return project(self.columns(theta).design, self.value)
+        return project_data(self.columns(theta).design, self.value)
 
     def slopes(self, theta) -> np.ndarray:
         """Compute the derivatives (k, 2n) of the residual."""
         columns = self.columns(theta)
-        linear = project(columns.design, self.value)
+        linear = project_data(columns.design, self.value)
         coefficients = linear.coefficients[3:].reshape(-1, 3)
         slopes = []
         for derivatives in (columns.by_frequency, columns.by_damping):
@@ -156,7 +159,7 @@ class _Record:
                 slopes.append(sum(parts))
         return linear.jacobian(np.stack(slopes, axis=1))
 
-    def refine(self, theta, max_evaluations: int = 100, tolerance: float = 1e-13) -> _Fit:
+    def refine(self, theta, max_evaluations: int = 100, tolerance: float = 1e-13) -> _ModeFit:
         """Minimize the residual from a start, until its relative change is below a tolerance."""
         n = theta.size // 2
         low = np.repeat(np.log([self.omega[1] / 2, MIN_ZETA]), n)
@@ -172,7 +175,7 @@ class _Record:
             gtol=1e-14,
             max_nfev=max_evaluations,
         )
-        return _Fit(result.x, result.fun * self.size)
+        return _ModeFit(result.x, result.fun * self.size)
 
 
 def fit_driven_modes(
@@ -187,7 +190,7 @@ def fit_driven_modes(
     force, response : (k,) ndarray
         Input and response.
     quantity : str
-        Kind of the response, a key of `DERIVATIVES`.
+        Kind of the response, a key of `DERIVATIVE_ORDERS`.
     estimate : Estimate
         Frequency response of the same record, for `estimate_damping`.
     band : (float, float)
@@ -202,16 +205,18 @@ def fit_driven_modes(
     PatchfemError
         If no mode is visible in the band.
     """
-    derivative = DERIVATIVES[quantity]
-    record = _Record(step, force[:MAX_SAMPLES], response[:MAX_SAMPLES], derivative)
+    derivative = DERIVATIVE_ORDERS[quantity]
+    record = _ModeProblem(
+        step, force[:MAX_FITTED_SAMPLES], response[:MAX_FITTED_SAMPLES], derivative
+    )
     fit = _add_modes(record, estimate)
     n = fit.theta.size // 2
     w, zeta = np.exp(fit.theta).reshape(2, -1)
     residue = record.solve(fit.theta).coefficients[3::3]
     rms = float(np.sqrt(np.mean(fit.residual**2)))
-    error = standard_errors(record.slopes(fit.theta), rms)[n:] * zeta
+    error = compute_standard_errors(record.slopes(fit.theta), rms)[n:] * zeta
     low = 2 * np.pi * max(band[0], estimate.frequency[0])
-    high = 2 * np.pi * min(band[1], MAX_FREQUENCY / (2 * step))
+    high = 2 * np.pi * min(band[1], MAX_NYQUIST_FRACTION / (2 * step))
     is_kept = (w >= low) & (w <= high) & (zeta > 2 * MIN_ZETA) & (zeta < 0.99 * MAX_ZETA)
     if not is_kept.any():
         raise PatchfemError(
@@ -233,10 +238,10 @@ def fit_driven_modes(
     )
 
 
-def _add_modes(record: _Record, estimate: Estimate) -> _Fit:
+def _add_modes(record: _ModeProblem, estimate: Estimate) -> _ModeFit:
     """Add modes one at a time, as long as each reduces the residual enough."""
-    fit = _Fit(np.empty(0), record.solve(np.empty(0)).residual)
-    min_reduction = MIN_AMPLITUDE**2 * fit.residual.size * record.size**2
+    fit = _ModeFit(np.empty(0), record.solve(np.empty(0)).residual)
+    min_reduction = MIN_RMS_RATIO**2 * fit.residual.size * record.size**2
     min_square = (MIN_MISFIT * record.size) ** 2 * fit.residual.size
     while fit.theta.size < 2 * MAX_MODES and fit.sum_of_squares > min_square:
         attempts = [
@@ -245,7 +250,7 @@ def _add_modes(record: _Record, estimate: Estimate) -> _Fit:
         ]
         best = min(attempts, key=lambda attempt: attempt.sum_of_squares)
         reduction = fit.sum_of_squares - best.sum_of_squares
-        if reduction < max(MIN_GAIN * fit.sum_of_squares, min_reduction):
+        if reduction < max(MIN_RESIDUAL_DECREASE * fit.sum_of_squares, min_reduction):
             break
         fit = record.refine(best.theta)
     if not fit.theta.size:
@@ -255,7 +260,7 @@ def _add_modes(record: _Record, estimate: Estimate) -> _Fit:
     return fit
 
 
-def _find_starts(record: _Record, estimate: Estimate, residual) -> list:
+def _find_starts(record: _ModeProblem, estimate: Estimate, residual) -> list:
     """Return starting modes (w, zeta) at the line where the residual follows the input most."""
     response = estimate_response(
         record.step,
@@ -270,7 +275,7 @@ def _find_starts(record: _Record, estimate: Estimate, residual) -> list:
     frequency = response.frequency[int(np.argmax(power))]
     line_width = 1 / (estimate.segment * record.step)
     starts = []
-    for width in START_WIDTHS:
+    for width in START_PEAK_WIDTHS:
         zeta = float(np.clip(width * line_width / frequency, 1e-4, 0.2))
         starts.append((2 * np.pi * frequency, zeta))
     return starts

@@ -14,15 +14,17 @@ from ..core import PatchfemError
 from ..response.welch import CrossDensities, average_segments, transform_segments
 
 # largest error of a sample time in time steps; times in text files have only six digits
-MAX_UNEVENNESS = 1e-3
-DEFAULT_SEGMENTS = 8  # number of segment lengths in a record, if the user gives no length
-MIN_SEGMENT = 64  # smallest number of samples in a segment
+MAX_TIME_ERROR = 1e-3
+DEFAULT_N_SEGMENTS = 8  # number of segment lengths in a record, if the user gives no length
+MIN_SEGMENT_SAMPLES = 64  # smallest number of samples in a segment
 # fraction of the largest response; if both ends are below it, the record is a complete transient
 MAX_END_FRACTION = 1e-2
-MIN_INPUT = 1e-6  # fraction of the largest input power; spectral lines with less are not excited
-MAX_FREQUENCY = 0.8  # fraction of the Nyquist frequency; filters and aliasing disturb higher lines
+# fraction of the largest input power; spectral lines with less are not excited
+MIN_INPUT_POWER = 1e-6
+# fraction of the Nyquist frequency; filters and aliasing disturb higher lines
+MAX_NYQUIST_FRACTION = 0.8
 # number of spectral lines by which a Hann window widens the average of a segment
-WINDOW_LINES = 1.5
+WINDOW_WIDTH_LINES = 1.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,11 +49,11 @@ class Estimate:
     window: str
 
 
-def even_step(time) -> float:
+def find_time_step(time) -> float:
     """Return the time step [s] of times (k,); raise PatchfemError if it is not even."""
     step = (time[-1] - time[0]) / (time.size - 1)
     deviation = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
-    if deviation > max(MAX_UNEVENNESS, 1e-5 * time.size):
+    if deviation > max(MAX_TIME_ERROR, 1e-5 * time.size):
         raise PatchfemError(
             f"the times deviate from an even step of {step:.6g} s by up to {deviation:.2g} of this step; an "
             "evenly sampled record is needed"
@@ -87,11 +89,11 @@ def estimate_response(
     """
     is_whole = segment is None and window in (None, "none") and _is_transient(response)
     if segment is None:
-        segment = force.size if is_whole else 2 * (force.size // (2 * DEFAULT_SEGMENTS))
+        segment = force.size if is_whole else 2 * (force.size // (2 * DEFAULT_N_SEGMENTS))
     window = window or ("none" if is_whole else "hann")
-    if not MIN_SEGMENT <= segment <= force.size:
+    if not MIN_SEGMENT_SAMPLES <= segment <= force.size:
         raise PatchfemError(
-            f"a segment has {segment} samples; at least {MIN_SEGMENT}, and at most the {force.size} samples of "
+            f"a segment has {segment} samples; at least {MIN_SEGMENT_SAMPLES}, and at most the {force.size} samples of "
             "the record, are needed"
         )
     has_window = window == "hann"
@@ -99,9 +101,9 @@ def estimate_response(
         step, (force, response), segment, has_window=has_window
     )
     densities = average_segments(*transforms)
-    lowest = WINDOW_LINES / (segment * step) if has_window else 0.0
-    is_kept = (frequency > lowest) & (frequency <= MAX_FREQUENCY / (2 * step))
-    is_kept &= densities.input > MIN_INPUT * densities.input[is_kept].max(initial=0.0)
+    lowest = WINDOW_WIDTH_LINES / (segment * step) if has_window else 0.0
+    is_kept = (frequency > lowest) & (frequency <= MAX_NYQUIST_FRACTION / (2 * step))
+    is_kept &= densities.input > MIN_INPUT_POWER * densities.input[is_kept].max(initial=0.0)
     if not is_kept.any() or not densities.input.max() > 0:
         raise PatchfemError("the input is zero, so there is no response to it")
     densities = CrossDensities(*(part[is_kept] for part in densities))

@@ -10,19 +10,20 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
-from .correlation import effective_rows
+from .correlation import estimate_effective_rows
 from .space import CubeResidual
 
 # fraction of the largest singular value of the scaled Jacobian; smaller ones are undetermined directions
 MIN_SINGULAR_VALUE = 1e-6
-MIN_EFFECT = 1e-9  # fraction of the largest residual; a value that changes the residual by less has no effect
+# fraction of the largest residual; a value that changes the residual by less has no effect
+MIN_RESIDUAL_EFFECT = 1e-9
 # squared component of an undetermined direction; a value with a smaller one is determined
-MIN_DIRECTION = 1e-3
+MIN_DIRECTION_COMPONENT = 1e-3
 # relative error of the linear growth of the sum of squares at an interval's ends
 MAX_NONLINEARITY = 0.2
 MIN_INTERVAL = 1e-9  # fraction of the range of a parameter; a smaller interval is round-off and treated as linear
 # distance to the bound / first step of a profile, for a parameter without a linear interval
-START_FRACTION = 64
+N_FIRST_STEPS = 64
 # relative error of the growth of the sum of squares at the end of a profile, also for quick models
 PROFILE_TOL = 1e-3
 QUICK_PROFILE_TOL = 1e-2
@@ -67,14 +68,14 @@ class _LeastSquares(NamedTuple):
     descend: Callable
 
 
-class _Profile(NamedTuple):
+class _IntervalEnd(NamedTuple):
     """End of an interval in the unit cube, and whether it is only the bound."""
 
     end: float
     is_open: bool
 
 
-def no_intervals(n: int) -> FitIntervals:
+def make_unknown_intervals(n: int) -> FitIntervals:
     """Return NaN intervals for a fit of n values whose intervals were not requested."""
     return FitIntervals(
         ends=np.full((n, 2), np.nan),
@@ -111,16 +112,16 @@ def compute_intervals(
     FitIntervals
     """
     residual = model(u) if is_series else None
-    rows = model.rows if residual is None else effective_rows(residual)
+    rows = model.rows if residual is None else estimate_effective_rows(residual)
     n = u.size
     dof = max(rows - n, 1)
     cost = max(cost, (1e-15 * model.largest) ** 2 * model.rows, 1e-300)
     jacobian = model.jacobian(u, range(n))
     size = np.sqrt((jacobian**2).sum(axis=0))
-    has_effect = size > MIN_EFFECT * model.largest * np.sqrt(model.rows)
+    has_effect = size > MIN_RESIDUAL_EFFECT * model.largest * np.sqrt(model.rows)
     inner = [i for i in range(n) if 0 < u[i] < 1 and has_effect[i]]
-    inverse, null = _invert(jacobian[:, inner], size[inner])
-    unknown = {inner[k] for row in null for k in np.flatnonzero(row**2 > MIN_DIRECTION)}
+    inverse, null = _invert_normal_matrix(jacobian[:, inner], size[inner])
+    unknown = {inner[k] for row in null for k in np.flatnonzero(row**2 > MIN_DIRECTION_COMPONENT)}
     quantile = student.ppf(0.975, dof)
     covariance = np.full((n, n), np.nan)
     covariance[np.ix_(inner, inner)] = inverse * cost / dof
@@ -143,17 +144,17 @@ def compute_intervals(
             methods[i] = "profile"
             ends[i] = [profile.end for profile in profiles]
     return FitIntervals(
-        ends=_ends_as_values(model, u, ends),
+        ends=_convert_ends(model, u, ends),
         methods=tuple(methods),
         open_ends=open_ends,
-        correlation=_correlation(covariance, unknown),
+        correlation=_compute_correlation(covariance, unknown),
         sensitivity=size / np.sqrt(model.rows),
-        unknown=_unknown_directions(model, u, inner, null, size),
+        unknown=_list_unknown_directions(model, u, inner, null, size),
         rows=float(rows),
     )
 
 
-def _ends_as_values(model: CubeResidual, u, ends) -> np.ndarray:
+def _convert_ends(model: CubeResidual, u, ends) -> np.ndarray:
     """Convert ends (n, 2) of intervals about a point u of the unit cube to values."""
     values = ends.copy()
     for i in np.flatnonzero(np.isfinite(ends[:, 0])):
@@ -164,7 +165,7 @@ def _ends_as_values(model: CubeResidual, u, ends) -> np.ndarray:
     return values
 
 
-def _invert(jacobian, size) -> tuple:
+def _invert_normal_matrix(jacobian, size) -> tuple:
     """Invert J^T J over the directions that the rows determine.
 
     Returns the inverse (f, f), and the unit directions (d, f) that they do not determine. `size` (f,) are
@@ -179,7 +180,7 @@ def _invert(jacobian, size) -> tuple:
     return root @ root.T, directions[~is_known]
 
 
-def _correlation(covariance, unknown: set) -> np.ndarray:
+def _compute_correlation(covariance, unknown: set) -> np.ndarray:
     """Return the correlation matrix (n, n), NaN for unknown values."""
     matrix = covariance.copy()
     index = list(unknown)
@@ -190,7 +191,7 @@ def _correlation(covariance, unknown: set) -> np.ndarray:
         return matrix / np.outer(scale, scale)
 
 
-def _unknown_directions(model: CubeResidual, u, inner: list, null, size) -> np.ndarray:
+def _list_unknown_directions(model: CubeResidual, u, inner: list, null, size) -> np.ndarray:
     """Return the undetermined directions (d, n) as relative changes, scaled to a maximum of 1.
 
     If a value at the point u of the cube is 0, they are changes over the range.
@@ -228,7 +229,9 @@ def _is_linear(fit: _LeastSquares, i: int, half: float, covariance, inner: list)
     return True
 
 
-def _follow_profile(fit: _LeastSquares, i: int, sign: float, half: float, others: list) -> _Profile:
+def _follow_profile(
+    fit: _LeastSquares, i: int, sign: float, half: float, others: list
+) -> _IntervalEnd:
     """Find the end of the interval of value i by the profile of the sum of squares.
 
     There the sum of squares, minimized over the other values, has grown by `fit.growth`. The root of the
@@ -236,7 +239,7 @@ def _follow_profile(fit: _LeastSquares, i: int, sign: float, half: float, others
     """
     room = fit.u[i] if sign < 0 else 1 - fit.u[i]
     if room <= 0:
-        return _Profile(fit.u[i], True)
+        return _IntervalEnd(fit.u[i], True)
 
     def evaluate(step: float, near) -> tuple:
         point = near.copy()
@@ -245,7 +248,7 @@ def _follow_profile(fit: _LeastSquares, i: int, sign: float, half: float, others
         growth = max(descent.cost / fit.cost - 1, 0.0)
         return np.sqrt(growth / fit.growth) - 1, descent.u
 
-    step = room / START_FRACTION
+    step = room / N_FIRST_STEPS
     if np.isfinite(half) and half > MIN_INTERVAL:
         step = min(half, room)
     low = 0.0
@@ -263,7 +266,7 @@ def _follow_profile(fit: _LeastSquares, i: int, sign: float, half: float, others
             f_low = f
             near = point
             if step >= room:
-                return _Profile(float(fit.u[i] + sign * room), True)
+                return _IntervalEnd(float(fit.u[i] + sign * room), True)
         else:
             high = step
             f_high = f
@@ -274,4 +277,4 @@ def _follow_profile(fit: _LeastSquares, i: int, sign: float, half: float, others
         step = low + (high - low) * min(max(fraction, 0.1), 0.9)
         if high - low < 1e-6 * max(high, 1e-12):
             break
-    return _Profile(float(fit.u[i] + sign * step), False)
+    return _IntervalEnd(float(fit.u[i] + sign * step), False)

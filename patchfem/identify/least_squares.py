@@ -15,19 +15,21 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..core import NotConverged, Outcome, frozen_array
-from .intervals import FitIntervals, compute_intervals, no_intervals
-from .space import CubeResidual, space, spread_points
+from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
+from .space import CubeResidual, make_space, make_space_filling_points
 
-FTOL = 1e-10  # relative change of the sum of squares in a step at which a descent ends
-QUICK_FTOL = 1e-4  # FTOL of a residual that is expensive to evaluate
+COST_TOL = 1e-10  # relative change of the sum of squares in a step at which a descent ends
+QUICK_COST_TOL = 1e-4  # COST_TOL of a residual that is expensive to evaluate
 MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without those for Jacobians
-EXACT = 1e-9  # fraction of the largest residual; a fit with less is exact and needs no other starting point
+# fraction of the largest residual; a fit with less is exact and needs no other starting point
+EXACT_FIT_RATIO = 1e-9
 # sum of squares / the smallest one; descents that end below it found the same minimum
-SAME_VALLEY = 1.02
-SAME_RESULT = 1e-6  # relative difference of the sums of squares of descents that agree
-NEAR_BOUND = 1e-3  # fraction of the range; a value closer to a bound is also tried on the bound
+SAME_MINIMUM_RATIO = 1.02
+SAME_RESULT_TOL = 1e-6  # relative difference of the sums of squares of descents that agree
+# fraction of the range; a value closer to a bound is also tried on the bound
+NEAR_BOUND_FRACTION = 1e-3
 # number of points per value at which the residual is evaluated to choose the starting points
-STARTS_PER_VALUE = 8
+N_TRIALS_PER_VALUE = 8
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -102,7 +104,7 @@ def fit(
     low, high : (n,) array_like
         Bounds.
     log : (n,) array_like of bool, optional
-        Whether each value is searched in logarithms (see `space.space`).
+        Whether each value is searched in logarithms (see `space.make_space`).
     start : (n,) array_like, optional
         Values from which the first descent starts.
     starts : int
@@ -122,16 +124,16 @@ def fit(
     NotConverged
         If all starts fail.
     """
-    box = space(low, high, log)
+    box = make_space(low, high, log)
     model = CubeResidual(residual, box)
     n = box.low.size
-    begins = starting_points(model, None if start is None else box.unit(start), starts)
+    begins = choose_starting_points(model, None if start is None else box.unit(start), starts)
     if model.rows < n:
         raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
-    return assemble_fit(model, descents(model, begins, stops_when_exact=True), bars)
+    return assemble_fit(model, run_descents(model, begins, stops_when_exact=True), bars)
 
 
-def descents(
+def run_descents(
     model: CubeResidual,
     begins,
     *,
@@ -172,7 +174,7 @@ def descents(
         ends.append(end)
         if report is not None:
             report(1)
-        if stops_when_exact and end.cost <= (EXACT * model.largest) ** 2 * model.rows:
+        if stops_when_exact and end.cost <= (EXACT_FIT_RATIO * model.largest) ** 2 * model.rows:
             break
     return ends
 
@@ -194,16 +196,16 @@ def assemble_fit(model: CubeResidual, ends: list, bars: str = "rows", starts=Non
     Fit
     """
     best = min(ends, key=lambda end: end.cost)
-    max_difference = SAME_RESULT * best.cost + 1e-20 * model.largest**2 * model.rows
+    max_difference = SAME_RESULT_TOL * best.cost + 1e-20 * model.largest**2 * model.rows
     agreed = sum(abs(end.cost - best.cost) <= max_difference for end in ends)
     u = best.u
     cost = best.cost
     if bars:
         u, cost = _move_onto_bounds(model, u, cost)
-    intervals = no_intervals(u.size)
+    intervals = make_unknown_intervals(u.size)
     if bars not in ("", "bounds"):
         intervals = compute_intervals(model, u, cost, descend, is_series=bars == "series")
-    n_same_valley = sum(end.cost <= SAME_VALLEY * cost for end in starts or ends)
+    n_same_valley = sum(end.cost <= SAME_MINIMUM_RATIO * cost for end in starts or ends)
     is_converged = best.done or n_same_valley > 1
     return _make_fit(
         model,
@@ -235,7 +237,7 @@ def _make_fit(model: CubeResidual, u, intervals: FitIntervals, **results) -> Fit
     )
 
 
-def starting_points(model: CubeResidual, own, count: int, trials: int = 0) -> list:
+def choose_starting_points(model: CubeResidual, own, count: int, trials: int = 0) -> list:
     """Choose points of the unit cube from which descents start.
 
     Parameters
@@ -262,7 +264,7 @@ def starting_points(model: CubeResidual, own, count: int, trials: int = 0) -> li
         return [own]
     costs = []
     points = []
-    for u in spread_points(trials or STARTS_PER_VALUE * n, n):
+    for u in make_space_filling_points(trials or N_TRIALS_PER_VALUE * n, n):
         residual = model(u)
         if residual is not None:
             costs.append(float(residual @ residual))
@@ -316,7 +318,7 @@ def descend(model: CubeResidual, u, free) -> Descent:
     else:
         return start._replace(done=False)
     size = max(float(np.abs(model.with_penalty(point(begin))).max()), 1e-300)
-    ftol = QUICK_FTOL if model.quick else FTOL
+    ftol = QUICK_COST_TOL if model.quick else COST_TOL
     result = least_squares(
         lambda p: model.with_penalty(point(p)) / size,
         begin,
@@ -344,8 +346,8 @@ def _move_onto_bounds(model: CubeResidual, u, cost: float) -> tuple:
     Returns the point u (n,) and the sum of squares.
     """
     gradient = model.jacobian(u, range(u.size)).T @ model(u)
-    presses_low = (u < NEAR_BOUND) & (gradient > 0)
-    presses_high = (u > 1 - NEAR_BOUND) & (gradient < 0)
+    presses_low = (u < NEAR_BOUND_FRACTION) & (gradient > 0)
+    presses_high = (u > 1 - NEAR_BOUND_FRACTION) & (gradient < 0)
     presses = presses_low | presses_high
     if not presses.any():
         return u, cost

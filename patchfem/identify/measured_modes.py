@@ -8,17 +8,17 @@ import numpy as np
 from ..core import PatchfemError
 from ..response.decay_curve import compute_swing_curve
 from ..structure import places as structure_places
-from ..structure.places import Shapes
+from ..structure.places import MeasuredModes
 from .decay import fit_decay
-from .driven_modes import DERIVATIVES, MAX_SAMPLES, DrivenModes, fit_driven_modes
-from .frequency_response import Estimate, estimate_response, even_step
-from .swings import half_swings, sparse_after
+from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, DrivenModes, fit_driven_modes
+from .frequency_response import Estimate, estimate_response, find_time_step
+from .swings import describe_sparse_end, find_half_swings
 
-INPUTS = ("force", "base_acceleration")  # quantities of a record that drive the rig
+INPUT_QUANTITIES = ("force", "base_acceleration")  # quantities of a record that drive the rig
 # quantities whose mode-shape components a user can name
-PLACES = ("slide", "output", "base", "normal", "pitch")
+SHAPE_QUANTITIES = ("slide", "output", "base", "normal", "pitch")
 # fraction by which the damping ratio of the windowed estimate may be larger without a note
-MAX_WIDENING = 0.05
+MAX_DAMPING_EXCESS = 0.05
 MAX_ERROR_RATIO = 2.0  # half-width of the interval / damping ratio; an amplitude with a wider interval is left out
 # fraction of a driven response that the modes may leave unexplained without a note
 MAX_MISFIT = 0.1
@@ -57,7 +57,7 @@ class RecordEstimate(NamedTuple):
     response: str
 
 
-class _Rows(NamedTuple):
+class _ModeRows(NamedTuple):
     """Mode-shape components (n,) by key, modal mass [kg] or None, and notes."""
 
     rows: dict
@@ -65,12 +65,12 @@ class _Rows(NamedTuple):
     notes: list
 
 
-def response_name(values: dict) -> str:
+def find_response_name(values: dict) -> str:
     """Return the name of the only response of a record; raise PatchfemError if there is not one."""
-    names = [name for name in DERIVATIVES if name in values]
+    names = [name for name in DERIVATIVE_ORDERS if name in values]
     if len(names) != 1:
         raise PatchfemError(
-            f"exactly one response is needed ({' or '.join(DERIVATIVES)}), but the record has "
+            f"exactly one response is needed ({' or '.join(DERIVATIVE_ORDERS)}), but the record has "
             f"{', '.join(names) or 'none'}: choose one with --map"
         )
     return names[0]
@@ -99,8 +99,8 @@ def estimate_record(
     PatchfemError
         If the record lacks one of them, or has several inputs or responses.
     """
-    response = response_name(values)
-    inputs = [name for name in INPUTS if name in values]
+    response = find_response_name(values)
+    inputs = [name for name in INPUT_QUANTITIES if name in values]
     if len(inputs) != 1 or "time" not in values:
         raise PatchfemError(
             "a frequency response needs time, a response and one input (force or base_acceleration), "
@@ -108,13 +108,13 @@ def estimate_record(
             "has " + ", ".join(values) + ": choose channels with --map, or use --decay for a free "
             "decay"
         )
-    step = even_step(values["time"])
+    step = find_time_step(values["time"])
     samples = None if segment is None else round(segment / step)
     estimate = estimate_response(step, values[inputs[0]], values[response], samples, window)
     return RecordEstimate(estimate, step, inputs[0], response)
 
 
-def modes_of_driven_record(
+def identify_driven_modes(
     values: dict, segment: float | None, window: str | None, band: tuple
 ) -> ListedModes:
     """Identify modes from the response to a force at the same point or to a base acceleration.
@@ -141,12 +141,12 @@ def modes_of_driven_record(
     relative = estimate_response(step, force, motion, estimate.segment, estimate.window)
     modes = fit_driven_modes(step, force, motion, response, relative, band)
     rows, mass, notes = (
-        _modes_of_force_residues(modes) if drive == "force" else _modes_of_base_residues(modes)
+        _convert_force_residues(modes) if drive == "force" else _convert_base_residues(modes)
     )
-    if force.size > MAX_SAMPLES:
+    if force.size > MAX_FITTED_SAMPLES:
         notes.append(
-            f"the modes are fitted to the first {MAX_SAMPLES} of {force.size} samples, a duration of "
-            f"{MAX_SAMPLES * step:.4g} s"
+            f"the modes are fitted to the first {MAX_FITTED_SAMPLES} of {force.size} samples, a duration of "
+            f"{MAX_FITTED_SAMPLES * step:.4g} s"
         )
     return ListedModes(
         frequency=modes.frequency,
@@ -159,7 +159,7 @@ def modes_of_driven_record(
     )
 
 
-def _modes_of_force_residues(modes: DrivenModes) -> _Rows:
+def _convert_force_residues(modes: DrivenModes) -> _ModeRows:
     """Derive mode-shape components at the drive point, and the modal mass, from the residues.
 
     The components are relative to that of the first mode, whose residue is the reciprocal of the mass.
@@ -176,10 +176,10 @@ def _modes_of_force_residues(modes: DrivenModes) -> _Rows:
         "same point; the sign of this mode is ignored"
         for f in modes.frequency[modes.residue < 0]
     ]
-    return _Rows({"slide": motion, "output": motion}, 1 / float(first), notes)
+    return _ModeRows({"slide": motion, "output": motion}, 1 / float(first), notes)
 
 
-def _modes_of_base_residues(modes: DrivenModes) -> _Rows:
+def _convert_base_residues(modes: DrivenModes) -> _ModeRows:
     """Split residues of a base excitation into participation and mode-shape component.
 
     The residue is minus their product; both factors get the same size.
@@ -190,7 +190,7 @@ def _modes_of_base_residues(modes: DrivenModes) -> _Rows:
     scale = max(1.0, float(np.sqrt(np.sum(size**2))))
     motion = np.sign(product) * size * scale
     rows = {"slide": motion, "output": motion, "base": size / scale}
-    return _Rows(rows, None, ["a response to base motion gives no modal mass: set moving_mass"])
+    return _ModeRows(rows, None, ["a response to base motion gives no modal mass: set moving_mass"])
 
 
 def _describe_modes(modes: DrivenModes) -> list:
@@ -209,7 +209,7 @@ def _describe_modes(modes: DrivenModes) -> list:
 def _note_quality(modes: DrivenModes, estimate: Estimate, step: float) -> list:
     """Write notes on peaks that the window widens, and on a large misfit."""
     notes = []
-    is_widened = modes.estimate_damping > (1 + MAX_WIDENING) * modes.damping
+    is_widened = modes.estimate_damping > (1 + MAX_DAMPING_EXCESS) * modes.damping
     # a single segment has no window, so that a larger damping comes from noise
     if is_widened.any() and estimate.segments > 1:
         ratio = np.where(is_widened, modes.estimate_damping / modes.damping, 0)
@@ -228,12 +228,12 @@ def _note_quality(modes: DrivenModes, estimate: Estimate, step: float) -> list:
     return notes
 
 
-def _decay_part(values: dict, begin: float | None) -> tuple:
+def _select_decay(values: dict, begin: float | None) -> tuple:
     """Return the times [s] and values of the only response from `begin` [s] on.
 
     By default they begin at the maximum.
     """
-    value = values[response_name(values)]
+    value = values[find_response_name(values)]
     if "time" not in values:
         raise PatchfemError("a free decay needs a time channel; choose this channel with --map")
     time = values["time"]
@@ -245,7 +245,7 @@ def _decay_part(values: dict, begin: float | None) -> tuple:
     return time[start:], value[start:]
 
 
-def decay_curve(values: dict, begin: float | None = None) -> tuple:
+def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
     """Determine frequency and damping of a free decay as functions of the amplitude.
 
     A velocity is divided by the undamped circular frequency of its point, an acceleration by its square.
@@ -269,8 +269,8 @@ def decay_curve(values: dict, begin: float | None = None) -> tuple:
     PatchfemError
         If no decay rises above the noise.
     """
-    time, value = _decay_part(values, begin)
-    swings = half_swings(time, value)
+    time, value = _select_decay(values, begin)
+    swings = find_half_swings(time, value)
     curve = compute_swing_curve(swings)
     notes = []
     is_certain = curve.damping_error <= MAX_ERROR_RATIO * np.abs(curve.damping)
@@ -285,17 +285,17 @@ def decay_curve(values: dict, begin: float | None = None) -> tuple:
             f"of the damping ratio is wider than {MAX_ERROR_RATIO:g} times its value there"
         )
         curve = curve.at(is_certain)
-    reason = sparse_after(time, swings)
+    reason = describe_sparse_end(time, swings)
     if reason:
         notes.append(f"the decay is followed up to {swings.middle[-1]:.4g} s only: {reason}")
     omega = 2 * np.pi * curve.frequency / np.sqrt(1 - curve.damping**2)
-    displacement = curve.amplitude / omega ** DERIVATIVES[response_name(values)]
+    displacement = curve.amplitude / omega ** DERIVATIVE_ORDERS[find_response_name(values)]
     return curve._replace(amplitude=displacement), notes
 
 
-def modes_of_decay(values: dict, begin: float | None = None) -> ListedModes:
+def identify_decay_modes(values: dict, begin: float | None = None) -> ListedModes:
     """Identify modes from a free decay that begins at `begin` [s], by default at the maximum."""
-    decay = fit_decay(*_decay_part(values, begin))
+    decay = fit_decay(*_select_decay(values, begin))
     descriptions = [
         f"damping {zeta:.4g} +- {error:.1g}, logarithmic decrement {decrement:.4g}"
         for zeta, error, decrement in zip(decay.damping, decay.error, decay.decrement())
@@ -314,7 +314,7 @@ def modes_of_decay(values: dict, begin: float | None = None) -> ListedModes:
     return ListedModes(decay.frequency, decay.damping, rows, None, descriptions, notes)
 
 
-def modes_of_shapes(shapes: Shapes, places: dict) -> ListedModes:
+def list_shape_modes(shapes: MeasuredModes, places: dict) -> ListedModes:
     """List measured shapes as modes.
 
     The mass is 1 / sum phi^2 at the place that slides, or at `base`: the part of the mass that the modes
@@ -324,7 +324,7 @@ def modes_of_shapes(shapes: Shapes, places: dict) -> ListedModes:
     ----------
     shapes : Shapes
     places : dict
-        Text of a place such as ``"12:+x"`` for some of `PLACES`; `slide` is needed unless there is only
+        Text of a place such as ``"12:+x"`` for some of `SHAPE_QUANTITIES`; `slide` is needed unless there is only
         one place.
 
     Returns
@@ -333,7 +333,7 @@ def modes_of_shapes(shapes: Shapes, places: dict) -> ListedModes:
     """
     if "slide" not in places:
         node, axis = next(iter(shapes.motion))
-        slide = f"{node}:+{structure_places.AXES[axis]}"
+        slide = f"{node}:+{structure_places.DIRECTION_NAMES[axis]}"
         if len(shapes.motion) != 1:
             raise PatchfemError(
                 f"the file has {len(shapes.motion)} nodes and directions; give the node and direction "

@@ -7,13 +7,13 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 
-STEP = 1e-5  # fraction of the range of a value; step of difference quotients
-WIDE_RANGE = 10  # upper / lower bound; a value with a wider range is searched in logarithms
-PENALTY = 1e3  # residual of a failed evaluation / largest residual so far
+DIFFERENCE_STEP = 1e-5  # fraction of the range of a value; step of difference quotients
+MIN_LOG_RATIO = 10  # upper / lower bound; a value with a wider range is searched in logarithms
+PENALTY_FACTOR = 1e3  # residual of a failed evaluation / largest residual so far
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Space:
+class SearchSpace:
     """Bounds of n values, mapped to the unit cube u in [0, 1]^n.
 
     - low, high: bounds (n,), low < high.
@@ -54,7 +54,7 @@ class Space:
         return slope
 
 
-def space(low, high, log=None) -> Space:
+def make_space(low, high, log=None) -> SearchSpace:
     """Build the unit cube of bounds.
 
     Parameters
@@ -81,13 +81,13 @@ def space(low, high, log=None) -> Space:
         )
     if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
         raise ValueError("bounds must be finite with low < high")
-    is_wide = (low > 0) & (high > WIDE_RANGE * low)
+    is_wide = (low > 0) & (high > MIN_LOG_RATIO * low)
     log = is_wide if log is None else np.array(log, bool)
     if log.shape != low.shape or (log & (low <= 0)).any():
         raise ValueError(
             "'log' needs one flag per parameter, and 'low' must be > 0 wherever the flag is set"
         )
-    return Space(low, high, log)
+    return SearchSpace(low, high, log)
 
 
 class CubeResidual:
@@ -106,7 +106,7 @@ class CubeResidual:
         of profiles are accurate to 1 %.
     """
 
-    def __init__(self, residual: Callable, space: Space, *, quick: bool = False):
+    def __init__(self, residual: Callable, space: SearchSpace, *, quick: bool = False):
         self.residual = residual
         self.space = space
         self.quick = quick
@@ -153,7 +153,7 @@ class CubeResidual:
         """Evaluate the residual (r,); if it fails, return rows larger than all others so far."""
         residual = self(u)
         if residual is None:
-            return np.full(self.rows, PENALTY * max(self.largest, 1e-300))
+            return np.full(self.rows, PENALTY_FACTOR * max(self.largest, 1e-300))
         return residual
 
     def jacobian(self, u, free) -> np.ndarray:
@@ -179,7 +179,7 @@ class CubeResidual:
             if self.quick and neighbours:
                 break
             point = np.array(u, float)
-            point[i] += n_steps * STEP
+            point[i] += n_steps * DIFFERENCE_STEP
             is_needed = abs(n_steps) == 1 or 1 not in neighbours or -1 not in neighbours
             if is_needed and 0 <= point[i] <= 1:
                 residual = self(point)
@@ -194,16 +194,16 @@ def _difference_quotient(here, neighbours: dict) -> np.ndarray:
     It is 0 if there is no neighbour.
     """
     if 1 in neighbours and -1 in neighbours:
-        return (neighbours[1] - neighbours[-1]) / (2 * STEP)
+        return (neighbours[1] - neighbours[-1]) / (2 * DIFFERENCE_STEP)
     for k in (1, -1):
         if k in neighbours and 2 * k in neighbours:
-            return k * (4 * neighbours[k] - 3 * here - neighbours[2 * k]) / (2 * STEP)
+            return k * (4 * neighbours[k] - 3 * here - neighbours[2 * k]) / (2 * DIFFERENCE_STEP)
         if k in neighbours:
-            return k * (neighbours[k] - here) / STEP
+            return k * (neighbours[k] - here) / DIFFERENCE_STEP
     return np.zeros_like(here)
 
 
-def spread_points(count: int, n: int) -> np.ndarray:
+def make_space_filling_points(count: int, n: int) -> np.ndarray:
     """Return points (count, n) that fill the unit cube evenly, the same in every call.
 
     They are an additive recurrence with the root of x^(n + 1) = x + 1 (Roberts 2018).

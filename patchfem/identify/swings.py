@@ -14,12 +14,12 @@ from ..response.decay_curve import HalfSwings, smooth_slopes
 
 MIN_SAMPLES = 5  # smallest number of samples in a half swing
 # fraction of a half period and of the amplitude; error of a sine that is fitted to few samples
-SINE_ERROR = 3e-5
+SINE_FIT_ERROR = 3e-5
 # standard deviation / amplitude; a half swing with a larger ratio is lost in the noise
-MAX_NOISE = 0.25
+MAX_NOISE_RATIO = 0.25
 N_PASSES = 3  # number of passes over all half swings; each starts from the half periods and rates of the pass before
-MAX_MOVES = 4  # largest number of iterations that move the middle of a half swing
-MAX_SHIFT = 0.35  # largest distance of a middle from the predicted one, in half periods
+MAX_ITERATIONS = 4  # largest number of iterations that move the middle of a half swing
+MAX_MIDDLE_SHIFT = 0.35  # largest distance of a middle from the predicted one, in half periods
 # number of half swings on each side whose residuals give the noise of a half swing
 N_NEIGHBOURS = 8
 # frequencies of the first cycle that are tried, over that of the highest spectral line
@@ -27,7 +27,7 @@ FREQUENCY_RATIOS = np.linspace(0.75, 1.3, 56)
 MAX_STEP_RATIO = 10.0  # time step / 10 % quantile of the time steps; messages name a larger step
 # largest difference of the second half period from the first, as a fraction of the first
 MAX_PERIOD_CHANGE = 0.3
-PADDING = 8  # factor by which zeros lengthen the record for its spectrum
+PADDING_FACTOR = 8  # factor by which zeros lengthen the record for its spectrum
 
 
 class _HalfSwing(NamedTuple):
@@ -50,7 +50,7 @@ class _HalfSwing(NamedTuple):
     n_free: int
 
 
-def half_swings(time, value) -> HalfSwings:
+def find_half_swings(time, value) -> HalfSwings:
     """Find the half swings of a free decay.
 
     Parameters
@@ -74,16 +74,16 @@ def half_swings(time, value) -> HalfSwings:
             f"the free decay has {time.size} samples; at least {4 * MIN_SAMPLES} are needed"
         )
     first = _find_first(time, value)
-    followed = _follow(time, value, *first)
+    followed = _follow_half_swings(time, value, *first)
     dry = viscous = followed
     if len(followed) > 2:
         for _ in range(N_PASSES):
-            dry = _refine(time, value, dry, is_viscous=False)
-            viscous = _refine(time, value, viscous, is_viscous=True)
-    best = min(dry, viscous, key=_mean_noise)
+            dry = _refine_half_swings(time, value, dry, is_viscous=False)
+            viscous = _refine_half_swings(time, value, viscous, is_viscous=True)
+    best = min(dry, viscous, key=_compute_mean_noise)
     if len(best) < 3:
         _refuse_short_decay(time, *first)
-    noise = _noise(best)
+    noise = _compute_noise(best)
     half_period = np.array([swing.length for swing in best])
     size = np.abs([swing.size for swing in best])
     middle_error = np.array([swing.middle_error for swing in best])
@@ -91,8 +91,8 @@ def half_swings(time, value) -> HalfSwings:
     return HalfSwings(
         np.array([swing.middle for swing in best]),
         size,
-        np.maximum(noise * middle_error, SINE_ERROR * half_period),
-        np.maximum(noise * size_error, SINE_ERROR * size),
+        np.maximum(noise * middle_error, SINE_FIT_ERROR * half_period),
+        np.maximum(noise * size_error, SINE_FIT_ERROR * size),
     )
 
 
@@ -111,7 +111,7 @@ def _refuse_short_decay(time, middle: float, length: float) -> None:
     )
 
 
-def sparse_after(time, swings: HalfSwings) -> str:
+def describe_sparse_end(time, swings: HalfSwings) -> str:
     """Describe a lack of samples after the last half swing, "" at the end of the record."""
     length = swings.middle[-1] - swings.middle[-2]
     return _describe_sparse(time, float(swings.middle[-1] + length), float(length))
@@ -137,7 +137,7 @@ def _describe_uneven(time) -> str:
 
 def _find_first(time, value) -> tuple:
     """Find the first half swing; return its middle [s] and its half period [s]."""
-    frequency = _main_frequency(time, value)
+    frequency = _find_main_frequency(time, value)
     best = None
     for f in frequency * FREQUENCY_RATIOS:
         is_first_cycle = time - time[0] <= 1 / f
@@ -163,7 +163,7 @@ def _find_first(time, value) -> tuple:
     return time[0] + start, half_period
 
 
-def _main_frequency(time, value) -> float:
+def _find_main_frequency(time, value) -> float:
     """Return the frequency [Hz] of the highest spectral line.
 
     Raises PatchfemError if nothing oscillates.
@@ -172,15 +172,15 @@ def _main_frequency(time, value) -> float:
     even = np.linspace(time[0], time[-1], n)
     # half of a Hann window gives most weight to the beginning of the decay
     weighted = np.interp(even, time, value - value.mean()) * np.hanning(2 * n)[n:]
-    lines = np.abs(np.fft.rfft(weighted, PADDING * n))
-    lines[:PADDING] = 0.0
-    frequency = int(np.argmax(lines)) / (PADDING * n * (even[1] - even[0]))
+    lines = np.abs(np.fft.rfft(weighted, PADDING_FACTOR * n))
+    lines[:PADDING_FACTOR] = 0.0
+    frequency = int(np.argmax(lines)) / (PADDING_FACTOR * n * (even[1] - even[0]))
     if not frequency > 0 or not np.ptp(value) > 0:
         raise PatchfemError("the record contains no oscillation")
     return frequency
 
 
-def _follow(time, value, middle: float, length: float) -> list:
+def _follow_half_swings(time, value, middle: float, length: float) -> list:
     """Fit half swings from the first one on, until one is lost in the noise."""
     swings = []
     while middle + length / 2 <= time[-1]:
@@ -188,7 +188,7 @@ def _follow(time, value, middle: float, length: float) -> list:
         if swing is None or (swings and swing.size * swings[-1].size > 0):
             break
         noise = np.sqrt(swing.sum_of_squares / swing.n_free) * swing.size_error
-        if noise > MAX_NOISE * abs(swing.size):
+        if noise > MAX_NOISE_RATIO * abs(swing.size):
             break
         swings.append(swing)
         if len(swings) > 2:
@@ -202,11 +202,11 @@ def _follow(time, value, middle: float, length: float) -> list:
     return swings
 
 
-def _refine(time, value, swings: list, *, is_viscous: bool) -> list:
+def _refine_half_swings(time, value, swings: list, *, is_viscous: bool) -> list:
     """Fit half swings again, with half periods and decay rates from their neighbours."""
     if len(swings) < 3:
         return swings
-    noise = _noise(swings)
+    noise = _compute_noise(swings)
     middle = np.array([swing.middle for swing in swings])
     size = np.abs([swing.size for swing in swings])
     middle_noise = noise * np.array([swing.middle_error for swing in swings])
@@ -230,7 +230,7 @@ def _fit_half_swing(time, value, middle: float, length: float, rate: float) -> _
     `length` is its half period [s], `rate` its decay rate [1/s].
     """
     predicted = middle
-    for _ in range(MAX_MOVES):
+    for _ in range(MAX_ITERATIONS):
         low, high = np.searchsorted(time, (middle - length / 2, middle + length / 2))
         t = time[low:high] - middle
         if t.size < MIN_SAMPLES:
@@ -242,7 +242,7 @@ def _fit_half_swing(time, value, middle: float, length: float, rate: float) -> _
         )
         x = np.linalg.lstsq(columns, value[low:high], rcond=None)[0]
         move = -float(np.arctan2(x[2] * np.sign(x[1]), abs(x[1]))) * length / np.pi
-        if not abs(middle + move - predicted) <= MAX_SHIFT * length:
+        if not abs(middle + move - predicted) <= MAX_MIDDLE_SHIFT * length:
             return None
         if abs(move) < 1e-9 * length:
             break
@@ -261,7 +261,7 @@ def _fit_half_swing(time, value, middle: float, length: float, rate: float) -> _
     )
 
 
-def _noise(swings: list) -> np.ndarray:
+def _compute_noise(swings: list) -> np.ndarray:
     """Compute the standard deviation (k,) of the noise around each half swing."""
     n = len(swings)
     index = np.arange(n)
@@ -272,6 +272,6 @@ def _noise(swings: list) -> np.ndarray:
     return np.sqrt((squares[high] - squares[low]) / (n_free[high] - n_free[low]))
 
 
-def _mean_noise(swings: list) -> float:
+def _compute_mean_noise(swings: list) -> float:
     """Return the mean noise of half swings, infinite if there are fewer than three."""
-    return _noise(swings).mean() if len(swings) > 2 else np.inf
+    return _compute_noise(swings).mean() if len(swings) > 2 else np.inf

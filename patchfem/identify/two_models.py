@@ -14,23 +14,26 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from .least_squares import descend, descents, starting_points
-from .space import CubeResidual, Space
+from .least_squares import choose_starting_points, descend, run_descents
+from .space import CubeResidual, SearchSpace
 
-MAX_ROUNDS = 4  # largest number of corrections of the cheap model in one search
+MAX_CORRECTIONS = 4  # largest number of corrections of the cheap model in one search
 MAX_RESIDUAL_CHANGE = 1e-3  # largest difference of the residuals of two models that agree
-TRIALS_PER_VALUE = 24  # number of points per value at which the cheap model is computed to choose the starting points
-MAX_VALLEYS = 3  # largest number of minima of the cheap model from which the search continues
+# number of points per value at which the cheap model is computed to choose the starting points
+N_TRIALS_PER_VALUE = 24
+MAX_MINIMA = 3  # largest number of minima of the cheap model from which the search continues
 # smallest distance in the unit cube between two minima from which the search continues
-MIN_DISTANCE = 0.03
-MAX_WORSE = 10.0  # sum of squares / the smallest one; a minimum with a larger ratio is left out
+MIN_MINIMUM_DISTANCE = 0.03
+# sum of squares / the smallest one; a minimum with a larger ratio is left out
+MAX_COST_RATIO = 10.0
 # sum of squares / the smallest one; points below it are refined with derivatives of the expensive model
-MAX_RIVAL = 1.5
-SLOPE_STEP = 1e-4  # fraction of the edge of the unit cube; step of difference quotients of the expensive model
+MAX_RIVAL_COST_RATIO = 1.5
+# fraction of the edge of the unit cube; step of difference quotients of the expensive model
+DIFFERENCE_STEP = 1e-4
 MIN_IMPROVEMENT = 1e-4  # relative decrease of the sum of squares below which the search ends
 
 
-class _Point(NamedTuple):
+class _SearchPoint(NamedTuple):
     """Point of a search.
 
     - sum_of_squares: of the expensive model.
@@ -55,7 +58,7 @@ class TwoModels:
     cheap: Callable
     expensive: Callable
     residual: Callable
-    space: Space
+    space: SearchSpace
 
     def search(self, own, starts: int) -> tuple:
         """Minimize the sum of squares of the expensive model.
@@ -82,11 +85,11 @@ class TwoModels:
             If the cheap model fails at all starts.
         """
         cheap = CubeResidual(lambda values: self.residual(self.cheap(values)), self.space)
-        trials = TRIALS_PER_VALUE * len(own)
-        begins = starting_points(cheap, self.space.unit(own), starts, trials)
+        trials = N_TRIALS_PER_VALUE * len(own)
+        begins = choose_starting_points(cheap, self.space.unit(own), starts, trials)
         points = []
         errors = []
-        for u in _choose_valleys(descents(cheap, begins)):
+        for u in _choose_minima(run_descents(cheap, begins)):
             try:
                 points.append(self._search_with_value(u))
             except PatchfemError as error:
@@ -97,7 +100,7 @@ class TwoModels:
         refined = [
             self._search_with_slopes(point)
             for point in points
-            if point.sum_of_squares <= MAX_RIVAL * least
+            if point.sum_of_squares <= MAX_RIVAL_COST_RATIO * least
         ]
         best = min(refined, key=lambda point: point.sum_of_squares)
         return best.model, self.space.values(best.u)
@@ -127,14 +130,14 @@ class TwoModels:
 
         return model
 
-    def _search_with_value(self, u) -> _Point:
+    def _search_with_value(self, u) -> _SearchPoint:
         """Minimize with the cheap model, corrected to the expensive one at the last minimum.
 
         Both steps are repeated until the models agree. Returns the best point.
         """
         expensive = self.expensive(self.space.values(u))
-        best = _Point(self._sum_of_squares(expensive), u)
-        for _ in range(MAX_ROUNDS):
+        best = _SearchPoint(self._sum_of_squares(expensive), u)
+        for _ in range(MAX_CORRECTIONS):
             model = self.correct_cheap_model(u, expensive)
             u = self._descend(model, u)
             values = self.space.values(u)
@@ -144,20 +147,20 @@ class TwoModels:
                 break
             sum_of_squares = self._sum_of_squares(expensive)
             if sum_of_squares < best.sum_of_squares:
-                best = _Point(sum_of_squares, u)
+                best = _SearchPoint(sum_of_squares, u)
             change = np.abs(self.residual(expensive) - self.residual(model(values))).max()
             if change < MAX_RESIDUAL_CHANGE:
                 break
         return best
 
-    def _search_with_slopes(self, point: _Point) -> _Point:
+    def _search_with_slopes(self, point: _SearchPoint) -> _SearchPoint:
         """Minimize with the cheap model, corrected to value and derivatives of the expensive one.
 
         Returns the best point, without a model if the sum of squares does not converge.
         """
         sum_of_squares = point.sum_of_squares
         u = point.u
-        for _ in range(MAX_ROUNDS):
+        for _ in range(MAX_CORRECTIONS):
             try:
                 model = self._tangent_model(u)
                 new_u = self._descend(model, u)
@@ -166,10 +169,10 @@ class TwoModels:
                 break
             if new_sum > sum_of_squares * (1 - MIN_IMPROVEMENT):
                 is_converged = new_sum < sum_of_squares * (1 + MIN_IMPROVEMENT)
-                return _Point(sum_of_squares, u, model if is_converged else None)
+                return _SearchPoint(sum_of_squares, u, model if is_converged else None)
             sum_of_squares = new_sum
             u = new_u
-        return _Point(sum_of_squares, u)
+        return _SearchPoint(sum_of_squares, u)
 
     def _tangent_model(self, u) -> Callable:
         """Correct the cheap model to the value and derivatives of the expensive one at u (n,).
@@ -181,7 +184,7 @@ class TwoModels:
         slopes = []
         for i in range(u.size):
             neighbour = u.copy()
-            neighbour[i] += -SLOPE_STEP if u[i] > 0.5 else SLOPE_STEP
+            neighbour[i] += -DIFFERENCE_STEP if u[i] > 0.5 else DIFFERENCE_STEP
             values = self.space.values(neighbour)
             slopes.append((self.expensive(values) - plain(values)) / (neighbour[i] - u[i]))
         return self.correct_cheap_model(u, expensive, np.stack(slopes, axis=-1))
@@ -196,12 +199,15 @@ class TwoModels:
         return float(np.square(self.residual(data)).sum())
 
 
-def _choose_valleys(ends: list) -> list:
+def _choose_minima(ends: list) -> list:
     """Return the points (n,) of the best descents that are far enough apart, best first."""
     ends = sorted((end for end in ends if np.isfinite(end.cost)), key=lambda end: end.cost)
     valleys = []
     for end in ends:
         distances = [np.abs(end.u - valley).max() for valley in valleys]
-        if end.cost <= MAX_WORSE * ends[0].cost and min(distances, default=1.0) >= MIN_DISTANCE:
+        if (
+            end.cost <= MAX_COST_RATIO * ends[0].cost
+            and min(distances, default=1.0) >= MIN_MINIMUM_DISTANCE
+        ):
             valleys.append(end.u)
-    return valleys[:MAX_VALLEYS]
+    return valleys[:MAX_MINIMA]

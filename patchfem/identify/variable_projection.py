@@ -29,7 +29,7 @@ class Projection(NamedTuple):
         return derivatives - self.basis @ (self.basis.T @ derivatives)
 
 
-def project(design, value) -> Projection:
+def project_data(design, value) -> Projection:
     """Solve design (k, n) @ coefficients = value (k,) in the least-squares sense."""
     norms = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
     basis, triangle = np.linalg.qr(design / norms)
@@ -37,7 +37,7 @@ def project(design, value) -> Projection:
     return Projection(design / norms @ scaled - value, scaled / norms, basis)
 
 
-def standard_errors(jacobian, rms: float) -> np.ndarray:
+def compute_standard_errors(jacobian, rms: float) -> np.ndarray:
     """Return the standard deviations (p,) of parameters from the rms of the residual."""
     variances = np.diag(np.linalg.pinv(jacobian.T @ jacobian))
     return rms * np.sqrt(np.maximum(variances, 0))

@@ -8,7 +8,7 @@ from .least_squares import MAX_EVALUATIONS, Fit
 MIN_SENSITIVITY = 1e-9  # fraction of the largest sensitivity; a value with less has no effect
 
 
-def remarks(fit: Fit, names) -> list:
+def describe_fit(fit: Fit, names) -> list:
     """Describe which values a fit does not determine, and where the search failed.
 
     The sentences name values that are at a bound, without effect, determined only in a combination, or whose

@@ -18,8 +18,8 @@ MAX_BYTES = 64 * 2**20  # largest size of a text file [bytes]
 BLOCK_BYTES = 2**17  # bytes that are read at a time, so that a long file takes little memory
 MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
 NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
-_HEAD = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
-_COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
+_HEADER_CELL_PATTERN = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
+_NUMBER_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine")
 
 
 class TableFormat(NamedTuple):
@@ -116,7 +116,7 @@ def parse_header(path, line: str, table: TableFormat) -> tuple[list, dict]:
         If the line is not such a header.
     """
     expected = f"a header like `{table.example}` is needed, not '{line.strip()[:80]}'"
-    heads = [_HEAD.fullmatch(cell) for cell in line.split(",")]
+    heads = [_HEADER_CELL_PATTERN.fullmatch(cell) for cell in line.split(",")]
     if not all(heads):
         raise PatchfemError(f"{path}:1: {expected}")
     names = [head[1] for head in heads]
@@ -174,7 +174,7 @@ def split_cells(path, line_number: int, line: str, names: list) -> dict:
             f"{path}:{line_number}: the quotation marks in this row cannot be read ({error})"
         ) from None
     if len(cells) != len(names):
-        count = _COUNTS[len(names)] if len(names) < len(_COUNTS) else len(names)
+        count = _NUMBER_WORDS[len(names)] if len(names) < len(_NUMBER_WORDS) else len(names)
         columns = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
         raise PatchfemError(
             f"{path}:{line_number}: {count} cells are needed, {columns}, not '{line.strip()[:80]}'"

@@ -14,8 +14,8 @@ import numpy as np
 from ..core import PatchfemError
 from . import matlab, universal
 from .cells import NUMBER_PATTERN, read_text
-from .loops import EXPORTED_NAMES, standard_name
-from .measured import UNIVERSAL_ENDINGS
+from .loops import EXPORTED_NAMES, find_standard_name
+from .measured import UNIVERSAL_EXTENSIONS
 from .records import (
     Channel,
     Records,
@@ -24,15 +24,15 @@ from .records import (
     make_records,
     select_channels,
 )
-from .units import CHANNEL_UNITS, unit_factor
+from .units import CHANNEL_UNITS, find_unit_factor
 
-ENDINGS = (*UNIVERSAL_ENDINGS, ".mat", ".csv", ".txt")
+EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
 # Channels that every motion of `patchfem export` has.
 MOTION_CHANNELS = {"absolute_acceleration", "base_acceleration"}
 MAX_COLUMNS = 1000  # largest number of columns of a table
-MAX_LISTED = 20  # arrays of a MATLAB file that an error message lists
-_HEAD = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
-_COLUMN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
+MAX_LISTED_ARRAYS = 20  # arrays of a MATLAB file that an error message lists
+_HEADER_CELL_PATTERN = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
+_COLUMN_PATTERN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
 
 
 def read_records(path, requests: list, exported: Mapping = EXPORTED_NAMES) -> Records:
@@ -44,7 +44,7 @@ def read_records(path, requests: list, exported: Mapping = EXPORTED_NAMES) -> Re
     requests : list of RequestedChannel
         Without any, the channels whose quantity the file states are read.
     exported : Mapping
-        Quantity -> names of `patchfem export` that stand for it, as in `loops.standard_name`.
+        Quantity -> names of `patchfem export` that stand for it, as in `loops.find_standard_name`.
 
     Returns
     -------
@@ -61,21 +61,21 @@ def read_records(path, requests: list, exported: Mapping = EXPORTED_NAMES) -> Re
     ending = path.suffix.lower()
     if ending == ".mat":
         return _read_matlab(path, requests)
-    if ending in UNIVERSAL_ENDINGS:
+    if ending in UNIVERSAL_EXTENSIONS:
         return _read_universal(path, requests, exported)
-    if ending in ENDINGS:
+    if ending in EXTENSIONS:
         return select_channels(path, _read_table(path, exported), requests, [])
-    raise PatchfemError(f"{path}: the name of an imported file must end in {', '.join(ENDINGS)}")
+    raise PatchfemError(f"{path}: the name of an imported file must end in {', '.join(EXTENSIONS)}")
 
 
 def _read_universal(path: Path, requests: list, exported: Mapping) -> Records:
     notes = []
-    channels = universal.record_channels(path, universal.read_datasets(path), notes)
+    channels = universal.make_channels(path, universal.read_datasets(path), notes)
     names = [channel.name for channel in channels]
     if MOTION_CHANNELS <= set(names):
         # The data types do not distinguish the displacements of an export; the names do.
         channels = [
-            channel._replace(quantity=_quantity(channel.name, names, exported))
+            channel._replace(quantity=_find_quantity(channel.name, names, exported))
             for channel in channels
         ]
     if not channels:
@@ -86,9 +86,9 @@ def _read_universal(path: Path, requests: list, exported: Mapping) -> Records:
     return select_channels(path, channels, requests, notes)
 
 
-def _quantity(name: str, names: list, exported: Mapping) -> str:
+def _find_quantity(name: str, names: list, exported: Mapping) -> str:
     """Return the quantity that the name of a column states, or "" if it states none."""
-    quantity = standard_name(name, names, exported)
+    quantity = find_standard_name(name, names, exported)
     return quantity if quantity in CHANNEL_UNITS else ""
 
 
@@ -96,7 +96,7 @@ def _read_table(path: Path, exported: Mapping) -> list:
     """Read the numeric columns of a table as channels; columns that contain text are left out."""
     header, *lines = read_text(path, "a measured table").rstrip("\n").split("\n")
     separator = max(",;\t", key=header.count)
-    heads = [_HEAD.fullmatch(_bare(cell)) for cell in header.split(separator)]
+    heads = [_HEADER_CELL_PATTERN.fullmatch(_strip_cell(cell)) for cell in header.split(separator)]
     names = [head[1] for head in heads]
     is_data = any(map(NUMBER_PATTERN.fullmatch, names))
     if len(names) > MAX_COLUMNS or len(lines) < 2 or is_data:
@@ -106,7 +106,7 @@ def _read_table(path: Path, exported: Mapping) -> list:
         )
     rows = []
     for number, line in enumerate(lines, 2):
-        cells = [_bare(cell) for cell in line.split(separator)]
+        cells = [_strip_cell(cell) for cell in line.split(separator)]
         if len(cells) != len(names):
             raise PatchfemError(
                 f"{path}:{number}: {len(cells)} cells, but {len(names)} column names"
@@ -120,11 +120,13 @@ def _read_table(path: Path, exported: Mapping) -> list:
             continue
         unit = head[2] or head[3] or ""
         values = np.array(cells, float)
-        channels.append(Channel(head[1], "", _quantity(column, columns, exported), unit, values))
+        channels.append(
+            Channel(head[1], "", _find_quantity(column, columns, exported), unit, values)
+        )
     return channels
 
 
-def _bare(cell: str) -> str:
+def _strip_cell(cell: str) -> str:
     """Return a cell without the blanks and quotation marks around it."""
     return cell.strip().strip('"').strip()
 
@@ -150,7 +152,9 @@ def _read_matlab(path: Path, requests: list) -> Records:
     check_file(path, "save fewer variables or a part of the record")
     variables = matlab.read_variables(path)
     arrays = {name: array for name, array in variables.items() if array.kind == "number"}
-    described = [f"{name} {_size(arrays[name])}" for name in list(arrays)[:MAX_LISTED]]
+    described = [
+        f"{name} {_format_shape(arrays[name])}" for name in list(arrays)[:MAX_LISTED_ARRAYS]
+    ]
     contents = ", ".join(described) or (
         "no array of numbers (objects, and structures with several elements, cannot be read)"
     )
@@ -161,14 +165,14 @@ def _read_matlab(path: Path, requests: list) -> Records:
         )
     requests = sorted(requests, key=lambda request: request.quantity != "time")
     values = {
-        request.quantity: _matlab_values(path, arrays, request, contents) for request in requests
+        request.quantity: _select_values(path, arrays, request, contents) for request in requests
     }
     return make_records(path, values, [])
 
 
-def _matlab_values(path, arrays: dict, request: RequestedChannel, contents: str) -> np.ndarray:
+def _select_values(path, arrays: dict, request: RequestedChannel, contents: str) -> np.ndarray:
     """Return the values (k,) of a requested variable or column in SI."""
-    match = _COLUMN.fullmatch(request.source)
+    match = _COLUMN_PATTERN.fullmatch(request.source)
     name = match[1] if match else request.source
     if name not in arrays:
         raise PatchfemError(f"{path}: no variable '{name[:40]}'; the file contains {contents}")
@@ -181,17 +185,19 @@ def _matlab_values(path, arrays: dict, request: RequestedChannel, contents: str)
     if match is None:
         if values.ndim != 2 or min(values.shape) != 1:
             raise PatchfemError(
-                f"{path}: {name} is {_size(values)}; choose a column such as {name}(:,1)"
+                f"{path}: {name} is {_format_shape(values)}; choose a column such as {name}(:,1)"
             )
         values = values.ravel()
     else:
         column = int(match[2])
         if values.ndim != 2 or column > values.shape[1]:
-            raise PatchfemError(f"{path}: {name} is {_size(values)}, so it has no column {column}")
+            raise PatchfemError(
+                f"{path}: {name} is {_format_shape(values)}, so it has no column {column}"
+            )
         values = values[:, column - 1]
-    return values * unit_factor(request.quantity, request.unit)
+    return values * find_unit_factor(request.quantity, request.unit)
 
 
-def _size(array) -> str:
+def _format_shape(array) -> str:
     """Return the shape of an array in words, such as 51x2."""
     return "x".join(map(str, array.shape))

@@ -9,7 +9,7 @@ import numpy as np
 from ..core import PatchfemError
 from .cells import TableFormat
 from .columns import read_columns
-from .slides import check_rising
+from .slides import require_increasing_time
 from .units import FORCE_UNITS, SLIDE_UNITS
 
 LOOP_HEADER = "time [s],displacement [um],force [N]"
@@ -97,7 +97,7 @@ def read_loop(path, units: Mapping = SLIDE_UNITS) -> Loop:
     table = TableFormat(known, (required,), LOOP_HEADER, "a measured loop", has_label_units=True)
     columns = read_columns(path, table)
     values = {
-        standard_name(name, columns.values): column for name, column in columns.values.items()
+        find_standard_name(name, columns.values): column for name, column in columns.values.items()
     }
     quantities = [name for name in FORCE_UNITS if name in values]
     if not quantities:
@@ -113,7 +113,7 @@ def read_loop(path, units: Mapping = SLIDE_UNITS) -> Loop:
     displacement = values["displacement"]
     time = values.get("time")
     if time is not None:
-        check_rising(path, time)
+        require_increasing_time(path, time)
     if not np.ptp(displacement):
         raise PatchfemError(f"{path}: displacement is the same in every row, so nothing slides")
     if not values[quantity].any():
@@ -123,7 +123,7 @@ def read_loop(path, units: Mapping = SLIDE_UNITS) -> Loop:
     )
 
 
-def standard_name(name: str, names: Container, exported: Mapping = EXPORTED_NAMES) -> str:
+def find_standard_name(name: str, names: Container, exported: Mapping = EXPORTED_NAMES) -> str:
     """Return the quantity for which a column of `patchfem export` stands, or the name itself.
 
     Parameters

@@ -6,7 +6,8 @@ from ..core import PatchfemError
 from . import matlab5, matlab73
 
 MAX_BYTES = 512 * 2**20  # largest size of a file [bytes]
-HDF5 = b"\x89HDF\r\n\x1a\n"  # signature at the beginning of the file, or behind the user block that MATLAB puts there
+# signature at the beginning of the file, or behind the user block that MATLAB puts there
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
 def read_variables(path, data: bytes | None = None) -> dict:
@@ -34,7 +35,7 @@ def read_variables(path, data: bytes | None = None) -> dict:
     """
     if data is None:
         data = _read_bytes(path)
-    if data.startswith((HDF5, b"MATLAB 7.3")) or data[512:520] == HDF5:
+    if data.startswith((HDF5_SIGNATURE, b"MATLAB 7.3")) or data[512:520] == HDF5_SIGNATURE:
         return matlab73.read_variables(path, data)
     return matlab5.read_variables(path, data)
 
@@ -44,7 +45,7 @@ def _read_bytes(path) -> bytes:
         head = file.read(128)
         # a version-4 file has zeros there, and so may a file that is not from MATLAB
         if len(head) < 128 or 0 in head[:4]:
-            raise PatchfemError(f"{path}: {matlab5.DAMAGED_HEADER}")
+            raise PatchfemError(f"{path}: {matlab5.FILE_HEADER_DAMAGE}")
         if os.fstat(file.fileno()).st_size > MAX_BYTES:
             raise PatchfemError(
                 f"{path}: more than {MAX_BYTES >> 20} MiB; save only the variables that are needed"

@@ -27,16 +27,16 @@ from .damage import refuse_damage
 
 MAX_NUMBERS = 15 * 10**7  # largest number of values in one variable
 MAX_VARIABLES = 1000
-MAX_DEPTH = 8  # largest depth of nested structures
+MAX_NESTING = 8  # largest depth of nested structures
 MAX_UNPACK_RATIO = 200  # unpacked / packed size of a variable above UNPACK_CHECK_BYTES
 UNPACK_CHECK_BYTES = 2**20
 HEADER_BYTES = 1024  # bytes of a packed variable that contain its shape and its name
 COMPLEX_FLAG = 0x0800
-DAMAGED_HEADER = (
+FILE_HEADER_DAMAGE = (
     "the header of the MATLAB file is damaged or of version 4; save it anew with save(name, '-v7')"
 )
-REMEDY = "; save it anew"
-HEAD_DAMAGE = "a variable of the MATLAB file is damaged"
+DAMAGE_REMEDY = "; save it anew"
+VARIABLE_DAMAGE = "a variable of the MATLAB file is damaged"
 
 
 class DataType(IntEnum):
@@ -69,8 +69,14 @@ class ArrayClass(IntEnum):
     UINT64 = 15
 
 
-_NUMERIC = range(ArrayClass.DOUBLE, ArrayClass.UINT64 + 1)
-_READABLE = (ArrayClass.CELL, ArrayClass.STRUCT, ArrayClass.CHAR, ArrayClass.SPARSE, *_NUMERIC)
+_NUMERIC_CLASSES = range(ArrayClass.DOUBLE, ArrayClass.UINT64 + 1)
+_READABLE_CLASSES = (
+    ArrayClass.CELL,
+    ArrayClass.STRUCT,
+    ArrayClass.CHAR,
+    ArrayClass.SPARSE,
+    *_NUMERIC_CLASSES,
+)
 _ENCODINGS = {
     DataType.UINT8: "latin-1",
     DataType.UTF8: "utf-8",
@@ -120,7 +126,7 @@ def read_variables(path, data: bytes) -> dict:
     """Read the variables of a MATLAB file, as `matlab.read_variables` does."""
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if order is None:
-        raise PatchfemError(f"{path}: {DAMAGED_HEADER}")
+        raise PatchfemError(f"{path}: {FILE_HEADER_DAMAGE}")
     file = _MatFile(path, order)
     arrays = {}
     at = 128
@@ -147,7 +153,7 @@ class _MatFile(NamedTuple):
 
     def unpack_head(self, body) -> _Variable | None:
         """Read the header of a compressed variable."""
-        with refuse_damage(f"{self.path}: {HEAD_DAMAGE}", REMEDY):
+        with refuse_damage(f"{self.path}: {VARIABLE_DAMAGE}", DAMAGE_REMEDY):
             head = zlib.decompressobj().decompress(body, HEADER_BYTES)
             kind, size = struct.unpack_from(self.order + "II", head)
             if kind != DataType.MATRIX:
@@ -157,7 +163,7 @@ class _MatFile(NamedTuple):
 
     def read_head(self, body) -> _Variable | None:
         """Read the header of a variable that is not compressed."""
-        with refuse_damage(f"{self.path}: {HEAD_DAMAGE}", REMEDY):
+        with refuse_damage(f"{self.path}: {VARIABLE_DAMAGE}", DAMAGE_REMEDY):
             return self.check_head(self.parse_head(body))
 
     def parse_head(self, body) -> _Variable:
@@ -177,7 +183,7 @@ class _MatFile(NamedTuple):
         PatchfemError.
         """
         kind, shape = variable.kind, variable.shape
-        if kind not in _READABLE:
+        if kind not in _READABLE_CLASSES:
             return None
         count = prod(shape)
         n_numbers = max(shape, default=0) if kind == ArrayClass.SPARSE else count
@@ -186,7 +192,7 @@ class _MatFile(NamedTuple):
                 f"{self.path}: a variable of shape {shape}, more than {MAX_NUMBERS:.1e} numbers; save a "
                 "part of it"
             )
-        if kind in _NUMERIC and variable.size > 8 * count + variable.start + 16:
+        if kind in _NUMERIC_CLASSES and variable.size > 8 * count + variable.start + 16:
             raise ValueError(f"{variable.size} bytes for {count} numbers")
         return variable
 
@@ -196,10 +202,10 @@ class _MatFile(NamedTuple):
             return {}
         if variable.kind != ArrayClass.STRUCT:
             return {variable.name: self.make_array(variable)}
-        if max(variable.shape) > 1 or min(variable.shape) < 1 or depth >= MAX_DEPTH:
+        if max(variable.shape) > 1 or min(variable.shape) < 1 or depth >= MAX_NESTING:
             return {}
         arrays = {}
-        with refuse_damage(f"{self.path}: a structure is damaged", REMEDY):
+        with refuse_damage(f"{self.path}: a structure is damaged", DAMAGE_REMEDY):
             for name, body in self.list_fields(self.unpack(variable), variable.start):
                 field = self.check_head(self.parse_head(body))
                 if field is not None and len(arrays) < MAX_VARIABLES:
@@ -230,12 +236,12 @@ class _MatFile(NamedTuple):
         name = variable.name[:40] if variable.name.isprintable() else "?"
 
         def read(convert: Callable):
-            with refuse_damage(f"{self.path}: variable {name} is damaged", REMEDY):
+            with refuse_damage(f"{self.path}: variable {name} is damaged", DAMAGE_REMEDY):
                 return convert(self.unpack(variable), variable)
 
         if variable.kind == ArrayClass.SPARSE:
             return make_sparse_array(self.path, variable.shape, partial(read, self.read_sparse))
-        if variable.kind in _NUMERIC:
+        if variable.kind in _NUMERIC_CLASSES:
             return Array("number", variable.shape, partial(read, self.read_numbers))
         return Array("text", variable.shape, partial(read, self.read_texts))
 

@@ -16,7 +16,7 @@ import numpy as np
 from ..core import PatchfemError
 from .damage import refuse_damage
 from .matlab5 import (
-    MAX_DEPTH,
+    MAX_NESTING,
     MAX_NUMBERS,
     MAX_UNPACK_RATIO,
     MAX_VARIABLES,
@@ -33,7 +33,7 @@ def read_variables(path, data: bytes) -> dict:
     arrays = {}
     with _refuse_damage(path):
         # The file stays open as long as an array refers to it.
-        _collect(path, h5py.File(io.BytesIO(data), "r"), "", arrays, 0)
+        _collect_arrays(path, h5py.File(io.BytesIO(data), "r"), "", arrays, 0)
     return arrays
 
 
@@ -41,7 +41,7 @@ def _refuse_damage(path) -> AbstractContextManager:
     return refuse_damage(f"{path}: the MATLAB file of version 7.3 is damaged", "; save it anew")
 
 
-def _collect(path, group, prefix: str, arrays: dict, depth: int) -> None:
+def _collect_arrays(path, group, prefix: str, arrays: dict, depth: int) -> None:
     """Add the arrays of a group, and of the structures in it, to `arrays`."""
     for name in group:
         if not isinstance(name, str):
@@ -53,16 +53,16 @@ def _collect(path, group, prefix: str, arrays: dict, depth: int) -> None:
         item = group[name]
         array = None
         if isinstance(item, h5py.Dataset):
-            array = _dataset_array(path, item)
+            array = _read_dataset(path, item)
         elif "MATLAB_sparse" in item.attrs:
-            array = _sparse_array(path, item)
-        elif _matlab_class(item) == "struct" and depth < MAX_DEPTH:
-            _collect(path, item, f"{prefix}{name}.", arrays, depth + 1)
+            array = _read_sparse_array(path, item)
+        elif _read_matlab_class(item) == "struct" and depth < MAX_NESTING:
+            _collect_arrays(path, item, f"{prefix}{name}.", arrays, depth + 1)
         if array is not None:
             arrays[prefix + name] = array
 
 
-def _matlab_class(item) -> str:
+def _read_matlab_class(item) -> str:
     name = item.attrs.get("MATLAB_class", b"")
     return name.decode("latin-1") if isinstance(name, bytes) else ""
 
@@ -77,16 +77,16 @@ def _make_array(path, kind: str, shape: tuple, read: Callable) -> Array:
     return Array(kind, shape, values)
 
 
-def _dataset_array(path, dataset) -> Array | None:
+def _read_dataset(path, dataset) -> Array | None:
     """Return a real array, a string or a cell array of strings; None for other content."""
     if dataset.shape is None:
         return None
-    kind = _matlab_class(dataset)
+    kind = _read_matlab_class(dataset)
     if "MATLAB_empty" in dataset.attrs:
-        return _empty_array(path, dataset, kind)
+        return _read_empty_array(path, dataset, kind)
     _check_size(path, dataset)
     if kind == "cell":
-        return _cell_array(path, dataset)
+        return _read_cell_array(path, dataset)
     is_known = kind in ("", "char", "double", "single", "logical") or "int" in kind
     if dataset.dtype.kind not in "iufb" or not is_known:
         return None
@@ -98,12 +98,12 @@ def _dataset_array(path, dataset) -> Array | None:
 
     if kind == "char":
         return _make_array(
-            path, "text", shape, lambda: make_texts(map(_text, read().reshape(shape[0], -1)))
+            path, "text", shape, lambda: make_texts(map(_decode_text, read().reshape(shape[0], -1)))
         )
     return _make_array(path, "number", shape, lambda: read().astype(float))
 
 
-def _empty_array(path, dataset, kind: str) -> Array | None:
+def _read_empty_array(path, dataset, kind: str) -> Array | None:
     """Return an array without values; the dataset contains its shape."""
     shape = tuple(int(size) for size in np.ravel(dataset[()])[:2])
     has_values = max(shape, default=1) > 0 and min(shape, default=1) > 0
@@ -112,28 +112,30 @@ def _empty_array(path, dataset, kind: str) -> Array | None:
     return _make_array(path, "text" if kind == "char" else "number", shape, lambda: np.zeros(shape))
 
 
-def _cell_array(path, cells) -> Array | None:
+def _read_cell_array(path, cells) -> Array | None:
     """Return the first row of each string in a cell array; None if a cell is not a string."""
     if not isinstance(h5py.check_dtype(ref=cells.dtype), type):
         return None
     parts = [cells.file[reference] for reference in np.ravel(cells[()])[:MAX_VARIABLES]]
     for part in parts:
-        if _matlab_class(part) != "char" or not isinstance(part, h5py.Dataset):
+        if _read_matlab_class(part) != "char" or not isinstance(part, h5py.Dataset):
             return None
     for part in parts:
         _check_size(path, part)
-    return _make_array(path, "text", cells.shape[::-1], lambda: make_texts(map(_first_row, parts)))
+    return _make_array(
+        path, "text", cells.shape[::-1], lambda: make_texts(map(_read_first_row, parts))
+    )
 
 
-def _first_row(dataset) -> str:
-    return "" if "MATLAB_empty" in dataset.attrs else _text(np.ravel(dataset[()].T[0]))
+def _read_first_row(dataset) -> str:
+    return "" if "MATLAB_empty" in dataset.attrs else _decode_text(np.ravel(dataset[()].T[0]))
 
 
-def _text(codes) -> str:
+def _decode_text(codes) -> str:
     return "".join(map(chr, codes))
 
 
-def _sparse_array(path, group) -> Array | None:
+def _read_sparse_array(path, group) -> Array | None:
     """Return a sparse matrix, stored as row indices `ir`, starts of the columns `jc` and `data`."""
     for part in group.values():
         if not isinstance(part, h5py.Dataset):
@@ -150,13 +152,13 @@ def _sparse_array(path, group) -> Array | None:
 
     def read():
         with _refuse_damage(path):
-            rows = _optional_values(group, "ir").astype(np.int64)
-            return make_sparse(rows, starts, _optional_values(group, "data"), shape)
+            rows = _read_optional_values(group, "ir").astype(np.int64)
+            return make_sparse(rows, starts, _read_optional_values(group, "data"), shape)
 
     return make_sparse_array(path, shape, read)
 
 
-def _optional_values(group, name: str) -> np.ndarray:
+def _read_optional_values(group, name: str) -> np.ndarray:
     """Return a dataset of a group, or None; MATLAB leaves out datasets without values."""
     return group[name][()] if name in group else np.zeros(0)
 

@@ -18,22 +18,23 @@ from . import matlab, nastran
 from .damage import refuse_damage
 
 # Names of a matrix in a file of several matrices.
-NAMES = {
+MATRIX_NAMES = {
     "stiffness": ("k", "kaax", "kaa", "kgg", "stiffness"),
     "mass": ("m", "maax", "maa", "mgg", "mass"),
     "damping": ("c", "d", "baax", "baa", "bgg", "damping"),
 }
 MAX_SKEW = 1e-8  # |A - A^T| / |A| of a matrix that counts as symmetric
-NO_SKEW = "gyroscopic and follower terms are not supported"
-MAX_LISTED = 12  # arrays that an error message lists
+SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
+MAX_LISTED_ARRAYS = 12  # arrays that an error message lists
 # Numbers of a matrix by which its rounding is recognised, and the fewest distinct ones that suffice.
-N_SAMPLES = 500
-MIN_SAMPLES = 10
-SINGLE_DIGITS = 7  # decimal digits of single precision
-DOUBLE_DIGITS = 15  # decimal digits that double precision always keeps
+N_SAMPLED_NUMBERS = 500
+MIN_DISTINCT_NUMBERS = 10
+SINGLE_PRECISION_DIGITS = 7  # decimal digits of single precision
+DOUBLE_PRECISION_DIGITS = 15  # decimal digits that double precision always keeps
 # If at least this fraction of the numbers need nearly all digits, all numbers were rounded to these digits.
-MIN_FULL_FRACTION = 0.6
-FREE_DIGITS = 2  # digits by which a number may be shorter: a sign or an exponent takes their place in the field
+MIN_FULL_DIGITS_FRACTION = 0.6
+# digits by which a number may be shorter: a sign or an exponent takes their place in the field
+N_DROPPED_DIGITS = 2
 ROUNDING_DEVIATION = 12**-0.5  # standard deviation of a rounding error of a unit
 
 
@@ -50,48 +51,51 @@ class Matrix(NamedTuple):
     has_size: bool = True
 
 
-def read(path, wanted: str) -> Matrix:
+def read_matrix(path, wanted: str) -> Matrix:
     """Read the "stiffness", "mass" or "damping" of a file, and make it exactly symmetric.
 
-    Raises PatchfemError if the file cannot be read, if the matrix has none of its `NAMES`, or if it is not
+    Raises PatchfemError if the file cannot be read, if the matrix has none of its `MATRIX_NAMES`, or if it is not
     a square, symmetric matrix of finite real numbers.
     """
     path = Path(path)
     with refuse_damage(f"{path} cannot be read"):
-        matrix = READERS[path.suffix.lower()](path, wanted)
+        matrix = READERS_BY_EXTENSION[path.suffix.lower()](path, wanted)
     return matrix._replace(values=_symmetrize(path, matrix.values, wanted))
 
 
-class Rounding(NamedTuple):
+class MatrixRounding(NamedTuple):
     """Rounding of a matrix: digits in words, and standard deviation of the errors (k,)."""
 
     digits: str
     deviation: np.ndarray
 
 
-def estimate_rounding(values) -> Rounding | None:
+def estimate_rounding(values) -> MatrixRounding | None:
     """Estimate how the numbers of a sparse array (k of them) were rounded.
 
     Returns None if they have all digits of double precision, or too few distinct values to tell.
     """
     data = values.data
     size = np.abs(data)
-    samples = np.unique(size[:: max(1, data.size // (20 * N_SAMPLES))])
+    samples = np.unique(size[:: max(1, data.size // (20 * N_SAMPLED_NUMBERS))])
     samples = samples[samples > 0]
-    samples = samples[:: max(1, samples.size // N_SAMPLES)]
-    if samples.size < MIN_SAMPLES:
+    samples = samples[:: max(1, samples.size // N_SAMPLED_NUMBERS)]
+    if samples.size < MIN_DISTINCT_NUMBERS:
         return None
     digits = np.array([_count_digits(sample) for sample in samples.tolist()])
     most = digits.max()
-    if most > SINGLE_DIGITS and np.array_equal(samples.astype(np.float32), samples):
+    if most > SINGLE_PRECISION_DIGITS and np.array_equal(samples.astype(np.float32), samples):
         unit = np.where(size > 0, np.spacing(size.astype(np.float32)), 0.0).astype(float)
-        return Rounding("single precision", ROUNDING_DEVIATION * unit)
-    if most >= DOUBLE_DIGITS or np.mean(digits >= most - FREE_DIGITS) < MIN_FULL_FRACTION:
+        return MatrixRounding("single precision", ROUNDING_DEVIATION * unit)
+    if (
+        most >= DOUBLE_PRECISION_DIGITS
+        or np.mean(digits >= most - N_DROPPED_DIGITS) < MIN_FULL_DIGITS_FRACTION
+    ):
         return None
     count = int(np.median(digits))
     with np.errstate(divide="ignore"):
         power = np.floor(np.log10(size))
-    return Rounding(f"{count} digits", ROUNDING_DEVIATION * 10.0 ** (power + 1 - count))
+    return MatrixRounding(f"{count} digits", ROUNDING_DEVIATION * 10.0 ** (power + 1 - count))
 
 
 def _count_digits(number: float) -> int:
@@ -99,7 +103,7 @@ def _count_digits(number: float) -> int:
     return len(repr(number).split("e")[0].replace(".", "").strip("0"))
 
 
-def quadratic_form_deviation(values, deviation, shape) -> float:
+def compute_form_deviation(values, deviation, shape) -> float:
     """Return the standard deviation of shape^T A shape for a rounded sparse array A.
 
     Parameters
@@ -139,7 +143,7 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
         ends = np.cumsum([len(matrix.places) for matrix in matrices])
         parts = np.split(index, ends[:-1])
         return [
-            Matrix(_spread(matrix.values, rows, len(places)), places)
+            Matrix(_insert_empty_rows(matrix.values, rows, len(places)), places)
             for matrix, rows in zip(matrices, parts)
         ]
     n = max(matrix.values.shape[0] for matrix in matrices)
@@ -148,10 +152,10 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
         raise PatchfemError(
             "the matrices differ in size: " + " and ".join(f"{size} x {size}" for size in sizes)
         )
-    return [matrix._replace(values=_enlarge(matrix.values, n)) for matrix in matrices]
+    return [matrix._replace(values=_append_empty_rows(matrix.values, n)) for matrix in matrices]
 
 
-def _enlarge(values, n: int) -> sparse.csr_array:
+def _append_empty_rows(values, n: int) -> sparse.csr_array:
     """Return a matrix (n, n) that has empty rows and columns after those of the given matrix."""
     if values.shape[0] < n:
         values = values.copy()
@@ -159,7 +163,7 @@ def _enlarge(values, n: int) -> sparse.csr_array:
     return values
 
 
-def _spread(values, rows: np.ndarray, n: int) -> sparse.csr_array:
+def _insert_empty_rows(values, rows: np.ndarray, n: int) -> sparse.csr_array:
     """Return a matrix (n, n) that has the given one in some of its rows and columns."""
     matrix = values.tocoo()
     i, j = matrix.coords
@@ -186,25 +190,25 @@ def _symmetrize(path, values, wanted: str) -> sparse.csr_array:
     if skew > MAX_SKEW * largest:
         raise PatchfemError(
             f"{path}: the {wanted} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-            f"which is {skew / largest:.2g} of the largest entry; {NO_SKEW}"
+            f"which is {skew / largest:.2g} of the largest entry; {SKEW_REFUSAL}"
         )
     return ((values + values.T) / 2).tocsr()
 
 
-def _matrix_name(path, names, wanted: str) -> str:
-    """Return the name of the requested matrix in a file: one of `NAMES`, or the only name in it."""
+def _find_matrix_name(path, names, wanted: str) -> str:
+    """Return the name of the requested matrix in a file: one of `MATRIX_NAMES`, or the only name in it."""
     short_names = {name.rpartition(".")[2].lower(): name for name in reversed(list(names))}
-    for known in NAMES[wanted]:
+    for known in MATRIX_NAMES[wanted]:
         if known in short_names:
             return short_names[known]
     names = list(names)
     if len(names) != 1:
-        contents = ", ".join(names[:MAX_LISTED]) or "none"
+        contents = ", ".join(names[:MAX_LISTED_ARRAYS]) or "none"
         raise PatchfemError(
-            f"{path}: contains no {wanted} under a known name ({', '.join(NAMES[wanted])}); its arrays: "
+            f"{path}: contains no {wanted} under a known name ({', '.join(MATRIX_NAMES[wanted])}); its arrays: "
             f"{contents}"
         )
-    for other, known_names in NAMES.items():
+    for other, known_names in MATRIX_NAMES.items():
         if not short_names.keys().isdisjoint(known_names):
             raise PatchfemError(
                 f"{path}: the only array of the file, {names[0]}, has the name of a {other}, but the "
@@ -229,7 +233,7 @@ def _read_market(path: Path, wanted: str) -> Matrix:
                 f"{path}: a Matrix Market pattern without numbers; write the matrix with its values"
             )
         if symmetry == "skew-symmetric":
-            raise PatchfemError(f"{path}: the {wanted} is not symmetric; {NO_SKEW}")
+            raise PatchfemError(f"{path}: the {wanted} is not symmetric; {SKEW_REFUSAL}")
         lines = (line for line in file if line.strip() and line[0] != "%")
         n_rows, n_columns, *count = map(int, next(lines, "").split())
         n_numbers = count[0] if count else n_rows * n_columns
@@ -244,7 +248,7 @@ def _read_market(path: Path, wanted: str) -> Matrix:
         if n_numbers:
             table = np.loadtxt(lines, comments=None, ndmin=2)
     if count:
-        rows, columns = _whole_numbers(path, table[:, :2]).T - 1
+        rows, columns = _to_integers(path, table[:, :2]).T - 1
     elif symmetry == "general":
         columns, rows = np.divmod(np.arange(n_numbers), n_rows)
     else:  # a symmetric array is stored as the lower triangle, column by column
@@ -275,7 +279,7 @@ def _read_abaqus(path: Path) -> Matrix:
             f"{path}: is not a matrix: write a Matrix Market file, or lines of row, column, number, or "
             "lines of node, direction, node, direction, number"
         )
-    labels = _whole_numbers(path, table[:, :-1])
+    labels = _to_integers(path, table[:, :-1])
     places = None
     if table.shape[1] == 5:
         places, index = nastran.rank_dofs(labels.reshape(-1, 2))
@@ -292,7 +296,7 @@ def _read_abaqus(path: Path) -> Matrix:
     return Matrix(values, places, has_size=False)
 
 
-def _whole_numbers(path, numbers: np.ndarray) -> np.ndarray:
+def _to_integers(path, numbers: np.ndarray) -> np.ndarray:
     """Convert the numbers of rows, nodes or directions to integers."""
     if not (numbers == np.floor(numbers)).all() or not (np.abs(numbers) < 2**31).all():
         raise PatchfemError(f"{path}: rows, nodes and directions must be whole numbers")
@@ -303,7 +307,7 @@ def _read_matlab(path: Path, wanted: str) -> Matrix:
     arrays = {
         name: array for name, array in matlab.read_variables(path).items() if array.kind != "text"
     }
-    array = arrays[_matrix_name(path, arrays, wanted)]
+    array = arrays[_find_matrix_name(path, arrays, wanted)]
     return Matrix(sparse.csr_array(array.values() if array.sparse is None else array.sparse()))
 
 
@@ -313,22 +317,22 @@ def _read_numpy(path: Path, wanted: str) -> Matrix:
     with np.load(path, allow_pickle=False) as file:
         if {"format", "shape", "data"} <= set(file.files):
             return Matrix(sparse.csr_array(sparse.load_npz(path)))
-        return Matrix(sparse.csr_array(file[_matrix_name(path, file.files, wanted)]))
+        return Matrix(sparse.csr_array(file[_find_matrix_name(path, file.files, wanted)]))
 
 
 def _read_output4(path: Path, wanted: str) -> Matrix:
     matrices = nastran.read_output4(path)
-    return Matrix(matrices[_matrix_name(path, matrices, wanted)].assemble())
+    return Matrix(matrices[_find_matrix_name(path, matrices, wanted)].assemble())
 
 
 def _read_dmig(path: Path, wanted: str) -> Matrix:
     matrices = nastran.read_dmig(path)
-    values, places = matrices[_matrix_name(path, matrices, wanted)].assemble()
+    values, places = matrices[_find_matrix_name(path, matrices, wanted)].assemble()
     return Matrix(values, places, has_size=False)
 
 
 # ending of a file -> its reader
-READERS = {
+READERS_BY_EXTENSION = {
     ".mtx": _read_market,
     ".mat": _read_matlab,
     ".npz": _read_numpy,

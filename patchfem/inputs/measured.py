@@ -7,17 +7,17 @@ from pathlib import Path
 from ..exceptions import PatchfemError
 from .cells import TableFormat, parse_header, parse_number, read_text, split_cells
 
-UNITS = {
+COLUMN_UNITS = {
     "frequency": {"Hz": 1.0, "kHz": 1e3},
     "input": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
     "acceleration": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
     "displacement": {"mil": 25.4e-6, "in": 0.0254, "m": 1.0, "mm": 1e-3, "um": 1e-6},
 }
-TABLE = TableFormat(
-    UNITS, ("frequency", "input"), "frequency [Hz],input [g],flag", "a measured table"
+TABLE_FORMAT = TableFormat(
+    COLUMN_UNITS, ("frequency", "input"), "frequency [Hz],input [g],flag", "a measured table"
 )
-UNIVERSAL_ENDINGS = (".uff", ".unv", ".uf", ".58")
-FLAGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
+UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
+FLAG_MEANINGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class MeasuredRow:
     """One measured condition in SI; a value that was not read is None.
 
     frequency [Hz], input [m s-2], acceleration [m s-2], displacement [m], all >= 0; flag: letters of
-    `FLAGS`, may be empty.
+    `FLAG_MEANINGS`, may be empty.
     """
 
     frequency: float
@@ -49,18 +49,18 @@ def read_table(path: Path) -> list[MeasuredRow]:
     """
     path = Path(path)
     ending = path.suffix.lower()
-    if ending in (".mat", *UNIVERSAL_ENDINGS) and path.is_file():
-        raise _records_error(path)
-    header, *lines = read_text(path, TABLE.contents).split("\n")
+    if ending in (".mat", *UNIVERSAL_EXTENSIONS) and path.is_file():
+        raise _make_record_error(path)
+    header, *lines = read_text(path, TABLE_FORMAT.contents).split("\n")
     columns = {cell.partition("[")[0].strip().lower() for cell in header.split(",")}
     if "time" in columns and "frequency" not in columns:
-        raise _records_error(path)
-    names, factors = parse_header(path, header, TABLE)
-    unknown = [name for name in names if name not in (*UNITS, "flag")]
+        raise _make_record_error(path)
+    names, factors = parse_header(path, header, TABLE_FORMAT)
+    unknown = [name for name in names if name not in (*COLUMN_UNITS, "flag")]
     if unknown:
         raise PatchfemError(
             f"{path}:1: column '{unknown[0][:40]}' is unknown; possible columns are flag and "
-            f"{', '.join(UNITS)}"
+            f"{', '.join(COLUMN_UNITS)}"
         )
     rows = []
     for number, line in enumerate(lines, 2):
@@ -70,7 +70,7 @@ def read_table(path: Path) -> list[MeasuredRow]:
     return rows
 
 
-def _records_error(path: Path) -> PatchfemError:
+def _make_record_error(path: Path) -> PatchfemError:
     """Make the error for a time record that was given where a table of responses is needed."""
     options = ""
     if path.suffix.lower() == ".mat":
@@ -85,11 +85,11 @@ def _records_error(path: Path) -> PatchfemError:
 
 def _parse_row(where: str, cells: dict, factors: dict) -> MeasuredRow:
     flag = cells.get("flag", "")
-    if set(flag) - set(FLAGS):
+    if set(flag) - set(FLAG_MEANINGS):
         raise PatchfemError(
-            f"{where}flag '{flag[:40]}' is unknown; possible letters are {', '.join(FLAGS)}"
+            f"{where}flag '{flag[:40]}' is unknown; possible letters are {', '.join(FLAG_MEANINGS)}"
         )
-    values = dict.fromkeys(UNITS)
+    values = dict.fromkeys(COLUMN_UNITS)
     for name, factor in factors.items():
         if cells[name]:
             values[name] = parse_number(where + name, cells[name], factor)

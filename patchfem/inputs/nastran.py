@@ -19,10 +19,10 @@ from .damage import refuse_damage
 
 MAX_NUMBERS = 5 * 10**7  # largest number of values in a matrix
 MAX_ROWS = 2 * 10**6  # largest number of rows of a matrix
-ROW_FIELD = 2**16  # head of a string in one word: length * ROW_FIELD + row
-FORM_SYMMETRIC = 6  # form of a DMIG matrix of which one triangle is stored
-FIELD = 16  # characters of a wide field of a DMIG card
-_NUMBER = re.compile(r"([+-]?[\d.]+)(?:[ED]?([+-]?\d+))?\Z", re.IGNORECASE)
+ROW_FACTOR = 2**16  # head of a string in one word: length * ROW_FACTOR + row
+SYMMETRIC_FORM = 6  # form of a DMIG matrix of which one triangle is stored
+WIDE_FIELD_CHARACTERS = 16  # characters of a wide field of a DMIG card
+_NUMBER_PATTERN = re.compile(r"([+-]?[\d.]+)(?:[ED]?([+-]?\d+))?\Z", re.IGNORECASE)
 
 
 class StringMatrix:
@@ -84,7 +84,7 @@ def _refuse_output4(path) -> AbstractContextManager:
     return refuse_damage(f"{path}: not a readable OUTPUT4 file")
 
 
-def _words_per_number(number_type: int) -> int:
+def _count_words_per_number(number_type: int) -> int:
     """Return the words per number of a type: 1 single, 2 double precision, 3 and 4 complex."""
     if number_type in (3, 4):
         raise ValueError("a matrix is complex; write only the real part")
@@ -114,7 +114,7 @@ def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
             raise ValueError("it is cut off")
         if matrix is None:
             columns, rows, _, number_type = struct.unpack_from(f"{order}4{integer}", record)
-            is_double = _words_per_number(number_type) == 2 or word == 8
+            is_double = _count_words_per_number(number_type) == 2 or word == 8
             number = np.dtype(f"{order}f{8 if is_double else 4}")
             name = record[4 * word :].decode("ascii").strip()
             matrix = matrices.setdefault(name, StringMatrix(path, (rows, columns), number))
@@ -138,7 +138,7 @@ def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
             if has_long_heads:
                 length, first_row = string_head.unpack_from(record, start)
             else:
-                length, first_row = divmod(string_head.unpack_from(record, start)[0], ROW_FIELD)
+                length, first_row = divmod(string_head.unpack_from(record, start)[0], ROW_FACTOR)
             start += string_head.size
             stop = start + (length - 1) * word
             if stop < start:
@@ -154,29 +154,29 @@ def _read_text(path, data: bytes) -> dict[str, StringMatrix]:
     matrices = {}
     at = 0
     while at < len(lines):
-        columns, rows, _, number_type = _integers(lines[at], 4)
-        _words_per_number(number_type)
+        columns, rows, _, number_type = _parse_integers(lines[at], 4)
+        _count_words_per_number(number_type)
         name = lines[at][32:40].decode("ascii").strip()
         number_format = re.search(rb"[ED](\d+)\.", lines[at][40:])
-        number = np.dtype(("S", int(number_format[1]) if number_format else FIELD))
+        number = np.dtype(("S", int(number_format[1]) if number_format else WIDE_FIELD_CHARACTERS))
         matrix = matrices.setdefault(name, StringMatrix(path, (rows, columns), number))
         header_words = 2 if rows < 0 else 1
         at += 1
         while True:
-            column, row, _ = _integers(lines[at], 3)
+            column, row, _ = _parse_integers(lines[at], 3)
             at += 1
             if column > columns:
-                at = _numbers_end(lines, at)
+                at = _find_numbers_end(lines, at)
                 break
             if row:
-                end = _numbers_end(lines, at)
+                end = _find_numbers_end(lines, at)
                 matrix.places.append((column, row))
                 matrix.strings.append(_join_numbers(lines[at:end]))
                 at = end
                 continue
             while at < len(lines) and len(header := lines[at].split()) == header_words:
-                first_row = int(header[1]) if header_words == 2 else int(header[0]) % ROW_FIELD
-                end = _numbers_end(lines, at + 1)
+                first_row = int(header[1]) if header_words == 2 else int(header[0]) % ROW_FACTOR
+                end = _find_numbers_end(lines, at + 1)
                 matrix.places.append((column, first_row))
                 matrix.strings.append(_join_numbers(lines[at + 1 : end]))
                 at = end
@@ -188,12 +188,12 @@ def _join_numbers(parts: list[bytes]) -> bytes:
     return b"".join(parts).upper().replace(b"D", b"E")
 
 
-def _integers(line: bytes, count: int) -> list[int]:
+def _parse_integers(line: bytes, count: int) -> list[int]:
     """Read the first integers of a line, in fields of eight characters."""
     return [int(line[8 * k : 8 * k + 8]) for k in range(count)]
 
 
-def _numbers_end(lines: list, at: int) -> int:
+def _find_numbers_end(lines: list, at: int) -> int:
     """Return the index of the first line after a block of numbers, which have decimal points."""
     while at < len(lines) and b"." in lines[at][:16]:
         at += 1
@@ -227,7 +227,9 @@ class DmigMatrix:
             Row of the entry; the component of a scalar point may be empty.
         number : str
         """
-        self.entries.append(f"{node:>{FIELD}}{component or '0':>{FIELD}}{number:>{FIELD}}")
+        self.entries.append(
+            f"{node:>{WIDE_FIELD_CHARACTERS}}{component or '0':>{WIDE_FIELD_CHARACTERS}}{number:>{WIDE_FIELD_CHARACTERS}}"
+        )
 
     def assemble(self) -> tuple[sparse.csr_array, np.ndarray]:
         """Return the matrix (n, n), and node and component (n, 2) of its rows.
@@ -238,7 +240,7 @@ class DmigMatrix:
         sizes = np.diff([*first_entries, len(self.entries)])
         try:
             text = _join_numbers(["".join(self.entries).encode("ascii")])
-            fields = np.frombuffer(text, f"S{FIELD}").reshape(-1, 3)
+            fields = np.frombuffer(text, f"S{WIDE_FIELD_CHARACTERS}").reshape(-1, 3)
             rows = fields[:, :2].astype(int)
             numbers = fields[:, 2].astype(float)
         except ValueError:  # a blank component, or 1.5-3 for 1.5E-3
@@ -246,7 +248,7 @@ class DmigMatrix:
         columns = np.array([column[1:3] for column in self.columns], int).reshape(-1, 2)
         places, index = rank_dofs(np.vstack([rows, np.repeat(columns, sizes, axis=0)]))
         values = sparse.coo_array((numbers, index.reshape(2, -1)), 2 * (len(places),)).tocsr()
-        return (mirror_triangle(values) if self.form == FORM_SYMMETRIC else values), places
+        return (mirror_triangle(values) if self.form == SYMMETRIC_FORM else values), places
 
     def _parse_entries(self, sizes: np.ndarray) -> tuple:
         """Parse the entries one by one, to accept all spellings of numbers."""
@@ -255,9 +257,9 @@ class DmigMatrix:
         lines = np.repeat([column.line for column in self.columns], sizes)
         for line, entry in zip(lines, self.entries):
             with refuse_damage(f"{self.path}:{line}: not a readable DMIG card"):
-                component = entry[FIELD : 2 * FIELD].strip() or "0"
-                rows.append((int(entry[:FIELD]), int(component)))
-                numbers.append(parse_real(entry[2 * FIELD :].strip()))
+                component = entry[WIDE_FIELD_CHARACTERS : 2 * WIDE_FIELD_CHARACTERS].strip() or "0"
+                rows.append((int(entry[:WIDE_FIELD_CHARACTERS]), int(component)))
+                numbers.append(parse_real(entry[2 * WIDE_FIELD_CHARACTERS :].strip()))
         return np.array(rows, int).reshape(-1, 2), np.array(numbers)
 
 
@@ -305,7 +307,7 @@ def read_dmig(path) -> dict[str, DmigMatrix]:
                 matrix = None
                 continue
             try:
-                fields = _card_fields(line, is_wide=line[4:5] == "*" if is_card else line[0] == "*")
+                fields = _split_card(line, is_wide=line[4:5] == "*" if is_card else line[0] == "*")
                 if is_card:
                     matrix = _start_card(path, matrices, number, fields)
                     fields = fields[4:]
@@ -339,13 +341,13 @@ def _start_card(path, matrices: dict, line: int, fields: list) -> DmigMatrix | N
 
 def parse_real(text: str) -> float:
     """Parse a Nastran number, as in 1.5-3, 1.5D-3 and 1.5E-3; ValueError for other text."""
-    match = _NUMBER.match(text)
+    match = _NUMBER_PATTERN.match(text)
     if match is None:
         raise ValueError(f"'{text}' is not a number")
     return float(f"{match[1]}e{match[2] or 0}")
 
 
-def _card_fields(line: str, *, is_wide: bool) -> list[str]:
+def _split_card(line: str, *, is_wide: bool) -> list[str]:
     """Return the stripped fields after the first one of a card: four wide or eight narrow ones."""
     count = 4 if is_wide else 8
     width = 64 // count

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Missing, PatchfemError, frozen_array
-from .units import CHANNEL_UNITS, SI_UNITS, unit_factor
+from .units import CHANNEL_UNITS, SI_UNITS, find_unit_factor
 
 MAX_BYTES = 256 * 2**20  # largest size of a file of records [bytes]
-MAX_LISTED = 12  # channels that an error message lists
-_REQUEST = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
+MAX_LISTED_CHANNELS = 12  # channels that an error message lists
+_REQUEST_PATTERN = re.compile(r"\s*(\w+)\s*=\s*(.+?)\s*(?:\[\s*([^\[\]]+?)\s*\])?\s*", re.S)
 
 
 class Channel(NamedTuple):
@@ -85,7 +85,7 @@ def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> lis
     requests = {}
     parts = [part for text in texts for part in re.split(r",(?=\s*\w+\s*=)", text)]
     for part in parts:
-        match = _REQUEST.fullmatch(part)
+        match = _REQUEST_PATTERN.fullmatch(part)
         if match is None:
             raise PatchfemError(
                 f"--map {part}: NAME=CHANNEL or NAME=CHANNEL [unit] is needed, such as "
@@ -95,7 +95,7 @@ def parse_requests(texts: Iterable, quantities: Iterable = CHANNEL_UNITS) -> lis
         if name not in quantities:
             raise PatchfemError(f"--map {name}: unknown; use one of {', '.join(quantities)}")
         if unit and name in CHANNEL_UNITS:
-            unit_factor(name, unit, "--map ")
+            find_unit_factor(name, unit, "--map ")
         if name in requests:
             raise PatchfemError(f"--map {name}: given twice")
         requests[name] = RequestedChannel(name, source, unit)
@@ -126,7 +126,7 @@ def select_channels(path: Path, channels: list, requests: list, notes: list) -> 
     """
     channel_list = describe_channels(channels)
     if requests:
-        selected = [_requested_channel(path, channels, request) for request in requests]
+        selected = [_make_requested_channel(path, channels, request) for request in requests]
     else:
         selected = [channel for channel in channels if channel.quantity]
     names = [channel.quantity for channel in selected]
@@ -145,13 +145,13 @@ def select_channels(path: Path, channels: list, requests: list, notes: list) -> 
     values = {channel.quantity: _convert_to_si(path, channel) for channel in selected}
     time = values.pop("time", None)
     if time is None:
-        time = _shared_time(path, selected, channels if requests else [], channel_list)
+        time = _find_shared_time(path, selected, channels if requests else [], channel_list)
     if time is not None:
         values = {"time": time, **values}
     return make_records(path, values, notes, channel_list)
 
 
-def _requested_channel(path, channels: list, request: RequestedChannel) -> Channel:
+def _make_requested_channel(path, channels: list, request: RequestedChannel) -> Channel:
     """Return a channel with the quantity of a request, and the unit if the request has one."""
     channel = find_channel(path, channels, request.source)._replace(quantity=request.quantity)
     return channel._replace(unit=request.unit, factor=None) if request.unit else channel
@@ -195,11 +195,11 @@ def find_channel(path, channels: list, source: str) -> Channel:
 def describe_channels(channels: list) -> str:
     """List channels with number, name, degree of freedom and unit."""
     texts = []
-    for number, channel in enumerate(channels[:MAX_LISTED], 1):
+    for number, channel in enumerate(channels[:MAX_LISTED_CHANNELS], 1):
         place = f" at {channel.place}" if channel.place else ""
         unit = f" [{channel.unit[:20]}]" if channel.unit else ""
         texts.append(f"{number} '{channel.name[:40]}'{place}{unit}")
-    rest = len(channels) - MAX_LISTED
+    rest = len(channels) - MAX_LISTED_CHANNELS
     return ", ".join(texts) + (f" and {rest} more" if rest > 0 else "")
 
 
@@ -269,11 +269,11 @@ def _convert_to_si(path, channel: Channel) -> np.ndarray:
                 f"{path}: '{channel.name[:40]}' has no unit; write --map "
                 f'"{quantity}=CHANNEL [{SI_UNITS[quantity]}]"'
             )
-        factor = unit_factor(quantity, channel.unit, f"{path}: ")
+        factor = find_unit_factor(quantity, channel.unit, f"{path}: ")
     return np.asarray(channel.values, float) * factor
 
 
-def _shared_time(path, selected: list, channels: list, channel_list: str) -> np.ndarray | None:
+def _find_shared_time(path, selected: list, channels: list, channel_list: str) -> np.ndarray | None:
     """Return the time [s] of the selected channels, or of the only channel that contains times."""
     times = [channel.time for channel in selected if channel.time is not None]
     if not times:

@@ -8,12 +8,12 @@ from ..core import PatchfemError
 from .cells import TableFormat
 from .columns import read_columns
 from .records import select_channels
-from .slides import check_rising
+from .slides import require_increasing_time
 from .units import RECORD_UNITS, SI_UNITS, SLIDE_UNITS
-from .universal import OrdinateType, read_datasets, record_channels
+from .universal import OrdinateType, make_channels, read_datasets
 
-REMEDY = "; drive.file is relative to the scene"
-SPECTRUM = TableFormat(
+FILE_REMEDY = "; drive.file is relative to the scene"
+SPECTRUM_FORMAT = TableFormat(
     {
         "frequency": {"Hz": 1.0, "kHz": 1e3},
         "level": {"g^2/Hz": 9.80665**2, "m^2/s^3": 1.0, "(m/s^2)^2/Hz": 1.0},
@@ -21,7 +21,7 @@ SPECTRUM = TableFormat(
     ("frequency", "level"),
     "frequency [Hz],level [g^2/Hz]",
     "a spectrum",
-    REMEDY,
+    FILE_REMEDY,
 )
 
 
@@ -58,11 +58,11 @@ def read_signal(path, quantity: str) -> tuple:
             ("time", quantity),
             f"time [s],{quantity} [{SI_UNITS[quantity]}]",
             "a drive",
-            REMEDY,
+            FILE_REMEDY,
         )
         values = read_columns(path, table).values
         time, value = values["time"], values[quantity]
-        check_rising(path, time)
+        require_increasing_time(path, time)
     if not np.any(value):
         raise PatchfemError(f"{path}: {quantity} is 0 in every row, so nothing moves")
     return time - time[0], np.array(value)
@@ -85,7 +85,7 @@ def read_spectrum(path) -> tuple:
     PatchfemError
         If the table is not a spectrum; the message names the line.
     """
-    values = read_columns(path, SPECTRUM).values
+    values = read_columns(path, SPECTRUM_FORMAT).values
     frequency, level = values["frequency"], values["level"]
     wrong = np.flatnonzero((level <= 0) | (np.diff(frequency, prepend=0.0) <= 0))
     if wrong.size:
@@ -107,7 +107,7 @@ def _read_universal(path: Path, quantity: str) -> tuple:
         if dataset["type"] != 58 or int(dataset["ordinate_spec_data_type"]) in (kind, 0)
     ]
     notes = []
-    channels = record_channels(path, candidates, notes)
+    channels = make_channels(path, candidates, notes)
     if len(channels) != 1:
         raise PatchfemError(
             f"{path}: exactly one time response (dataset 58, function type 1) of {quantity} is needed; "

@@ -13,7 +13,7 @@ from .cells import TableFormat
 from .columns import read_columns
 from .units import RECORD_UNITS, SLIDE_UNITS
 
-NAMES = ("time", "displacement", "lateral")
+COLUMN_NAMES = ("time", "displacement", "lateral")
 
 
 def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
@@ -48,7 +48,7 @@ def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
         "; slide.file is relative to the scene",
     )
     values = read_columns(path, table).values
-    columns = {name: values[name] for name in NAMES if name in values}
+    columns = {name: values[name] for name in COLUMN_NAMES if name in values}
     for name, column in columns.items():
         if column[0] != 0:
             raise PatchfemError(
@@ -57,13 +57,13 @@ def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
                 "import --zero`"
             )
     time, *displacements = columns.values()
-    check_rising(path, time)
+    require_increasing_time(path, time)
     if not np.any(displacements):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")
     return tuple(columns.values())
 
 
-def check_rising(path, time: np.ndarray) -> None:
+def require_increasing_time(path, time: np.ndarray) -> None:
     """Raise PatchfemError at the first row of a table whose time (k,) [s] does not rise."""
     late = np.flatnonzero(np.diff(time) <= 0)
     if late.size:

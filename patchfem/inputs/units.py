@@ -8,29 +8,29 @@ import re
 
 from ..exceptions import PatchfemError
 
-_TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
-_LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 25.4e-6}
-_ACCELERATIONS = {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "in/s^2": 0.0254}
-SLIDE_UNITS = {"time": _TIMES, "displacement": _LENGTHS, "lateral": _LENGTHS}
+_TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+_LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 25.4e-6}
+_ACCELERATION_UNITS = {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "in/s^2": 0.0254}
+SLIDE_UNITS = {"time": _TIME_UNITS, "displacement": _LENGTH_UNITS, "lateral": _LENGTH_UNITS}
 FORCE_UNITS = {
     "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665},
     "friction_ratio": {"": 1.0, "1": 1.0},
 }
 # Quantities that a record may contain besides time; a reader ignores those that it does not need.
 RECORD_UNITS = {
-    "displacement": _LENGTHS,
-    "lateral": _LENGTHS,
+    "displacement": _LENGTH_UNITS,
+    "lateral": _LENGTH_UNITS,
     "velocity": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
-    "acceleration": _ACCELERATIONS,
-    "base_acceleration": _ACCELERATIONS,
+    "acceleration": _ACCELERATION_UNITS,
+    "base_acceleration": _ACCELERATION_UNITS,
     **FORCE_UNITS,
 }
-CHANNEL_UNITS = {"time": _TIMES | {"min": 60.0}, **RECORD_UNITS}
+CHANNEL_UNITS = {"time": _TIME_UNITS | {"min": 60.0}, **RECORD_UNITS}
 SI_UNITS = {
     name: next(unit for unit, factor in units.items() if factor == 1.0 and unit)
     for name, units in CHANNEL_UNITS.items()
 }
-_SYNONYMS = {
+_UNIT_SYNONYMS = {
     "sec": "s",
     "seconds": "s",
     "newton": "N",
@@ -50,15 +50,15 @@ _RATE_UNIT_PATTERNS = {
 def normalize_unit(text: str) -> str:
     """Spell a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
     text = " ".join(text.split())
-    text = _SYNONYMS.get(text.lower(), _SYNONYMS.get(text, text))
+    text = _UNIT_SYNONYMS.get(text.lower(), _UNIT_SYNONYMS.get(text, text))
     for ending, pattern in _RATE_UNIT_PATTERNS.items():
         match = pattern.fullmatch(text)
         if match:
-            return _SYNONYMS.get(match[1], match[1]) + ending
+            return _UNIT_SYNONYMS.get(match[1], match[1]) + ending
     return text
 
 
-def unit_factor(quantity: str, unit: str, where: str = "") -> float:
+def find_unit_factor(quantity: str, unit: str, where: str = "") -> float:
     """Return the factor that converts a value in a unit to SI.
 
     Parameters

@@ -15,8 +15,8 @@ from .damage import refuse_damage
 from .records import Channel, check_file
 from .units import CHANNEL_UNITS, normalize_unit
 
-DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of a node
-TIME_ABSCISSA = 17  # abscissa type "time"
+DIRECTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of a node
+TIME_ABSCISSA_TYPE = 17  # abscissa type "time"
 
 
 class OrdinateType(IntEnum):
@@ -79,7 +79,7 @@ def read_datasets(path, where: str = "") -> list[dict]:
     return datasets
 
 
-def record_channels(path, datasets: list, notes: list) -> list[Channel]:
+def make_channels(path, datasets: list, notes: list) -> list[Channel]:
     """Return the channels of the records over time among the datasets.
 
     A record along a negative axis is reversed, so that it points along the positive one.
@@ -118,7 +118,7 @@ def record_channels(path, datasets: list, notes: list) -> list[Channel]:
 
 def _is_record(dataset: dict) -> bool:
     kind = int(dataset["func_type"])
-    is_over_time = int(dataset["abscissa_spec_data_type"]) == TIME_ABSCISSA
+    is_over_time = int(dataset["abscissa_spec_data_type"]) == TIME_ABSCISSA_TYPE
     return kind == FunctionType.TIME_RESPONSE or (kind == FunctionType.GENERAL and is_over_time)
 
 
@@ -133,7 +133,7 @@ def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes:
         raise PatchfemError(
             f"{where}: {values.size} values, but {dataset['num_pts']} are announced; the file is damaged"
         )
-    quantity = _quantity(int(dataset["ordinate_spec_data_type"]))
+    quantity = _find_quantity(int(dataset["ordinate_spec_data_type"]))
     unit = normalize_unit(_clean_text(dataset["ordinate_axis_units_lab"]))
     factor = None
     if quantity and unit not in CHANNEL_UNITS[quantity]:
@@ -146,7 +146,7 @@ def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes:
             reason = f"its unit '{unit[:20]}' is not known" if unit else "it has no unit"
             notes.append(f"record {number} ({quantity}): {reason}; {remedy}")
     direction = int(dataset["rsp_dir"])
-    axis = _axis(direction)
+    axis = _format_direction(direction)
     if direction < 0:
         notes.append(f"record {number} points along -{axis}, so its sign is reversed here")
         values = -values
@@ -155,15 +155,17 @@ def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes:
     return Channel(name, place, quantity, unit, values, time, factor)
 
 
-def _quantity(ordinate_type: int) -> str:
+def _find_quantity(ordinate_type: int) -> str:
     """Return the quantity of a data type, or "" for an unknown type."""
     if ordinate_type not in list(OrdinateType):
         return ""
     return OrdinateType(ordinate_type).name.lower().removeprefix("excitation_")
 
 
-def _axis(direction: int) -> str:
-    return DIRECTIONS[abs(direction) - 1] if 1 <= abs(direction) <= len(DIRECTIONS) else "?"
+def _format_direction(direction: int) -> str:
+    return (
+        DIRECTION_NAMES[abs(direction) - 1] if 1 <= abs(direction) <= len(DIRECTION_NAMES) else "?"
+    )
 
 
 def _clean_text(value) -> str:

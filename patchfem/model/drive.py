@@ -6,10 +6,10 @@ from ..core import ModalBasis, PatchfemError
 from ..effects import find_waveform, import_effect
 from ..inputs import signals
 from ..structure import drives
-from ..structure.drive_sizes import DriveKeys, cycles_per_level, first_period
+from ..structure.drive_sizes import DriveKeys, count_cycles_per_level, find_first_period
 from .file_cache import cache_by_file
 
-MIN_CYCLES = 0.25  # drive cycles; minimum length of a run whose length is given as a duration
+MIN_RUN_CYCLES = 0.25  # drive cycles; minimum length of a run whose length is given as a duration
 
 
 def build_signal(scene, modes: ModalBasis):
@@ -20,12 +20,12 @@ def build_signal(scene, modes: ModalBasis):
     first elastic mode.
     """
     if scene.drive.kind == "free":
-        return drives.release(first_period(modes))
+        return drives.make_release(find_first_period(modes))
     keys = DriveKeys(
-        scene.drive, modes.mass, first_period(modes), lambda: _read_recorded_drive(scene)
+        scene.drive, modes.mass, find_first_period(modes), lambda: _read_recorded_drive(scene)
     )
     waveform = scene.drive.waveform
-    return import_effect(f"drive.waveform={waveform}").BUILDERS[waveform](keys)
+    return import_effect(f"drive.waveform={waveform}").DRIVE_BUILDERS[waveform](keys)
 
 
 def has_levels(keys) -> bool:
@@ -39,11 +39,11 @@ def count_run_cycles(keys, signal) -> float:
     `keys` are those of [drive], `signal` is the drive that follows from them.
     """
     if has_levels(keys):
-        return cycles_per_level(keys) * len(keys.levels)
+        return count_cycles_per_level(keys) * len(keys.levels)
     if keys.cycles is not None:
         return keys.cycles
     duration = signal.duration if keys.duration is None else keys.duration
-    return max(duration / signal.period, MIN_CYCLES)
+    return max(duration / signal.period, MIN_RUN_CYCLES)
 
 
 def _read_recorded_drive(scene) -> tuple:

@@ -12,7 +12,7 @@ from ..formatting import format_length
 from ..scene.keys.tables import Tables
 from ..scene.text import format_toml
 
-KEY = "wear.start"
+START_KEY = "wear.start"
 # keys of [contact] that may differ between two runs because they do not describe the surfaces
 LOADING_KEYS = (
     "load",
@@ -30,11 +30,11 @@ SURFACE_KEYS = (
     "mesh",
 )
 # fraction of the range of the gap; the gaps of one patch on two meshes differ by less
-MAX_GAP_CHANGE = 1e-2
-MIN_GAP_CHANGE = 1e-12  # m; a smaller difference between gaps is round-off
-MAX_LENGTH_CHANGE = 1e-6  # relative; the lengths of one interface on two meshes differ by less
+MAX_GAP_DIFFERENCE = 1e-2
+MIN_GAP_DIFFERENCE = 1e-12  # m; a smaller difference between gaps is round-off
+MAX_LENGTH_DIFFERENCE = 1e-6  # relative; the lengths of one interface on two meshes differ by less
 # errors of h5py, json and tomllib for a file of another kind
-UNREADABLE = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
+FILE_ERRORS = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -84,12 +84,12 @@ class EarlierWear:
         self._require_same_length(x)
         change = np.interp(x, self.x, self.gap) - gap
         change = float(np.abs(change - np.polyval(np.polyfit(x, change, 1), x)).max())
-        if change > MAX_GAP_CHANGE * float(np.ptp(gap)) + MIN_GAP_CHANGE:
+        if change > MAX_GAP_DIFFERENCE * float(np.ptp(gap)) + MIN_GAP_DIFFERENCE:
             raise PatchfemError(
                 f"{self.path}: the unworn surfaces of that run differ from those of this scene by "
                 f"{format_length(change, 3)}; choose a run of the same pieces, and elements of the same length if "
                 "the surfaces are rough",
-                KEY,
+                START_KEY,
             )
 
     def measure_error(self, name: str, value: float) -> float | None:
@@ -106,15 +106,15 @@ class EarlierWear:
     def _require_same_length(self, x) -> None:
         """Raise PatchfemError unless the interface of that run is as long as x (m,) [m]."""
         ends = (x[0], x[-1])
-        if not np.allclose(self.x[[0, -1]], ends, rtol=MAX_LENGTH_CHANGE, atol=0):
+        if not np.allclose(self.x[[0, -1]], ends, rtol=MAX_LENGTH_DIFFERENCE, atol=0):
             raise PatchfemError(
                 f"{self.path}: the interface of that run is {format_length(float(np.ptp(self.x)))} long, but "
                 f"that of this scene {format_length(x[-1] - x[0])}; choose a run of the same pieces",
-                KEY,
+                START_KEY,
             )
 
 
-def read(path: Path) -> EarlierWear:
+def read_end_state(path: Path) -> EarlierWear:
     """Read the end of an earlier run from its result.nc.
 
     Raises
@@ -126,21 +126,22 @@ def read(path: Path) -> EarlierWear:
         earlier = _read_state(path)
         has_strips = "strips" in earlier.scene["contact"]
         is_usable = _has_depth_along_patch(earlier) and bool(earlier.sentence)
-    except UNREADABLE:
+    except FILE_ERRORS:
         raise PatchfemError(
-            f"{path}: not the result.nc of a run with [wear] and [contact]; give such a file", KEY
+            f"{path}: not the result.nc of a run with [wear] and [contact]; give such a file",
+            START_KEY,
         ) from None
     if has_strips:
         raise PatchfemError(
             f"{path}: that run has strips, and wear of strips cannot be continued yet; choose a run "
             "without [contact.strips]",
-            KEY,
+            START_KEY,
         )
     if not is_usable:
         raise PatchfemError(
             f"{path}: the worn depth in this file is not a list of depths along a patch; run that "
             "scene again",
-            KEY,
+            START_KEY,
         )
     return earlier
 
@@ -173,7 +174,7 @@ def _has_depth_along_patch(earlier: EarlierWear) -> bool:
 
 def read_earlier_wear(path: Path, tables: Tables) -> EarlierWear:
     """Read the end of an earlier run; raise PatchfemError unless a scene has the same pieces."""
-    earlier = read(path)
+    earlier = read_end_state(path)
     pieces_before = _describe_pieces(earlier.scene)
     pieces_now = _describe_pieces(tomllib.loads(format_toml(tables)))
     different_keys = [
@@ -185,7 +186,7 @@ def read_earlier_wear(path: Path, tables: Tables) -> EarlierWear:
         raise PatchfemError(
             f"{path}: the pieces of that run are not those of this scene ({', '.join(different_keys)} "
             "differ); choose a run of the same pieces",
-            KEY,
+            START_KEY,
         )
     return earlier
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from functools import lru_cache, wraps
 
 # results that are kept for each function; those of large traces and modes take memory
-MAX_RESULTS = 8
+MAX_CACHED_RESULTS = 8
 
 
 def cache_by_file(function: Callable) -> Callable:
@@ -14,7 +14,7 @@ def cache_by_file(function: Callable) -> Callable:
     be hashable, and are passed by position.
     """
 
-    @lru_cache(MAX_RESULTS)
+    @lru_cache(MAX_CACHED_RESULTS)
     def call(path, _version, *arguments):
         return function(path, *arguments)
 

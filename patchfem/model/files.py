@@ -25,8 +25,8 @@ from . import (
     structure_reduced,
 )
 
-MAX_WHOLE_MESH = 2 * 2**20  # bytes; of a larger mesh file only the start is examined
-START_BYTES = 4096  # bytes of the start of a mesh file
+MAX_FULLY_READ_MESH_BYTES = 2 * 2**20  # bytes; of a larger mesh file only the start is examined
+MESH_START_BYTES = 4096  # bytes of the start of a mesh file
 # bytes with which a mesh file begins, by its ending
 MESH_STARTS = {
     ".msh": (b"$MeshFormat",),
@@ -36,7 +36,7 @@ MESH_STARTS = {
 }
 
 
-def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) -> list:
+def find_file_faults(tables, folder: Path, whole: bool = True, notes: list | None = None) -> list:
     """Return the faults of the files that the tables of a scene name.
 
     Parameters
@@ -62,7 +62,7 @@ def faults(tables, folder: Path, whole: bool = True, notes: list | None = None) 
             continue
         prefix, own_key, own_tables = _select_interface(key, tables)
         try:
-            sentences = READERS[own_key](path, own_tables, whole) or ()
+            sentences = FILE_CHECKS[own_key](path, own_tables, whole) or ()
         except PatchfemError as error:
             fault_key = prefix + (error.key or own_key)
             found.append((fault_key, str(error).removeprefix(f"{own_key}: ")))
@@ -104,11 +104,11 @@ def _check_reduction(tables, folder: Path) -> list:
 def _check_mesh(path: Path, tables, whole: bool) -> None:
     """Read a mesh, or the start of a large one."""
     starts = MESH_STARTS.get(path.suffix)
-    if starts is None or path.stat().st_size <= MAX_WHOLE_MESH:
+    if starts is None or path.stat().st_size <= MAX_FULLY_READ_MESH_BYTES:
         files.read_pieces(path)
         return
     with open(path, "rb") as file:
-        if not file.read(START_BYTES).lstrip().startswith(starts):
+        if not file.read(MESH_START_BYTES).lstrip().startswith(starts):
             raise PatchfemError(
                 f"{path}: not a readable {path.suffix} file (the content does not start as in such a "
                 "file)"
@@ -127,10 +127,10 @@ def _check_profile(path: Path, tables, whole: bool) -> tuple:
     even_cell = pieces.length / gap.DEFAULT_CELLS
     n_cells = max(1, round(pieces.length / (contact.element_size or even_cell)))
     x = np.linspace(-pieces.length / 2, pieces.length / 2, n_cells + 1)
-    _, notes = profile.profile_gap(
+    _, notes = profile.compute_profile_gap(
         path,
         x,
-        patch.profile_lengths(contact, pieces),
+        patch.find_profile_lengths(contact, pieces),
         even_cell,
         is_rough=contact.asperities is not None,
         is_material=contact.profile.heights == "surface",
@@ -155,7 +155,7 @@ def _check_drive(path: Path, tables, whole: bool) -> None:
 
 def _check_structure(path: Path, tables, whole: bool) -> None:
     """Check structure.file: build the modes of arrays, but do not fit those of responses."""
-    if structure_files.is_universal(path) or not whole:
+    if structure_files.is_universal_file(path) or not whole:
         structure_files.read_content(path)
         return
     rubs = tables.friction is not None or bool(tables.structure.interface)
@@ -174,7 +174,9 @@ def _check_measured(path: Path, tables, whole: bool) -> None:
 
 def _check_wear_start(path: Path, tables, whole: bool) -> tuple:
     """Check that the pieces are those of the earlier run; return a note on the worn depth."""
-    start = earlier_wear.read_earlier_wear(path, tables) if whole else earlier_wear.read(path)
+    start = (
+        earlier_wear.read_earlier_wear(path, tables) if whole else earlier_wear.read_end_state(path)
+    )
     return (start.sentence,)
 
 
@@ -182,11 +184,11 @@ def _check_asperities(path: Path, tables, whole: bool) -> None:
     """Check that a rough surface can have the peaks of a trace."""
     cutoff = None
     if whole:
-        cutoff = patch.shortest_wave(tables.contact, patch.build_pieces(tables.contact).length)
-    peaks.read_moments(path, cutoff)
+        cutoff = patch.find_shortest_wave(tables.contact, patch.build_pieces(tables.contact).length)
+    peaks.read_spectral_moments(path, cutoff)
 
 
-READERS = {
+FILE_CHECKS = {
     "contact.mesh": _check_mesh,
     "contact.asperities.from": _check_asperities,
     "contact.profile.file": _check_profile,

@@ -117,7 +117,7 @@ class Gap:
             return None
         beside = loaded[1:] | loaded[:-1]
         longest = np.diff(x)[beside].max(initial=0.0) or np.diff(x).max()
-        return float(max(longest, self.average or profiles.sample_spacing(self.profile)))
+        return float(max(longest, self.average or profiles.find_sample_spacing(self.profile)))
 
     def half_step_heights(self, x) -> np.ndarray:
         """Return half the height [m] of the step at a node, (m,); 0 at nodes that are no step edge."""
@@ -141,7 +141,7 @@ class Gap:
             seconds[name] = perf_counter() - begin
         if self.profile is not None:
             begin = perf_counter()
-            heights, notes = profiles.profile_gap(
+            heights, notes = profiles.compute_profile_gap(
                 self.profile,
                 x,
                 ProfileLengths(self.average, self.limit),

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 # default of the rest speed of bonds (2.10) as a fraction of the peak speed
 REST_SPEED_FRACTION = 1e-3
-LOAD_OF_UNLOADED = 1.0  # N; an unloaded law with a stiffness takes its bond length at this load
+DEFAULT_LOAD = 1.0  # N; an unloaded law with a stiffness takes its bond length at this load
 
 
 class FrictionLimits(NamedTuple):
@@ -65,7 +65,7 @@ class InterfaceLaw:
         return FrictionLimits(law.static * load, kinetic * load)
 
 
-def effective_law(
+def make_effective_law(
     law: Friction, width: float | None, where: Callable, load: float | None = None
 ) -> Friction:
     """Return the keys of a law changed by the effects that only modify numbers of the law.
@@ -96,7 +96,7 @@ def effective_law(
         return complete_bond_length(law, load)
     changes = {"temperature": None, "spread": None}
     if law.temperature is not None and law.rest_growth is not None:
-        rest_growth, slip_growth = _growth_at_temperature(law, where)
+        rest_growth, slip_growth = _scale_growth_rates(law, where)
         changes |= {"rest_growth": rest_growth, "slip_growth": slip_growth}
     if law.spread is not None:
         factor = spread.pad_factor(width, law.spread)
@@ -105,7 +105,7 @@ def effective_law(
     return complete_bond_length(law.model_copy(update=changes), load)
 
 
-def _growth_at_temperature(law: Friction, where: Callable) -> tuple:
+def _scale_growth_rates(law: Friction, where: Callable) -> tuple:
     """Return the rates of growth at rest and in slip at the surface temperature."""
     heat = law.temperature
     try:
@@ -129,11 +129,11 @@ def complete_bond_length(law: Friction, load) -> Friction:
     if law.stiffness is None or not takes_stiffness_or_length(law.law):
         return law
     if np.ndim(load) == 0:
-        load = load or LOAD_OF_UNLOADED
+        load = load or DEFAULT_LOAD
     return law.model_copy(update={"bond_length": law.static * load / law.stiffness})
 
 
-def bond_parameters(law: Friction, peak_speed: float, min_rest_speed: float = 0.0):
+def make_bond_parameters(law: Friction, peak_speed: float, min_rest_speed: float = 0.0):
     """Return the bond parameters of the law 'nonlocal'.
 
     Parameters
@@ -176,7 +176,9 @@ def build_interface_laws(scene: Scene) -> tuple:
         return tuple(_build_interface(scene, number) for number in range(len(tables)))
     if scene.friction is None:
         return ()
-    law = effective_law(scene.friction, pad_width(scene), scene.where, load_of_scene(scene))
+    law = make_effective_law(
+        scene.friction, find_pad_width(scene), scene.where, find_normal_load(scene)
+    )
     return (InterfaceLaw("friction", law, None),)
 
 
@@ -185,7 +187,7 @@ def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
     table = scene.structure.interface[number]
     return InterfaceLaw(
         key=f"structure.interface.{number}",
-        numbers=effective_law(table, None, scene.where, table.normal_load),
+        numbers=make_effective_law(table, None, scene.where, table.normal_load),
         load=table.normal_load,
         patch=_build_interface_patch(scene, number),
         lateral="-".join(map(str, table.lateral or ())),
@@ -205,21 +207,21 @@ def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
     return replace(patch, interface=replace(patch.interface, partial_slip=table.compliance_key))
 
 
-def load_of_scene(scene: Scene) -> float | None:
+def find_normal_load(scene: Scene) -> float | None:
     """Return the (mean) normal load [N] of [friction]; None if an approach is prescribed."""
     if scene.contact is not None:
         return scene.contact.load
     return scene.normal.load if scene.normal is not None else None
 
 
-def pad_width(scene: Scene) -> float | None:
+def find_pad_width(scene: Scene) -> float | None:
     """Return the width [m] of the contact across the path, None if the scene gives none."""
     if scene.contact is not None:
         return scene.contact.width
     return scene.normal.width if scene.normal is not None else None
 
 
-def interface_names(structure) -> list:
+def make_interface_names(structure) -> list:
     """Return the names of the interfaces between masses, such as "1-2"; [] without masses."""
     names = ["-".join(map(str, interface.between)) for interface in structure.interface]
     return [

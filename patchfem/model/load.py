@@ -10,11 +10,11 @@ from ..core import Missing
 from ..friction import grooves
 from .slide import SlidePath
 
-MAX_SAMPLES = 5_000_000  # samples of a slide; more take too much memory
+MAX_SLIDE_SAMPLES = 5_000_000  # samples of a slide; more take too much memory
 # fraction of the largest load; a smaller load is round-off of zero, so the contact is lost
 MIN_LOAD_FRACTION = 1e-12
 # periods of the load; samples that are closer differ only by round-off of the same instant
-MIN_SPACING = 1e-9
+MIN_SAMPLE_SPACING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,21 +64,21 @@ class PointLoad:
         Raises
         ------
         Missing
-            If more than `MAX_SAMPLES` samples were needed.
+            If more than `MAX_SLIDE_SAMPLES` samples were needed.
         """
         period = 1 / self.frequency
         duration = time[-1] - time[0]
-        if duration / period * steps + time.size > MAX_SAMPLES:
+        if duration / period * steps + time.size > MAX_SLIDE_SAMPLES:
             raise Missing(
                 f"the load oscillates {duration / period:.3g} times during the slide, which "
-                f"{MAX_SAMPLES} samples cannot resolve; lower normal.frequency, slide.cycles or "
+                f"{MAX_SLIDE_SAMPLES} samples cannot resolve; lower normal.frequency, slide.cycles or "
                 "slide.hold",
                 "",
             )
         load_times = self._times_in_periods(time, steps)
         inner = load_times[(load_times > time[0]) & (load_times < time[-1])]
         grid = np.union1d(time, inner)
-        is_new_instant = np.append(True, np.diff(grid) > MIN_SPACING * period)
+        is_new_instant = np.append(True, np.diff(grid) > MIN_SAMPLE_SPACING * period)
         grid = grid[is_new_instant | np.isin(grid, time)]
         if slide.kind == "sine":
             return grid, slide.amplitude * np.sin(2 * np.pi * slide.frequency * grid)

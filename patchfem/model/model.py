@@ -13,11 +13,11 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..core import PatchfemError
-from ..effects import absent_effects, law_has_trait
+from ..effects import law_has_trait, list_absent_effects
 from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
 from . import load, patch, rig, slide, wear
-from .law import bond_parameters, effective_law, load_of_scene, pad_width
+from .law import find_normal_load, find_pad_width, make_bond_parameters, make_effective_law
 from .source import Source, locate_errors
 
 if TYPE_CHECKING:
@@ -134,14 +134,14 @@ class Model:
     def bonds(self) -> Bonds:
         """Bond parameters (2.10-2.17) of the law 'nonlocal'."""
         min_rest_speed = 0.0 if self.rig is None else MIN_RIG_REST_SPEED
-        return bond_parameters(self.friction, self.speed_scale, min_rest_speed)
+        return make_bond_parameters(self.friction, self.speed_scale, min_rest_speed)
 
     def friction_limits(self, load: float) -> FrictionLimits:
         """Return the friction limits of the first interface of a rig under a load [N]."""
         return self.rig.friction.interfaces[0].friction_limits(load)
 
 
-def build_unswept(scene: Scene) -> Model:
+def build_without_sweep(scene: Scene) -> Model:
     """Build the model of a scene without its [sweep].
 
     A swept key keeps the value that the scene gives it; a key that only [sweep] names has its first
@@ -190,7 +190,7 @@ def build(scene: Scene) -> Model:
         rig=rig_model,
         accuracy=scene.accuracy,
         measured=_build_measured(scene),
-        wear=wear.build_wear(scene) if scene.wear else None,
+        wear=wear.build_wear_model(scene) if scene.wear else None,
         absent=_find_absent(effects),
         grooves=grooves,
     )
@@ -245,14 +245,14 @@ def _request_slip_mesh(model: PatchModel, path: SlidePath, law: Friction | None)
 def _build_law(scene: Scene) -> _SceneLaw:
     """Build the law of the first interface."""
     law = scene.friction
-    normal_load = load_of_scene(scene)
+    normal_load = find_normal_load(scene)
     if scene.structure is not None and scene.structure.interface:
         law = scene.structure.interface[0]
         normal_load = law.normal_load
     if law is None:
         return _SceneLaw()
-    pad = pad_width(scene)
-    friction = effective_law(law, pad, scene.where, normal_load)
+    pad = find_pad_width(scene)
+    friction = make_effective_law(law, pad, scene.where, normal_load)
     return _SceneLaw(friction, law.temperature, law.spread, pad)
 
 
@@ -268,4 +268,4 @@ def _build_measured(scene: Scene) -> MeasuredFile | None:
 @lru_cache(64)
 def _find_absent(effects: tuple) -> tuple:
     """Return the known effects that are not among the given effects of a scene."""
-    return tuple(absent_effects(effects))
+    return tuple(list_absent_effects(effects))

@@ -11,7 +11,7 @@ from ..scene.keys.contact import Asperities, Coating, Contact, Material
 from . import peaks, profile
 from .gap import DEFAULT_CELLS, Gap, ProfileLengths, build_gap, list_gap_shapes
 
-TYPICAL_POINTS = 160  # number of interface nodes that a patch takes at the default tolerance
+TYPICAL_N_NODES = 160  # number of interface nodes that a patch takes at the default tolerance
 LENGTH_TOL = 1e-9  # lengths that differ by a smaller fraction are equal
 
 
@@ -278,7 +278,7 @@ class PatchModel:
         )
         load = loading.approach / compliance
         if loading.can_rotate and not loading.rotational_stiffness:
-            return _load_of_tilted_bars(load, loading.line_moment or 0.0, self.pieces.length)
+            return _compute_tilted_bar_load(load, loading.line_moment or 0.0, self.pieces.length)
         return load
 
     def with_element_size(self, size: float | None) -> "PatchModel":
@@ -315,7 +315,7 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
     pieces = build_pieces(contact)
     return PatchModel(
         pieces=pieces,
-        gap=build_gap(contact, profile_lengths(contact, pieces), resolve_path),
+        gap=build_gap(contact, find_profile_lengths(contact, pieces), resolve_path),
         loading=_build_loading(contact),
         interface=_build_interface(contact, pieces.length, resolve_path),
         mesh=PatchMesh(
@@ -390,21 +390,21 @@ def _build_interface(contact: Contact, length: float, resolve_path: Callable) ->
     """Build the interface of a table [contact] over a length [m]."""
     skin = contact.asperities
     if skin is not None and skin.law == "hertz":
-        skin = peaks.complete_asperities(skin, resolve_path, shortest_wave(contact, length))
+        skin = peaks.complete_asperities(skin, resolve_path, find_shortest_wave(contact, length))
     strips = contact.strips
     if strips is not None:
         strips = PatchStrips(strips.count, strips.roll, strips.offset)
     return PatchInterface(skin, strips, contact.shear is not None, contact.compliance_key)
 
 
-def profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLengths:
+def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLengths:
     """Return the lengths over which a profile is averaged.
 
     An automatic mesh resolves the whole file. Where the finest waves cannot be solved apart
     (strips, pieces that reach beyond the interface), its cells are those of an even mesh at most.
     """
     if contact.asperities is not None:
-        cutoff = shortest_wave(contact, pieces.length)
+        cutoff = find_shortest_wave(contact, pieces.length)
         average = cutoff and cutoff / profile.ELEMENTS_PER_WAVE
         return ProfileLengths(average, None)
     if contact.mesh is not None:
@@ -416,7 +416,7 @@ def profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLengths:
     return ProfileLengths(None, pieces.length / DEFAULT_CELLS)
 
 
-def shortest_wave(contact: Contact, length: float) -> float | None:
+def find_shortest_wave(contact: Contact, length: float) -> float | None:
     """Return the shortest wave [m] of a profile that belongs to the gap.
 
     Shorter waves belong to [contact.asperities]; None if all waves do. `length` [m] is that of the
@@ -428,7 +428,7 @@ def shortest_wave(contact: Contact, length: float) -> float | None:
     return profile.ELEMENTS_PER_WAVE * length / DEFAULT_CELLS
 
 
-def _load_of_tilted_bars(load: float, moment: float, length: float) -> float:
+def _compute_tilted_bar_load(load: float, moment: float, length: float) -> float:
     """Return the load [N] of parallel bars that a moment [N m] tilts about their middle.
 
     Without rotation the bars carry `load` [N]; the middle keeps its depth. All bars carry up to a

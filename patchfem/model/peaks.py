@@ -9,7 +9,7 @@ from ..surface.files.read import read_profile
 from ..surface.roughness.peaks import Moments, TraceMoments, gaussian_peaks, trace_moments
 from .file_cache import cache_by_file
 
-TABLE = "contact.asperities."  # prefix of the keys in messages
+KEY_PREFIX = "contact.asperities."  # prefix of the keys in messages
 
 
 def complete_asperities(
@@ -42,13 +42,13 @@ def complete_asperities(
     if table.from_ is not None:
         key = "from"
         path = Path(resolve_path(table.from_))
-        moments = read_moments(path, cutoff).fine
+        moments = read_spectral_moments(path, cutoff).fine
         squares = {f"rms_{name}": value for name, value in moments._asdict().items()}
         table = table.model_copy(update={"from_": str(path), "cutoff": cutoff, **squares})
     try:
         peaks = gaussian_peaks(Moments(table.rms_height, table.rms_slope, table.rms_curvature))
     except PatchfemError as error:
-        raise PatchfemError(str(error), TABLE + key) from None
+        raise PatchfemError(str(error), KEY_PREFIX + key) from None
     changes = {
         "radius": peaks.radius,
         "density": peaks.density,
@@ -57,20 +57,20 @@ def complete_asperities(
     return table.model_copy(update=changes)
 
 
-def read_moments(path: Path, cutoff: float | None = None) -> TraceMoments:
+def read_spectral_moments(path: Path, cutoff: float | None = None) -> TraceMoments:
     """Read the spectral moments of the waves below a cut-off [m] of the trace in a file.
 
     PatchfemError names the key if the trace has no peaks of a surface.
     """
     try:
-        return _read_moments(path, cutoff)
+        return _compute_spectral_moments(path, cutoff)
     except PatchfemError as error:
-        remedy = f"; {TABLE}cutoff sets this cut-off" if "cut-off" in str(error) else ""
-        raise type(error)(f"{error}{remedy}", f"{TABLE}from") from None
+        remedy = f"; {KEY_PREFIX}cutoff sets this cut-off" if "cut-off" in str(error) else ""
+        raise type(error)(f"{error}{remedy}", f"{KEY_PREFIX}from") from None
 
 
 @cache_by_file
-def _read_moments(path: Path, cutoff: float | None) -> TraceMoments:
+def _compute_spectral_moments(path: Path, cutoff: float | None) -> TraceMoments:
     """Read the spectral moments of a trace; raise PatchfemError if no rough surface has them."""
     moments = trace_moments(read_profile(path), cutoff)
     gaussian_peaks(moments.fine)

@@ -10,7 +10,7 @@ from ..mesh.tensor import ROW_GROWTH, TensorGrid, graded_grid
 from .patch import PatchModel, PatchPiece
 
 # fraction of the length of the interface; mesh files contain coordinates of few digits
-MESH_FILE_TOL = 1e-6
+MESH_SIZE_TOL = 1e-6
 
 
 class RoundedEdges(NamedTuple):
@@ -25,7 +25,7 @@ class RoundedEdges(NamedTuple):
     distance: float | None = None
 
 
-def elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
+def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
     """Return the elastic layers of a piece; a bare piece has its substrate as coating."""
     coating, substrate = piece.face_material, piece.substrate
     return Layers(
@@ -33,7 +33,7 @@ def elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
     )
 
 
-def _even_grid(patch: PatchModel, piece: PatchPiece):
+def _make_flat_grid(patch: PatchModel, piece: PatchPiece):
     """Generate the grid of a piece with an even interface."""
     grid = graded_grid(patch.pieces.length, piece.height, patch.even_element_size, piece.thickness)
     return extend_grid(patch, piece, grid)
@@ -59,7 +59,7 @@ def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: 
     return shaped.shaped_grid(grid, piece.length, piece.end, growth)
 
 
-def rounded_edges(patch: PatchModel) -> RoundedEdges:
+def find_rounded_edges(patch: PatchModel) -> RoundedEdges:
     """Return where the flat part and the contact of rounded pieces end.
 
     The contact is that of a rounded punch on a half plane under the nominal load without tilt
@@ -80,7 +80,7 @@ def rounded_edges(patch: PatchModel) -> RoundedEdges:
     return RoundedEdges((-half_width, -flat, flat, half_width), half_width - flat)
 
 
-def piece_meshes(patch: PatchModel) -> tuple:
+def make_piece_meshes(patch: PatchModel) -> tuple:
     """Return the meshes of both pieces, generated or read from the mesh file of the scene.
 
     Returns
@@ -97,8 +97,8 @@ def piece_meshes(patch: PatchModel) -> tuple:
     """
     pieces = patch.pieces
     if patch.mesh.file is None:
-        lower = _even_grid(patch, pieces.lower)
-        return lower, None if pieces.are_alike else _even_grid(patch, pieces.upper)
+        lower = _make_flat_grid(patch, pieces.lower)
+        return lower, None if pieces.are_alike else _make_flat_grid(patch, pieces.upper)
 
     try:
         lower, upper = files.read_bodies(patch.mesh.file)
@@ -120,7 +120,7 @@ def _check_mesh_size(patch: PatchModel, side: str, body) -> None:
         ("height", body.height, piece.height),
         ("coating.thickness", body.coating_thickness, piece.thickness),
     ):
-        if abs(in_file - in_scene) > MESH_FILE_TOL * patch.pieces.length:
+        if abs(in_file - in_scene) > MESH_SIZE_TOL * patch.pieces.length:
             raise PatchfemError(
                 f"{in_scene:.9g} m in the scene, but {in_file:.9g} m in the {side} piece of the mesh",
                 f"contact.{key}",

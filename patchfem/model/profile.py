@@ -17,12 +17,12 @@ from .file_cache import cache_by_file
 
 CURVE_POINTS_PER_CELL = 16  # line segments per cell that represent a smooth profile
 # m; heights with a smaller standard deviation are round-off of a straight line
-MIN_HEIGHT_STD = 1e-10
+MIN_HEIGHT_DEVIATION = 1e-10
 STRAIGHT_TOL = 1e-5  # standard deviation over range of heights; a straighter profile is a line
 # height difference between the ends due to the removed slope over the range of heights; a note reports a larger one
 MAX_UNREPORTED_SLOPE = 1e-2
 SAMPLES_PER_CUTOFF = 16  # minimum number of samples per cut-off on which a trace is filtered
-EVEN_TOL = 1e-9  # spacings that differ by a smaller fraction of the interface are equal
+SPACING_TOL = 1e-9  # spacings that differ by a smaller fraction of the interface are equal
 CELL_TOL = 1e-2  # relative difference of the nodes' spacing from the averaging length
 
 
@@ -37,7 +37,7 @@ class _LevelledProfile(NamedTuple):
     is_straight: bool
 
 
-def profile_gap(
+def compute_profile_gap(
     path: Path,
     x,
     lengths: tuple,
@@ -98,7 +98,7 @@ def profile_gap(
         return heights - heights.min(), notes
     nodes = x
     curve = trace
-    if not _is_even(x, average):
+    if not _is_evenly_spaced(x, average):
         n_means = max(2, round(float(x[-1] - x[0]) / average) + 1)
         nodes = np.linspace(x[0], x[-1], n_means)
         curve = _smooth_profile(trace, nodes)
@@ -116,7 +116,7 @@ def read_trace(path: Path) -> Profile:
         raise type(error)(str(error), "contact.profile.file") from None
 
 
-def sample_spacing(path: Path) -> float:
+def find_sample_spacing(path: Path) -> float:
     """Return the median distance [m] between samples of the trace in a file."""
     return float(np.median(np.diff(read_trace(path).x)))
 
@@ -156,7 +156,7 @@ def _level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelle
     """
     length = float(x[-1] - x[0])
     nodes = np.linspace(x[0], x[-1], max(1, round(length / cell)) + 1)
-    raw = _read_clean(path, nodes, 2 * cell)
+    raw = _read_without_spikes(path, nodes, 2 * cell)
     if is_material:
         raw = replace(raw, z=frozen_array(-raw.z))
     trace = level(raw)
@@ -168,7 +168,7 @@ def _level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelle
             f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "
             "tilt, give [contact.tilt]",
         )
-    is_straight = np.std(trace.z) <= max(MIN_HEIGHT_STD, STRAIGHT_TOL * np.ptp(raw.z))
+    is_straight = np.std(trace.z) <= max(MIN_HEIGHT_DEVIATION, STRAIGHT_TOL * np.ptp(raw.z))
     n_before = int(trace.x[0] > x[0])
     n_after = int(trace.x[-1] < x[-1])
     places = np.concatenate([x[:n_before], trace.x, x[x.size - n_after :]])
@@ -177,9 +177,9 @@ def _level_profile(path: Path, x, cell: float, *, is_material: bool) -> _Levelle
     return _LevelledProfile(trace, notes, bool(is_straight))
 
 
-def _is_even(x, size: float) -> bool:
+def _is_evenly_spaced(x, size: float) -> bool:
     """Return whether the nodes x (m,) [m] are evenly spaced by a size [m]."""
-    is_uniform = np.ptp(np.diff(x)) <= EVEN_TOL * np.ptp(x)
+    is_uniform = np.ptp(np.diff(x)) <= SPACING_TOL * np.ptp(x)
     return is_uniform and abs(x[1] - x[0] - size) <= CELL_TOL * size
 
 
@@ -198,7 +198,7 @@ def _smooth_profile(trace: Profile, nodes) -> Profile:
     return replace(trace, x=frozen_array(x), z=frozen_array(_fit_spline(means)(x)), notes=())
 
 
-def _read_clean(path: Path, x, max_gap: float) -> Profile:
+def _read_without_spikes(path: Path, x, max_gap: float) -> Profile:
     """Read a trace over the nodes without spikes; a line may bridge a gap of `max_gap` [m]."""
     trace = read_trace(path)
     try:

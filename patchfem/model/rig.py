@@ -8,20 +8,25 @@ import numpy as np
 
 from ..core import InitialState, ModalBasis
 from ..effects import Waveform, find_waveform
-from ..structure.drive_sizes import cycles_per_level, decay_rate, drive_omega, peak_speed
+from ..structure.drive_sizes import (
+    count_cycles_per_level,
+    estimate_peak_speed,
+    find_decay_rate,
+    find_drive_omega,
+)
 from . import structure_reduced
 from .drive import build_signal, count_run_cycles, has_levels
-from .law import build_interface_laws, interface_names
+from .law import build_interface_laws, make_interface_names
 from .structure import (
     build_modes,
     build_own_modes,
     build_start,
-    file_notes,
-    first_elastic_mode,
-    has_patch_joint,
+    compute_natural_frequencies,
+    find_first_elastic_mode,
+    has_pressed_joint,
     has_varying_load,
-    natural_frequencies,
     needs_strip_displacements,
+    read_file_notes,
 )
 
 MAX_TRAVEL = 1e3  # m; a motion that grows without bound is not followed beyond this displacement
@@ -195,12 +200,12 @@ class Rig:
     @property
     def speed_scale(self) -> float:
         """Expected speed [m/s] by drive and start; the default of the rest speed (2.10) follows."""
-        return peak_speed(self.drive.signal, self.start)
+        return estimate_peak_speed(self.drive.signal, self.start)
 
     @property
     def displacement_scale(self) -> float:
         """Expected displacement [m] by drive and start: the speed over the omega of the drive."""
-        return self.speed_scale / drive_omega(self.drive.signal)
+        return self.speed_scale / find_drive_omega(self.drive.signal)
 
     def with_signal(self, signal, **changes) -> "Rig":
         """Return the rig under another drive signal; `changes` replace other fields of the drive."""
@@ -247,7 +252,7 @@ def _build(scene, own: ModalBasis, interfaces: tuple, joint: float | None = None
     modes = build_modes(scene, own)
     friction = RigFriction(
         interfaces=interfaces,
-        names=tuple(interface_names(scene.structure)),
+        names=tuple(make_interface_names(scene.structure)),
         load_varies=has_varying_load(scene),
         strips_slide_apart=needs_strip_displacements(scene),
     )
@@ -269,7 +274,9 @@ def _build_drive(scene, modes: ModalBasis) -> RigDrive:
     levels = DriveLevels()
     if has_levels(keys):
         amplitudes = tuple(segment.amplitude for segment in signal.segments)
-        levels = DriveLevels(amplitudes, cycles_per_level(keys), (keys.onset, keys.onset_length))
+        levels = DriveLevels(
+            amplitudes, count_cycles_per_level(keys), (keys.onset, keys.onset_length)
+        )
     return RigDrive(
         signal=signal,
         kind=keys.kind,
@@ -290,7 +297,7 @@ def _build_springs(structure, modes: ModalBasis) -> RigSprings:
     cubic = structure.stiffening.cubic if structure.stiffening is not None else None
     travel = structure.travel
     if not travel:
-        can_grow = decay_rate(modes) < 0 or (cubic or 0.0) < 0
+        can_grow = find_decay_rate(modes) < 0 or (cubic or 0.0) < 0
         travel = MAX_TRAVEL if can_grow else np.inf
     stiffness = bonded.stiffness if bonded is not None else None
     return RigSprings(stiffness, interlock, cubic, travel)
@@ -301,7 +308,7 @@ def _build_first_mode(scene, own: ModalBasis, modes: ModalBasis) -> FirstMode:
 
     `own` are the modes without the bonded spring, `modes` the coordinates of the rig.
     """
-    frequency, mass = first_elastic_mode(scene, own)
+    frequency, mass = find_first_elastic_mode(scene, own)
     slide = own.interfaces[0] if len(own.interfaces) else own.output
     elastic = np.flatnonzero(own.omega > 0)
     first = int(elastic[0]) if elastic.size else 0
@@ -322,12 +329,12 @@ def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStruct
     """Build the record of where the modes of a rig come from."""
     structure = scene.structure
     without_joint = None
-    if structure.measured == "stuck" and joint is None and has_patch_joint(scene):
+    if structure.measured == "stuck" and joint is None and has_pressed_joint(scene):
         without_joint = partial(build_rig, scene)
     return RigStructure(
-        frequencies=natural_frequencies(structure, modes),
+        frequencies=compute_natural_frequencies(structure, modes),
         lists_modes=bool(structure.mode),
-        notes=tuple(file_notes(scene)),
+        notes=tuple(read_file_notes(scene)),
         without_joint=without_joint,
         joint_stiffness=joint,
     )

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core import frozen_array
 from . import patch as patches
-from .law import complete_bond_length, load_of_scene
+from .law import complete_bond_length, find_normal_load
 from .load import build_point_load
 from .model import Model, write_resolved
 from .rig import build_rig
@@ -118,7 +118,9 @@ def replace_numbers(
         if "normal" in tables:
             changes["point"] = build_point_load(scene)
         if model.friction is not None and tables & {"friction", "normal", "contact"}:
-            law = changes["friction"] = complete_bond_length(scene.friction, load_of_scene(scene))
+            law = changes["friction"] = complete_bond_length(
+                scene.friction, find_normal_load(scene)
+            )
             rig = _replace_law(rig, law)
         if "drive" in tables:
             rig = _replace_drive(rig, scene.drive)

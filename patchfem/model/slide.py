@@ -17,14 +17,14 @@ from .file_cache import cache_by_file
 MIN_STEPS_PER_LEG = 8
 # steps per leg at rest; growth at rest (2.10) is exact in a step of any duration
 STEPS_PER_HOLD = 4
-REFERENCE_STEPS = 400  # steps per cycle that give an error of about REFERENCE_TOLERANCE
-REFERENCE_TOLERANCE = 1e-3  # relative error; it falls with the square of the time step
+REFERENCE_STEPS = 400  # steps per cycle that give an error of about REFERENCE_ERROR
+REFERENCE_ERROR = 1e-3  # relative error; it falls with the square of the time step
 STEPS_PER_BOND_LENGTH = 20  # steps while the slide covers the length of a bond
 MAX_BOND_LENGTHS = 1000  # bond lengths per cycle that are resolved by STEPS_PER_BOND_LENGTH
-MIN_STEPS = 100  # steps per cycle; they resolve the loop at any tolerance
-MAX_STEPS = 20_000  # steps per cycle; more would take too long
-MAX_SAMPLES = 20_000_000  # samples of a path; more take too much memory
-ROUND_OFF = 1e-12  # relative round-off of a number of steps that is exactly an integer
+MIN_STEPS_PER_CYCLE = 100  # steps per cycle; they resolve the loop at any tolerance
+MAX_STEPS_PER_CYCLE = 20_000  # steps per cycle; more would take too long
+MAX_PATH_SAMPLES = 20_000_000  # samples of a path; more take too much memory
+STEP_COUNT_TOL = 1e-12  # relative round-off of a number of steps that is exactly an integer
 
 
 class SlideSamples(NamedTuple):
@@ -72,7 +72,7 @@ class SlidePath:
             return 2 * np.pi * self.frequency * self.amplitude
         if self.kind == "file":
             time, rel_disp = self.corners
-            return float((_leg_lengths(rel_disp, self.across) / np.diff(time)).max())
+            return float((_compute_leg_lengths(rel_disp, self.across) / np.diff(time)).max())
         return self.speed
 
     @property
@@ -91,7 +91,7 @@ class SlidePath:
         Raises
         ------
         Missing
-            If the cycles take more than `MAX_SAMPLES` steps.
+            If the cycles take more than `MAX_PATH_SAMPLES` steps.
         """
         if self.kind == "constant":
             fraction = np.linspace(0, 1, steps + 1)
@@ -100,10 +100,10 @@ class SlidePath:
         if self.corners is not None:
             return _sample_legs(*self.corners, steps, self.across)
         n_steps = max(1, round(self.cycles * steps))
-        if n_steps > MAX_SAMPLES:
+        if n_steps > MAX_PATH_SAMPLES:
             raise Missing(
                 f"slide.cycles = {self.cycles:g} needs {n_steps:.3g} steps, but at most "
-                f"{MAX_SAMPLES:.0e} are possible; lower slide.cycles or accuracy.steps_per_cycle",
+                f"{MAX_PATH_SAMPLES:.0e} are possible; lower slide.cycles or accuracy.steps_per_cycle",
                 "",
             )
         index = np.arange(n_steps + 1)
@@ -154,16 +154,16 @@ class SlidePath:
             min_steps = MIN_STEPS_PER_LEG * (legs[0].size - 1)
         if pinned is not None:
             return 4 * ceil(max(pinned, min_steps) / 4)
-        per_cycle = REFERENCE_STEPS * sqrt(REFERENCE_TOLERANCE / tolerance)
+        per_cycle = REFERENCE_STEPS * sqrt(REFERENCE_ERROR / tolerance)
         cycles = 1.0
         if legs is not None:
-            path = float(_leg_lengths(legs[1], self.across).sum())
+            path = float(_compute_leg_lengths(legs[1], self.across).sum())
             stroke = 2 * self.amplitude if self.kind == "file" else float(np.ptp(legs[1]))
             cycles = max(1.0, path / (2 * stroke))
             if length:
                 bond_lengths = min(path / cycles / length, MAX_BOND_LENGTHS)
                 per_cycle = max(per_cycle, STEPS_PER_BOND_LENGTH * bond_lengths)
-        per_cycle = min(max(per_cycle, MIN_STEPS), MAX_STEPS)
+        per_cycle = min(max(per_cycle, MIN_STEPS_PER_CYCLE), MAX_STEPS_PER_CYCLE)
         return 4 * ceil(max(cycles * per_cycle, min_steps) / 4)
 
     def _legs(self) -> tuple:
@@ -197,7 +197,7 @@ def build_slide(scene) -> SlidePath:
             if reason:
                 raise PatchfemError(f"{scene.where('slide.file')}: {reason}")
     elif keys.kind == "dwell":
-        corners = _dwell_corners(keys)
+        corners = _list_dwell_corners(keys)
     run_in = (keys.distance or 0.0) if keys.kind == "triangle" else 0.0
     return SlidePath(
         kind=keys.kind,
@@ -211,7 +211,7 @@ def build_slide(scene) -> SlidePath:
     )
 
 
-def _dwell_corners(keys) -> tuple:
+def _list_dwell_corners(keys) -> tuple:
     """Return time [s] and relative displacement [m] at corners of a dwell, without empty legs."""
     length = np.array([keys.distance, 0.0, keys.distance_after or 0.0])
     duration = np.array([keys.distance / keys.speed, keys.hold, length[2] / keys.speed])
@@ -220,7 +220,7 @@ def _dwell_corners(keys) -> tuple:
     return time, np.append(0.0, np.cumsum(length[is_leg]))
 
 
-def _leg_lengths(rel_disp, across=None) -> np.ndarray:
+def _compute_leg_lengths(rel_disp, across=None) -> np.ndarray:
     """Compute the lengths [m] of the straight legs between corners, in one or two directions."""
     if across is None:
         return np.abs(np.diff(rel_disp))
@@ -244,9 +244,9 @@ def _sample_legs(time, rel_disp, steps: int, across=None) -> SlideSamples:
     Half of the steps are spread by length, half evenly over the legs that move. A leg at rest gets
     `STEPS_PER_HOLD` steps.
     """
-    length = _leg_lengths(rel_disp, across)
+    length = _compute_leg_lengths(rel_disp, across)
     fraction = length / length.sum() / 2 + 1 / (2 * np.count_nonzero(length))
-    moving_steps = np.maximum(1, np.ceil(steps * fraction * (1 - ROUND_OFF)))
+    moving_steps = np.maximum(1, np.ceil(steps * fraction * (1 - STEP_COUNT_TOL)))
     leg_steps = np.where(length > 0, moving_steps, STEPS_PER_HOLD).astype(int)
     corner_index = np.concatenate([[0], np.cumsum(leg_steps)])
     index = np.arange(corner_index[-1] + 1)

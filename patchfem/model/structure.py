@@ -16,7 +16,7 @@ from ..scene.keys.memoize import memoize
 from ..structure import masses, starts
 from ..structure import modes as listed_modes
 from . import structure_files, structure_reduced
-from .law import InterfaceLaw, build_interface_laws, load_of_scene
+from .law import InterfaceLaw, build_interface_laws, find_normal_load
 
 # fraction of the squared motion of the output; a mode with less moves the output by round-off only
 MIN_MODE_FRACTION = 1e-12
@@ -75,10 +75,10 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
         were measured with a pressed patch are not changed until its stiffness is given.
     """
     modes = _build_given_modes(scene)
-    if scene.structure.measured == "free" or (joint is None and has_patch_joint(scene)):
+    if scene.structure.measured == "free" or (joint is None and has_pressed_joint(scene)):
         return modes
     bonded = scene.structure.bonded
-    stiffness = np.array(_joint_stiffnesses(scene) if joint is None else [joint])
+    stiffness = np.array(_compute_joint_stiffnesses(scene) if joint is None else [joint])
     damping = 0.0
     if bonded is not None:
         damping = bonded.damping
@@ -93,7 +93,7 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
         ) from None
 
 
-def has_patch_joint(scene) -> bool:
+def has_pressed_joint(scene) -> bool:
     """Return whether the joint stiffness depends on a pressed patch and not on the law alone."""
     contact = scene.contact
     if scene.friction is None or contact is None:
@@ -101,20 +101,20 @@ def has_patch_joint(scene) -> bool:
     return bool(contact.compliance_key or contact.load is None)
 
 
-def _joint_stiffnesses(scene) -> list:
+def _compute_joint_stiffnesses(scene) -> list:
     """Compute the stiffness [N/m] of each sticking interface from its law."""
-    scene_load = load_of_scene(scene)
+    scene_load = find_normal_load(scene)
     stiffnesses = []
     for interface in build_interface_laws(scene):
         load = scene_load if interface.load is None else interface.load
         try:
-            stiffnesses.append(sticking_stiffness(interface, load))
+            stiffnesses.append(compute_sticking_stiffness(interface, load))
         except PatchfemError as error:
             raise PatchfemError(f"{scene.where('structure.measured')}: {error}") from None
     return stiffnesses
 
 
-def sticking_stiffness(interface: InterfaceLaw, load: float) -> float:
+def compute_sticking_stiffness(interface: InterfaceLaw, load: float) -> float:
     """Compute the tangential stiffness [N/m] of a sticking interface under a load [N].
 
     Raises
@@ -151,16 +151,16 @@ def _build_given_modes(scene) -> ModalBasis:
         return structure_reduced.build_reduced_modes(scene).modes
     if not structure.masses:
         return structure_files.read_scene_modes(scene).modes
-    pairs, laterals = structure_reduced.slide_pairs(structure)
+    pairs, laterals = structure_reduced.list_slide_pairs(structure)
     modes = masses.build_basis(
         structure.masses,
         [(spring.between, spring.stiffness) for spring in structure.spring],
         [(damper.between, damper.coefficient) for damper in structure.damper],
         pairs,
         structure.output_mass or 1,
-        _driven_mass(scene) if is_forced else None,
+        _find_driven_mass(scene) if is_forced else None,
     )
-    return masses.set_lateral_faces(modes, laterals)
+    return masses.set_lateral_displacements(modes, laterals)
 
 
 @memoize
@@ -182,17 +182,17 @@ def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
     n_strips = scene.contact.strips.count
     width = scene.contact.width
     offsets = (np.arange(n_strips) + 0.5) * (width / n_strips) - width / 2
-    return replace(modes, faces=frozen_array(strip_slides(modes, offsets)))
+    return replace(modes, faces=frozen_array(compute_strip_slides(modes, offsets)))
 
 
-def file_notes(scene) -> list:
+def read_file_notes(scene) -> list:
     """Return the sentences for the user on what was neglected or changed in structure.file."""
     if scene.structure.file is None:
         return []
     return structure_files.read_scene_modes(scene).notes
 
 
-def _driven_mass(scene) -> int:
+def _find_driven_mass(scene) -> int:
     """Return the number, from 1, of the mass that a force drives or that is released."""
     return scene.drive.mass or scene.structure.output_mass or 1
 
@@ -205,7 +205,7 @@ def build_start(scene, modes: ModalBasis) -> InitialState | None:
     PatchfemError
         If the motion starts beyond structure.travel.
     """
-    start = initial_state(scene, modes)
+    start = compute_initial_state(scene, modes)
     travel = scene.structure.travel
     if travel is not None and abs(float(modes.output @ start.z)) > travel:
         raise PatchfemError(
@@ -215,7 +215,7 @@ def build_start(scene, modes: ModalBasis) -> InitialState | None:
     return start if start.z.any() or start.v.any() else None
 
 
-def initial_state(scene, modes: ModalBasis) -> InitialState:
+def compute_initial_state(scene, modes: ModalBasis) -> InitialState:
     """Compute displacements and velocities at t = 0 in the coordinates of a rig.
 
     [structure.start] gives them for each mode or mass. A release displaces one mass, or the output in
@@ -228,24 +228,24 @@ def initial_state(scene, modes: ModalBasis) -> InitialState:
         displacement = _extend_boundary_values(structure, modes, structure.start.displacement)
         velocity = _extend_boundary_values(structure, modes, structure.start.velocity)
         try:
-            return starts.from_values(modes, displacement, velocity)
+            return starts.start_from_values(modes, displacement, velocity)
         except PatchfemError as error:
             text = str(error).removeprefix("structure.start: ")
             raise PatchfemError(f"{scene.where('structure.start')}: {text}") from None
     if drive.kind == "free":
         if structure.masses is None and drive.mass is None:
-            return starts.from_output_displacement(modes, drive.displacement)
+            return starts.start_from_output_displacement(modes, drive.displacement)
         displacement = np.zeros(len(modes.names))
-        mass = _driven_mass(scene)
+        mass = _find_driven_mass(scene)
         if mass > displacement.size:
             raise PatchfemError(
                 f"{scene.where('drive.mass')}: the rig has only {displacement.size} coordinates"
             )
         displacement[mass - 1] = drive.displacement
-        return starts.from_values(modes, displacement)
+        return starts.start_from_values(modes, displacement)
     if drive.kind == "base" and find_waveform(drive).is_step and drive.displacement is not None:
-        return starts.from_base_step(modes, drive.displacement)
-    return starts.at_rest(modes)
+        return starts.start_from_base_step(modes, drive.displacement)
+    return starts.start_at_rest(modes)
 
 
 def _extend_boundary_values(structure, modes: ModalBasis, values):
@@ -255,7 +255,7 @@ def _extend_boundary_values(structure, modes: ModalBasis, values):
     return np.append(np.asarray(values, float), np.zeros(len(modes.names) - len(values)))
 
 
-def named_motions(modes: ModalBasis, modal) -> np.ndarray:
+def compute_named_motions(modes: ModalBasis, modal) -> np.ndarray:
     """Return the motions (k, p) [m] of the modes or masses that the scene names.
 
     `modal` (k, n) [m] are coordinates of `modes`.
@@ -263,7 +263,7 @@ def named_motions(modes: ModalBasis, modal) -> np.ndarray:
     return modal if modes.shapes is None else modal @ modes.shapes.T
 
 
-def natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
+def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
     """Return the natural frequencies (n,) [Hz] with the bonded spring, 0 for rigid modes."""
     if structure.mode and structure.bonded is None and structure.measured == "free":
         # frequencies that the scene states are returned without round-off of the modes
@@ -271,7 +271,7 @@ def natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
     return modes.omega / (2 * pi)
 
 
-def first_elastic_mode(scene, own: ModalBasis) -> tuple:
+def find_first_elastic_mode(scene, own: ModalBasis) -> tuple:
     """Return the frequency [Hz] and the mass [kg] of the first mode that is not rigid.
 
     The mass is structure.moving_mass, or else the modal mass at the output. If the mode does not move
@@ -306,7 +306,7 @@ def needs_strip_displacements(scene) -> bool:
     return any(mode.yaw for mode in scene.structure.mode)
 
 
-def strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
+def compute_strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
     """Compute the relative displacement of strips per modal coordinate: slide - y yaw.
 
     A positive yaw turns +x towards +y, so that a piece at +y moves backwards. The friction forces f of

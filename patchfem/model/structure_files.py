@@ -7,8 +7,8 @@ from ..core import ModalBasis, PatchfemError
 from ..structure import arrays, places, universal
 from .file_cache import cache_by_file
 
-PLACE_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
-UNIVERSAL_SUFFIXES = (".uff", ".unv")  # file endings of universal files
+LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
+UNIVERSAL_EXTENSIONS = (".uff", ".unv")  # file endings of universal files
 
 
 class FileModes(NamedTuple):
@@ -64,20 +64,20 @@ def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileMo
 def read_content(path: Path):
     """Read a file without building modes: arrays by name, or the shapes of a universal file."""
     try:
-        return _read(path)
+        return _read_file(path)
     except PatchfemError as error:
         raise type(error)(str(error).removeprefix("structure.file: "), "structure.file") from None
 
 
-def is_universal(path: Path) -> bool:
+def is_universal_file(path: Path) -> bool:
     """Return whether a file is a universal file by its ending."""
-    return path.suffix.lower() in UNIVERSAL_SUFFIXES
+    return path.suffix.lower() in UNIVERSAL_EXTENSIONS
 
 
 @cache_by_file
-def _read(path: Path):
+def _read_file(path: Path):
     """Read a universal file or a file of arrays."""
-    return universal.read(path) if is_universal(path) else arrays.read(path)
+    return universal.read_universal(path) if is_universal_file(path) else arrays.read_arrays(path)
 
 
 @cache_by_file
@@ -85,21 +85,21 @@ def _build_modes(
     path: Path, structure, drive_kind: str, mass: int | None, needs_interface: bool
 ) -> FileModes:
     """Build the modes of a file."""
-    content = _read(path)
+    content = _read_file(path)
     is_forced = drive_kind == "force"
-    if not is_universal(path):
-        return _modes_of_arrays(content, structure, is_forced, mass, needs_interface)
+    if not is_universal_file(path):
+        return _build_modes_from_arrays(content, structure, is_forced, mass, needs_interface)
     if mass is not None:
         raise PatchfemError(
             "drive.mass: a universal file has no numbered masses; use structure.force_at or output_at"
         )
-    place_texts = {key: getattr(structure, key) for key in PLACE_KEYS}
+    place_texts = {key: getattr(structure, key) for key in LOCATION_KEYS}
     modes = places.build_basis(content, structure.moving_mass, place_texts, is_forced=is_forced)
-    notes = [] if is_forced else places.participation_note(modes)
+    notes = [] if is_forced else places.note_missing_mass(modes)
     return FileModes(modes, [*content.notes, *notes])
 
 
-def _modes_of_arrays(
+def _build_modes_from_arrays(
     content: dict, structure, is_forced: bool, mass: int | None, needs_interface: bool
 ) -> FileModes:
     """Build the modes of matrices or modal data."""

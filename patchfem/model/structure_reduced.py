@@ -11,11 +11,11 @@ from ..core import ModalBasis, PatchfemError
 from ..formatting import format_number
 from ..inputs import matrices
 from ..structure import masses, reduced
-from ..structure.places import AXES
+from ..structure.places import DIRECTION_NAMES
 
 # relative uncertainty of a frequency; a smaller one is not reported
 MIN_REPORTED_UNCERTAINTY = 1e-5
-MATRICES = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
+MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
 NODE_PATTERN = re.compile(r"(\d+)(?::(r?[xyz]))?")  # "1201:x" or "1201"
 RANGE_PATTERN = re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")  # "a..b" or "a..b:n"
 
@@ -69,7 +69,7 @@ def build_reduced_modes(scene) -> ReducedModes:
             table.unit,
             is_base_driven,
         )
-        pairs, laterals = slide_pairs(structure)
+        pairs, laterals = list_slide_pairs(structure)
         pushed = None if is_base_driven else scene.drive.mass or output
         ratio = 0.0
         if table.damping is not None and not isinstance(table.damping, str):
@@ -78,7 +78,7 @@ def build_reduced_modes(scene) -> ReducedModes:
 
         def build(count: int) -> ModalBasis:
             modes = reduced.build_basis(reduction, count, pairs, output, pushed, ratio, names)
-            return masses.set_lateral_faces(modes, laterals)
+            return masses.set_lateral_displacements(modes, laterals)
 
         modes = build(table.modes)
         n_computed = reduction.modes.omega.size
@@ -93,7 +93,7 @@ def build_reduced_modes(scene) -> ReducedModes:
     return ReducedModes(modes, None if keeps_all else richer_modes, notes, n_computed)
 
 
-def slide_pairs(structure) -> tuple:
+def list_slide_pairs(structure) -> tuple:
     """List the pairs of coordinates between which the interfaces slide.
 
     Returns
@@ -132,7 +132,7 @@ def _describe_reduction(reduction, modes: ModalBasis, table) -> str:
 def _find_files(table, locate) -> tuple:
     """Return the matrix files of [structure.reduced]; `locate` turns a name into a path."""
     files = []
-    for key in MATRICES:
+    for key in MATRIX_KEYS:
         name = getattr(table, key)
         if isinstance(name, str):
             files.append(_find_file(key, locate(name)))
@@ -154,7 +154,7 @@ def _find_file(key: str, path: Path) -> _MatrixFile:
 def _read_matrix(file: _MatrixFile) -> matrices.Matrix:
     """Read a matrix file; an unchanged file is read once."""
     try:
-        return matrices.read(file.path, file.key)
+        return matrices.read_matrix(file.path, file.key)
     except PatchfemError as error:
         raise PatchfemError(str(error), f"structure.reduced.{file.key}") from None
 
@@ -199,7 +199,7 @@ def _note_rounding(files: tuple, aligned: list, stiffness, unit: float, shape) -
         rounding = matrices.estimate_rounding(matrix.values)
         if rounding is None or not square:
             continue
-        deviation = matrices.quadratic_form_deviation(matrix.values, rounding.deviation, shape)
+        deviation = matrices.compute_form_deviation(matrix.values, rounding.deviation, shape)
         uncertainty = deviation / unit / scale
         if uncertainty > MIN_REPORTED_UNCERTAINTY:
             notes.append(
@@ -290,15 +290,15 @@ def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
         return np.array([name - 1])
     row_range = RANGE_PATTERN.fullmatch(name)
     if key == "moved" and row_range:
-        return _rows_in_range(row_range, n, where)
+        return _list_rows_in_range(row_range, n, where)
     if matrix.places is None:
         raise PatchfemError(
             f"'{name}' names a node, but the files name no nodes; give row numbers of the matrices, "
             "which start at 1",
             where,
         )
-    if key == "moved" and name in AXES:
-        return np.flatnonzero(matrix.places[:, 1] == AXES.index(name) + 1)
+    if key == "moved" and name in DIRECTION_NAMES:
+        return np.flatnonzero(matrix.places[:, 1] == DIRECTION_NAMES.index(name) + 1)
     match = NODE_PATTERN.fullmatch(name)
     if match is None:
         raise PatchfemError(
@@ -306,14 +306,14 @@ def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
             where,
         )
     node = int(match[1])
-    direction = AXES.index(match[2]) + 1 if match[2] else 0
+    direction = DIRECTION_NAMES.index(match[2]) + 1 if match[2] else 0
     rows = np.flatnonzero((matrix.places == (node, direction)).all(axis=1))
     if not rows.size:
-        raise PatchfemError(f"the files have no {name}; {_list_places(matrix, node)}", where)
+        raise PatchfemError(f"the files have no {name}; {_list_directions(matrix, node)}", where)
     return rows
 
 
-def _rows_in_range(row_range: re.Match, n: int, where: str) -> np.ndarray:
+def _list_rows_in_range(row_range: re.Match, n: int, where: str) -> np.ndarray:
     """Return the row indices, counted from 0, of a range "a..b" or "a..b:n" of row numbers."""
     first = int(row_range[1])
     last = int(row_range[2])
@@ -328,10 +328,12 @@ def _rows_in_range(row_range: re.Match, n: int, where: str) -> np.ndarray:
     return np.arange(first - 1, last, max(int(step), 1))
 
 
-def _list_places(matrix: matrices.Matrix, node: int) -> str:
+def _list_directions(matrix: matrices.Matrix, node: int) -> str:
     """List the directions of a node, or the nodes of the files if they have no such node."""
     directions = matrix.places[matrix.places[:, 0] == node, 1]
     if not directions.size:
         return f"their nodes are {matrix.places[0, 0]} to {matrix.places[-1, 0]}"
-    names = [AXES[direction - 1] if direction else "no direction" for direction in directions]
+    names = [
+        DIRECTION_NAMES[direction - 1] if direction else "no direction" for direction in directions
+    ]
     return f"node {node} has {', '.join(names)}"

@@ -70,7 +70,7 @@ class WearModel:
         return np.zeros(np.shape(area)) if self.start is None else self.start.depth_at(x)
 
 
-def build_wear(scene: Scene) -> WearModel | None:
+def build_wear_model(scene: Scene) -> WearModel | None:
     """Build the wear of a scene, None without [wear]."""
     wear = scene.wear
     if wear is None:

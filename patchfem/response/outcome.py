@@ -82,7 +82,7 @@ def judge_outcome(
         return Outcome.DONE if stationary.is_steady(
             raw.window, drive
         ) else Outcome.TRANSIENT, measures
-    if not drive.segments and drive_sizes.repeat_cycles(drive) is None:
+    if not drive.segments and drive_sizes.count_repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, measures
     # several tones, of which each window contains whole beats
     if not drive.segments and not drive_sizes.is_periodic(drive):
@@ -90,16 +90,16 @@ def judge_outcome(
             raw.amplitudes,
             tolerance,
             AMPLITUDE_ROUND_OFF
-            * drive_sizes.max_acceleration(drive)
-            / drive_sizes.drive_omega(drive) ** 2,
+            * drive_sizes.find_max_acceleration(drive)
+            / drive_sizes.find_drive_omega(drive) ** 2,
         )
         return found, remove_errors(measures) if found is Outcome.GROWS else measures
     amplitudes, extremes = raw.amplitudes, raw.extremes
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
     floor = (
         AMPLITUDE_ROUND_OFF
-        * drive_sizes.max_acceleration(drive)
-        / drive_sizes.drive_omega(drive) ** 2
+        * drive_sizes.find_max_acceleration(drive)
+        / drive_sizes.find_drive_omega(drive) ** 2
     )
     if level_cycles:
         amplitudes = amplitudes[-max(1, int(level_cycles / window)) :]
@@ -420,7 +420,7 @@ def changing_note(outcome: Outcome, drive) -> list:
     if (
         outcome is not Outcome.TRANSIENT
         or drive.segments
-        or drive_sizes.repeat_cycles(drive) is not None
+        or drive_sizes.count_repeat_cycles(drive) is not None
     ):
         return []
     return [

@@ -176,7 +176,7 @@ class LastCycles:
         if self.own.acceleration_harmonics is None:
             return wave_measures(*odd_harmonics(self.window, self.drive))
         return wave_measures(
-            *self.own.acceleration_harmonics, drive_sizes.max_acceleration(self.drive)
+            *self.own.acceleration_harmonics, drive_sizes.find_max_acceleration(self.drive)
         )
 
     @cached_property

@@ -12,7 +12,7 @@ from ..effects import law_has_trait
 from ..friction import record
 from ..model.model import Model
 from ..model.source import locate_errors
-from ..model.structure import sticking_stiffness
+from ..model.structure import compute_sticking_stiffness
 from .patch import result as patch_result
 from .patch.jenkins_elements import elements, strip_elements
 
@@ -45,7 +45,7 @@ def patch_stiffness(model: Model, patch) -> float:
     f, load = model.friction, patch.pressure.load
     held = record.stick_stiffness(f, load)
     if not model.partial_slip or (np.isfinite(held) and not law_has_trait(f.law, "set-valued")):
-        held = sticking_stiffness(model.rig.friction.interfaces[0], load)
+        held = compute_sticking_stiffness(model.rig.friction.interfaces[0], load)
     if not model.partial_slip:
         return held
     length = f.static * load / held  # 0 for a law that is rigid in stick

@@ -200,7 +200,7 @@ def _more_cycles(model: Model) -> dict:
     rig, tolerance = model.rig, model.accuracy.tolerance
     if not rig.drive.waveform.is_sine or not drive_sizes.is_sinusoidal(rig.drive.signal):
         return {}
-    decay = drive_sizes.min_decay_rate(rig.modes) * rig.drive.signal.period
+    decay = drive_sizes.find_min_decay_rate(rig.modes) * rig.drive.signal.period
     if decay <= 0 or exp(-decay * rig.drive.cycles) <= tolerance:
         return {}
     cycles = ceil(log(1 / tolerance) / decay)

@@ -40,14 +40,14 @@ ARRAY_NAMES = (  # arrays that are read from a file
 MAX_NAME_BYTES = 1024  # bytes of a name; a longer one is not a name
 MAX_NUMBER_BYTES = 16  # bytes of a number, which is at most complex of double precision
 MAX_DIRECTORY_BYTES = 2**20  # bytes of the list of members of a zip file; a longer one is damaged
-ZIP_END = b"PK\x05\x06"  # signature of the end of the list of members of a zip file
+ZIP_END_SIGNATURE = b"PK\x05\x06"  # signature of the end of the list of members of a zip file
 MAX_ZIP_END_BYTES = 2**16 + 22  # bytes after the list of members: a record and a comment
 # fraction of the largest entry; a more negative eigenvalue is not round-off of a singular D
-MIN_DAMPING = -1e-9
+MIN_DAMPING_EIGENVALUE = -1e-9
 MAX_MASS_FRACTION = 1 + 1e-9  # sum of base^2: at most 1, plus round-off of the shapes
 
 
-def read(path: Path) -> dict:
+def read_arrays(path: Path) -> dict:
     """Read the known arrays of a .npz or .mat file by name.
 
     Raises
@@ -99,7 +99,7 @@ def _refuse_long_directory(path: Path) -> None:
         size = file.seek(0, 2)
         file.seek(max(0, size - MAX_ZIP_END_BYTES))
         tail = file.read()
-    end = tail.rfind(ZIP_END)
+    end = tail.rfind(ZIP_END_SIGNATURE)
     size = int.from_bytes(tail[end + 12 : end + 16], "little") if end >= 0 else 0
     if size > MAX_DIRECTORY_BYTES:
         raise PatchfemError(
@@ -134,7 +134,7 @@ def build_basis(
     Parameters
     ----------
     data : dict
-        Arrays by name, from `read`.
+        Arrays by name, from `read_arrays`.
     pairs : sequence of (i, j)
         Interfaces between coordinates of the matrices, from 1 on and 0 for the base, in place of
         `slide`.
@@ -156,8 +156,8 @@ def build_basis(
     """
     try:
         if "M" in data or "K" in data:
-            return _basis_of_matrices(data, pairs, pushed, is_forced)
-        return _basis_of_modes(data, pairs, pushed, is_forced, mass)
+            return _build_basis_from_matrices(data, pairs, pushed, is_forced)
+        return _build_basis_from_modes(data, pairs, pushed, is_forced, mass)
     except PatchfemError as error:
         message = str(error).removeprefix("structure: ")
         raise PatchfemError(f"structure.file: {message}") from None
@@ -169,12 +169,14 @@ def _refuse_missing(data: dict, what: str) -> None:
     raise PatchfemError(f"lacks {what}; the file contains {names}")
 
 
-def _basis_of_matrices(data: dict, pairs, pushed: int | None, is_forced: bool) -> ModalBasis:
+def _build_basis_from_matrices(
+    data: dict, pairs, pushed: int | None, is_forced: bool
+) -> ModalBasis:
     """Build the modal basis of matrices."""
     for name in ("M", "K"):
         if name not in data:
             _refuse_missing(data, f"the matrix {name}")
-    M, K, C = (_as_matrix(data.get(name), name) for name in ("M", "K", "C"))
+    M, K, C = (_to_matrix(data.get(name), name) for name in ("M", "K", "C"))
     n = len(M)
     if n == 0:
         raise PatchfemError(
@@ -190,9 +192,9 @@ def _basis_of_matrices(data: dict, pairs, pushed: int | None, is_forced: bool) -
     missing = [coordinate for coordinate in named if coordinate > n]
     if missing:
         raise PatchfemError(f"there is no coordinate {missing[0]}: M has {n}, numbered from 1")
-    faces = masses.slide_rows(pairs, n) if pairs else data.get("slide")
+    faces = masses.make_slide_rows(pairs, n) if pairs else data.get("slide")
     if faces is not None:
-        faces = matrices.as_real(faces, "slide")
+        faces = matrices.to_real(faces, "slide")
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
     output = data.get("output")
     if output is None:
@@ -219,7 +221,7 @@ def _basis_of_matrices(data: dict, pairs, pushed: int | None, is_forced: bool) -
     )
 
 
-def _as_matrix(values, name: str):
+def _to_matrix(values, name: str):
     """Return a matrix; a single number is a matrix of one row. None stays None."""
     if values is None or np.ndim(values) == 2:
         return values
@@ -228,7 +230,7 @@ def _as_matrix(values, name: str):
     return np.reshape(values, (1, 1))
 
 
-def _basis_of_modes(
+def _build_basis_from_modes(
     data: dict, pairs, pushed: int | None, is_forced: bool, mass: float | None
 ) -> ModalBasis:
     """Build the modal basis of modal data."""
@@ -298,7 +300,7 @@ def _read_damping(data: dict, omega) -> tuple:
             raise PatchfemError(f"damping must be >= 0, not {damping.min():g}")
         return frozen_array(damping), None
     lowest = np.linalg.eigvalsh(damping + damping.T).min()
-    if lowest < MIN_DAMPING * np.abs(damping).max():
+    if lowest < MIN_DAMPING_EIGENVALUE * np.abs(damping).max():
         raise PatchfemError(
             "the damping matrix adds energy; a positive semidefinite matrix D [1/s] is needed"
         )
@@ -316,7 +318,7 @@ def _read_numbers(data: dict, name: str, *shapes) -> np.ndarray:
         Shapes that are allowed, beginning with (n,); None stands for any length. Without a shape the
         array is flattened.
     """
-    values = matrices.as_real(data[name], name)
+    values = matrices.to_real(data[name], name)
     if values.dtype.kind not in "iufb":
         raise PatchfemError(f"{name} does not contain real numbers")
     values = values.astype(float)

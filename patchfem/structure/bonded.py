@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError, frozen_array
-from .matrices import decouple, split_damping, trim_round_off
+from .matrices import decouple_modes, split_damping, trim_round_off
 
-MIN_STIFFNESS = 1e-12  # fraction of the largest omega^2; a mode with a smaller omega^2 is rigid
-ROWS = (
+# fraction of the largest omega^2; a mode with a smaller omega^2 is rigid
+MIN_ELASTIC_FRACTION = 1e-12
+PARTICIPATION_FIELDS = (
     "slide",
     "base",
     "output",
@@ -40,7 +41,7 @@ def add_spring(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> Mod
     """
     slide = basis.interfaces[0]
     spring_row = np.sqrt(stiffness / basis.mass) * slide
-    omega, shapes = decouple(np.vstack([np.diag(basis.omega), spring_row]))
+    omega, shapes = decouple_modes(np.vstack([np.diag(basis.omega), spring_row]))
     return _change_coordinates(basis, omega, shapes, damping / basis.mass * np.outer(slide, slide))
 
 
@@ -70,7 +71,7 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
     mass = basis.mass
     joint = slides.T * np.asarray(stiffness, float) @ slides / mass
     squares, shapes = np.linalg.eigh(np.diag(basis.omega**2) - joint)
-    min_square = MIN_STIFFNESS * float(np.max(basis.omega**2 + np.diag(joint), initial=0.0))
+    min_square = MIN_ELASTIC_FRACTION * float(np.max(basis.omega**2 + np.diag(joint), initial=0.0))
     if squares[0] < -min_square:
         measured = float(shapes[:, 0] ** 2 @ basis.omega**2)
         ratio = 1 - squares[0] / measured if measured else np.inf
@@ -83,7 +84,7 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
     damper = -damping / mass * np.outer(slides[0], slides[0])
     if damping:
         decay_rates = np.linalg.eigvalsh(basis.damping_matrix + damper)
-        if decay_rates[0] < -(min_square**0.5) * MIN_STIFFNESS:
+        if decay_rates[0] < -(min_square**0.5) * MIN_ELASTIC_FRACTION:
             raise PatchfemError(
                 "structure.bonded.damping is larger than the damping of the modes, of which it should be a "
                 "part; lower structure.bonded.damping"
@@ -113,7 +114,7 @@ def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
     scale = size.T @ (np.abs(basis.damping_matrix) + np.abs(damper)) @ size
     zeta, damping = split_damping(trim_round_off(D, scale), omega)
     rows = {}
-    for key in (*ROWS, "faces"):
+    for key in (*PARTICIPATION_FIELDS, "faces"):
         row = getattr(basis, key)
         if row is not None:
             rows[key] = frozen_array(row @ shapes)

@@ -9,8 +9,8 @@ from ..core import InitialState, ModalBasis, SineDrive
 
 SAMPLES_PER_CYCLE = 200  # equally spaced samples of a whole release; they resolve 100 harmonics
 MIN_SAMPLES_PER_CYCLE = 20  # with fewer samples only the reversals are stored
-MAX_SAMPLES = 20_000  # samples of a whole run; more make results files large
-ROUND_OFF_TIME = 1e-6  # fraction of a period; round-off of times after many cycles
+MAX_STORED_SAMPLES = 20_000  # samples of a whole run; more make results files large
+TIME_TOL = 1e-6  # fraction of a period; round-off of times after many cycles
 
 
 class DriveKeys(NamedTuple):
@@ -51,19 +51,19 @@ class DriveKeys(NamedTuple):
         return self.keys.displacement * omega**2
 
 
-def cycles_per_level(keys) -> float:
+def count_cycles_per_level(keys) -> float:
     """Return the drive cycles per level, an integer, so each level begins at a cycle start."""
     cycles = keys.cycles if keys.cycles is not None else keys.duration * keys.frequency
     return float(max(1, round(cycles)))
 
 
-def first_period(modes: ModalBasis) -> float:
+def find_first_period(modes: ModalBasis) -> float:
     """Return the period [s] of the first elastic mode, 1 s if all modes are rigid."""
     elastic = modes.omega[modes.omega > 0]
     return float(2 * np.pi / elastic[0]) if elastic.size else 1.0
 
 
-def min_decay_rate(modes: ModalBasis) -> float:
+def find_min_decay_rate(modes: ModalBasis) -> float:
     """Return the lowest decay rate [1/s] of a damped coordinate, 0 if none is damped.
 
     The rate is half the diagonal entry of the damping matrix. Modes with several sets of values (...,
@@ -74,13 +74,13 @@ def min_decay_rate(modes: ModalBasis) -> float:
     return np.where(np.isfinite(lowest), lowest, 0.0)[()]
 
 
-def decay_rate(modes: ModalBasis) -> float:
-    """Return `min_decay_rate`, or minus the largest growth rate [1/s] if a coordinate grows."""
+def find_decay_rate(modes: ModalBasis) -> float:
+    """Return `find_min_decay_rate`, or minus the largest growth rate [1/s] if a coordinate grows."""
     lowest = float(np.diagonal(modes.damping_matrix).min(initial=0.0)) / 2
-    return lowest if lowest < 0 else float(min_decay_rate(modes))
+    return lowest if lowest < 0 else float(find_min_decay_rate(modes))
 
 
-def max_acceleration(drive) -> float:
+def find_max_acceleration(drive) -> float:
     """Return the largest acceleration [m s-2] of a drive, or force over modal mass; it is >= 0."""
     if isinstance(drive, SineDrive):
         return drive.acceleration
@@ -89,19 +89,19 @@ def max_acceleration(drive) -> float:
     return drive.max_acceleration
 
 
-def drive_omega(drive) -> float:
+def find_drive_omega(drive) -> float:
     """Return the circular frequency [rad/s] of the cycle of a drive."""
     return 2 * np.pi / drive.period
 
 
-def peak_speed(drive, start: InitialState | None = None) -> float:
+def estimate_peak_speed(drive, start: InitialState | None = None) -> float:
     """Estimate the largest speed [m/s] of a motion from its drive and its start.
 
     It is the largest of the acceleration over omega, the initial velocities, and the initial
     displacements times omega.
     """
-    omega = drive_omega(drive)
-    speed = max_acceleration(drive) / omega
+    omega = find_drive_omega(drive)
+    speed = find_max_acceleration(drive) / omega
     if start is None:
         return speed
     start_speed = np.maximum(
@@ -110,7 +110,7 @@ def peak_speed(drive, start: InitialState | None = None) -> float:
     return np.maximum(speed, start_speed)
 
 
-def max_frequency_ratio(drive) -> float:
+def find_max_frequency_ratio(drive) -> float:
     """Return the highest frequency of a drive over that of its cycle."""
     return 1.0 if drive.segments else drive.max_frequency_ratio
 
@@ -129,25 +129,25 @@ def is_periodic(drive) -> bool:
     return is_sinusoidal(drive) or getattr(drive, "is_periodic", False)
 
 
-def repeat_cycles(drive) -> float | None:
+def count_repeat_cycles(drive) -> float | None:
     """Return the number of cycles after which a drive repeats, None if it never does."""
     return 1.0 if is_periodic(drive) else getattr(drive, "beat", None)
 
 
 def has_full_cycle(span: float, drive) -> bool:
     """Return whether a time span [s] contains a full drive cycle, as a friction loop needs."""
-    return span > drive.period * (1 - ROUND_OFF_TIME)
+    return span > drive.period * (1 - TIME_TOL)
 
 
 def is_release(drive) -> bool:
     """Return whether the motion is a release, which nothing drives."""
-    return len(drive.segments) == 1 and max_acceleration(drive) == 0
+    return len(drive.segments) == 1 and find_max_acceleration(drive) == 0
 
 
-def stored_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> int:
+def choose_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> int:
     """Return the number of equally spaced samples per cycle that a whole run stores.
 
-    They are `SAMPLES_PER_CYCLE`, or fewer so that the run has at most `MAX_SAMPLES`. They are 0, so that
+    They are `SAMPLES_PER_CYCLE`, or fewer so that the run has at most `MAX_STORED_SAMPLES`. They are 0, so that
     only reversals are stored, if fewer than `MIN_SAMPLES_PER_CYCLE` remained, and under a drive.
 
     Parameters
@@ -160,7 +160,7 @@ def stored_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> i
     """
     if not (wanted or is_release(drive)):
         return 0
-    count = int(min(SAMPLES_PER_CYCLE, MAX_SAMPLES / max(cycles, 1e-300)))
+    count = int(min(SAMPLES_PER_CYCLE, MAX_STORED_SAMPLES / max(cycles, 1e-300)))
     return count if count >= MIN_SAMPLES_PER_CYCLE else 0
 
 
@@ -171,4 +171,4 @@ def _build_sine(drive: DriveKeys) -> SineDrive:
 
 
 # only the sine is built here, so a run with a sine does not import the other drives
-BUILDERS = {"sine": _build_sine}
+DRIVE_BUILDERS = {"sine": _build_sine}

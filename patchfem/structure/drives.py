@@ -18,7 +18,7 @@ without segments also has:
 - rate [1/s]: the Taylor series in time of the drive is exact to round-off with 27 terms for steps up to
   2/rate.
 
-`BUILDERS` maps each waveform to the function that builds its drive from `DriveKeys`.
+`DRIVE_BUILDERS` maps each waveform to the function that builds its drive from `DriveKeys`.
 """
 
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core import DriveSegment, PatchfemError
-from .drive_sizes import DriveKeys, cycles_per_level
+from .drive_sizes import DriveKeys, count_cycles_per_level
 
 # rate times duration is at least this, so a Taylor series covers at most 1/20 of a sweep
-MIN_SWEEP_RATE = 40
+MIN_TAYLOR_RATE = 40
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Piecewise:
+class PiecewiseDrive:
     """Drive that consists of constants and sines, the first of which begins at t = 0.
 
     - period: duration [s] of a cycle.
@@ -59,17 +59,19 @@ class Piecewise:
         return values
 
 
-def step(acceleration: float, period: float, *, moving: bool = True) -> Piecewise:
+def make_step(acceleration: float, period: float, *, moving: bool = True) -> PiecewiseDrive:
     """Build a drive that is constant [m s-2] from t = 0 on; `period` [s] is that of the cycle."""
-    return Piecewise((DriveSegment(0.0, acceleration),), period, moving)
+    return PiecewiseDrive((DriveSegment(0.0, acceleration),), period, moving)
 
 
-def release(period: float) -> Piecewise:
+def make_release(period: float) -> PiecewiseDrive:
     """Build a drive that is zero, for free motion; `period` [s] is that of the cycle."""
-    return Piecewise((DriveSegment(0.0),), period, False)
+    return PiecewiseDrive((DriveSegment(0.0),), period, False)
 
 
-def levels(accelerations, omega: float, cycles: float, *, moving: bool = True) -> Piecewise:
+def make_levels(
+    accelerations, omega: float, cycles: float, *, moving: bool = True
+) -> PiecewiseDrive:
     """Build a sine of continuous phase whose amplitude changes between levels (report, 4.C).
 
     Parameters
@@ -92,11 +94,11 @@ def levels(accelerations, omega: float, cycles: float, *, moving: bool = True) -
     for k, acceleration in enumerate(accelerations):
         phase = 2 * np.pi * (k * cycles % 1.0)
         segments.append(DriveSegment(k * cycles * period, 0.0, float(acceleration), omega, phase))
-    return Piecewise(tuple(segments), period, moving)
+    return PiecewiseDrive(tuple(segments), period, moving)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Sweep:
+class SweepDrive:
     """Sine whose frequency changes from `low` to `high` and then stays constant.
 
     The drive is sin(2 pi int f dt) times its amplitude.
@@ -132,7 +134,7 @@ class Sweep:
     def rate(self) -> float:
         """Rate [1/s] of the Taylor series: that of the highest frequency, or of a fast sweep."""
         change = abs(np.log(self.high / self.low)) if self.logarithmic else 1.0
-        sweep_rate = MIN_SWEEP_RATE * max(1.0, change) / self.duration
+        sweep_rate = MIN_TAYLOR_RATE * max(1.0, change) / self.duration
         return max(2 * np.pi * max(self.low, self.high), sweep_rate)
 
     @property
@@ -179,7 +181,7 @@ class Sweep:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Recorded:
+class RecordedDrive:
     """Recorded signal, linear between its rows and zero after the last.
 
     - time: times (k,) [s], rising from 0; at least two.
@@ -239,21 +241,21 @@ class Recorded:
         return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)
 
 
-def _build_levels(drive: DriveKeys) -> Piecewise:
+def _build_levels(drive: DriveKeys) -> PiecewiseDrive:
     """Build the drive with waveform "levels"."""
     omega = 2 * np.pi * drive.keys.frequency
-    return levels(drive.levels, omega, cycles_per_level(drive.keys), moving=drive.moving)
+    return make_levels(drive.levels, omega, count_cycles_per_level(drive.keys), moving=drive.moving)
 
 
-def _build_step(drive: DriveKeys) -> Piecewise:
+def _build_step(drive: DriveKeys) -> PiecewiseDrive:
     """Build the drive with waveform "step"."""
     if drive.moving and drive.keys.acceleration is None:
         # the jump of the base displacement is included in the initial state
-        return release(drive.period)
-    return step(float(drive.acceleration(0.0)), drive.period, moving=drive.moving)
+        return make_release(drive.period)
+    return make_step(float(drive.acceleration(0.0)), drive.period, moving=drive.moving)
 
 
-def _build_sweep(drive: DriveKeys) -> Sweep:
+def _build_sweep(drive: DriveKeys) -> SweepDrive:
     """Build the drive with waveform "sweep"."""
     keys = drive.keys
     low = keys.from_
@@ -263,7 +265,7 @@ def _build_sweep(drive: DriveKeys) -> Sweep:
         duration = abs(high - low) / keys.rate
     else:
         duration = abs(np.log2(high / low)) / keys.log_rate
-    return Sweep(
+    return SweepDrive(
         low,
         high,
         duration,
@@ -274,14 +276,14 @@ def _build_sweep(drive: DriveKeys) -> Sweep:
     )
 
 
-def _build_recorded(drive: DriveKeys) -> Recorded:
+def _build_recorded(drive: DriveKeys) -> RecordedDrive:
     """Build the drive with waveform "file"."""
     time, value = drive.read()
     scale = 1.0 if drive.moving else 1 / drive.mass
-    return Recorded(time, scale * value, drive.period, drive.moving)
+    return RecordedDrive(time, scale * value, drive.period, drive.moving)
 
 
-BUILDERS = {
+DRIVE_BUILDERS = {
     "levels": _build_levels,
     "step": _build_step,
     "sweep": _build_sweep,

@@ -8,7 +8,7 @@ from ..core import ModalBasis, frozen_array
 from . import matrices
 
 
-def slide_rows(pairs, n: int) -> np.ndarray:
+def make_slide_rows(pairs, n: int) -> np.ndarray:
     """Build the rows (k, n) that give the relative displacements x_i - x_j of pairs of n masses.
 
     `pairs` holds k pairs (i, j) of masses, numbered from 1; 0 is the base.
@@ -48,26 +48,26 @@ def build_basis(
     ModalBasis
     """
     n = len(masses)
-    damper_rows = _weighted_rows(dampers, n)
+    damper_rows = _make_weighted_rows(dampers, n)
     unit = np.eye(n)
     return matrices.build_basis(
         np.diag(np.asarray(masses, float)),
-        faces=slide_rows(interfaces, n) if interfaces else None,
+        faces=make_slide_rows(interfaces, n) if interfaces else None,
         output=unit[output - 1],
         force=None if pushed is None else unit[pushed - 1],
-        spring_rows=_weighted_rows(springs, n),
+        spring_rows=_make_weighted_rows(springs, n),
         damper_rows=damper_rows if len(damper_rows) else None,
     )
 
 
-def _weighted_rows(elements, n: int) -> np.ndarray:
+def _make_weighted_rows(elements, n: int) -> np.ndarray:
     """Build rows with rows^T rows = K of springs, or = C of dampers."""
-    rows = slide_rows([pair for pair, _ in elements], n)
+    rows = make_slide_rows([pair for pair, _ in elements], n)
     coefficients = np.array([coefficient for _, coefficient in elements], float)
     return rows * np.sqrt(coefficients)[:, None]
 
 
-def set_lateral_faces(basis: ModalBasis, laterals) -> ModalBasis:
+def set_lateral_displacements(basis: ModalBasis, laterals) -> ModalBasis:
     """Turn the last faces of a basis into the second directions of its interfaces.
 
     Parameters

@@ -12,16 +12,16 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 from ..core import ModalBasis, PatchfemError, frozen_array
 
 # relative; round-off of an eigenvalue of an n x n matrix is about n times this fraction of the largest eigenvalue
-ROUND_OFF = 16 * np.finfo(float).eps
-ROUND_OFF_ENTRY = 1e-12  # relative; smaller entries of a projected damping matrix are round-off
+EIGENVALUE_TOL = 16 * np.finfo(float).eps
+ENTRY_TOL = 1e-12  # relative; smaller entries of a projected damping matrix are round-off
 # fraction of the largest entry by which a matrix may differ from its transpose
 MAX_ASYMMETRY = 1e-8
 # fraction of the largest eigenvalue; a more negative one is not round-off of a singular C
-MIN_DAMPING = -1e-9
+MIN_DAMPING_EIGENVALUE = -1e-9
 # relative; closer modes count as modes of equal frequency, whose shapes may be rotated
-SAME_FREQUENCY = 1e-11
+EQUAL_FREQUENCY_TOL = 1e-11
 # relative; a smaller motion of the output is round-off, because the output is a node of the mode
-MIN_OUTPUT = 1e-9
+MIN_OUTPUT_MOTION = 1e-9
 
 
 def build_basis(
@@ -76,25 +76,25 @@ def build_basis(
     """
     M = _symmetrize(M, "M")
     n = len(M)
-    root = _mass_root(M)
+    root = _factor_mass(M)
     if spring_rows is None:
-        omega, normalized = _modes_of_stiffness(root, _symmetrize(K, "K", M.shape))
+        omega, normalized = _compute_modes(root, _symmetrize(K, "K", M.shape))
     else:
         rows_per_root = _divide_by_root(root, np.asarray(spring_rows, float).T).T
-        omega, normalized = decouple(_require_finite(rows_per_root))
+        omega, normalized = decouple_modes(_require_finite(rows_per_root))
     phi = _divide_by_root(root, normalized, transpose=True)
     D = np.zeros((n, n))
     if damper_rows is not None:
-        D = _damping_of_rows(phi, np.asarray(damper_rows, float))
+        D = _project_damper_rows(phi, np.asarray(damper_rows, float))
     elif C is not None:
-        D = _damping_of_matrix(phi, _symmetrize(C, "C", M.shape))
+        D = _project_damping_matrix(phi, _symmetrize(C, "C", M.shape))
     phi, D = _decouple_equal_frequencies(phi, omega, D)
 
     faces = np.zeros((0, n)) if faces is None else np.atleast_2d(_check_row(faces, n, "slide"))
     if output is None:
         output = faces[0] if len(faces) else np.eye(n)[0]
     output = _check_row(output, n, "output")
-    sign = _shape_signs(phi, output)
+    sign = _find_shape_signs(phi, output)
     phi = phi * sign
     zeta, damping = split_damping(D * np.outer(sign, sign), omega)
     if force is not None:
@@ -135,7 +135,7 @@ def split_damping(D, omega) -> tuple:
     return frozen_array(zeta), frozen_array(D) if is_coupled else None
 
 
-def decouple(rows) -> tuple:
+def decouple_modes(rows) -> tuple:
     """Compute the modes of the stiffness rows^T rows over unit mass.
 
     The singular value decomposition gives omega to round-off of the largest omega; an eigenvalue
@@ -157,21 +157,21 @@ def decouple(rows) -> tuple:
     missing = max(n - len(rows), 0)
     padded = np.vstack([rows, np.zeros((missing, n))])
     _, values, shapes = svd(padded, full_matrices=False)
-    omega = np.where(values <= n * ROUND_OFF * values[0], 0.0, values)
+    omega = np.where(values <= n * EIGENVALUE_TOL * values[0], 0.0, values)
     return omega[::-1], shapes[::-1].T
 
 
-def trim_round_off(matrix, scale, round_off: float = ROUND_OFF_ENTRY) -> np.ndarray:
+def trim_round_off(matrix, scale, round_off: float = ENTRY_TOL) -> np.ndarray:
     """Make a matrix (n, n) symmetric and zero entries that are round-off of a scale (n, n)."""
     matrix = (matrix + matrix.T) / 2
     return np.where(np.abs(matrix) <= round_off * scale, 0.0, matrix)
 
 
-def _modes_of_stiffness(root, K) -> tuple:
+def _compute_modes(root, K) -> tuple:
     """Compute ascending circular frequencies (n,) [rad/s] and shapes (n, n) of a stiffness K."""
     per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
     squares, shapes = eigh((per_mass + per_mass.T) / 2)
-    min_square = len(K) * ROUND_OFF * np.abs(squares).max(initial=0.0)
+    min_square = len(K) * EIGENVALUE_TOL * np.abs(squares).max(initial=0.0)
     if squares[0] < -min_square:
         raise PatchfemError(
             "structure: K is not positive semidefinite: for one motion the stiffness divided by the "
@@ -191,7 +191,7 @@ def _require_finite(per_mass) -> np.ndarray:
     return per_mass
 
 
-def _mass_root(M):
+def _factor_mass(M):
     """Compute the lower Cholesky factor (n, n) of M, or the roots (n,) of a diagonal M."""
     diagonal = np.diag(M)
     scale = np.sqrt(np.maximum(diagonal, 0.0))
@@ -201,7 +201,7 @@ def _mass_root(M):
     else:
         try:
             root = cholesky(M, lower=True)
-            is_positive = bool((np.diag(root) > np.sqrt(len(M) * ROUND_OFF) * scale).all())
+            is_positive = bool((np.diag(root) > np.sqrt(len(M) * EIGENVALUE_TOL) * scale).all())
         except LinAlgError:
             is_positive = False
     if not is_positive:
@@ -215,7 +215,7 @@ def _mass_root(M):
 
 
 def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
-    """Solve root x = right, or root^T x = right, for a root of `_mass_root`."""
+    """Solve root x = right, or root^T x = right, for a root of `_factor_mass`."""
     if root.ndim == 2:
         return solve_triangular(
             root, right, lower=True, trans="T" if transpose else "N", check_finite=False
@@ -224,7 +224,7 @@ def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
         return right / root[:, None]
 
 
-def as_real(values, name: str) -> np.ndarray:
+def to_real(values, name: str) -> np.ndarray:
     """Return the real parts of an array that is stored as complex numbers.
 
     Hysteretic damping K (1 + i eta) is refused, because it describes a single frequency. C = eta K/omega
@@ -259,7 +259,7 @@ def _symmetrize(matrix, name: str, shape=None) -> np.ndarray:
     if hasattr(matrix, "toarray"):
         matrix = matrix.toarray()
     try:
-        matrix = np.asarray(as_real(matrix, name), float)
+        matrix = np.asarray(to_real(matrix, name), float)
     except (TypeError, ValueError):
         raise PatchfemError(f"structure: {name} is not a matrix of real numbers") from None
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
@@ -282,12 +282,12 @@ def _symmetrize(matrix, name: str, shape=None) -> np.ndarray:
     return (matrix + matrix.T) / 2
 
 
-def _damping_of_matrix(phi, C) -> np.ndarray:
+def _project_damping_matrix(phi, C) -> np.ndarray:
     """Project a damping matrix C on shapes; raise PatchfemError if it adds energy."""
     size = np.abs(phi)
     D = trim_round_off(phi.T @ C @ phi, size.T @ np.abs(C) @ size)
     values = eigh(D, eigvals_only=True)
-    if values[0] < MIN_DAMPING * max(abs(values[-1]), abs(values[0])):
+    if values[0] < MIN_DAMPING_EIGENVALUE * max(abs(values[-1]), abs(values[0])):
         raise PatchfemError(
             "structure: C adds energy: for one motion the damping divided by the mass is "
             f"{values[0]:.3g} 1/s; dampers >= 0 are needed"
@@ -295,7 +295,7 @@ def _damping_of_matrix(phi, C) -> np.ndarray:
     return D
 
 
-def _damping_of_rows(phi, damper_rows) -> np.ndarray:
+def _project_damper_rows(phi, damper_rows) -> np.ndarray:
     """Project dampers that are known one by one on shapes; they never add energy."""
     rates = damper_rows @ phi
     size = np.abs(damper_rows) @ np.abs(phi)
@@ -306,7 +306,7 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple:
     """Rotate shapes of equal frequency so that D does not couple them; return shapes and D."""
     first = 0
     for last in range(1, len(omega) + 1):
-        if last < len(omega) and omega[last] - omega[first] <= SAME_FREQUENCY * omega[last]:
+        if last < len(omega) and omega[last] - omega[first] <= EQUAL_FREQUENCY_TOL * omega[last]:
             continue
         block = D[first:last, first:last]
         if last - first > 1 and np.abs(block).sum() > np.abs(np.diag(block)).sum():
@@ -322,7 +322,7 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple:
 def _check_row(row, n: int, name: str) -> np.ndarray:
     """Check that a row has n finite real numbers; `slide` may have several rows."""
     try:
-        row = np.asarray(as_real(row, name), float)
+        row = np.asarray(to_real(row, name), float)
     except (TypeError, ValueError):
         raise PatchfemError(f"structure: {name} does not contain real numbers") from None
     if row.ndim == 2 and 1 in row.shape and name != "slide":
@@ -334,12 +334,12 @@ def _check_row(row, n: int, name: str) -> np.ndarray:
     return row
 
 
-def _shape_signs(phi, output) -> np.ndarray:
+def _find_shape_signs(phi, output) -> np.ndarray:
     """Return a sign (n,) per shape that makes the motion of the output positive.
 
     At a node of the shape the largest entry is made positive instead.
     """
     motion = output @ phi
     largest = phi[np.abs(phi).argmax(axis=0), np.arange(phi.shape[1])]
-    is_node = np.abs(motion) <= MIN_OUTPUT * (np.abs(output) @ np.abs(phi))
+    is_node = np.abs(motion) <= MIN_OUTPUT_MOTION * (np.abs(output) @ np.abs(phi))
     return np.where(np.where(is_node, largest, motion) < 0, -1.0, 1.0)

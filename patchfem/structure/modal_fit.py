@@ -17,16 +17,18 @@ from scipy.optimize import least_squares, nnls
 from scipy.signal import find_peaks
 
 from ..core import NotConverged, PatchfemError
-from .places import AXES, Shapes
+from .places import DIRECTION_NAMES, MeasuredModes
 
 MAX_MODES = 30  # maximum number of modes of one fit
-PEAKS_TRIED = 2  # largest peaks of each residual spectrum at which a further mode is tried
-MIN_CORRELATION = 0.5  # mean cosine of neighbouring residuals at a peak: 1 for a mode, 0 for noise
-NEIGHBOURS = 8  # frequencies on each side of a peak or mode over which means are taken
+N_PEAKS_PER_SPECTRUM = 2  # largest peaks of each residual spectrum at which a further mode is tried
+# mean cosine of neighbouring residuals at a peak: 1 for a mode, 0 for noise
+MIN_RESIDUAL_CORRELATION = 0.5
+N_NEIGHBOURS = 8  # frequencies on each side of a peak or mode over which means are taken
 # decrease of the sum of squares by a further mode over the decrease expected in white noise
 MIN_NOISE_RATIO = 15.0
-MIN_GAIN = 0.02  # fraction of the residual sum of squares that a further mode must explain
-MIN_LEVEL = 1e-3  # fraction of the responses near its frequency that a mode must contribute
+# fraction of the residual sum of squares that a further mode must explain
+MIN_RESIDUAL_DECREASE = 0.02
+MIN_CONTRIBUTION = 1e-3  # fraction of the responses near its frequency that a mode must contribute
 # minimum contribution of a mode near its frequency over the residual there
 MIN_RESIDUAL_RATIO = 5.0
 MIN_MISFIT = 1e-9  # relative residual; a smaller one is round-off
@@ -252,7 +254,7 @@ def fit_poles(omega, data, power) -> FittedPoles:
         n_parameters = new_theta.size + (new_theta.size // 2 + 2) * n_responses
         n_free = max(fit.target.size - n_parameters, 1)
         noise_gain = (2 + n_responses) * new_cost / n_free
-        if cost - new_cost < max(MIN_NOISE_RATIO * noise_gain, MIN_GAIN * cost):
+        if cost - new_cost < max(MIN_NOISE_RATIO * noise_gain, MIN_RESIDUAL_DECREASE * cost):
             break
         theta = new_theta
         cost = new_cost
@@ -313,8 +315,8 @@ def _remove_weak_modes(fit: ModalFit, theta):
         contribution = np.sqrt(np.mean(np.abs(fit.contributions(theta)) ** 2, axis=2))
         strength = np.zeros(w.size)
         for r, index in enumerate(np.searchsorted(fit.omega, w)):
-            near = slice(max(0, index - NEIGHBOURS), index + NEIGHBOURS)
-            needed = MIN_LEVEL * fit.level[near].max(initial=1e-300)
+            near = slice(max(0, index - N_NEIGHBOURS), index + N_NEIGHBOURS)
+            needed = MIN_CONTRIBUTION * fit.level[near].max(initial=1e-300)
             if residual[near].size:
                 noise = np.sqrt(np.mean(residual[near] ** 2))
                 needed = max(needed, MIN_RESIDUAL_RATIO * noise)
@@ -342,16 +344,17 @@ def _find_starts(fit: ModalFit, theta):
         modal_peaks = [
             k
             for k in peaks
-            if correlation[max(0, k - NEIGHBOURS) : k + NEIGHBOURS].mean() > MIN_CORRELATION
+            if correlation[max(0, k - N_NEIGHBOURS) : k + N_NEIGHBOURS].mean()
+            > MIN_RESIDUAL_CORRELATION
         ]
-        for k in sorted(modal_peaks, key=lambda k: -spectrum[k])[:PEAKS_TRIED]:
+        for k in sorted(modal_peaks, key=lambda k: -spectrum[k])[:N_PEAKS_PER_SPECTRUM]:
             if k not in tried:
-                width = _half_power_width(fit.omega, spectrum, k)
+                width = _find_half_power_width(fit.omega, spectrum, k)
                 yield fit.omega[k], np.clip(width / (2 * fit.omega[k]), 1e-5, 0.3)
             tried.add(k)
 
 
-def _half_power_width(omega, spectrum, peak: int) -> float:
+def _find_half_power_width(omega, spectrum, peak: int) -> float:
     """Return the width [rad/s] of a peak at half its height."""
     below = above = peak
     while below > 0 and spectrum[below] > spectrum[peak] / 2:
@@ -361,7 +364,7 @@ def _half_power_width(omega, spectrum, peak: int) -> float:
     return omega[above] - omega[below]
 
 
-def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
+def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
     """Identify modes from frequency responses.
 
     One reference must have a response at itself, which gives the scale of the shapes. Modes outside the
@@ -392,8 +395,8 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     driven = places.index(reference)
     if len(places) < len(measured):
         notes.append(
-            f"of {len(measured)} frequency responses, only the {len(places)} to a force at {_direction_name(reference)} are "
-            "used"
+            f"of {len(measured)} frequency responses, only the {len(places)} to a force at "
+            f"{_format_direction(reference)} are used"
         )
     is_positive = frequency > 0
     omega = 2 * np.pi * frequency[is_positive]
@@ -403,7 +406,7 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     is_moving = np.abs(data).max(axis=0) > 0
     if not is_moving[driven]:
         raise PatchfemError(
-            f"structure.file: the response at the driven point itself, {_direction_name(reference)}, is zero"
+            f"structure.file: the response at the driven point itself, {_format_direction(reference)}, is zero"
         )
     power = np.array([measured[place, reference][1] for place in places])
     poles = fit_poles(omega, data[:, is_moving], power[is_moving])
@@ -418,19 +421,19 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     is_scaled = own > MIN_DRIVEN_RESIDUE * np.abs(residues).max(axis=1)
     notes += [
         f"the mode at {w_r / (2 * np.pi):.5g} Hz does not move the driven point "
-        f"{_direction_name(reference)} and is left out"
+        f"{_format_direction(reference)} and is left out"
         for w_r in w[~is_scaled]
     ]
     if not is_scaled.any():
         raise PatchfemError(
-            f"structure.file: no mode moves the driven point {_direction_name(reference)} in the direction of the "
+            f"structure.file: no mode moves the driven point {_format_direction(reference)} in the direction of the "
             "force; check the sign of the response"
         )
     notes += _note_modes_below(poles, data[0, is_moving])
     notes += _check_misfit(poles, int(is_scaled.sum()))
     shapes = residues[is_scaled] / np.sqrt(own[is_scaled])[:, None]
     motion = {place: shapes[:, k] for k, place in enumerate(places)}
-    return Shapes(w[is_scaled] / (2 * np.pi), zeta[is_scaled], motion, notes)
+    return MeasuredModes(w[is_scaled] / (2 * np.pi), zeta[is_scaled], motion, notes)
 
 
 def _check_misfit(poles: FittedPoles, n_modes: int) -> list:
@@ -464,10 +467,10 @@ def _note_modes_below(poles: FittedPoles, first_response) -> list:
     ]
 
 
-def _direction_name(place) -> str:
+def _format_direction(place) -> str:
     """Return the name of a measured degree of freedom for messages, such as "12:x"."""
     node, axis = place
-    return f"{node}:{AXES[axis]}"
+    return f"{node}:{DIRECTION_NAMES[axis]}"
 
 
 def _choose_reference(measured: dict):
@@ -475,7 +478,7 @@ def _choose_reference(measured: dict):
     candidates = [reference for place, reference in measured if place == reference]
     if not candidates:
         references = sorted({reference for _, reference in measured})
-        names = ", ".join(_direction_name(reference) for reference in references)
+        names = ", ".join(_format_direction(reference) for reference in references)
         raise PatchfemError(
             f"structure.file: a response at the driven point itself ({names}) is missing, and without "
             "this response the mode shapes have no scale; measure the response at the driven point"

@@ -13,16 +13,16 @@ import numpy as np
 
 from ..core import PatchfemError
 from .drive_sizes import DriveKeys
-from .drives import Recorded
+from .drives import RecordedDrive
 
 ROWS_PER_PERIOD = 8  # rows of the record per period of the highest frequency
-MIN_LINES = 8  # spectral lines of a record; fewer do not make its values Gaussian
+MIN_SPECTRAL_LINES = 8  # spectral lines of a record; fewer do not make its values Gaussian
 # line spacings; tolerance on the number of the spectral line at each end of the band
 LINE_NUMBER_TOL = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Random(Recorded):
+class RandomRecord(RecordedDrive):
     """Stationary random record; `band` is its lowest and its highest frequency [Hz]."""
 
     band: tuple = (0.0, 0.0)
@@ -33,7 +33,9 @@ class Random(Recorded):
         return max(1.0, self.band[1] * self.period)
 
 
-def random_record(frequency, density, duration: float, seed: int, period: float) -> Random:
+def draw_random_record(
+    frequency, density, duration: float, seed: int, period: float
+) -> RandomRecord:
     """Draw a random record with a given spectral density.
 
     Parameters
@@ -56,7 +58,7 @@ def random_record(frequency, density, duration: float, seed: int, period: float)
     Raises
     ------
     PatchfemError
-        If fewer than `MIN_LINES` spectral lines, 1/duration apart, lie in the band.
+        If fewer than `MIN_SPECTRAL_LINES` spectral lines, 1/duration apart, lie in the band.
     """
     low = float(frequency[0])
     high = float(frequency[-1])
@@ -64,10 +66,10 @@ def random_record(frequency, density, duration: float, seed: int, period: float)
     step = duration / n_rows
     first_line = int(np.ceil(low * duration - LINE_NUMBER_TOL))
     lines = np.arange(first_line, int(high * duration + LINE_NUMBER_TOL) + 1)
-    if lines.size < MIN_LINES:
+    if lines.size < MIN_SPECTRAL_LINES:
         raise PatchfemError(
             f"{duration:g} s are too short for a band of {high - low:g} Hz, which then has only "
-            f"{lines.size} spectral lines; at least {MIN_LINES / (high - low):.3g} s are "
+            f"{lines.size} spectral lines; at least {MIN_SPECTRAL_LINES / (high - low):.3g} s are "
             "needed",
             "drive.duration",
         )
@@ -79,10 +81,10 @@ def random_record(frequency, density, duration: float, seed: int, period: float)
     transform[lines] = (cosine - 1j * sine) * (n_rows / 2) / np.sinc(f * step) ** 2
     value = np.fft.irfft(transform, n_rows)
     time = step * np.arange(n_rows + 1)
-    return Random(time, np.append(value, value[0]), period, band=(low, high))
+    return RandomRecord(time, np.append(value, value[0]), period, band=(low, high))
 
 
-def _build_random(drive: DriveKeys) -> Random:
+def _build_random(drive: DriveKeys) -> RandomRecord:
     """Build the drive with waveform "random"."""
     keys = drive.keys
     if keys.file is not None:
@@ -94,7 +96,7 @@ def _build_random(drive: DriveKeys) -> Random:
         np.array(frequency, float), np.array(density, float), keys.from_, keys.to
     )
     duration = keys.duration if keys.duration is not None else keys.cycles * drive.period
-    return random_record(frequency, density, duration, keys.seed or 0, drive.period)
+    return draw_random_record(frequency, density, duration, keys.seed or 0, drive.period)
 
 
 def _cut_spectrum(frequency, density, low: float | None, high: float | None) -> tuple:
@@ -116,4 +118,4 @@ def _cut_spectrum(frequency, density, low: float | None, high: float | None) -> 
     return kept, np.exp(np.interp(np.log(kept), np.log(frequency), np.log(density)))
 
 
-BUILDERS = {"random": _build_random}
+DRIVE_BUILDERS = {"random": _build_random}

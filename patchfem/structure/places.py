@@ -7,8 +7,8 @@ import numpy as np
 
 from ..core import ModalBasis, PatchfemError, frozen_array
 
-AXES = ("x", "y", "z", "rx", "ry", "rz")
-PLACE_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")  # "12:+x"
+DIRECTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")
+DIRECTION_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")  # "12:+x"
 MAX_LISTED_NODES = 12  # nodes with directions that an error message lists
 # fraction of the moving mass; with more, the mass or the node of the base motion is wrong
 MAX_MASS_FRACTION = 1.05
@@ -16,7 +16,7 @@ MIN_MASS_FRACTION = 0.8  # fraction of the moving mass; with less, a note says h
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Shapes:
+class MeasuredModes:
     """Measured modes, n of them.
 
     - frequency: natural frequencies (n,) [Hz].
@@ -53,33 +53,33 @@ class Shapes:
         """
         total = np.zeros(self.frequency.size)
         for part in text.split(","):
-            match = PLACE_PATTERN.fullmatch(part.strip())
+            match = DIRECTION_PATTERN.fullmatch(part.strip())
             if match is None:
                 raise PatchfemError(
                     f"structure.{key}: '{text}' is not a node with a direction; write node:direction, "
                     'such as "12:+x", or "12:+x, 13:-x" for the motion of 12 relative to 13'
                 )
             node = int(match[1])
-            axis = AXES.index(match[3])
+            axis = DIRECTION_NAMES.index(match[3])
             if (node, axis) not in self.motion:
                 raise PatchfemError(
                     f"structure.{key}: the file has no motion of {node}:{match[3]}; the file has "
-                    f"{_list_places(self.motion)}"
+                    f"{_list_directions(self.motion)}"
                 )
             sign = -1.0 if match[2] == "-" else 1.0
             total += sign * self.motion[node, axis]
         return total
 
 
-def _list_places(motion: dict) -> str:
+def _list_directions(motion: dict) -> str:
     """List the first nodes and directions of a file for a message."""
-    names = [f"{node}:{AXES[axis]}" for node, axis in sorted(motion)]
+    names = [f"{node}:{DIRECTION_NAMES[axis]}" for node, axis in sorted(motion)]
     text = ", ".join(names[:MAX_LISTED_NODES])
     n_more = len(names) - MAX_LISTED_NODES
     return f"{text} and {n_more} more" if n_more > 0 else text
 
 
-def build_basis(shapes: Shapes, mass: float, places: dict, *, is_forced: bool) -> ModalBasis:
+def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: bool) -> ModalBasis:
     """Build the modal basis of measured modes.
 
     A fixed-base mode phi of a rig whose moving mass m is all in one rigid block participates in the base
@@ -142,7 +142,7 @@ def build_basis(shapes: Shapes, mass: float, places: dict, *, is_forced: bool) -
     )
 
 
-def participation_note(basis: ModalBasis) -> list:
+def note_missing_mass(basis: ModalBasis) -> list:
     """Return a note if the modes of a file contain too little of the moving mass, else no note."""
     mass_fraction = float(np.sum(basis.base**2))
     if mass_fraction >= MIN_MASS_FRACTION:

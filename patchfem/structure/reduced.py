@@ -27,9 +27,9 @@ from . import masses, matrices
 # coordinates; the modes of a larger structure come from Lanczos iteration
 MAX_DENSE_COORDINATES = 600
 # modes in addition to twice the number that is kept; the run for the error estimate keeps more
-EXTRA_MODES = 4
+N_EXTRA_MODES = 4
 # relative; round-off of a projected matrix entry, compared with the sum of its absolute terms
-ROUND_OFF = 64 * np.finfo(float).eps
+PROJECTION_TOL = 64 * np.finfo(float).eps
 # fraction of the largest stiffness over mass, by which the stiffness of an unconstrained structure is shifted,
 # because K alone has no inverse
 SHIFT_FRACTION = 1e-9
@@ -39,7 +39,7 @@ MIN_INERTIA = 1e-14
 # fraction of the largest squared frequency, per coordinate; a smaller one belongs to a rigid motion
 MIN_STRAIN = 1e-12
 # minimum reciprocal condition number of the residual flexibility at the boundary; a smaller one is round-off
-MIN_RESIDUAL = 1e-8
+MIN_RESIDUAL_FLEXIBILITY = 1e-8
 CRAIG_BAMPTON = "craig-bampton"
 
 
@@ -101,7 +101,7 @@ class Reduction(NamedTuple):
         scale = np.sqrt(np.abs(np.diag(flexibility)))
         if (
             not scale.all()
-            or np.linalg.cond(flexibility / np.outer(scale, scale)) > 1 / MIN_RESIDUAL
+            or np.linalg.cond(flexibility / np.outer(scale, scale)) > 1 / MIN_RESIDUAL_FLEXIBILITY
         ):
             raise PatchfemError(
                 "the modes already contain all flexibility at the boundary, so no flexibility remains "
@@ -140,19 +140,21 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
     _refuse_indefinite(K, "stiffness")
     _refuse_indefinite(M, "mass")
     load = None if moved is None else M @ moved
-    compute_shapes = _craig_bampton_shapes if method == CRAIG_BAMPTON else _free_interface_shapes
-    count = 2 * modes + EXTRA_MODES
+    compute_shapes = (
+        _compute_craig_bampton_shapes if method == CRAIG_BAMPTON else _compute_free_interface_shapes
+    )
+    count = 2 * modes + N_EXTRA_MODES
     with one_thread():
         shapes, computed = compute_shapes(K.tocsc(), M.tocsc(), np.asarray(boundary), count, load)
-        stiffness = _project(K, shapes, ROUND_OFF)
-        mass = _project(M, shapes, ROUND_OFF)
-        damping = None if C is None else _project(C, shapes, matrices.ROUND_OFF_ENTRY)
+        stiffness = _project(K, shapes, PROJECTION_TOL)
+        mass = _project(M, shapes, PROJECTION_TOL)
+        damping = None if C is None else _project(C, shapes, matrices.ENTRY_TOL)
         # static shapes are orthogonal to the modes with respect to K
         n_modes = computed.omega.size
         stiffness[:n_modes] = 0.0
         stiffness[:, :n_modes] = 0.0
         np.fill_diagonal(stiffness[:n_modes, :n_modes], computed.omega**2)
-        squares, combinations = _elastic_modes(stiffness, mass)
+        squares, combinations = _compute_elastic_modes(stiffness, mass)
     return Reduction(
         stiffness=stiffness,
         mass=mass,
@@ -208,7 +210,7 @@ def _factorize(K) -> SparseFactor | None:
         ) from None
 
 
-def _lowest_modes(K, M, count: int, factor: SparseFactor, shift: float = 0.0) -> tuple:
+def _compute_lowest_modes(K, M, count: int, factor: SparseFactor, shift: float = 0.0) -> tuple:
     """Compute the lowest modes of unit modal mass, at most `count`.
 
     `factor` is that of K + shift M, with the shift in 1/s^2. Returns circular frequencies (m,) [rad/s]
@@ -239,7 +241,7 @@ def _lowest_modes(K, M, count: int, factor: SparseFactor, shift: float = 0.0) ->
     return np.sqrt(np.maximum(1 / inverse_squares - shift, 0.0)), shapes
 
 
-def _craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
+def _compute_craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
     """Compute fixed-interface modes, constraint modes and the residual static shape of a load.
 
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
@@ -261,7 +263,7 @@ def _craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
             "'free-interface'",
             "structure.reduced.boundary",
         )
-    omega, fixed_modes = _lowest_modes(K_inner, M_inner, count, factor)
+    omega, fixed_modes = _compute_lowest_modes(K_inner, M_inner, count, factor)
     is_complete = omega.size < count or count == inner.size
     constraint_modes[inner] = -factor.solve(K[inner][:, boundary].toarray())
     shapes = [_expand_rows(fixed_modes, inner, n), constraint_modes]
@@ -274,7 +276,7 @@ def _craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
     return np.hstack(shapes), ComputedModes(omega, participation, is_complete)
 
 
-def _free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
+def _compute_free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
     """Compute free modes, and residual attachment modes of the boundary and of a load.
 
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
@@ -294,7 +296,7 @@ def _free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
         )
     max_modes = n - boundary.size
     count = min(count, max_modes)
-    omega, free_modes = _lowest_modes(K, M, count, factor, shift)
+    omega, free_modes = _compute_lowest_modes(K, M, count, factor, shift)
     is_complete = omega.size < count or count == max_modes
     forces = _expand_rows(np.eye(boundary.size), boundary, n)
     if load is not None and not is_complete:
@@ -381,11 +383,11 @@ def build_basis(
         mass,
         None,
         damping,
-        faces=masses.slide_rows(pairs, n_boundary) @ motion if pairs else None,
+        faces=masses.make_slide_rows(pairs, n_boundary) @ motion if pairs else None,
         output=motion[output - 1],
         force=force,
         names=[*boundary_names, *mode_names],
-        spring_rows=_stiffness_rows(stiffness, mass),
+        spring_rows=_factor_stiffness(stiffness, mass),
     )
     modal_shapes = np.delete(basis.shapes, np.s_[n_modes : n_modes + n_boundary], axis=0)
     shapes = np.vstack([motion @ basis.shapes, modal_shapes])
@@ -393,13 +395,13 @@ def build_basis(
     return basis if not ratio else replace(basis, zeta=frozen_array(ratio * (basis.omega > 0)))
 
 
-def _stiffness_rows(stiffness, mass) -> np.ndarray:
+def _factor_stiffness(stiffness, mass) -> np.ndarray:
     """Return rows (s, c) with stiffness = rows^T rows, exactly zero for rigid motions.
 
     Without rigid motions they are a Cholesky factor. Eigenvalues would have round-off of the largest
     one, which leaves few digits of the lowest.
     """
-    squares, shapes = _elastic_modes(stiffness, mass)
+    squares, shapes = _compute_elastic_modes(stiffness, mass)
     diagonal = np.sqrt(np.diag(stiffness))
     if squares.size == diagonal.size:
         try:
@@ -411,7 +413,7 @@ def _stiffness_rows(stiffness, mass) -> np.ndarray:
     return (np.sqrt(squares)[:, None] * shapes.T) @ mass
 
 
-def _elastic_modes(stiffness, mass) -> tuple:
+def _compute_elastic_modes(stiffness, mass) -> tuple:
     """Compute the modes of dense matrices (c, c) that are not rigid, of unit modal mass.
 
     Returns the squares (k,) [1/s^2] of the circular frequencies, ascending, and the shapes (c, k).

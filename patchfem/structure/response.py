@@ -5,7 +5,7 @@ import numpy as np
 from ..core import ModalBasis, PatchfemError
 
 
-def receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarray:
+def compute_receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarray:
     """Compute the exact receptance matrix of a rig, even if the damping couples its modes.
 
     H = rows_out (diag(omega_r^2) - omega^2 + i omega D)^-1 rows_in^T / mass

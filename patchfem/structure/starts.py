@@ -5,13 +5,13 @@ import numpy as np
 from ..core import InitialState, ModalBasis, PatchfemError, frozen_array
 
 
-def at_rest(basis: ModalBasis) -> InitialState:
+def start_at_rest(basis: ModalBasis) -> InitialState:
     """Return the start at rest, without displacement."""
     zero = frozen_array(np.zeros(basis.omega.size))
     return InitialState(zero, zero)
 
 
-def from_values(basis: ModalBasis, displacement=None, velocity=None) -> InitialState:
+def start_from_values(basis: ModalBasis, displacement=None, velocity=None) -> InitialState:
     """Convert initial values of the named modes or masses into coordinates of a basis.
 
     Parameters
@@ -53,7 +53,7 @@ def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
     return np.linalg.lstsq(basis.shapes, values, rcond=None)[0]
 
 
-def from_output_displacement(basis: ModalBasis, displacement: float) -> InitialState:
+def start_from_output_displacement(basis: ModalBasis, displacement: float) -> InitialState:
     """Start at rest from a displacement [m] of the output, in the shape of a static force there.
 
     The coordinates are proportional to output_i / omega_i^2. If rigid modes move the output, a force
@@ -82,7 +82,7 @@ def from_output_displacement(basis: ModalBasis, displacement: float) -> InitialS
     )
 
 
-def from_base_step(basis: ModalBasis, displacement: float) -> InitialState:
+def start_from_base_step(basis: ModalBasis, displacement: float) -> InitialState:
     """Start right after the base has jumped by a displacement X [m]: z = -X base.
 
     The masses have not moved yet, and displacements are relative to the base.

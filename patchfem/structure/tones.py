@@ -12,14 +12,14 @@ from math import gcd, lcm
 import numpy as np
 
 from .drive_sizes import DriveKeys
-from .drives import Recorded
+from .drives import RecordedDrive
 
 ROWS_PER_PERIOD = 64  # rows of the record per period of the highest tone
 MAX_DENOMINATOR = 10**6  # largest denominator of a frequency [Hz]; finer differences do not matter
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Tones(Recorded):
+class TonesRecord(RecordedDrive):
     """Record of tones, whose cycle is that of the first tone.
 
     - beat: number of cycles after which all tones repeat.
@@ -35,7 +35,7 @@ class Tones(Recorded):
         return self.max_frequency * self.period
 
 
-def tones(frequencies, accelerations, phases, duration: float) -> Tones:
+def make_tones(frequencies, accelerations, phases, duration: float) -> TonesRecord:
     """Build a drive of several tones.
 
     Parameters
@@ -56,16 +56,16 @@ def tones(frequencies, accelerations, phases, duration: float) -> Tones:
         a / np.sinc(f * step) ** 2 * np.sin(2 * np.pi * f * time + phi)
         for f, a, phi in zip(frequencies, accelerations, phases)
     )
-    return Tones(
+    return TonesRecord(
         time,
         value,
         1 / frequencies[0],
-        beat=beat_cycles(frequencies),
+        beat=count_beat_cycles(frequencies),
         max_frequency=max_frequency,
     )
 
 
-def beat_cycles(frequencies) -> float:
+def count_beat_cycles(frequencies) -> float:
     """Return the cycles of the first tone after which all repeat: f_1 / greatest common divisor."""
     fractions = [Fraction(f).limit_denominator(MAX_DENOMINATOR) or Fraction(f) for f in frequencies]
     denominator = lcm(*(fraction.denominator for fraction in fractions))
@@ -73,12 +73,12 @@ def beat_cycles(frequencies) -> float:
     return float(fractions[0] * denominator / gcd(*numerators))
 
 
-def _build_tones(drive: DriveKeys) -> Tones:
+def _build_tones(drive: DriveKeys) -> TonesRecord:
     """Build the drive with waveform "tones"."""
     keys = drive.keys
     duration = keys.duration if keys.duration is not None else keys.cycles / keys.frequencies[0]
     phases = keys.phases or (0.0,) * len(keys.frequencies)
-    return tones(keys.frequencies, keys.accelerations, phases, duration)
+    return make_tones(keys.frequencies, keys.accelerations, phases, duration)
 
 
-BUILDERS = {"tones": _build_tones}
+DRIVE_BUILDERS = {"tones": _build_tones}

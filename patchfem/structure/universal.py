@@ -8,17 +8,17 @@ import numpy as np
 from ..core import PatchfemError
 from ..inputs.universal import FunctionType, OrdinateType, read_datasets
 from . import modal_fit
-from .places import AXES, Shapes
+from .places import DIRECTION_NAMES, MeasuredModes
 
-NORMAL_MODE = 2  # analysis type of a real mode in dataset 55
-COMPLEX_MODES = (3, 7)  # analysis types of a complex mode in dataset 55
-DERIVATIVES = {  # time derivative of the displacement for each ordinate type of dataset 58
+NORMAL_MODE_TYPE = 2  # analysis type of a real mode in dataset 55
+COMPLEX_MODE_TYPES = (3, 7)  # analysis types of a complex mode in dataset 55
+DERIVATIVE_ORDERS = {  # time derivative of the displacement for each ordinate type of dataset 58
     OrdinateType.DISPLACEMENT: 0,
     OrdinateType.VELOCITY: 1,
     OrdinateType.ACCELERATION: 2,
 }
-FORCES = (OrdinateType.EXCITATION_FORCE, OrdinateType.FORCE)
-UNITS = {"g": 9.80665, "lbf": 4.4482216152605}  # SI units per unit of an axis label
+FORCE_TYPES = (OrdinateType.EXCITATION_FORCE, OrdinateType.FORCE)
+UNIT_FACTORS = {"g": 9.80665, "lbf": 4.4482216152605}  # SI units per unit of an axis label
 SI_LABELS = {"", "none", "n", "m", "m/s", "m/s^2", "m/s2", "m/s**2", "mps2"}
 MAX_FREQUENCY_CHANGE = 1e-6  # relative; the frequencies of all responses agree to single precision
 
@@ -47,7 +47,7 @@ class _Mode(NamedTuple):
     notes: tuple = ()
 
 
-def read(path: Path) -> Shapes:
+def read_universal(path: Path) -> MeasuredModes:
     """Read the modes of a universal file, or fit modes to its frequency responses.
 
     Dataset 164 gives the units of the file.
@@ -78,17 +78,17 @@ def read(path: Path) -> Shapes:
 def _is_mode(dataset: dict) -> bool:
     """Return whether a dataset is a normal or a complex mode."""
     is_shape = dataset.get("type") == 55
-    return is_shape and dataset.get("analysis_type") in (NORMAL_MODE, *COMPLEX_MODES)
+    return is_shape and dataset.get("analysis_type") in (NORMAL_MODE_TYPE, *COMPLEX_MODE_TYPES)
 
 
-def _read_modes(datasets: list, factors: _UnitFactors) -> Shapes:
+def _read_modes(datasets: list, factors: _UnitFactors) -> MeasuredModes:
     """Read modes of dataset 55 and scale them to unit modal mass."""
     modes = []
     columns = []
     for number, dataset in enumerate(datasets, 1):
-        motion = _motion_by_place(dataset)
+        motion = _collect_motion(dataset)
         values = np.array(list(motion.values()))
-        if dataset["analysis_type"] == NORMAL_MODE:
+        if dataset["analysis_type"] == NORMAL_MODE_TYPE:
             mode = _read_normal_mode(number, dataset, values)
         else:
             mode = _read_complex_mode(number, dataset, values.astype(complex))
@@ -107,7 +107,7 @@ def _read_modes(datasets: list, factors: _UnitFactors) -> Shapes:
         modes.append(mode)
         columns.append(dict(zip(motion, mode.shape / np.sqrt(modal_mass))))
     places = dict.fromkeys(place for column in columns for place in column)
-    return Shapes(
+    return MeasuredModes(
         frequency=np.array([mode.frequency for mode in modes]),
         zeta=np.array([mode.zeta for mode in modes]),
         motion={
@@ -117,10 +117,10 @@ def _read_modes(datasets: list, factors: _UnitFactors) -> Shapes:
     )
 
 
-def _motion_by_place(dataset: dict) -> dict:
+def _collect_motion(dataset: dict) -> dict:
     """Return the motion of a shape in each direction (node, axis)."""
     motion = {}
-    for axis in range(len(AXES)):
+    for axis in range(len(DIRECTION_NAMES)):
         column = dataset.get(f"r{axis + 1}")
         if column is not None:
             for node, value in zip(dataset["node_nums"], column):
@@ -167,7 +167,7 @@ def _rotate_to_real(values):
     return values * np.exp(-0.5j * np.angle(np.sum(values**2)))
 
 
-def _fit_responses(datasets: list, factors: _UnitFactors) -> Shapes:
+def _fit_responses(datasets: list, factors: _UnitFactors) -> MeasuredModes:
     """Fit modes to frequency responses of dataset 58."""
     kinds = {str(dataset["func_type"]) for dataset in datasets}
     datasets = [
@@ -187,20 +187,20 @@ def _fit_responses(datasets: list, factors: _UnitFactors) -> Shapes:
             f"{dataset['ref_node']}:{dataset['ref_dir']:+d}"
         )
         derivative = _check_response(dataset, name, frequency)
-        sign_out, place = _signed_place(dataset["rsp_node"], dataset["rsp_dir"])
-        sign_in, reference = _signed_place(dataset["ref_node"], dataset["ref_dir"])
-        unit_out = _unit_of_label(dataset["ordinate_axis_units_lab"], notes)
-        unit_in = _unit_of_label(dataset["orddenom_axis_units_lab"], notes)
+        sign_out, place = _find_direction(dataset["rsp_node"], dataset["rsp_dir"])
+        sign_in, reference = _find_direction(dataset["ref_node"], dataset["ref_dir"])
+        unit_out = _find_unit_factor(dataset["ordinate_axis_units_lab"], notes)
+        unit_in = _find_unit_factor(dataset["orddenom_axis_units_lab"], notes)
         scale = sign_out * sign_in * (unit_out / unit_in) * (factors.force / factors.length)
         measured[place, reference] = (scale * np.asarray(dataset["data"]), derivative)
-    return modal_fit.modes_from_responses(frequency, measured, notes)
+    return modal_fit.identify_modes(frequency, measured, notes)
 
 
 def _check_response(dataset: dict, name: str, frequency) -> int:
     """Check a response of dataset 58; return its time derivative of the displacement."""
     kind = dataset["ordinate_spec_data_type"]
     input_kind = dataset["orddenom_spec_data_type"]
-    if kind not in DERIVATIVES or input_kind not in FORCES:
+    if kind not in DERIVATIVE_ORDERS or input_kind not in FORCE_TYPES:
         raise PatchfemError(
             f"structure.file: {name} is a response of type {kind} per input of type {input_kind}; "
             "displacement (8), velocity (11) or acceleration (12) per force (13) is needed"
@@ -217,22 +217,22 @@ def _check_response(dataset: dict, name: str, frequency) -> int:
         raise PatchfemError(
             f"structure.file: {name} contains values that are not finite or not complex"
         )
-    return DERIVATIVES[kind]
+    return DERIVATIVE_ORDERS[kind]
 
 
-def _unit_of_label(label: str | None, notes: list) -> float:
+def _find_unit_factor(label: str | None, notes: list) -> float:
     """Return the SI units per unit of an axis label; `notes` receives a note on an unknown one."""
     label = (label or "").strip()
-    if label.lower() not in SI_LABELS and label not in UNITS:
+    if label.lower() not in SI_LABELS and label not in UNIT_FACTORS:
         note = f"structure.file: the unit label '{label}' is not known; the values are taken as SI"
         if note not in notes:
             notes.append(note)
-    return UNITS.get(label, 1.0)
+    return UNIT_FACTORS.get(label, 1.0)
 
 
-def _signed_place(node: int, direction: int) -> tuple:
+def _find_direction(node: int, direction: int) -> tuple:
     """Return the sign and the (node, axis) of a direction +-1 to +-6 of a universal file."""
-    if not 1 <= abs(direction) <= len(AXES):
+    if not 1 <= abs(direction) <= len(DIRECTION_NAMES):
         raise PatchfemError(
             f"structure.file: direction {direction} of node {node} is unknown; +-1 to +-6 for x, y, z, "
             "rx, ry, rz is needed"

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.special import gamma, gammainc, gammaincc, gammaln, hyp1f1, xlogy
 
-from patchfem.closed_forms.contact import positive
+from patchfem.closed_forms.contact import require_positive
 
 
 def _reading(reading):
@@ -76,7 +76,7 @@ def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):
     speed [m/s] of either sign, ratio = eps_k/eps_0, rest_growth a_s [m s-2], slip_growth l_k [m]; ValueError unless
     the last four are positive.
     """
-    positive(length=length, ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth)
+    require_positive(length=length, ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth)
     slow = 1 / np.hypot(1.0, np.asarray(speed, float) / np.sqrt(rest_growth * slip_growth))
     return length * (ratio + (1 - ratio) * slow * slow)
 
@@ -87,7 +87,7 @@ def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
     limit*(P(p + 1, x) + m_0 phi_p(x)), x = slide/length, P the lower incomplete gamma function, phi_p = x^p e^-x/p!.
     Stretch p = 1, m_0 = 1 and report p = 0, m_0 = 0 are both 1 - e^-x. ValueError for p <= -1 or a slide < 0.
     """
-    positive(length=length)
+    require_positive(length=length)
     x = np.asarray(slide, float) / length
     if order <= -1:
         raise ValueError(f"order must exceed -1, got {order}")
@@ -108,7 +108,7 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
     e^-2x - P(p + 1, x) - x^(p+1) e^-x M(1, p + 2, -x)/(p + 1)!, M Kummer's function.
     ValueError for a way back < 0, another reading, or an order <= -1 (report) or < 0 (stretch).
     """
-    positive(length=length)
+    require_positive(length=length)
     _reading(reading)
     x = np.asarray(back, float) / length
     if np.any(x < 0):
@@ -134,7 +134,7 @@ def stretch_loop(amplitude, length, limit=1.0, breakaway=0.0):
     Up to x = b the loop is a line: no area, force limit x of a slide from rest. ValueError unless amplitude and length
     are positive and 0 <= breakaway <= 1.
     """
-    positive(amplitude=amplitude, length=length)
+    require_positive(amplitude=amplitude, length=length)
     if not 0 <= breakaway <= 1:
         raise ValueError(f"breakaway must be in [0, 1], got {breakaway}")
     x, b = np.asarray(amplitude, float) / length, breakaway
@@ -165,7 +165,7 @@ def report_loop(amplitude, length, limit=1.0):
     They are 4 limit (A coth(2A/eps) - eps/2) and limit: as printed the law reaches its full force at ANY amplitude.
     ValueError unless amplitude and length are positive.
     """
-    positive(amplitude=amplitude, length=length)
+    require_positive(amplitude=amplitude, length=length)
     amplitude = np.asarray(amplitude, float)
     return 4 * limit * (
         amplitude / np.tanh(2 * amplitude / length) - length / 2
@@ -178,6 +178,6 @@ def jenkins_loop(amplitude, length, limit=1.0):
     They are 4 limit (A - eps) and limit. Below the yield slide (amplitude <= length) the loop is a line: (0, limit
     A/eps). ValueError unless amplitude and length are positive.
     """
-    positive(amplitude=amplitude, length=length)
+    require_positive(amplitude=amplitude, length=length)
     amplitude = np.asarray(amplitude, float)
     return 4 * limit * np.maximum(amplitude - length, 0), limit * np.minimum(amplitude / length, 1)

@@ -7,7 +7,7 @@ and input a in the same unit (an acceleration, or a force over the same mass), m
 import numpy as np
 from scipy.optimize import brentq
 
-from patchfem.closed_forms.contact import positive
+from patchfem.closed_forms.contact import require_positive
 
 COULOMB_RESONANCE = np.pi / 4  # least f/a that bounds an undamped mode driven at its own frequency
 
@@ -18,7 +18,7 @@ def decay_half_cycles(start, friction) -> int:
     start x_0 [m], friction F/k [m]. The report leaves N_0 in 3.11 unrounded, but (-1)^N_0 needs an integer.
     ValueError unless friction is positive.
     """
-    positive(friction=friction)
+    require_positive(friction=friction)
     return max(0, int(np.ceil((abs(start) / friction - 1) / 2)))
 
 
@@ -27,7 +27,7 @@ def decay_rest(start, friction, omega) -> tuple:
 
     Arguments and refusals as in `decay`.
     """
-    positive(omega=omega)
+    require_positive(omega=omega)
     count = decay_half_cycles(start, friction)
     sign = 1.0 if start >= 0 else -1.0
     return np.pi * count / omega, sign * (-1.0) ** count * (abs(start) - 2 * count * friction)
@@ -65,7 +65,7 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
     antisymmetric over half a drive period, which gives A and B; the rest follows from the particular
     amplitude 1/|1 - r^2 + 2 i xi r|.
     """
-    positive(r=r)
+    require_positive(r=r)
     if friction < 0 or not 0 <= damping < 1:
         raise ValueError(
             f"friction must be >= 0 and damping must lie in [0, 1), got friction = {friction} and damping "

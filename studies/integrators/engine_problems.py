@@ -19,7 +19,7 @@ from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_model
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene import scene
-from patchfem.structure.drives import release
+from patchfem.structure.drives import make_release
 
 HERE = Path(__file__).parent
 POINTS = 20  # per cycle at which slides are compared
@@ -73,7 +73,7 @@ def problem(name: str) -> Problem:
         made = Problem(
             name,
             problems.PLAIN,
-            release(2 * half),
+            make_release(2 * half),
             1.0,
             16,
             {"limit": 1.0, "xi": 0.0, "size": 0.0, "place": 11.5},

@@ -12,7 +12,7 @@ from problems import SDOF, SDOF_DRIVE, SDOF_LIMIT, TWO, TWO_LIMIT, exact
 from report_methods import Law, coulomb, elastic_plastic, solve_duhamel, solve_newmark
 
 from patchfem.core import DriveSegment
-from patchfem.structure.drives import Piecewise
+from patchfem.structure.drives import PiecewiseDrive
 
 SLIDES = 8.079711463905416  # exact instant at which mass 2 moves first
 END, MOVED = 40.0, 0.05
@@ -58,7 +58,7 @@ class Row:
 
 def solve(name, law: Law, step, criterion, tolerance, relax) -> Row:
     """Run one case and judge it."""
-    drive = Piecewise((DriveSegment(0.0, 0.0, 1.0, 1.14),), 1000 * step, False)
+    drive = PiecewiseDrive((DriveSegment(0.0, 0.0, 1.0, 1.14),), 1000 * step, False)
     found = solve_duhamel(
         TWO,
         drive,

@@ -32,7 +32,7 @@ from vibration_forms import decay
 import patchfem as pf
 from patchfem.core import DriveSegment, InitialState
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.structure.drives import Piecewise
+from patchfem.structure.drives import PiecewiseDrive
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
@@ -82,7 +82,7 @@ def solve(omega: float, ratio: float) -> Row:
 
 def stepped(step: float = 0.05) -> tuple:
     """(time, x, share of steps that do not converge) of the first reading by the report's steps."""
-    drive = Piecewise((DriveSegment(0.0, 0.0, 0.0, 1.0),), 1000 * step, False)
+    drive = PiecewiseDrive((DriveSegment(0.0, 0.0, 0.0, 1.0),), 1000 * step, False)
     found = solve_duhamel(
         PLAIN,
         drive,

@@ -29,7 +29,7 @@ from told import told
 
 import patchfem as pf
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.structure.response import receptance
+from patchfem.structure.response import compute_receptance
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
@@ -55,7 +55,12 @@ class Free(NamedTuple):
 def transmissibility(f) -> np.ndarray:
     """Acceleration of the block over that of the base (k,), complex, of the scene's modes at f (k,) [Hz]."""
     modes, omega = pf.build(SCENE).rig.modes, 2 * np.pi * np.asarray(f, float)
-    return 1 + omega**2 * modes.mass * receptance(modes, omega, modes.output, modes.base)[:, 0, 0]
+    return (
+        1
+        + omega**2
+        * modes.mass
+        * compute_receptance(modes, omega, modes.output, modes.base)[:, 0, 0]
+    )
 
 
 def curve() -> Free:

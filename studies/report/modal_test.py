@@ -15,7 +15,7 @@ from patchfem.dynamics.march.march import march, warm_up
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.rig.interface import contact_of
 from patchfem.runs.rig.numerics import choose
-from patchfem.structure.drives import Recorded
+from patchfem.structure.drives import RecordedDrive
 
 G, RATE, STEPS = 9.80665, 4000.0, 32  # rows per second; rows that count as a cycle
 BAND = (20.0, 400.0)  # of the random base [Hz]
@@ -44,7 +44,7 @@ class Estimate(NamedTuple):
         return Estimate(self.f[inside], self.h[inside], self.coherence[inside])
 
 
-def random_base(seconds: float, rms: float, seed: int = 1) -> Recorded:
+def random_base(seconds: float, rms: float, seed: int = 1) -> RecordedDrive:
     """A normal random record, even over BAND; rms in g."""
     count = int(seconds * RATE)
     f, random = np.fft.rfftfreq(count, 1 / RATE), np.random.default_rng(seed)
@@ -54,7 +54,7 @@ def random_base(seconds: float, rms: float, seed: int = 1) -> Recorded:
     value = np.fft.irfft(lines, count)
     value *= rms * G / value.std()
     value[0] = 0.0
-    return Recorded(np.arange(count) / RATE, value, STEPS / RATE)
+    return RecordedDrive(np.arange(count) / RATE, value, STEPS / RATE)
 
 
 def marched(scene, drive=None, steps: int = STEPS, seconds: float | None = None):

@@ -16,8 +16,8 @@ from patchfem.campaigns.rows.computed import Computed
 from patchfem.campaigns.rows.null_models import predicted
 from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N
-from patchfem.identify.least_squares import NEAR_BOUND, descents
-from patchfem.identify.space import CubeResidual, space
+from patchfem.identify.least_squares import NEAR_BOUND_FRACTION, run_descents
+from patchfem.identify.space import CubeResidual, make_space
 
 MIL = 25.4e-6
 SCORES = HERE / "scores.json"
@@ -154,12 +154,12 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
     the best training score its training score and the scores of the readings that were not fitted}.
     """
     wanted, residual = computed.asked.wanted, residual_of(cells, computed, seen, "bound")
-    box = space([one.low for one in wanted], [one.high for one in wanted])
+    box = make_space([one.low for one in wanted], [one.high for one in wanted])
     quick, drawn, random = CubeResidual(residual, box, quick=True), np.random.default_rng(SEED), 0
-    ends = descents(quick, [box.unit(one) for one in begins], before=computed.forget)
+    ends = run_descents(quick, [box.unit(one) for one in begins], before=computed.forget)
     while True:
         points = drawn.random((starts - random, SCREEN, len(wanted)))
-        ends += descents(
+        ends += run_descents(
             quick,
             [screened(quick, some, computed.forget) for some in points],
             before=computed.forget,
@@ -168,10 +168,10 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
         zeros = [
             np.where(np.arange(top.size) == k, 0.0, top)
             for k, one in enumerate(wanted)
-            if one.low == 0 and top[k] > NEAR_BOUND
+            if one.low == 0 and top[k] > NEAR_BOUND_FRACTION
         ]
-        ends += descents(quick, zeros, before=computed.forget)
-        last = descents(
+        ends += run_descents(quick, zeros, before=computed.forget)
+        last = run_descents(
             CubeResidual(residual, box),
             [min(ends, key=lambda one: one.cost).u],
             before=computed.forget,
@@ -200,7 +200,7 @@ def valleys_of(cells, computed, seen, last, ends) -> tuple:
     """(number of ends in the best valley, the other valleys near it) of (values, rms) at the ends of the starts; last:
     the Descent to the bottom of the best."""
     wanted, residual = computed.asked.wanted, residual_of(cells, computed, seen, "bound")
-    box = space([one.low for one in wanted], [one.high for one in wanted])
+    box = make_space([one.low for one in wanted], [one.high for one in wanted])
 
     def at(values) -> np.ndarray:
         computed.forget()
@@ -225,8 +225,13 @@ def rms(values) -> float:
 
 def bounds(wanted, values) -> list:
     """ "low", "high" or "" of every value: whether it lies within a thousandth of its range from an end."""
-    u = space([one.low for one in wanted], [one.high for one in wanted]).unit(np.asarray(values))
-    return ["low" if x < NEAR_BOUND else "high" if x > 1 - NEAR_BOUND else "" for x in u]
+    u = make_space([one.low for one in wanted], [one.high for one in wanted]).unit(
+        np.asarray(values)
+    )
+    return [
+        "low" if x < NEAR_BOUND_FRACTION else "high" if x > 1 - NEAR_BOUND_FRACTION else ""
+        for x in u
+    ]
 
 
 def gain(computed, reading: str, values) -> float | None:

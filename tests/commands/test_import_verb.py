@@ -128,7 +128,7 @@ def test_exact_the_response_written_is_read_by_structure_file(shaken, tmp_path):
         if one["type"] == 58
     ]
     assert kinds == [4, 6]
-    shapes = universal.read(tmp_path / "response.uff")
+    shapes = universal.read_universal(tmp_path / "response.uff")
     at = np.argmin(np.abs(shapes.frequency - HERTZ[1]))
     assert shapes.frequency[at] == pytest.approx(HERTZ[1], rel=1e-3)
     answer = cli("import", tmp_path / "response.uff", "-o", tmp_path / "modes.toml")

@@ -14,7 +14,7 @@ from scene_texts import BENCH
 
 from patchfem.core import Missing
 from patchfem.disk import exchange
-from patchfem.disk.lock import HOST, OWN_LOCK_PATHS, FolderLock, is_running, start_ticks
+from patchfem.disk.lock import HOST_HASH, OWN_LOCK_PATHS, FolderLock, is_running, read_start_ticks
 from patchfem.export.results import Folder
 from patchfem.export.sweeps.folder import Folder as SweepFolder
 from patchfem.export.sweeps.folder import Writer
@@ -77,7 +77,7 @@ def names(place: Path) -> set:
 def test_always_one_of_many_that_start_at_one_instant_owns_a_folder(tmp_path):
     count = 100
     for k in range(0, count, 2):  # every second one was left by a dead process
-        (tmp_path / str(k)).write_text(f"4194305 17 {HOST}")
+        (tmp_path / str(k)).write_text(f"4194305 17 {HOST_HASH}")
     several = [process(RACE, tmp_path, count) for _ in range(3)]
     for one in several:
         assert one.stdout.readline() == "ready\n"
@@ -114,17 +114,17 @@ def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
     path, pid = tmp_path / "lock", os.getppid()
     own = FolderLock(path, "out", "run")
     for text, free in (
-        (f"{pid} {start_ticks(pid)} {HOST}", False),
-        (f"{pid} 17 {HOST}", True),
-        (f"{pid} - {HOST}", False),
+        (f"{pid} {read_start_ticks(pid)} {HOST_HASH}", False),
+        (f"{pid} 17 {HOST_HASH}", True),
+        (f"{pid} - {HOST_HASH}", False),
         (str(pid), False),
         ("4194305", True),
         ("", True),
         ("\udcff\0", True),
         ("x" * 300, True),
         (f"{pid} 17 01234567", False),
-        (f"4194305 17 {HOST}", True),
-        (f"{os.getpid()} {start_ticks(os.getpid())} {HOST}", True),
+        (f"4194305 17 {HOST_HASH}", True),
+        (f"{os.getpid()} {read_start_ticks(os.getpid())} {HOST_HASH}", True),
     ):  # its own, which never ended
         path.write_text(text, errors="surrogateescape")
         if free:
@@ -144,7 +144,9 @@ def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
     own.release()  # what another one owns stays
     assert path.read_text() == "4194305"
     assert (
-        start_ticks(os.getpid()).isdecimal() and not is_running(4194305) and is_running(os.getpid())
+        read_start_ticks(os.getpid()).isdecimal()
+        and not is_running(4194305)
+        and is_running(os.getpid())
     )
 
 

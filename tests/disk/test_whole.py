@@ -19,10 +19,10 @@ from scene_texts import BENCH, COATED
 from patchfem.core import Missing
 from patchfem.disk.atomic_write import (
     PLACED_PATHS,
-    free_space,
+    find_free_space,
     is_partial_name,
+    make_partial_path,
     open_lossy,
-    partial_path,
     write_atomically,
     write_in_partial_folder,
     write_text,
@@ -161,7 +161,7 @@ def test_exact_what_is_not_whole_replaces_nothing(tmp_path, raised):
 
 
 def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_path):
-    path, name = tmp_path / "a.vtu", partial_path(tmp_path / "a.vtu").name
+    path, name = tmp_path / "a.vtu", make_partial_path(tmp_path / "a.vtu").name
     # beyond the largest number of a process
     dead = tmp_path / name.replace(str(os.getpid()), "4194305")
     living = tmp_path / name.replace(str(os.getpid()), str(os.getppid()))
@@ -179,11 +179,11 @@ def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_
 
 
 def test_refuses_before_it_writes_what_has_no_room(tmp_path):
-    space = free_space(tmp_path / "not" / "yet" / "a")
+    space = find_free_space(tmp_path / "not" / "yet" / "a")
     assert space.size > 0 and ("free" in space.limit or "limit" in space.limit)
     with limited(100):
         limit = "is the limit on the size of a file (ulimit -f)"
-        assert free_space(tmp_path / "a") == (100, limit, True)
+        assert find_free_space(tmp_path / "a") == (100, limit, True)
         with (
             pytest.raises(
                 Missing, match=r"a: not enough space: 101 bytes needed, 100 bytes is the limit"

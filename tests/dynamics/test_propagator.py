@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from patchfem.core import G_N, ModalBasis, SineDrive
 from patchfem.dynamics.propagator import propagator
-from patchfem.structure.drives import Recorded, Sweep, levels
+from patchfem.structure.drives import RecordedDrive, SweepDrive, make_levels
 
 W = 2 * pi * 143
 MODES = {
@@ -20,8 +20,8 @@ MODES = {
 }
 DRIVES = {
     "sine": SineDrive(5 * G_N, 2 * pi * 150),
-    "sweep": Sweep(120.0, 180.0, 0.05, 5 * G_N),
-    "swept displacement": Sweep(180.0, 90.0, 0.05, displacement=1e-4, logarithmic=True),
+    "sweep": SweepDrive(120.0, 180.0, 0.05, 5 * G_N),
+    "swept displacement": SweepDrive(180.0, 90.0, 0.05, displacement=1e-4, logarithmic=True),
     "force": SineDrive(20.0, 2 * pi * 40, False),
 }
 
@@ -107,11 +107,11 @@ def test_exact_step_against_dop853(kind, drive, steps):
 def test_exact_recorded_line_and_levels():
     """A straight recorded signal pushes a rigid mode by a t^3/6; a level scales the sine's own table."""
     rigid = basis(0.0, 0.0, mass=1.0)
-    line = Recorded(np.array([0.0, 10.0]), np.array([0.0, 30.0]), 0.5)
+    line = RecordedDrive(np.array([0.0, 10.0]), np.array([0.0, 30.0]), 0.5)
     prop = propagator(rigid, line, 5)
     added = prop.tables(line, 0, 1)[0]
     np.testing.assert_allclose(added[:2], [-3 * 0.1**3 / 6, -3 * 0.1**2 / 2], rtol=1e-12)
-    sine, two = SineDrive(4.0, W), levels([4.0, 6.0], W, 3)
+    sine, two = SineDrive(4.0, W), make_levels([4.0, 6.0], W, 3)
     prop = propagator(coupled(), sine, 20)
     own = prop.tables(sine, 0, 20)
     np.testing.assert_allclose(prop.tables(two, 40, 20), own, rtol=0, atol=1e-13)
@@ -163,7 +163,7 @@ def test_exact_energy_of_a_step_that_is_long_beside_stiff_modes(modes):
 def test_exact_doubled_step_is_the_step_itself(monkeypatch):
     """The same step by Gauss points and by doubling a short one, where both can: coupled modes or not."""
     for modes in (basis([W, 5 * W], [0.003, 0.4], (1, 1), (1, 0.5)), coupled()):
-        drive = Sweep(120.0, 180.0, 0.05, 5 * G_N)
+        drive = SweepDrive(120.0, 180.0, 0.05, 5 * G_N)
         direct = propagator(modes, drive, 300)
         monkeypatch.setattr("patchfem.dynamics.propagator.STIFF", 0.0)
         # ports that are named: nothing kept is taken

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.identify.correlation import effective_rows
+from patchfem.identify.correlation import estimate_effective_rows
 from patchfem.identify.least_squares import fit
 
 
@@ -20,7 +20,7 @@ def process(count, tie, seed):
 @pytest.mark.parametrize("tie", [0.0, 0.5, 0.8])
 def test_rows_of_a_first_order_process(tie):
     """n (1 - a)/(1 + a) for n large; the median of 200 series lies within three of its own standard errors of that."""
-    found = np.array([effective_rows(process(2000, tie, seed)) for seed in range(200)])
+    found = np.array([estimate_effective_rows(process(2000, tie, seed)) for seed in range(200)])
     within = 3 * np.sqrt(np.pi / 2) * found.std() / np.sqrt(found.size)
     assert within < 0.05 * found.mean()
     assert np.median(found) == pytest.approx(2000 * (1 - tie) / (1 + tie), abs=within)
@@ -32,8 +32,10 @@ def test_cycles_that_repeat_count_once():
     for seed in range(400):
         rng = np.random.default_rng(seed)
         cycles = [np.convolve(rng.normal(size=207), np.ones(8), "valid") for _ in range(4)]
-        alike.append(effective_rows(np.tile(cycles[0], 4)) / effective_rows(cycles[0]))
-        other.append(effective_rows(np.concatenate(cycles)))
+        alike.append(
+            estimate_effective_rows(np.tile(cycles[0], 4)) / estimate_effective_rows(cycles[0])
+        )
+        other.append(estimate_effective_rows(np.concatenate(cycles)))
     assert np.median(alike) == pytest.approx(1, abs=0.01)
     # three standard errors of the median
     assert np.median(other) == pytest.approx(800 / 8, rel=0.03)

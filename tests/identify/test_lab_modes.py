@@ -7,8 +7,8 @@ from lab_modes import OMEGA, RESIDUE, SAMPLES, STEP, TIME, ZETA, driven, free
 from patchfem.core import PatchfemError
 from patchfem.identify.decay import fit_decay
 from patchfem.identify.driven_modes import fit_driven_modes
-from patchfem.identify.frequency_response import estimate_response, even_step
-from patchfem.identify.measured_modes import modes_of_decay, modes_of_driven_record
+from patchfem.identify.frequency_response import estimate_response, find_time_step
+from patchfem.identify.measured_modes import identify_decay_modes, identify_driven_modes
 
 HERTZ = OMEGA / (2 * np.pi)
 
@@ -43,7 +43,7 @@ def test_exact_a_blow_that_rings_out_within_the_record_needs_no_window():
     modes = fit_driven_modes(STEP, force, response, "acceleration", found)
     np.testing.assert_allclose(modes.damping, 0.02, rtol=1e-7)
     np.testing.assert_allclose(modes.estimate_damping, 0.02, rtol=1e-6)
-    listed = modes_of_driven_record(
+    listed = identify_driven_modes(
         {"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf)
     )
     assert not listed.notes and listed.mass == pytest.approx(1 / 1.2, rel=1e-7)
@@ -96,17 +96,17 @@ def test_always_a_decay_by_dry_friction_is_said_not_to_be_exponential():
     """Coulomb friction takes the same from every cycle: a straight line, then rest."""
     time = TIME[:2000]
     value = np.maximum(1 - time / 0.6, 0) * np.cos(OMEGA[0] * time)
-    found = modes_of_decay({"time": time, "displacement": value}, 0.0)
+    found = identify_decay_modes({"time": time, "displacement": value}, 0.0)
     assert any("exponential, as with friction damping" in note for note in found.notes)
     # one mode, not the several that would make the line
     assert found.frequency == pytest.approx(HERTZ[:1], rel=1e-3)
-    clean = modes_of_decay(dict(zip(("time", "displacement"), free())), 0.0)
+    clean = identify_decay_modes(dict(zip(("time", "displacement"), free())), 0.0)
     assert len(clean.notes) == 1 and "logarithmic decrement" in clean.descriptions[0]
 
 
 def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
     force, response = driven("acceleration")
-    found = modes_of_driven_record(
+    found = identify_driven_modes(
         {"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf)
     )
     assert found.mass == pytest.approx(1 / 1.2, rel=1e-6)
@@ -120,7 +120,7 @@ def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
 def test_exact_base_motion_determines_participations_but_no_mass():
     """Absolute acceleration of a block that holds 0.9 of its mass in two modes: A = -base * output each."""
     base, relative = driven("acceleration")
-    found = modes_of_driven_record(
+    found = identify_driven_modes(
         {"time": TIME, "base_acceleration": base, "acceleration": base - relative / 2},
         None,
         None,
@@ -129,7 +129,7 @@ def test_exact_base_motion_determines_participations_but_no_mass():
     np.testing.assert_allclose(found.rows["base"] ** 2, RESIDUE / 2, rtol=1e-6)
     np.testing.assert_allclose(found.rows["output"] * found.rows["base"], RESIDUE / 2, rtol=1e-6)
     assert found.mass is None and "gives no modal mass" in found.notes[-1]
-    found = modes_of_driven_record(
+    found = identify_driven_modes(
         {"time": TIME, "base_acceleration": base, "acceleration": base - relative},
         None,
         None,
@@ -143,26 +143,26 @@ def test_exact_base_motion_determines_participations_but_no_mass():
 def test_refuses_records_by_name():
     force, response = driven("acceleration")
     with pytest.raises(PatchfemError, match="moves against the force"):
-        modes_of_driven_record(
+        identify_driven_modes(
             {"time": TIME, "force": -force, "acceleration": response}, None, None, (0, np.inf)
         )
     with pytest.raises(
         PatchfemError,
         match=r"one input \(force or base_acceleration\), but the record has time, acc",
     ):
-        modes_of_driven_record({"time": TIME, "acceleration": response}, None, None, (0, np.inf))
+        identify_driven_modes({"time": TIME, "acceleration": response}, None, None, (0, np.inf))
     with pytest.raises(PatchfemError, match="between 300 and 400 Hz"):
-        modes_of_driven_record(
+        identify_driven_modes(
             {"time": TIME, "force": force, "acceleration": response}, None, None, (300, 400)
         )
     with pytest.raises(PatchfemError, match="one response is needed"):
-        modes_of_decay({"time": TIME, "force": force})
+        identify_decay_modes({"time": TIME, "force": force})
     with pytest.raises(PatchfemError, match="the input is zero"):
         estimate_response(STEP, 0 * force, response)
     with pytest.raises(PatchfemError, match="a segment has 10 samples"):
         estimate_response(STEP, force, response, 10)
     with pytest.raises(PatchfemError, match="evenly sampled"):
-        even_step(TIME**1.01)
+        find_time_step(TIME**1.01)
     with pytest.raises(PatchfemError, match="grows instead of decaying"):
         fit_decay(TIME[:500], np.exp(3 * TIME[:500]) * np.cos(OMEGA[0] * TIME[:500]))
     with pytest.raises(PatchfemError, match="no decaying oscillation"):

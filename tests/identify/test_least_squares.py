@@ -8,8 +8,8 @@ from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
 from patchfem.identify.least_squares import fit
-from patchfem.identify.space import space
-from patchfem.identify.words import remarks
+from patchfem.identify.space import make_space
+from patchfem.identify.words import describe_fit
 
 RNG = np.random.default_rng(7)
 DESIGN = RNG.normal(size=(30, 3))
@@ -43,7 +43,7 @@ def test_exact_a_linear_problem_has_the_closed_form_intervals():
         and found.at_bound == ("",) * 3
         and found.unknown.shape == (0, 3)
     )
-    assert found.outcome is Outcome.DONE and found.agreed == 3 and remarks(found, "abc") == []
+    assert found.outcome is Outcome.DONE and found.agreed == 3 and describe_fit(found, "abc") == []
 
 
 @given(st.integers(0, 10_000), st.floats(-3, 3), st.integers(-8, 8))
@@ -78,7 +78,7 @@ def test_exact_a_value_pressed_on_its_bound_has_the_profile_of_the_plane():
     assert found.intervals[1] == pytest.approx([0.3, end], rel=2e-3) and found.open_ends[
         1
     ].tolist() == [True, False]
-    assert remarks(found, ["a", "b"]) == [
+    assert describe_fit(found, ["a", "b"]) == [
         "b is at its low bound 0.3: widen the range, or try another law"
     ]
 
@@ -109,7 +109,7 @@ def test_exact_two_values_known_by_their_product_are_named():
     )
     assert np.abs(found.unknown) == pytest.approx(np.array([[1, 1, 0, 0]]), abs=1e-6)
     assert found.unknown[0, 0] * found.unknown[0, 1] == pytest.approx(-1, abs=1e-6)
-    product, flat = remarks(found, "abcd")
+    product, flat = describe_fit(found, "abcd")
     assert "a and b cannot be determined separately" in product and product.endswith(
         "only their product is known"
     )
@@ -121,17 +121,18 @@ def test_exact_a_ratio_is_named_and_the_rest_keeps_its_interval():
     found = fit(lambda v: v[0] / v[1] * LINE + v[2] - 2 * LINE - 1 - noise, [1, 1, -3], [9, 9, 3])
     alone = fit(lambda v: v[0] * LINE + v[1] - 2 * LINE - 1 - noise, [1, -3], [9, 3])
     assert found.intervals[2] == pytest.approx(alone.intervals[1], rel=2e-2)
-    assert "only their ratio is known" in remarks(found, "abc")[0]
+    assert "only their ratio is known" in describe_fit(found, "abc")[0]
 
 
 def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
     data = RNG.normal(size=20)
     found = fit(lambda v: v[0] - data + 1e-3 * v[1], [-5, 0], [5, 1])
     alone = fit(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1])
-    assert "cannot be determined separately" in remarks(found, "ab")[0]
+    assert "cannot be determined separately" in describe_fit(found, "ab")[0]
     assert np.isnan(alone.intervals[1]).all() and alone.methods[1] == "none"
-    assert "b is not determined: its interval of 95 % reaches both ends of its range" in remarks(
-        alone, "ab"
+    assert (
+        "b is not determined: its interval of 95 % reaches both ends of its range"
+        in describe_fit(alone, "ab")
     )
 
 
@@ -158,7 +159,7 @@ def test_exact_a_wide_positive_range_is_searched_in_logarithms():
     assert np.log(found.intervals[0]) == pytest.approx(
         [spread.mean() - half, spread.mean() + half], abs=1e-6
     )
-    assert space([1.0, 1.0, -1.0], [10.0, 11.0, 1e3]).log.tolist() == [False, True, False]
+    assert make_space([1.0, 1.0, -1.0], [10.0, 11.0, 1e3]).log.tolist() == [False, True, False]
 
 
 def test_always_failures_are_counted_and_passed_over():
@@ -170,7 +171,10 @@ def test_always_failures_are_counted_and_passed_over():
     found = fit(residual, [0.0], [6.0], start=[5.0])
     assert found.values[0] == pytest.approx(1, abs=1e-9) and found.failures >= 5
     assert found.reason in ("too long", "the residual is not finite")
-    assert f"{found.failures} of {found.evaluations} evaluations failed" in remarks(found, "a")[-1]
+    assert (
+        f"{found.failures} of {found.evaluations} evaluations failed"
+        in describe_fit(found, "a")[-1]
+    )
 
 
 def test_refuses_what_cannot_be_fitted():

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.identify.measured_modes import decay_curve
-from patchfem.identify.swings import half_swings
+from patchfem.identify.measured_modes import compute_decay_curve
+from patchfem.identify.swings import find_half_swings
 from patchfem.response.decay_curve import compute_swing_curve
 
 
@@ -42,7 +42,7 @@ def covered(kind, seeds) -> np.ndarray:
         rng = np.random.default_rng(seed)
         t, y, frequency, ratio = kind(rng)
         found = compute_swing_curve(
-            half_swings(t, y + 10 ** rng.uniform(-4, -1.5) * rng.normal(size=t.size))
+            find_half_swings(t, y + 10 ** rng.uniform(-4, -1.5) * rng.normal(size=t.size))
         )
         out += zip(
             np.abs(found.frequency - frequency(found.amplitude)) <= found.frequency_error,
@@ -63,7 +63,7 @@ def test_exact_any_trace_gives_the_amplitude_of_the_displacement(name, power):
     zeta, w = 0.02, 500.0
     t = np.arange(2000) / 10000
     pole = w * complex(-zeta, np.sqrt(1 - zeta**2))
-    found, _ = decay_curve({"time": t, name: (pole**power * 1e-3 * np.exp(pole * t)).real})
+    found, _ = compute_decay_curve({"time": t, name: (pole**power * 1e-3 * np.exp(pole * t)).real})
     assert found.damping == pytest.approx(zeta, rel=2e-3)
     exact = 1e-3 * np.exp(-zeta * w * found.time)
     assert found.amplitude == pytest.approx(exact, rel=2e-3)
@@ -72,10 +72,10 @@ def test_exact_any_trace_gives_the_amplitude_of_the_displacement(name, power):
 def test_refuses_what_holds_no_decay():
     rng, t = np.random.default_rng(0), np.arange(500) / 1000
     with pytest.raises(PatchfemError, match=r"rise above the noise|samples per cycle"):
-        half_swings(t, rng.normal(size=t.size))
+        find_half_swings(t, rng.normal(size=t.size))
     with pytest.raises(PatchfemError, match="the free decay has 9 samples"):
-        half_swings(t[:9], t[:9])
+        find_half_swings(t[:9], t[:9])
     with pytest.raises(PatchfemError, match="the record contains no oscillation"):
-        half_swings(t, 0 * t)
+        find_half_swings(t, 0 * t)
     with pytest.raises(PatchfemError, match="samples per cycle"):
-        half_swings(t, np.cos(2 * np.pi * 300 * t))
+        find_half_swings(t, np.cos(2 * np.pi * 300 * t))

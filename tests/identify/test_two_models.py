@@ -5,13 +5,13 @@ import pytest
 
 from patchfem.core import PatchfemError
 from patchfem.identify.least_squares import fit
-from patchfem.identify.space import space
+from patchfem.identify.space import make_space
 from patchfem.identify.two_models import TwoModels
 
 X = np.linspace(0.1, 3.0, 30)
 # no values of the models below leave nothing over
 DATA = np.array([np.exp(-X) + 0.3 * np.sin(3 * X), 0.5 * X])
-BOX = space([0.1, 0.1], [5.0, 5.0])
+BOX = make_space([0.1, 0.1], [5.0, 5.0])
 
 
 def dear(values) -> np.ndarray:

@@ -20,7 +20,7 @@ MATRIX_73 = b"MATLAB 7.3 MAT-file" + bytes(500)
 
 
 def read_stiffness(path):
-    return matrices.read(path, "stiffness")
+    return matrices.read_matrix(path, "stiffness")
 
 
 def saved(write, **keys) -> bytes:

@@ -31,6 +31,6 @@ def test_exact_rows_of_numbers_without_mass_at_the_end_fit_a_larger_stiffness(tm
     stiffness, mass = tmp_path / "k.mtx", tmp_path / "m.mtx"
     stiffness.write_text("1 1 4.0\n1 2 -1.0\n2 2 3.0\n")
     mass.write_text("1 1 2.5\n")
-    pair = (matrices.read(stiffness, "stiffness"), matrices.read(mass, "mass"))
+    pair = (matrices.read_matrix(stiffness, "stiffness"), matrices.read_matrix(mass, "mass"))
     found = [one.values.toarray().tolist() for one in matrices.align_rows(*pair)]
     assert found == [[[4.0, -1.0], [-1.0, 3.0]], [[2.5, 0.0], [0.0, 0.0]]]

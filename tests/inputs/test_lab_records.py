@@ -11,7 +11,7 @@ from patchfem.inputs.laboratory import read_records
 from patchfem.inputs.loops import read_loop
 from patchfem.inputs.records import parse_requests
 from patchfem.inputs.signals import read_signal
-from patchfem.inputs.units import unit_factor
+from patchfem.inputs.units import find_unit_factor
 
 TIME, SLIDE, FORCE = loop(20, 1)
 
@@ -131,7 +131,7 @@ def test_exact_tables_of_instruments(tmp_path):
     ],
 )
 def test_exact_spellings_of_units(unit, factor):
-    assert unit_factor("acceleration", unit) == factor
+    assert find_unit_factor("acceleration", unit) == factor
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,7 @@ def bomb(path, shape):
 
 @pytest.mark.parametrize("shape", [(20_000, 20_000), (2_000_000, 2_000_000), (2001, 2000)])
 def test_refuses_an_array_by_its_head_before_it_is_unpacked(tmp_path, shape):
-    said, peak = peak_of(lambda: arrays.read(bomb(tmp_path / "a.npz", shape)))
+    said, peak = peak_of(lambda: arrays.read_arrays(bomb(tmp_path / "a.npz", shape)))
     assert (
         f"K of shape {shape[0]}x{shape[1]} is larger than 2000 coordinates" in said and peak < 2e6
     )
@@ -122,7 +122,7 @@ def test_refuses_a_matrix_of_matlab_by_its_head(tmp_path):
     scipy.io.savemat(
         tmp_path / "a.mat", {"K": np.ones((2001, 2000), np.uint8)}, do_compression=True
     )
-    said, peak = peak_of(lambda: arrays.read(tmp_path / "a.mat"))
+    said, peak = peak_of(lambda: arrays.read_arrays(tmp_path / "a.mat"))
     assert "K of shape 2001x2000" in said and peak < 1e6
 
 
@@ -142,13 +142,13 @@ def test_exact_arrays_of_a_file_are_those_that_were_saved(tmp_path):
         "other": np.zeros(5),
     }
     np.savez_compressed(tmp_path / "a.npz", **saved)
-    found = arrays.read(tmp_path / "a.npz")
+    found = arrays.read_arrays(tmp_path / "a.npz")
     assert set(found) == {"M", "K", "names"} and all(
         np.array_equal(found[key], saved[key]) for key in found
     )
     with pytest.raises(PatchfemError, match="contains values of 4000 bytes"):
         np.savez(tmp_path / "b.npz", names=np.array(["a" * 1000]))
-        arrays.read(tmp_path / "b.npz")
+        arrays.read_arrays(tmp_path / "b.npz")
 
 
 @pytest.mark.parametrize(
@@ -156,8 +156,8 @@ def test_exact_arrays_of_a_file_are_those_that_were_saved(tmp_path):
     [
         ("a.csv", measured.read_table, "more than 64 MiB of text"),
         ("a.msh", meshes.read_pieces, "more than 256 MiB"),
-        ("a.uff", universal.read, "more than 256 MiB"),
-        ("a.mat", arrays.read, "is damaged or of version 4"),
+        ("a.uff", universal.read_universal, "more than 256 MiB"),
+        ("a.mat", arrays.read_arrays, "is damaged or of version 4"),
         ("a.csv", read, "more than 64 MiB of text"),
     ],
 )

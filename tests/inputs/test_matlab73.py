@@ -139,7 +139,7 @@ def test_exact_a_rig_of_version_73_is_that_of_version_7(tmp_path):
     (tmp_path / "new.mat").write_bytes(written(rig, more))
     savemat(tmp_path / "old.mat", rig | {"K": stiff, "names": np.array(names, dtype=object)})
     new, old = (
-        arrays.build_basis(arrays.read(tmp_path / f"{name}.mat")) for name in ("new", "old")
+        arrays.build_basis(arrays.read_arrays(tmp_path / f"{name}.mat")) for name in ("new", "old")
     )
     assert (
         new.names == old.names

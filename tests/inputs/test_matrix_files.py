@@ -127,7 +127,9 @@ def written(path, kind: str):
 @pytest.mark.parametrize("kind", [".mtx", ".mat", ".npz"])
 def test_exact_matrices_of_plain_files(tmp_path, kind):
     stiffness, mass = written(tmp_path, kind)
-    found = matrices.align_rows(matrices.read(stiffness, "stiffness"), matrices.read(mass, "mass"))
+    found = matrices.align_rows(
+        matrices.read_matrix(stiffness, "stiffness"), matrices.read_matrix(mass, "mass")
+    )
     assert [np.array_equal(one.values.toarray(), true) for one, true in zip(found, (K, M))] == [
         True,
         True,
@@ -136,7 +138,7 @@ def test_exact_matrices_of_plain_files(tmp_path, kind):
 
 def test_exact_matrix_of_save_npz(tmp_path):
     sparse.save_npz(tmp_path / "k.npz", sparse.csr_array(K))
-    assert np.array_equal(matrices.read(tmp_path / "k.npz", "damping").values.toarray(), K)
+    assert np.array_equal(matrices.read_matrix(tmp_path / "k.npz", "damping").values.toarray(), K)
 
 
 @pytest.mark.parametrize("sparse_rows, big", [(False, False), (True, False), (True, True)])
@@ -154,15 +156,15 @@ def test_exact_output4(tmp_path, sparse_rows, big):
                 )
             )
     for file in files:
-        assert np.array_equal(matrices.read(file, "stiffness").values.toarray(), K), file
-        assert np.array_equal(matrices.read(file, "mass").values.toarray(), M), file
+        assert np.array_equal(matrices.read_matrix(file, "stiffness").values.toarray(), K), file
+        assert np.array_equal(matrices.read_matrix(file, "mass").values.toarray(), M), file
 
 
 @pytest.mark.parametrize("wide", [True, False])
 def test_exact_punched_cards_with_their_places(tmp_path, wide):
     (tmp_path / "a.pch").write_text(punched("KAAX", K, wide) + punched("MAAX", M, wide))
     stiffness, mass = matrices.align_rows(
-        *(matrices.read(tmp_path / "a.pch", name) for name in ("stiffness", "mass"))
+        *(matrices.read_matrix(tmp_path / "a.pch", name) for name in ("stiffness", "mass"))
     )
     assert stiffness.places.tolist() == [list(place) for place in PLACES]
     assert np.array_equal(stiffness.values.toarray(), K) and np.array_equal(
@@ -174,7 +176,7 @@ def test_exact_lines_of_abaqus(tmp_path):
     (tmp_path / "rows.mtx").write_text(lower(K, False))
     (tmp_path / "nodes.mtx").write_text(lower(K, True))
     by_rows, by_nodes = (
-        matrices.read(tmp_path / f"{name}.mtx", "stiffness") for name in ("rows", "nodes")
+        matrices.read_matrix(tmp_path / f"{name}.mtx", "stiffness") for name in ("rows", "nodes")
     )
     assert np.array_equal(by_rows.values.toarray(), K) and by_rows.places is None
     assert np.array_equal(by_nodes.values.toarray(), K) and by_nodes.places.tolist() == [
@@ -211,7 +213,7 @@ def test_exact_what_digits_that_a_file_lacks_leave_uncertain(told, rounded):
         words, off = matrices.estimate_rounding(short)
         assert words == told
         shares.append(
-            shape @ (short - whole) @ shape / matrices.quadratic_form_deviation(short, off, shape)
+            shape @ (short - whole) @ shape / matrices.compute_form_deviation(short, off, shape)
         )
     assert 0.85 < np.sqrt(np.mean(np.square(shares))) < 1.15
 
@@ -277,7 +279,7 @@ def test_refuses_each_bad_file_with_its_sentence(tmp_path, name):
     content, says = BAD[name]
     (tmp_path / name).write_text(content)
     with pytest.raises(PatchfemError) as caught:
-        matrices.read(tmp_path / name, "stiffness")
+        matrices.read_matrix(tmp_path / name, "stiffness")
     assert says in str(caught.value) and name in str(caught.value), str(caught.value)
 
 
@@ -289,7 +291,7 @@ def test_always_refuses_damaged_binary_matrices_by_a_sentence(tmp_path):
     ]:
         path.write_bytes(change)
         try:
-            matrices.read(path, "stiffness")
+            matrices.read_matrix(path, "stiffness")
         except PatchfemError as error:
             assert "k.op4" in str(error)
 
@@ -299,13 +301,13 @@ def test_refuses_names_that_are_not_known_and_sizes_that_differ(tmp_path):
     with pytest.raises(
         PatchfemError, match=r"contains no stiffness under a known name .* its arrays: A, B"
     ):
-        matrices.read(tmp_path / "a.npz", "stiffness")
+        matrices.read_matrix(tmp_path / "a.npz", "stiffness")
     np.savez(tmp_path / "k.npz", K=K)
     for wanted in ("mass", "damping"):
         with pytest.raises(
             PatchfemError, match=rf"of the file, K, has the name of a stiffness, but the {wanted}"
         ):
-            matrices.read(tmp_path / "k.npz", wanted)
+            matrices.read_matrix(tmp_path / "k.npz", wanted)
     one, small = (matrices.Matrix(sparse.csr_array(part)) for part in (K, M[:2, :2]))
     with pytest.raises(PatchfemError, match="differ in size: 4 x 4 and 2 x 2"):
         matrices.align_rows(one, small)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from patchfem.core import G_N, Missing, PatchfemError
-from patchfem.inputs.measured import FLAGS, read_table
+from patchfem.inputs.measured import FLAG_MEANINGS, read_table
 
 TABLE_1 = Path(__file__).parents[2] / "studies" / "rig" / "table1.csv"
 OMEGA = 2 * pi * 143
@@ -54,7 +54,7 @@ def test_exact_units_of_a_table(tmp_path):
     )
     assert first.displacement == pytest.approx(3e-6, rel=1e-15)
     assert (second.input, second.displacement, second.flag) == (4.0, None, "")
-    assert set("UR") < set(FLAGS)
+    assert set("UR") < set(FLAG_MEANINGS)
 
 
 @pytest.mark.parametrize("text, wanted", [

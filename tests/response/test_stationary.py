@@ -9,7 +9,7 @@ from scipy.signal import csd, welch
 from vibration_forms import shaken_rms
 
 from patchfem.response import stationary
-from patchfem.structure.noise import random_record
+from patchfem.structure.noise import draw_random_record
 
 
 def test_exact_spectra_are_those_of_scipy():
@@ -72,7 +72,7 @@ def test_exact_a_record_has_the_power_of_its_spectrum_between_its_rows():
     """Lines of the record, straight between its rows, over 40 seeds: the mean power is the spectrum's."""
     powers, (low, high), span = [], (20.0, 100.0), 5.0
     for seed in range(40):
-        drive = random_record((low, 50.0, high), (1.0, 4.0, 1.0), span, seed, 0.01)
+        drive = draw_random_record((low, 50.0, high), (1.0, 4.0, 1.0), span, seed, 0.01)
         f = np.arange(drive.time.size // 2 + 1) / span
         lines = (
             np.fft.rfft(drive.value[:-1]) / (drive.time.size - 1) * np.sinc(f * drive.time[1]) ** 2
@@ -87,5 +87,5 @@ def test_exact_a_record_has_the_power_of_its_spectrum_between_its_rows():
         span, rel=1e-12
     )
     assert not np.array_equal(
-        drive.value, random_record((low, high), (1.0, 1.0), span, 0, 0.01).value
+        drive.value, draw_random_record((low, high), (1.0, 1.0), span, 0, 0.01).value
     )

@@ -20,8 +20,8 @@ from patchfem.elasticity.elasticity import compute_displacement
 from patchfem.elasticity.recovery import get_cells, make_quadratures
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows
-from patchfem.model.files import faults
-from patchfem.model.pieces import extend_grid, piece_meshes, rounded_edges
+from patchfem.model.files import find_file_faults
+from patchfem.model.pieces import extend_grid, find_rounded_edges, make_piece_meshes
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.press import solve
@@ -52,7 +52,7 @@ def asked(text: str):
 def even(text: str):
     """The patch of a scene solved on its even interface."""
     model = asked(text)
-    return solve(model, *piece_meshes(model))
+    return solve(model, *make_piece_meshes(model))
 
 
 def towards(place: float, half: float, fine: float, growth: float = 1.2) -> np.ndarray:
@@ -153,7 +153,7 @@ def test_exact_the_narrow_piece_may_lie_above_or_below(text, outline):
 
 def test_exact_the_whole_load_passes_the_bond_lines_and_the_interface_of_either_piece():
     model = asked(COATED + OUTLINE.format("upper", "lower") + TILT.format(""))
-    patch = solve(model, *piece_meshes(model))
+    patch = solve(model, *make_piece_meshes(model))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     assert force.sum() == pytest.approx(model.loading.load, rel=1e-10)
     assert patch.pieces.interface.weight.sum() == pytest.approx(
@@ -172,7 +172,7 @@ def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(
     model = asked(
         text.replace("[contact.tilt]", OUTLINE.format("upper", "lower") + "[contact.tilt]")
     )
-    bodies = piece_meshes(model)
+    bodies = make_piece_meshes(model)
     write_mesh(bodies[0], tmp_path / "pair.vtu", bodies[1])
     again = build(
         loads(
@@ -182,7 +182,7 @@ def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(
             tmp_path / "scene.toml",
         )
     ).patch
-    a, b = values(solve(model, *bodies)), values(solve(again, *piece_meshes(again)))
+    a, b = values(solve(model, *bodies)), values(solve(again, *make_piece_meshes(again)))
     assert b == pytest.approx(a, rel=1e-8)
 
 
@@ -206,7 +206,7 @@ def test_always_errors_of_what_has_a_bound_hold_on_meshes_that_the_tolerance_cho
 def test_always_the_peak_beside_a_rounding_lies_in_the_bar_of_cells_that_pass_over_it(radius, tilt):
     tables = UPPER + f'length = "8 mm"\nend_radius = "{radius}"\n' + tilt
     model = asked(BLOCK + tables)
-    (*_, half), edge = rounded_edges(model)
+    (*_, half), edge = find_rounded_edges(model)
     true = values(graded(model, towards(half, model.pieces.length / 2, edge / 30)))
     for cells in (20, 150):
         found = measures(
@@ -242,15 +242,15 @@ def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer
     profile = '[contact.profile]\nfile = "before.csv"\n'
     scene = loads(BLOCK + NARROW.format("upper") + profile, tmp_path / "scene.toml")
     model = build(scene).patch
-    patch = solve(model, *piece_meshes(model))
+    patch = solve(model, *make_piece_meshes(model))
     assert patch.x[-1] == 4e-3 and np.ptp(patch.gap) > 0
-    assert faults(scene, tmp_path) == []
+    assert find_file_faults(scene, tmp_path) == []
     for text in (BLOCK, BLOCK + NARROW.format("upper").replace("8 mm", "8.3 mm")):
         scene = loads(text + profile, tmp_path / "scene.toml")
         model = build(scene).patch
         with pytest.raises(PatchfemError, match="trace"):
-            solve(model, *piece_meshes(model))
-        assert [key for key, _ in faults(scene, tmp_path)] == ["contact.profile.file"]
+            solve(model, *make_piece_meshes(model))
+        assert [key for key, _ in find_file_faults(scene, tmp_path)] == ["contact.profile.file"]
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from patchfem.formatting import format_length
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.pairs import as_piece
 from patchfem.mesh.tensor import graded_grid
-from patchfem.model.pieces import piece_meshes
+from patchfem.model.pieces import make_piece_meshes
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures, plane_band
 from patchfem.runs.patch.press import solve
@@ -58,7 +58,7 @@ def asked(*args, **kwargs):
 
 def solved(*args, **kwargs) -> tuple:
     found = asked(*args, **kwargs)
-    patch = solve(found, *piece_meshes(found))
+    patch = solve(found, *make_piece_meshes(found))
     return patch, values(patch)
 
 
@@ -235,7 +235,7 @@ def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
     found = build(
         scene(TILT.format(1e-4), meshed(tmp_path, coarse, fine), path=tmp_path / "scene.toml")
     ).patch
-    low, high = piece_meshes(found)
+    low, high = make_piece_meshes(found)
     patch = solve(found, low, high)
     assert patch.pair.joint is not None and (low.x.size, high.x.size) == (61, 97)
     forces = patch.pair.forces(patch.pressure.sigma_n * patch.pieces.interface.weight)
@@ -259,7 +259,7 @@ def test_refuses_a_mesh_whose_pieces_are_not_those_of_the_scene(tmp_path):
     with pytest.raises(
         PatchfemError, match=r"^0\.009 m in the scene, but 0\.00635 m in the upper"
     ) as caught:
-        piece_meshes(build(found).patch)
+        make_piece_meshes(build(found).patch)
     assert caught.value.key == "contact.height"
     with pytest.raises(
         PatchfemError, match=r"scene\.toml:4: contact\.height: 0\.009 m in the scene"
@@ -287,7 +287,7 @@ def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_
     round_ = replace(flat, points=frozen_array(points))
     keys = meshed(tmp_path, round_, round_)
     found = asked("", keys, path=tmp_path / "scene.toml")
-    patch = solve(found, *piece_meshes(found))
+    patch = solve(found, *make_piece_meshes(found))
     x = patch.x
     assert patch.gap == pytest.approx(x**2 / (2 * 5.0), rel=1e-9, abs=1e-18)
     mine, crown = values(patch), solved('[contact.crown]\nradius = "5 m"\n')[1]
@@ -314,10 +314,10 @@ def test_exact_the_chosen_mesh_meets_hertz_within_its_error():
 
 def test_exact_the_plane_band_is_the_other_plane_state():
     found = asked(TILT.format(1e-5))
-    patch = solve(found, *piece_meshes(found))
+    patch = solve(found, *make_piece_meshes(found))
     [sentence] = plane_band(found, patch)
     in_stress = replace(found, pieces=replace(found.pieces, plane="stress"))
-    stress = values(solve(in_stress, *piece_meshes(found)))
+    stress = values(solve(in_stress, *make_piece_meshes(found)))
     mine = values(patch)
     assert "approach by +" + format_length(stress["approach"] - mine["approach"], 3) in sentence
     assert (
@@ -326,7 +326,7 @@ def test_exact_the_plane_band_is_the_other_plane_state():
     )
     wide = asked()
     wide = replace(wide, pieces=replace(wide.pieces, width=60e-3))
-    assert plane_band(wide, solve(wide, *piece_meshes(wide))) == []
+    assert plane_band(wide, solve(wide, *make_piece_meshes(wide))) == []
 
 
 def test_always_the_bar_of_an_even_mesh_holds_the_error_of_its_rows():

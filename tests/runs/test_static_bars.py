@@ -13,7 +13,7 @@ from static_scenes import JUDGED, KINDS, drawn, judged_rows, solve_reference, te
 
 import patchfem as pf
 from patchfem import build
-from patchfem.model.pieces import piece_meshes
+from patchfem.model.pieces import make_piece_meshes
 from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.press import pressed
 
@@ -185,7 +185,7 @@ def test_always_the_bar_of_a_single_jump_holds_the_worn_peak():
 def test_a_ripple_is_said_where_the_pressure_zigzags(worn, said):
     """One join, which is expected to ripple by 6.7 %: a smooth pressure has none, one on alternating nodes has."""
     asked = build(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM).patch
-    pair = condensed(asked, *piece_meshes(asked))
+    pair = condensed(asked, *make_piece_meshes(asked))
     pair = replace(
         pair, joint=SimpleNamespace(ripple=0.067, reason="is expected to ripple by 6.7 %")
     )

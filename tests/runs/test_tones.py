@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.structure.tones import beat_cycles
+from patchfem.structure.tones import count_beat_cycles
 
 MODE = {"name": "axial", "frequency": 100.0, "damping": 0.02, "slide": 1.0}
 RIG = {
@@ -67,7 +67,7 @@ def test_exact_energies_balance_under_two_tones():
     [((96.0, 102.0), 16), ((100.0, 90.0, 110.0), 10), ((0.3, 0.2), 3), ((1e-9, 2e-9), 1)],
 )
 def test_exact_a_beat_is_the_shortest_time_after_which_all_tones_repeat(frequencies, cycles):
-    assert beat_cycles(frequencies) == cycles
+    assert count_beat_cycles(frequencies) == cycles
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from scene_texts import BLOCK, COULOMB, LINEAR, MODE, STRUCTURE, line_of, only
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
 from patchfem.model.source import locate_errors
-from patchfem.model.structure import build_modes, initial_state, named_motions
+from patchfem.model.structure import build_modes, compute_initial_state, compute_named_motions
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.overrides import BaseScene
@@ -76,7 +76,7 @@ def test_exact_linear_run_of_masses():
     assert value["relative_displacement_amplitude"] == pytest.approx(abs(x[1]), rel=1e-9)
     assert value["absolute_acceleration_peak"] == pytest.approx(abs(2.0 - w * w * x[1]), rel=1e-6)
     assert value["energy_balance"] < 1e-12 and result.outcome == "steady"
-    both = named_motions(result.plan.model.rig.modes, result.response.modal)
+    both = compute_named_motions(result.plan.model.rig.modes, result.response.modal)
     np.testing.assert_allclose(both[:, 1], result.response.output, atol=1e-15)
 
 
@@ -167,20 +167,24 @@ def test_exact_starts_of_a_scene():
     begin = '[structure.start]\ndisplacement = ["1 mm", "-2 mm"]\nvelocity = ["0 m/s", "3 mm/s"]\n'
     scene = loads(MASSES + begin)
     found = build_modes(scene)
-    start = initial_state(scene, found)
+    start = compute_initial_state(scene, found)
     np.testing.assert_allclose(found.shapes @ start.z, [1e-3, -2e-3], rtol=1e-13)
     np.testing.assert_allclose(found.shapes @ start.v, [0, 3e-3], rtol=1e-13, atol=1e-18)
     free = driven(MASSES, kind="free", displacement=1e-3)
-    np.testing.assert_allclose(found.shapes @ initial_state(free, found).z, [0, 1e-3], atol=1e-18)
+    np.testing.assert_allclose(
+        found.shapes @ compute_initial_state(free, found).z, [0, 1e-3], atol=1e-18
+    )
     free = driven(MASSES, kind="free", displacement=1e-3, mass=1)
-    np.testing.assert_allclose(found.shapes @ initial_state(free, found).z, [1e-3, 0], atol=1e-18)
+    np.testing.assert_allclose(
+        found.shapes @ compute_initial_state(free, found).z, [1e-3, 0], atol=1e-18
+    )
     step = driven(MASSES, waveform="step", displacement=1e-3, acceleration=None)
     np.testing.assert_allclose(
-        found.shapes @ initial_state(step, found).z, [-1e-3, -1e-3], rtol=1e-13
+        found.shapes @ compute_initial_state(step, found).z, [-1e-3, -1e-3], rtol=1e-13
     )
-    assert not initial_state(loads(MASSES), found).z.any()
+    assert not compute_initial_state(loads(MASSES), found).z.any()
     one = driven(STRUCTURE, kind="free", displacement=1e-3)
-    assert initial_state(one, build_modes(one)).z.tolist() == [1e-3]
+    assert compute_initial_state(one, build_modes(one)).z.tolist() == [1e-3]
     assert (
         "structure.start" in scene.effect_names()
         and loads(scene.resolved()).structure.start == scene.structure.start
@@ -334,7 +338,7 @@ def test_refuses_files_at_the_line_of_the_scene(tmp_path):
     with pytest.raises(
         PatchfemError, match=r":8: structure\.start: 1 values are given for 2 modes or masses"
     ):
-        initial_state(late, build_modes(late))
+        compute_initial_state(late, build_modes(late))
     with pytest.raises(SceneError, match=r"structure\.file: there is no file"):
         write_scene(tmp_path, FILE.replace("rig.npz", "other.npz"))
     for text, says in (

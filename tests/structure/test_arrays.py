@@ -36,7 +36,7 @@ def test_exact_file_is_its_arrays(tmp_path, ending):
     else:
         savemat(path, data | {"K": csc_matrix(K)})
     found, want = (
-        arrays.build_basis(arrays.read(path)),
+        arrays.build_basis(arrays.read_arrays(path)),
         matrices.build_basis(M, K, C, faces=[0, 1], normal=[0.1, 0]),
     )
     for key in ("omega", "zeta", "damping", "slide", "base", "output", "normal", "shapes"):
@@ -48,7 +48,7 @@ def test_exact_one_coordinate_from_matlab(tmp_path):
     """MATLAB has no vectors and no numbers, only matrices."""
     names = np.array(["block"], dtype=object)
     savemat(tmp_path / "rig.mat", {"M": 2.0, "K": 8.0, "C": 0.4, "slide": 1.0, "names": names})
-    found = arrays.build_basis(arrays.read(tmp_path / "rig.mat"))
+    found = arrays.build_basis(arrays.read_arrays(tmp_path / "rig.mat"))
     assert found.names == ("block",) and (found.omega[0], found.zeta[0]) == pytest.approx(
         (2.0, 0.05)
     )
@@ -82,7 +82,7 @@ def test_exact_force_of_a_file():
 
 def test_exact_modal_file(tmp_path):
     np.savez(tmp_path / "rig.npz", **MODAL, pitch=np.array([0.0, 3.0]), yaw=np.zeros(2))
-    found = arrays.build_basis(arrays.read(tmp_path / "rig.npz"))
+    found = arrays.build_basis(arrays.read_arrays(tmp_path / "rig.npz"))
     np.testing.assert_array_equal(found.omega, 2 * np.pi * MODAL["frequency"])
     for key in ("slide", "base"):
         np.testing.assert_array_equal(getattr(found, key), MODAL[key])
@@ -152,13 +152,13 @@ def test_refuses_interfaces_that_are_not_there():
 def test_refuses_files_that_are_none(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(PatchfemError, match="cannot be read"):
-        arrays.read(tmp_path / name)
+        arrays.read_arrays(tmp_path / name)
 
 
 def test_refuses_objects(tmp_path):
     np.savez(tmp_path / "a.npz", M=np.array([{}], dtype=object))
     with pytest.raises(PatchfemError, match="not objects"):
-        arrays.read(tmp_path / "a.npz")
+        arrays.read_arrays(tmp_path / "a.npz")
 
 
 def test_refuses_numbers_of_many_bytes_by_the_header_alone(tmp_path):
@@ -175,7 +175,7 @@ def test_refuses_numbers_of_many_bytes_by_the_header_alone(tmp_path):
         with zipfile.ZipFile(tmp_path / "a.npz", "w") as file:
             file.writestr(f"{key}.npy", head.getvalue())
         with pytest.raises(PatchfemError, match=said):
-            arrays.read(tmp_path / "a.npz")
+            arrays.read_arrays(tmp_path / "a.npz")
 
 
 def test_refuses_a_list_of_members_that_is_too_long(tmp_path):
@@ -183,4 +183,4 @@ def test_refuses_a_list_of_members_that_is_too_long(tmp_path):
         for number in range(40):
             file.writestr(f"{number}" * 30_000, b"")
     with pytest.raises(PatchfemError, match=r"the list of members takes \d+ bytes"):
-        arrays.read(tmp_path / "a.npz")
+        arrays.read_arrays(tmp_path / "a.npz")

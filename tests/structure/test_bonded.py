@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from patchfem.core import ModalBasis, PatchfemError
 from patchfem.structure import masses
 from patchfem.structure.bonded import add_spring, remove_springs
-from patchfem.structure.response import receptance
+from patchfem.structure.response import compute_receptance
 
 
 def one(omega=3.0, zeta=0.01, slide=0.8, mass=2.0):
@@ -30,9 +30,9 @@ def test_always_equals_a_spring_that_was_there(seed):
     np.testing.assert_allclose(late.omega, soon.omega, rtol=1e-12)
     omega = np.array([0.3, 1.1, 2.7])
     for row in ("slide", "output"):
-        ours = receptance(late, omega, getattr(late, row), late.base)
+        ours = compute_receptance(late, omega, getattr(late, row), late.base)
         np.testing.assert_allclose(
-            ours, receptance(soon, omega, getattr(soon, row), soon.base), rtol=1e-9
+            ours, compute_receptance(soon, omega, getattr(soon, row), soon.base), rtol=1e-9
         )
     z = rng.normal(size=3)
     np.testing.assert_allclose(
@@ -73,8 +73,8 @@ def test_always_what_a_joint_adds_comes_off_again(seed):
     np.testing.assert_allclose(found.omega, omega, rtol=1e-10)
     at = np.array([0.3, 1.1, 2.7])
     np.testing.assert_allclose(
-        receptance(found, at, found.interfaces, found.base),
-        receptance(base, at, rows, base.base),
+        compute_receptance(found, at, found.interfaces, found.base),
+        compute_receptance(base, at, rows, base.base),
         rtol=1e-8,
     )
 

@@ -10,7 +10,13 @@ from patchfem.core import InitialState, ModalBasis, Outcome, PatchfemError, Sine
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model
 from patchfem.scene.scene import loads
-from patchfem.structure.drives import Recorded, Sweep, levels, release, step
+from patchfem.structure.drives import (
+    RecordedDrive,
+    SweepDrive,
+    make_levels,
+    make_release,
+    make_step,
+)
 
 W = 2 * np.pi * 143
 
@@ -26,7 +32,7 @@ def one(omega=W, zeta=0.003, base=1.0):
 @pytest.mark.parametrize("logarithmic", [False, True])
 @pytest.mark.parametrize("low, high", [(50.0, 200.0), (200.0, 50.0)])
 def test_exact_the_phase_of_a_sweep_is_the_integral_of_its_frequency(low, high, logarithmic):
-    sweep = Sweep(low, high, 2.0, 3.0, None, logarithmic)
+    sweep = SweepDrive(low, high, 2.0, 3.0, None, logarithmic)
     for t in (0.3, 1.7, 2.0, 2.4):
         turns = (
             quad(lambda s: float(sweep.frequency(s)), 0, min(t, 2.0), epsabs=1e-12)[0]
@@ -36,14 +42,14 @@ def test_exact_the_phase_of_a_sweep_is_the_integral_of_its_frequency(low, high, 
     assert sweep.frequency(np.array([0.0, 2.0, 9.0])) == pytest.approx([low, high, high])
     middle = np.sqrt(low * high) if logarithmic else (low + high) / 2
     assert sweep.frequency(1.0) == pytest.approx(middle)
-    other = Sweep(low, high, 2.0, 0.0, 1e-3, logarithmic)
+    other = SweepDrive(low, high, 2.0, 0.0, 1e-3, logarithmic)
     assert other.values(1.0) == pytest.approx(
         1e-3 * (2 * np.pi * middle) ** 2 * np.sin(other.phase(1.0))
     )
 
 
 def test_exact_levels_go_on_in_phase():
-    drive, sine = levels([2.0, 3.0], W, 2.5), SineDrive(1.0, W)
+    drive, sine = make_levels([2.0, 3.0], W, 2.5), SineDrive(1.0, W)
     t = np.linspace(0, 5 * sine.period, 101)[:-1]
     size = np.where(t < 2.5 * sine.period - 1e-12, 2.0, 3.0)
     assert drive.values(t) == pytest.approx(size * np.sin(W * t), abs=1e-12)
@@ -52,7 +58,7 @@ def test_exact_levels_go_on_in_phase():
 def test_refuses_a_signal_without_a_rising_time():
     for time in ([0.0], [0.0, 0.0], [1.0, 2.0]):
         with pytest.raises(PatchfemError, match=r"drive\.file"):
-            Recorded(np.array(time), np.zeros(len(time)), 1.0)
+            RecordedDrive(np.array(time), np.zeros(len(time)), 1.0)
 
 
 # ---- the march
@@ -83,9 +89,9 @@ def by_dop853(modes, drive, duration, at):
 @pytest.mark.parametrize(
     "drive",
     [
-        Sweep(100.0, 190.0, 0.1, 20.0),
-        Sweep(190.0, 100.0, 0.1, 0.0, 1e-4, True),
-        levels([10.0, 30.0, 5.0], W, 4),
+        SweepDrive(100.0, 190.0, 0.1, 20.0),
+        SweepDrive(190.0, 100.0, 0.1, 0.0, 1e-4, True),
+        make_levels([10.0, 30.0, 5.0], W, 4),
     ],
     ids=["up", "down, logarithmic, displacement", "levels"],
 )
@@ -97,7 +103,7 @@ def test_exact_linear_response_to_a_drive_is_that_of_dop853(drive):
 
 def test_exact_a_step_overshoots_and_settles():
     """-a/w^2 (1 - exp(-z w t)(cos + z/sqrt(1 - z^2) sin)); the accelerometer reads 0 - a + a at first, then w^2 z."""
-    drive, zeta = step(9.0, 2 * np.pi / W), 0.05
+    drive, zeta = make_step(9.0, 2 * np.pi / W), 0.05
     r = free(one(zeta=zeta), drive, 20, 40).response
     own = W * np.sqrt(1 - zeta**2)
     shape = 1 - np.exp(-zeta * W * r.time) * (
@@ -111,7 +117,7 @@ def test_exact_a_step_overshoots_and_settles():
 def test_exact_a_release_decays_and_its_energy_counts_as_work():
     """Free viscous decay in closed form; with friction the released energy is what is lost, to round-off."""
     got = free(
-        one(), release(2 * np.pi / W), 30, 50, InitialState(np.array([1e-3]), np.array([0.2]))
+        one(), make_release(2 * np.pi / W), 30, 50, InitialState(np.array([1e-3]), np.array([0.2]))
     )
     r, own, d = got.response, W * np.sqrt(1 - 0.003**2), 0.003 * W
     truth = np.exp(-d * r.time) * (
@@ -120,7 +126,7 @@ def test_exact_a_release_decays_and_its_energy_counts_as_work():
     assert r.slide == pytest.approx(truth, abs=1e-13)
     got = march(
         one(),
-        release(2 * np.pi / W),
+        make_release(2 * np.pi / W),
         jenkins_model([39.0 / 1e-6], [1e-6]),
         60,
         100,

@@ -5,8 +5,8 @@ import pytest
 
 from patchfem.core import PatchfemError
 from patchfem.structure import masses
-from patchfem.structure.modal_fit import fit_poles, modes_from_responses
-from patchfem.structure.response import receptance
+from patchfem.structure.modal_fit import fit_poles, identify_modes
+from patchfem.structure.response import compute_receptance
 
 BAND = np.arange(20.0, 400.0, 0.5)
 
@@ -69,7 +69,7 @@ def test_always_modes_outside_the_band_go_into_the_rest():
     f, zeta, shape = [5, 100, 200, 900], [0.01] * 4, np.random.default_rng(2).normal(size=(4, 4))
     data = responses(f, zeta, shape, 0, 1e-3)
     measured = {((k + 1, 0), (1, 0)): (data[:, k], 0) for k in range(4)}
-    found = modes_from_responses(BAND, measured, [])
+    found = identify_modes(BAND, measured, [])
     inside = [np.abs(found.frequency - one).argmin() for one in (100, 200)]
     np.testing.assert_allclose(found.frequency[inside], [100, 200], rtol=1e-4)
     assert np.all((found.frequency > 20) & (found.frequency < 400))
@@ -91,9 +91,9 @@ def test_exact_shapes_of_masses():
         *(getattr(rig, k) for k in ("slide", "base", "output", "mass")),
         shapes=rig.shapes,
     )
-    H = receptance(rig, 2 * np.pi * BAND, rig.shapes, rig.shapes[1])[:, :, 0]
+    H = compute_receptance(rig, 2 * np.pi * BAND, rig.shapes, rig.shapes[1])[:, :, 0]
     notes = []
-    found = modes_from_responses(BAND, {((k, 2), (1, 2)): (H[:, k], 0) for k in range(3)}, notes)
+    found = identify_modes(BAND, {((k, 2), (1, 2)): (H[:, k], 0) for k in range(3)}, notes)
     np.testing.assert_allclose(2 * np.pi * found.frequency, rig.omega, rtol=1e-8)
     np.testing.assert_allclose(found.zeta, zeta, rtol=1e-6)
     got = np.stack([found.motion[k, 2] for k in range(3)])
@@ -104,9 +104,9 @@ def test_exact_shapes_of_masses():
 def test_always_a_free_rig_is_told_that_its_rigid_mode_is_missing():
     """Two free masses: of rigid mode and sqrt(2) the elastic one is found, and the rigid one named as left out."""
     rig = masses.build_basis([1.0, 1.0], [((1, 2), 4e5)], [((1, 2), 8.0)], [], 1)
-    H = receptance(rig, 2 * np.pi * BAND, rig.shapes, rig.shapes[0])[:, :, 0]
+    H = compute_receptance(rig, 2 * np.pi * BAND, rig.shapes, rig.shapes[0])[:, :, 0]
     notes = []
-    found = modes_from_responses(BAND, {((k, 0), (0, 0)): (H[:, k], 0) for k in range(2)}, notes)
+    found = identify_modes(BAND, {((k, 0), (0, 0)): (H[:, k], 0) for k in range(2)}, notes)
     np.testing.assert_allclose(2 * np.pi * found.frequency, rig.omega[1:], rtol=1e-9)
     np.testing.assert_allclose(found.motion[0, 0], np.sqrt(0.5), rtol=1e-6)
     assert len(notes) == 1 and "rigid-body modes" in notes[0]
@@ -126,7 +126,7 @@ def test_refuses_responses_without_scale_or_modes():
         ({((1, 0), (1, 0)): (H[:, 0], 0), ((2, 0), (1, 0)): (H[:, 1], 2)}, "are mixed"),
     ):
         with pytest.raises(PatchfemError) as caught:
-            modes_from_responses(BAND, measured, [])
+            identify_modes(BAND, measured, [])
         assert says in str(caught.value)
     with pytest.raises(PatchfemError, match="at least 8 frequencies"):
-        modes_from_responses(BAND[:4], {((1, 0), (1, 0)): (H[:4, 0], 0)}, [])
+        identify_modes(BAND[:4], {((1, 0), (1, 0)): (H[:4, 0], 0)}, [])

@@ -8,7 +8,7 @@ from scipy.linalg import eig, eigh
 
 from patchfem.core import PatchfemError
 from patchfem.structure import masses, matrices
-from patchfem.structure.response import receptance
+from patchfem.structure.response import compute_receptance
 
 
 def chain(n, held=True, k=1.0):
@@ -81,18 +81,18 @@ def test_always_springs_one_by_one_are_their_matrix(seed, n):
     pairs = [(i + 1, int(rng.integers(0, i + 1))) for i in range(n)][int(rng.integers(0, 2)) :]
     springs = [(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))]
     m = rng.uniform(0.5, 2, n)
-    rows = masses.slide_rows(pairs, n)
+    rows = masses.make_slide_rows(pairs, n)
     ours = masses.build_basis(m, springs, [], [(1, 0)], n)
     want = matrices.build_basis(
         np.diag(m),
         rows.T @ np.diag([k for _, k in springs]) @ rows,
-        faces=masses.slide_rows([(1, 0)], n),
+        faces=masses.make_slide_rows([(1, 0)], n),
     )
     np.testing.assert_allclose(ours.omega, want.omega, atol=1e-12)
     assert (ours.omega == 0).sum() == (want.omega == 0).sum() == n - len(springs)
     w = np.array([0.37])
     np.testing.assert_allclose(
-        *(receptance(one, w, one.slide, one.base) for one in (ours, want)), rtol=1e-8
+        *(compute_receptance(one, w, one.slide, one.base) for one in (ours, want)), rtol=1e-8
     )
 
 
@@ -106,14 +106,14 @@ def test_always_dampers_one_by_one_are_their_matrix(seed, n):
     )
     m, dash = (
         rng.uniform(0.5, 2, n),
-        masses.slide_rows(pairs, n) * np.sqrt([[c] for _, c in dampers]),
+        masses.make_slide_rows(pairs, n) * np.sqrt([[c] for _, c in dampers]),
     )
     ours = masses.build_basis(m, springs, dampers, [(1, 0)], n)
-    stretch = masses.slide_rows(pairs, n) * np.sqrt([[k] for _, k in springs])
+    stretch = masses.make_slide_rows(pairs, n) * np.sqrt([[k] for _, k in springs])
     want = matrices.build_basis(
         np.diag(m),
         C=dash.T @ dash,
-        faces=masses.slide_rows([(1, 0)], n),
+        faces=masses.make_slide_rows([(1, 0)], n),
         output=np.eye(n)[n - 1],
         spring_rows=stretch,
     )

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
 from patchfem.structure import masses, matrices
-from patchfem.structure.response import receptance
+from patchfem.structure.response import compute_receptance
 
 
 @given(st.integers(0, 10**6), st.booleans())
@@ -21,7 +21,7 @@ def test_always_equals_the_direct_solve_and_is_reciprocal(seed, proportional):
     found = matrices.build_basis(M, K, C, faces=np.eye(n)[1])
     assert (found.damping is None) == proportional
     omega = rng.uniform(0.01, 3, 5)
-    ours = receptance(found, omega, found.shapes, found.shapes)
+    ours = compute_receptance(found, omega, found.shapes, found.shapes)
     for k, w in enumerate(omega):
         direct = np.linalg.inv(K + 1j * w * C - w * w * M)
         np.testing.assert_allclose(ours[k], direct, rtol=1e-8, atol=1e-10 * np.abs(direct).max())
@@ -35,7 +35,8 @@ def test_exact_base_drive_of_a_free_structure():
     """Nothing ties the masses to the base: each stays in space, so relative to the base it moves by -X."""
     found = masses.build_basis([1.0, 3.0], [((1, 2), 5.0)], [], [(2, 0)], 1)
     w = 1.7
-    moved = receptance(found, w, found.shapes, -w * w * found.base)  # base X = 1, acceleration -w^2
+    # base X = 1, acceleration -w^2
+    moved = compute_receptance(found, w, found.shapes, -w * w * found.base)
     np.testing.assert_allclose(-moved[0, :, 0], -1.0, rtol=1e-12)
 
 
@@ -45,4 +46,4 @@ def test_refuses_an_infinite_response():
     damped = masses.build_basis([1.0, 1.0], [((1, 2), 4.0)], [((1, 0), 1.0)], [], 1)
     for basis, at in ((free, 0.0), (held, 2.0), (damped, 0.0)):
         with pytest.raises(PatchfemError, match="is infinite"):
-            receptance(basis, at, basis.output, basis.output)
+            compute_receptance(basis, at, basis.output, basis.output)

@@ -6,7 +6,7 @@ import pyuff
 
 from patchfem.core import PatchfemError
 from patchfem.structure import masses, places, universal
-from patchfem.structure.response import receptance
+from patchfem.structure.response import compute_receptance
 
 SIX = 2e-5  # dataset 55 and the frequencies of 58 have six digits
 RIG = masses.build_basis(
@@ -84,7 +84,7 @@ def responses(kind=12, noise=0.0, sign=(1, 1, 1), every=0.5, **change):
     f = np.arange(20.0, 250.0, every)
     w = 2 * np.pi * f
     H = (
-        receptance(damped(), w, RIG.shapes, RIG.shapes[2])[:, :, 0]
+        compute_receptance(damped(), w, RIG.shapes, RIG.shapes[2])[:, :, 0]
         * ((1j * w) ** {8: 0, 11: 1, 12: 2}[kind])[:, None]
     )
     rng = np.random.default_rng(5)
@@ -117,20 +117,20 @@ def check(found, rtol, shape_tol):
 
 
 def test_exact_normal_modes(tmp_path):
-    found = universal.read(write(tmp_path / "a.uff", normal_modes()))
+    found = universal.read_universal(write(tmp_path / "a.uff", normal_modes()))
     check(found, SIX, SIX)
     np.testing.assert_allclose(found.zeta, ZETA, rtol=SIX)
     assert not found.notes
 
 
 def test_exact_complex_modes_are_turned_and_said(tmp_path):
-    found = universal.read(write(tmp_path / "a.uff", complex_modes()))
+    found = universal.read_universal(write(tmp_path / "a.uff", complex_modes()))
     check(found, SIX, SIX)
     np.testing.assert_allclose(found.zeta, ZETA, rtol=1e-4)
     assert len(found.notes) == 3 and "mode 1 is complex" in found.notes[0]
     sets = complex_modes()
     sets[1]["r2"] = sets[1]["r2"] * np.array([1, np.exp(0.1j), 1])
-    assert "leaves out" in universal.read(write(tmp_path / "b.uff", sets)).notes[1]
+    assert "leaves out" in universal.read_universal(write(tmp_path / "b.uff", sets)).notes[1]
 
 
 def test_exact_units_of_dataset_164(tmp_path):
@@ -145,17 +145,17 @@ def test_exact_units_of_dataset_164(tmp_path):
         "temp": 1.0,
         "temp_offset": 0.0,
     }
-    check(universal.read(write(tmp_path / "a.uff", [units, *normal_modes()])), SIX, SIX)
+    check(universal.read_universal(write(tmp_path / "a.uff", [units, *normal_modes()])), SIX, SIX)
     # mass unit lbf s^2/in = 175.1268 kg
     inches = units | {
         "length": 39.37007874,
         "force": 0.2248089431,
     }
-    found = universal.read(write(tmp_path / "b.uff", [inches, *normal_modes()]))
+    found = universal.read_universal(write(tmp_path / "b.uff", [inches, *normal_modes()]))
     np.testing.assert_allclose(
         np.abs(found.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=SIX
     )
-    found = universal.read(write(tmp_path / "c.uff", [inches, *responses(8)]))
+    found = universal.read_universal(write(tmp_path / "c.uff", [inches, *responses(8)]))
     np.testing.assert_allclose(
         np.abs(found.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=1e-5
     )
@@ -164,14 +164,14 @@ def test_exact_units_of_dataset_164(tmp_path):
 @pytest.mark.parametrize("kind", [8, 11, 12])
 def test_exact_modes_from_written_responses(tmp_path, kind):
     """Receptance, mobility and accelerance with a turned accelerometer give the modes back to 1e-6."""
-    found = universal.read(write(tmp_path / "a.uff", responses(kind, sign=(1, -1, 1))))
+    found = universal.read_universal(write(tmp_path / "a.uff", responses(kind, sign=(1, -1, 1))))
     check(found, 1e-6, 1e-6)
     np.testing.assert_allclose(found.zeta, ZETA, rtol=1e-6)
     assert not found.notes
 
 
 def test_always_noise_of_one_per_cent(tmp_path):
-    found = universal.read(write(tmp_path / "a.uff", responses(12, 0.01)))
+    found = universal.read_universal(write(tmp_path / "a.uff", responses(12, 0.01)))
     check(found, 1e-3, 0.03)
     np.testing.assert_allclose(found.zeta, ZETA, rtol=0.03)
 
@@ -180,8 +180,8 @@ def test_exact_accelerometer_in_g(tmp_path):
     sets = responses(12, ordinate_axis_units_lab="g")
     for one in sets:
         one["data"] = one["data"] / 9.80665
-    check(universal.read(write(tmp_path / "a.uff", sets)), 1e-6, 1e-6)
-    odd = universal.read(
+    check(universal.read_universal(write(tmp_path / "a.uff", sets)), 1e-6, 1e-6)
+    odd = universal.read_universal(
         write(tmp_path / "b.uff", responses(12, ordinate_axis_units_lab="furlong"))
     )
     assert any("'furlong' is not known" in note for note in odd.notes)
@@ -189,7 +189,7 @@ def test_exact_accelerometer_in_g(tmp_path):
 
 def test_exact_places_give_the_basis(tmp_path):
     """Scaled to a moving mass of 2 kg at node 12: slide of 13 against 11, base by the share of the block."""
-    shapes = universal.read(write(tmp_path / "a.uff", normal_modes()))
+    shapes = universal.read_universal(write(tmp_path / "a.uff", normal_modes()))
     found = places.build_basis(
         shapes,
         2.0,
@@ -213,14 +213,16 @@ def test_exact_places_give_the_basis(tmp_path):
     )
     # the modes answer a force as the rig itself does
     w = np.array([300.0, 700.0])
-    ours = receptance(found, w, found.output, found.slide)
+    ours = compute_receptance(found, w, found.output, found.slide)
     np.testing.assert_allclose(
-        ours, receptance(damped(), w, RIG.shapes[1], RIG.shapes[2] - RIG.shapes[0]), rtol=1e-3
+        ours,
+        compute_receptance(damped(), w, RIG.shapes[1], RIG.shapes[2] - RIG.shapes[0]),
+        rtol=1e-3,
     )
-    assert not places.participation_note(found)
+    assert not places.note_missing_mass(found)
     assert (
         "contain"
-        in places.participation_note(
+        in places.note_missing_mass(
             places.build_basis(shapes, 0.5, {"slide_at": "12:+y"}, is_forced=False)
         )[0]
     )
@@ -236,7 +238,7 @@ def test_exact_places_give_the_basis(tmp_path):
                                                "structure.moving_mass"),
 ])  # fmt: skip
 def test_refuses_places_that_are_not_there(tmp_path, where, says):
-    shapes = universal.read(write(tmp_path / "a.uff", normal_modes()))
+    shapes = universal.read_universal(write(tmp_path / "a.uff", normal_modes()))
     with pytest.raises(PatchfemError) as caught:
         places.build_basis(shapes, 2.0, where, is_forced=False)
     assert says in str(caught.value)
@@ -254,7 +256,7 @@ def test_refuses_places_that_are_not_there(tmp_path, where, says):
 ])  # fmt: skip
 def test_refuses_files_without_what_is_needed(tmp_path, sets, says):
     with pytest.raises(PatchfemError) as caught:
-        universal.read(write(tmp_path / "a.uff", sets))
+        universal.read_universal(write(tmp_path / "a.uff", sets))
     assert says in str(caught.value)
 
 
@@ -264,4 +266,4 @@ def test_refuses_files_without_what_is_needed(tmp_path, sets, says):
 def test_refuses_what_is_no_universal_file(tmp_path, content):
     (tmp_path / "a.uff").write_bytes(content)
     with pytest.raises(PatchfemError, match=r"cannot be read|no dataset 55"):
-        universal.read(tmp_path / "a.uff")
+        universal.read_universal(tmp_path / "a.uff")

@@ -16,7 +16,7 @@ from report_methods import (
 from scipy.linalg import expm
 
 from patchfem.core import DriveSegment, InitialState, SineDrive
-from patchfem.structure.drives import Piecewise, Recorded, release
+from patchfem.structure.drives import PiecewiseDrive, RecordedDrive, make_release
 
 DRIVE = SineDrive(1.3, 0.9)
 NO_FRICTION = 1e-300
@@ -75,7 +75,7 @@ def test_order_without_friction(solve, steps, order):
 
 
 def test_exact_a_free_mass_slides_under_a_constant_force():
-    drive = Recorded(np.array([0.0, 10.0]), np.array([3.0, 3.0]), 10.0, False)
+    drive = RecordedDrive(np.array([0.0, 10.0]), np.array([3.0, 3.0]), 10.0, False)
     start = InitialState(np.zeros(1), np.array([0.1]))
     found = solve_newmark(FREE, drive, coulomb(1.0), (10.0, 50), start=start)
     assert found.v[-1, 0] == pytest.approx(0.1 + 2.0 * 10)
@@ -86,7 +86,7 @@ def test_exact_a_free_mass_slides_under_a_constant_force():
 @pytest.mark.parametrize("needs_force, release_at", [(False, 3.0), (True, 1.0)])
 def test_exact_a_stick_speed_adds_to_the_friction(needs_force, release_at):
     """A force that grows by 1 N/s against 1 N: with v_th = 0.01 m/s the step of 0.01 s holds the mass up to 3 N."""
-    drive = Recorded(np.array([0.0, 4.0]), np.array([0.0, 4.0]), 4.0, False)
+    drive = RecordedDrive(np.array([0.0, 4.0]), np.array([0.0, 4.0]), 4.0, False)
     found = solve_newmark(FREE, drive, coulomb(1.0, 0.01), (4.0, 400), needs_force=needs_force)
     assert found.time[np.argmax(found.v[:, 0] > 0)] == pytest.approx(release_at, abs=0.021)
 
@@ -98,7 +98,7 @@ def test_order_of_the_first_slide(needs_force, order):
     for steps in (200, 400):
         found = solve_newmark(
             problems.PLAIN,
-            release(2 * np.pi),
+            make_release(2 * np.pi),
             coulomb(1.0, 1e-3),
             (3.0, steps),
             needs_force=needs_force,
@@ -124,7 +124,7 @@ LAWS = {
 @cache
 def two_masses(law: str, h: float, **how):
     """Return the motion of Fig 16 (m = k = P0 = 1, omega = 1.14) in steps of h."""
-    drive = Piecewise((DriveSegment(0.0, 0.0, 1.0, 1.14),), 1000 * h, False)
+    drive = PiecewiseDrive((DriveSegment(0.0, 0.0, 1.0, 1.14),), 1000 * h, False)
     return solve_duhamel(problems.TWO, drive, LAWS[law], (40.0, 1000), **how)
 
 
@@ -192,7 +192,7 @@ def test_exact_a_block_at_resonance_by_newmark(speed, steps, needs_force, peak, 
 def test_exact_newmark_in_free_decay(steps, error):
     start = InitialState(np.array([11.5]), np.zeros(1))
     found = solve_newmark(
-        problems.PLAIN, release(2 * np.pi), coulomb(1.0, 1e-2), (100.0, steps), start=start
+        problems.PLAIN, make_release(2 * np.pi), coulomb(1.0, 1e-2), (100.0, steps), start=start
     )
     half = np.floor(found.time / np.pi)
     # equation 3.11, N0 = 6
@@ -209,7 +209,7 @@ def test_exact_figure_5_by_euler(h, peak, within):
     omega, c = 0.1, 0.04
     response = 1 - omega**2 + 1j * c * omega
     segment = DriveSegment(0.0, 0.0, abs(response), omega, np.angle(response))
-    drive = Piecewise((segment,), 2 * np.pi / omega)
+    drive = PiecewiseDrive((segment,), 2 * np.pi / omega)
     steps = round(drive.period / h)
     found = solve_euler(
         problems.basis([1.0], [c / 2], [1.0], [1.0]),

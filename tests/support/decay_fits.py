@@ -26,7 +26,7 @@ from patchfem.campaigns.fits.curve import fit_curve, read_curve
 from patchfem.core import PatchfemError
 from patchfem.export.lab import imported
 from patchfem.identify.least_squares import descend
-from patchfem.identify.space import CubeResidual, space
+from patchfem.identify.space import CubeResidual, make_space
 from patchfem.model.model import build
 from patchfem.scene.overrides import BaseScene
 from patchfem.scene.ranges import read_ranges
@@ -163,7 +163,7 @@ def least(one: Made, place: Path, wanted: list) -> float:
         ]
         return ((np.array([curve.frequency, curve.damping]) - measured) / error).ravel()
 
-    box = space([key.low for key in wanted], [key.high for key in wanted])
+    box = make_space([key.low for key in wanted], [key.high for key in wanted])
     return descend(
         CubeResidual(residual, box, quick=True),
         box.unit(list(one.truth.values())),

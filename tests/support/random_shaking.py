@@ -8,7 +8,7 @@ import numpy as np
 from vibration_forms import shaken_rms
 
 from patchfem.response import stationary
-from patchfem.structure.noise import random_record
+from patchfem.structure.noise import draw_random_record
 
 # frequency [Hz], damping ratio, duration [s]
 CASES = (
@@ -32,7 +32,7 @@ def band_of(frequency: float) -> tuple:
 def shaken(frequency: float, damping: float, duration: float, seed: int) -> tuple:
     """(window, drive): the steady motion of an oscillator under a record, whose lines are those of the drive."""
     low, high = band_of(frequency)
-    drive = random_record((low, high), (LEVEL, LEVEL), duration, seed, 1 / frequency)
+    drive = draw_random_record((low, high), (LEVEL, LEVEL), duration, seed, 1 / frequency)
     f, omega = np.arange(drive.time.size // 2 + 1) / drive.duration, 2 * np.pi * frequency
     lines = (
         np.fft.rfft(drive.value[:-1])

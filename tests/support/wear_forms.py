@@ -6,7 +6,7 @@ and slip path; `path` [m]: slip path so far.
 
 import numpy as np
 
-from patchfem.closed_forms.contact import positive
+from patchfem.closed_forms.contact import require_positive
 
 
 def worn_volume(coefficient, load, path):
@@ -20,7 +20,7 @@ def worn_crown_half_width(coefficient, line_load, path, radius):
     Even pressure wears a parabola of height x^2/(2 radius) flat: 2 a^3/(3 R) = kappa P s per width. The elastic
     contact is not counted, so the value is approached from below.
     """
-    positive(radius=radius)
+    require_positive(radius=radius)
     return np.cbrt(1.5 * radius * coefficient * line_load * path)
 
 
@@ -30,7 +30,7 @@ def worn_pad_fraction(coefficient, line_load, path, angle, length, stiffness):
     c = sqrt(2 P (1/k + kappa s)/angle) as long as it is shorter than `length`, then 1: the worn depth adds to the
     compliance of every point.
     """
-    positive(angle=angle, length=length, stiffness=stiffness)
+    require_positive(angle=angle, length=length, stiffness=stiffness)
     return np.minimum(
         np.sqrt(2 * line_load * (1 / stiffness + coefficient * path) / angle) / length, 1.0
     )
@@ -42,5 +42,5 @@ def even_wear_pressure(line_load, path, weight):
     weight (m,) [m]: length of each node. Every point wears alike, so pressure times path is the same everywhere.
     """
     path = np.asarray(path, float)
-    positive(path=path)
+    require_positive(path=path)
     return line_load / path / np.sum(weight / path)

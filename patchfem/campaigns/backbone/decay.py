@@ -24,7 +24,7 @@ from ...response.decay_curve import (
 from ...runs.rig import decays, numerics
 from ...runs.rig.engines import ENGINES, PIECES, SMOOTH
 from ...structure import drives
-from ...structure.drive_sizes import decay_rate
+from ...structure.drive_sizes import find_decay_rate
 from .balance import HARMONICS, find_free_motions
 from .joint import MIN_AMPLITUDE_FACTOR, RELEASE_FACTOR, Joint
 from .records import Curve
@@ -337,7 +337,7 @@ def _grows(joint: Joint, found) -> bool:
     motion, shape = found.response, joint.shape
     _, places = find_turning_points(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     swings = np.abs(np.diff(places))
-    return decay_rate(joint.modes) < 0 and swings.size > 2 and swings[-1] > swings[0]
+    return find_decay_rate(joint.modes) < 0 and swings.size > 2 and swings[-1] > swings[0]
 
 
 def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
@@ -430,7 +430,7 @@ def release_model(joint: Joint, amplitude: float) -> Model:
     model = decays.steadily(joint.model)
     period = 2 * np.pi / (joint.held[0] or joint.modes.omega[joint.mode])
     rig = model.rig.with_signal(
-        drives.release(period),
+        drives.make_release(period),
         kind="free",
         waveform=NO_WAVEFORM,
         frequency=None,

@@ -9,7 +9,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...dynamics.events.elements import CELL_MERGES, join_cells
 from ...dynamics.harmonic.forces import Group
-from ...effects import law_has_trait, not_supported_message
+from ...effects import describe_unsupported, law_has_trait
 from ...model.model import Model
 from ...response.errors import error_of_change
 from ...runs.patch import result as patch_result
@@ -274,7 +274,7 @@ def build_joint(model: Model, name: str) -> Joint:
     modes, number = model.rig.modes, _find_mode(model.rig, name)
     if modes.lateral_faces is not None:
         key = next(one.key for one in model.rig.friction.interfaces if one.lateral)
-        refusal = not_supported_message("a backbone with interfaces that slide in a plane", "out")
+        refusal = describe_unsupported("a backbone with interfaces that slide in a plane", "out")
         raise PatchfemError(refusal, f"{key}.lateral")
     patch = None
     coarser: tuple = (None,)

@@ -19,7 +19,7 @@ import numpy as np
 from ...core import NotConverged, PatchfemError, frozen_array
 from ...formatting import format_length
 from ...identify.least_squares import Fit
-from ...identify.space import spread_points
+from ...identify.space import make_space_filling_points
 from ...identify.two_models import TwoModels
 from ...inputs.cells import TableFormat, read_text
 from ...inputs.columns import read_columns
@@ -292,7 +292,7 @@ def fit_curve(
 
     problem = Problem(scene, wanted, lambda values: misfit(curves.quick(values)))
     start, box = problem.own_values(), problem.box
-    trials = [start, *map(box.values, spread_points(MAX_TRIALS, len(start)))]
+    trials = [start, *map(box.values, make_space_filling_points(MAX_TRIALS, len(start)))]
     curves.choose_methods(trials)
     if say:
         say(f"{count} amplitudes computed by {' and '.join(curves.methods)}")

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...core import Outcome, PatchfemError
 from ...identify.least_squares import Fit, fit
-from ...identify.space import Space, space
-from ...identify.words import remarks
+from ...identify.space import SearchSpace, make_space
+from ...identify.words import describe_fit
 from ...model.model import Model, build
 from ...runs import joint
 from ...runs.patch import ladder
@@ -91,9 +91,9 @@ class Problem:
         return [*self.ranges, *self.offsets]
 
     @property
-    def box(self) -> Space:
+    def box(self) -> SearchSpace:
         """The space of the values."""
-        return space([one.low for one in self.bounds], [one.high for one in self.bounds])
+        return make_space([one.low for one in self.bounds], [one.high for one in self.bounds])
 
     def own_values(self) -> list:
         """Return starting values: those of the scene, else the middle of each range."""
@@ -130,7 +130,7 @@ class Problem:
         doubts : sequence of str
             Warnings that only this kind of fit gives.
         """
-        told = remarks(found, [bound.key for bound in self.bounds])
+        told = describe_fit(found, [bound.key for bound in self.bounds])
         warnings = [*self.scene.remarks, *self.notes, *told, *doubts]
         sets = self.assign(found.values)
         seconds = perf_counter() - begin

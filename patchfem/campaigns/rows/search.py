@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import NotConverged
-from ...identify.least_squares import Descent, Fit, assemble_fit, descents
-from ...identify.space import CubeResidual, space
+from ...identify.least_squares import Descent, Fit, assemble_fit, run_descents
+from ...identify.space import CubeResidual, make_space
 from .cells import Cells
 from .computed import Computed
 
@@ -127,7 +127,7 @@ def searched(
         If all starts fail.
     """
     wanted = computed.asked.wanted
-    box = space([one.low for one in wanted], [one.high for one in wanted])
+    box = make_space([one.low for one in wanted], [one.high for one in wanted])
     residual, n = residual_of(cells, computed, training, how.unstable), len(wanted)
     quick = CubeResidual(residual, box, quick=True)
     begins = np.random.default_rng(how.seed).random((how.starts, n))
@@ -148,13 +148,13 @@ def searched(
             known[n + 1],
         )
 
-    ends = descents(quick, begins, stored=kept, before=computed.forget, report=tell)
+    ends = run_descents(quick, begins, stored=kept, before=computed.forget, report=tell)
     rms = np.array([one.rms for one in ends])
     if np.isnan(rms).all():
         raise NotConverged(
             f"fit: all {how.starts} searches failed; the first failed for this reason: {quick.reason}"
         )
-    best = descents(
+    best = run_descents(
         CubeResidual(residual, box), [ends[int(np.nanargmin(rms))].u], before=computed.forget
     )
     found = assemble_fit(quick, best, bars, ends)

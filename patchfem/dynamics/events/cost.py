@@ -10,8 +10,8 @@ from math import pi, sqrt
 import numpy as np
 
 from ...core import ModalBasis
-from ...cost_model import PYTHON_PIECE_SECONDS, PYTHON_SAMPLE_FRACTION
-from ...structure.drive_sizes import max_frequency_ratio
+from ...cost_model import PYTHON_PIECE_SECONDS, PYTHON_SAMPLE_TIME_RATIO
+from ...structure.drive_sizes import find_max_frequency_ratio
 
 
 def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) -> float:
@@ -35,7 +35,9 @@ def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) ->
     most = stiffness * float((modes.interfaces**2).sum(axis=1).max(initial=0.0)) / modes.mass
     rate = damper + sqrt(damper**2 + float(modes.omega.max()) ** 2 + most)
     pieces = (
-        max(rate * drive.period, 2 * pi * max_frequency_ratio(drive)) / 2 + 4 * faces + 2 * elements
+        max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / 2
+        + 4 * faces
+        + 2 * elements
     )
     return PYTHON_PIECE_SECONDS * (1 + modes.omega.size) * (1 + faces) * pieces
 
@@ -43,7 +45,7 @@ def python_seconds(modes: ModalBasis, drive, stiffness: float, elements: int) ->
 def sample_seconds(modes: ModalBasis) -> float:
     """Estimate the CPU seconds of a sample of the motion as interpreted Python."""
     return (
-        PYTHON_SAMPLE_FRACTION
+        PYTHON_SAMPLE_TIME_RATIO
         * PYTHON_PIECE_SECONDS
         * (1 + modes.omega.size)
         * (1 + len(modes.interfaces))

@@ -15,8 +15,8 @@ from ...core import (
     Response,
     frozen_array,
 )
-from ...cost_model import PYTHON_READ_FRACTION
-from ...structure.drive_sizes import stored_samples_per_cycle
+from ...cost_model import PYTHON_READ_TIME_RATIO
+from ...structure.drive_sizes import choose_samples_per_cycle
 from .cost import python_seconds, sample_seconds
 from .elements import coulomb, element_stretches, make_table, unstretched_memory
 from .event_list import BORDER, MAX_EVENTS, RELEASE, REVERSAL, STOP, EventLog
@@ -157,7 +157,7 @@ def announce_runs(
     march.march.expect(runs * cycles * each)
     march.stored_energy.expect(runs * each)
     dense.evaluate_rows.expect(runs * shown * SAMPLES_PER_CYCLE * sample_seconds(modes))
-    read.read_rows.expect(PYTHON_READ_FRACTION * runs * shown * each)
+    read.read_rows.expect(PYTHON_READ_TIME_RATIO * runs * shown * each)
 
 
 def is_loop_kept(modes: ModalBasis, drive) -> bool:
@@ -246,7 +246,7 @@ def simulate(
         Memory of the elements at the start, unstretched by default.
     even : bool, optional
         Whether equally spaced samples of all cycles are kept, as `wanted` of
-        `stored_samples_per_cycle`.
+        `choose_samples_per_cycle`.
 
     Returns
     -------
@@ -629,7 +629,7 @@ class _Run:
         end = self.cycles
         wide = []
         late = []
-        even = stored_samples_per_cycle(self.drive, self.cycles, wanted=even)
+        even = choose_samples_per_cycle(self.drive, self.cycles, wanted=even)
         first = max(0.0, end - self.n_window)
         last = max(0.0, end - 1)
         begin = max(0.0, min(first, end - 2))

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...compiled import load
 from ...core import InitialState, ModalBasis, NotConverged, Response
-from ...cost_model import PYTHON_READ_FRACTION
+from ...cost_model import PYTHON_READ_TIME_RATIO
 from . import histories
 from .elements import Memory
 from .modal_system import make_modal_system, start_previous_cycle, start_sums
@@ -77,7 +77,7 @@ class Orbits:
             period_map, drive, near if self._is_compatible(near) else None
         )[0].point
         used, swing = self._march_half_period(drive, point, period_map.modal_system)
-        self.peak.expect(PYTHON_READ_FRACTION * period_map.seconds / 2)
+        self.peak.expect(PYTHON_READ_TIME_RATIO * period_map.seconds / 2)
         high = self.peak.call_with_bound_args(
             self._bound_arguments("peak", period_map.modal_system, float(drive.moving)),
             self.rows[:used],

@@ -14,7 +14,7 @@ from ...core import ModalBasis, Outcome, Response, SineDrive
 from ...formatting import format_length
 from ...friction.bonds.list_rows_kernels import STATUS
 from ...friction.path_work import sampled_work
-from ...structure.drive_sizes import stored_samples_per_cycle
+from ...structure.drive_sizes import choose_samples_per_cycle
 from ..checkpoint import Samples, slot_of
 from ..cycles import extremes_of, phasors_of, thinned
 from ..integrated import histories
@@ -239,7 +239,7 @@ def march(
         Whether extremes and phasors of all cycles are kept for bonds behind shear modes although `whole` is false,
         and the sample of the largest slide.
     even : bool
-        The argument `wanted` of `stored_samples_per_cycle`.
+        The argument `wanted` of `choose_samples_per_cycle`.
 
     Returns
     -------
@@ -277,7 +277,7 @@ def march(
         if not run.passed(before_last, lambda: slot.offer(run, samples)):
             run = restart()
             samples.again = True
-    n_even = stored_samples_per_cycle(drive, cycles, wanted=even)
+    n_even = choose_samples_per_cycle(drive, cycles, wanted=even)
     recorder = _Recorder(samples, keeps_samples, keeps_samples or keeps_folded, n_even)
     snapshots = _march_recorded(run, recorder, plan, slot, progress)
     run.check()

@@ -14,7 +14,7 @@ from ...compiled import load as compiled
 from ...contact.contact_sets import ContactSets
 from ...contact.set_arrays import N_BUILT, SetArrays, make_set_arrays, name_set
 from ...core import ModalBasis, PatchfemError, Response
-from ...effects import not_supported_message
+from ...effects import describe_unsupported
 from ...friction.bonds.list_rows_kernels import STATUS
 from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.stretch import growth_numbers
@@ -78,7 +78,7 @@ def bonds(law) -> Rubbing:
     """Return the stretch reading of bonds with order 1 at every point; PatchfemError for other bonds."""
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
         raise PatchfemError(
-            not_supported_message(
+            describe_unsupported(
                 "friction: a changing normal load together with reading = 'report', an order other "
                 "than 1 or a breakaway above 0",
                 "recursion",
@@ -110,7 +110,7 @@ def lists(law, reach: float, merge: float) -> Rubbing:
     """
     if law.reading != "report":
         raise PatchfemError(
-            not_supported_message(
+            describe_unsupported(
                 "friction: a changing normal load together with reading = 'stretch' and an order "
                 "other than 1",
                 "recursion",
@@ -134,13 +134,13 @@ def contact_sets_of(patch, spring: float = 0.0) -> ContactSets:
     """
     if patch.skin is not None:
         raise PatchfemError(
-            not_supported_message(
+            describe_unsupported(
                 "contact.asperities.law: a nonlinear law under a normal load that changes", "linear"
             )
         )
     if patch.strips is not None:
         raise PatchfemError(
-            not_supported_message("[contact.strips] with a normal load that changes", "either")
+            describe_unsupported("[contact.strips] with a normal load that changes", "either")
         )
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     c = patch.pieces.normal
@@ -369,7 +369,7 @@ def model_of(
     """
     if shear is not None and law.kind not in (PLASTIC, POINTS, LISTS):
         raise PatchfemError(
-            not_supported_message(
+            describe_unsupported(
                 "friction.law: this law together with [contact.shear] and a normal load that "
                 "changes",
                 "stiff",

@@ -11,7 +11,7 @@ from ... import compiled
 from ...core import IntegratedMeasures, ModalBasis, Outcome, Response
 from ...friction.laws.stretch import unpack_bonds
 from ...friction.path_work import sampled_work
-from ...structure.drive_sizes import stored_samples_per_cycle
+from ...structure.drive_sizes import choose_samples_per_cycle
 from ..events.modal_system import drive_segments
 from ..events.positions_kernels import KIND, SEGMENT
 from ..integrated import histories
@@ -541,7 +541,7 @@ def simulate(
         Is called with the fraction of the run that is done, whenever the loop returns.
     even : bool, optional
         Whether equally spaced samples of all cycles are kept, as `wanted` of
-        `stored_samples_per_cycle`.
+        `choose_samples_per_cycle`.
 
     Returns
     -------
@@ -557,7 +557,7 @@ def simulate(
     shots = []
     run.progress = progress
     whole = min(2.0, cycles) * period
-    even = stored_samples_per_cycle(drive, cycles, wanted=even)
+    even = choose_samples_per_cycle(drive, cycles, wanted=even)
     if even:
         begin = end - max(whole, window * period)
         kept.append(run.run_to(begin, np.arange(0, begin, period / even)))

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...core import G_N
-from ...formatting import axis_unit, format_number, needs_log_scale
+from ...formatting import choose_axis_unit, format_number, needs_log_scale
 
 # points of a line; frames of the shear stress behind the one with the largest resultant
 LINE, FRAMES = 6000, 24
@@ -144,9 +144,9 @@ def interface(x, fields: dict, name: str = "") -> list:
     """
     sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
     part = part_in_contact(x, sigma) or (x[0], x[-1])
-    along, size = axis_unit(part, "m")
+    along, size = choose_axis_unit(part, "m")
     place = axis("x", along) | {"range": [part[0] * size, part[1] * size]}
-    unit, scale = axis_unit(sigma, "Pa")
+    unit, scale = choose_axis_unit(sigma, "Pa")
     out = [
         chart(
             f"Pressure on {name or 'the interface'}",
@@ -159,7 +159,7 @@ def interface(x, fields: dict, name: str = "") -> list:
         )
     ]
     if tau is not None and np.any(tau):
-        unit, scale = axis_unit(tau, "Pa")
+        unit, scale = choose_axis_unit(tau, "Pa")
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
         shown = np.unique(
             np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int)
@@ -226,12 +226,12 @@ def bodies(x, depths, mises, sigma) -> list:
     depth = max(depths, key=lambda rows: rows[-1])
     box = closer(x, depth, sigma, 1.3)
     (unit, scale), top, out = (
-        axis_unit(np.concatenate([np.ravel(part) for part in mises]), "Pa"),
+        choose_axis_unit(np.concatenate([np.ravel(part) for part in mises]), "Pa"),
         0.0,
         [],
     )
     for left, right, height in (box, (x[0], x[-1], depth[-1])):
-        name, size = axis_unit((left, right, height), "m")
+        name, size = choose_axis_unit((left, right, height), "m")
         i = slice(max(np.searchsorted(x, left, "right") - 1, 0), np.searchsorted(x, right) + 1)
         rows = [part[: np.searchsorted(part, height) + 1] for part in depths]
         cells = [
@@ -271,7 +271,10 @@ def bodies(x, depths, mises, sigma) -> list:
 def worn_map(x, width: float, depth) -> list:
     """Return a map of the worn depth (s, m) [m] of strips over x (m,) [m] and the width [m]."""
     edges = np.linspace(-width / 2, width / 2, len(depth) + 1)
-    (unit, scale), (name, size) = axis_unit(depth, "m"), axis_unit(np.concatenate([x, edges]), "m")
+    (unit, scale), (name, size) = (
+        choose_axis_unit(depth, "m"),
+        choose_axis_unit(np.concatenate([x, edges]), "m"),
+    )
     along, over, means = coarser(x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, GRID)
     values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(means.shape)
     marks = [
@@ -342,7 +345,7 @@ def loop(slide, force, title: str, measured: tuple | None = None) -> list:
     measured : tuple, optional
         Measured slide and force.
     """
-    (along, size), (up, scale) = axis_unit(slide, "m"), axis_unit(force, "N")
+    (along, size), (up, scale) = choose_axis_unit(slide, "m"), choose_axis_unit(force, "N")
     read = (
         None
         if measured is None
@@ -435,9 +438,9 @@ def histories(
     time, value, (name, per) = (
         history["time"],
         history["displacement"],
-        axis_unit(history["time"], "s"),
+        choose_axis_unit(history["time"], "s"),
     )
-    unit, scale = axis_unit(value, "m")
+    unit, scale = choose_axis_unit(value, "m")
     begin = whole_from(time, period, window["time"][0] if window else 0.0) if period else time[0]
     late, marks = time >= begin, []
     if joined and not late.all():
@@ -450,7 +453,7 @@ def histories(
     out = [chart("Whole run", axis("time", name), axis("displacement", unit), marks)]
     if window is None:
         if np.any(history["force"]):
-            up, size = axis_unit(history["force"], "N")
+            up, size = choose_axis_unit(history["force"], "N")
             read = history.get("measured")
             read = read and line(
                 read[0] * per, read[1] * size, "soft", "measured", width=3, alpha=0.55
@@ -470,7 +473,10 @@ def histories(
             )
         return out
     since = window["time"] - window["time"][0]
-    (name, per), (unit, scale) = axis_unit(since, "s"), axis_unit(window["displacement"], "m")
+    (name, per), (unit, scale) = (
+        choose_axis_unit(since, "s"),
+        choose_axis_unit(window["displacement"], "m"),
+    )
     out.append(
         chart(
             title,
@@ -600,7 +606,7 @@ def curve(found: dict) -> list:
     largest acceleration with its first harmonic.
     """
     along, what, unit = axis_of(found)
-    name, scale = axis_unit(found["amplitude"], "m")
+    name, scale = choose_axis_unit(found["amplitude"], "m")
     value, parts = np.asarray(found["amplitude"]) * scale, spans(found)
     colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
     lost = np.concatenate([[False], ~np.isfinite(value), [False]]).astype(int)
@@ -663,7 +669,7 @@ def spectra(found, frequency: float | None) -> list:
     driven, out = np.isfinite(found.coherence), []
     found = type(found)(*(column[driven] for column in found))
     hertz = found.frequency
-    unit, scale = axis_unit([float(np.sqrt(found.place.max(initial=0.0)))], "m")
+    unit, scale = choose_axis_unit([float(np.sqrt(found.place.max(initial=0.0)))], "m")
     along = axis("frequency", "Hz", True)
     out.append(
         chart(
@@ -685,7 +691,7 @@ def spectra(found, frequency: float | None) -> list:
         )
     )
     gain, told = np.abs(found.gain) * G_N, found.coherence >= COHERENT
-    unit, scale = axis_unit([gain.max(initial=0.0)], "m")
+    unit, scale = choose_axis_unit([gain.max(initial=0.0)], "m")
     marks = [
         _above(hertz, gain * scale, "soft"),
         _above(hertz, np.where(told, gain * scale, np.nan), "accent", "H1"),
@@ -717,7 +723,7 @@ def decay(found) -> list:
 
     found: a `response.decay_curve.DecayCurve`, whose errors become bars.
     """
-    unit, scale = axis_unit(found.amplitude, "m")
+    unit, scale = choose_axis_unit(found.amplitude, "m")
     out = []
     for name, label, of in (("frequency", "frequency", "Hz"), ("damping", "damping ratio", "")):
         error, y = getattr(found, f"{name}_error"), getattr(found, name)
@@ -753,7 +759,7 @@ def levels(rows: list) -> list:
     forced = rows[0].get("unit") == "N"
     drive = np.array([row["drive"] for row in rows]) / (1.0 if forced else G_N)
     amplitude = np.array([row["values"]["relative_displacement_amplitude"] for row in rows])
-    name, scale = axis_unit(amplitude, "m")
+    name, scale = choose_axis_unit(amplitude, "m")
     error = (
         np.array([row["errors"].get("relative_displacement_amplitude") or 0.0 for row in rows])
         * scale
@@ -818,10 +824,10 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
     history : dict
         Name -> (j,), with `cycle`; measures are divided by their first value.
     """
-    (along, size), out = axis_unit(x, "m"), []
+    (along, size), out = choose_axis_unit(x, "m"), []
     pick = np.unique(np.linspace(0, len(cycles) - 1, PROFILES).round().astype(int))
     for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
-        name, scale = axis_unit(values, unit)
+        name, scale = choose_axis_unit(values, unit)
         lines = [
             line(
                 x * size,
@@ -832,7 +838,10 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
             for k, colour in zip(pick, ("soft", *COLOURS))
         ]
         out.append(chart(title, axis("x", along), axis(title.lower(), name), lines))
-    out[0]["y"]["range"] = [0.0, 1.05 * float(np.max(pressure)) * axis_unit(pressure, "Pa")[1]]
+    out[0]["y"]["range"] = [
+        0.0,
+        1.05 * float(np.max(pressure)) * choose_axis_unit(pressure, "Pa")[1],
+    ]
     over = [
         line(history["cycle"], history[name] / history[name][0], colour, text)
         for colour, (name, text) in zip(COLOURS, WORN.items())

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from ...formatting import axis_unit
+from ...formatting import choose_axis_unit
 from ..fields.series import Frame
 from .panels import Panel, borders, curves, panels
 from .pictures import BLUE, ORANGE, STYLE
@@ -71,10 +71,10 @@ class Picture:
         ]
         axes.set(xlabel="x [mm]", ylabel=f"stress on the interface [{unit}]")
         if reach is not None:
-            low, high = np.array(reach) * axis_unit(reach, "Pa")[1]
+            low, high = np.array(reach) * choose_axis_unit(reach, "Pa")[1]
             axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
         axes.legend(loc="best" if reach is None else "upper right")
-        drawn, unit = self.bodies[0].cells[0][2], axis_unit([shown[0].top], "Pa")[0]
+        drawn, unit = self.bodies[0].cells[0][2], choose_axis_unit([shown[0].top], "Pa")[0]
         self.figure.colorbar(
             drawn, ax=self.bodies[0].axes, label=f"von Mises stress [{unit}]", shrink=0.7
         )
@@ -107,7 +107,7 @@ class _Bodies:
     def __init__(self, axes, frame: Frame, panel: Panel):
         from matplotlib.collections import LineCollection, PolyCollection
 
-        self.scale = axis_unit([panel.top], "Pa")[1]
+        self.scale = choose_axis_unit([panel.top], "Pa")[1]
         self.axes, self.edges = axes, borders(frame, panel.cells)
         self.cells = []  # (selection, corners, collection) of triangles and of quadrilaterals
         size = np.diff(frame.offsets)

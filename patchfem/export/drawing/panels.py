@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...formatting import axis_unit
+from ...formatting import choose_axis_unit
 from ..fields.series import Frame
 
 SHOWN = 0.995  # fraction of the area of a panel whose stresses the colours distinguish
@@ -59,7 +59,7 @@ class Panel:
             if self.factor == 0
             else f"motion and gap magnified {self.factor:g} times"
         )
-        unit, scale = axis_unit([self.top], "Pa")
+        unit, scale = choose_axis_unit([self.top], "Pa")
         text += (
             f", top colour: {self.top * scale:.3g} {unit} or more" if self.over and scaled else ""
         )
@@ -333,7 +333,7 @@ def curves(frame: Frame, reach: tuple | None = None) -> tuple:
     shown = [("normal stress", frame.point_data["normal_stress"][line])]
     if "shear_stress" in frame.point_data:
         shown.append(("shear stress", frame.point_data["shear_stress"][line]))
-    unit, scale = axis_unit(
+    unit, scale = choose_axis_unit(
         np.concatenate([values for _, values in shown]) if reach is None else reach, "Pa"
     )
     return (

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...core import PatchfemError
-from ...formatting import UNIT_LADDERS, axis_unit, format_number, format_quantity
+from ...formatting import UNIT_LADDERS, choose_axis_unit, format_number, format_quantity
 from ...runs.results.patch_rows import minimum_of
 from ..tolerance_misses import over
 from ..written import label
@@ -89,7 +89,7 @@ def _spans(values, ratio: float) -> bool:
 
 def _axis_unit(values, unit: str) -> tuple:
     """Return unit and scale for an axis of these values [SI]."""
-    return axis_unit(values, unit) if unit in UNIT_LADDERS else (unit, 1.0)
+    return choose_axis_unit(values, unit) if unit in UNIT_LADDERS else (unit, 1.0)
 
 
 def _format_key(key, place: int) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import write_atomically
-from ...formatting import axis_unit
+from ...formatting import choose_axis_unit
 from ..fields.series import Frame, Series
 from . import film, flat
 from .panels import Panel, borders, curves, panels
@@ -161,7 +161,7 @@ def _bodies(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
     """Draw both pieces in a panel."""
     import pyvista as pv
 
-    unit, scale = axis_unit([panel.top], "Pa")
+    unit, scale = choose_axis_unit([panel.top], "Pa")
     places = np.column_stack([panel.places, np.zeros(len(panel.places))])
     sizes = np.diff(one.offsets)
     faces = np.insert(one.connectivity, one.offsets[:-1], sizes)

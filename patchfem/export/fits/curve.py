@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ...campaigns.fits.curve import FittedCurve
-from ...formatting import axis_unit
+from ...formatting import choose_axis_unit
 from ..drawing import charts
 from .files import (
     FITTED_SCENE,
@@ -96,7 +96,7 @@ def _rows(fitted: FittedCurve) -> list:
 def _charts(fitted: FittedCurve) -> list:
     """Return frequency and damping ratio against amplitude, measured with errors and fitted."""
     measured = fitted.measured
-    unit, scale = axis_unit(measured.amplitude, "m")
+    unit, scale = choose_axis_unit(measured.amplitude, "m")
     along = charts.axis("amplitude", unit, True)
     x = measured.amplitude * scale
     out = []

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ...campaigns.fits.loop import FittedLoop
-from ...formatting import axis_unit, format_number, format_quantity
+from ...formatting import choose_axis_unit, format_number, format_quantity
 from ..drawing import charts
 from .files import (
     FITTED_SCENE,
@@ -105,8 +105,8 @@ def _charts(fitted: FittedLoop) -> list:
     """Return the reading against displacement, and the residual of each row."""
     loop = fitted.loop
     name, unit = LABELS[loop.quantity]
-    along, size = axis_unit(loop.displacement, "m")
-    up, scale = axis_unit(loop.reading, "N") if unit == "N" else ("1", 1.0)
+    along, size = choose_axis_unit(loop.displacement, "m")
+    up, scale = choose_axis_unit(loop.reading, "N") if unit == "N" else ("1", 1.0)
     number = np.arange(loop.reading.size)
     slide, reading = loop.displacement * size, loop.reading * scale
     residual = (fitted.model - loop.reading) * scale

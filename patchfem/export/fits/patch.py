@@ -6,7 +6,13 @@ from pathlib import Path
 import numpy as np
 
 from ...campaigns.fits.patch import FITTED_LAWS, FittedLaw, FittedPatch
-from ...formatting import SENTENCE_UNITS, axis_unit, format_number, format_quantity, format_value
+from ...formatting import (
+    SENTENCE_UNITS,
+    choose_axis_unit,
+    format_number,
+    format_quantity,
+    format_value,
+)
 from ...model.model import build, write_resolved
 from ...scene.scene import loads, move_scene
 from ...scene.sets import format_scene
@@ -135,7 +141,7 @@ def _rows(fitted: FittedPatch) -> list:
 def _charts(fitted: FittedPatch) -> list:
     """Return stiffness and loss per cycle against the amplitude of the slide."""
     slides = fitted.patch.slides
-    unit, scale = axis_unit(slides, "m")
+    unit, scale = choose_axis_unit(slides, "m")
     along = charts.axis("amplitude of the slide", unit, True)
     x = slides * scale
     own = fitted.patch.curves

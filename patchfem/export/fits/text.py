@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ...formatting import SENTENCE_UNITS, display_unit, round_to_error
+from ...formatting import SENTENCE_UNITS, choose_display_unit, round_to_error
 
 
 class FormattedValue(NamedTuple):
@@ -15,7 +15,7 @@ class FormattedValue(NamedTuple):
 
 def format_fitted(described: dict) -> FormattedValue:
     """Format a value of fit.json."""
-    unit, scale = display_unit(
+    unit, scale = choose_display_unit(
         described["value"], SENTENCE_UNITS.get(described["unit"], described["unit"])
     )
     ends = described.get("interval") or []

@@ -124,7 +124,7 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
 def _decay(file: Path, out: Path, asked, begin: str) -> dict:
     """Write frequency and damping of a free decay as a table."""
     values, notes = _records(file, asked)
-    found, more = measured.decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
+    found, more = measured.compute_decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
     write.write_table(
         out,
         {f"decay_{name}": one for name, one in found._asdict().items()},
@@ -148,13 +148,15 @@ def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
     """Write modes as tables of a scene."""
     shapes, notes = _shapes(file, asked, how)
     if shapes is not None:
-        found = measured.modes_of_shapes(*shapes)
+        found = measured.list_shape_modes(*shapes)
     else:
         values, notes = _records(file, asked)
         found = (
-            measured.modes_of_decay(values, _quantity(how.begin, "time", f"--begin {how.begin}"))
+            measured.identify_decay_modes(
+                values, _quantity(how.begin, "time", f"--begin {how.begin}")
+            )
             if how.decay
-            else measured.modes_of_driven_record(
+            else measured.identify_driven_modes(
                 values, _segment(how.segment), _window(how.window), _band(how.band)
             )
         )
@@ -200,10 +202,10 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
 def _records(file: Path, asked) -> tuple:
     """Read records and check that one of them is a response."""
     found = laboratory.read_records(file, records.parse_requests(asked), OUTPUT)
-    if found.channel_list and not found.values.keys() & measured.DERIVATIVES.keys():
+    if found.channel_list and not found.values.keys() & measured.DERIVATIVE_ORDERS.keys():
         raise PatchfemError(
-            f"{file}: no channel is known as a response ({', '.join(measured.DERIVATIVES)}); choose one with "
-            f"--map {next(iter(measured.DERIVATIVES))}=CHANNEL among {found.channel_list}"
+            f"{file}: no channel is known as a response ({', '.join(measured.DERIVATIVE_ORDERS)}); choose one with "
+            f"--map {next(iter(measured.DERIVATIVE_ORDERS))}=CHANNEL among {found.channel_list}"
         )
     return found.values, found.notes
 
@@ -215,7 +217,7 @@ def _shapes(file: Path, asked, how: Estimate) -> tuple:
     """
     names = {text.partition("=")[0].strip() for text in asked}
     if (
-        file.suffix.lower() not in laboratory.UNIVERSAL_ENDINGS
+        file.suffix.lower() not in laboratory.UNIVERSAL_EXTENSIONS
         or how != Estimate()
         or names & set(CHANNEL_UNITS)
     ):
@@ -226,12 +228,15 @@ def _shapes(file: Path, asked, how: Estimate) -> tuple:
     ):
         return None, ()
     try:
-        shapes = universal_modes.read(file)
+        shapes = universal_modes.read_universal(file)
     except PatchfemError as error:
         raise type(error)(str(error).removeprefix("structure.file: ")) from None
     return (
         shapes,
-        {one.quantity: one.source for one in records.parse_requests(asked, measured.PLACES)},
+        {
+            one.quantity: one.source
+            for one in records.parse_requests(asked, measured.SHAPE_QUANTITIES)
+        },
     ), ()
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...disk.atomic_write import write_atomically
 from ...formatting import format_quantity
-from ...structure.drive_sizes import MAX_SAMPLES, MIN_SAMPLES_PER_CYCLE
+from ...structure.drive_sizes import MAX_STORED_SAMPLES, MIN_SAMPLES_PER_CYCLE
 from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of
 
@@ -60,7 +60,7 @@ def _thinned(found) -> str:
         return ""
     return (
         f"; before {format_quantity(float(found.time[turns[few[-1] + 1]]), 's', 3)} the rows are turning points, stops and "
-        f"starts of slip alone: a release of up to {MAX_SAMPLES // MIN_SAMPLES_PER_CYCLE} cycles "
+        f"starts of slip alone: a release of up to {MAX_STORED_SAMPLES // MIN_SAMPLES_PER_CYCLE} cycles "
         "(drive.cycles) has even rows all along, any other run in its last cycles"
     )
 

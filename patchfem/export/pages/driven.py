@@ -6,7 +6,7 @@ from textwrap import shorten
 
 from ...core import G_N
 from ...effects import SINE_WAVEFORM, WAVEFORMS
-from ...formatting import UNIT_LADDERS, axis_unit
+from ...formatting import UNIT_LADDERS, choose_axis_unit
 
 PLAIN = {
     "m/s^2": ("g", 1 / G_N),
@@ -22,7 +22,7 @@ def size(text) -> str:
     name, scale = (
         PLAIN[unit]
         if unit in PLAIN
-        else axis_unit([float(value)], unit)
+        else choose_axis_unit([float(value)], unit)
         if unit in UNIT_LADDERS
         else (unit, 1.0)
     )

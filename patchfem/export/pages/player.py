@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ...disk.atomic_write import write_text
-from ...formatting import axis_unit
+from ...formatting import choose_axis_unit
 from ..drawing.panels import corners, shape, slides
 from ..fields.series import Series, moving
 from ..fields.vtkhdf import NAME
@@ -119,7 +119,7 @@ def _reel(folder: Path) -> dict:
         upper = _piece(series, "upper", numbers, most, near)
         slide = _open(upper, x, line)
         times = series.times[numbers]
-    unit, scale = axis_unit(
+    unit, scale = choose_axis_unit(
         np.concatenate([piece["colours"].ravel() for piece in (lower, upper)]), "Pa"
     )
     shear = np.any(line.get("shear_stress", 0.0))
@@ -222,14 +222,14 @@ def _told(piece: dict, scale: float) -> dict:
 
 def _curve(values, label: str, unit: str) -> dict:
     """Return a curve as packed data in a suitable unit."""
-    name, scale = axis_unit(values, unit)
+    name, scale = choose_axis_unit(values, unit)
     return {"label": label, "unit": name, "values": packed(values * scale)}
 
 
 def section(film: dict) -> Section:
     """Return the section of a page that contains the player."""
     frames, (cells, fine) = len(film["times"]), film["cells"]
-    label, scale = axis_unit(film["times"], "s")
+    label, scale = choose_axis_unit(film["times"], "s")
     still = f"The pressed state, {cells} cells"
     if frames > 1:
         still = (

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...campaigns.sweeps.ranking import ranking
 from ...core import Outcome
-from ...formatting import display_unit, format_number
+from ...formatting import choose_display_unit, format_number
 from ..written import NUMBER, label
 from . import document
 from .key_lines import shown_of, varies
@@ -519,7 +519,9 @@ def spread(found: dict, of: int) -> str:
     rows, most = [], max((one[2] for one in found.values()), default=0)
     for name, (unit, values, count, misses) in found.items():
         in_unit, scale = (
-            ("%", 100.0) if is_share(name) else display_unit(float(np.abs(values).max()), unit)
+            ("%", 100.0)
+            if is_share(name)
+            else choose_display_unit(float(np.abs(values).max()), unit)
         )
         known = (
             ["not known"] * len(ENDS)

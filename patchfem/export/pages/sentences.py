@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from ... import formatting
-from ...core import Measure, Outcome, allowed_error
+from ...core import Measure, Outcome, compute_allowed_error
 from ...response.outcome import OPEN_LOOP, UNSETTLED
 from ...response.rows import TABLE as MOTION
 from ...response.rows import add_interface_number, remove_interface_number
@@ -107,7 +107,7 @@ def units(name: str, value: float, unit: str, error: float | None = None) -> lis
         return [("g", 1 / G)]
     size = max(abs(value), error or 0.0) if isfinite(error or 0.0) else value
     return [
-        formatting.display_unit(value, unit, error),
+        formatting.choose_display_unit(value, unit, error),
         *([formatting.choose_unit(WORKSHOP[unit], size)] if unit in WORKSHOP else []),
     ]
 
@@ -181,7 +181,7 @@ def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
         or abs(high) > 1000 * abs(low)
     ):
         return texts
-    own, scale = formatting.display_unit(max(abs(low), abs(high)), unit)
+    own, scale = formatting.choose_display_unit(max(abs(low), abs(high)), unit)
     return tuple(f"{formatting.format_number(one * scale, digits)} {own}" for one in (low, high))
 
 
@@ -193,7 +193,7 @@ def pair(name: str, measure: dict) -> str:
     unit, scale = units(name, measure["value"], measure["unit"], measure["error"])[0]
     if below_minimum(name, measure):
         return f"0 to {formatting.format_number((measure['value'] + measure['error']) * scale, 2)} {unit}".rstrip()
-    return formatting.join_error(value, error, unit)
+    return formatting.format_with_error(value, error, unit)
 
 
 def below_minimum(name: str, measure: dict) -> bool:
@@ -341,7 +341,7 @@ def _looped(loop: dict, stiffness: dict) -> str:
         value, off = formatting.round_to_error(
             factor * scale, None if error is None else error * scale, 1e-9, is_ratio=True
         )
-        return formatting.join_error(value, off, "")
+        return formatting.format_with_error(value, off, "")
 
     return (
         f"At a slide amplitude of {formatting.format_quantity(loop['slide_amplitude'], 'm', 4)} the "
@@ -609,7 +609,7 @@ def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
             (size for kind, size in RANGES.items() if remove_interface_number(name).endswith(kind)),
             0.0,
         )
-        limit = allowed_error(tolerance, one.value, one.floor)
+        limit = compute_allowed_error(tolerance, one.value, one.floor)
         if name in STEPPED:
             parts.append(f"{name}: one step between the drive levels of the scene")
         elif one.error <= tolerance * full:

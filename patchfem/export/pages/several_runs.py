@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...formatting import UNIT_LADDERS, axis_unit
+from ...formatting import UNIT_LADDERS, choose_axis_unit
 from ..drawing.charts import COLOURS, mark
 from ..read_results import numeric, readable, variables, wanted
 from ..summary import read_summary
@@ -177,7 +177,7 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
     if not lines:
         return None
     (unit_a, scale_a), (unit_b, scale_b) = (
-        axis_unit(np.concatenate([line[k] for line in lines]), unit)
+        choose_axis_unit(np.concatenate([line[k] for line in lines]), unit)
         if unit in UNIT_LADDERS
         else (unit, 1.0)
         for k, unit in ((1, unit_a), (2, unit_b))

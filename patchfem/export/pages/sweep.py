@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Outcome
-from ...formatting import UNIT_LADDERS, axis_unit, round_to_error
+from ...formatting import UNIT_LADDERS, choose_axis_unit, round_to_error
 from ...runs.results.patch_rows import minimum_of
 from ..tolerance_misses import over
 from ..written import NUMBER, brief, label
@@ -164,7 +164,7 @@ def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     unit, scale = (
         ("%", 100.0)
         if is_share(name)
-        else axis_unit(one["values"], one["unit"])
+        else choose_axis_unit(one["values"], one["unit"])
         if one["unit"] in UNIT_LADDERS
         else (one["unit"], 1.0)
     )

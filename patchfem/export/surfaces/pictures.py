@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...formatting import axis_unit
+from ...formatting import choose_axis_unit
 from ...surface.profile import level, resample_evenly
 from ...surface.quantity import Quantity
 from ...surface.roughness.parameters import Heights, abbott
@@ -34,8 +34,8 @@ class Picture(NamedTuple):
 
 def draw_trace(primary, waviness) -> str:
     """Draw a levelled trace and, if there is one, its waviness."""
-    along, mm = axis_unit(primary.x, "m")
-    up, um = axis_unit(primary.z, "m")
+    along, mm = choose_axis_unit(primary.x, "m")
+    up, um = choose_axis_unit(primary.z, "m")
     if waviness is None:
         marks = [line(primary.x * mm, primary.z * um, "accent", most=MAX_POINTS, width=0.7)]
     else:
@@ -66,8 +66,8 @@ def draw_roughness(roughness, ends: tuple, cutoff: float) -> str:
     str
         The picture as SVG.
     """
-    along, mm = axis_unit(ends, "m")
-    up, um = axis_unit(roughness.z, "m")
+    along, mm = choose_axis_unit(ends, "m")
+    up, um = choose_axis_unit(roughness.z, "m")
     marks = [line(roughness.x * mm, roughness.z * um, "accent", most=MAX_POINTS, width=0.7)]
     count = roughness.length / cutoff
     if count < MAX_SECTION_RULES:
@@ -86,7 +86,7 @@ def abbott_core_chart(heights: Heights, names: tuple = ("Mr1", "Mr2")) -> dict:
     """
     ratio, height = abbott(heights)
     core = heights.core
-    up, um = axis_unit(height, "m")
+    up, um = choose_axis_unit(height, "m")
     marks = [line(100 * ratio, height * um, "accent")]
     if core is not None:
         bottom = core.top - core.height
@@ -162,7 +162,7 @@ def depth_axis(unit: str, depth, scale: float) -> dict:
 
 
 def _wavelength_unit(spectrum: Spectrum) -> tuple:
-    return axis_unit([1 / spectrum.frequency[0] / 4], "m")
+    return choose_axis_unit([1 / spectrum.frequency[0] / 4], "m")
 
 
 def _density_marks(
@@ -199,7 +199,7 @@ def draw_scan(x, y, z):
     known = z[~np.isnan(z)]
     _draw_map(figure, left, (x, y, z), np.quantile(known, COLOUR_QUANTILES), "viridis")
     left.set(title="Heights")
-    up, um = axis_unit(z, "m")
+    up, um = choose_axis_unit(z, "m")
     right.hist(known * um, bins=N_BINS, color=BLUE, weights=np.full(known.size, 100 / known.size))
     right.set(
         xlabel=f"height [{up}]",
@@ -237,8 +237,8 @@ def draw_maps(x, y, heights: tuple):
 def _draw_map(figure, panel, scan: tuple, ends: tuple, colours: str, name: str = "height") -> None:
     """Draw a scan (x, y, z) [m] on matplotlib Axes in colours that span `ends` [m]."""
     x, y, z = scan
-    along, mm = axis_unit(np.concatenate([x, y]), "m")
-    up, um = axis_unit(ends, "m")
+    along, mm = choose_axis_unit(np.concatenate([x, y]), "m")
+    up, um = choose_axis_unit(ends, "m")
     rows, columns = (slice(None, None, max(1, count // MAX_PIXELS)) for count in z.shape)
     mesh = panel.pcolormesh(
         x[columns] * mm,
@@ -258,7 +258,7 @@ def _draw_map(figure, panel, scan: tuple, ends: tuple, colours: str, name: str =
 def draw_both_heights(heights: tuple) -> str:
     """Draw the distributions and the Abbott curves of the heights (k,) [m] before and after."""
     both = np.concatenate(heights)
-    up, um = axis_unit(both, "m")
+    up, um = choose_axis_unit(both, "m")
     edges = np.linspace(*np.quantile(both, (0.001, 0.999)), N_BINS + 1)
     middles = (edges[:-1] + edges[1:]) / 2 * um
     bars = []
@@ -276,7 +276,7 @@ def draw_both_heights(heights: tuple) -> str:
 def _abbott_chart(heights: tuple) -> dict:
     """Chart the Abbott curves of heights (k,) [m] before and after."""
     curves = [abbott(Heights(z, 1.0)) for z in heights]
-    up, um = axis_unit(np.concatenate([height for _, height in curves]), "m")
+    up, um = choose_axis_unit(np.concatenate([height for _, height in curves]), "m")
     lines = []
     for (ratio, height), (colour, name) in zip(curves, SIDES):
         lines.append(line(100 * ratio, height * um, colour, name))
@@ -304,8 +304,8 @@ def draw_mean_section(track, start: float, end: float) -> str:
     x = track.across[known]
     depth = track.section[known]
     spread = track.spread[known]
-    along, mm = axis_unit(x, "m")
-    up, um = axis_unit(depth, "m")
+    along, mm = choose_axis_unit(x, "m")
+    up, um = choose_axis_unit(depth, "m")
     low = depth - spread
     high = depth + spread
     marks = [
@@ -334,8 +334,8 @@ def draw_aligned(x, first, second, worn) -> str:
     str
         The picture as SVG.
     """
-    along, mm = axis_unit(x, "m")
-    up, um = axis_unit(np.concatenate([first, second]), "m")
+    along, mm = choose_axis_unit(x, "m")
+    up, um = choose_axis_unit(np.concatenate([first, second]), "m")
     marks = []
     for z, (colour, name) in zip((first, second), SIDES):
         marks.append(line(x * mm, z * um, colour, name, most=MAX_POINTS, width=1.0))
@@ -364,8 +364,10 @@ def _detail_ends(x, worn) -> np.ndarray:
 def draw_separate(before, after) -> str:
     """Draw two traces without a common place, one above the other."""
     flat = [level(resample_evenly(profile)) for profile in (before, after)]
-    along, mm = axis_unit(np.concatenate([profile.x - profile.x[0] for profile in flat]), "m")
-    up, um = axis_unit(np.concatenate([profile.z for profile in flat]), "m")
+    along, mm = choose_axis_unit(
+        np.concatenate([profile.x - profile.x[0] for profile in flat]), "m"
+    )
+    up, um = choose_axis_unit(np.concatenate([profile.z for profile in flat]), "m")
     lift = 1.1 * (np.ptp(flat[1].z) / 2 + np.ptp(flat[0].z) / 2)
     marks = []
     for profile, shift, (colour, name) in zip(flat, (lift, 0.0), SIDES):
@@ -392,8 +394,8 @@ def draw_depth(x, depth, used=None, ends: tuple | None = None) -> str:
     str
         The picture as SVG.
     """
-    along, mm = axis_unit(x, "m")
-    up, um = axis_unit(depth, "m")
+    along, mm = choose_axis_unit(x, "m")
+    up, um = choose_axis_unit(depth, "m")
     marks = [
         line(x * mm, depth * um, "warm", "depth of the second trace", most=MAX_POINTS, width=1.0),
         line(x[[0, -1]] * mm, [0.0, 0.0], GREY, width=0.8),
@@ -484,7 +486,7 @@ def draw_pairs(panels: list) -> str:
         bounds = []
         for value in known.values():
             bounds += [bound for bound in (value.low, value.high) if bound is not None]
-        unit, scale = ("", 1.0) if mean.unit == "1" else axis_unit(bounds, mean.unit)
+        unit, scale = ("", 1.0) if mean.unit == "1" else choose_axis_unit(bounds, mean.unit)
         ends = np.array([min(panel.values) - 0.5, max(panel.values) + 0.5])
         low, middle, high = (
             np.full(2, value * scale) for value in (mean.low, mean.value, mean.high)
@@ -516,8 +518,8 @@ class PressedSide(NamedTuple):
 
 def draw_pressures(sides: list) -> str:
     """Draw the normal stress of the patch with each surface; sides: list of PressedSide."""
-    along, mm = axis_unit(sides[0].x, "m")
-    unit, scale = axis_unit(np.concatenate([side.stress for side in sides]), "Pa")
+    along, mm = choose_axis_unit(sides[0].x, "m")
+    unit, scale = choose_axis_unit(np.concatenate([side.stress for side in sides]), "Pa")
     top = 1.05 * max(float(side.stress.max()) for side in sides) * scale
     colours = {name: colour for colour, name in SIDES}
     charts = []

@@ -7,7 +7,7 @@ import numpy as np
 
 from ... import __version__
 from ...disk.atomic_write import write_text
-from ...formatting import axis_unit, format_length
+from ...formatting import choose_axis_unit, format_length
 from ...surface.quantity import LEVEL, Quantity
 from ..drawing.charts import axis, chart, line, loop, mark
 from ..drawing.pictures import draw
@@ -256,13 +256,13 @@ def _pictures(wear: Wear) -> list:
 
 def _place_axis(x) -> tuple[dict, float]:
     """Return the axis of places x (m,) [m] and the scale of its unit."""
-    unit, scale = axis_unit(x, "m")
+    unit, scale = choose_axis_unit(x, "m")
     return axis("x", unit) | {"range": [x[0] * scale, x[-1] * scale]}, scale
 
 
 def _draw_gaps(x, gaps: tuple) -> str:
     place, mm = _place_axis(x)
-    up, um = axis_unit(np.concatenate(gaps), "m")
+    up, um = choose_axis_unit(np.concatenate(gaps), "m")
     marks = [
         line(x * mm, gap * um, colour, name) for gap, (colour, name) in zip(gaps, SIDE_COLOURS)
     ]
@@ -273,7 +273,7 @@ def _draw_gaps(x, gaps: tuple) -> str:
 def _draw_worn_depth(x, depth) -> str:
     place, mm = _place_axis(x)
     hidden = np.array(hidden_line(x, depth))
-    unit, scale = axis_unit(depth, "m")
+    unit, scale = choose_axis_unit(depth, "m")
     marks = [
         line(x * mm, depth * scale, "warm", "worn depth"),
         line(

@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...effects import not_supported_message
+from ...effects import describe_unsupported
 from ..protocol import Step
 from .parameters import Bonds, grow, split_elastic
 
@@ -254,7 +254,7 @@ def press_bonds(law: Bonds, bonds, s0, s1):
 def refuse_directions(law: Bonds, directions: int) -> None:
     """Raise PatchfemError for a law with breakaway in a plane, where it is not defined."""
     if directions > 1 and law.breakaway:
-        raise PatchfemError(not_supported_message("breakaway in two directions", "elastic range"))
+        raise PatchfemError(describe_unsupported("breakaway in two directions", "elastic range"))
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Outcome, allowed_error
+from ...core import Outcome, compute_allowed_error
 from ...elasticity.lapack import one_thread
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, select_models
@@ -134,7 +134,8 @@ def _solved(models: Sequence[Model], say: Callable | None) -> CaseResults:
         ):
             columns[name][:] = np.where(good, given, np.nan)
         wide = wide | (
-            found.errors[name] > np.maximum(allowed_error(tolerance, values, floors[name]), TINY)
+            found.errors[name]
+            > np.maximum(compute_allowed_error(tolerance, values, floors[name]), TINY)
         )
     out.outcome[good] = str(Outcome.DONE)
     out.outcome[good & unknown] = str(Outcome.NOT_CONVERGED)

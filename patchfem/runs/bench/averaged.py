@@ -7,7 +7,7 @@ over mu_s N, and tractions.
 import numpy as np
 
 from ...core import PatchfemError
-from ...effects import import_effect, law_has_trait, not_supported_message
+from ...effects import describe_unsupported, import_effect, law_has_trait
 
 ALIKE = 1e-9  # relative difference of the limits in both directions that counts as zero
 
@@ -42,7 +42,7 @@ def limit_share(model, patch) -> float:
     forward, back = _law().sliding_limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
         raise PatchfemError(
-            not_supported_message(
+            describe_unsupported(
                 f"law '{f.law}' with a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "
                 f"{back * f.static:.6g} N back)",
                 "make the patch symmetric, or prescribe the slide with a table [slide]",

@@ -97,7 +97,7 @@ def bench_engine(
         ):
             return _summed(model, slide, points, choice or sum_of(model, slide), points)
         return BenchEngine(
-            POINTS, cost_model.shear_mode_step_seconds(points, modes, load_varies=varies)
+            POINTS, cost_model.predict_shear_mode_step(points, modes, load_varies=varies)
         )
     if soft:
         return BenchEngine(

@@ -20,7 +20,7 @@ from ...elasticity.elasticity import (
     make_piece,
 )
 from ...mesh.tensor import TensorGrid
-from ...model.pieces import elastic_layers
+from ...model.pieces import make_elastic_layers
 from . import store
 
 LEAST_CACHED = 150  # number of interface nodes from which a condensed operator is kept on disk
@@ -113,7 +113,7 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     ----------
     asked : PatchModel
     grid, upper_grid : TensorGrid or PieceMesh
-        Meshes from `piece_meshes`; the upper one is None if the pieces are alike.
+        Meshes from `make_piece_meshes`; the upper one is None if the pieces are alike.
     fresh : bool
         Whether to ignore operators kept on disk.
 
@@ -123,10 +123,10 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     """
     width = asked.pieces.width * asked.pieces.pairs
     start = perf_counter()
-    piece = finite_elements(grid, elastic_layers(asked, asked.pieces.lower))
+    piece = finite_elements(grid, make_elastic_layers(asked, asked.pieces.lower))
     upper = piece
     if upper_grid is not None:
-        upper = finite_elements(upper_grid, elastic_layers(asked, asked.pieces.upper))
+        upper = finite_elements(upper_grid, make_elastic_layers(asked, asked.pieces.upper))
     low = compliance_of(grid, piece, fresh)
     high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
     joint, x, share = None, grid.x, grid.tributary_lengths()

@@ -25,7 +25,7 @@ from ...elasticity.elasticity import make_piece
 from ...elasticity.lapack import one_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...model import profile
-from ...model.pieces import elastic_layers
+from ...model.pieces import make_elastic_layers
 from .measures import OFFSET, Hidden, combined, least_of
 from .press import Surface
 from .values import vertex
@@ -133,7 +133,7 @@ def solve_on_points(asked, enough) -> PointSolution:
 
 def _first(asked) -> int:
     """Return the number of points of the first level."""
-    n_samples = asked.pieces.length / profile.sample_spacing(asked.gap.profile)
+    n_samples = asked.pieces.length / profile.find_sample_spacing(asked.gap.profile)
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 
@@ -178,7 +178,7 @@ def _ends(asked, level: int) -> list:
     for piece, share in _bodies(asked):
         depth, coated = _rows(piece, layout)
         changes = changes + share * np.array(
-            end_compliance(make_piece(places, depth, coated, elastic_layers(asked, piece)))
+            end_compliance(make_piece(places, depth, coated, make_elastic_layers(asked, piece)))
         )
     return places, changes
 
@@ -205,7 +205,9 @@ def operators(asked, ends: tuple, count: int) -> tuple:
     k = np.arange(count) * np.pi / length
     waves = sum(
         share
-        * np.array(layer_compliance(k, piece.height, piece.thickness, elastic_layers(asked, piece)))
+        * np.array(
+            layer_compliance(k, piece.height, piece.thickness, make_elastic_layers(asked, piece))
+        )
         for piece, share in _bodies(asked)
     )
     out = []

@@ -16,7 +16,7 @@ from ...core import frozen_array
 from ...elasticity.grid_fronts import predict_seconds
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.tensor import TensorGrid
-from ...model.pieces import extend_grid, rounded_edges
+from ...model.pieces import extend_grid, find_rounded_edges
 from . import slip_zones, store
 from .condensed import Pair, condensed, without_factors
 from .press import Patch, pressed
@@ -228,7 +228,7 @@ def layout_of(asked, seen: list) -> Layout:
     # a jump of the gap is a node; quantities that depend on it converge with the first power of its
     # cell
     bands += tuple((place, place, least / STEP_CELLS) for place in asked.gap.jumps)
-    known, fall = rounded_edges(asked)
+    known, fall = find_rounded_edges(asked)
     near = [place for place in known if span[0] - least <= place <= span[1] + least]
     bands += tuple((place, place, min(least, fall / 4)) for place in near)
     sharp = STEP_CELLS if asked.has_singular_ends else 1

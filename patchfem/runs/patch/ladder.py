@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 
 from ...core import NotConverged, Outcome
-from ...model.pieces import piece_meshes
+from ...model.pieces import make_piece_meshes
 from . import fine, slip_zones, store
 from .condensed import condensed, shared_pairs
 from .grids import MAX_SECONDS, MIN_LEVELS, base_grids, seconds_of
@@ -27,7 +27,7 @@ def solve_split(asked, level: int, estimate: bool) -> tuple:
 
     The coarser patches are those of `solve_all`.
     """
-    low, high = piece_meshes(asked)
+    low, high = make_piece_meshes(asked)
     for _ in range(level):
         low, high = (None if body is None else body.refine() for body in (low, high))
     return _with_coarser(asked, low, high, estimate, True)
@@ -75,7 +75,7 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
         return found
     if asked.mesh.is_automatic:
         return climb(asked, asked.mesh.tolerance or tolerance, estimate, fresh)
-    return _with_coarser(asked, *piece_meshes(asked), estimate, fresh)
+    return _with_coarser(asked, *make_piece_meshes(asked), estimate, fresh)
 
 
 def _misses_trace(asked, patches: tuple, tolerance: float) -> bool:
@@ -107,7 +107,7 @@ def meshes_of_file(asked) -> list:
 
     The order is that of `solve_all`.
     """
-    low, high = piece_meshes(asked)
+    low, high = make_piece_meshes(asked)
     return [(low, high), *meshes_beside(low, high)]
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...contact import edges
-from ...core import Measure, PatchfemError, allowed_error
+from ...core import Measure, PatchfemError, compute_allowed_error
 from ...formatting import format_length
 from ...response import errors
 from ...scene.keys.contact import outermost_strip_distance
@@ -232,7 +232,7 @@ def converge(
     hidden, floors = np.zeros((2, *known.shape[1:]))
     for row, name in enumerate(names):
         hidden[row], floors[row] = least.get(name, 0.0), TABLE[name].floor
-    enough = np.inf if wanted is None else allowed_error(wanted, known[-1], floors)
+    enough = np.inf if wanted is None else compute_allowed_error(wanted, known[-1], floors)
     with np.errstate(invalid="ignore", divide="ignore"):  # patches that were not solved have NaN
         seen = limit(known, nested)
         plain = np.maximum(rough * seen.error, hidden)

@@ -12,7 +12,7 @@ from ... import cost_model
 from ...elasticity.grid_fronts import predict_bytes
 from ...formatting import format_length
 from ...model.model import Model
-from ...model.pieces import piece_meshes
+from ...model.pieces import make_piece_meshes
 from ..cost import Cost, MemoryPart
 from . import skin, store
 from .grids import (
@@ -86,7 +86,7 @@ def _expected_levels(asked, tolerance: float) -> list:
     if asked.mesh.shared is not None:
         return list(asked.mesh.shared.levels)
     if not asked.mesh.is_automatic:
-        low, high = piece_meshes(asked.with_mesh(file=None))
+        low, high = make_piece_meshes(asked.with_mesh(file=None))
         return [(low, high), *meshes_beside(low, high)]
     bodies, contact = base_grids(asked)
     has_edges = bool(asked.gap.jumps or (contact is not None and contact.places))

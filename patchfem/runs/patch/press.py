@@ -125,7 +125,7 @@ def solve(asked, grid, upper_grid=None, fresh: bool = False) -> Patch:
     ----------
     asked : PatchModel
     grid, upper_grid : TensorGrid or PieceMesh
-        Meshes from `piece_meshes`; the upper one is None if the pieces are alike.
+        Meshes from `make_piece_meshes`; the upper one is None if the pieces are alike.
     fresh : bool
         Whether to ignore operators kept on disk.
 

@@ -13,7 +13,7 @@ from ...core import Outcome
 from ...formatting import format_length, format_quantity
 from ...mesh import recognise
 from ...mesh.tensor import TensorGrid
-from ...model.pieces import piece_meshes
+from ...model.pieces import make_piece_meshes
 from ...model.source import locate_errors
 from ...surface import nodes
 from ..results.patch_rows import TABLE
@@ -56,7 +56,7 @@ def bodies(model) -> tuple:
     """
     with locate_errors(model.source):
         if not model.patch.mesh.is_automatic:
-            return piece_meshes(model.patch)
+            return make_piece_meshes(model.patch)
         pair = solve_all(model.patch, model.accuracy.tolerance)[0].pair
         return pair.grid, None if pair.upper is pair.piece else pair.upper_grid
 

@@ -59,7 +59,7 @@ def ranged(asked, pressure: float) -> list:
     half, told = "", []
     waves = f" of the waves below {format_quantity(part.cutoff, 'm', 3)}" if part.cutoff else ""
     if part.from_ is not None:
-        found = traces.read_moments(Path(part.from_), part.cutoff)
+        found = traces.read_spectral_moments(Path(part.from_), part.cutoff)
         half = f" (from every second sample: {_half(asked, found.coarse, pressure)})"
         told = [f"contact.asperities: {one}" for one in (*found.dust, found.not_gaussian) if one]
     elif asked.gap.profile is not None and part.cutoff is None:

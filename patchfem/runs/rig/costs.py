@@ -26,11 +26,11 @@ from ...friction.laws import stretch
 from ...model import patch as patch_model
 from ...model.model import Model
 from ...structure.drive_sizes import (
-    drive_omega,
+    find_drive_omega,
+    find_max_acceleration,
+    find_max_frequency_ratio,
+    find_min_decay_rate,
     is_sinusoidal,
-    max_acceleration,
-    max_frequency_ratio,
-    min_decay_rate,
 )
 from ..cost import EVENT_CODE, LINEAR_CODE, SMOOTH_CODE, Cost, MemoryPart
 
@@ -103,7 +103,7 @@ def steps_wanted(model: Model) -> int:
     """Return the steps per cycle that the tolerance requires of a march, without upper bound."""
     accuracy, rig = model.accuracy, model.rig
     quickest = max(
-        max_frequency_ratio(rig.drive.signal),
+        find_max_frequency_ratio(rig.drive.signal),
         float(rig.structure.frequencies.max()) * rig.drive.signal.period,
     )
     if model.load_varies:
@@ -154,7 +154,7 @@ def expected_elements(model: Model) -> tuple:
         if model.partial_slip or one.partial_slip:
             patch = one.patch or model.patch
             most = 1 / (1 / most + 1 / patch.pieces.shear_stiffness)
-            mine = patch_model.TYPICAL_POINTS
+            mine = patch_model.TYPICAL_N_NODES
             if not patch.mesh.is_automatic:
                 mine = round(patch.pieces.length / patch.even_element_size) + 1
         count, stiff = count + mine, max(stiff, most if most < inf else 0.0)
@@ -176,12 +176,12 @@ def ringing_and_events(model: Model) -> tuple:
     )
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
     ringing, quick = (
-        max(rate * drive.period, 2 * pi * max_frequency_ratio(drive)) / REACH,
-        max_frequency_ratio(drive),
+        max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / REACH,
+        find_max_frequency_ratio(drive),
     )
     events = 2 * max(count, faces) * quick + 2 + rows
     if 2 * pi * quick <= made.slow_rate * drive.period:
-        dying = DYING / min(min_decay_rate(modes), float(modes.omega.min()) ** 2 / damping)
+        dying = DYING / min(find_min_decay_rate(modes), float(modes.omega.min()) ** 2 / damping)
         # events per cycle after which a mode rings
         times = (
             events + _jumps(model) if model.rig.friction.interfaces else 1 / model.rig.drive.cycles
@@ -201,7 +201,7 @@ def _jumps(model: Model) -> float:
         for one in model.rig.friction.interfaces
         if one.numbers.kinetic is not None
     ]
-    drive_force = model.rig.first_mode.mass * max_acceleration(model.rig.drive.signal)
+    drive_force = model.rig.first_mode.mass * find_max_acceleration(model.rig.drive.signal)
     return sum(2 * drive_force / fall for fall in falls if fall > 0)
 
 
@@ -234,7 +234,7 @@ def expected_seconds(model: Model) -> float:
         one.numbers.static * (model.nominal_load if one.load is None else one.load)
         for one in rig.friction.interfaces
     )
-    push = rig.drive.force or rig.first_mode.mass * max_acceleration(rig.drive.signal)
+    push = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
     ringing, events = ringing_and_events(model)
     share = min(1.0, limit / push) ** HELD if stiff and push else 1.0
     return (
@@ -425,12 +425,12 @@ def smooth_steps(model: Model, element: "Element") -> float:
     those that keep a state of the law with a short relaxation stable.
     """
     rig, modes = model.rig, model.rig.modes
-    omega, period = drive_omega(rig.drive.signal), rig.drive.signal.period
+    omega, period = find_drive_omega(rig.drive.signal), rig.drive.signal.period
     damper = modes.damping if modes.damping is not None else np.diag(2 * modes.zeta * modes.omega)
     pace = max(
         float(modes.omega.max()),
         float(np.abs(damper).sum(axis=1).max()),
-        omega * max_frequency_ratio(rig.drive.signal),
+        omega * find_max_frequency_ratio(rig.drive.signal),
     )
     ease = float((modes.slide**2).sum()) / modes.mass
     rigid = (
@@ -459,7 +459,7 @@ def clings(model: Model, element: "Element") -> float:
         return 0.0
     r = (
         modes.mass
-        * max_acceleration(rig.drive.signal)
+        * find_max_acceleration(rig.drive.signal)
         * abs(modes.base[0] / modes.slide[0])
         / element.limit
     )
@@ -480,7 +480,7 @@ def smooth_cost(model: Model, numerics, points: int) -> Cost:
     # after this many cycles the motion repeats, and the other cycles are not computed
     if (
         is_sinusoidal(rig.drive.signal)
-        and (decay := min_decay_rate(rig.modes) * rig.drive.signal.period) > 0
+        and (decay := find_min_decay_rate(rig.modes) * rig.drive.signal.period) > 0
     ):
         cycles = min(cycles, 20 + REPEATS / decay)
     steps = 2 * cycles * smooth_steps(model, smooth_element(model))

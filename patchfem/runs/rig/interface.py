@@ -15,10 +15,10 @@ from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import points_element
 from ...friction.protocol import Element
 from ...friction.record import make_law
-from ...model.law import InterfaceLaw, bond_parameters
+from ...model.law import InterfaceLaw, make_bond_parameters
 from ...model.model import Model
 from ...slip import fields, shear_modes
-from ...structure.drive_sizes import drive_omega
+from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged, rigid, shear
 from ..patch import faces, jenkins_elements
 from . import strips, varying_load
@@ -69,7 +69,7 @@ def contact_of(model: Model, numerics: Numerics, patch):
     if rig.springs.cubic is not None:
         found.append(joints.cubic(len(rows), rig.springs.cubic))
         rows.append(rig.modes.output)
-    size = rig.modes.mass * drive_omega(rig.drive.signal) * rig.speed_scale
+    size = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
     beside = alone if alone is not None and alone.limit > 0 else None
     return joints.JointsModel(beside, tuple(found), np.array(rows), size)
 
@@ -128,7 +128,7 @@ def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:
     """
     f = one.numbers
     if law_has_trait(f.law, "bonds"):
-        return points_element(bond_parameters(f, speed, 1e-12), [1.0], [load])
+        return points_element(make_bond_parameters(f, speed, 1e-12), [1.0], [load])
     return make_law(f, load).element(load)
 
 

@@ -20,7 +20,7 @@ from ...response.levels import (
     make_onset_test,
 )
 from ...response.rows import TABLE
-from ...structure.drive_sizes import drive_omega
+from ...structure.drive_sizes import find_drive_omega
 
 EXACT = 1e-9  # relative error of measures of a motion in closed form
 MOST = 40  # most bisections of the bracket of an onset
@@ -211,7 +211,7 @@ def by_levels(reader, go, state, end, progress=None) -> tuple:
 
     def at(level, state, watch=None, last=False) -> tuple:
         """Run one level from a state, and return the run and its Level."""
-        sine = SineDrive(level, drive_omega(rig.drive.signal), rig.drive.signal.moving)
+        sine = SineDrive(level, find_drive_omega(rig.drive.signal), rig.drive.signal.moving)
         done = go(sine, state, watch, last)
         return done, reader.level(level, done, sine, EXACT)
 

@@ -19,7 +19,11 @@ from ...friction.bonds.list_forms_kernels import FORM_REPORT_GROWING
 from ...friction.bonds.list_numbers import sum_form
 from ...friction.bonds.parameters import MAX_LIST_SECONDS
 from ...model.model import Model
-from ...structure.drive_sizes import drive_omega, max_acceleration, max_frequency_ratio
+from ...structure.drive_sizes import (
+    find_drive_omega,
+    find_max_acceleration,
+    find_max_frequency_ratio,
+)
 from ..bench import engine as bench_engine
 from .numerics import Numerics
 
@@ -85,7 +89,7 @@ def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
     stroke = max(
         4
         * left
-        * min(model.speed_scale / drive_omega(model.rig.drive.signal) / law.length, stretch),
+        * min(model.speed_scale / find_drive_omega(model.rig.drive.signal) / law.length, stretch),
         1e-9,
     )
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
@@ -122,7 +126,7 @@ def halvings(model: Model) -> int:
     if stretch == inf or stretch**2 / 2 < MOVES:
         return 0
     quickest = max(
-        max_frequency_ratio(rig.drive.signal) / rig.drive.signal.period,
+        find_max_frequency_ratio(rig.drive.signal) / rig.drive.signal.period,
         float(rig.structure.frequencies.max()),
     )
     return min(max(0, ceil(log2(_bond_swing(model) / (2 * pi * quickest)))), MOST_HALVINGS)
@@ -216,7 +220,7 @@ def gentlest(rig) -> float:
     level.
     """
     levels = rig.drive.levels.amplitudes
-    return min(levels[0] / 2, *levels) if levels else max_acceleration(rig.drive.signal)
+    return min(levels[0] / 2, *levels) if levels else find_max_acceleration(rig.drive.signal)
 
 
 def force_that_holds(rig, push: float | None = None) -> float:
@@ -229,9 +233,9 @@ def force_that_holds(rig, push: float | None = None) -> float:
     push: acceleration of the drive [m s-2]; None: the largest one.
     """
     modes = rig.modes
-    size = max_acceleration(rig.drive.signal) if push is None else push
+    size = find_max_acceleration(rig.drive.signal) if push is None else push
     return _held_with(
-        rig, drive_omega(rig.drive.signal), modes.base * size, np.zeros(len(modes.interfaces))
+        rig, find_drive_omega(rig.drive.signal), modes.base * size, np.zeros(len(modes.interfaces))
     )
 
 

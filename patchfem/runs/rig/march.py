@@ -17,7 +17,12 @@ from ...response.inside_steps import motion_inside_steps
 from ...response.measures import compute_step_harmonic, peak_sampling_errors
 from ...response.rows import NEEDS_RUN, lateral_work
 from ...response.spectrum import friction_harmonic, motion_harmonic
-from ...structure.drive_sizes import drive_omega, has_full_cycle, is_sinusoidal, peak_speed
+from ...structure.drive_sizes import (
+    estimate_peak_speed,
+    find_drive_omega,
+    has_full_cycle,
+    is_sinusoidal,
+)
 from . import levels as rig_levels
 from . import strips
 from .interface import contact_of
@@ -90,7 +95,9 @@ class MarchReader(Reader):
     def __init__(self, model, numerics, patch, contact):
         held = 0.0
         if model.friction is not None:
-            least = 1e-15 * peak_speed(model.rig.drive.signal) * model.rig.drive.signal.period
+            least = (
+                1e-15 * estimate_peak_speed(model.rig.drive.signal) * model.rig.drive.signal.period
+            )
             held = least if contact.set_valued else 1e-3 * contact.length
         super().__init__(model, numerics, patch, contact, held)
 
@@ -166,7 +173,7 @@ class MarchReader(Reader):
         if not (stuck and jumps):
             return out
         # the energies of a stuck interface are round-off of the kinetic energy
-        moving = rig.modes.mass * peak_speed(drive, rig.start) ** 2
+        moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
         # the remaining motion is round-off, not slip
         return out | {
             "book": run.ledger | {"power": run.ledger["power"] + moving},
@@ -218,7 +225,7 @@ class MarchReader(Reader):
         )
         if alone and is_sinusoidal(drive) and has_full_cycle(span, drive):
             return (
-                motion_harmonic(w.time, w.slide, w.slide_rate, drive_omega(drive)),
+                motion_harmonic(w.time, w.slide, w.slide_rate, find_drive_omega(drive)),
                 friction_harmonic(w, rig.modes, drive),
                 work,
             )
@@ -226,7 +233,9 @@ class MarchReader(Reader):
             w,
             drive,
             work,
-            compute_step_harmonic(w.time, part.step_force, drive_omega(drive)) if span > 0 else 0j,
+            compute_step_harmonic(w.time, part.step_force, find_drive_omega(drive))
+            if span > 0
+            else 0j,
         )
 
     def _levels(self, done) -> tuple:

@@ -9,7 +9,7 @@ from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length, format_number, format_quantity
 from ...response.outcome import changing_note, warn_if_ringing
-from ...structure.drive_sizes import min_decay_rate
+from ...structure.drive_sizes import find_min_decay_rate
 from ..patch import faces
 from ..results.notes import (
     climbing_as_one,
@@ -72,7 +72,7 @@ def warnings_of(run) -> list:
         out += warn_if_ringing(
             raw,
             found,
-            (model.accuracy.tolerance, min_decay_rate(model.rig.modes)),
+            (model.accuracy.tolerance, find_min_decay_rate(model.rig.modes)),
             run.drive,
             run.numerics.cycles,
         )

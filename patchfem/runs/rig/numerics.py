@@ -10,7 +10,7 @@ import numpy as np
 
 from ...effects import law_has_trait
 from ...model.model import Model
-from ...structure.drive_sizes import is_sinusoidal, min_decay_rate, repeat_cycles
+from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, is_sinusoidal
 from .costs import pairs_of, steps_per_cycle
 from .engines import engine_of
 
@@ -90,10 +90,10 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     window = int(max(1, min(10, (rig.drive.cycles + WHOLE) // 10)))
     # the window is the whole record except the transient at its start
     if rig.drive.waveform.is_random:
-        rate = min_decay_rate(rig.modes) * rig.drive.signal.period
+        rate = find_min_decay_rate(rig.modes) * rig.drive.signal.period
         start = min(rig.drive.cycles / 4, SETTLED / rate if rate else np.inf)
         window = int(max(1, rig.drive.cycles - start + WHOLE))
-    beat = repeat_cycles(rig.drive.signal) or 0.0
+    beat = count_repeat_cycles(rig.drive.signal) or 0.0
     if 1 < beat <= rig.drive.cycles:  # the window contains whole beats
         window = int(beat * max(1, min(10, rig.drive.cycles // (10 * beat))) + WHOLE)
     if rig.drive.levels.amplitudes:

@@ -22,12 +22,12 @@ from ...response.ringing import held_modes, make_ring, select_strongest
 from ...response.rows import NEEDS_RUN, stick_fraction
 from ...response.spectrum import distortion_ratio
 from ...structure.drive_sizes import (
-    drive_omega,
+    find_drive_omega,
+    find_max_acceleration,
+    find_min_decay_rate,
     has_full_cycle,
     is_periodic,
     is_sinusoidal,
-    max_acceleration,
-    min_decay_rate,
 )
 from ..bench import averaged
 from . import interface, strips
@@ -174,7 +174,7 @@ class Pieces(Reader):
             is_sinusoidal(drive),
             bool(has_full_cycle(run.reading.span, drive)),
             mode_stiffness(self.model, run.window),
-            max_acceleration(drive),
+            find_max_acceleration(drive),
         )
         known = {name: None if np.isnan(value) else float(value) for name, value in found.items()}
         if not self.rubs:
@@ -256,7 +256,7 @@ class Pieces(Reader):
             return left
         if not self.apart:
             return left | {"drift_per_cycle": 1e-14 * float(np.abs(window.slide).max(initial=0.0))}
-        faster = max(1.0, float(modes.omega.max()) / drive_omega(drive)) ** 2
+        faster = max(1.0, float(modes.omega.max()) / find_drive_omega(drive)) ** 2
         return left | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
@@ -267,7 +267,7 @@ class Pieces(Reader):
             run.amplitudes,
             numerics.window,
             self.model.accuracy.tolerance,
-            min_decay_rate(self.model.rig.modes) * drive.period,
+            find_min_decay_rate(self.model.rig.modes) * drive.period,
         )
         if (
             numerics.whole
@@ -287,7 +287,7 @@ def _of_strips(run, drive) -> InterfaceLoop:
     The samples are those on both sides of every event; the yaw does work in addition to the mean
     slide.
     """
-    window, omega = run.window, drive_omega(drive)
+    window, omega = run.window, find_drive_omega(drive)
     gaps = np.diff(window.time)
     weight = np.concatenate([[0.0], gaps / 2]) + np.concatenate([gaps / 2, [0.0]])
     held = ~window.extra["slide_rates"].any(axis=1)

@@ -17,7 +17,7 @@ from ...friction.bonds import parameters
 from ...model.model import Model
 from ...response.rows import add_interface_number, remove_interface_number
 from ...slip import shear_modes
-from ...structure.drive_sizes import drive_omega, max_acceleration
+from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ..cost import (
     BALANCE_CODE,
     EVENT_CODE,
@@ -189,7 +189,7 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
         )
     elif soft and (is_bonds or model.grooves is not None or rig.friction.load_varies):
         sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.N_SHEAR_MODES
-        each = cost_model.shear_mode_step_seconds(
+        each = cost_model.predict_shear_mode_step(
             points, modes, load_varies=rig.friction.load_varies or model.grooves is not None
         )
         each += _step(rig, f) if is_bonds else 0.0
@@ -241,8 +241,8 @@ def _step(rig, f) -> float:
             cost_model.BOND_STEP_SECONDS
             + cost_model.STEP_MODE_SECONDS * (len(rig.structure.frequencies) - 1)
         )
-        * (cost_model.BOND_GROWTH_FACTOR if grows else 1.0)
-        * (cost_model.INTERFACE_FACTOR * faces if faces > 1 else 1.0)
+        * (cost_model.GROWING_BOND_STEP_FACTOR if grows else 1.0)
+        * (cost_model.INTERFACE_STEP_FACTOR * faces if faces > 1 else 1.0)
     )
 
 
@@ -260,7 +260,7 @@ def groups(model: Model) -> dict:
         for one in rig.friction.interfaces
     ]
     limit, kinetic = (sum(one[k] for one in limits) for k in range(2))
-    push = rig.drive.force or rig.first_mode.mass * max_acceleration(rig.drive.signal)
+    push = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
     if push > 0:
         out |= {"D": limit / push} | ({} if kinetic == limit else {"D_kinetic": kinetic / push})
     ratio = rig.first_mode.frequency * rig.drive.signal.period if rig.drive.frequency else inf
@@ -269,7 +269,9 @@ def groups(model: Model) -> dict:
         out |= {"knee_force": bound} if rig.drive.force else {"knee": bound / rig.first_mode.mass}
     if f is not None and f.bond_length and f.stiffness is None and rig.drive.signal.moving:
         out["drive_amplitude_over_bond_length"] = (
-            max_acceleration(rig.drive.signal) / drive_omega(rig.drive.signal) ** 2 / f.bond_length
+            find_max_acceleration(rig.drive.signal)
+            / find_drive_omega(rig.drive.signal) ** 2
+            / f.bond_length
         )
     return out
 
@@ -293,7 +295,7 @@ def run_away(model: Model) -> dict:
     knee = groups(model).get("knee")
     if not knee:
         return {}
-    return {"drive": float(max_acceleration(rig.drive.signal)), "knee": float(knee)}
+    return {"drive": float(find_max_acceleration(rig.drive.signal)), "knee": float(knee)}
 
 
 def _lever(rig) -> float:

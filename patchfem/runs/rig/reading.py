@@ -18,7 +18,7 @@ from ...response.loops import reversal_evaluation
 from ...response.measures import slip_round_off, window_amplitudes, window_end_values
 from ...response.outcome import estimate_steady
 from ...response.rows import NEEDS_RUN, compute_measures, find_row
-from ...structure.drive_sizes import stored_samples_per_cycle
+from ...structure.drive_sizes import choose_samples_per_cycle
 from .solution import Solution, decaying, last_cycles
 
 
@@ -147,7 +147,7 @@ class Reader:
         kept = (
             NEEDS_RUN
             and histories is not None
-            and stored_samples_per_cycle(drive, self.numerics.cycles, wanted=True)
+            and choose_samples_per_cycle(drive, self.numerics.cycles, wanted=True)
         )
         return histories if kept and histories.time.size and histories.time[0] == 0 else None
 

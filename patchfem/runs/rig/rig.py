@@ -19,7 +19,7 @@ from ...response.errors import add_errors
 from ...response.outcome import judge_outcome, remove_errors
 from ...response.rows import NEEDS_RUN, set_final_floors
 from ...response.settling import slip_period
-from ...structure.drive_sizes import decay_rate, is_periodic
+from ...structure.drive_sizes import find_decay_rate, is_periodic
 from ..patch import faces
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import outcome_on_piece
@@ -99,7 +99,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         *motion_warnings.peak_at_an_end(run, lambda: what.modes(what.chain)),
     ]
     notes = [*motion_warnings.notes_of(run), *left_out]
-    if decay_rate(rig.modes) < 0 and run.rubs:
+    if find_decay_rate(rig.modes) < 0 and run.rubs:
         fluttering, more = flutter.flutter_of(run)
         run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]
     run = _judged(run)
@@ -145,7 +145,7 @@ def _settled(run: Coupled) -> Coupled:
         run.model.accuracy.tolerance,
         run.drive,
         rig.drive.levels.cycles,
-        decay_rate(rig.modes),
+        find_decay_rate(rig.modes),
     )
     if (
         outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL

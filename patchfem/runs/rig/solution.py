@@ -12,7 +12,7 @@ from ...response.decay_curve import measure_last_swing
 from ...response.measures import compute_harmonic, measure_half_swing
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.rows import LastCycles
-from ...structure.drive_sizes import drive_omega, has_full_cycle, is_sinusoidal
+from ...structure.drive_sizes import find_drive_omega, has_full_cycle, is_sinusoidal
 
 NO_PEAK = "the output does not move at any of the swept frequencies, so there is no peak"
 OF_OTHERS = 3.0  # factor on the shift of a peak by a coarser mesh or fewer modes
@@ -183,7 +183,7 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
     """
     if not has_full_cycle(window.time[-1] - window.time[0], drive):
         return None
-    weight, omega = np.full(window.time.size, 1.0), drive_omega(drive)
+    weight, omega = np.full(window.time.size, 1.0), find_drive_omega(drive)
     weight[[0, -1]] = 0.5
     slide = compute_harmonic(window.time, weight, window.slide - window.slide.mean(), omega)
     pull = compute_harmonic(window.time, weight, window.force, omega) if force is None else force

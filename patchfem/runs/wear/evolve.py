@@ -18,7 +18,7 @@ import numpy as np
 from ...contact import strips
 from ...core import PatchfemError, frozen_array
 from ...disk.atomic_write import write_atomically
-from ...effects import not_supported_message
+from ...effects import describe_unsupported
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, replay_jumps, start_wear, take_jump
 from ..patch.measures import other_strips
@@ -173,7 +173,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         For a slide in two directions.
     """
     if model.slide is not None and model.slide.across is not None:
-        text = not_supported_message(
+        text = describe_unsupported(
             "with a slide in two directions",
             "leave out [wear], or leave the column `lateral` out of slide.file",
         )

@@ -7,7 +7,7 @@ a row of independent springs that wears like the patch.
 import numpy as np
 
 from ...core import PatchfemError
-from ...structure.drive_sizes import drive_omega, max_acceleration
+from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ...wear.jumps import WearProblem, start_wear, take_jump
 from ..cost import Cost
 from .evolve import next_row
@@ -79,7 +79,11 @@ def _path_about(model) -> float:
     """Return the slip path [m] of a cycle, without friction on the mass of a rig."""
     if model.rig is None:
         return (4.0 if model.slide.period else 1.0) * model.slide.amplitude
-    return 4 * max_acceleration(model.rig.drive.signal) / drive_omega(model.rig.drive.signal) ** 2
+    return (
+        4
+        * find_max_acceleration(model.rig.drive.signal)
+        / find_drive_omega(model.rig.drive.signal) ** 2
+    )
 
 
 def _springs(asked, x, area):

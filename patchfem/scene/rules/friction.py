@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...effects import law_has_trait, law_takes_key, laws_with_key, takes_stiffness_or_length
+from ...effects import law_has_trait, law_takes_key, name_laws_with_key, takes_stiffness_or_length
 from ..keys.contact import Contact
 from ..keys.tables import Friction
 from .methods import find_climbed_grooves
@@ -75,7 +75,7 @@ LAW_RULES = (
         lambda law: law.has_unsupported_kinetic,
         "{at}.kinetic",
         f"law '{{law}}' has only one coefficient of friction; laws with a kinetic coefficient are "
-        f"{laws_with_key('kinetic')}",
+        f"{name_laws_with_key('kinetic')}",
     ),
     Mistake(
         lambda law: law.is_kinetic_larger,
@@ -99,7 +99,7 @@ LAW_RULES = (
     Mistake(
         lambda law: law.spread and not law.has_key("spread"),
         "{at}.spread",
-        f"law '{{law}}' has no spread; laws with a spread are {laws_with_key('spread')}",
+        f"law '{{law}}' has no spread; laws with a spread are {name_laws_with_key('spread')}",
     ),
     Missing(
         lambda law: (

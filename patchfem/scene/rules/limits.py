@@ -10,13 +10,13 @@ from functools import cached_property
 from typing import Any
 
 from ...effects import (
-    ALTERNATIVES,
+    REMEDIES,
     describe_law,
+    describe_unsupported,
     is_bond_list,
     law_has_trait,
     law_supports,
     law_takes_key,
-    not_supported_message,
     suggest_laws,
 )
 from ..keys.contact import Contact
@@ -107,7 +107,7 @@ class JointFacts(Facts):
     def plane_advice(self) -> str:
         """Advice on a friction law that does not support motion in two directions."""
         if self.has_trait("set-valued"):
-            return ALTERNATIVES["stiff"]
+            return REMEDIES["stiff"]
         return f"{suggest_laws('plane')}, or leave lateral out"
 
     @property
@@ -381,7 +381,7 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
         apply_rules(draft, CHANGING_LOAD_RULES, joint)
         for key in list_lower_shapes(draft.tables.contact):
             feature = f"'lower' with {joint.load_change_description}"
-            draft.add_mistake(key, not_supported_message(feature, "shapes"))
+            draft.add_mistake(key, describe_unsupported(feature, "shapes"))
     if joint.compliance:
         apply_rules(draft, COMPLIANCE_RULES, joint)
     if joint.contact:
@@ -433,14 +433,12 @@ def _check_shape_sides(joint: JointFacts, only_upper: str) -> None:
         key = next((key for key in reversed(sides) if draft.has(key)), next(iter(sides)))
         names = " and ".join(f"contact.{key.split('.')[-2]}" for key in sides)
         piece = "the upper piece" if only_upper else "one piece"
-        message = not_supported_message(
-            f"{names} on different pieces", f"put all shapes on {piece}"
-        )
+        message = describe_unsupported(f"{names} on different pieces", f"put all shapes on {piece}")
         draft.add_mistake(key, message)
         return
     lower = list_lower_shapes(joint.contact.table, joint.patch_at)
     if lower and only_upper:
-        draft.add_mistake(lower[0], not_supported_message(f"'lower' {only_upper}", "shapes"))
+        draft.add_mistake(lower[0], describe_unsupported(f"'lower' {only_upper}", "shapes"))
 
 
 def find_lateral_slide_obstacle(tables: Tables) -> str:
@@ -448,7 +446,7 @@ def find_lateral_slide_obstacle(tables: Tables) -> str:
     law = tables.friction
     scene = View(tables)
     compliance = find_compliance_key(law, tables)
-    either = ALTERNATIVES["either"]
+    either = REMEDIES["either"]
     obstacles = (
         (
             not law_supports(law, "two-directions"),
@@ -458,12 +456,12 @@ def find_lateral_slide_obstacle(tables: Tables) -> str:
         (scene.friction.spread, "friction.spread", either),
         (scene.friction.breakaway, "friction.breakaway", either),
         (compliance, compliance, either),
-        (list_lower_shapes(tables.contact), "a shape on the lower piece", ALTERNATIVES["shapes"]),
+        (list_lower_shapes(tables.contact), "a shape on the lower piece", REMEDIES["shapes"]),
         (scene.normal.amplitude, "normal.amplitude", either),
     )
     for is_there, feature, instead in obstacles:
         if is_there:
-            return not_supported_message(
+            return describe_unsupported(
                 f"a lateral column with {feature}", f"{instead}, or leave the lateral column out"
             )
     return ""

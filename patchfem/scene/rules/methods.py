@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 from ...effects import (
     Waveform,
     describe_law,
+    describe_unsupported,
     find_waveform,
     law_has_trait,
     law_supports,
-    not_supported_message,
     suggest_laws,
 )
 from ..keys.tables import Interface, Tables
@@ -267,7 +267,7 @@ def _find_harmonic_obstacle(motion: MotionFeatures) -> str:
             "drive.displacement"
         )
     if feature := find_unsupported_feature("harmonic", motion):
-        return not_supported_message(f"'harmonic' {feature}", "march")
+        return describe_unsupported(f"'harmonic' {feature}", "march")
     is_exact = not all(find_unsupported_feature(engine, motion) for engine in EXACT_ENGINES)
     if not motion.joints or is_exact or motion.has_grooves:
         return ""  # with grooves, the method integrates in time until the motion repeats
@@ -278,19 +278,19 @@ def _find_harmonic_law_obstacle(motion: MotionFeatures) -> str:
     """Return why harmonic balance cannot use the law of a rig; "" if it can."""
     law = motion.joints[0].law
     if len(motion.joints) > 1:
-        return not_supported_message(
+        return describe_unsupported(
             "'harmonic' with several interfaces and a law without exact solution or a nonlinear spring",
             "march",
         )
     if law_has_trait(law.law, "set-valued"):
         if motion.compliance:
             return ""
-        return not_supported_message(
+        return describe_unsupported(
             f"'harmonic' with law '{law.law}', whose force jumps, and {motion.spring}",
             "march or stiff",
         )
     if not law_supports(law, "harmonic"):
-        return not_supported_message(
+        return describe_unsupported(
             f"'harmonic' with {describe_law(law)}",
             f"use 'march', or {suggest_laws('harmonic', friction=law)}",
         )
@@ -298,6 +298,4 @@ def _find_harmonic_law_obstacle(motion: MotionFeatures) -> str:
         return ""
     keys = [f"friction.{key}" for key in ("rest_growth", "breakaway") if getattr(law, key)]
     beside = next(filter(None, (*keys, motion.compliance, motion.lower_shape)), "")
-    return beside and not_supported_message(
-        f"'harmonic' with law '{law.law}' and {beside}", "march"
-    )
+    return beside and describe_unsupported(f"'harmonic' with law '{law.law}' and {beside}", "march")

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
-from ...effects import not_supported_message
+from ...effects import describe_unsupported
 from ..keys.types import Table
 from .methods import find_compliance_key, find_load_change_key
 from .scene_draft import SceneDraft, find_value
@@ -93,9 +93,9 @@ def unsupported_rule(condition: Callable, key: str, feature: str, instead: str) 
     condition, key
         As in `Rule`.
     feature, instead : str
-        As in `effects.not_supported_message`, with facts in braces.
+        As in `effects.describe_unsupported`, with facts in braces.
     """
-    return Mistake(condition, key, not_supported_message(feature, instead))
+    return Mistake(condition, key, describe_unsupported(feature, instead))
 
 
 def apply_rules(draft: SceneDraft, rules: Iterable[Rule], facts: Any) -> None:

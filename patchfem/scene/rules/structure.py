@@ -6,7 +6,7 @@ from functools import cached_property
 from math import pi, sqrt
 from typing import Any, NamedTuple
 
-from ...effects import find_waveform, not_supported_message
+from ...effects import describe_unsupported, find_waveform
 from ..keys.tables import Tables
 from ..keys.types import advise_on_name
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
@@ -421,7 +421,7 @@ def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
     if written and beside:
         draft.add_mistake(
             written[0],
-            not_supported_message(
+            describe_unsupported(
                 f"with {beside}", "give `accelerometer` and `gauge` the value of `output`"
             ),
         )
@@ -491,12 +491,12 @@ def _check_lateral(draft: SceneDraft, key: str, interface: Any) -> None:
         )
     if draft.has("structure.file"):
         instead = "use structure.masses or [structure.reduced], or leave this key out"
-        draft.add_mistake(key, not_supported_message("with structure.file", instead))
+        draft.add_mistake(key, describe_unsupported("with structure.file", instead))
     if draft.has("structure.bonded"):
         instead = "either"
         if draft.has("structure.masses"):
             instead = "write a [[structure.spring]] between the same places"
-        draft.add_mistake(key, not_supported_message("with [structure.bonded]", instead))
+        draft.add_mistake(key, describe_unsupported("with [structure.bonded]", instead))
 
 
 def _check_mass_number(draft: SceneDraft, key: str, number: int | None) -> None:

@@ -3,7 +3,7 @@
 from itertools import pairwise
 from math import pi
 
-from ...effects import Waveform, find_waveform, law_has_trait, law_takes_key, laws_with_key
+from ...effects import Waveform, find_waveform, law_has_trait, law_takes_key, name_laws_with_key
 from .grooves import find_groove_key, find_groove_table
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules, unsupported_rule
 from .scene_draft import SceneDraft
@@ -172,7 +172,7 @@ LAW_RULES = (
     Mistake(
         lambda w: w.friction.bond_length_factor and not law_takes_key(w.law.law, "bond_length"),
         "wear.friction.bond_length_factor",
-        f"law '{{law.law}}' has no bond_length; leave this key out, or use {laws_with_key('bond_length')}",
+        f"law '{{law.law}}' has no bond_length; leave this key out, or use {name_laws_with_key('bond_length')}",
     ),
     Mistake(
         lambda w: (

@@ -16,7 +16,7 @@ from patchfem.dynamics.events.elements import coulomb, make_elements
 from patchfem.structure import drives
 
 SINE = SineDrive(1.0, 1.2)
-SWEEP = drives.Sweep(0.1, 0.4, 40.0, 1.0)
+SWEEP = drives.SweepDrive(0.1, 0.4, 40.0, 1.0)
 CASES = (
     # seed, modes, interfaces, kind of the interfaces, drive
     (1, 1, 1, "rigid", SINE),

@@ -14,7 +14,7 @@ from patchfem.core import DriveSegment, InitialState, ModalBasis, Outcome, Patch
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.histories import evaluate_motion
 from patchfem.response.measures import energy_balance
-from patchfem.structure.drives import Piecewise, levels, release
+from patchfem.structure.drives import PiecewiseDrive, make_levels, make_release
 
 
 def modes_of(omega=1.0, zeta=0.003, slide=1.0, base=1.0, output=1.0, mass=1.0):
@@ -149,7 +149,7 @@ def test_refuses_friction_that_moves_nothing():
 )
 def test_exact_free_decay(start, rest, time):
     begin = InitialState(np.array([start]), np.zeros(1))
-    result = simulate(modes_of(zeta=0.0), release(2 * pi), 1.0, 1.0, 10, 10, start=begin)
+    result = simulate(modes_of(zeta=0.0), make_release(2 * pi), 1.0, 1.0, 10, 10, start=begin)
     assert result.window.slide[-1] == pytest.approx(rest, abs=2e-14)
     assert np.ptp(result.window.slide[result.window.time > time + 1e-9]) == 0.0
     late = result.window.time
@@ -161,7 +161,7 @@ def test_exact_free_decay(start, rest, time):
 
 def test_exact_levels_that_do_not_change_are_a_sine():
     one = driven(0.8, cycles=30)
-    many = simulate(modes_of(), levels([1.0] * 6, 1.0, 5.0), 0.8, 0.8, 30)
+    many = simulate(modes_of(), make_levels([1.0] * 6, 1.0, 5.0), 0.8, 0.8, 30)
     np.testing.assert_allclose(many.amplitudes, one.amplitudes, rtol=0, atol=1e-13)
     np.testing.assert_allclose(many.phasors, one.phasors, rtol=0, atol=1e-13)
 
@@ -239,7 +239,7 @@ def test_exact_motion_in_40_digits(omega, decay, om):
 
     modes = modes_of(omega, decay / omega if omega else 0.0)
     phase, push, v0 = 0.9, 0.7, 0.3
-    drive = Piecewise((DriveSegment(0.0, 0.2, push, om, phase),), 2 * pi / om)
+    drive = PiecewiseDrive((DriveSegment(0.0, 0.2, push, om, phase),), 2 * pi / om)
     times = np.array([1e-3, 0.02, 0.2, 0.29, 0.31, 0.8, 2.0, 5.0]) / max(om, omega, 0.1)
     found = evaluate_motion(
         modes,
@@ -274,10 +274,10 @@ def test_exact_motion_in_40_digits(omega, decay, om):
 @pytest.mark.parametrize(
     "drive, zeta, static, kinetic",
     [
-        (levels([0.9, 1.3, 0.2], 0.9, 2.3), 0.02, 0.6, 0.6),
-        (levels([1.0, 0.4], 1.4, 3.0), 0.1, 0.5, 0.35),
+        (make_levels([0.9, 1.3, 0.2], 0.9, 2.3), 0.02, 0.6, 0.6),
+        (make_levels([1.0, 0.4], 1.4, 3.0), 0.1, 0.5, 0.35),
         (
-            Piecewise(
+            PiecewiseDrive(
                 (
                     DriveSegment(0.0, 0.2, 1.0, 0.7, 0.3),
                     DriveSegment(9.0, -0.1, 0.5, 1.1, 0.0),

@@ -122,7 +122,7 @@ def test_exact_two_motions_at_one_level():
 
 def test_refuses_drives_that_do_not_repeat():
     with pytest.raises(PatchfemError, match="a single sine without end"):
-        steady(basis_of(1.0), drives.levels([1.0, 2.0], 1.0, 5), 1.0, 1.0)
+        steady(basis_of(1.0), drives.make_levels([1.0, 2.0], 1.0, 5), 1.0, 1.0)
 
 
 def two_faces(seed=2, ratio=1.0):

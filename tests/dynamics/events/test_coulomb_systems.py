@@ -67,7 +67,7 @@ def test_exact_coupled_systems_against_dop853(seed, n, faces, ratio, rigid):
 def test_exact_steps_and_sines_in_turn_against_dop853():
     rng = np.random.default_rng(11)
     modes, static = random_basis(rng, 3, 2), np.array([0.3, 0.5])
-    drive = drives.Piecewise(
+    drive = drives.PiecewiseDrive(
         (
             DriveSegment(0.0, 0.7),
             DriveSegment(4.1, 0.0, 2.0, 1.7, 0.4),
@@ -247,7 +247,7 @@ def choice_at_rest(seed, n, faces, ratio):
     modes = random_basis(rng, n, faces)
     static = rng.uniform(0.1, 1.0, faces)
     z, v, rows = rng.normal(size=n), np.zeros(n), np.asarray(modes.interfaces)
-    drive = drives.Piecewise((DriveSegment(0.0, 0.7, 0.5, 1.0, 0.64),), 2 * pi)
+    drive = drives.PiecewiseDrive((DriveSegment(0.0, 0.7, 0.5, 1.0, 0.64),), 2 * pi)
     one, first = rows_of(modes, drive, static, ratio * static, 1e-3, InitialState(z, v))
     out = one.evaluate_rows(first, np.zeros(1, np.int64), np.zeros(1))[0]
     forces = out[2 * n + 3 :: 6]
@@ -288,7 +288,7 @@ def test_always_a_combination_that_is_not_found_is_refused():
 
 # starts, drives and printed numbers
 
-FREE = drives.release(2 * pi)
+FREE = drives.make_release(2 * pi)
 
 
 def test_exact_belt():
@@ -296,7 +296,7 @@ def test_exact_belt():
     tiny, speed = 1e-8, 0.1
     modes = basis_of([1.0, 0.0], 0.0, [[1.0, -tiny]], (0, 0), (1, 0))
     begin = InitialState(np.zeros(2), np.array([speed, speed / tiny]))
-    done = simulate(modes, drives.release(2 * pi), 1.0, 0.6, 30.0, 10, start=begin)
+    done = simulate(modes, drives.make_release(2 * pi), 1.0, 0.6, 30.0, 10, start=begin)
     releases = done.log.time[np.abs(done.log.what) == RELEASE]
     np.testing.assert_allclose(np.diff(releases)[2:], 8 + 2 * (pi - atan(4)), atol=1e-9)
     assert 8 + 2 * (pi - atan(4)) == pytest.approx(11.6315499798, abs=1e-10)
@@ -327,7 +327,7 @@ def test_exact_phase_after_a_million_cycles():
     """Stuck for a million cycles (the clock is put there), then 1.25 times the amplitude: the motion is the one from
     rest, at the same phases."""
     rate = 2 * pi * 0.37
-    drive, modes = drives.levels([0.5, 1.25], rate, 10**6), basis_of(rate, 0.003)
+    drive, modes = drives.make_levels([0.5, 1.25], rate, 10**6), basis_of(rate, 0.003)
     _, late = rows_of(modes, drive, 1.0, 1.0, 10**6 + 4, begin=10**6 - 1)
     _, early = rows_of(modes, SineDrive(1.25, rate), 1.0, 1.0, 4)
     late = late[late[:, 5] >= 10**6]
@@ -403,7 +403,7 @@ def test_exact_coordinates_stay_on_the_stuck_slide():
     """The coordinates move on while the interface sticks; their slide stays where it stopped, over 300 cycles."""
     h = sqrt(0.5)
     modes = basis_of([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
-    one, rows = rows_of(modes, drives.levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)
+    one, rows = rows_of(modes, drives.make_levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)
     rows = rows[rows[:, ROW.cycle] >= 20]
     held, z = rows[0, one._column(0, COLUMN.slide)], rows[:, ROW.motion : ROW.motion + 2]
     assert (

@@ -8,7 +8,7 @@ from patchfem.core import ModalBasis, Outcome, SineDrive
 from patchfem.dynamics.events.elements import make_elements
 from patchfem.dynamics.events.histories import simulate
 from patchfem.response.measures import energy_balance
-from patchfem.structure.drives import Recorded, Sweep
+from patchfem.structure.drives import RecordedDrive, SweepDrive
 
 
 def basis(omega, zeta, slide, base, output, damping=None, faces=None):
@@ -155,10 +155,10 @@ def test_exact_window_of_samples_agrees_with_the_sums():
 
 
 SWEPT = [
-    Sweep(0.15, 0.35, 30.0, 1.0),
-    Sweep(0.35, 0.1, 25.0, 0.9, None, True),
-    Sweep(0.1, 0.3, 30.0, 0.0, 0.5),
-    Sweep(0.1, 0.25, 30.0, 0.0, 0.7, True),
+    SweepDrive(0.15, 0.35, 30.0, 1.0),
+    SweepDrive(0.35, 0.1, 25.0, 0.9, None, True),
+    SweepDrive(0.1, 0.3, 30.0, 0.0, 0.5),
+    SweepDrive(0.1, 0.25, 30.0, 0.0, 0.7, True),
 ]
 
 
@@ -167,7 +167,7 @@ SWEPT = [
     "drive",
     [
         *SWEPT,
-        Recorded(
+        RecordedDrive(
             np.array([0.0, 2.0, 3.5, 9.0, 9.5, 20.0]),
             np.array([0.0, 1.5, -1.0, 0.7, -2.0, 1.0]),
             2 * np.pi,
@@ -184,7 +184,7 @@ def test_exact_sweeps_and_records_against_dop853(drive):
     end = 1.1 * drive.duration
     done = simulate(modes, drive, [make_elements(k, y)], end / drive.period, window=2)
     reference = Reference(modes, drive, [(k, y)])
-    breaks = drive.breaks if isinstance(drive, Recorded) else [drive.duration]
+    breaks = drive.breaks if isinstance(drive, RecordedDrive) else [drive.duration]
     for stop in (*breaks, end):  # the integrator is stopped where the formula of the drive changes
         want = reference.go(stop)
     found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])

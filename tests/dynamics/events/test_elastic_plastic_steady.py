@@ -14,7 +14,7 @@ from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.events.period import PeriodMap
 from patchfem.dynamics.events.steady import find_steady_state_from as settled
 from patchfem.dynamics.events.steady import solve_steady as steady
-from patchfem.structure.drives import levels
+from patchfem.structure.drives import make_levels
 
 FACES = np.array([[1.0, 0.4], [0.3, -1.0]])
 PAIR = basis([1.0, 2.3], [0.01, 0.02], FACES[0], [1.0, 0.5], [1.0, 0.2], None, FACES)
@@ -188,7 +188,7 @@ def test_exact_limits_are_the_linear_response(seed, held):
 def test_refuses_what_does_not_repeat():
     group = [make_elements([4.0], [0.05])]
     with pytest.raises(PatchfemError, match="a single sine without end"):
-        steady(ONE, levels([1.0, 2.0], 1.0, 5), group)
+        steady(ONE, make_levels([1.0, 2.0], 1.0, 5), group)
     free = basis([1.0], [0.0], [1.0], [1.0], [1.0])
     with pytest.raises(NotConverged, match="grows from period to period"):  # 0.7 is below pi/4
         steady(free, SineDrive(1.0, 1.0), [make_elements([20.0], [0.7 / 20])])

@@ -10,7 +10,7 @@ from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import event_list
 from patchfem.response.run_events import events_of_log
 from patchfem.runs.run import run
-from patchfem.structure.drives import Piecewise, levels
+from patchfem.structure.drives import PiecewiseDrive, make_levels
 
 RIG = (
     POINT
@@ -34,7 +34,7 @@ def one_mode(zeta=0.003, slide=1.0):
 
 
 def test_exact_borders_of_levels_are_listed():
-    modes, drive = one_mode(0.05), levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
+    modes, drive = one_mode(0.05), make_levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
     log = event_run.simulate(modes, drive, 0.6, 0.6, 12, 2).log
     assert log.time[log.what == event_list.BORDER] == pytest.approx(
         2 * np.pi / 0.9 * np.array([3, 6, 9])
@@ -46,7 +46,7 @@ def test_exact_levels_of_a_scene_are_those_of_one_run():
     result = run(plan(RIG), estimate=False)
     found, model = result.extra["events"], result.plan.model
     drive = model.rig.drive.signal
-    assert isinstance(drive, Piecewise)
+    assert isinstance(drive, PiecewiseDrive)
     limit = 0.3 * model.point.load
     whole = events_of_log(event_run.simulate(model.rig.modes, drive, limit, limit, 100, 10).log)
     assert found.count == whole.count and found.kind.tolist() == whole.kind.tolist()

@@ -13,23 +13,23 @@ from hypothesis import strategies as st
 from patchfem.core import InitialState, Outcome
 from patchfem.dynamics.events.event_list import BORDER
 from patchfem.response.measures import energy_balance
-from patchfem.structure.drives import Recorded, Sweep
+from patchfem.structure.drives import RecordedDrive, SweepDrive
 
 REACH, TERMS = 2.0, 27  # reach of a series times the rate of its drive, and its terms
 SWEEPS = [
-    Sweep(0.1, 0.3, 30.0, 1.0),
-    Sweep(0.3, 0.1, 20.0, 1.0, None, True),
-    Sweep(0.08, 0.4, 25.0, 0.0, 0.6),
-    Sweep(0.4, 0.05, 25.0, 0.0, 0.6, True),
-    Sweep(0.05, 0.5, 0.5, 1.0),
-    Sweep(1.0, 20.0, 9.0, 1.0, None, True),
+    SweepDrive(0.1, 0.3, 30.0, 1.0),
+    SweepDrive(0.3, 0.1, 20.0, 1.0, None, True),
+    SweepDrive(0.08, 0.4, 25.0, 0.0, 0.6),
+    SweepDrive(0.4, 0.05, 25.0, 0.0, 0.6, True),
+    SweepDrive(0.05, 0.5, 0.5, 1.0),
+    SweepDrive(1.0, 20.0, 9.0, 1.0, None, True),
 ]
 
 
 def record(seed, rows=40, end=30.0):
     rng = np.random.default_rng(seed)
     time = np.sort(np.concatenate([[0.0, end], rng.uniform(0, end, rows - 2)]))
-    return Recorded(time, np.concatenate([[0.0], rng.normal(size=rows - 2), [0.7]]), 5.0)
+    return RecordedDrive(time, np.concatenate([[0.0], rng.normal(size=rows - 2), [0.7]]), 5.0)
 
 
 # the drive's own series
@@ -119,7 +119,7 @@ def test_exact_records_against_dop853():
 
 def test_exact_stiff_face_slides_once_a_record_passes_its_limit():
     """A rigid block without spring: it slips while the ramp is above the limit, in closed form."""
-    drive = Recorded(np.array([0.0, 1.0, 2.0]), np.array([0.0, -2.0, -2.0]), 1.0)
+    drive = RecordedDrive(np.array([0.0, 1.0, 2.0]), np.array([0.0, -2.0, -2.0]), 1.0)
     # from t = .5 on v = t^2 - t/2, from t = 1 on v = .5 + 1.5 (t - 1), from t = 2 on v = 2 - .5 (t - 2)
     wanted = {0.5: 0.0, 1.0: 5 / 48, 2.0: 5 / 48 + 1.25, 6.0: 5 / 48 + 5.25, 9.0: 5 / 48 + 5.25}
     for time, slide in wanted.items():
@@ -148,7 +148,7 @@ def test_always_the_energy_of_a_sweep_and_a_record_balances():
 def test_always_a_record_of_a_force_never_beyond_the_limit_moves_nothing(size, start, seed):
     rng = np.random.default_rng(seed)
     value = size * rng.uniform(-1, 1, 12)
-    drive = Recorded(np.linspace(0, 9, 12), value, 1.0)
+    drive = RecordedDrive(np.linspace(0, 9, 12), value, 1.0)
     done = simulate(basis_of([1.0]), drive, 1.0, start, 10.0)
     assert not done.response.slide.any() and done.log.count <= 1
 

@@ -7,7 +7,7 @@ from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.elements import make_elements
 from patchfem.response.measures import energy_balance
-from patchfem.structure.drives import levels
+from patchfem.structure.drives import make_levels
 
 
 def case(modes: int, faces: int, elements: int) -> tuple:
@@ -90,7 +90,7 @@ def test_exact_a_motion_that_repeats_is_counted_on(shape):
 def test_exact_a_level_that_follows_ends_the_repeating():
     """Levels of 300 cycles: those of the first repeat, and what follows is the run in parts of one level each."""
     modes, _, groups = case(1, 1, 3)
-    both = histories.simulate(modes, levels([1.5, 2.5], 1.3, 300), groups, 600, 5)
+    both = histories.simulate(modes, make_levels([1.5, 2.5], 1.3, 300), groups, 600, 5)
     first = histories.simulate(modes, SineDrive(1.5, 1.3), groups, 300, 5)
     then = histories.simulate(
         modes, SineDrive(2.5, 1.3), groups, 300, 5, start=first.end[0], memory=first.end[1]
@@ -106,7 +106,9 @@ def test_exact_a_level_that_follows_ends_the_repeating():
 
 def test_exact_a_push_that_grows_by_a_billionth_ends_it():
     modes, _, groups = case(1, 1, 24)
-    grown = histories.simulate(modes, levels([1.5, 1.5 * (1 + 1e-9)], 1.3, 300), groups, 600, 5)
+    grown = histories.simulate(
+        modes, make_levels([1.5, 1.5 * (1 + 1e-9)], 1.3, 300), groups, 600, 5
+    )
     assert np.all(np.ptp(grown.amplitudes[290:300], axis=0) == 0)
     assert 1e-10 < np.ptp(grown.amplitudes[[299, -1], 1]) / grown.amplitudes[-1, 1] < 1e-8
 

@@ -11,7 +11,7 @@ from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.elements import make_elements
 from patchfem.dynamics.events.modal_system import make_modal_system
 from patchfem.response.measures import energy_balance
-from patchfem.structure.drives import Piecewise, Recorded, Sweep
+from patchfem.structure.drives import PiecewiseDrive, RecordedDrive, SweepDrive
 
 TWO = basis_of([1.0, 1.7], [0.05, 0.04], [[1.0, 0.5]], [1.0, 0.2], [1.0, -0.4])
 
@@ -68,7 +68,7 @@ def test_exact_long_pieces_are_the_short_ones(monkeypatch, ratio, friction):
 
 def test_exact_long_pieces_of_two_faces_and_of_segments(monkeypatch):
     modes = random_basis(np.random.default_rng(5), 3, 2)
-    drive = Piecewise(
+    drive = PiecewiseDrive(
         (DriveSegment(0.0, 0.3, 1.0, 0.0007, 0.2), DriveSegment(5000.0, -0.2, 0.7, 0.001, 1.0)),
         12e3,
     )
@@ -80,9 +80,9 @@ def test_exact_long_pieces_of_two_faces_and_of_segments(monkeypatch):
     "drive",
     [
         SineDrive(1.0, 0.0005),
-        Sweep(2e-5, 5e-5, 40000.0, 1.0),
-        Sweep(5e-5, 2e-5, 40000.0, 1.0, None, True),
-        Recorded(np.array([0.0, 4e3, 11e3, 20e3]), np.array([0.0, 1.0, -0.8, 0.4]), 2e4),
+        SweepDrive(2e-5, 5e-5, 40000.0, 1.0),
+        SweepDrive(5e-5, 2e-5, 40000.0, 1.0, None, True),
+        RecordedDrive(np.array([0.0, 4e3, 11e3, 20e3]), np.array([0.0, 1.0, -0.8, 0.4]), 2e4),
     ],
 )
 @pytest.mark.parametrize("stiffness", [[0.5, 1.0, 0.4], [400.0, 10.0, 10.0]])

@@ -12,7 +12,7 @@ from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.march.march import fresh, march
 from patchfem.friction.grooves import Grooves
 from patchfem.response.measures import energy_balance
-from patchfem.structure.drives import levels, step
+from patchfem.structure.drives import make_levels, make_step
 
 ONE = np.ones(1)
 
@@ -124,7 +124,7 @@ def test_exact_it_breaks_away_at_the_limits_of_the_flank(place):
             model = make_model(grooves, load, mu, mu, None, basis)
             done = march(
                 basis,
-                step(-push, 0.01),
+                make_step(-push, 0.01),
                 model,
                 1,
                 20,
@@ -207,7 +207,7 @@ def test_always_a_fork_goes_on_as_the_march_does():
     case = case_of(3)
     basis, drive = (
         modes(case.omega, case.zeta, case.mass),
-        levels([case.acceleration, 0.0], case.drive, 2),
+        make_levels([case.acceleration, 0.0], case.drive, 2),
     )
     model = make_model(
         Grooves(case.wavelength, case.amplitude, case.phase, case.lifted),

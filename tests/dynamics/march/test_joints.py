@@ -18,7 +18,7 @@ from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.stretch import points_element
 from patchfem.friction.laws.tanh import TanhLaw
-from patchfem.structure.drives import release
+from patchfem.structure.drives import make_release
 
 OMEGA = 2 * np.pi * 143
 DRIVE = SineDrive(49.0, OMEGA)
@@ -149,7 +149,9 @@ def test_exact_potential_springs_keep_their_energy_and_find_their_period(element
     start, errors = InitialState(np.array([1.0]), np.zeros(1)), []
     for steps in (20, 100, 500):
         model = JointsModel(None, (element,), np.ones((1, 1)), 1.0, ALL)
-        got = march(one(0.0, 0.0), release(2 * np.pi), model, 30, steps, window=30, start=start)
+        got = march(
+            one(0.0, 0.0), make_release(2 * np.pi), model, 30, steps, window=30, start=start
+        )
         assert got.outcome is None
         assert got.ledger["work_in"] == pytest.approx(got.ledger["stored"], rel=1e-9)
         r = got.response

@@ -319,7 +319,7 @@ def test_always_free_decay_never_gains_energy(shear, steps_per_cycle):
     start = InitialState(1e-4 * np.array([1.0, -0.3, 0.1, 0.02, -0.01, 0.005]), np.zeros(6))
     done = march(
         basis,
-        drives.release(1 / 143),
+        drives.make_release(1 / 143),
         points_model(law, area, sigma, modes),
         15,
         steps_per_cycle,

@@ -10,7 +10,7 @@ from patchfem.contact.unilateral import solve_forces
 from patchfem.core import InitialState, ModalBasis, PatchfemError, SineDrive
 from patchfem.dynamics.march import varying_load
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.model.structure import strip_slides
+from patchfem.model.structure import compute_strip_slides
 
 # one loop; that of Coulomb and that of tanh are others to compile
 POINTED = [
@@ -276,7 +276,7 @@ def test_exact_strips_slide_by_yaw():
         yaw=np.array([2.0]),
     )
     offsets = np.array([-1e-3, 0.0, 1e-3])
-    rows = strip_slides(turning, offsets)
+    rows = compute_strip_slides(turning, offsets)
     assert rows[:, 0] == pytest.approx([1.002, 1.0, 0.998])
     # resists, so the piece feels -f at y: M_z = -sum(y (-f)) = sum y f
     friction = np.array([1.0, 2.0, 5.0])

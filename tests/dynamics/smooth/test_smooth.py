@@ -87,10 +87,10 @@ def test_exact_laws_are_their_rate_equations(law, modes, form, kink, near):
 @pytest.mark.parametrize(
     "drive",
     [
-        drives.Sweep(100.0, 160.0, 0.02, 49.0),
-        drives.Sweep(160.0, 100.0, 0.02, displacement=6e-5, logarithmic=True),
-        drives.levels([30.0, 60.0], OMEGA, 1.0),
-        drives.Recorded(
+        drives.SweepDrive(100.0, 160.0, 0.02, 49.0),
+        drives.SweepDrive(160.0, 100.0, 0.02, displacement=6e-5, logarithmic=True),
+        drives.make_levels([30.0, 60.0], OMEGA, 1.0),
+        drives.RecordedDrive(
             np.array([0, 0.004, 0.009, 0.02]), np.array([0, 60.0, -50.0, 20.0]), 1 / 143, False
         ),
     ],
@@ -133,7 +133,9 @@ def test_exact_energy_goes_into_motion_heat_and_stretch(law):
 
 def test_exact_a_release_ends_at_rest_and_its_energy_is_lost():
     start = InitialState(np.array([2e-4]), np.zeros(1))
-    done = simulate(ONE, drives.release(SINE.period), element(SHORT), 30, 1e-10, 2, start=start)
+    done = simulate(
+        ONE, drives.make_release(SINE.period), element(SHORT), 30, 1e-10, 2, start=start
+    )
     book = done.ledger
     assert book["work_in"] == pytest.approx(MASS * OMEGA**2 * 2e-4**2 / 2, rel=1e-12)
     assert book["work_in"] == pytest.approx(
@@ -143,7 +145,7 @@ def test_exact_a_release_ends_at_rest_and_its_energy_is_lost():
 
 
 def test_exact_nothing_moves_without_a_push():
-    done = simulate(ONE, drives.release(SINE.period), element(SHORT), 3, 1e-9, 1)
+    done = simulate(ONE, drives.make_release(SINE.period), element(SHORT), 3, 1e-9, 1)
     assert not done.response.modal.any() and not done.response.force.any() and done.outcome is None
 
 
@@ -222,7 +224,7 @@ def test_always_snapshots_of_the_interface_are_those_of_the_march():
         assert one["slide"] == pytest.approx(other["slide"], abs=1e-4 * 5e-5)
 
 
-@pytest.mark.parametrize("drive", [SineDrive(1e-6, OMEGA), drives.release(1 / 143)])
+@pytest.mark.parametrize("drive", [SineDrive(1e-6, OMEGA), drives.make_release(1 / 143)])
 def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
     """Round-off of a bond length of 5 um is 1e-8 of such a slide: no step met its tolerance for it."""
     start = (

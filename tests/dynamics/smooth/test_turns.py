@@ -52,7 +52,7 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
     """104 cycles of a rate law far above critical damping: z falls by 1e31. A state within round-off of rest that
     sets off is no stop; it was taken for one at a 1e-12 of each step, for ever (hundreds of steps are enough)."""
     omega = 2 * np.pi * 162.4
-    free, law = drives.release(1 / 162.4), TanhLaw(0.671, 1.569e-3).element(15.46)
+    free, law = drives.make_release(1 / 162.4), TanhLaw(0.671, 1.569e-3).element(15.46)
     run = Motion(
         one_mode(omega, 0.05, 0.7626),
         free,
@@ -89,7 +89,12 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
         InitialState(np.array([1.023e-5]), np.zeros(1)),
     )
     run = Motion(
-        one_mode(omega, 0.05, 0.4143), drives.release(1 / 62.86), law, 108, tolerance, start=start
+        one_mode(omega, 0.05, 0.4143),
+        drives.make_release(1 / 62.86),
+        law,
+        108,
+        tolerance,
+        start=start,
     )
     run.run_to(108 / 62.86)
     y, force = run.arrays.state, run.read_state()[0][5]

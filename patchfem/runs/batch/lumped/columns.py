@@ -39,7 +39,7 @@ from ....response.settling import (
     extrapolate_steady_amplitudes,
     window_amplitude_means,
 )
-from ....structure.drive_sizes import max_acceleration, min_decay_rate
+from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...accuracy_warnings import Finding, tolerance_warnings
 from ...results.notes import BOOKS
 from ...results.result import without_folders
@@ -76,9 +76,9 @@ def sizes_of(models) -> Sizes:
             lambda model: (
                 model.accuracy.tolerance,
                 model.rig.displacement_scale,
-                max_acceleration(model.rig.drive.signal),
+                find_max_acceleration(model.rig.drive.signal),
                 model.rig.drive.signal.period,
-                min_decay_rate(model.rig.modes),
+                find_min_decay_rate(model.rig.modes),
             ),
         )
     )

@@ -41,7 +41,7 @@ from ....response.ringing import (
 from ....response.rows import larger_term
 from ....response.settling import extrapolate_steady_amplitudes, window_amplitude_means
 from ....scene.rules.accuracy import list_fixed_settings
-from ....structure.drive_sizes import max_acceleration
+from ....structure.drive_sizes import find_max_acceleration
 from ...rig.motion_warnings import creeping_note
 from ...rig.pieces import CHANGES, read_off
 from .. import one_by_one
@@ -257,7 +257,9 @@ def _rate(model: Model) -> tuple:
         rate = np.where(rate > CALM * SMOOTH[-1] / (2 * np.pi) * omega, np.inf, LAYER * rate)
     # its force peak during a reversal lasts as long as the speed is below the Stribeck speed
     if model.friction.law == "lugre":
-        turns = np.abs(modes.slide[0] * modes.base[0]) * max_acceleration(model.rig.drive.signal)
+        turns = np.abs(modes.slide[0] * modes.base[0]) * find_max_acceleration(
+            model.rig.drive.signal
+        )
         rate = np.maximum(damper, PASSES * turns / model.friction.stribeck_speed)
     return (
         np.where(
@@ -1015,7 +1017,7 @@ def _of_rig(model: Model) -> tuple:
         drive.moving,
         *((0.0, 0.0) if start is None else (start.z[0], start.v[0])),
         model.rig.first_mode.stiffness,
-        max_acceleration(drive),
+        find_max_acceleration(drive),
     )
 
 

@@ -18,7 +18,7 @@ from ....response import run_events
 from ....response.errors import merged_cell_errors
 from ....response.measures import COORDINATE_ROUND_OFF, energy_balance
 from ....response.ringing import make_ring
-from ....structure.drive_sizes import max_acceleration, min_decay_rate
+from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...rig.costs import pairs_of
 from ...rig.engines import EXACT, PIECES, engine_of
 from ...rig.pieces import RigidElements, elements_of_law, read_off, settles, still_changes
@@ -174,7 +174,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
             *(
                 (
                     model.rig.first_mode.stiffness,
-                    max_acceleration(model.rig.drive.signal),
+                    find_max_acceleration(model.rig.drive.signal),
                     case.held,
                     case.load,
                     model.accuracy.tolerance,
@@ -205,7 +205,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         lost[k] = ring is None
         for name, value in (ring or {}).items():
             rings[name][k] = value
-        decay = min_decay_rate(model.rig.modes) * model.rig.drive.signal.period
+        decay = find_min_decay_rate(model.rig.modes) * model.rig.drive.signal.period
         if (
             steady
             and not rigid

@@ -19,8 +19,8 @@ from ....dynamics.events import histories, steady, stick_steady
 from ....dynamics.periodic import is_stable
 from ....response.measures import measure_half_swing
 from ....response.spectrum import wave_measures
-from ....structure.drive_sizes import max_acceleration
-from ....structure.response import receptance
+from ....structure.drive_sizes import find_max_acceleration
+from ....structure.response import compute_receptance
 from ..pieces import Pieces, RigidElements, YieldingElements
 from .curves import SHOWN, Followed, Shown, exact_errors, traced, unlasting
 
@@ -154,7 +154,7 @@ class Maps(Followed):
         values = _of_curve(
             amplitude,
             done.acceleration,
-            wave_measures(*map(float, done.reading.waves), max_acceleration(drive)),
+            wave_measures(*map(float, done.reading.waves), find_max_acceleration(drive)),
         )
         holds = Pieces(self.model, self.numerics, self.patch, self.found).sticks(done)
         return Shown(
@@ -264,7 +264,7 @@ class EventFinder(Maps):
         )
         try:
             seen, felt = (
-                receptance(modes, drive.omega, [gauge, modes.output], modes.base)[0, :, 0]
+                compute_receptance(modes, drive.omega, [gauge, modes.output], modes.base)[0, :, 0]
                 * modes.mass
             )
         except PatchfemError:
