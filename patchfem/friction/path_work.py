@@ -16,8 +16,8 @@ def sampled_work(rel_disp, force, force_after=None) -> np.ndarray:
     force : (k,) array
         Friction force [N], positive against positive slip.
     force_after : (k - 1,) array, optional
-        Force [N] in the step that follows a sample. It replaces the sample where the slide starts or reverses, because
-        friction may jump there and the sample then holds the force before the jump.
+        Force [N] in the step that follows a sample. It replaces the sample where the relative displacement starts or
+        reverses, because friction may jump there, and the sample is then the force before the jump.
 
     Returns
     -------

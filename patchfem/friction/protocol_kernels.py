@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 from ..compiled.jit import NJIT_NO_REFCOUNT, njit
 
-IS_SET_VALUED = False  # a set-valued law holds the relative displacement at rest without a stretch
-HAS_ZERO_KINK = False  # the rate equation of the law has a kink at zero stretch
-# the stretch of the law depends on the path alone and is given by `integrate_stretch`
+IS_SET_VALUED = False  # whether the law keeps a relative displacement at rest without a stretch
+HAS_ZERO_KINK = False  # whether the rate equation has a kink at zero stretch
+# whether the stretch depends on the path alone and is given by `integrate_stretch`
 IS_RATE_INDEPENDENT = False
-HAS_SPEED_LAYER = False  # the force of the law changes within a layer of small speeds
+HAS_SPEED_LAYER = False  # whether the force changes within a layer of small velocities
 
 
 class Reading(NamedTuple):

@@ -1,4 +1,4 @@
-"""Shear modes of a patch, and traction and slip at its nodes from states."""
+"""Shear modes of a patch, and traction and slip of its nodes in given states."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from .shear_modes import N_SHEAR_MODES, enough_modes, fewest_modes, shear_modes
 
 
 class ShearFields(NamedTuple):
-    """Traction (f, m) [Pa] and irreversible local slip (f, m) [m] of f states."""
+    """Traction (f, m) [Pa] and irreversible slip (f, m) [m] of the nodes in f states."""
 
     traction: np.ndarray
     local_slip: np.ndarray
@@ -24,17 +24,22 @@ def element_fields(patch, elements, states, length: float) -> ShearFields:
         The pressed patch.
     elements : JenkinsSet
     states : sequence
-        f pairs of slide [m] and stretch (t,) [m].
+        f pairs of relative displacement [m] and stretches (t,) [m] of the elements.
     length : float
         Length of the elastic-plastic law [m], 0 for Coulomb's law.
+
+    Returns
+    -------
+    ShearFields
     """
-    shape, weight = (len(states), patch.x.size), patch.pieces.interface.weight
-    traction, local_slip = np.zeros(shape), np.zeros(shape)
-    for i, (slide, stretch) in enumerate(states):
+    weight = patch.pieces.interface.weight
+    traction = np.zeros((len(states), patch.x.size))
+    local_slip = np.zeros_like(traction)
+    for i, (rel_disp, stretch) in enumerate(states):
         force = np.zeros(patch.x.size)
         force[elements.points] = elements.force_matrix @ stretch
         traction[i] = force / weight
-        local_slip[i] = slide - patch.giving @ force
+        local_slip[i] = rel_disp - patch.giving @ force
         local_slip[i, elements.points] -= length * force[elements.points] / elements.limit
     return ShearFields(traction, local_slip)
 
@@ -49,14 +54,18 @@ def point_fields(patch, law: Bonds, shear, states) -> ShearFields:
     law : Bonds
     shear : ShearModes or None
     states : sequence
-        f pairs of slide [m] and bonds (5, a), of which m, z, s2 and the local slide are read.
+        f pairs of relative displacement [m] and bonds (5, a): m, z, s2, local displacement [m] and play of each point.
+
+    Returns
+    -------
+    ShearFields
     """
-    shape = (len(states), patch.x.size)
     index = np.arange(patch.x.size) if shear is None else shear.points
-    traction, local_slip = np.zeros(shape), np.zeros(shape)
-    for i, (slide, bonds) in enumerate(states):
+    traction = np.zeros((len(states), patch.x.size))
+    local_slip = np.zeros_like(traction)
+    for i, (rel_disp, bonds) in enumerate(states):
         traction[i, index] = law.static / law.length * bonds[1]
-        local_slip[i] = slide
+        local_slip[i] = rel_disp
         stretch = np.divide(bonds[1], bonds[0], out=np.zeros(index.size), where=bonds[0] > 0)
         local_slip[i, index] = bonds[3] - stretch
     return ShearFields(traction, local_slip)
@@ -67,7 +76,7 @@ def bond_shear_modes(
 ):
     """Return the ShearModes of a pressed patch for a bond law.
 
-    The friction limit of a node is mu_s sigma_n times its area [N]; the bonds are springs in series.
+    The friction limit [N] of a node is mu_s sigma_n times its area. Its bonds are springs in series with the pieces.
 
     Parameters
     ----------
@@ -75,13 +84,17 @@ def bond_shear_modes(
         The pressed patch.
     law : Bonds
     count : int or None
-        Number of modes; without it the tolerance decides.
+        Number of modes; None to determine it from the tolerance.
     tolerance : float
-        Error of the backbone over the friction limit.
+        Largest error of the backbone / friction limit.
     fewest : bool
-        Whether to search for the smallest number of modes, in place of doubling it.
+        Whether to search for the smallest number of modes, instead of doubling the number.
     sigma : (m,) ndarray, optional
-        Another pressure [Pa], of nodes that are not yet in contact.
+        Pressure [Pa] that replaces that of the patch.
+
+    Returns
+    -------
+    ShearModes
     """
     pressure = patch.pressure.sigma_n if sigma is None else sigma
     limit = law.static * pressure * patch.pieces.interface.weight

@@ -185,7 +185,8 @@ class Spectrum:
             start[:, :n_cached] = self.cache[n_cached].coordinates
         is_own = shape is None
         if is_own:
-            shape, limit = self.shape[:, :count], self.limit
+            shape = self.shape[:, :count]
+            limit = self.limit
         with one_thread(), np.errstate(over="ignore", invalid="ignore"):
             backbone = _solve_backbone(
                 limit, shape, self.compliance[:count], self.length, self.displacements, start
@@ -255,7 +256,8 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     if not (limit > 0).any():
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     points = np.flatnonzero(limit > 0)
-    force, none = limit[points], np.zeros(0, np.int64)
+    force = limit[points]
+    none = np.zeros(0, np.int64)
     # rigid pieces in series with one spring slip at all nodes together
     if local_length == 0 and np.ptp(tangential) == 0:
         stiffness = 1 / tangential[0, 0]
@@ -340,7 +342,8 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
     one.
     """
     rate = dpotrs(_factorise(c), np.ones(force.size), lower=1)[0]
-    order, displacements = np.arange(force.size), _divide_or_inf(force, rate)
+    order = np.arange(force.size)
+    displacements = _divide_or_inf(force, rate)
     for _ in range(MAX_SORTS + 1):
         order = order[np.argsort(-displacements, kind="stable")]
         sequence = _yield_sequence(c, force, order)
@@ -382,12 +385,13 @@ def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
     An exchange changes the yields of these two nodes alone. L with two rows exchanged becomes lower triangular again by
     a rotation of two of its columns, which also rotates L^-1 1 and L' force.
     """
-    cholesky_factor = sequence.cholesky_factor
-    order, inverse_ones, factored_force = (
-        part.tolist() for part in (sequence.order, sequence.inverse_ones, sequence.factored_force)
-    )
+    factor = sequence.cholesky_factor
+    order = sequence.order.tolist()
+    inverse_ones = sequence.inverse_ones.tolist()
+    factored_force = sequence.factored_force.tolist()
     displacements = sequence.displacements.tolist()
-    pending, remaining = list(range(len(order) - 1))[::-1], MAX_EXCHANGES * len(order)
+    pending = list(range(len(order) - 1))[::-1]
+    remaining = MAX_EXCHANGES * len(order)
     while pending:
         k = pending.pop()
         is_neighbour = 0 <= k < len(order) - 1
@@ -397,31 +401,31 @@ def _exchange_neighbours(sequence: _Sequence) -> _Sequence | None:
         if remaining < 0:
             return None
         both = slice(k, k + 2)
-        cholesky_factor[both, : k + 2] = cholesky_factor[[k + 1, k], : k + 2]
-        size = np.hypot(cholesky_factor[k, k], cholesky_factor[k, k + 1])
-        c, s = float(cholesky_factor[k, k] / size), float(cholesky_factor[k, k + 1] / size)
+        factor[both, : k + 2] = factor[[k + 1, k], : k + 2]
+        size = np.hypot(factor[k, k], factor[k, k + 1])
+        c = float(factor[k, k] / size)
+        s = float(factor[k, k + 1] / size)
         # this sign keeps the diagonal positive
         rotation = np.array([[c, s], [s, -c]])
-        cholesky_factor[k:, both] = cholesky_factor[k:, both] @ rotation
-        cholesky_factor[k, k + 1] = 0.0
+        factor[k:, both] = factor[k:, both] @ rotation
+        factor[k, k + 1] = 0.0
         order[both] = order[both][::-1]
         for part in (inverse_ones, factored_force):
             part[both] = c * part[k] + s * part[k + 1], s * part[k] - c * part[k + 1]
-        displacements[both] = [
-            a / b if b > 0 else np.inf for a, b in zip(factored_force[both], inverse_ones[both])
-        ]
+        for i in (k, k + 1):
+            is_positive = inverse_ones[i] > 0
+            displacements[i] = factored_force[i] / inverse_ones[i] if is_positive else np.inf
         pending += [k + 1, k - 1]
-    return _Sequence(
-        *map(np.array, (order, cholesky_factor, inverse_ones, factored_force, displacements))
-    )
+    lists = (order, factor, inverse_ones, factored_force, displacements)
+    return _Sequence(*map(np.array, lists))
 
 
 def _factorise(c: np.ndarray) -> np.ndarray:
     """Return the lower Cholesky factor of c (n, n); PatchfemError if c is not positive definite."""
-    cholesky_factor, fault = dpotrf(c.T, lower=1)
+    factor, fault = dpotrf(c.T, lower=1)
     if fault:
         raise PatchfemError(INDEFINITE_MESSAGE)
-    return cholesky_factor
+    return factor
 
 
 def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -429,7 +433,9 @@ def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
 
     This takes n^3 products in all.
     """
-    inverse, remaining, yielded = np.linalg.inv(c), force.copy(), []
+    inverse = np.linalg.inv(c)
+    remaining = force.copy()
+    yielded = []
     rate = inverse.sum(axis=0)
     for _ in range(force.size):
         wait = _divide_or_inf(remaining, rate)
@@ -437,7 +443,8 @@ def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
         point = int(wait.argmin())
         yielded.append(point)
         remaining -= rate * max(wait[point], 0.0)
-        column, pivot = inverse[point].copy(), inverse[point, point]
+        column = inverse[point].copy()
+        pivot = inverse[point, point]
         rate = rate - column / pivot * rate[point]
         inverse -= np.outer(column, column / pivot)
     return np.array(yielded[::-1])
@@ -488,7 +495,8 @@ def _make_spectrum(
 
     first_modes_only: whether the N_REFERENCE_MODES most compliant modes are enough if there are many nodes.
     """
-    index, spectrum = np.flatnonzero(limit > 0), None
+    index = np.flatnonzero(limit > 0)
+    spectrum = None
     if first_modes_only and index.size >= MIN_LANCZOS_POINTS:
         spectrum = _first_modes(tangential, index, limit[index], bond_length)
     if spectrum is None:
@@ -521,9 +529,11 @@ def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
     It is None if Lanczos' method does not converge, as for a soft layer of asperities, whose eigenvalues lie close
     together.
     """
-    root, c = np.sqrt(limit)[:, None], _block(tangential, index)
+    root = np.sqrt(limit)[:, None]
+    c = _block(tangential, index)
 
     def product(vectors: np.ndarray) -> np.ndarray:
+        """Multiply by D^1/2 C D^1/2."""
         return root * (c @ (root * vectors))
 
     with one_thread():
@@ -575,7 +585,7 @@ def largest_eigenpairs(
     basis, images = np.empty((2, len(start), 2 * n_products))
     new = np.stack([start, start * np.linspace(-1, 1, len(start))], axis=1)
     for k in range(0, 2 * n_products, 2):
-        # The orthogonalization is repeated because rounding errors of the first pass remain.
+        # the orthogonalisation is repeated because rounding errors of the first pass remain
         for _ in range(2):
             new = new - basis[:, :k] @ (basis[:, :k].T @ new)
             first = new[:, 0] / np.sqrt(new[:, 0] @ new[:, 0])
@@ -586,7 +596,8 @@ def largest_eigenpairs(
         images[:, k : k + 2] = new
     projected = basis.T @ images
     values, parts = np.linalg.eigh((projected + projected.T) / 2)
-    values, parts = values[: -count - 1 : -1], parts[:, : -count - 1 : -1]
+    values = values[: -count - 1 : -1]
+    parts = parts[:, : -count - 1 : -1]
     vectors = basis @ parts
     residuals = ((images @ parts - vectors * values) ** 2).sum(axis=0)
     return EigenPairs(values, vectors, float(np.sqrt(residuals.max())))
@@ -727,7 +738,8 @@ def modes_on_gauss(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
     -------
     GaussModes
     """
-    spectrum, n_modes = modes.spectrum, modes.stiffness.size
+    spectrum = modes.spectrum
+    n_modes = modes.stiffness.size
     positions, limit = gauss_rule(x, spectrum.limit, count)
     shape = np.stack([np.interp(positions, x, mode) for mode in modes.shape.T], axis=1)
     error = spectrum.relative_difference(
@@ -754,12 +766,15 @@ def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
     -------
     positions, weights : (count,) ndarray
     """
-    scaled, total = 2 * (x - x.mean()) / np.ptp(x), weight.sum()
-    basis, diagonal, off_diagonal = [np.sqrt(weight / total)], [], []
+    scaled = 2 * (x - x.mean()) / np.ptp(x)
+    total = weight.sum()
+    basis = [np.sqrt(weight / total)]
+    diagonal = []
+    off_diagonal = []
     for _ in range(count):
         new = scaled * basis[-1]
         diagonal.append(new @ basis[-1])
-        # The orthogonalization is repeated because rounding errors of the first pass remain.
+        # the orthogonalisation is repeated because rounding errors of the first pass remain
         for _ in range(2):
             new = new - np.array(basis).T @ (np.array(basis) @ new)
         off_diagonal.append(np.linalg.norm(new))
@@ -776,14 +791,16 @@ class _Backbone(NamedTuple):
     coordinates: np.ndarray
 
 
-def _solve_backbone(limit, shape, values, length, displacements, start) -> _Backbone:
+def _solve_backbone(limit, shape, compliance, length, displacements, start) -> _Backbone:
     """Compute the friction force on first loading at relative displacements (k,) by Newton's method.
 
     A node with the local displacement xi carries D (1 - exp(-xi/length)). The modal coordinates `start` (k, r) are the
     initial guess and are overwritten. No step moves a node back by more than MAX_BACKWARD_LENGTHS lengths, because the
     law is so steep there that Newton's method does not return.
     """
-    coordinates, pending, n_modes = start, np.arange(displacements.size), values.size
+    coordinates = start
+    pending = np.arange(displacements.size)
+    n_modes = compliance.size
     first, second = np.tril_indices(n_modes)
     products = (shape.T[first] * shape.T[second]).T
     entries = np.empty((n_modes, n_modes), np.int64)
@@ -791,21 +808,21 @@ def _solve_backbone(limit, shape, values, length, displacements, start) -> _Back
     for _ in range(MAX_ITERATIONS):
         xi = displacements[pending, None] - coordinates[pending] @ shape.T
         decay = np.exp(np.minimum(-xi / length, MAX_DECAY_EXPONENT))
-        residual = coordinates[pending] / values - (limit * (1 - decay)) @ shape
-        tangent = ((limit * decay / length) @ products)[:, entries] + np.diag(1 / values)
+        residual = coordinates[pending] / compliance - (limit * (1 - decay)) @ shape
+        tangent = ((limit * decay / length) @ products)[:, entries] + np.diag(1 / compliance)
         try:
             step = np.linalg.solve(tangent, residual[:, :, None])[:, :, 0]
         except np.linalg.LinAlgError:
             return _Backbone(np.full(displacements.size, np.nan), coordinates)
         change = step @ shape.T
+        # fraction of the step that moves no node back by more than the limit
         backward = np.where(change < 0, -change, 1.0)
-        part = np.where(change < 0, (xi + MAX_BACKWARD_LENGTHS * length) / backward, 1.0).min(
-            axis=1
-        )
-        part = np.where((part > 0) & (part < 1), part, 1.0)
-        coordinates[pending] -= part[:, None] * step
+        fraction = (xi + MAX_BACKWARD_LENGTHS * length) / backward
+        fraction = np.where(change < 0, fraction, 1.0).min(axis=1)
+        fraction = np.where((fraction > 0) & (fraction < 1), fraction, 1.0)
+        coordinates[pending] -= fraction[:, None] * step
         size = np.abs(coordinates[pending]).max(axis=1) + 1e-300
-        is_converged = (part == 1.0) & (np.abs(step).max(axis=1) <= NEWTON_TOL * size)
+        is_converged = (fraction == 1.0) & (np.abs(step).max(axis=1) <= NEWTON_TOL * size)
         pending = pending[~is_converged]
         if not pending.size:
             break

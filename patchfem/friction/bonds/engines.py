@@ -47,7 +47,7 @@ class EngineChoice:
     - engine: name of the engine
     - tail: fraction of the friction limit that the cut-off may lose
     - merge: width [eps_0] up to which strips are merged
-    - error: bound of the whole error over the friction limit
+    - error: bound of the total error / friction limit
     - strips: expected length of the list
     - seconds: CPU seconds per step
     """

@@ -178,7 +178,7 @@ def _have_similar_density(bonds, i, k, width, eps0):
     """Return whether two adjacent strips have nearly the same weight per path.
 
     Where the bond length changes their weights differ by 1/eps^p. Joining them moves a quarter of the relative
-    difference of their weights. With an order below 1 the whole of it acts once the displacement returns to them, where
+    difference of their weights. With an order below 1 all of it acts once the displacement returns to them, where
     u = 0.
     """
     left = bonds[STRIP.weight, i] * bonds[STRIP.covered, k]

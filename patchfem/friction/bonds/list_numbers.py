@@ -40,7 +40,7 @@ def cutoff_age(order: float, tail: float) -> float:
 
 
 def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0) -> np.ndarray:
-    """Return the numbers of a law at the positions of `LAW`.
+    """Return the parameters of a law, with the indices of `LAW`.
 
     Parameters
     ----------
@@ -50,8 +50,8 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
     merge : float
         Largest width of a merged strip of age 0 in bond lengths; 0 merges nothing.
     half_width : float
-        Half the width in bond lengths over which the initial bonds are spread. A force that jumps at one place has no
-        step that ends in the jump.
+        Half the width in bond lengths over which the initial bonds are distributed. With 0 their force jumps at
+        displacement 0, and no step of a rig can end in the jump.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def make_status(capacity: int, count: int | None = None) -> np.ndarray:
     ----------
     capacity : int
     count : int, optional
-        Number of lists that lie one behind the other in one array.
+        Number of lists that follow each other in an array.
 
     Returns
     -------

@@ -158,13 +158,13 @@ def _integrate_power_strip(displacement, bonds, k, p, nodes, is_force):
     slope = bonds[STRIP.clock_width, k] / step
     low = min(start, end)
     high = max(start, end)
-    behind = _integrate_jacobi(displacement - low, -slope, nodes, p)
-    behind -= _integrate_jacobi(displacement - high, -slope, nodes, p)
-    ahead = _integrate_jacobi(high - displacement, slope, nodes, p)
-    ahead -= _integrate_jacobi(low - displacement, slope, nodes, p)
+    below = _integrate_jacobi(displacement - low, -slope, nodes, p)
+    below -= _integrate_jacobi(displacement - high, -slope, nodes, p)
+    above = _integrate_jacobi(high - displacement, slope, nodes, p)
+    above -= _integrate_jacobi(low - displacement, slope, nodes, p)
     density = 2 * bonds[POWER_ROW.weight_1, k] / abs(step)
     density *= exp(slope * (displacement - end + GAUSS_POINT_1 * step))
-    return density * (behind - ahead if is_force else behind + ahead)
+    return density * (below - above if is_force else below + above)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -543,9 +543,9 @@ def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
             if is_steep:
                 power_low = (near + low * width) ** (p + 1)
                 power_high = (near + high * width) ** (p + 1)
-                place = (power_low + gauss * (power_high - power_low)) ** (1 / (p + 1))
-                fraction = (place - near) / width
-                weight = 0.5 * (power_high - power_low) / (p + 1) * place ** (-p)
+                position = (power_low + gauss * (power_high - power_low)) ** (1 / (p + 1))
+                fraction = (position - near) / width
+                weight = 0.5 * (power_high - power_low) / (p + 1) * position ** (-p)
             x = max(near + fraction * width, MIN_PATH) / _bond_length(fraction, mature, bonds, k)
             carried = weight * fast_exp(p * fast_log(x) - x)
             u = displacement - end + fraction * step

@@ -28,7 +28,8 @@ NUMBER_UNITS = "N m 1 1"  # units of `numbers`, for batches that scale time and 
 HAS_ZERO_KINK = True  # the slope over the path jumps between loading and unloading
 IS_RATE_INDEPENDENT = True  # z depends on the path alone
 
-GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)
+GAUSS_POINTS = np.polynomial.legendre.leggauss(8)[0]  # Gauss points in (-1, 1) of a piece
+GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)[1]  # weights of these points
 MAX_PIECE = 0.25  # longest interval of the Gauss rule in |y| or w
 FIRST_PIECE = 0.05  # longest interval at zero, where a fractional power is not smooth
 MAX_W = 36.0  # value of w beyond which y rounds to 1

@@ -14,7 +14,7 @@ from ..protocol import Element, SteadyLoop, Step
 class ElasticPlastic:
     """Eq. 3.12 per point: springs of stiffness mu sigma/length that slip at mu sigma.
 
-    A rising pressure adds unstretched springs. A falling pressure only lowers the limit; the springs beyond it break
+    An increase of the pressure adds unstretched springs. A decrease only lowers the limit; the springs beyond it break
     within one length of slip. So a change of the pressure creates no energy, and a force below the limit stays.
 
     - static: mu [1]

@@ -1,7 +1,7 @@
 """Parallel elastic-plastic elements (eq. 3.12), compiled. NumPy form: `elastic_plastic`.
 
-numbers: number t of elements, their stiffness (t,) [N/m], their yield slide (t,) [m]; memory: force [N], stored energy
-[J], stretch [m] averaged with the slip forces as weights, then the stretch (t,) [m] of every element.
+numbers: number t of elements, their stiffness (t,) [N/m], their yield displacement (t,) [m]; memory: force [N], stored
+energy [J], mean stretch [m] weighted by the slip forces, then the stretch (t,) [m] of every element.
 
 A point under a load that changes has a traction over mu and a density of springs (`ElasticPlastic.press`, `step`). It
 stretches and slips as one of the elements does.

@@ -3,8 +3,8 @@
     g(v) = mu_k N + (mu_s - mu_k) N exp(-(v/v_s)^2),   z' = v - stiffness |v| z/g(v),
     F = stiffness z + micro_damping z' + viscous v
 
-A steady slide has the Stribeck curve F = g(v) sgn v + viscous v. With mu_k = mu_s and neither damping it is Dahl's law,
-which is eq. 2.17 with reading="stretch" and eps_0 = mu N/stiffness. `lugre_kernels` steps it.
+A motion at constant velocity has the Stribeck curve F = g(v) sgn v + viscous v. With mu_k = mu_s and no damping it is
+Dahl's law, which is eq. 2.17 with reading="stretch" and eps_0 = mu N/stiffness. `lugre_kernels` steps it.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from ..protocol import Element
 
 @dataclass(frozen=True, slots=True)
 class LuGre:
-    """LuGre law per newton of normal load, with the same z at all points of a contact.
+    """LuGre law per newton of normal load; all points of a contact have the same z.
 
     - static, kinetic: friction coefficients mu_s and mu_k
     - stiffness: [1/m]
@@ -33,10 +33,10 @@ class LuGre:
 
     def element(self, load: float) -> Element:
         """Return the `protocol.Element` of a contact under a constant load [N], of form "flow"."""
-        share = np.array(
+        per_load = np.array(
             [self.stiffness, self.kinetic, self.static, 0.0, self.micro_damping, self.viscous]
         )
-        numbers = np.concatenate([[0.0], load * share])
+        numbers = np.concatenate([[0.0], load * per_load])
         numbers[4] = self.speed
         return Element(
             "friction.laws.lugre_kernels",
@@ -65,13 +65,13 @@ def from_keys(friction, load: float) -> LuGre:
 
     A load of 0 counts as 1 N. Without a kinetic coefficient it is the static one.
     """
-    whole = load or 1.0
+    reference_load = load or 1.0
     kinetic = friction.static if friction.kinetic is None else friction.kinetic
     return LuGre(
         friction.static,
         kinetic,
-        friction.stiffness / whole,
+        friction.stiffness / reference_load,
         friction.stribeck_speed,
-        friction.micro_damping / whole,
-        friction.viscous / whole,
+        friction.micro_damping / reference_load,
+        friction.viscous / reference_load,
     )

@@ -1,12 +1,10 @@
-"""Elastic-plastic element in a plane, compiled: F = k s, |F| <= k w, s' = q' - slip'.
+"""Elastic-plastic element in a plane, compiled: F = k s, |F| <= k w, s' = q' - slip', with the slip along F.
 
-The slip is along F.
-
-The stretch s (2,) of its spring follows the relative displacement until it reaches the yield slide w; then it stays on
-that circle and turns towards the direction of motion. Along a straight increment, with the angle psi between s and the
-increment, psi' = -sin(psi)/w, so tan(psi/2) falls as exp(-path/w): end, path mean and dissipation have closed forms
-(Krieg and Krieg, J. Pressure Vessel Technol. 99, 510, 1977, for metals that yield). Along one line it is
-`elastic_plastic_kernels`, whose memory two elements have here, one for each direction.
+The stretch s (2,) of its spring follows the relative displacement until it reaches the yield displacement w; then it
+stays on that circle and turns towards the direction of motion. Along a straight increment, with the angle psi between s
+and the increment, psi' = -sin(psi)/w, so tan(psi/2) decays as exp(-path/w): end, path mean and dissipation have closed
+forms (Krieg and Krieg, J. Pressure Vessel Technol. 99, 510, 1977, for metals that yield). Along a line, the element is
+that of `elastic_plastic_kernels`; here two elements have its memory, one per direction.
 """
 
 from math import atan, exp, expm1, log1p, sqrt
@@ -61,7 +59,7 @@ def advance_straight(spring, stretch, increment):
     Parameters
     ----------
     spring : (float, float)
-        Stiffness k [N/m] and yield slide w [m].
+        Stiffness k [N/m] and yield displacement w [m].
     stretch, increment : (float, float)
         Stretch before, and increment [m].
 
@@ -161,9 +159,9 @@ def solve_plane_step(free, compliance, spring, stretch, guess, tolerance):
     fx = 0.0
     fy = 0.0
     for count in range(1, MAX_ITERATIONS):
-        slide = advance_straight(spring, stretch, (dx, dy))
-        fx = slide.mean_x
-        fy = slide.mean_y
+        step = advance_straight(spring, stretch, (dx, dy))
+        fx = step.mean_x
+        fy = step.mean_y
         rx = dx - gx + xx * fx + xy * fy
         ry = dy - gy + xy * fx + yy * fy
         round_x = ROUND_OFF_RATIO * (abs(gx) + abs(dx) + xx * abs(fx) + abs(xy * fy))
@@ -176,10 +174,10 @@ def solve_plane_step(free, compliance, spring, stretch, guess, tolerance):
             y = dy
             smallest = size
             damping = 1.0
-            a = 1 + xx * slide.slope.xx + xy * slide.slope.yx
-            b = xx * slide.slope.xy + xy * slide.slope.yy
-            c = xy * slide.slope.xx + yy * slide.slope.yx
-            d = 1 + xy * slide.slope.xy + yy * slide.slope.yy
+            a = 1 + xx * step.slope.xx + xy * step.slope.yx
+            b = xx * step.slope.xy + xy * step.slope.yy
+            c = xy * step.slope.xx + yy * step.slope.yx
+            d = 1 + xy * step.slope.xy + yy * step.slope.yy
             determinant = a * d - b * c
             step_x = (b * ry - d * rx) / determinant
             step_y = (c * rx - a * ry) / determinant
@@ -207,9 +205,9 @@ def update_plane_memory(numbers, memory_x, memory_y, increment):
         Dissipated energy [J].
     """
     k = numbers[2]
-    slide = advance_straight((k, numbers[3]), (memory_x[3], memory_y[3]), increment)
-    x = slide.stretch_x
-    y = slide.stretch_y
+    step = advance_straight((k, numbers[3]), (memory_x[3], memory_y[3]), increment)
+    x = step.stretch_x
+    y = step.stretch_y
     memory_x[0] = k * x
     memory_x[1] = 0.5 * k * (x * x + y * y)
     memory_x[2] = x
@@ -218,4 +216,4 @@ def update_plane_memory(numbers, memory_x, memory_y, increment):
     memory_y[1] = 0.0
     memory_y[2] = y
     memory_y[3] = y
-    return slide.dissipated
+    return step.dissipated

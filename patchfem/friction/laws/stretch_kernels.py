@@ -33,7 +33,7 @@ from ..protocol_kernels import (
 from .exponential_kernels import exp_minus
 
 NUMBER_UNITS = "N/m m"  # units of `numbers`, for batches that scale time and force
-IS_RATE_INDEPENDENT = True  # at a constant bond length the stretch depends on the path alone
+IS_RATE_INDEPENDENT = True  # the stretch depends on the path alone if the bond length is constant
 GROWTH_INDEX = (
     3  # index in `numbers` where the growth begins: a_s, l_k, v_h, eps_0, eps_k, breakaway
 )
