@@ -1,14 +1,15 @@
-"""Random benches behind [contact.shear] against an own finite-element and partial-slip solver.
+"""Random benches with [contact.shear] against a separate partial-slip solver.
 
-Campaign `partial-slip` of `campaigns`. The benches are crowned, tilted or both, coated or not, and slide by 0.02 to 2
-of the relative displacement at which the whole patch slips, at tolerances of 1e-2 to 1e-4.
+Campaign `partial-slip` of `campaigns`. The benches are crowned, tilted or both, coated or not, and
+slide by 0.02 to 2 of the relative displacement at which the whole patch slips, at tolerances of
+1e-2 to 1e-4.
 
-The solver shares nothing with patchfem. The half of a pair is a grid of biquadratic elements,
-assembled as sums of Kronecker products. Pressure and shear are constant on the cells of the
-interface, contact and stick hold for the averages over cells. With the limits g = mu p of the
-cells, the missing shear r = g - t at the slide q solves r >= 0, C r >= C g - q, r (C r - C g + q)
-= 0, and Masing's rule gives the loop. Each bench is solved on two grids; their difference is the
-uncertainty of the reference.
+The solver shares nothing with patchfem. Half of a pair is a grid of biquadratic elements, assembled
+as sums of Kronecker products. Pressure and shear are constant on the cells of the interface;
+contact and stick hold for the averages over cells. With the limits g = mu p of the cells, the
+missing shear r = g - t at the slide q solves r >= 0, C r >= C g - q, r (C r - C g + q) = 0, and
+Masing's rule gives the loop. Each bench is solved on two grids; their difference is the uncertainty
+of the reference.
 """
 
 from pathlib import Path
@@ -26,12 +27,12 @@ MATERIALS = (("steel", 210e9, 0.3), ("titanium", 121e9, 0.32), ("aluminium", 70e
 COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio
 MASS = np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]]) / 30  # quadratic element of length 1
 STIFFNESS = np.array([[7, -8, 1], [-8, 16, -8], [1, -8, 7]]) / 3
-# derivative of the row by the column
+# Derivative of the row's function times the column's function.
 GRADIENT = np.array([[-3, -4, 1], [4, 0, -4], [-1, 4, 3]]) / 6
 
 
 def line_matrix(element, lengths, scale):
-    """Global matrix (2 n + 1, 2 n + 1) of quadratic elements; scale: (n,) factor of each."""
+    """Return the matrix (2 n + 1, 2 n + 1) of quadratic elements; scale: (n,) factor of each."""
     out = lil_matrix((2 * lengths.size + 1, 2 * lengths.size + 1))
     for k, factor in enumerate(scale):
         out[2 * k : 2 * k + 3, 2 * k : 2 * k + 3] += factor * element
@@ -39,9 +40,16 @@ def line_matrix(element, lengths, scale):
 
 
 def stiffness_of(columns, rows, young, poisson):
-    """Stiffness of a grid in plane strain, unknowns u, then v, x before y; the last row is held.
+    """Return the stiffness of a grid in plane strain, with the last row fixed.
 
-    columns (n + 1,), rows (m + 1,) [m]; young, poisson: (m,) of the rows.
+    The unknowns are all u, then all v, with x before y.
+
+    Parameters
+    ----------
+    columns, rows : (n + 1,), (m + 1,) array
+        Grid lines [m].
+    young, poisson : (m,) array
+        Of each row.
     """
     hx, hy = np.diff(columns), np.diff(rows)
     lame, shear = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 + 2 * poisson)
@@ -67,7 +75,10 @@ def stiffness_of(columns, rows, young, poisson):
 
 
 def compliances(columns, rows, young, poisson, cells, width):
-    """Normal and tangential compliance (k, k) [m/N] of both pieces between the averages of cells."""
+    """Return normal and tangential compliance (k, k) [m/N] of both pieces.
+
+    They relate averages over cells.
+    """
     matrix, free = stiffness_of(columns, rows, young, poisson)
     size = matrix.shape[0]
     order = np.argsort(np.tile(np.repeat(np.arange(2 * columns.size - 1), free), 2), kind="stable")
@@ -97,7 +108,10 @@ def compliances(columns, rows, young, poisson, cells, width):
 
 
 def complementary(matrix, right, load=None):
-    """Solve f >= 0, matrix f - right - d >= 0, complementary; d = 0, or so that sum f = load."""
+    """Solve the complementarity problem f >= 0, matrix f - right - d >= 0.
+
+    d is 0, or such that sum f = load.
+    """
     active = np.ones(right.size, bool)
     for _ in range(200):
         index = np.flatnonzero(active)
@@ -120,7 +134,7 @@ def complementary(matrix, right, load=None):
 
 
 def spaced(start, stop, size):
-    """Places from start to stop with steps of about size(x)."""
+    """Return positions from start to stop with steps of about size(x)."""
     x, out = start, [start]
     while x < stop:
         x += size(x + size(x) / 2)
@@ -154,13 +168,13 @@ class Bench:
         self.amplitude = None
 
     def gap(self, x):
-        """Gap [m] at x [m] of the unloaded faces."""
+        """Return the gap [m] of the unloaded faces at x [m]."""
         return (x**2 / (2 * self.radius) if self.crowned else 0.0) + (
             self.angle * x if self.tilted else 0.0
         )
 
     def text(self):
-        """Scene file; the amplitude has to be set."""
+        """Return the text of the scene, for which the amplitude must be set."""
         out = [
             f'[contact]\nlength = "{self.length!r} m"\nwidth = "{self.width!r} m"\nheight = "{self.height!r} m"',
             f'load = "{self.load!r} N"',
@@ -185,12 +199,12 @@ class Bench:
 
 
 class Reference:
-    """Own solution of a bench; fine: cells per length, 1 for the coarse grid."""
+    """Solution of a bench by this solver; fine: number of cells relative to the coarse grid."""
 
     def __init__(self, bench, fine):
         self.bench, half = bench, bench.length / 2
         cells, low, high = spaced(-half, half, lambda x: bench.length / 80), -half, half
-        for _ in range(3):  # zoom to the contact on coarse grids
+        for _ in range(3):  # grids that zoom in on the contact
             centre = (cells[1:] + cells[:-1]) / 2
             chosen = np.flatnonzero((centre > low) & (centre < high))
             normal, _ = self._matrices(cells, chosen, 1.0)
@@ -211,7 +225,10 @@ class Reference:
         self.stiffness = float(np.linalg.solve(self.shear, np.ones(index.size)).sum())
 
     def _sizes(self, ends, least, slope):
-        """Cell length at x for a contact between `ends`, `least` of it at its open ends."""
+        """Return the cell length as a function of x for a contact between `ends`.
+
+        `least` is its fraction of the contact at the open ends.
+        """
         half, wide = self.bench.length / 2, ends[1] - ends[0]
         inside = wide * max(least, 1 / 60 * slope / 0.12)
         open_ends = [end for end in ends if abs(end) < half * (1 - 1e-9)]
@@ -228,7 +245,7 @@ class Reference:
         return size
 
     def _ends(self, cells, chosen, force):
-        """Ends of the contact, between cells by the square of the pressure."""
+        """Return the ends of the contact [m]."""
         loaded = np.flatnonzero(force > 0)
         first, last = chosen[loaded[0]], chosen[loaded[-1]]
         return float(cells[first]), float(cells[last + 1])
@@ -254,7 +271,7 @@ class Reference:
         return compliances(cells, rows, young, poisson, chosen, bench.width)
 
     def measures(self):
-        """Measures by their names in patchfem."""
+        """Return the measures by their names in patchfem."""
         bench, amplitude = self.bench, self.bench.amplitude
         free = self.shear @ self.limit
         slides = amplitude * (np.arange(161) / 160) ** 2
@@ -300,7 +317,7 @@ class Reference:
 
 
 def solve_bench(seed: int) -> tuple:
-    """Return a bench with its amplitude, the measures of the fine grid and their differences from the coarse one."""
+    """Return a bench, its measures on the fine grid, and their differences from the coarse grid."""
     bench = Bench(seed)
     fine, coarse = Reference(bench, 1.5), Reference(bench, 1.0)
     bench.amplitude = float(bench.share * bench.static * bench.load / fine.stiffness)

@@ -1,7 +1,8 @@
-"""Laws of friction as differential equations between events, for the independent integrator `motion_reference`.
+"""Friction laws as differential equations between events, for `motion_reference`.
 
-A law holds the numbers of one contact; its state s (k,) and its mode: +-1 the sign of the slide rate, 0 where a contact
-holds (Coulomb) or stretches (elastic-plastic). Nothing here comes from the package.
+A law has the parameters of one contact; its state is s (k,). Its mode is +-1, the sign of the
+relative velocity, or 0 if the contact sticks (Coulomb) or stretches (elastic-plastic). Nothing is
+imported from the package.
 """
 
 from itertools import pairwise
@@ -11,11 +12,18 @@ from scipy.special import gamma, gammainc
 
 
 class Law:
-    """force(s, v, t), rate(s, v, t): of the state; reversible(s) [m]: what of the slide springs back; split(s, v, t):
-    rate of the rest; energy(s), None where it has none; guards(s, v, t): values whose fall through zero ends a stretch;
-    turned: what an event does."""
+    """Base class of the laws.
 
-    # the last: slip and the rest can be told apart
+    - force(s, v, t): friction force [N]
+    - rate(s, v, t): rate of the state
+    - reversible(s): reversible part of the slide [m]
+    - split(s, v, t): rate of its irreversible part [m/s]
+    - energy(s): stored energy [J]; None if the law has none
+    - guards(s, v, t): values whose decrease through zero ends a stretch
+    - turned: changes mode and state at an event
+    """
+
+    # `splits`: whether slip and the reversible part of the slide can be distinguished.
     size, set_valued, split_by_mode, splits = (
         1,
         False,
@@ -25,28 +33,34 @@ class Law:
 
     def __init__(self, limit: float, **keys):
         self.limit, self.mode, self.keys = limit, 1, keys
-        self.side = 1  # of a second border, where a law has one
+        self.side = 1  # side of a second border, if a law has one
 
     def begin(self, v: float, accel: float) -> None:
+        """Set the mode for a motion that begins with velocity v and acceleration accel."""
         self.mode = 1 if (v if v != 0 else accel) >= 0 else -1
 
     def resume(self, s) -> None:
-        """Take the borders on which a motion lies that begins in a state s other than 0."""
+        """Set the sides of borders for a motion that begins in a state s other than 0."""
 
     def take_branch(self, s, v: float, way: float) -> None:
-        """Take the branch of the rate equation at a state s and a rate v of the slide, which goes to the side `way`."""
+        """Choose the branch of the rate equation at a state s and a velocity v.
+
+        way: direction of the motion, +-1.
+        """
         self.mode = way
 
     def guards(self, s, v, t) -> list:
+        """Return the values whose decrease through zero is an event."""
         return [self.mode * v]
 
     def turned(self, k: int, s, v, accel: float):
-        # its speed is beyond zero at the next look, whatever round-off says of its gain
+        """Change the mode at event k and return the state."""
+        # At the next evaluation the velocity is beyond zero, whatever round-off does to it.
         self.mode = -self.mode
         return s
 
     def scale(self) -> float:
-        """Size of the state, and of the slide that turns it over."""
+        """Return the size of the state, which is also the slide that reverses it."""
         return (
             self.keys.get("bond_length", 1.0)
             if "stiffness" not in self.keys
@@ -54,14 +68,17 @@ class Law:
         )
 
     def energy(self, s):
+        """Return the stored energy [J]; None if the law has none."""
         return None
 
     def reversible(self, s) -> float:
-        """What of the slide springs back [m]."""
+        """Return the reversible part of the slide [m]."""
         return s[0] if self.size else 0.0
 
 
 class Tanh(Law):
+    """F = mu N tanh(v/v_0)."""
+
     size = 0
 
     def force(self, s, v, t):
@@ -75,7 +92,7 @@ class Tanh(Law):
 
 
 class Plastic(Law):
-    """F' = mu N v/eps, |F| <= mu N: mode 0 stretches, +-1 slips."""
+    """F' = mu N v/eps, |F| <= mu N: stretches in mode 0, slips in modes +-1."""
 
     split_by_mode = True
 
@@ -107,7 +124,10 @@ class Plastic(Law):
 
 
 class Stretch(Law):
-    """z' = v - |v| z/eps, F = mu N z/eps_0; with growth eps follows 2.10 with |v| floored in a_s/|v|."""
+    """z' = v - |v| z/eps, F = mu N z/eps_0; with growth, eps follows 2.10.
+
+    The speed |v| has a lower bound in a_s/|v|.
+    """
 
     def __init__(self, limit, **keys):
         super().__init__(limit, **keys)
@@ -157,7 +177,7 @@ class Stretch(Law):
 
 
 class Maturing(Stretch):
-    """A fraction m of the bonds is formed at first: z' = m v - |v| z/eps, m' = |v| (1 - m)/eps."""
+    """Bonds of which only a fraction m is formed: z' = m v - |v| z/eps, m' = |v| (1 - m)/eps."""
 
     def __init__(self, limit, **keys):
         super().__init__(limit, **keys)
@@ -238,7 +258,7 @@ class LuGre(Law):
 
 
 class Iwan(Law):
-    """Segalman's sliders by the rules of Masing: the state is the slide; turns of the path are kept on a stack."""
+    """Segalman's sliders by Masing's rules; the state is the slide, a stack has reversals."""
 
     def __init__(self, limit, **keys):
         super().__init__(limit, **keys)
@@ -246,10 +266,11 @@ class Iwan(Law):
         self.top = limit * (1 + beta) / (k * (beta + (chi + 1) / (chi + 2)))
         self.density = k * (chi + 1) / (1 + beta) / self.top ** (chi + 1)
         self.last = k * beta / (1 + beta)
-        self.turns = [(0.0, 0.0, 0.0)]  # (slide, force, mean stretch), the first the virgin state
+        # (slide, force, mean stretch) at reversals; the first is the virgin state
+        self.turns = [(0.0, 0.0, 0.0)]
 
     def loading(self, u: float) -> float:
-        """Force of a first loading to u >= 0."""
+        """Return the force of a first loading to u >= 0."""
         chi, u = self.keys["chi"], min(u, self.top)
         inside = u ** (chi + 2) / (chi + 2) + u * (self.top ** (chi + 1) - u ** (chi + 1)) / (
             chi + 1
@@ -257,7 +278,7 @@ class Iwan(Law):
         return self.density * inside + self.last * u
 
     def stretch(self, u: float) -> float:
-        """Mean stretch of the sliders at a first loading to u, weighted by what each carries at most."""
+        """Return the mean stretch of the sliders at a first loading to u, weighted by their limits."""
         chi, u = self.keys["chi"], min(u, self.top)
         inside = u ** (chi + 3) / (chi + 3) + u * (self.top ** (chi + 2) - u ** (chi + 2)) / (
             chi + 2
@@ -265,13 +286,16 @@ class Iwan(Law):
         return (self.density * inside + self.last * self.top * u) / self.limit
 
     def held(self, u: float) -> float:
-        """Rate of that mean stretch over the slide."""
+        """Return the derivative of this mean stretch by the slide."""
         chi, u = self.keys["chi"], min(u, self.top)
         inside = (self.top ** (chi + 2) - u ** (chi + 2)) / (chi + 2)
         return (self.density * inside + self.last * self.top * (u < self.top)) / self.limit
 
     def masing(self, s, of, start: int) -> float:
-        """A first loading `of` by the rules of Masing from the last turn, whose own value is turn[start]."""
+        """Return a first loading `of` from the last reversal by Masing's rules.
+
+        start: index of its own value in the reversal.
+        """
         turn, way = self.turns[-1], s[0] - self.turns[-1][0]
         if len(self.turns) == 1:
             return np.sign(s[0]) * of(abs(s[0]))
@@ -292,15 +316,16 @@ class Iwan(Law):
 
     def guards(self, s, v, t):
         out = [self.mode * v]
-        if len(self.turns) > 2:  # a minor loop closes where the turn before is reached
+        if len(self.turns) > 2:  # a minor loop closes at the reversal before the last one
             out.append(self.mode * (self.turns[-2][0] - s[0]))
-        elif len(self.turns) == 2:  # back on the first loading at the other end of the first stroke
+        elif len(self.turns) == 2:
+            # back on the first loading, at the opposite end of the first stroke
             out.append(self.mode * (-self.turns[1][0] - s[0]))
         return out
 
     def turned(self, k, s, v, accel):
         if k == 0:
-            # a start to the other side is no turn
+            # A start in the other direction is not a reversal.
             if len(self.turns) > 1 or abs(s[0]) > 1e-12 * self.top:
                 self.turns.append(
                     (float(s[0]), float(self.force(s, v, 0.0)), float(self.reversible(s)))
@@ -312,10 +337,11 @@ class Iwan(Law):
 
 
 class Report(Law):
-    """Eq. 2.17 as printed: F = mu N int (R/eps)^p exp(-R/eps) sgn(u) dR/eps, u the displacement since a bond formed.
+    """Eq. 2.17 as printed: F = mu N int (R/eps)^p exp(-R/eps) sgn(u) dR/eps.
 
-    Between turns of the path u changes its sign once at most, so that every stroke is a difference of incomplete gamma
-    functions. The state is (slide, path); turns of both are kept as long as they count.
+    u is the displacement since a bond formed. Between reversals of the path u changes its sign at
+    most once, so that every stroke is a difference of incomplete gamma functions. The state is
+    (slide, path); reversals of both are kept as long as they count.
     """
 
     size, splits = 2, False
@@ -329,7 +355,7 @@ class Report(Law):
         places = np.array([*self.turns, (path, q)])
         rho, u = (path - places[:, 0]) / eps, q - places[:, 1]
         sums = gammainc(p + 1, np.maximum(rho, 0.0))
-        # where a stroke was at the present place, if it was
+        # age at which a stroke was at the present position, if it was
         passed = rho[:-1] - np.abs(u[:-1]) / eps
         inside = u[:-1] * u[1:] < 0
         middle = np.where(inside, gammainc(p + 1, np.maximum(passed, 0.0)), sums[1:])
@@ -354,7 +380,7 @@ class Report(Law):
 
 
 class Coulomb(Law):
-    """|F| <= static while it holds, kinetic against the slide while it slides."""
+    """|F| <= static while it sticks; the kinetic force against the velocity while it slips."""
 
     size, set_valued, split_by_mode = 0, True, True
 

@@ -6,12 +6,13 @@ import numpy as np
 from motion_reference import Motion
 from scipy.optimize import brentq, minimize_scalar
 
-NEAR, MOST = 1e-4, 12  # peaks that are refined: how near the largest node, and how many
+# relative distance to the largest node within which peaks are refined, and their largest number
+NEAR, MOST = 1e-4, 12
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
 
 class Window:
-    """The last cycles of a motion: Gauss nodes t, weights w, and the sides of every step, with what is read there."""
+    """The last cycles of a motion: Gauss nodes and ends of every step, and values there."""
 
     def __init__(self, motion: Motion, stretches, begin: float, end: float, cycles: int):
         self.motion, self.begin, self.end = motion, begin, end
@@ -38,7 +39,7 @@ class Window:
         self.out = self.y[:, :n] @ motion.plant.output
 
     def restore(self, one) -> None:
-        """Put the laws into the modes of a stretch."""
+        """Set the laws to the modes and reversals of a stretch."""
         for k, law in enumerate(self.motion.laws):
             law.mode, law.side = one.modes[k]
             if one.turns:
@@ -67,14 +68,22 @@ class Window:
         columns["kind"].append(np.tile([law.mode == 0 for law in m.laws], (t.size, 1)))
 
     def acceleration(self, t, y) -> float:
+        """Return the absolute acceleration of the output [m s-2]."""
         m = self.motion
         own = m.plant.output @ m.slope(t, y)[m.n : 2 * m.n]
         return own + m.drive(t) if m.moving else own
 
     def top(self, values, of, where=None) -> float:
-        """Largest value over the window: that of the nodes, refined in the steps where it lies; of(t, y) -> value.
+        """Return the largest value over the window, refined in the steps in which it lies.
 
-        where: mask of the nodes that count, all unless given; a step lies inside it or outside.
+        Parameters
+        ----------
+        values : array
+            Values at the nodes.
+        of : callable
+            of(t, y) -> value.
+        where : array of bool, optional
+            Nodes that count; by default all. A step lies completely inside or outside.
         """
         values, each = values if where is None else np.where(where, values, -np.inf), NODES.size + 2
         best = float(values.max())
@@ -90,7 +99,7 @@ class Window:
             }:
                 one, t = self.parts[part]
                 if where is not None and not where[part * each + 1 : part * each + each - 1].all():
-                    continue  # the next cycle begins here, it may go farther
+                    continue  # the next cycle begins here and may go farther
                 inside = min(max(k - part * each, 0), each - 1)
                 self.restore(one)
                 found = minimize_scalar(
@@ -104,7 +113,19 @@ class Window:
 
 
 def measures(motion: Motion, stretches, period: float, cycles: float, window: int) -> dict:
-    """Measures by name over the last `window` cycles of a motion; those of a second interface have _2 behind."""
+    """Return the measures over the last `window` cycles; those of a second interface end in _2.
+
+    Parameters
+    ----------
+    motion : Motion
+    stretches : list
+        From `Motion.run`.
+    period : float
+        [s]
+    cycles : float
+        Cycles of the run.
+    window : int
+    """
     s, p, end = motion.s, motion.plant, period * cycles
     w = Window(motion, stretches, end - window * period, end, window)
     n, out = motion.n, {}
@@ -154,9 +175,11 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
 
 
 def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
-    """Half the peak-to-peak output of the last whole cycle, None of less than one, by the definition: seen from the
-    end, a place is a turn once the output has gone back from it by more than a quarter of its range in the last
-    period."""
+    """Return half the peak-to-peak output of the last whole cycle; None if there is none.
+
+    Seen from the end, a position is a reversal if the output has returned from it by more than a
+    quarter of its range in the last period.
+    """
     n, row, each, places = motion.n, motion.plant.output, NODES.size + 2, []
     rate = w.y[:, n : 2 * n] @ row
     way = np.where(np.abs(rate) <= 1e-9 * np.abs(rate).max(), 0.0, np.sign(rate))
@@ -173,7 +196,7 @@ def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
                 xtol=1e-16,
             )
             places.append(float(row @ one.solution(at)[:n]))
-        else:  # an event at the turn
+        else:  # an event at the reversal
             places.append(float(w.out[a : b + 1][np.argmin(np.abs(rate[a : b + 1]))]))
     least, back = 0.25 * np.ptp(w.out[w.t >= w.end - period]), [float(w.out[-1]), *places[::-1]]
     if not least > 0:
@@ -194,8 +217,10 @@ def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
 
 
 def works(motion: Motion, stretches, begin: float, end: float) -> dict:
-    """Work that a single interface takes between two times [s], and what of it is lost; the latter where the law knows
-    what it stores."""
+    """Return the work on a single interface between two times [s], and the dissipated part.
+
+    The latter is left out if the law has no stored energy.
+    """
     if len(motion.laws) > 1:
         return {}
     law, (first, last) = motion.laws[0], (at(stretches, t) for t in (begin, end))
@@ -211,14 +236,16 @@ def works(motion: Motion, stretches, begin: float, end: float) -> dict:
 
 
 def at(stretches, time: float) -> np.ndarray:
-    """State at a time [s]."""
+    """Return the state at a time [s]."""
     one = next((one for one in stretches if one.times[-1] >= time), stretches[-1])
     return one.solution(max(time, one.times[0]))
 
 
 def _stuck(w: Window, law, k: int) -> tuple:
-    """(share of the time, starts of slip (j,) [s]): the contact holds while less than half of its slide is
-    irreversible."""
+    """Return the fraction of the time that the contact sticks, and the starts of slip (j,) [s].
+
+    The contact sticks while less than half of its slide is irreversible.
+    """
     if law.split_by_mode:
         stuck = w.stuck[:, k]
         share = float(np.sum(w.w * stuck)) / (w.end - w.begin)
@@ -252,8 +279,11 @@ def _stuck(w: Window, law, k: int) -> tuple:
 
 
 def _secant(w: Window, motion: Motion, period: float, window: int) -> float | None:
-    """Force at the largest slide of a cycle less that at the smallest over their distance, the mean over the cycles; of
-    laws whose force does not jump. None where a cycle ends before the slide turns."""
+    """Return the mean secant stiffness of the cycles, for laws whose force does not jump.
+
+    It is the difference of the forces at the largest and smallest slide over that of the slides.
+    None if a cycle ends before the slide reverses.
+    """
     out = []
     for c in range(window):
         mine = np.flatnonzero((w.t >= w.begin + c * period) & (w.t <= w.begin + (c + 1) * period))
@@ -266,7 +296,7 @@ def _secant(w: Window, motion: Motion, period: float, window: int) -> float | No
 
 
 def _turn(w: Window, motion: Motion, k: int) -> tuple | None:
-    """(slide, force) where the slide turns beside the node k; None where it does not."""
+    """Return (slide, force) at a reversal next to node k; None if there is none."""
     each, face = NODES.size + 2, motion.plant.faces[0]
     if w.v[k, 0] == 0:
         return w.q[k, 0], w.f[k, 0]

@@ -1,8 +1,8 @@
-"""An independent program for `motion_scenes`: DOP853 between located events, and the measures as they are defined.
+"""Independent integrator for `motion_scenes`: DOP853 between located events.
 
-It reads the numbers of a spec, not the scene, and imports nothing of the package. Energies are integrated beside the
-motion; `motion_read` takes harmonics and means by a Gauss rule on every step of the integrator, peaks from its dense
-output.
+It reads the numbers of a spec, not the scene, and imports nothing from the package. Energies are
+integrated with the motion. `motion_read` evaluates the measures by their definitions: harmonics and
+means by a Gauss rule on every step of the integrator, peaks from its dense output.
 """
 
 from itertools import pairwise, product
@@ -13,12 +13,15 @@ from motion_laws import LAWS
 from scipy.integrate import DOP853, OdeSolution
 from scipy.optimize import brentq
 
-LOOKS = 4  # at the guards in a step of the integrator
+LOOKS = 4  # evaluations of the guards in a step of the integrator
 
 
 class ModalSystem(NamedTuple):
-    """M x'' + C x' + K x = -base a(t) - faces^T F; output (n,), stiffness K_1 of the first mode at the contact,
-    cubic [N/m3]."""
+    """M x'' + C x' + K x = -base a(t) - faces^T F.
+
+    output: (n,); first: stiffness of the first mode at the contact [N/m]; cubic: of the spring
+    [N/m3]; fastest: largest natural frequency [Hz].
+    """
 
     M: np.ndarray
     C: np.ndarray
@@ -32,6 +35,7 @@ class ModalSystem(NamedTuple):
 
 
 def plant_of(s: dict) -> ModalSystem:
+    """Return the modal system of a spec."""
     if s["several"]:
         m = s["masses"]
         K, C = np.zeros((2, 2)), np.zeros((2, 2))
@@ -56,11 +60,12 @@ def plant_of(s: dict) -> ModalSystem:
 
 
 def forced(s: dict) -> bool:
-    """Whether a force drives the rig of a spec, not its base."""
+    """Return whether a force drives the rig of a spec, rather than its base."""
     return s.get("forced", s["drive"] == "force")
 
 
 def _row(i: int, j: int) -> np.ndarray:
+    """Return the row of the displacement of mass i relative to mass j; 0 is the base."""
     out = np.zeros(3)
     out[i] += 1
     out[j] -= 1
@@ -68,7 +73,13 @@ def _row(i: int, j: int) -> np.ndarray:
 
 
 def drive_of(s: dict):
-    """(a(t) [m s-2], moments where it is not smooth, whether the base moves) of a spec."""
+    """Return the drive of a spec.
+
+    Returns
+    -------
+    tuple
+        a(t) [m s-2], times at which it is not smooth [s], and whether the base moves.
+    """
     kind, size, omega = s["drive"], s["size"], 2 * np.pi * s["frequency"]
     if kind == "free":
         return (lambda t: 0.0), [], False
@@ -101,18 +112,35 @@ def drive_of(s: dict):
 
 
 class TooLong(Exception):
-    """A motion takes more steps than it is worth."""
+    """Raised if a motion takes more steps than it is worth."""
 
 
 def stretched(
     motion, t: float, y, stop: float, guards, tolerances: tuple, most: float = np.inf
 ) -> tuple:
-    """(dense solution from t [s] to the first guard that falls through zero or to stop [s], that guard or None).
+    """Integrate from t [s] to the first guard that decreases through zero, or to `stop` [s].
 
-    tolerances: (relative, absolute) error of a step; TooLong beyond `most` steps.
+    The guards are evaluated LOOKS times in every step, on its dense output; a value that decreases
+    and increases between two evaluations is not noticed.
 
-    Guards are looked at LOOKS times in every step, on its dense output: what falls and rises between two looks is not
-    seen.
+    Parameters
+    ----------
+    motion : Motion
+    t : float
+    y : array
+        State.
+    stop : float
+    guards : list
+        From `Motion.guards`.
+    tolerances : tuple
+        Relative and absolute error of a step.
+    most : float
+        Number of steps above which TooLong is raised.
+
+    Returns
+    -------
+    tuple
+        Dense solution, and the guard or None.
     """
     first, (rtol, atol) = motion.longest(y, motion.slope(t, y)), tolerances
     solver = DOP853(
@@ -150,7 +178,7 @@ def stretched(
 
 
 class Stretch(NamedTuple):
-    """One stretch between events: modes of the laws, turns of their paths, dense solution, times of its steps."""
+    """One stretch between events: modes, reversals, dense solution, times of its steps."""
 
     modes: tuple
     turns: list
@@ -159,8 +187,10 @@ class Stretch(NamedTuple):
 
 
 class Motion:
-    """The equations of a spec: state (x, x', states of the laws, friction work); share: longest step over the shortest
-    period."""
+    """Equations of a spec; the state is (x, x', states of the laws, friction work).
+
+    share: longest step / shortest period.
+    """
 
     def __init__(self, s: dict, share: float = 0.04):
         self.s, self.plant, self.share = s, plant_of(s), share
@@ -220,7 +250,10 @@ class Motion:
         return self.plant.faces @ self.slope(t, y)[self.n : 2 * self.n]
 
     def guards(self) -> list:
-        """Events of the modes as they are: (number of the interface, number of the guard, function)."""
+        """Return the events of the present modes.
+
+        They are tuples (number of the interface, number of the guard, function).
+        """
         out = []
         for k, law in enumerate(self.laws):
             face, part = self.plant.faces[k], self.parts[k]
@@ -258,8 +291,10 @@ class Motion:
         return out
 
     def choose(self, t, y, active) -> None:
-        """Modes of the set-valued interfaces in `active`, none of which slides: the first choice without a
-        contradiction."""
+        """Choose the modes of set-valued interfaces in `active`, none of which slides.
+
+        It is the first choice without a contradiction.
+        """
         for option in sorted(
             product((0, 1, -1), repeat=len(active)), key=lambda c: sum(map(abs, c))
         ):
@@ -277,9 +312,12 @@ class Motion:
         raise AssertionError("no choice")
 
     def longest(self, y, slope) -> float:
-        """Longest step [s] of the integrator from a state y with its slope: a share of the shortest period, and what
-        slides by, or changes the speed by, no more than that over which a law relaxes: beyond it dense output is no
-        better than 1e-4."""
+        """Return the longest step [s] of the integrator from a state y with its derivative.
+
+        It is a fraction of the shortest period. The slide, or the change of the velocity, is
+        limited to the scale over which a law relaxes, because beyond it dense output is not better
+        than 1e-4.
+        """
         out, n = self.share / max(self.plant.fastest, self.s["frequency"]), self.n
         speed = np.abs(self.plant.faces @ y[n : 2 * n]).max()
         gain = np.abs(self.plant.faces @ slope[n : 2 * n]).max() + 1e-300
@@ -294,8 +332,18 @@ class Motion:
         return out
 
     def run(self, end: float, rtol: float, start=None, most: float = np.inf) -> list:
-        """Stretches of the motion from 0 to end [s]; start: another state than that of the scene. TooLong beyond
-        `most` steps."""
+        """Return the stretches of the motion from 0 to `end` [s].
+
+        Parameters
+        ----------
+        end : float
+        rtol : float
+            Relative error of a step.
+        start : array, optional
+            Initial state; by default that of the scene.
+        most : float
+            Number of steps above which TooLong is raised.
+        """
         t, y, out, n = 0.0, self.start() if start is None else np.append(start, 0.0), [], self.n
         stops = [b for b in self.breaks if 0 < b < end * (1 - 1e-12)] + [end]
         reach = self.s["size"] / self.s["seeded"] ** 2
@@ -326,7 +374,8 @@ class Motion:
                 if count > most:
                     raise TooLong
                 same = same + 1 if done.t_max - t < 1e-9 / self.s["frequency"] else 0
-                if same >= 50:  # it would hold: a printed law of order 0 that starts from rest
+                # such a motion would stick: a printed law of order 0 that starts from rest
+                if same >= 50:
                     raise TooLong("events without end")
                 t = float(done.t_max)
                 y = done(t)

@@ -1,7 +1,8 @@
-"""Random scenes of rigs: every law, drive and structure, as numbers that a scene and an independent program both read.
+"""Random scenes of rigs, with every law, drive and structure, for program and reference.
 
-`spec(seed)` draws the numbers, `text(spec)` writes the scene, `record(spec)` is the table of a drive from a file;
-`held_out(count)` are rigs for each of the methods alike, of seeds that no number of the program was fitted to.
+`spec(seed)` draws the numbers, `text(spec)` writes the scene, and `record(spec)` is the table of a
+drive from a file. `held_out(count)` gives rigs for each of the methods, with seeds to which no
+number of the program was fitted.
 """
 
 from itertools import count as from_
@@ -43,12 +44,12 @@ DRIVES = (
 
 
 def draw_log_uniform(r, low: float, high: float) -> float:
-    """A number whose logarithm is evenly spread."""
+    """Draw a number whose logarithm is uniformly distributed."""
     return float(np.exp(r.uniform(np.log(low), np.log(high))))
 
 
 def spec(seed: int) -> dict:
-    """Numbers of a random scene in SI units, by name; a seed gives the same scene always."""
+    """Return the numbers of a random scene by name, in SI; a seed gives always the same scene."""
     r = np.random.default_rng(seed)
     law, drive = str(r.choice(LAWS)), str(r.choice(DRIVES))
     own, mass = draw_log_uniform(r, 20, 400), draw_log_uniform(r, 0.2, 2)
@@ -90,7 +91,7 @@ def spec(seed: int) -> dict:
 
 
 HELD_OUT = 29_000_000  # the first seed of the held-out rigs
-# laws that each method has: events, yields, high order, and those of which only a march is chosen
+# Laws that each method can compute: events, yields, smooth laws, and those that are only marched.
 METHODS = {
     "events": ("coulomb", "weakening"),
     "yields": ("elastic-plastic", "iwan"),
@@ -101,8 +102,10 @@ METHODS = {
 
 
 def held_out(count: int) -> list:
-    """Specs of `count` rigs of 1 to 4 modes, each method in turn: it is named in the scene where it is a march or
-    harmonic balance, else the program chooses."""
+    """Return specs of `count` rigs with 1 to 4 modes, for each method in turn.
+
+    A march and harmonic balance are named in the scene; otherwise the program chooses the method.
+    """
     seeds, out = from_(HELD_OUT), []
     for k in range(count):
         method = tuple(METHODS)[k % len(METHODS)]
@@ -113,7 +116,7 @@ def held_out(count: int) -> list:
 
 
 def fits(s: dict, method: str) -> bool:
-    """Whether a method has the equations of a spec and is chosen, or can be named, for it."""
+    """Return whether a method can compute a spec and is chosen, or can be named, for it."""
     if s["law"] not in METHODS[method]:
         return False
     if method == "harmonic":
@@ -131,6 +134,7 @@ def fits(s: dict, method: str) -> bool:
 
 
 def _modes(r, own: float) -> list:
+    """Draw the modes of a rig whose first natural frequency is `own` [Hz]."""
     count, out, left = int(r.choice([1, 1, 2, 3, 4])), [], 1.0
     for k in range(count):
         base = float(r.uniform(0.65, 0.9) if k == 0 else r.uniform(-0.25, 0.25))
@@ -150,7 +154,10 @@ def _modes(r, own: float) -> list:
 
 
 def draw_law_keys(r, law: str, load: float, reach: float, speed: float) -> dict:
-    """Keys of [friction] by name; the lengths are shares of the motion that the drive alone makes."""
+    """Return the keys of [friction] by name.
+
+    The lengths are fractions of the motion that the drive alone would cause.
+    """
     length, out = reach * draw_log_uniform(r, 0.01, 0.6), {"static": 0.3}
     if law == "weakening" or law in ("growing", "lugre"):
         out["kinetic"] = 0.3 * float(r.uniform(0.3, 0.95))
@@ -187,7 +194,10 @@ def draw_law_keys(r, law: str, load: float, reach: float, speed: float) -> dict:
 
 
 def _structure(r, out: dict, omega: float) -> None:
-    """One interface on modes, or two masses with an interface each; a spring beside the contact, bonded or stiff."""
+    """Draw the structure: modes with one interface, or two masses with an interface each.
+
+    There may be a spring in parallel with the contact, bonded or nonlinear.
+    """
     out["several"] = out["law"] not in ("order", "report", "convolution") and r.random() < 0.12
     if out["several"]:
         stiff = [out["mass"] * omega**2 * draw_log_uniform(r, 0.3, 2) for _ in range(3)]
@@ -211,6 +221,7 @@ def _structure(r, out: dict, omega: float) -> None:
 
 
 def _drive(r, out: dict, own: float, reach: float) -> None:
+    """Draw the details of the drive."""
     kind = out["drive"]
     if out["several"] and kind in ("levels",):
         kind = out["drive"] = "sine"
@@ -239,7 +250,10 @@ def _drive(r, out: dict, own: float, reach: float) -> None:
 
 
 def _contact(r, out: dict) -> None:
-    """One point, its load changing or not, or a patch with or without its shear, tilted or not."""
+    """Draw the contact: a point with constant or varying load, or a patch.
+
+    A patch may be elastic in shear, and tilted.
+    """
     out["patch"] = None
     if out["several"]:
         return
@@ -260,10 +274,12 @@ def _contact(r, out: dict) -> None:
 
 
 def table(name: str, values: dict) -> str:
+    """Return a table of a scene as text."""
     return f"[{name}]\n" + "".join(f"{key} = {value}\n" for key, value in values.items())
 
 
 def quantity(value: float, unit: str) -> str:
+    """Return a quantity as text of a scene."""
     return f'"{float(value)!r} {unit}"'
 
 
@@ -288,7 +304,7 @@ NAMES = {
 
 
 def write_law_keys(s: dict) -> dict:
-    """Keys of the law as a scene writes them."""
+    """Return the keys of the law as a scene writes them."""
     name = NAMES.get(s["law"], s["law"])
     out = {"law": f'"{name}"'} | ({"reading": '"report"'} if s["law"] == "report" else {})
     return out | {
@@ -297,7 +313,7 @@ def write_law_keys(s: dict) -> dict:
 
 
 def text(s: dict, signal: str = "signal.csv") -> str:
-    """The scene of a spec; signal: name of the file of a recorded drive."""
+    """Return the scene of a spec as text; signal: name of the file of a recorded drive."""
     if s["several"]:
         return _masses(s) + _driven(s, signal) + _accuracy(s)
     parts = []
@@ -357,6 +373,7 @@ def text(s: dict, signal: str = "signal.csv") -> str:
 
 
 def _masses(s: dict) -> str:
+    """Return the structure of two masses as text."""
     m = s["masses"]
     parts = [
         table(
@@ -383,6 +400,7 @@ def _masses(s: dict) -> str:
 
 
 def _driven(s: dict, signal: str) -> str:
+    """Return the drive as text."""
     kind, size, out = s["drive"], s["size"], ""
     force = s["mass"] * size
     pushed = {"mass": 1} if s["several"] else {}
@@ -449,19 +467,20 @@ def _driven(s: dict, signal: str) -> str:
 
 
 def _accuracy(s: dict) -> str:
+    """Return [accuracy] as text."""
     method = {"method": f'"{s["method"]}"'} if "method" in s else {}
     return table("accuracy", {"tolerance": s["tolerance"]} | method)
 
 
 def record(s: dict) -> str:
-    """The table of a recorded drive."""
+    """Return the table of a recorded drive."""
     return "time [s],acceleration [m/s^2]\n" + "".join(
         f"{t!r},{a!r}\n" for t, a in zip(*s["record"])
     )
 
 
 def written(s: dict, folder):
-    """Path of the scene of a spec in a folder, its recorded drive beside it."""
+    """Write the scene of a spec and its recorded drive; return the path of the scene."""
     path = folder / f"scene{s['seed']}.toml"
     if "record" in s:
         (folder / f"signal{s['seed']}.csv").write_text(record(s), "utf-8")

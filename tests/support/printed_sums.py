@@ -1,16 +1,18 @@
-"""Equation 2.17 behind [contact.shear] summed by hand, for random benches and rigs, and what of their bars holds.
+"""Equation 2.17 with [contact.shear] as a plain sum, for random benches and rigs.
 
-Campaigns `printed-benches` and `printed-rigs` of `campaigns`. Rigs begin at rest. From seed 8000 on the pressure may
-lie on the lower piece, and modes may heave and rock the patch up to lift-off.
+Used by the campaigns `printed-benches` and `printed-rigs` of `campaigns`, which count how often the
+errors of a run hold. Rigs begin at rest. From seed 8000 on the pressure may be given by the shape
+of the lower piece, and modes may heave and rock the patch up to lift-off.
 
-The sum is plain NumPy, written from 2.10-2.17 without the compiled lists: every node of a mesh for a tenth of the
-tolerance keeps every bond of its own path, in strips of 80 bond lengths over the steps of a cycle (0.2 at 400, which
-alone leaves 4e-4 of the friction limit), each with the midpoint rule and the share of it on either side of u = 0; the
-pieces are the whole compliance, s_i = q - sum_j C_ij F_j(s_j) at the end of each step, by Newton's method on all nodes;
-a mode moves by the trapezoidal rule, which adds beta to every C_ij. Nothing of it averages a force over a step, merges
-bonds, drops modes or reduces points. A bond forms under the pressure of the place, or the load, half way along its part
-of the step; heave and rotation press the nodes by the whole normal compliance, of which those that would pull are left
-out one set after the other.
+The sum is plain NumPy, written from 2.10-2.17 without the compiled lists. Every node of a mesh for
+a tenth of the tolerance keeps every bond of its own path, in strips of 80 bond lengths over the
+steps of a cycle (0.2 at 400, which alone leaves 4e-4 of the friction limit), each with the midpoint
+rule and the fraction of it on either side of u = 0. The pieces are the whole compliance, s_i = q -
+sum_j C_ij F_j(s_j) at the end of each step, solved by Newton's method on all nodes. A mode moves by
+the trapezoidal rule, which adds beta to every C_ij. Nothing averages a force over a step, merges
+bonds, drops modes or reduces points. A bond forms under the pressure at its position, or under the
+load, half way along its part of the step. Heave and rotation press the nodes by the whole normal
+compliance; nodes that would pull are left out, one set after the other.
 """
 
 from math import gamma, pi
@@ -25,12 +27,12 @@ from patchfem.runs import run as runs
 from patchfem.runs.patch import ladder as patches
 from patchfem.scene.scene import loads
 
-# bond lengths: age of a bond that counts; half width of the first bonds
+# Largest age of a bond that counts, and half-width of the first bonds [bond lengths].
 MOST, FIRST_WIDE = (
     25.0,
     1e-6,
 )
-FINEST, MOST_PARTS = 80.0, 60  # bond lengths of a strip times steps a cycle; parts of a step
+FINEST, MOST_PARTS = 80.0, 60  # bond lengths of a strip times steps per cycle; parts of a step
 COMPARED = {
     "bench": (
         "loop_area",
@@ -81,7 +83,10 @@ ROCK = (
 
 
 def scene_of(kind: str, seed: int):
-    """A random scene: reading, order, first bonds, growth, pressure, stroke or drive, below and above gross slip."""
+    """Return a random scene, below or above gross slip.
+
+    Random are reading, order, first bonds, growth, pressure, and stroke or drive.
+    """
     draw = np.random.default_rng(seed)
     length = 10 ** draw.uniform(-0.7, 0.5)  # um
     reading = draw.choice(["report", "report", "report", "stretch"])
@@ -117,7 +122,8 @@ def scene_of(kind: str, seed: int):
             "friction.rest_speed": f"{floor:.4g} m/s",
         }
     motion = MOTION[kind]
-    # the pressure on the lower piece, or a load that changes: heave, or rocking that lifts the ends
+    # The pressure is given by the lower piece, or the load changes by heave or by rocking that
+    # lifts the ends.
     if seed >= 8000:
         what = draw.choice(
             ["upper", "lower", "lower"] if kind == "bench" else ["upper", "lower", "heave", "rock"]
@@ -136,7 +142,19 @@ def scene_of(kind: str, seed: int):
 
 
 class Bonds:
-    """Bonds of m points, each along its own path, by 2.10 and 2.14-2.17."""
+    """Bonds of m points, each along its own path, by 2.10 and 2.14-2.17.
+
+    Parameters
+    ----------
+    f : Friction
+        Law of the scene.
+    size : int
+        Number of points m.
+    floor : float
+        Smallest speed in the growth at rest [m/s].
+    steps : int
+        Steps per cycle.
+    """
 
     def __init__(self, f, size: int, floor: float, steps: int = 400):
         self.f, self.floor, self.mu, self.finest = f, floor, f.static, FINEST / steps
@@ -152,8 +170,14 @@ class Bonds:
         self.first, self.forming = np.ones(size), lambda places, part: np.ones_like(places)
 
     def grown(self, moved, dt):
-        """(mature length after the step, factor on the distance of a bond from it, length half way) at |v| = moved/dt,
-        2.10."""
+        """Return lengths of bonds by 2.10 for points that move by `moved` (m,) [m] in a step dt [s].
+
+        Returns
+        -------
+        tuple
+            Mature length after the step, factor on the distance of a bond from it, and length half
+            way, (m,) each.
+        """
         f = self.f
         if f.rest_growth is None:
             return self.eps, np.ones_like(moved), self.eps
@@ -171,7 +195,10 @@ class Bonds:
         return out[0], out[1], out[2]
 
     def weight(self, s, dt, keep: bool = False):
-        """(m,) force over mu_s sigma A of points that slide on to s in a step; keep: take it as the new state."""
+        """Return force / (mu_s sigma A) (m,) of points that slide to s (m,) [m] in a step dt [s].
+
+        keep: whether s becomes the new state.
+        """
         f, p, e0 = self.f, self.f.order, self.f.bond_length
         moved, norm = np.abs(s - self.at), gamma(self.f.order + 1)
         eps, left, middle = self.grown(moved, dt)
@@ -181,12 +208,12 @@ class Bonds:
         )
         parts = min(parts, MOST_PARTS)
         ends = self.at + np.arange(parts + 1)[:, None] / parts * (s - self.at)
-        # of the step, from its end to the middle of a part
+        # fraction of the step from its end to the middle of a part
         back = 1 - (np.arange(parts)[:, None] + 0.5) / parts
         low, high = np.vstack([self.low, ends[:-1]]), np.vstack([self.high, ends[1:]])
         size = np.abs(high - low)
         share = np.divide(s - low, high - low, out=np.full(low.shape, 0.5), where=size > 0)
-        # what lies behind less that ahead
+        # bonds formed behind the point minus bonds formed ahead of it
         side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(share, 0, 1) - 1)
         when, hurt = (
             np.vstack([self.when, path - back * moved]),
@@ -194,7 +221,7 @@ class Bonds:
         )
         born = np.vstack([self.born, np.tile(middle, (parts, 1))])
         gone = np.zeros_like(moved) + left
-        # how far a bond's own length is behind, 2.10 from 0
+        # difference of a bond's length from its mature length, by 2.10 from 0
         lag = np.vstack([self.lag * gone, middle * gone**back])
         dense = np.vstack([self.dense, self.forming((ends[1:] + ends[:-1]) / 2, 1 - back)])
         age = path - when
@@ -230,12 +257,32 @@ class Bonds:
         return (each * side).sum(axis=0) + first
 
     def lift(self, off):
-        """Break the bonds of points that nothing presses, off (m,) bool."""
+        """Break the bonds of points without pressure, off (m,) bool."""
         self.dense[:, off], self.first[off] = 0.0, 0.0
 
 
 def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
-    """(slides (m,), forces (m,)) with s = q - c F(s), from a guess, by Newton's method with a halved step."""
+    """Solve s = q - c F(s) by Newton's method with step halving.
+
+    Parameters
+    ----------
+    bonds : Bonds
+    limit : (m,) array
+        Friction limits [N].
+    c : (m, m) array
+        Compliance [m/N].
+    q : float
+        Slide of the holder [m].
+    dt : float
+        Step [s].
+    guess : (m,) array
+        Initial slides [m].
+
+    Returns
+    -------
+    tuple
+        Slides (m,) [m] and forces (m,) [N].
+    """
     s, tiny = guess.copy(), 1e-7 * bonds.f.bond_length
     force = limit * bonds.weight(s, dt)
     miss = s - q + c @ force
@@ -255,7 +302,7 @@ def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
 
 
 class Pressed:
-    """Nodal forces (m,) of a patch whose upper holder heaves and turns, by the whole normal compliance."""
+    """Nodal forces (m,) of a patch whose upper holder heaves and rotates."""
 
     def __init__(self, patch):
         self.force = patch.pieces.interface.weight * patch.pressure.sigma_n
@@ -264,8 +311,11 @@ class Pressed:
         self.opening, self.inverses = patch.pressure.gap - self.c @ self.force, {}
 
     def at(self, heave: float, turn: float):
-        """(nodal forces (m,) [N], their slopes over heave and turn (m, 2)) with force >= 0 and gap >= 0, from the set
-        found last: nodes that pull leave it, nodes that would overlap join it."""
+        """Return nodal forces (m,) [N] and their derivatives by heave and rotation (m, 2).
+
+        The forces and gaps are >= 0. The active set starts from the last one: nodes that pull leave
+        it, nodes that would overlap join it.
+        """
         on, open_ = self.force > 0, self.opening + heave + turn * self.x
         for _ in range(200):
             force, slopes = np.zeros_like(self.x), np.zeros((self.x.size, 2))
@@ -284,7 +334,7 @@ class Pressed:
 
 
 def by_hand(scene, steps: int = 500) -> dict:
-    """Measures of a scene by the sum by hand, at `steps` a cycle."""
+    """Return the measures of a scene by the sum, at `steps` per cycle."""
     model = build(scene)
     patch = patches.solve_all(model.patch, 0.1 * model.accuracy.tolerance, False, False)[0]
     f, rig = model.friction, model.rig
@@ -376,9 +426,26 @@ def by_hand(scene, steps: int = 500) -> dict:
 
 
 def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
-    """(nodal forces (m,) [N], coordinates (n,) by which they push the modes beyond `free`) where heave and turn press
-    the contact as much as it pushes back, by Newton's method; stiff (n,) [N/m]: of the modes in the step."""
-    up = rows[1:] / stiff  # what one newton, one newton metre does to the coordinates
+    """Find heave and rotation in equilibrium with the contact forces, by Newton's method.
+
+    Parameters
+    ----------
+    press : Pressed
+    rows : (3, n) array
+        Slide, heave and rotation per unit of the modal coordinates.
+    free : (n,) array
+        Coordinates without contact forces.
+    stiff : (n,) array
+        Stiffness of the modes in the step [N/m].
+    guess : (n,) array
+        Initial coordinates.
+
+    Returns
+    -------
+    tuple
+        Nodal forces (m,) [N], and the coordinates (n,) by which they push the modes from `free`.
+    """
+    up = rows[1:] / stiff  # change of the coordinates by one newton and one newton metre
     place, rest = rows[1:] @ guess, rows[1:] @ free
     for _ in range(60):
         force, slopes = press.at(*place)
@@ -392,7 +459,10 @@ def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
 
 
 def compare_sum(kind: str, seed: int) -> dict:
-    """Compare a random scene with the sum by hand at two step lengths, whose difference is the doubt."""
+    """Compare a random scene with the sum at two step lengths.
+
+    The difference of the two sums is the uncertainty of the reference.
+    """
     scene = scene_of(kind, seed)
     try:
         result = runs.run(pf.plan(scene))

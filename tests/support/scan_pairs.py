@@ -39,9 +39,9 @@ FALSE_CLAIMS = {
     "exchanged": ("worn",),
 } | dict.fromkeys(UNKNOWABLE, ("worn", "grew", "no wear"))
 OVERSAMPLING = 2  # points of the surface per spacing of the scans, in each direction
-# of the longer side of the scan: surface beyond each edge, which the shifted scan may see
+# Surface beyond each edge / longer side of the scan, which the shifted scan may show.
 MARGIN = 0.22
-MAX_SHIFT = 0.12  # of each side of the scan
+MAX_SHIFT = 0.12  # largest shift / side of the scan, in each direction
 
 
 class Volumes(NamedTuple):
@@ -60,7 +60,7 @@ class Volumes(NamedTuple):
 
 
 class Depths(NamedTuple):
-    """Noise-free depths [m] in the common region, > 0 where material was lost."""
+    """Noise-free depths [m] in the common region, positive for lost material."""
 
     mean_worn: float  # worn volume / area; growth does not count
     mean_net: float  # mean of all depths
@@ -69,7 +69,7 @@ class Depths(NamedTuple):
 
 
 class Pose(NamedTuple):
-    """Place of the scan after: position on the piece = shift + centre + R(rotation) (position - centre)."""
+    """Pose of the scan after: piece = shift + centre + R(rotation) (position - centre)."""
 
     shift: tuple
     rotation: float  # [rad], counterclockwise
@@ -81,15 +81,15 @@ class Track(NamedTuple):
 
     middle: tuple
     direction: float  # [rad] of its axis from x, in [0, pi)
-    width: float  # between the places where the wear begins
-    length: float | None  # from tip to tip; None where the track leaves the common region
+    width: float  # between the positions at which the wear begins
+    length: float | None  # from tip to tip; None if the track leaves the common region
     ends: tuple | None  # the two tips ((x, y), (x, y))
-    # the flanks run out flat (cosine), so that no scan shows where they begin
+    # The flanks run out flat (cosine), so that no scan shows where they begin.
     is_flat_flanked: bool
 
 
 class Section(NamedTuple):
-    """Mean cross-section of a track: the quantities that the user guide defines, [m] and [m^2]."""
+    """Mean cross-section of a track, with the quantities of the user guide [m], [m^2]."""
 
     mean_depth: float
     floor_depth: float
@@ -128,7 +128,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Pair:
-    """Heights (ny, nx) [m] of two scans (NaN where missing), their spacing [m] and the truth."""
+    """Heights (ny, nx) [m] of two scans (NaN if missing), their spacing [m] and the truth."""
 
     kind: str
     seed: int
@@ -140,7 +140,7 @@ class Pair:
 
 
 class Field(NamedTuple):
-    """Surface grid: positions x, y (n, m) [m], pitch [m], and the box that both scans show safely."""
+    """Surface grid: positions x, y (n, m) [m], pitch [m], and a box that is inside both scans."""
 
     x: np.ndarray
     y: np.ndarray
@@ -150,7 +150,7 @@ class Field(NamedTuple):
 
 
 def make(seed: int, kind: str | None = None) -> Pair:
-    """Draw the pair of scans that belongs to `seed`; without `kind` the kinds take turns."""
+    """Draw the pair of scans of a seed; without `kind` each kind follows in turn."""
     kind = KINDS[(seed - 1) % len(KINDS)] if kind is None else kind
     random = np.random.default_rng([seed, 311, KINDS.index(kind)])
     shape = np.array([random.integers(120, 301), random.integers(150, 401)])  # ny, nx
@@ -182,7 +182,10 @@ def make(seed: int, kind: str | None = None) -> Pair:
 
 
 def draw_pose(random, size) -> Pose:
-    """Draw shift and rotation of the second scan: from a fraction of a point to many, and at most 2 degrees."""
+    """Draw shift and rotation of the second scan, from a fraction of a point to many points.
+
+    The rotation is at most 2 degrees.
+    """
     reach = 0.01 if random.random() < 0.2 else MAX_SHIFT
     shift = random.uniform(-reach, reach, 2) * size
     rotation = 0.0 if random.random() < 0.3 else np.radians(random.uniform(-2, 2))
@@ -190,7 +193,7 @@ def draw_pose(random, size) -> Pose:
 
 
 def make_field(size, spacing: float, pose: Pose) -> Field:
-    """Lay the grid of the surface over both scans, and find the box within both of them."""
+    """Return the grid of the surface over both scans, and the box within both of them."""
     pitch, margin = spacing / OVERSAMPLING, MARGIN * size.max()
     x = np.arange(-margin, size[0] + margin, pitch)
     y = np.arange(-margin, size[1] + margin, pitch)
@@ -250,7 +253,7 @@ def measure(
 
 
 def draw_noise(random, shape, instrument: str) -> np.ndarray:
-    """Draw noise whose fast part has unit deviation: lines of a stylus or blurred pixels of a camera."""
+    """Draw noise whose fast part has unit deviation: lines of a stylus, or pixels of a camera."""
     ny, nx = shape
     white = random.normal(size=shape)
     if instrument == "camera":
@@ -271,7 +274,7 @@ def draw_noise(random, shape, instrument: str) -> np.ndarray:
 
 
 def apply_wear(kind: str, random, grid: Field, new, rms: float) -> tuple:
-    """Return the worn surface (n, m) [m] and the track, None where there is none."""
+    """Return the worn surface (n, m) [m] and the track; None if there is no track."""
     if kind == "exchanged":
         kind = random.choice(["smooth track", "crater", "shallow wear"])
     if kind in TRACKS:
@@ -318,7 +321,10 @@ def apply_wear(kind: str, random, grid: Field, new, rms: float) -> tuple:
 
 
 def cut(random, grid: Field, new, depth) -> np.ndarray:
-    """Cut to `depth` [m] below the smoothed surface where depth > 0; the floor is smooth or keeps the roughness."""
+    """Cut to `depth` [m] below the smoothed surface where depth > 0.
+
+    The floor is smooth or keeps the roughness.
+    """
     if random.random() < 0.4:
         return new - np.maximum(depth, 0)
     smooth = gaussian_filter(new, random.uniform(20, 40) * OVERSAMPLING)
@@ -447,7 +453,10 @@ def find_truth(
 
 
 def find_section(track: Track, depth, points, common, spacing: float) -> Section:
-    """Average the depth along the track (nine tenths of the straight part) and measure the mean cross-section."""
+    """Average the depth along the track and measure the mean cross-section.
+
+    The average is over nine tenths of the straight part.
+    """
     axis = np.array([np.cos(track.direction), np.sin(track.direction)])
     dx, dy = points[0] - track.middle[0], points[1] - track.middle[1]
     across, along = axis[0] * dy - axis[1] * dx, axis[0] * dx + axis[1] * dy
