@@ -1,5 +1,6 @@
 """The numerical methods of the report: exact maps, orders of convergence, and the numbers of the report's problems."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -81,6 +82,16 @@ def test_exact_a_free_mass_slides_under_a_constant_force():
     assert found.v[-1, 0] == pytest.approx(0.1 + 2.0 * 10)
     assert found.z[-1, 0] == pytest.approx(1.0 + 100.0)
     assert found.accelerations(FREE)[-1] == pytest.approx([2.0])
+
+
+def test_exact_a_stuck_mass_is_held_from_the_start():
+    """2 kg under 0.5 m/s^2: friction of 1 N holds the mass, and a limit of 0.9 N lets it go."""
+    modes = replace(FREE, mass=2.0)
+    drive = Recorded(np.array([0.0, 1.0]), np.array([0.5, 0.5]), 1.0, False)
+    for limit, force, speed in ((3.0, 1.0, 0.0), (0.9, 0.9, 0.05)):
+        found = solve_newmark(modes, drive, coulomb(limit, 1e-3), (1.0, 100), needs_force=True)
+        assert found.force == pytest.approx(force)
+        assert found.v[-1, 0] == pytest.approx(speed, abs=1e-12)
 
 
 @pytest.mark.parametrize("needs_force, release_at", [(False, 3.0), (True, 1.0)])
