@@ -87,7 +87,7 @@ def test_exact_a_free_mass_slides_under_a_constant_force():
 def test_exact_a_stuck_mass_is_held_from_the_start():
     """2 kg under 0.5 m/s^2: friction of 1 N holds the mass, and a limit of 0.9 N lets it go."""
     modes = replace(FREE, mass=2.0)
-    drive = Recorded(np.array([0.0, 1.0]), np.array([0.5, 0.5]), 1.0, False)
+    drive = RecordedDrive(np.array([0.0, 1.0]), np.array([0.5, 0.5]), 1.0, False)
     for limit, force, speed in ((3.0, 1.0, 0.0), (0.9, 0.9, 0.05)):
         found = solve_newmark(modes, drive, coulomb(limit, 1e-3), (1.0, 100), needs_force=True)
         assert found.force == pytest.approx(force)
