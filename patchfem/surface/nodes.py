@@ -50,7 +50,7 @@ def place_over_patch(profile: Profile, x: np.ndarray, how: str = "auto") -> Prof
     if how == "centred" or (how == "auto" and not _covers(known, x)):
         shift = float(x[0] + x[-1] - known[0] - known[-1]) / 2
         if how == "auto":
-            notes += (_centred_note(profile.source, known, x, shift),)
+            notes += (_describe_centring(profile.source, known, x, shift),)
     known = known + shift
     _require_cover(profile.source, known, x)
     first = max(int(np.searchsorted(known, x[0], "right")) - 1, 0)
@@ -69,7 +69,7 @@ def place_over_patch(profile: Profile, x: np.ndarray, how: str = "auto") -> Prof
     )
 
 
-def _centred_note(source: str, known, x, shift: float) -> str:
+def _describe_centring(source: str, known, x, shift: float) -> str:
     if abs(np.ptp(known) - np.ptp(x)) <= sum(_max_missing(x)):
         return (
             f"{source}: {AS_LONG}, {format_length(np.ptp(x))}, and is centred on it, which adds "

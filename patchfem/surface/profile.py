@@ -60,7 +60,7 @@ def level(profile: Profile) -> Profile:
 
 
 def resample_evenly(profile: Profile) -> Profile:
-    """Resample a trace at an even step without gaps, as filters and spectra need.
+    """Resample a trace at a constant step without gaps, as filters and spectra need.
 
     Missing heights are bridged by straight lines. An uneven trace is resampled at the 10th
     percentile of its steps, so that nothing between its samples is lost. The notes state both.
@@ -77,7 +77,7 @@ def resample_evenly(profile: Profile) -> Profile:
     x = profile.x[(profile.x >= places[0]) & (profile.x <= places[-1])]
     notes = profile.notes
     if not is_whole:
-        notes += (_missing_note(profile, float(np.diff(places).max())),)
+        notes += (_describe_missing(profile, float(np.diff(places).max())),)
     if not is_even:
         step = max(float(np.percentile(steps, 10)), float(x[-1] - x[0]) / MAX_SAMPLES)
         count = int(np.ceil((x[-1] - x[0]) / step * (1 - 1e-9))) + 1
@@ -91,7 +91,7 @@ def resample_evenly(profile: Profile) -> Profile:
     return replace(profile, x=frozen_array(x), z=frozen_array(z), notes=notes)
 
 
-def _missing_note(profile: Profile, longest: float) -> str:
+def _describe_missing(profile: Profile, longest: float) -> str:
     count = profile.missing.sum()
     return (
         f"{profile.source}: {count} of {profile.z.size} heights are missing; the gaps are bridged "
@@ -131,7 +131,7 @@ def clean(profile: Profile, max_gap: float) -> Profile:
             "straight lines replace these heights",
         )
     if profile.missing.any():
-        notes += (_missing_note(profile, float(gaps[longest])),)
+        notes += (_describe_missing(profile, float(gaps[longest])),)
     places = profile.x[good[0] : good[-1] + 1]
     z = np.interp(places, x, profile.z[good])
     return replace(profile, x=frozen_array(places), z=frozen_array(z), notes=notes)

@@ -1,4 +1,4 @@
-"""Checks of samples from a file: finite, plausible, rising x, one height for each place."""
+"""Checks of samples from a file: finite, plausible, increasing x, one height for each place."""
 
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ class Places(NamedTuple):
 
 
 def make_trace(path, x, z, lines, factors: tuple, stated: str = "") -> Profile:
-    """Make a trace of samples, with rising x and one height for each place.
+    """Make a trace of samples, with increasing x and one height for each place.
 
     Its notes state every change of the samples.
 
@@ -54,7 +54,7 @@ def make_trace(path, x, z, lines, factors: tuple, stated: str = "") -> Profile:
         z = z[::-1]
         lines = None if lines is None else lines[::-1]
     x, notes = undo_rounding(path, x, factors[0])
-    _require_rising(path, x, lines, factors[0])
+    _require_increasing(path, x, lines, factors[0])
     x, z, more = _merge_equal_places(path, x, z, lines)
     x = x * factors[0]
     z = z * factors[1]
@@ -143,7 +143,7 @@ def undo_rounding(path, x, factor: float, name: str = "x") -> Places:
 
 
 def printed_digit(x) -> float:
-    """Return the largest power of ten that divides all rising places (n,), 0 if there is none."""
+    """Return the largest power of ten that divides all increasing places (n,), 0 if there is none."""
     largest = int(np.floor(np.log10((x[-1] - x[0]) / 5)))
     for digit in 10.0 ** np.arange(largest, largest - 8, -1):
         if np.abs(x / digit - np.rint(x / digit)).max() < DIGIT_TOL:
@@ -156,7 +156,7 @@ def _min_step(x) -> float:
     return 1e-6 * (x[-1] - x[0]) / x.size
 
 
-def _require_rising(path, x, lines, factor: float) -> None:
+def _require_increasing(path, x, lines, factor: float) -> None:
     """Raise PatchfemError for places (n,) that reverse or are all the same."""
     steps = np.diff(x)
     reverses = steps < -_min_step(x)
@@ -178,7 +178,7 @@ def _require_rising(path, x, lines, factor: float) -> None:
 
 
 class Merged(NamedTuple):
-    """Strictly rising places (k,) and heights (k,) in the units of the file, with notes."""
+    """Strictly increasing places (k,) and heights (k,) in the units of the file, with notes."""
 
     x: np.ndarray
     z: np.ndarray

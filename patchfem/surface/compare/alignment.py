@@ -111,13 +111,13 @@ class Alignment:
         return self.depth - self.errors.drift
 
     @property
-    def agreed(self) -> float:
+    def agreed_fraction(self) -> float:
         """Fraction of the heights that agree in both traces, on this floor or the rival floor."""
         other = self if self.rival is None else self.rival
         return float(max(self.unworn.mean(), other.unworn.mean()))
 
     @property
-    def visible(self) -> float | None:
+    def detection_limit(self) -> float | None:
         """Detection limit: mean depth [m] of a track over the middle third; None for short traces."""
         threshold = find_shallow_track(np.asarray(self.depth), self.noise)[1]
         return threshold if np.isfinite(threshold) else None
@@ -128,7 +128,7 @@ class Alignment:
             return float("nan")
         return float(self.errors.parameters[:, self.free.index(parameter)].std())
 
-    def back(self, place: float) -> float:
+    def map_to_first(self, place: float) -> float:
         """Map a position [m] along the second trace to the first one."""
         return self.middle + (place - self.middle) / (1 + self.stretch) - self.shift
 

@@ -102,7 +102,7 @@ class Comparison:
     """Differences of two traces or two scans, before and after wear.
 
     - direction: "x" or "y" for traces of scans, else "".
-    - basis: what the worn depth counts from: "place" (heights that agree in both traces),
+    - basis: surface from which the worn depth is measured: "place" (heights that agree in both traces),
       "flanks" (of the second trace) or "" (nothing; there is no worn depth).
     - match: search for the same place; None for scans and where the shift is given.
     - is_exchanged: whether material stands above the first trace and none is missing, or the
@@ -189,7 +189,7 @@ def compare_traces(
 
     Spikes, dropouts and dust are left out first. Traces that share a place, as they are or mirrored, are
     aligned on the heights that did not wear, and the worn depth is what is missing. Otherwise the worn
-    depth counts from unworn flanks of the second trace, or there is none.
+    depth is measured from unworn flanks of the second trace, or there is none.
 
     Parameters
     ----------
@@ -294,7 +294,9 @@ def _compare_aligned(place: Place, heights, direction: str) -> Comparison:
         removed=_count_removed(place),
         is_mirrored=place.is_mirrored,
         gain=find_gain(alignment) if is_unchanged else None,
-        detection_limit=alignment.visible if is_unchanged and not wear.reading.headline else None,
+        detection_limit=alignment.detection_limit
+        if is_unchanged and not wear.reading.headline
+        else None,
         ambiguity=wear.reading.headline,
     )
 

@@ -54,13 +54,13 @@ class Parts(NamedTuple):
         sums = np.add.reduceat(np.where(self.unworn, values, 0.0), self.edges[:-1], axis=-1)
         return sums[..., self.known] / self.count[self.known]
 
-    def spread(self, values) -> np.ndarray:
+    def interpolate(self, values) -> np.ndarray:
         """Interpolate values (..., k) at the middles to all heights (..., n)."""
         place = (np.arange(self.edges[-1]) + 0.5) / self.edges[-1]
         after = np.clip(np.searchsorted(self.middles, place), 1, self.middles.size - 1)
         width = self.middles[after] - self.middles[after - 1]
-        share = np.clip((place - self.middles[after - 1]) / width, 0.0, 1.0)
-        return values[..., after - 1] * (1 - share) + values[..., after] * share
+        weight = np.clip((place - self.middles[after - 1]) / width, 0.0, 1.0)
+        return values[..., after - 1] * (1 - weight) + values[..., after] * weight
 
 
 class Drift(NamedTuple):
@@ -77,7 +77,7 @@ class Drift(NamedTuple):
 
     def remove(self, values) -> np.ndarray:
         """Subtract from values (..., n) the datum and drift predicted from their means."""
-        return values - self.parts.spread(self.parts.average(values) @ self.smoother.T)
+        return values - self.parts.interpolate(self.parts.average(values) @ self.smoother.T)
 
 
 class _Covariance(NamedTuple):
@@ -155,7 +155,7 @@ def _matern(distance, root: float, length: float) -> np.ndarray:
     return polynomial * np.exp(-scaled)
 
 
-def _datum(place, degree: int) -> np.ndarray:
+def _evaluate_datum(place, degree: int) -> np.ndarray:
     """Return the polynomials (m, degree + 1) of the datum at positions (m,) from 0 to 1."""
     return np.vander(2 * place - 1, degree + 1)
 
@@ -179,7 +179,7 @@ def _fit_covariances(centres, means, noise, degree: int) -> list:
     degree : int
         Degree of the datum.
     """
-    forms = _datum(centres, degree)
+    forms = _evaluate_datum(centres, degree)
     scale = 1 / np.sqrt(noise)
     freedom = centres.size - forms.shape[1]
     covariances = []
@@ -209,13 +209,13 @@ def _fit_covariances(centres, means, noise, degree: int) -> list:
 def _predict(covariance: _Covariance, centres, places, noise, degree: int) -> np.ndarray:
     """Return the kriging matrix (m, k) from part means at (k,) to datum and drift at (m,)."""
     root, length, ratio = covariance[:3]
-    forms = _datum(centres, degree)
+    forms = _evaluate_datum(centres, degree)
     total = ratio * _matern(_distances(centres, centres), root, length) + np.diag(noise)
     between = ratio * _matern(_distances(places, centres), root, length)
     precision = np.linalg.inv(total)
     datum = np.linalg.solve(forms.T @ precision @ forms, forms.T @ precision)
     residual = np.eye(centres.size) - forms @ datum
-    return _datum(places, degree) @ datum + between @ precision @ residual
+    return _evaluate_datum(places, degree) @ datum + between @ precision @ residual
 
 
 def _draw_drift(covariance: _Covariance, places, freedom: int, count: int, random) -> np.ndarray:

@@ -155,7 +155,7 @@ def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErro
     length = block_length(correlation, values.size)
     errors = draw_blocks(values, length, depth.size) * noise * student_factor(values.size / length)
     if model is not None:
-        errors += model.parts.spread(model.draws)
+        errors += model.parts.interpolate(model.draws)
     steps = _propagate_to_parameters(errors, noise, unworn, jacobian)
     errors += steps @ jacobian.T
     if model is not None:

@@ -9,7 +9,7 @@ from ...inputs.cells import TableFormat, parse_header, read_text, split_cells
 from ..quantity import Quantity, average_quantities
 
 COLUMNS = ("before", "after")  # columns that every table has
-# basis of the answer for a pair, in words; means are taken only over pairs of the same kind
+# basis of the answer for a pair, as printed; means are taken only over pairs of the same kind
 KINDS = {
     "scans": "areal scans",
     "run": "results folders",

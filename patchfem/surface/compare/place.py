@@ -173,7 +173,7 @@ def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: b
 
 def _has_enough_unworn(alignment: Alignment) -> bool:
     """Whether enough heights agree for a reference; with a straight datum, more than two flanks."""
-    return alignment.agreed > (2 * SHORT_FLANK if alignment.is_straight else MIN_UNWORN)
+    return alignment.agreed_fraction > (2 * SHORT_FLANK if alignment.is_straight else MIN_UNWORN)
 
 
 def _rms_height(x, z) -> float:
@@ -197,7 +197,7 @@ def _is_same_place(alignment: Alignment, match: Match) -> bool:
 def _has_high_agreement(alignment: Alignment) -> bool:
     """Whether more heights agree than in traces of different surfaces."""
     height = _rms_height(alignment.x, alignment.first)
-    return alignment.agreed > MIN_AGREED and alignment.noise < MAX_AGREED_NOISE * height
+    return alignment.agreed_fraction > MIN_AGREED and alignment.noise < MAX_AGREED_NOISE * height
 
 
 def _agrees_closely(alignment: Alignment, match: Match, max_height: float = np.inf) -> bool:

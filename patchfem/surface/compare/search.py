@@ -71,7 +71,7 @@ class Match(NamedTuple):
 
 
 class Resampled(NamedTuple):
-    """Two traces at a common even step without their long waves.
+    """Two traces at a common constant step without their long waves.
 
     first, second: (n,), (m,) heights [m]; step [m]; start: x of the first sample of the second trace
     less that of the first [m].
@@ -135,7 +135,7 @@ def search_shift_in_parts(before: Profile, after: Profile) -> Match | None:
 
 
 def resample_both(before: Profile, after: Profile) -> Resampled:
-    """Resample two traces at a common even step and filter out their long waves.
+    """Resample two traces at a common constant step and filter out their long waves.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def _overlapping_lags(count: int, other: int) -> np.ndarray:
 
 
 def _resample(trace: Profile, step: float) -> np.ndarray:
-    """Return the heights at an even step, averaged over it where it is coarser than the samples."""
+    """Return the heights at a constant step, averaged over it where it is coarser than the samples."""
     count = int(trace.length / step * (1 + 1e-9)) + 1
     z = running_mean(trace.z, max(1, round(step / trace.step)))
     return np.interp(trace.x[0] + step * np.arange(count), trace.x, z)

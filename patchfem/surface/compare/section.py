@@ -230,7 +230,7 @@ def _select_end(deviances, candidates, low: int, count: int) -> FlankEnd:
     deviances : (flanks, m) array
         Of the flanks of `_flank_deviances` from each candidate on.
     candidates : (m,) int array
-        First worn samples, counted from `low`.
+        First worn samples, as indices from `low`.
     low, count : int
         First sample of the flank, and number of samples.
     """
@@ -366,7 +366,7 @@ def find_ends(section: Section, span: tuple, free: tuple) -> TrackEnds:
 
 
 def find_flank_ends(depth, noise, correlation: float, first: int, last: int) -> tuple:
-    """Find where both flanks of a track begin, as the `FlankEnd` of each, counted from outside.
+    """Find where both flanks of a track begin, as the `FlankEnd` of each, measured from outside.
 
     Parameters
     ----------

@@ -73,7 +73,7 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
         side = int(np.argmax([np.abs(np.diff(z[around])).max() for z in surfaces]))
         ends = [alignment.x[max(low - 1, 0)], alignment.x[min(high + 1, depth.size - 1)]]
         if side == 0:
-            ends = [alignment.back(end) for end in ends]
+            ends = [alignment.map_to_first(end) for end in ends]
         x = profiles[side].x
         margin = 0.5 * float(x[1] - x[0])
         is_speck[side] |= (x >= ends[0] - margin) & (x <= ends[1] + margin)
@@ -101,7 +101,9 @@ def limit_left_out_wear(
     known = ~after.missing
     aligned = np.interp(section.x, after.x[known], after.z[known])
     datum = np.interp(x, section.x, section.depth - alignment.first + aligned)
-    first = np.interp(alignment.back(x), before.x[~before.missing], before.z[~before.missing])
+    first = np.interp(
+        alignment.map_to_first(x), before.x[~before.missing], before.z[~before.missing]
+    )
     counted = np.maximum(np.interp(x, section.x, section.depth), 0.0)
     lost = np.maximum(first + datum - heights[is_dip] - counted, 0.0)
     return float(lost.sum() * np.median(np.diff(after.x)))

@@ -61,7 +61,7 @@ def compose_verdict(parts: list, directions: list = ()) -> tuple:
 class _Facts(NamedTuple):
     """Conditions on which the rules for the headline depend.
 
-    parts: list of `Comparison`; waves: change of the waves in words; scan_headline: that of the two
+    parts: list of `Comparison`; waves: change of the waves as a phrase; scan_headline: that of the two
     scans, "" of traces; is_worn: whether a worn depth is shown; is_flatter: whether a slope fell.
     """
 

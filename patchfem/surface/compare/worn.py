@@ -223,7 +223,9 @@ def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Exten
     before = []
     after = []
     for end, text in zip(ends, END_TEXTS):
-        value, low, high = (alignment.back(place) for place in (end.value, end.low, end.high))
+        value, low, high = (
+            alignment.map_to_first(place) for place in (end.value, end.low, end.high)
+        )
         before.append(
             Quantity(
                 value, low - error, high + error, "m", f"{text} in the first trace (before wear)"

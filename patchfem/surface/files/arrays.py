@@ -15,9 +15,9 @@ from ...inputs.matlab import read_variables
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN, make_trace
-from .raster import areal, raster
+from .raster import make_scan_of_matrix, make_scan_of_points
 from .raw import MAX_POINTS, Raw, shorten
-from .units import GIVE, LISTED, PIXEL, length_unit, pixel_size
+from .units import GIVE_PIXEL_SIZE, GIVE_UNITS, UNIT_LIST, parse_length_unit, parse_pixel_size
 
 MAX_HEADER = 10_000  # bytes of the header of an .npy file; usual ones have fewer than 200
 MIN_ROWS = 8  # rows of an unnamed matrix that may be a table of columns
@@ -39,11 +39,11 @@ class LengthFactors(NamedTuple):
 def read_npy(raw: Raw, units: tuple | None) -> Profile | Areal:
     """Read an .npy file of two or three columns, or a matrix of heights with a pixel size."""
     table = _load_npy(raw)
-    pixel = None if units is None else pixel_size(units[0])
+    pixel = None if units is None else parse_pixel_size(units[0])
     if pixel is not None and table.ndim == 2 and min(table.shape) > 1:
         factor = length_factors(raw, units[1:] * 2).height
         rows, columns = table.shape
-        return areal(
+        return make_scan_of_matrix(
             raw.path, np.arange(columns) * pixel, np.arange(rows) * pixel, table * factor, GIVEN
         )
     factors = length_factors(raw, units)
@@ -52,7 +52,7 @@ def read_npy(raw: Raw, units: tuple | None) -> Profile | Areal:
     if table.ndim != 2 or table.shape[1] not in (2, 3):
         raise PatchfemError(
             f"{raw.path}: contains an array of shape {table.shape}; columns x, z or x, y, z are "
-            f"needed, as {EXAMPLE} writes them; for a matrix of heights, {PIXEL}"
+            f"needed, as {EXAMPLE} writes them; for a matrix of heights, {GIVE_PIXEL_SIZE}"
         )
     return _read_table(raw, table, factors)
 
@@ -92,15 +92,15 @@ def length_factors(raw: Raw, units: tuple | None) -> LengthFactors:
     """
     if units is None:
         raise PatchfemError(
-            f"{raw.path}: the file names no units, and units are never guessed; {GIVE}, or write "
+            f"{raw.path}: the file names no units, and units are never guessed; {GIVE_UNITS}, or write "
             "it as text with the header `x [um],z [um]`"
         )
     for unit in units:
-        if length_unit(unit) is None:
+        if parse_length_unit(unit) is None:
             raise PatchfemError(
-                f"{raw.path}: unknown unit '{shorten(str(unit))}'; use one of {LISTED}"
+                f"{raw.path}: unknown unit '{shorten(str(unit))}'; use one of {UNIT_LIST}"
             )
-    return LengthFactors(*map(length_unit, units))
+    return LengthFactors(*map(parse_length_unit, units))
 
 
 def _read_table(raw: Raw, table, factors: LengthFactors) -> Profile | Areal:
@@ -109,7 +109,7 @@ def _read_table(raw: Raw, table, factors: LengthFactors) -> Profile | Areal:
         raise PatchfemError(f"{raw.path}: {len(columns[0])} rows; a trace needs at least two")
     if len(columns) == 2:
         return make_trace(raw.path, *columns, None, factors, GIVEN)
-    return raster(raw.path, columns, None, (factors.lateral, *factors), GIVEN)
+    return make_scan_of_points(raw.path, columns, None, (factors.lateral, *factors), GIVEN)
 
 
 def _read_variables(raw: Raw, places: list, z, factors: LengthFactors) -> Profile | Areal:
@@ -122,7 +122,7 @@ def _read_variables(raw: Raw, places: list, z, factors: LengthFactors) -> Profil
         return _read_table(raw, np.column_stack([*flat, z.ravel()]), factors)
     if len(flat) == 2 and z.shape == (flat[1].size, flat[0].size):
         x, y = (values * factors.lateral for values in flat)
-        return areal(raw.path, x, y, z * factors.height, GIVEN)
+        return make_scan_of_matrix(raw.path, x, y, z * factors.height, GIVEN)
     shapes = ", ".join(str(np.shape(values)) for values in (*places, z))
     raise PatchfemError(
         f"{raw.path}: x, y and z of shapes {shapes} do not fit together; z needs a row for each y "

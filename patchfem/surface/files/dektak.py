@@ -18,7 +18,7 @@ from .head import Head
 from .raw import Raw, shorten
 from .rows import read_columns
 from .text import decode_text
-from .units import length_unit
+from .units import parse_length_unit
 
 FIRST_WORDS = b"Scan Parameters"  # every export begins with these
 MIN_DIGIT = 1e-5  # smallest printed digit of x, in the unit of the file
@@ -42,7 +42,7 @@ def read_dektak(raw: Raw) -> Profile:
     number = text.count("\n", 0, header.start()) + 1
     factors = []
     for word in header.groups():
-        factor = _dektak_unit(word)
+        factor = _parse_unit(word)
         if factor is None:
             raise PatchfemError(
                 f"{path}:{number}: unknown unit '{shorten(word)}'; export the scan in Micrometer "
@@ -56,21 +56,21 @@ def read_dektak(raw: Raw) -> Profile:
     values, lines = read_columns(path, body, head, {"x": 0, "z": 1}, 2)
     settings, _, _ = text[: header.start()].partition("\nFunction,")  # results come after it
     length = _LENGTH.search(settings)
-    factor = length and _dektak_unit(length[2])
+    factor = length and _parse_unit(length[2])
     x, note = values["x"], ""
     if factor and np.isfinite(float(length[1])):
-        x, note = _true_places(x, float(length[1]) * factor, factors[0])
+        x, note = _restore_places(x, float(length[1]) * factor, factors[0])
     trace = make_trace(path, x, values["z"], lines, tuple(factors))
     return replace(trace, notes=(f"{path}: {note}", *trace.notes)) if note else trace
 
 
-def _dektak_unit(word: str) -> float | None:
+def _parse_unit(word: str) -> float | None:
     """Return the factor to metres of a unit, None for no unit of length; A is the angstrom."""
-    return 1e-10 if word.lower() == "a" else length_unit(word)
+    return 1e-10 if word.lower() == "a" else parse_length_unit(word)
 
 
-def _true_places(x, length: float, factor: float) -> tuple[np.ndarray, str]:
-    """Replace rounded places by even steps of the length [m] in the header, with a note.
+def _restore_places(x, length: float, factor: float) -> tuple[np.ndarray, str]:
+    """Replace rounded places by equal steps of the length [m] in the header, with a note.
 
     The printed places stay if the steps do not fit them. factor: of x to metres.
     """

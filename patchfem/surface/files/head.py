@@ -12,7 +12,7 @@ from typing import NamedTuple
 from ...core import PatchfemError
 from ...inputs.cells import NUMBER_PATTERN
 from .raw import shorten
-from .units import length_unit
+from .units import parse_length_unit
 
 MAX_LINE = 1000  # characters; a longer line is not one of two to four columns
 MAX_LINES = 500  # lines of a head; instruments write fewer than 200
@@ -126,12 +126,12 @@ class Head(NamedTuple):
             cells, delimiter = split_cells(line.text)
             if len(cells) != len(self.row):
                 continue
-            is_unit = [length_unit(cell) is not None for cell in cells]
+            is_unit = [parse_length_unit(cell) is not None for cell in cells]
             if any(is_unit) and all(
                 cell in NO_UNIT for cell, known in zip(cells, is_unit) if not known
             ):
                 found = found._replace(units=cells)
-            elif names_columns(cells) or not (
+            elif has_column_names(cells) or not (
                 line.is_comment or delimiter != self.delimiter or re.search(r"[:=：]", line.text)
             ):
                 found = found._replace(number=line.number, names=cells)
@@ -184,7 +184,7 @@ def read_head(path, text: str) -> Head:
             )
         plain = line[:MAX_LINE].lstrip("#%/").strip() if is_comment else line
         if len(plain) <= MAX_LINE:
-            names = _names_with_units(plain, is_comment=is_comment)
+            names = _has_names_with_units(plain, is_comment=is_comment)
             if names:
                 return Head(lines, names, [], split_cells(plain).delimiter, number, stop + 1)
         if not is_comment and line.strip(" \t,;|"):
@@ -203,12 +203,12 @@ def read_head(path, text: str) -> Head:
     )
 
 
-def names_columns(cells: list) -> bool:
+def has_column_names(cells: list) -> bool:
     """Return whether cells name two columns of a trace or a scan."""
     return len({parse_column(cell).role for cell in cells} & {"x", "y", "z", "index"}) > 1
 
 
-def _names_with_units(line: str, *, is_comment: bool) -> list:
+def _has_names_with_units(line: str, *, is_comment: bool) -> list:
     """Return the cells of a line that names x and z with units, [] for any other line.
 
     Further words after the last column of a comment are left out.

@@ -19,9 +19,9 @@ from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN, make_trace
 from .arrays import length_factors
-from .raster import areal
+from .raster import make_scan_of_matrix
 from .raw import MAX_POINTS, UNPACK_ERRORS, Raw, shorten, shorten_reason
-from .units import IGNORED
+from .units import UNITS_IGNORED
 
 PYTHON = sys.executable
 MAX_CPU_SECONDS = 60.0  # CPU time for a file, independent of the load of the machine
@@ -57,9 +57,9 @@ def read_instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
     library = f"SurfaceTopography {shorten(about['version'])}"
     notes = (f"{raw.path}: read as {shorten(about['format'])} by {library}",)
     if about["unit"] and units:
-        notes += (f"{raw.path}: {IGNORED}",)
+        notes += (f"{raw.path}: {UNITS_IGNORED}",)
     if len(arrays) == 3:
-        return areal(raw.path, *arrays, stated, notes)
+        return make_scan_of_matrix(raw.path, *arrays, stated, notes)
     trace = make_trace(raw.path, *arrays, None, (1.0, 1.0), stated)
     return replace(trace, notes=(*notes, *trace.notes))
 
@@ -78,7 +78,9 @@ def _run_script(path, file: Path) -> dict:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise _refusal(path, f"did not finish reading this file in {MAX_SECONDS:g} s") from None
+        raise _make_refusal(
+            path, f"did not finish reading this file in {MAX_SECONDS:g} s"
+        ) from None
     except (OSError, ValueError) as error:
         raise Missing(f"{path}: no process could be started to read this file ({error})") from None
     if done.returncode == EXIT_NO_LIBRARY:
@@ -88,19 +90,19 @@ def _run_script(path, file: Path) -> dict:
             "with the header `x [um],z [um]`"
         )
     if done.returncode == CPU_LIMIT_SIGNAL:
-        raise _refusal(
+        raise _make_refusal(
             path, f"did not finish reading this file in {MAX_CPU_SECONDS:g} s of CPU time"
         )
     try:
         found = dict(np.load(io.BytesIO(done.stdout), allow_pickle=False))
     except UNPACK_ERRORS:
-        raise _refusal(path, "failed to read this file") from None
+        raise _make_refusal(path, "failed to read this file") from None
     if "error" in found:
-        raise _refusal(path, f"cannot read this file ({shorten_reason(found['error'])})")
+        raise _make_refusal(path, f"cannot read this file ({shorten_reason(found['error'])})")
     if "z" not in found or not all(values.size for values in found.values()):
-        raise _refusal(path, "found no heights in this file")
+        raise _make_refusal(path, "found no heights in this file")
     return found
 
 
-def _refusal(path, what: str) -> PatchfemError:
+def _make_refusal(path, what: str) -> PatchfemError:
     return PatchfemError(f"{path}: SurfaceTopography {what}; export the surface as text or X3P")

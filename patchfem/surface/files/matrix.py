@@ -9,14 +9,16 @@ from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN, make_trace
-from .head import Fact, Head, names_columns
-from .raster import areal
+from .head import Fact, Head, has_column_names
+from .raster import make_scan_of_matrix
 from .raw import shorten
 from .rows import read_matrix
-from .units import GIVE, PIXEL, length_unit, pixel_size
+from .units import GIVE_PIXEL_SIZE, GIVE_UNITS, parse_length_unit, parse_pixel_size
 
-SIZE = "`# Width: 1.2 mm` and `# Height: 0.8 mm`"
-SIZE_REMEDY = f"write the scan's {SIZE} and `# Value units: um` above its rows, or {PIXEL}"
+SIZE_LINES = "`# Width: 1.2 mm` and `# Height: 0.8 mm`"
+SIZE_REMEDY = (
+    f"write the scan's {SIZE_LINES} and `# Value units: um` above its rows, or {GIVE_PIXEL_SIZE}"
+)
 UNKNOWN = Fact()
 MAX_UNEVEN = 1e-6  # relative range of the steps of coordinates; those of heights vary more
 
@@ -51,7 +53,7 @@ def is_matrix(count: int, names: list, facts: dict) -> bool:
     -------
     bool
     """
-    if names_columns(names):
+    if has_column_names(names):
         return False
     has_size = "width" in facts or "step_x" in facts
     return count > 3 or (count == 1 and has_size) or facts.get("columns", UNKNOWN).number == count
@@ -108,7 +110,7 @@ def read_scan(path, head: Head, facts: dict, units: tuple | None, body: str) -> 
     if rows == 1:
         trace = make_trace(path, x, z[0], None, (1.0, 1.0), stated)
         return Profile(trace.x, trace.z, trace.source, (*notes, *trace.notes))
-    return areal(path, x, np.arange(rows) * step_y.value, z, stated, notes)
+    return make_scan_of_matrix(path, x, np.arange(rows) * step_y.value, z, stated, notes)
 
 
 def _is_even(values) -> bool:
@@ -136,21 +138,21 @@ def _find_height_factor(path, facts: dict, units: tuple | None) -> Scale:
     if units is None and stated is None:
         raise PatchfemError(
             f"{path}: a matrix of heights whose unit is not given; write `# Value units: um` above "
-            f"its rows, or {GIVE}"
+            f"its rows, or {GIVE_UNITS}"
         )
-    if units is None and length_unit(stated) is None:
+    if units is None and parse_length_unit(stated) is None:
         raise PatchfemError(
             f"{path}: the values are in '{shorten(stated)}', which is not a unit of length; export "
-            f"the channel of the heights, or {GIVE}"
+            f"the channel of the heights, or {GIVE_UNITS}"
         )
     unit = _choose_unit(path, "the heights", stated, units and units[1])
-    return Scale(scale * length_unit(unit.name), unit.notes)
+    return Scale(scale * parse_length_unit(unit.name), unit.notes)
 
 
 def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) -> Scale:
     """Return the sample spacing [m] along x or y: the pixel size, or scan size / number of pixels."""
     size, step = ("width", "step_x") if axis == "x" else ("height", "step_y")
-    pixel = None if units is None else pixel_size(units[0])
+    pixel = None if units is None else parse_pixel_size(units[0])
     if pixel is not None:
         note = (
             f"{path}: the header gives the size of the scan along {axis}, but the pixel size that "
@@ -171,18 +173,20 @@ def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) ->
     word = word or facts.get("lateral", UNKNOWN).word
     if not word and facts.get("format", UNKNOWN).word.lower() == "ascii":
         word = "nm"  # SPIP writes places in nanometres
-    if units is None and length_unit(word) is None:
+    if units is None and parse_length_unit(word) is None:
         raise PatchfemError(
             f"{path}: the unit of the scan's width and height, '{shorten(word)}', is not known; "
-            f"write {SIZE}, or {GIVE}"
+            f"write {SIZE_LINES}, or {GIVE_UNITS}"
         )
     unit = _choose_unit(path, f"places along {axis}", word or None, units and units[0])
-    return Scale(number * length_unit(unit.name) / (1 if step in facts else count), unit.notes)
+    return Scale(
+        number * parse_length_unit(unit.name) / (1 if step in facts else count), unit.notes
+    )
 
 
 def _choose_unit(path, what: str, stated: str | None, given: str | None) -> Unit:
     """Prefer the unit that the user gave, with a note if it differs from that of the file."""
-    if given is None or stated is None or length_unit(given) == length_unit(stated):
+    if given is None or stated is None or parse_length_unit(given) == parse_length_unit(stated):
         return Unit(given or stated)
     note = f"{path}: the header gives {what} in {shorten(stated)}, but {given} is used, as given by --units"
     return Unit(given, (note,))

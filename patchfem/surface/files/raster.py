@@ -16,13 +16,15 @@ ROUND_OFF = 1e-9  # relative to the length of an axis; nearer places are the sam
 
 
 class Axis(NamedTuple):
-    """Distinct rising places along an axis, and the index of the place of each point."""
+    """Distinct increasing places along an axis, and the index of the place of each point."""
 
     places: np.ndarray
     numbers: np.ndarray
 
 
-def raster(path, columns: list, lines, factors: tuple, stated: str = "") -> Profile | Areal:
+def make_scan_of_points(
+    path, columns: list, lines, factors: tuple, stated: str = ""
+) -> Profile | Areal:
     """Arrange points as an areal scan, or as a trace if they form a single row or column.
 
     Parameters
@@ -36,7 +38,7 @@ def raster(path, columns: list, lines, factors: tuple, stated: str = "") -> Prof
     factors : tuple
         Factors of x, y, z to metres.
     stated : str
-        As for `areal`.
+        As for `make_scan_of_matrix`.
 
     Returns
     -------
@@ -70,10 +72,12 @@ def raster(path, columns: list, lines, factors: tuple, stated: str = "") -> Prof
     heights = np.full(cells, np.nan)
     heights[place] = z
     heights = heights.reshape(shape) * factors[2]
-    return areal(path, along_x.places * factors[0], along_y.places * factors[1], heights, stated)
+    return make_scan_of_matrix(
+        path, along_x.places * factors[0], along_y.places * factors[1], heights, stated
+    )
 
 
-def areal(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal:
+def make_scan_of_matrix(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal:
     """Make an areal scan of heights on a grid, or a trace if y has one place.
 
     Parameters
@@ -81,7 +85,7 @@ def areal(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal
     path : Path
         For messages.
     x, y : (n,), (m,) arrays [m]
-        Rising or falling.
+        Increasing or decreasing.
     z : (m, n) array [m]
     stated : str
         Who states the units, METRES or GIVEN of `samples`; then steep heights get a note and are

@@ -17,7 +17,7 @@ MAX_POINTS = 50_000_000  # heights
 MAX_UNPACK_RATIO = 200  # unpacked / packed size above 1 MiB; only a zip bomb packs better
 HEAD_BYTES = 4096  # bytes at the start of a file that decide its format
 BLOCK_BYTES = 65_536  # bytes read at a time, which limits the memory
-MARKS = {  # first bytes of a file and its kind
+FIRST_BYTES = {  # first bytes of a file and its kind
     b"\x1f\x8b": "gzip",
     b"PK\x03\x04": "zip",
     b"PK\x05\x06": "zip",
@@ -50,7 +50,7 @@ UNPACK_ERRORS = (  # exceptions of zipfile, gzip and NumPy for a damaged file
 class Raw(NamedTuple):
     """File in memory.
 
-    path: name for messages; kind: "text", "binary", "x3p" or one of MARKS; suffix: of the unpacked
+    path: name for messages; kind: "text", "binary", "x3p" or one of FIRST_BYTES; suffix: of the unpacked
     file in lower case; data: bytes, b"" for a "binary" file that is not packed, which another
     process reads.
     """
@@ -101,7 +101,7 @@ def _read_limited(file, head: bytes, size: int) -> bytes:
 
 
 def _find_kind(head: bytes) -> str:
-    kind = next((kind for mark, kind in MARKS.items() if head.startswith(mark)), None)
+    kind = next((kind for mark, kind in FIRST_BYTES.items() if head.startswith(mark)), None)
     if kind is None:
         kind = "binary" if any(byte in head for byte in b"\x00\x01\x02\x03\x04") else "text"
     return kind

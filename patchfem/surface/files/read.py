@@ -11,7 +11,7 @@ from .dektak import FIRST_WORDS, read_dektak
 from .instruments import read_instrument
 from .raw import TEXT_SUFFIXES, fetch
 from .text import read_text
-from .units import IGNORED
+from .units import UNITS_IGNORED
 from .x3p import read_x3p
 
 READERS = {"npy": read_npy, "mat": read_mat, "binary": read_instrument, "text": read_text}
@@ -45,7 +45,7 @@ def read_surface(path, units: tuple | None = None) -> Profile | Areal:
         surface = READERS_WITH_UNITS[kind](raw)
         if units is None:
             return surface
-        return replace(surface, notes=(*surface.notes, f"{path}: {IGNORED}"))
+        return replace(surface, notes=(*surface.notes, f"{path}: {UNITS_IGNORED}"))
     try:
         return READERS[kind](raw, units)
     except PatchfemError:

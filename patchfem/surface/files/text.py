@@ -21,10 +21,10 @@ from ..profile import Profile
 from ..samples import GIVEN, make_trace
 from .head import EXAMPLE, ColumnNames, Fact, parse_column, read_head
 from .matrix import is_matrix, read_scan
-from .raster import raster
+from .raster import make_scan_of_points
 from .raw import Raw, shorten
 from .rows import read_columns
-from .units import GIVE, LISTED, length_unit, pixel_size
+from .units import GIVE_UNITS, UNIT_LIST, parse_length_unit, parse_pixel_size
 
 _QUOTED = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
@@ -54,10 +54,10 @@ def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
     """
     path = raw.path
     text = decode_text(raw)
-    is_pixel = units is not None and pixel_size(units[0]) is not None
+    is_pixel = units is not None and parse_pixel_size(units[0]) is not None
     for unit in (units or ())[is_pixel:]:
-        if length_unit(unit) is None:
-            raise PatchfemError(f"{path}: unknown unit '{shorten(unit)}'; use one of {LISTED}")
+        if parse_length_unit(unit) is None:
+            raise PatchfemError(f"{path}: unknown unit '{shorten(unit)}'; use one of {UNIT_LIST}")
     head = read_head(path, text)
     facts = {} if head.names else head.facts(path)
     named = head.column_names()
@@ -79,7 +79,7 @@ def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
     if not (named.names or units or named.units or "lateral" in facts):
         raise PatchfemError(
             f"{line}: there is no header, and units are never guessed; {EXAMPLE} above the first "
-            f"sample, or {GIVE}"
+            f"sample, or {GIVE_UNITS}"
         )
     names = named.names or list("xz" if width == 2 else "xyz")
     places = _find_places(line, names, has_units=units is not None)
@@ -90,7 +90,7 @@ def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
         values["z"] = np.where(values.pop("valid") == 0, np.nan, values["z"])
         del columns["valid"]
     roles = {parse_column(name).role for name in named.names}
-    if "y" in columns and not roles >= {"x", "y"} and _counts_samples(values):
+    if "y" in columns and not roles >= {"x", "y"} and _is_sample_count(values):
         columns = {"x": columns["y"], "z": columns["z"]}
         values = {"x": values["y"], "z": values["z"]}
         notes += (
@@ -100,7 +100,9 @@ def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
     factors = _find_factors(line, columns, named, facts, units)
     stated = GIVEN if units else ""
     if "y" in columns:
-        surface = raster(path, [values[name] for name in "xyz"], lines, factors.values, stated)
+        surface = make_scan_of_points(
+            path, [values[name] for name in "xyz"], lines, factors.values, stated
+        )
     else:
         surface = make_trace(path, values["x"], values["z"], lines, factors.values, stated)
     return replace(surface, notes=(*notes, *factors.notes, *surface.notes))
@@ -187,14 +189,14 @@ def _find_factors(
             name = named.names[k] if named.names else role
             raise PatchfemError(
                 f"{line}: column '{shorten(name)}' has no unit, and units are never guessed; "
-                f"{EXAMPLE}, or {GIVE}"
+                f"{EXAMPLE}, or {GIVE_UNITS}"
             )
-        factor = length_unit(unit)
+        factor = parse_length_unit(unit)
         if factor is None:
             raise PatchfemError(
-                f"{line}: unknown unit '{shorten(unit)}' of {role}; use one of {LISTED}"
+                f"{line}: unknown unit '{shorten(unit)}' of {role}; use one of {UNIT_LIST}"
             )
-        if stated is not None and length_unit(stated) != factor:
+        if stated is not None and parse_length_unit(stated) != factor:
             notes += (
                 f"{line}: the header gives {role} in {shorten(stated)}, but {unit} is used, as "
                 "given by --units",
@@ -203,7 +205,7 @@ def _find_factors(
     return Factors(tuple(factors), notes)
 
 
-def _counts_samples(values: dict) -> bool:
+def _is_sample_count(values: dict) -> bool:
     """Return whether x counts 0, 1, 2, ... or 1, 2, 3, ... while y only rises or falls."""
     x = values["x"]
     steps = np.diff(values["y"])

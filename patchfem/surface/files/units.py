@@ -28,23 +28,23 @@ SYNONYMS = {
 PREFIXES = {"": 1.0, "milli": 1e-3, "micro": 1e-6, "mikro": 1e-6, "nano": 1e-9}
 METRES = ("meter", "meters", "metre", "metres")
 SYNONYMS |= {prefix + metre: factor for prefix, factor in PREFIXES.items() for metre in METRES}
-LISTED = ", ".join(UNITS)
-GIVE = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
-PIXEL = 'give the pixel size in place of the unit of x, as in --units "0.8 um,um"'
-IGNORED = "the file states its own units; the units that you gave are ignored"
+UNIT_LIST = ", ".join(UNITS)
+GIVE_UNITS = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
+GIVE_PIXEL_SIZE = 'give the pixel size in place of the unit of x, as in --units "0.8 um,um"'
+UNITS_IGNORED = "the file states its own units; the units that you gave are ignored"
 
 
-def length_unit(word: str) -> float | None:
+def parse_length_unit(word: str) -> float | None:
     """Return the factor to metres of a unit such as um, µm, [mm] or Mikrometer, else None."""
     word = word.strip().strip("[]()").strip().replace("µ", "u").replace("μ", "u")
     return UNITS.get(word) or SYNONYMS.get(word.lower())
 
 
-def pixel_size(word: str) -> float | None:
+def parse_pixel_size(word: str) -> float | None:
     """Return the pixel size [m] of a text such as 0.8 um, None for any other text."""
     number, _, unit = word.strip().partition(" ")
     try:
-        size = float(number) * (length_unit(unit) or math.nan)
+        size = float(number) * (parse_length_unit(unit) or math.nan)
     except ValueError:
         return None
     return size if 0 < size < math.inf else None

@@ -20,7 +20,7 @@ from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import METRES
-from .raster import areal, raster
+from .raster import make_scan_of_matrix, make_scan_of_points
 from .raw import MAX_POINTS, MIB, Raw, open_zip, read_member, shorten, shorten_reason
 
 MAX_XML_BYTES = 16 * MIB  # bytes of main.xml; with its heights as a list it has 30 for each
@@ -91,7 +91,7 @@ class Package(NamedTuple):
             self.raw, self.archive, posixpath.join(self.folder, name.removeprefix("./")), max_bytes
         )
         stated = _text(node, checksum)
-        if _MD5.fullmatch(stated) and _md5(data) != stated.lower():
+        if _MD5.fullmatch(stated) and _compute_md5(data) != stated.lower():
             raise self.refuse(
                 f"the checksum of {shorten(name)} is wrong: the heights were changed after the "
                 "file was written; export the surface anew"
@@ -143,7 +143,9 @@ def _make_grid(
                 f"Increment of {name} is {axis.increment:g}; a length > 0 m is needed"
             )
     x, y = (axis.scale(np.arange(count)) for axis, count in zip(axes, counts))
-    return areal(package.raw.path, x, y, heights.reshape(shape.rows, shape.columns), METRES, notes)
+    return make_scan_of_matrix(
+        package.raw.path, x, y, heights.reshape(shape.rows, shape.columns), METRES, notes
+    )
 
 
 def _make_raster(package: Package, columns: list, axes: list, shape: Shape) -> Profile | Areal:
@@ -157,7 +159,7 @@ def _make_raster(package: Package, columns: list, axes: list, shape: Shape) -> P
     if known.sum() < 2:
         raise package.refuse(f"{known.sum()} points with coordinates; a trace needs at least two")
     points = [values[known] for values in (*places, columns[-1])]
-    return raster(package.raw.path, points, None, (1.0, 1.0, 1.0), METRES)
+    return make_scan_of_points(package.raw.path, points, None, (1.0, 1.0, 1.0), METRES)
 
 
 def _read_axis(package: Package, name: str) -> Axis:
@@ -284,7 +286,7 @@ def _verify_main(package: Package, text: bytes) -> tuple:
     words = read_member(package.raw, package.archive, name, MAX_XML_BYTES).decode("latin-1").split()
     if len(words) < 2 or posixpath.basename(words[1].lstrip("*")) != "main.xml":
         return ()
-    if not _MD5.fullmatch(words[0]) or _md5(text) == words[0].lower():
+    if not _MD5.fullmatch(words[0]) or _compute_md5(text) == words[0].lower():
         return ()
     return (
         f"{package.raw.path}: main.xml does not match its checksum in {shorten(name)}: main.xml "
@@ -292,7 +294,7 @@ def _verify_main(package: Package, text: bytes) -> tuple:
     )
 
 
-def _md5(data: bytes) -> str:
+def _compute_md5(data: bytes) -> str:
     return hashlib.md5(data, usedforsecurity=False).hexdigest()
 
 

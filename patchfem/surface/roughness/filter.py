@@ -17,7 +17,7 @@ MIN_CUTOFF_STEPS = 4  # steps; the samples do not resolve a shorter cut-off
 def filter_trace(profile: Profile, cutoff: float) -> tuple[Profile, Profile]:
     """Split a trace at a cut-off [m] into waviness and roughness.
 
-    The trace is put on an even step and levelled. The mean line is its convolution with the weights
+    The trace is resampled at equal steps and levelled. The mean line is its convolution with the weights
     exp(-pi (x / (alpha cutoff))^2), alpha = sqrt(ln 2 / pi); half a cut-off is trimmed at each end.
     Raises PatchfemError if the cut-off is shorter than four steps or as long as the trace.
     """
@@ -77,7 +77,7 @@ def mean_surface(z: np.ndarray, cutoffs: tuple) -> np.ndarray:
     sums = []
     for values in (np.where(known, z, 0.0), known.astype(float)):
         for axis, cutoff in enumerate(cutoffs):
-            _, weight = _weights(cutoff, z.shape[axis])
+            _, weight = _gaussian_weights(cutoff, z.shape[axis])
             values = _convolve(values, weight, axis)
         sums.append(values)
     return np.divide(*sums, out=np.full(z.shape, np.nan), where=known)
@@ -100,7 +100,7 @@ def mean_line(z: np.ndarray, cutoff: float, *, tilted: bool = False) -> np.ndarr
     (n,) array [m]
         A million samples take 0.2 s.
     """
-    offsets, weight = _weights(cutoff, z.size)
+    offsets, weight = _gaussian_weights(cutoff, z.size)
     ones = np.ones(z.size)
     sum_w = _convolve(ones, weight)
     sum_wz = _convolve(z, weight)
@@ -123,7 +123,7 @@ def _convolve(values, weights, axis: int = 0) -> np.ndarray:
     return np.moveaxis(irfft(spectrum, size)[..., first : first + count], -1, axis)
 
 
-def _weights(cutoff: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _gaussian_weights(cutoff: float, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return offsets and Gaussian weights for a cut-off in steps, over `count` samples at most."""
     half = min(int(np.ceil(REACH_FACTOR * cutoff)), count - 1)
     offsets = np.arange(-half, half + 1.0)

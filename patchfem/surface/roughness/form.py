@@ -13,8 +13,10 @@ from ..profile import Profile, level
 
 MAX_DEGREE = 9  # higher polynomials follow the waves of the surface
 CYLINDER = "cylinder"
-MAX_FITTED = 65_536  # heights of the fit of a cylinder; more take seconds and do not change it
-MAX_JACKKNIFE = 8_192  # heights of each fit of the jackknife
+MAX_FITTED_HEIGHTS = (
+    65_536  # heights of the fit of a cylinder; more take seconds and do not change it
+)
+MAX_JACKKNIFE_HEIGHTS = 8_192  # heights of each fit of the jackknife
 N_PARTS = 10  # parts of the surface, each of which the jackknife leaves out once
 STUDENT_T = 1.833  # Student's t of 90 % with N_PARTS - 1 degrees of freedom
 
@@ -90,26 +92,28 @@ def _subtract_cylinder(surface: Profile | Areal) -> tuple[Profile | Areal, str]:
     x = (surface.x - (surface.x[0] + surface.x[-1]) / 2) / size
     y = (y - (y[0] + y[-1]) / 2) / size
     z = np.atleast_2d(surface.z) / size
-    every = max(1, int(np.ceil((z.size / MAX_FITTED) ** (0.5 if is_scan else 1))))
+    every = max(1, int(np.ceil((z.size / MAX_FITTED_HEIGHTS) ** (0.5 if is_scan else 1))))
     rows, columns = np.nonzero(~np.isnan(z[::every, ::every]))
     points = np.stack([x[::every][columns], y[::every][rows], z[::every, ::every][rows, columns]])
     if rows.size < 10:
         raise PatchfemError(
             f"{surface.source}: {rows.size} heights; a {CYLINDER} needs at least ten"
         )
-    fitted = _fit(points, _start_scan(points) if is_scan else _start_trace(points))
-    points = points[:, :: max(1, rows.size // MAX_JACKKNIFE)]
+    fitted = _fit_cylinder(
+        points, _estimate_cylinder(points) if is_scan else _estimate_circle(points)
+    )
+    points = points[:, :: max(1, rows.size // MAX_JACKKNIFE_HEIGHTS)]
     across = -np.sin(fitted.angle) * points[0] + np.cos(fitted.angle) * points[1]
     part = np.floor((across - across.min()) / (np.ptp(across) * (1 + 1e-9)) * N_PARTS)
-    curvatures = [_fit(points[:, part != k], fitted).curvature for k in range(N_PARTS)]
+    curvatures = [_fit_cylinder(points[:, part != k], fitted).curvature for k in range(N_PARTS)]
     error = STUDENT_T * float(np.sqrt((N_PARTS - 1) * np.var(curvatures)))
     rest = surface.z - size * fitted.height(x, y[:, None] if is_scan else 0.0)
-    return replace(surface, z=frozen_array(rest)), _name(
+    return replace(surface, z=frozen_array(rest)), _describe_cylinder(
         fitted, error, size, "cylinder" if is_scan else "circle"
     )
 
 
-def _name(fitted: Cylinder, error: float, size: float, name: str) -> str:
+def _describe_cylinder(fitted: Cylinder, error: float, size: float, name: str) -> str:
     """Name a circle or cylinder with its radius.
 
     `size` [m] is the unit of its reduced coordinates.
@@ -126,14 +130,14 @@ def _name(fitted: Cylinder, error: float, size: float, name: str) -> str:
     return f"{text} whose axis lies {np.degrees(fitted.angle) % 180:.3g} deg from x"
 
 
-def _start_trace(points) -> Cylinder:
+def _estimate_circle(points) -> Cylinder:
     """Return the least-squares parabola of a trace as the start of its circle."""
     x, _, z = points
     base = np.linalg.lstsq(np.column_stack([np.ones(x.size), x, x * x / 2]), z, rcond=None)[0]
     return Cylinder(base[0], 0.0, base[1], base[2], -np.pi / 2)
 
 
-def _start_scan(points) -> Cylinder:
+def _estimate_cylinder(points) -> Cylinder:
     """Return the least-squares quadric of a scan, bent across one axis alone."""
     x, y, z = points
     columns = np.column_stack([np.ones(x.size), x, y, x * x / 2, x * y, y * y / 2])
@@ -146,7 +150,7 @@ def _start_scan(points) -> Cylinder:
     return Cylinder(base[0], rise, sine, values[most], angle)
 
 
-def _fit(points, start: Cylinder) -> Cylinder:
+def _fit_cylinder(points, start: Cylinder) -> Cylinder:
     """Fit a cylinder to points (3, k) by least squares.
 
     The axis of a trace, all of whose y are 0, stays fixed.

@@ -28,9 +28,9 @@ from .parameters import Heights, kurtosis, skewness
 from .rows import Parameter
 from .spectrum import BAND, Spectrum, chi_square_factor, estimate_spectrum
 
-LOW = 0.05  # probability of the lower bound
-HIGH = 0.95  # probability of the upper bound
-N_TRACES = 200  # simulated traces; the probability of a bound is then known to 1.5 %
+LOWER_PROBABILITY = 0.05  # probability of the lower bound
+UPPER_PROBABILITY = 0.95  # probability of the upper bound
+N_SIMULATED_TRACES = 200  # simulated traces; the probability of a bound is then known to 1.5 %
 MAX_SAMPLES = 2048  # samples of a simulated trace, which keeps all of them below 10 MB
 SPENT_FREEDOM = 2.5  # degrees of freedom that estimating the spectrum takes, from coverage tests
 MAX_DEVIATIONS = 1.96  # standard deviations of skewness and kurtosis of Gaussian heights
@@ -74,11 +74,11 @@ class Intervals:
 
     @cached_property
     def _height_widening(self) -> float:
-        return _widening(self.heights)
+        return _estimate_widening(self.heights)
 
     @cached_property
     def _slope_widening(self) -> float:
-        return _widening(Heights(np.diff(self.heights.z), self.heights.step))
+        return _estimate_widening(Heights(np.diff(self.heights.z), self.heights.step))
 
     def interval(self, row: Parameter, value: float | None) -> tuple[float | None, float | None]:
         """Return the bounds of a parameter with this value, (None, None) if there are none."""
@@ -88,7 +88,10 @@ class Intervals:
             return None, None
         if row.kind in ("power", "slope", "band"):
             freedom = self.freedom(row.kind)
-            low, high = (np.sqrt(chi_square_factor(freedom, p)) for p in (HIGH, LOW))
+            low, high = (
+                np.sqrt(chi_square_factor(freedom, p))
+                for p in (UPPER_PROBABILITY, LOWER_PROBABILITY)
+            )
             return value * float(low), value * float(high)
         return self._simulated_interval(row, value)
 
@@ -137,7 +140,7 @@ class Intervals:
     ) -> tuple[float | None, float | None]:
         simulated = [row.compute(trace) for trace in self._traces]
         values = np.array([number for number in simulated if number is not None])
-        if values.size < N_TRACES / 2:
+        if values.size < N_SIMULATED_TRACES / 2:
             return None, None
         spread = self._height_widening
         if row.kind != "extreme":  # an extreme of a longer trace scatters hardly less
@@ -145,19 +148,28 @@ class Intervals:
         if row.kind == "wave":
             spread *= PEAK_FACTOR
         positive = values[values > 0]  # a simulated trace without peaks above its core has Rpk = 0
-        if row.kind in ("shift", "fraction") or value <= 0 or positive.size < N_TRACES / 2:
-            low, high = value - np.quantile(values - values.mean(), (HIGH, LOW)) * spread
+        if (
+            row.kind in ("shift", "fraction")
+            or value <= 0
+            or positive.size < N_SIMULATED_TRACES / 2
+        ):
+            low, high = (
+                value
+                - np.quantile(values - values.mean(), (UPPER_PROBABILITY, LOWER_PROBABILITY))
+                * spread
+            )
             bounds = {"shift": (-np.inf, np.inf), "fraction": (0.0, 1.0)}.get(
                 row.kind, (0.0, np.inf)
             )
             return max(float(low), bounds[0]), min(float(high), bounds[1])
         low, high = value * np.exp(
-            -np.quantile(np.log(positive / values.mean()), (HIGH, LOW)) * spread
+            -np.quantile(np.log(positive / values.mean()), (UPPER_PROBABILITY, LOWER_PROBABILITY))
+            * spread
         )
         return float(low), float(high)
 
 
-def _widening(heights: Heights) -> float:
+def _estimate_widening(heights: Heights) -> float:
     """Return the factor by which a kurtosis above 3 widens an interval."""
     fourth = kurtosis(heights)
     return 1.0 if fourth is None else float(np.sqrt(max(1.0, (fourth - 1) / 2)))
@@ -181,7 +193,7 @@ def simulate_traces(spectrum: Spectrum, heights: Heights, degree: int | None) ->
     Returns
     -------
     list of Heights
-        N_TRACES traces.
+        N_SIMULATED_TRACES traces.
     """
     from scipy.fft import irfft, next_fast_len, prev_fast_len
 
@@ -200,7 +212,7 @@ def simulate_traces(spectrum: Spectrum, heights: Heights, degree: int | None) ->
     density = np.interp(frequency, spectrum.frequency, spectrum.density, right=0.0)
     density[0] = 0.0
     deviation = np.sqrt(density / (period * step)) * period / 2
-    numbers = np.random.default_rng(0).standard_normal((2, N_TRACES, frequency.size))
+    numbers = np.random.default_rng(0).standard_normal((2, N_SIMULATED_TRACES, frequency.size))
     z = irfft(deviation * (numbers[0] + 1j * numbers[1]), period, axis=1)[:, :size]
     if degree is not None:
         base = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, size), degree))[0]

@@ -1,4 +1,4 @@
-"""Means of the parameters of several traces, or of several scans, of alike surfaces."""
+"""Means of the parameters of several traces, or of several scans, of similar surfaces."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -30,12 +30,12 @@ def average_reports(reports: list[RoughnessReport]) -> list[Means]:
     """
     out = []
     for kind in KINDS:
-        alike = [report for report in reports if report.kind == kind]
-        if len(alike) < 2:
+        same_kind = [report for report in reports if report.kind == kind]
+        if len(same_kind) < 2:
             continue
         tables = [
             {value.name: value for value in report.values if value.value is not None}
-            for report in alike
+            for report in same_kind
         ]
         values = {}
         for name, first in tables[0].items():
@@ -43,7 +43,7 @@ def average_reports(reports: list[RoughnessReport]) -> list[Means]:
                 values[name] = average_quantities(
                     [_without_interval(table[name]) for table in tables], first.text
                 )
-        out.append(Means(kind, len(alike), values, _caution(alike)))
+        out.append(Means(kind, len(same_kind), values, _describe_caution(same_kind)))
     return out
 
 
@@ -53,7 +53,8 @@ def _without_interval(value: Quantity) -> Quantity:
     return value._replace(low=None if is_signed else 0.0, high=None)
 
 
-def _caution(reports: list[RoughnessReport]) -> str:
+def _describe_caution(reports: list[RoughnessReport]) -> str:
+    """Describe why the means of these reports are of limited use, "" if they are not."""
     if len({report.source for report in reports}) < len(reports):
         return "one file is given twice, so this file counts twice in the means"
     lengths = [report.sampling.length for report in reports]

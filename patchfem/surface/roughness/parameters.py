@@ -130,7 +130,7 @@ def mean_spacing(heights: Heights) -> float | None:
 
 
 def mean_element_height(heights: Heights) -> float | None:
-    """Compute Rc, the mean height of the elements of `mean_spacing` [m], None without one."""
+    """Compute Rc, the mean height of the elements of `mean_spacing` [m]; None if there is no element."""
     places = crossings(heights)
     if places.size < 3:
         return None
@@ -181,10 +181,10 @@ class Core(NamedTuple):
 def abbott(heights: Heights, count: int = 501) -> tuple[np.ndarray, np.ndarray]:
     """Compute the Abbott curve: material ratio (count,) from 0 to 1 and height (count,) [m]."""
     ratio = np.linspace(0.0, 1.0, count)
-    return ratio, np.interp(ratio, _ratios(heights.z.size), heights.ordered)
+    return ratio, np.interp(ratio, _material_ratios(heights.z.size), heights.ordered)
 
 
-def _ratios(count: int) -> np.ndarray:
+def _material_ratios(count: int) -> np.ndarray:
     return (np.arange(count) + 0.5) / count
 
 
@@ -203,7 +203,7 @@ def fit_core(heights: Heights) -> Core | None:
     size = max(round(CORE_FRACTION * n), 2)
     start = int(np.argmin(z[: n - size + 1] - z[size - 1 :]))
     part = z[start : start + size]
-    ratio = _ratios(n)[start : start + size]
+    ratio = _material_ratios(n)[start : start + size]
     centred = ratio - ratio.mean()
     slope = float(centred @ (part - part.mean()) / (centred @ centred))
     top = float(part.mean() - slope * ratio.mean())
@@ -243,4 +243,4 @@ def void_volume(heights: Heights, ratio: float) -> float:
 
 
 def _height_at(heights: Heights, ratio: float) -> float:
-    return float(np.interp(ratio, _ratios(heights.z.size), heights.ordered))
+    return float(np.interp(ratio, _material_ratios(heights.z.size), heights.ordered))

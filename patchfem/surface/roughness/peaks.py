@@ -1,6 +1,6 @@
 """Peaks of a rough surface from a trace, for the asperity law of Greenwood and Williamson.
 
-A surface of Gaussian heights, alike in all directions, whose traces have the mean squares m_0, m_2,
+An isotropic surface of Gaussian heights, whose traces have the mean squares m_0, m_2,
 m_4 of height, slope and curvature has m_4/(6 pi 3^(1/2) m_2) summits per area of mean curvature
 (8/3) (m_4/pi)^(1/2) (Nayak, J. Lubr. Technol. 93, 398, 1971). Their heights have the variance m_0
 (1 - 0.8968/alpha) with alpha = m_0 m_4/m_2^2 (Bush, Gibson and Keogh, Mech. Res. Commun. 3, 169,

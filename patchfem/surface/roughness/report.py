@@ -140,11 +140,11 @@ def _report_trace(
         primary = replace(primary, z=frozen_array(np.zeros(primary.z.size)))
     heights = Heights(primary.z, trace.step)
     intervals = Intervals(heights, form_degree(form))
-    values = [_quantity(row, row.compute(heights), intervals) for row in rows.PRIMARY]
+    values = [_make_quantity(row, row.compute(heights), intervals) for row in rows.PRIMARY]
     dominant, band = rows.WAVES
     values += [
-        _quantity(dominant, intervals.spectrum.dominant, intervals),
-        _band_quantity(band, trace, intervals),
+        _make_quantity(dominant, intervals.spectrum.dominant, intervals),
+        _make_band_quantity(band, trace, intervals),
     ]
     waviness = None
     roughness = None
@@ -153,11 +153,13 @@ def _report_trace(
         waviness, roughness = filter_trace(primary, cutoff)
         evaluated = replace(heights, z=roughness.z, section=cutoff)
         rough_intervals = Intervals(evaluated, None)
-        values += [_quantity(row, row.compute(evaluated), rough_intervals) for row in rows.ROUGH]
+        values += [
+            _make_quantity(row, row.compute(evaluated), rough_intervals) for row in rows.ROUGH
+        ]
     if window is not None:
         for row in rows.WINDOW:
             value = float(trace.z[-1] - trace.z[0]) if row.compute is None else row.compute(heights)
-            values.append(_quantity(row, value, intervals))
+            values.append(_make_quantity(row, value, intervals))
     notes = trace.notes + _spike_note(part)
     if trace.x.size != part.x.size and short is None:
         notes += _resampling_note(part, trace, primary)
@@ -274,7 +276,7 @@ def _require_samples(trace: Profile) -> Profile:
     return trace
 
 
-def _quantity(row: Parameter, value: float | None, intervals: Intervals) -> Quantity:
+def _make_quantity(row: Parameter, value: float | None, intervals: Intervals) -> Quantity:
     """Combine a value with its interval, or with the reason why there is none."""
     heights = intervals.heights
     if value is None:
@@ -301,7 +303,7 @@ def _quantity(row: Parameter, value: float | None, intervals: Intervals) -> Quan
     return Quantity(value, low, high, row.unit, row.text, reason, row.name)
 
 
-def _band_quantity(row: Parameter, trace: Profile, intervals: Intervals) -> Quantity:
+def _make_band_quantity(row: Parameter, trace: Profile, intervals: Intervals) -> Quantity:
     low, high = BAND
     heights = intervals.heights
     text = row.text.replace("the band", f"{format_length(low)} to {format_length(high)}")
@@ -309,7 +311,7 @@ def _band_quantity(row: Parameter, trace: Profile, intervals: Intervals) -> Quan
         refuse_band(trace.source, low, high, heights.length - heights.step, heights.step)
     except PatchfemError as error:
         return make_unknown(row.unit, text, str(error))._replace(name=row.name)
-    return _quantity(
+    return _make_quantity(
         row._replace(text=text), band_amplitude(intervals.spectrum, low, high), intervals
     )
 

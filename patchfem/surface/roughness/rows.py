@@ -163,21 +163,21 @@ _BASE = (  # names without their letter
 )
 
 
-def _primary(row: Parameter) -> Parameter:
+def _name_primary(row: Parameter) -> Parameter:
     """Name a row for the primary profile, whose only section is the whole trace."""
     kind = "extreme" if row.name in ("p", "v") else row.kind
     return row._replace(name=f"P{row.name}", text=f"{row.text}, of the levelled trace", kind=kind)
 
 
-def _roughness(row: Parameter) -> Parameter:
+def _name_roughness(row: Parameter) -> Parameter:
     """Name a row for the roughness profile."""
     mean = ", mean over the sections of one cut-off" if row.name in ("p", "v", "z") else ""
     name = row.name if row.name.startswith("Mr") else f"R{row.name}"
     return row._replace(name=name, text=f"{row.text}{mean}, of the roughness profile")
 
 
-PRIMARY = tuple(_primary(row) for row in _BASE if row.name != "z")
-ROUGH = tuple(_roughness(row) for row in _BASE)
+PRIMARY = tuple(_name_primary(row) for row in _BASE if row.name != "z")
+ROUGH = tuple(_name_roughness(row) for row in _BASE)
 WAVES = (
     Parameter(
         "dominant_wavelength",

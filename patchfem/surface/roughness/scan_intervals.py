@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .intervals import HIGH, LOW, MAX_DEVIATIONS
+from .intervals import LOWER_PROBABILITY, MAX_DEVIATIONS, UPPER_PROBABILITY
 from .spectrum import chi_square_factor
 
 SPENT_FRACTION = 0.85  # degrees of freedom left after estimating the spectrum, from 240 scans
-NORMAL_95 = 1.6449  # standard deviations at the 95 % quantile of a normal distribution
+NORMAL_QUANTILE_95 = 1.6449  # standard deviations at the 95 % quantile of a normal distribution
 MIN_PAIRS = 0.1  # pairs of heights / those at lag zero; lags with fewer pairs give no correlation
 
 
@@ -29,16 +29,19 @@ def scan_intervals(z: np.ndarray, values: dict) -> ScanIntervals:
     """
     if values["Ssk"] is None:
         return ScanIntervals({}, is_uneven=False)
-    scatter = _scatter(np.nan_to_num(z))
+    scatter = _estimate_scatter(np.nan_to_num(z))
     limits = MAX_DEVIATIONS * np.sqrt([6 * scatter.absolute_cubes, 24 * scatter.fourths])
     if abs(values["Ssk"]) > limits[0] or values["Sku"] - 3 > limits[1]:
         return ScanIntervals({}, is_uneven=True)
     widening = max(1.0, (values["Sku"] - 1) / 2)
     freedom = max(SPENT_FRACTION * 2 / scatter.variance / widening, 1.0)
-    low, high = (float(np.sqrt(chi_square_factor(freedom, p))) for p in (HIGH, LOW))
+    low, high = (
+        float(np.sqrt(chi_square_factor(freedom, p)))
+        for p in (UPPER_PROBABILITY, LOWER_PROBABILITY)
+    )
     bounds = {name: (values[name] * low, values[name] * high) for name in ("Sa", "Sq")}
     for name, variance in (("Ssk", 6 * scatter.cubes), ("Sku", 24 * scatter.fourths)):
-        reach = NORMAL_95 * float(np.sqrt(variance * widening))
+        reach = NORMAL_QUANTILE_95 * float(np.sqrt(variance * widening))
         bounds[name] = (values[name] - reach, values[name] + reach)
     return ScanIntervals(bounds, is_uneven=False)
 
@@ -52,7 +55,7 @@ class Scatter(NamedTuple):
     absolute_cubes: float
 
 
-def _scatter(z: np.ndarray) -> Scatter:
+def _estimate_scatter(z: np.ndarray) -> Scatter:
     """Estimate the scatter of the moments from the power spectrum under a cosine taper."""
     from scipy.fft import fft2, irfft2, rfft2
 

@@ -1,7 +1,7 @@
 """Alignment of a second scan on a first one: rotation, shift and plane of the unworn heights.
 
 The search (`search`) gives the place to a pixel of its images. The model (`model`) is fitted by
-Tukey's biweight to images of rising resolution without long waves, as smooth wear and slow errors
+Tukey's biweight to images of increasing resolution without long waves, as smooth wear and slow errors
 of an instrument have long waves. The plane of the unworn heights then comes from least trimmed
 squares over the modes of tiles (`compare.robust`, as for traces), and all six parameters from a
 biweight fit to the heights that did not change (`wear`).

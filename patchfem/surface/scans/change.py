@@ -1,4 +1,4 @@
-"""Changes between two areal scans: alignment, depth map, volumes, and the verdict on wear in words."""
+"""Changes between two areal scans: alignment, depth map, volumes, and the verdict on wear in sentences."""
 
 from dataclasses import dataclass, field, replace
 
@@ -113,7 +113,9 @@ def compare_scans(before: Areal, after: Areal, keep_spikes: bool = False) -> Cha
         axes = (before.x, before.y)
         track = measure_scan_track(alignment, volumes.filled, volumes.worn, axes, volumes.error)
     removed = removed[0], removed[1] + n_specks
-    return Change(before, after, alignment, volumes, "", removed, _registration(alignment), track)
+    return Change(
+        before, after, alignment, volumes, "", removed, _collect_registration(alignment), track
+    )
 
 
 def _align_and_measure(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
@@ -152,7 +154,7 @@ def remove_specks(alignment: ScanAlignment) -> tuple:
     return out, int(specks.sum())
 
 
-def _registration(alignment: ScanAlignment) -> dict:
+def _collect_registration(alignment: ScanAlignment) -> dict:
     """Return shift and rotation as quantities by name."""
     values = (*alignment.shift, alignment.angle)
     errors = np.sqrt(np.diag(alignment.covariance))[[1, 2, 0]]

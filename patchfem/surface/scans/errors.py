@@ -84,7 +84,9 @@ def draw_scan_errors(depth, unworn, plane_error) -> ScanErrors:
     weighted = plane * np.where(valid, count, 0.0).ravel()
     fit = np.linalg.pinv(weighted @ plane.T) @ weighted
     means = np.where(valid, means - (fit @ means.ravel() @ plane).reshape(means.shape), 0.0)
-    length = (_correlation_along(means, valid) + _correlation_along(means.T, valid.T)) / 2
+    length = (
+        _estimate_correlation_along(means, valid) + _estimate_correlation_along(means.T, valid.T)
+    ) / 2
     side = min(means.shape)
     block = max(block_length(length, side), int(MIN_BLOCK_FRACTION * side))
     block = max(min(block, int(MAX_BLOCK_FRACTION * side)), 1)
@@ -94,7 +96,9 @@ def draw_scan_errors(depth, unworn, plane_error) -> ScanErrors:
     steps += random.standard_normal((len(fields), 1)) * plane_error
     fields -= (steps @ plane).reshape(fields.shape)
     n_blocks = max(valid.sum() / block**2, 4.0)
-    return ScanErrors(fields * student_factor(n_blocks), tile, _correlation_area(depth, unworn))
+    return ScanErrors(
+        fields * student_factor(n_blocks), tile, _estimate_correlation_area(depth, unworn)
+    )
 
 
 def _sum_tiles(values, tile: int) -> np.ndarray:
@@ -103,7 +107,7 @@ def _sum_tiles(values, tile: int) -> np.ndarray:
     return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
 
 
-def _correlation_along(values, present) -> float:
+def _estimate_correlation_along(values, present) -> float:
     """Estimate the correlation length of values (m, n) along their rows, in points."""
     gap = ((0, 0), (0, values.shape[1]))
     return correlation_length(
@@ -111,13 +115,13 @@ def _correlation_along(values, present) -> float:
     )
 
 
-def _correlation_area(depth, unworn) -> float:
+def _estimate_correlation_area(depth, unworn) -> float:
     """Estimate the number of neighbouring heights whose errors are fully correlated."""
     area = 1.0
     for values, present in ((depth, unworn), (depth.T, unworn.T)):
         lines = np.unique(np.linspace(0, len(values) - 1, min(len(values), N_LINES)).astype(int))
         values, present = values[lines], present[lines]
-        area *= _correlation_along(np.where(present, values, 0.0), present)
+        area *= _estimate_correlation_along(np.where(present, values, 0.0), present)
     return min(area, MAX_CORRELATION_AREA)
 
 

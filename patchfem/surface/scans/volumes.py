@@ -82,9 +82,11 @@ def _measure(alignment: ScanAlignment, x, y) -> Volumes:
     depth = np.where(inside, filled, 0.0)
     worn = alignment.worn[nearest] & inside
     grown = alignment.grown[nearest] & inside
-    walls = _wall_error(alignment, worn)
+    walls = _estimate_wall_error(alignment, worn)
     volume = _measure_volume(alignment, cell, depth, worn, grown, walls)
-    growth = _measure_volume(alignment, cell, -depth, grown, worn, _wall_error(alignment, grown))
+    growth = _measure_volume(
+        alignment, cell, -depth, grown, worn, _estimate_wall_error(alignment, grown)
+    )
     mean = (bound / area for bound in volume)
     values = {
         "worn_volume": Quantity(*volume, *MEASURES["worn_volume"]),
@@ -142,12 +144,12 @@ def _measure_volume(alignment: ScanAlignment, cell, depth, changed, opposite, wa
     return tuple(max(bound, 0.0) for bound in bounds)
 
 
-def _wall_error(alignment: ScanAlignment, changed) -> np.ndarray:
+def _estimate_wall_error(alignment: ScanAlignment, changed) -> np.ndarray:
     """Estimate the error (m, n) [m] of the depth where the heights of a steep wall are missing.
 
     A missing point belongs to a wall if its distances to the deep part and to the unchanged part
     are similar. Its depth lies between zero and that of the deep part, so half of that depth is
-    the error, alike for all walls.
+    the error, the same for all walls.
     """
     from scipy.ndimage import distance_transform_edt
 

@@ -1,4 +1,4 @@
-"""Detection of worn and grown heights in a depth map, by means over squares of rising size."""
+"""Detection of worn and grown heights in a depth map, by means over squares of increasing size."""
 
 import numpy as np
 

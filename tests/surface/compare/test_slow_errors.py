@@ -21,7 +21,7 @@ def errors_of_gap(gap, walk: float, seeds: range) -> np.ndarray:
         ) / np.sqrt(COUNT)
         model = model_drift(depth, ~gap, 1, 200, random)
         noise = random.standard_normal((200, COUNT))
-        drawn = model.remove(noise + model.parts.spread(model.draws))
+        drawn = model.remove(noise + model.parts.interpolate(model.draws))
         errors.append(model.remove(depth)[gap].mean() / drawn[:, gap].mean(axis=1).std())
     return np.array(errors)
 

@@ -6,7 +6,7 @@ from ring_traces import traces
 
 from patchfem.surface.profile import Profile, level
 from patchfem.surface.roughness.filter import filter_trace
-from patchfem.surface.roughness.intervals import N_TRACES, Intervals, simulate_traces
+from patchfem.surface.roughness.intervals import N_SIMULATED_TRACES, Intervals, simulate_traces
 from patchfem.surface.roughness.parameters import Heights, root_mean_square
 from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE, WAVES
 from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum
@@ -122,7 +122,7 @@ def test_exact_made_traces_have_the_spectrum_and_are_the_same_each_time():
     heights = Heights(z - z.mean(), UM)
     found = estimate_spectrum(heights.z, UM)
     made = simulate_traces(found, heights, None)
-    assert len(made) == N_TRACES and made[0].z.size <= heights.z.size
+    assert len(made) == N_SIMULATED_TRACES and made[0].z.size <= heights.z.size
     power = np.mean([root_mean_square(one) ** 2 for one in made])
     assert power == pytest.approx(found.density.sum() * found.step, rel=0.1)
     assert np.array_equal(made[7].z, simulate_traces(found, heights, None)[7].z)
