@@ -27,7 +27,7 @@ DAMAGE_ERRORS = (
 
 @contextmanager
 def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
-    """Convert an exception that damaged bytes cause to PatchfemError ``message (reason)remedy``.
+    """Replace an exception that damaged bytes cause by PatchfemError ``message (reason)remedy``.
 
     These are `DAMAGE_ERRORS`, and a plain Exception, the only one that pyuff raises. It encloses code
     that reads a file.

@@ -6,7 +6,7 @@ from ..core import PatchfemError
 from . import matlab5, matlab73
 
 MAX_BYTES = 512 * 2**20  # largest size of a file [bytes]
-# signature at the beginning of the file, or behind the user block that MATLAB puts there
+# signature at the beginning of the file, or after the user block that MATLAB puts there
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 

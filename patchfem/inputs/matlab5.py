@@ -86,7 +86,7 @@ _ENCODINGS = {
 
 
 class Array(NamedTuple):
-    """One variable.
+    """Array of a variable of the file.
 
     kind: "number", "sparse" or "text"; values(): full array of floats, or texts (k,); sparse(): sparse
     array of a sparse variable, None for others.
@@ -167,7 +167,7 @@ class _MatFile(NamedTuple):
             return self.check_head(self.parse_head(body))
 
     def parse_head(self, body) -> _Variable:
-        """Parse the elements flags, shape and name."""
+        """Parse the header of a variable: its flags, its shape and its name."""
         _, flags, at = self.read_element(body, 0)
         _, dimensions, at = self.read_element(body, at)
         _, name, at = self.read_element(body, at)

@@ -19,7 +19,7 @@ from .damage import refuse_damage
 
 MAX_NUMBERS = 5 * 10**7  # largest number of values in a matrix
 MAX_ROWS = 2 * 10**6  # largest number of rows of a matrix
-ROW_FACTOR = 2**16  # head of a string in one word: length * ROW_FACTOR + row
+ROW_FACTOR = 2**16  # the header word of a string is length * ROW_FACTOR + row
 SYMMETRIC_FORM = 6  # form of a DMIG matrix of which one triangle is stored
 WIDE_FIELD_CHARACTERS = 16  # characters of a wide field of a DMIG card
 _NUMBER_PATTERN = re.compile(r"([+-]?[\d.]+)(?:[ED]?([+-]?\d+))?\Z", re.IGNORECASE)

@@ -47,7 +47,7 @@ class RequestedChannel(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Records:
-    """Channels in SI that share one time.
+    """Channels in SI with a common time axis.
 
     values: quantity -> (k,), with `time` [s] first if there is one; notes: sentences on what was not read
     as it stands; channel_list: all channels of the file in words.

@@ -40,7 +40,7 @@ _UNIT_SYNONYMS = {
     "µs": "us",
     "μs": "us",
 }
-# Spellings of "per second squared" and of "per second" behind a unit.
+# Spellings of "per second squared" and of "per second" after a unit.
 _RATE_UNIT_PATTERNS = {
     "/s^2": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?(?:\^|\*\*)?2|/ ?s²| s-2| s\^-2)"),
     "/s": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?| s-1| s\^-1)"),

@@ -34,7 +34,7 @@ def has_levels(keys) -> bool:
 
 
 def count_run_cycles(keys, signal) -> float:
-    """Return the length of a run in drive cycles, over all levels of a drive in levels.
+    """Return the length of a run in drive cycles, including all levels of a stepped amplitude.
 
     `keys` are those of [drive], `signal` is the drive that follows from them.
     """

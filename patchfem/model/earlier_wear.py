@@ -164,7 +164,7 @@ def _read_state(path: Path) -> EarlierWear:
 
 
 def _has_depth_along_patch(earlier: EarlierWear) -> bool:
-    """Return whether position, depth and gap are finite columns over rising positions."""
+    """Return whether position, depth and gap are finite columns and the positions increase."""
     x = earlier.x
     for column in (x, earlier.depth, earlier.gap):
         if column.ndim != 1 or column.shape != x.shape or not np.isfinite(column).all():

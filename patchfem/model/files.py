@@ -27,7 +27,7 @@ from . import (
 
 MAX_FULLY_READ_MESH_BYTES = 2 * 2**20  # bytes; of a larger mesh file only the start is examined
 MESH_START_BYTES = 4096  # bytes of the start of a mesh file
-# bytes with which a mesh file begins, by its ending
+# first bytes of a mesh file, by its extension
 MESH_STARTS = {
     ".msh": (b"$MeshFormat",),
     ".vtu": (b"<?xml", b"<VTKFile"),
@@ -168,7 +168,7 @@ def _make_matrix_check(key: str):
 
 
 def _check_measured(path: Path, tables, whole: bool) -> None:
-    """Read a table of measured responses."""
+    """Check a table of measured responses by reading it."""
     measured.read_table(path)
 
 

@@ -34,7 +34,7 @@ def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
 
 
 def _make_flat_grid(patch: PatchModel, piece: PatchPiece):
-    """Generate the grid of a piece with an even interface."""
+    """Generate the grid of a piece with a flat interface."""
     grid = graded_grid(patch.pieces.length, piece.height, patch.even_element_size, piece.thickness)
     return extend_grid(patch, piece, grid)
 

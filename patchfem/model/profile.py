@@ -199,7 +199,7 @@ def _smooth_profile(trace: Profile, nodes) -> Profile:
 
 
 def _read_without_spikes(path: Path, x, max_gap: float) -> Profile:
-    """Read a trace over the nodes without spikes; a line may bridge a gap of `max_gap` [m]."""
+    """Read a trace over the nodes and remove its spikes; gaps up to `max_gap` [m] are interpolated linearly."""
     trace = read_trace(path)
     try:
         return clean(place_over_patch(trace, x), max_gap)

@@ -159,7 +159,7 @@ class FirstMode:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RigStructure:
-    """Origin of the modes of a rig.
+    """How the modes of a rig were obtained.
 
     - frequencies: natural frequencies [Hz], with the bonded spring, shape (n,).
     - lists_modes: whether the scene lists the modes.

@@ -15,7 +15,7 @@ from .file_cache import cache_by_file
 
 # steps per straight leg; the coarsest run of the error estimate keeps two of them
 MIN_STEPS_PER_LEG = 8
-# steps per leg at rest; growth at rest (2.10) is exact in a step of any duration
+# steps per leg at rest; the growth of bonds at rest, eq. (2.10), is exact in any step
 STEPS_PER_HOLD = 4
 REFERENCE_STEPS = 400  # steps per cycle that give an error of about REFERENCE_ERROR
 REFERENCE_ERROR = 1e-3  # relative error; it falls with the square of the time step

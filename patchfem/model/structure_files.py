@@ -8,7 +8,7 @@ from ..structure import arrays, places, universal
 from .file_cache import cache_by_file
 
 LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
-UNIVERSAL_EXTENSIONS = (".uff", ".unv")  # file endings of universal files
+UNIVERSAL_EXTENSIONS = (".uff", ".unv")  # extensions of universal files
 
 
 class FileModes(NamedTuple):
@@ -70,7 +70,7 @@ def read_content(path: Path):
 
 
 def is_universal_file(path: Path) -> bool:
-    """Return whether a file is a universal file by its ending."""
+    """Return whether a file has the extension of a universal file."""
     return path.suffix.lower() in UNIVERSAL_EXTENSIONS
 
 

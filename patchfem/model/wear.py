@@ -13,7 +13,7 @@ from . import earlier_wear
 
 @dataclass(frozen=True, slots=True)
 class WornFriction:
-    """Factors on the friction law as functions of the mean worn depth.
+    """Factors on the friction law as functions of the mean wear depth.
 
     They are linear between their rows and constant beyond the last row.
 
@@ -71,7 +71,7 @@ class WearModel:
 
 
 def build_wear_model(scene: Scene) -> WearModel | None:
-    """Build the wear of a scene, None without [wear]."""
+    """Build the wear model of a scene; None without [wear]."""
     wear = scene.wear
     if wear is None:
         return None

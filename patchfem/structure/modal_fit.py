@@ -355,7 +355,7 @@ def _find_starts(fit: ModalFit, theta):
 
 
 def _find_half_power_width(omega, spectrum, peak: int) -> float:
-    """Return the width [rad/s] of a peak at half its height."""
+    """Return the width [rad/s] of a peak of a power spectrum at half its maximum."""
     below = above = peak
     while below > 0 and spectrum[below] > spectrum[peak] / 2:
         below -= 1

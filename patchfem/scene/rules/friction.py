@@ -54,7 +54,7 @@ class LawFacts(Facts):
 
     @property
     def missing_temperature_keys(self) -> str:
-        """Missing keys without which a surface temperature has no effect, in words."""
+        """Missing keys without which a surface temperature has no effect, as a clause of a message."""
         if not self.rest_growth:
             return "keys for the growth of the bonds; add rest_growth and slip_growth"
         return "activation temperatures; add rest_activation, slip_activation or both"

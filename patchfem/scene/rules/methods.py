@@ -60,7 +60,7 @@ class MotionFeatures(NamedTuple):
 
     @property
     def has_grooves(self) -> bool:
-        """Whether `spring` names grooves."""
+        """Whether `spring` is a key of grooves."""
         return self.spring.endswith("grooves]")
 
 

@@ -108,7 +108,7 @@ class SceneDraft:
         self._add(0, self.path, f"missing [{name}]: {reason}")
 
     def add_set_mistake(self, text: str) -> None:
-        """Add a --set that cannot be applied as a mistake."""
+        """Add a mistake for a --set that cannot be applied."""
         self._add(SET_MISTAKE_ORDER, "--set", text)
 
     def add_remark(self, key: str, sentence: str) -> None:

@@ -542,7 +542,7 @@ def _check_matrix_files(draft: SceneDraft) -> None:
 
 
 def find_file_extension(name: str) -> str:
-    """Return what follows the last dot of a file name, with the dot and in lower case."""
+    """Return the extension of a file name in lower case, with its dot."""
     return "." + name.rpartition(".")[2].lower()
 
 
