@@ -74,7 +74,7 @@ class FittedLoop:
 
     @property
     def held_rms(self) -> float | None:
-        """Root mean square of the residual in the rows held out; None without such rows."""
+        """Root mean square of the residual in the rows held out; None if there are none."""
         return self._rms(self.held) if self.held.any() else None
 
     def _rms(self, rows) -> float:

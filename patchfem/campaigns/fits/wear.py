@@ -179,7 +179,7 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
     SceneError, PatchfemError
         For input that cannot be used, or if no coefficient within the range gives the depth.
     NotConverged
-        If the runs do not settle on a coefficient.
+        If the runs do not converge to a coefficient.
     """
     bounds = _read_bounds(free)
     target = read_depth(to)

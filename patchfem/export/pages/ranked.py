@@ -309,9 +309,9 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str
 
 
 def _alike(shares: list) -> list:
-    """Return the shares in groups, the largest first.
+    """Return the Sobol indices in groups, the largest first.
 
-    The interval of each share overlaps that of the first share of its group.
+    The interval of each index overlaps that of the first index of its group.
     """
     out = []
     for one in shares:
@@ -323,7 +323,7 @@ def _alike(shares: list) -> list:
 
 
 def _equal(group: list) -> bool:
-    """Return whether no share of a group lies outside the interval of another."""
+    """Return whether no index of a group lies outside the interval of another."""
     return all(one.low <= other.total <= one.high for one in group for other in group)
 
 
@@ -352,25 +352,25 @@ def _shares(group: list) -> str:
 
 
 def percent(one) -> str:
-    """Write the total share of a key; if its interval includes 0, the upper end of the interval."""
+    """Write the total index of a key; if its interval includes 0, the upper end of the interval."""
     if not _small(one):
         return f"{100 * one.total:.0f} %"
     return f"at most {_most(one)} %" if _most(one) else "below 1 %"
 
 
 def _small(one) -> bool:
-    """Return whether a share may be 0."""
+    """Return whether an index may be 0."""
     return one.total < 0.01 or (one.low < 0.005 and one.total < 0.1)
 
 
 def _most(one) -> int:
-    """Return the upper end [%] of the interval of a share, rounded up; 0 up to 1 %."""
+    """Return the upper end [%] of the interval of an index, rounded up; 0 up to 1 %."""
     most = int(np.ceil(100 * one.high - 1e-9))
     return most if most > 1 else 0
 
 
 def _between(one) -> str:
-    """Write the interval of a share in brackets; "" if it has none."""
+    """Write the interval of an index in brackets; "" if it has none."""
     low, high = round(100 * one.low), round(100 * one.high)
     return f" ({low} to {high} %)" if low != high and not _small(one) else ""
 
@@ -485,7 +485,7 @@ def picture(ranks: dict) -> str:
 
 
 def _bar(one) -> str:
-    """Return the bar of a share as SVG."""
+    """Return the bar of a key's Sobol indices as SVG."""
     first, total, low, high = (f"{100 * part:.1f}" for part in one[1:])
     return (
         f"<svg viewBox='0 0 100 8' preserveAspectRatio=none role=img aria-label='{percent(one)}'>"
@@ -495,7 +495,7 @@ def _bar(one) -> str:
 
 
 def _range(one) -> str:
-    """Write the interval of a share."""
+    """Write the interval of an index."""
     return "&ndash;" if one.low == one.high else f"{100 * one.low:.0f} to {100 * one.high:.0f} %"
 
 

@@ -37,11 +37,11 @@ def write_x3p(path: Path, x, y, z, text: str) -> None:
     ----------
     path : Path
     x, y : (n,), (m,) arrays [m]
-        Even places.
+        Evenly spaced positions.
     z : (m, n) array [m]
-        NaN where a height is missing.
+        NaN for missing heights.
     text : str
-        What the heights are, as comment of the file.
+        Description of the heights, for the comment of the file.
     """
     data = np.ascontiguousarray(z, "<f8").tobytes()
     dx, dy = (float(np.ptp(axis) / max(axis.size - 1, 1)) or 1.0 for axis in (x, y))
@@ -91,6 +91,7 @@ def write_profile(path: Path, x, z) -> None:
 
 
 def _write_table(path: Path, names: str, columns: tuple) -> None:
+    """Write columns of lengths as text [um]."""
     table = np.column_stack(columns) * 1e6
     head = ",".join(f"{name} [um]" for name in names)
     row = ",".join(["%.10g"] * len(names))

@@ -13,15 +13,21 @@ from ...surface.roughness.peaks import (
     persson_stiffness,
 )
 
-PRESSURE_FRACTION = 1e-5  # pressure / combined modulus of stated stiffnesses; 1.2 MPa on steel
+# pressure / combined modulus at which stiffnesses are stated; 1.2 MPa on steel
+PRESSURE_FRACTION = 1e-5
 
 
 def data_of(moments: TraceMoments | None, cutoff: float | None) -> dict | None:
-    """Return the moments of a trace and its peaks as plain data in SI, None for a flat trace.
+    """Return the moments of a trace and its peaks as plain data in SI; None for a flat trace.
 
-    cutoff: [m] below which waves count, None for all. `stiffness` is the ratio of stiffness to
-    pressure [1/m], and `stiffness_half_sampled` that from every second sample; `reason` stands in
-    their place if no surface has such moments.
+    `stiffness` is the ratio of stiffness to pressure [1/m], and `stiffness_half_sampled` the same
+    from every second sample. If no surface has such moments, `reason` replaces them.
+
+    Parameters
+    ----------
+    moments : TraceMoments or None
+    cutoff : float or None
+        Largest wavelength that counts [m]; None for all.
     """
     if moments is None:
         return None
@@ -39,7 +45,7 @@ def data_of(moments: TraceMoments | None, cutoff: float | None) -> dict | None:
         try:
             out["stiffness_half_sampled"] = _stiffness_ratio(gaussian_peaks(moments.coarse))
         except PatchfemError:
-            pass  # every second sample fits no such surface, which None states
+            pass  # No surface fits every second sample, which None states.
     return out
 
 
@@ -110,4 +116,5 @@ def _stiffness_ratio(peaks: Peaks) -> float:
 
 
 def _per_um(value: float) -> str:
+    """Format a value [1/m] in 1/um."""
     return f"{value * 1e-6:.3g} 1/um"

@@ -77,9 +77,9 @@ NOTE = (
 
 
 def _averaged_part(comparison: Comparison) -> str | None:
-    """Name the part that the mean worn depth of traces is the mean over.
+    """Return the part over which the mean worn depth of traces is taken.
 
-    None for scans and without a mean.
+    None for scans, and if there is no mean.
     """
     if not isinstance(comparison.before, Profile) or comparison.worn.mean.value is None:
         return None
@@ -87,6 +87,7 @@ def _averaged_part(comparison: Comparison) -> str | None:
 
 
 def _table(comparison: Comparison) -> QuantityTable:
+    """Return the table of quantities of one direction."""
     rows = []
     for name, quantity in comparison.values.items():
         words = WORDS[name]
@@ -139,13 +140,14 @@ def sides_lines(rows: list) -> list:
 
 
 def _format_measure(name: str, measure) -> str:
+    """Format a measure with its error."""
     if measure is None or measure.value is None:
         return MISSING
     return pair(name, {"value": measure.value, "error": measure.error, "unit": measure.unit})
 
 
 def data_of(parts: list, verdict: tuple, directions: list, pressed: Pressed | None = None) -> dict:
-    """Return the comparison as plain data in SI; the first direction stands at the top.
+    """Return the comparison as plain data in SI; the first direction is at the top level.
 
     Parameters
     ----------
@@ -155,6 +157,7 @@ def data_of(parts: list, verdict: tuple, directions: list, pressed: Pressed | No
     directions : list
         (when, amplitude ratio, slope ratio) of x over y.
     pressed : Pressed, optional
+        A scene with each of the two surfaces.
 
     Returns
     -------
@@ -209,11 +212,12 @@ def _part_data(part: Comparison) -> dict:
 
 
 def _values_data(values: dict) -> dict:
+    """Return quantities by name as plain data."""
     return {name: quantity_data(quantity) for name, quantity in values.items()}
 
 
 def _scans_data(change: Change) -> dict:
-    """Return how scans were aligned, their track and the heights left out."""
+    """Return the alignment of two scans, their track and the number of removed heights."""
     placement = None if change.alignment is None else change.alignment.placement
     registration = _values_data(change.registration)
     registration |= {
@@ -238,7 +242,7 @@ def _scans_data(change: Change) -> dict:
 def surfaces(comparison: Comparison) -> tuple:
     """Return the traces (before, after) that a scene presses: their common part if there is one.
 
-    x counts from the middle, and heights are levelled by least squares, as the scene levels them.
+    x is measured from the middle, and heights are levelled by least squares, as the scene does.
     """
     found = comparison.alignment
     if found is None:
@@ -279,7 +283,7 @@ class Article(NamedTuple):
     notes: list
 
     def html(self, sections: list) -> str:
-        """Return the page with these sections, which needs no other file."""
+        """Return the self-contained page with these sections."""
         headline, sentences = self.verdict
         lead = f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict>"
         lead += f"<b>{prose(headline[0].upper() + headline[1:])}.</b>"

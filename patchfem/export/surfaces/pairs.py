@@ -97,14 +97,17 @@ def notes(rows: list) -> list:
 
 
 def _words(name: str) -> str:
-    """Name a quantity of a pair; `amplitude_ratio_y` is that of the other direction of a scan."""
+    """Return the name of a quantity of a pair.
+
+    `amplitude_ratio_y` is the one of the other direction of a scan.
+    """
     if name in compare.WORDS:
         return compare.WORDS[name]
     return f"{compare.WORDS[name.removesuffix('_x').removesuffix('_y')]} along {name[-1]}"
 
 
 def _title(group: str, direction: str, kind: str) -> str:
-    """Name the pairs that have means of their own."""
+    """Return the title of a group of pairs that has its own means."""
     along = f"along {direction}" if direction else ""
     return ", ".join(filter(None, (group, pairs.KINDS[kind], along)))
 
@@ -153,10 +156,12 @@ def _headline(rows: list) -> str:
 
 
 def _main_names(row: dict) -> tuple:
+    """Return the names of the main quantities of a pair."""
     return SCAN_NUMBERS if "worn_volume" in row else TRACE_NUMBERS
 
 
 def _direction(row: dict) -> str:
+    """Return the direction of a pair of traces as text."""
     return (
         f", along {row['direction']}"
         if row["direction"] and _main_names(row) == TRACE_NUMBERS
@@ -194,7 +199,7 @@ def _table(averages: dict) -> QuantityTable:
 
 
 def page(rows: list, name: str) -> str:
-    """Return the page of a table of pairs, which needs no other file."""
+    """Return the self-contained page of a table of pairs."""
     lead = f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict><b>{_headline(rows)}.</b></div>"
     lead += warned([f"{text}." for text in notes(rows)])
     sections = []
@@ -228,6 +233,7 @@ def page(rows: list, name: str) -> str:
 
 
 def _heading(group: tuple, count: int) -> str:
+    """Return the heading of a group of pairs."""
     text = _title(*group)
     return f"{text[0].upper()}{text[1:]}: mean of {count} pairs"
 

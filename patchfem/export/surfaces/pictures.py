@@ -13,7 +13,7 @@ from ..drawing.charts import axis, chart, line, mark
 from ..drawing.pictures import BLUE, draw, drawing, styled
 
 MAX_POINTS = 2400  # points of a drawn line, eight for each pixel column of the page
-MAX_SPECTRUM_POINTS = 400  # points of a drawn spectrum, even on the logarithmic axis
+MAX_SPECTRUM_POINTS = 400  # points of a drawn spectrum, evenly spaced on the logarithmic axis
 N_BINS = 120  # classes of a histogram
 MAX_PIXELS = 400  # heights of a drawn map along each axis, which the width of a page can show
 MIN_DETAIL_SAMPLES = 400  # samples of the enlarged part of two traces
@@ -149,7 +149,7 @@ def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: f
 
 
 def _full_axis(label: str, unit: str, x) -> dict:
-    """Return an axis from the first to the last of the places x."""
+    """Return an axis from the first to the last of the positions x."""
     return axis(label, unit) | {"range": [x[0], x[-1]]}
 
 
@@ -162,6 +162,7 @@ def depth_axis(unit: str, depth, scale: float) -> dict:
 
 
 def _wavelength_unit(spectrum: Spectrum) -> tuple:
+    """Return the unit of wavelengths of a spectrum and its scale."""
     return choose_axis_unit([1 / spectrum.frequency[0] / 4], "m")
 
 
@@ -362,7 +363,7 @@ def _detail_ends(x, worn) -> np.ndarray:
 
 
 def draw_separate(before, after) -> str:
-    """Draw two traces without a common place, one above the other."""
+    """Draw two traces that have no part in common, one above the other."""
     flat = [level(resample_evenly(profile)) for profile in (before, after)]
     along, mm = choose_axis_unit(
         np.concatenate([profile.x - profile.x[0] for profile in flat]), "m"

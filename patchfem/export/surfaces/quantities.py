@@ -20,7 +20,7 @@ UNITS = {**UNIT_LADDERS, "m2": (("um^2", 1e12),), "1": (("", 1.0),)}
 
 
 class QuantityText(NamedTuple):
-    """Value, interval ("" for none) and unit of a quantity as texts."""
+    """Value, interval ("" if there is none) and unit of a quantity as texts."""
 
     value: str
     interval: str
@@ -38,7 +38,7 @@ class QuantityText(NamedTuple):
 
 
 def format_quantity(quantity: Quantity, unit: tuple | None = None) -> QuantityText:
-    """Format a quantity so that its interval shows two digits of its own.
+    """Format a quantity with as many digits as show two digits of the width of its interval.
 
     unit: (name, scale) such as ("um", 1e6); by default the unit that suits the largest of value and
     bounds.
@@ -63,14 +63,14 @@ def format_quantity(quantity: Quantity, unit: tuple | None = None) -> QuantityTe
 
 
 def _format_below_million(value: float, digits: int) -> str:
-    """Write a number with so many digits, without a power of ten below a million."""
+    """Write a number with `digits` digits, without a power of ten below a million."""
     if value == 0 or not 1 <= abs(value) < MAX_PLAIN:
         return format_number(value, digits)
     return f"{value:.{max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)}f}"
 
 
 def _count_digits(low: float, high: float) -> int:
-    """Count the digits of a number that show two digits of the width of its interval."""
+    """Return the number of digits that show two digits of the width of an interval."""
     width = high - low
     size = max(abs(low), abs(high))
     if not width > 0 or not size > 0:
@@ -116,8 +116,18 @@ def csv_columns(tables: list) -> CsvColumns:
 class Row(NamedTuple):
     """Row of a table of quantities.
 
-    unit: (name, scale), by default the one that suits the quantity; more: cells between interval
-    and unit; remark: text behind the row on the screen; meaning: last cell on a page.
+    Attributes
+    ----------
+    words : str
+    quantity : Quantity
+    unit : tuple or None
+        (name, scale); by default the one that suits the quantity.
+    more : tuple of str
+        Cells between interval and unit.
+    remark : str
+        Text at the end of the row on the screen.
+    meaning : str
+        Last cell on a page.
     """
 
     words: str
@@ -129,7 +139,7 @@ class Row(NamedTuple):
 
 
 class QuantityTable(NamedTuple):
-    """Rows of quantities, and the heads of the columns words, value, interval, more, unit."""
+    """Rows of quantities, and the heads of the columns words, value, interval, more and unit."""
 
     heads: tuple
     rows: list

@@ -19,7 +19,7 @@ from .areal import write_columns, write_profile, write_x3p
 from .pictures import Picture
 from .quantities import QuantityTable, Row, csv_columns, format_quantity
 
-# lengths along the surface; all others are heights
+# Lengths along the surface; all other parameters are heights.
 LATERAL = (
     "PSm",
     "RSm",
@@ -41,7 +41,7 @@ MEANS = (
 
 
 def _units(report: RoughnessReport) -> dict:
-    """Choose one unit (name, scale) for all heights and one for all lengths, by parameter."""
+    """Return the unit (name, scale) of each parameter: one for all heights, one for all lengths."""
     rms = report["Sq" if report.kind == "areal" else "Pq"].value
     lengths = [
         value.value for value in report.values if value.name in LATERAL and value.value is not None
@@ -57,6 +57,7 @@ def _units(report: RoughnessReport) -> dict:
 
 
 def _parameters(report: RoughnessReport) -> QuantityTable:
+    """Return the table of the parameters."""
     units = _units(report)
     rows = []
     for value in report.values:
@@ -95,7 +96,7 @@ def heading(report: RoughnessReport) -> str:
     if treatment.cutoff is not None:
         cutoff = f"Gaussian filter at {format_length(treatment.cutoff)}, half this length trimmed at each end"
         return f"{text}; {cutoff}, {short or 'no filter for short waves'}"
-    # a trace has one step for each sample
+    # A trace has one step per sample.
     fitting = fitting_cutoff(size.length + size.step, size.step)
     advice = "; no standard cut-off fits five times into the trace once half of it is trimmed at each end"
     if fitting:
@@ -142,7 +143,7 @@ def lines_of(report: RoughnessReport, *, verbose: bool = False) -> list:
 
 
 def _asperities(report: RoughnessReport) -> TraceMoments | None:
-    """Measure the moments of the primary profile below the cut-off, None if it has none."""
+    """Return the moments of the primary profile below the cut-off; None if it has none."""
     try:
         return trace_moments(report.surface.primary, report.treatment.cutoff)
     except PatchfemError:
@@ -150,6 +151,7 @@ def _asperities(report: RoughnessReport) -> TraceMoments | None:
 
 
 def _asperity_lines(report: RoughnessReport) -> list:
+    """Return the asperities of a trace as lines."""
     if report.kind == "areal":
         return []
     return asperities.lines_of(_asperities(report), report.treatment.cutoff)
@@ -158,7 +160,7 @@ def _asperity_lines(report: RoughnessReport) -> list:
 def means_lines(reports: list) -> list:
     """Return the means over several files as lines.
 
-    Of two traces also the asperities of both faces combined.
+    For two traces they include the asperities of both faces combined.
     """
     out = []
     if len(reports) == 2 and all(report.kind == "profile" for report in reports):
@@ -174,10 +176,12 @@ def means_lines(reports: list) -> list:
 
 
 def _means_heading(means: Means) -> str:
+    """Return the heading of a mean."""
     return f"Mean of {means.count} {KINDS[means.kind]}"
 
 
 def _means_table(means: Means) -> QuantityTable:
+    """Return the table of the means."""
     rows = []
     for name, average in means.values.items():
         unit = ("", 1.0)
@@ -225,10 +229,11 @@ def write_csv(path: Path, reports: list) -> None:
 
 
 def write_surfaces(folder: Path, reports: list) -> None:
-    """Write the heights that the parameters are read from into `surfaces`.
+    """Write the heights from which the parameters are computed into `surfaces`.
 
-    Of a trace these are `primary.csv` and, with a cut-off, `roughness.csv`; of a scan `surface.x3p`
-    and `surface.csv`. With several files the number of the file is appended to the name.
+    For a trace these are `primary.csv` and, with a cut-off, `roughness.csv`; for a scan
+    `surface.x3p` and `surface.csv`. With several files the number of the file is appended to the
+    name.
     """
     folder = folder / "surfaces"
     folder.mkdir()
@@ -290,7 +295,7 @@ def data_of(report: RoughnessReport) -> dict:
 
 
 def page(reports: list) -> str:
-    """Return the page of one or several surfaces, which needs no other file."""
+    """Return the self-contained page of one or several surfaces."""
     title = "Roughness of " + ", ".join(Path(report.source).name for report in reports)
     sections = [_means_section(means) for means in average_reports(reports)]
     sections += [_section(number, report) for number, report in enumerate(reports)]
@@ -303,12 +308,14 @@ def write_page(path: Path, reports: list) -> None:
 
 
 def _means_section(means: Means) -> Section:
+    """Return the section of a mean."""
     caution = warned([f"{means.caution[0].upper()}{means.caution[1:]}."]) if means.caution else ""
     body = f"{caution}{_means_table(means).html()}<p class=soft>{prose(MEANS)}</p>"
     return Section(f"mean-{means.kind}", _means_heading(means), body)
 
 
 def _section(number: int, report: RoughnessReport) -> Section:
+    """Return the section of a surface."""
     parts = [
         f"<p class=verdict>{_verdict(report)}</p>",
         f"<p class=soft>{escape(heading(report))}.</p>",
@@ -349,10 +356,12 @@ def _verdict(report: RoughnessReport) -> str:
 
 
 def _text(report: RoughnessReport, name: str) -> str:
+    """Format a parameter with its interval."""
     return format_quantity(report[name]).long
 
 
 def _scan_pictures(report: RoughnessReport) -> list:
+    """Draw the pictures of a scan."""
     surface = report.surface
     heights = Picture(
         pictures.draw_scan(surface.x, surface.y, surface.z),
@@ -370,6 +379,7 @@ def _scan_pictures(report: RoughnessReport) -> list:
 
 
 def _trace_pictures(report: RoughnessReport) -> list:
+    """Draw the pictures of a trace."""
     parts = report.surface
     cutoff = report.treatment.cutoff
     waviness = "no cut-off was given" if cutoff is None else "the waviness drawn on it"

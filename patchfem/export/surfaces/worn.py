@@ -142,6 +142,7 @@ def data_of(wear: Wear, found: tuple) -> dict:
 
 
 def _table(wear: Wear) -> QuantityTable:
+    """Return the table of quantities of a comparison of two runs."""
     quantities = [(RUN_WORDS[name], quantity) for name, quantity in wear.values.items()]
     for name in ("from", "to", "depth_mean", "depth_floor", "hidden_wear"):
         if name in wear.track:
@@ -159,7 +160,7 @@ def _table(wear: Wear) -> QuantityTable:
 
 
 def _measure_rows(wear: Wear) -> list:
-    """Return (words, text before, text after) of the measures that at least one run has."""
+    """Return (name, text before, text after) of the measures that at least one run has."""
     rows = []
     for name in MEASURES:
         measures = [run.measure(name) for run in (wear.before, wear.after)]
@@ -255,12 +256,13 @@ def _pictures(wear: Wear) -> list:
 
 
 def _place_axis(x) -> tuple[dict, float]:
-    """Return the axis of places x (m,) [m] and the scale of its unit."""
+    """Return the axis of positions x (m,) [m] and the scale of its unit."""
     unit, scale = choose_axis_unit(x, "m")
     return axis("x", unit) | {"range": [x[0] * scale, x[-1] * scale]}, scale
 
 
 def _draw_gaps(x, gaps: tuple) -> str:
+    """Draw the gaps of the unloaded surfaces before and after."""
     place, mm = _place_axis(x)
     up, um = choose_axis_unit(np.concatenate(gaps), "m")
     marks = [
@@ -271,6 +273,7 @@ def _draw_gaps(x, gaps: tuple) -> str:
 
 
 def _draw_worn_depth(x, depth) -> str:
+    """Draw the worn depth and its part that a trace alone could not show."""
     place, mm = _place_axis(x)
     hidden = np.array(hidden_line(x, depth))
     unit, scale = choose_axis_unit(depth, "m")

@@ -15,7 +15,7 @@ from ...surface.quantity import Quantity, make_unknown
 from ..pages import several_runs
 from ..read_results import numeric, readable, variables, wanted
 
-REQUIRED = {  # variable: possible numbers of dimensions
+REQUIRED = {  # possible numbers of dimensions by variable
     "x": (1,),
     "weight": (1,),
     "unloaded_gap": (1, 2),
@@ -55,8 +55,18 @@ HIDDEN_UNDER_PLANE = (
 class PatchSurface(NamedTuple):
     """Fields of a patch (m,), or (s, m) with strips.
 
-    x (m,) [m]; y (s,) [m] of the middles of the strips, None without strips; area [m2] of the
-    nodes; gap [m] of the unloaded surfaces, wear included; depth [m] worn so far.
+    Attributes
+    ----------
+    x : (m,) array
+        [m]
+    y : (s,) array or None
+        Middles of the strips [m]; None without strips.
+    area : array
+        Areas of the nodes [m2].
+    gap : array
+        Gap of the unloaded surfaces, wear included [m].
+    depth : array
+        Worn depth so far [m].
     """
 
     x: np.ndarray
@@ -69,8 +79,18 @@ class PatchSurface(NamedTuple):
 class PatchRun(NamedTuple):
     """Run of a patch.
 
-    path: folder as it was named; pressure (m,) [Pa], of strips their mean; loop: displacement [m]
-    and friction force [N] (k,) of the last cycle, None without a drive; cycles of wear.
+    Attributes
+    ----------
+    run : FinishedRun
+    path : str
+        Folder as it was named.
+    surface : PatchSurface
+    pressure : (m,) array
+        Normal stress [Pa]; the mean over strips.
+    loop : tuple or None
+        Displacement [m] and friction force [N] (k,) of the last cycle; None without a drive.
+    cycles : float
+        Cycles of wear.
     """
 
     run: "several_runs.FinishedRun"
@@ -86,12 +106,12 @@ class PatchRun(NamedTuple):
         return "wear" in self.run.resolved
 
     def measure(self, name: str) -> dict | None:
-        """Return a measure with a value, None if the run has none."""
+        """Return a measure that has a value; None if the run has none."""
         measure = self.run.summary["measures"].get(name)
         return measure if measure is not None and measure["value"] is not None else None
 
     def place(self, number: int) -> str:
-        """Describe the place of a node by its number in the flat depth."""
+        """Describe the position of a node by its index in the flattened depth."""
         x, y = self.surface.x, self.surface.y
         strip, node = divmod(int(number), x.size)
         return f"x = {format_length(float(x[node]), 3)}" + (
@@ -102,8 +122,17 @@ class PatchRun(NamedTuple):
 class Wear(NamedTuple):
     """Wear between two runs.
 
-    gaps [m] of the surfaces before and after, and depth [m] worn between them, (m,) or (s, m) each;
-    values: Quantity by name; track: those of the worn part, {} with strips; notes: sentences.
+    Attributes
+    ----------
+    before, after : PatchRun
+    gaps : tuple
+        Gaps [m] before and after, (m,) or (s, m).
+    depth : array
+        Depth worn between them [m].
+    values : dict of Quantity
+    track : dict of Quantity
+        Quantities of the worn part; {} with strips.
+    notes : list of str
     """
 
     before: PatchRun
@@ -226,11 +255,12 @@ def _require_same_patch(first: PatchRun, second: PatchRun) -> None:
 
 
 def _interpolate(x, own, values) -> np.ndarray:
-    """Interpolate values (k,) or (s, k) at own (k,) to x (m,)."""
+    """Interpolate values (k,) or (s, k) at positions `own` (k,) to x (m,)."""
     return np.apply_along_axis(lambda row: np.interp(x, own, row), -1, values)
 
 
 def _measure_wear(first: PatchRun, second: PatchRun) -> Wear:
+    """Compute the quantities of the wear between two runs."""
     surface = second.surface
     x = surface.x
     depth = surface.depth - _interpolate(x, first.surface.x, first.surface.depth)
@@ -281,7 +311,10 @@ def _measure_wear(first: PatchRun, second: PatchRun) -> Wear:
 
 
 def _mesh_error(surface: PatchSurface, x) -> float:
-    """Estimate the error [m] of an interpolated depth: a quarter of what half of its nodes change."""
+    """Estimate the error [m] of an interpolated depth.
+
+    It is a quarter of the change if only every second node is used.
+    """
     if np.array_equal(surface.x, x) or not surface.depth.any():
         return 0.0
     every = np.unique([*range(0, surface.x.size, 2), surface.x.size - 1])
@@ -300,6 +333,7 @@ def _difference(first: PatchRun, second: PatchRun, name: str) -> tuple[float, fl
 
 
 def _quantity(name: str, value: float, error: float | None) -> Quantity:
+    """Return a quantity of TEXTS with its numerical error or None."""
     unit, text = TEXTS[name]
     return _nonnegative(value, error, unit, text)
 
@@ -380,6 +414,7 @@ def _wave_ratios(x, gaps: tuple) -> dict:
 
 
 def _profile_ratios(before: Profile, after: Profile, texts: dict) -> dict:
+    """Return the ratios of amplitude and slope of two profiles with their intervals."""
     step = float(np.diff(before.x).min())
     size_before, size_after = (ratios.measure_size(profile, step) for profile in (before, after))
     first, width = ratios.resample(before, step)
