@@ -278,7 +278,12 @@ def march(
             run = restart()
             samples.again = True
     n_even = choose_samples_per_cycle(drive, cycles, wanted=even)
-    recorder = _Recorder(samples, keeps_samples, keeps_samples or keeps_folded, n_even)
+    recorder = _Recorder(
+        samples,
+        n_even,
+        keeps_samples=keeps_samples,
+        keeps_extremes=keeps_samples or keeps_folded,
+    )
     snapshots = _march_recorded(run, recorder, plan, slot, progress)
     run.check()
     extremes = samples.extremes if recorder.keeps_extremes else ends_of(samples.last, run)
@@ -325,7 +330,7 @@ class _Recorder:
     - `capacity`: number of samples from before the last cycles that may still be kept.
     """
 
-    def __init__(self, samples: Samples, keeps_samples: bool, keeps_extremes: bool, n_even: int):
+    def __init__(self, samples: Samples, n_even: int, *, keeps_samples: bool, keeps_extremes: bool):
         self.samples = samples
         self.keeps_samples = keeps_samples
         self.keeps_extremes = keeps_extremes
