@@ -1,26 +1,44 @@
-"""Places of a curve, as close together as its bends want: straight lines between its points miss it by a given share.
+"""Points of a curve as dense as its curvature needs.
 
-Where three points a, b, c in order leave b off the straight line from a to c by e, a parabola through them leaves the
-middle of the interval ab off its straight line by e h_ab^2/(4 h_ab h_bc). An interval is halved while that is more than
-three quarters of the share of the largest of the three: a curve bends more on one side of b than on the other. A peak
-is found wherever it lies, if its flanks are seen from the places that are given.
+Where the point b of three points a, b, c lies off the line from a to c by e, a parabola through
+them leaves the middle of ab off its line by e h_ab^2/(4 h_ab h_bc). An interval is halved while
+that exceeds three quarters of the error of the largest of the three: a curve bends more on one
+side of b than on the other. A peak is found wherever it lies, if its flanks show at the first
+points.
 """
 
 from collections.abc import Callable
 
 import numpy as np
 
-LEAST = 1e-3  # of the largest value, below which values are held to that: one that starts from 0 has no share
-FINEST = 1e-6  # least interval over its place: a jump of the curve is not followed further
+# value over the largest one, below which errors are relative to this fraction: a curve may start from 0
+MIN_VALUE_RATIO = 1e-3
+# smallest interval over its place; a jump of the curve is not followed further
+MIN_INTERVAL_RATIO = 1e-6
 
 
 def adapted(find: Callable, places, share: float = 0.01, most: int = 2000) -> tuple:
-    """Places (k,) of a curve and what `find` gave at each, a list.
+    """Compute a curve at adaptive points.
 
-    find(place, near) -> (value, anything); near: what it gave at the place before, None at the first. places: the first
-    of them, in order, rising or falling; all are kept. share: largest miss of the straight line between two points over
-    the larger value at hand, or over LEAST of the largest. most: points, at which it ends. A value that is not finite
-    bends nothing.
+    Parameters
+    ----------
+    find : callable
+        find(place, near) -> (value, anything); near: what it returned at the point before, None at
+        the first.
+    places : sequence of float
+        First points in increasing or decreasing order; all are kept.
+    share : float, optional
+        Largest error of a straight line over the larger value at hand, or over MIN_VALUE_RATIO of
+        the largest value.
+    most : int, optional
+        Points.
+
+    Returns
+    -------
+    places : ndarray
+        (k,).
+    found : list
+        What `find` returned at each. A value that is not finite bends nothing.
     """
     places = [float(place) for place in places]
     found = []
@@ -39,10 +57,18 @@ def adapted(find: Callable, places, share: float = 0.01, most: int = 2000) -> tu
 
 
 def coarse(places, values, share: float) -> np.ndarray:
-    """Numbers k of the intervals from places (n,) k to k + 1 that want a point between, by the values (n,).
+    """Return the intervals k between places k and k + 1 that need a point between.
 
-    An interval wants one where the parabola through three neighbours leaves the straight line by more than 3/4 of
-    `share` of the largest of their values. Values of any unit; nan where none was found.
+    Parameters
+    ----------
+    places, values : ndarray
+        (n,); values may be nan.
+    share : float
+        As of `adapted`.
+
+    Returns
+    -------
+    ndarray
     """
     if places.size < 3:
         return np.zeros(0, int)
@@ -55,7 +81,9 @@ def coarse(places, values, share: float) -> np.ndarray:
         scale = (
             0.75
             * share
-            * np.maximum(scale, LEAST * np.max(values, initial=0.0, where=np.isfinite(values)))
+            * np.maximum(
+                scale, MIN_VALUE_RATIO * np.max(values, initial=0.0, where=np.isfinite(values))
+            )
         )
         # a comparison with nan is false
         bent = [
@@ -65,4 +93,4 @@ def coarse(places, values, share: float) -> np.ndarray:
     wide = np.zeros(h.size, bool)
     wide[:-1] |= bent[0]
     wide[1:] |= bent[1]
-    return np.flatnonzero(wide & (h > FINEST * np.abs(places[1:])))
+    return np.flatnonzero(wide & (h > MIN_INTERVAL_RATIO * np.abs(places[1:])))

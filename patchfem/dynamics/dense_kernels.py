@@ -1,4 +1,4 @@
-"""Small dense systems of the step solves, compiled: Cholesky factors of symmetric ones, elimination of others."""
+"""Small dense systems: Cholesky factors of symmetric ones, and elimination (compiled)."""
 
 import numpy as np
 
@@ -8,8 +8,12 @@ from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def factor(a):
-    """Cholesky factor of a (n, n) in its lower half, in place, one over its diagonal on the diagonal; False where a is
-    not positive definite."""
+    """Factorise a (n, n) in place in its lower half (Cholesky); false if not positive.
+
+    Returns False if it is not positive definite.
+
+    The diagonal has one over that of the factor.
+    """
     n = a.shape[0]
     for j in range(n):
         pivot = a[j, j]
@@ -29,9 +33,9 @@ def factor(a):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def solve(a, b):
-    """Put the solution x of (l l^T) x = b in place of b (n,), a as `factor` left it; returns b . x >= 0.
+    """Solve (l l^T) x = b in place of b (n,), with a as `factor` left it; returns b . x >= 0.
 
-    By columns: the unknowns below one do not wait for each other.
+    By columns, so that the unknowns below one do not wait for each other.
     """
     n = b.size
     product = 0.0
@@ -51,7 +55,10 @@ def solve(a, b):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def eliminate(a, b):
-    """Put the solution x of a x = b in place of b (n,), pivots in place; False where one is below 1e-12."""
+    """Solve a x = b in place of b (n,), with pivots in place.
+
+    Returns False where one is below 1e-12.
+    """
     n = b.size
     for i in range(n):
         if abs(a[i, i]) < 1e-12:

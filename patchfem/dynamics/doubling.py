@@ -1,8 +1,9 @@
-"""A step of modes that are stiff beside it, from a short step that resolves them, doubled until it is long enough.
+"""A step of modes that are stiff beside it, from a short step that is doubled.
 
-Numerical integration over a step sees nothing of a motion that dies out in a millionth of it. Over a short step it is
-exact to round-off, and two steps in a row are one of twice the length: the motion by a product, the energies by a sum.
-The motion is kept as its difference to standing still, so slow modes lose no digits however often it is doubled.
+Numerical integration over a step resolves nothing of a motion that dies out in a millionth of it.
+Over a short step it is exact to round-off, and two steps in a row are one of twice the length: the
+motion by a product, the energies by a sum. The motion is kept as its difference from standing
+still, so slow modes lose no digits however often it is doubled.
 """
 
 from dataclasses import dataclass
@@ -12,10 +13,13 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Step:
-    """What a step does to y = (z, z', f, a): coordinates, rates, constant accelerations (n,) each, drive (m,) at nodes.
+    """What a step does to y = (z, z', f, a).
 
-    change (2 n, 2 n): of (z, z') by themselves; push (2 n, n): by f; drive (2 n, m): by a; work, lost (3 n + m, 3 n +
-    m): the drive's work and the viscous loss [J] as quadratic forms of y.
+    These are coordinates, rates and constant accelerations (n,), and the drive (m,) at nodes.
+
+    - change: (2 n, 2 n) of (z, z') by themselves
+    - push, drive: (2 n, n), (2 n, m) by f and by a
+    - work, lost: (3 n + m, 3 n + m) work of the drive and viscous loss [J] as quadratic forms of y
     """
 
     change: np.ndarray
@@ -26,10 +30,20 @@ class Step:
 
 
 def short_step(square, damping, push, parts: dict, quadratic) -> Step:
-    """The Step of a short one, from `propagator`'s numbers of it.
+    """Return the Step of a short step, from the numbers of `propagator`.
 
-    square, damping (n, n): omega^2 and D; push: two (n, n), z and z' per constant acceleration; parts, quadratic: as
-    `propagator._parts` gives them where damping couples the modes.
+    Parameters
+    ----------
+    square, damping : ndarray
+        (n, n) omega^2 and D.
+    push : tuple
+        Two (n, n): z and z' per constant acceleration.
+    parts, quadratic
+        As `propagator._parts` gives them where damping couples the modes.
+
+    Returns
+    -------
+    Step
     """
     far, near = push
     stay = -far @ square  # what z keeps falls short of 1 by this: no difference of large numbers
@@ -51,8 +65,10 @@ def short_step(square, damping, push, parts: dict, quadratic) -> Step:
 
 
 def doubled(step: Step, halves) -> Step:
-    """The Step of twice the length; halves: two (m, m), the drive at the nodes of each half from that at those of the
-    whole."""
+    """Return the Step of twice the length.
+
+    halves: two (m, m), the drive at the nodes of each half from that at those of the whole.
+    """
     first, second = halves
     size = len(step.change)
     n = step.push.shape[1]
@@ -74,7 +90,7 @@ def doubled(step: Step, halves) -> Step:
 
 
 def as_parts(step: Step) -> tuple:
-    """(parts, quadratic) of a Step, as `propagator._parts` gives them where damping couples the modes."""
+    """Return parts and quadratic form of a Step, as `propagator._parts` for coupled modes."""
     n = step.push.shape[1]
     cut = 3 * n
     parts = {

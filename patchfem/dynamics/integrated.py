@@ -1,4 +1,4 @@
-"""Run of an engine: its histories and those of its last cycles, made from modal coordinates.
+"""Run of an engine: its histories, made from modal coordinates.
 
 What an engine integrated over the last cycles itself is a `core.IntegratedMeasures`.
 """
@@ -9,21 +9,39 @@ import numpy as np
 
 from ..core import ModalBasis, Outcome, Response
 
-ALIKE = 0.95  # length of the mean of unit vectors at twice their phases, from which starts of slip have one phase
+# length of the mean of unit vectors at twice the phases of the starts of slip, above which they have one phase
+MIN_ALIGNMENT = 0.95
 
 
 def start_phase(count, cosine, sine):
-    """Mean phase [rad] modulo pi of the starts of slip, of numbers or (n,) of n runs: their count, and the sums of the
-    cosine and of the sine of twice their phases. NaN without a start, and where they differ by more than ALIKE has it:
-    the mean of several slips in half a cycle is the phase of none of them."""
-    told = (count > 0) & (np.hypot(cosine, sine) >= ALIKE * count)
+    """Return the mean phase [rad] modulo pi of the starts of slip, of one run or of (n,) runs.
+
+    It is NaN without a start, and where the starts differ by more than MIN_ALIGNMENT allows: the
+    mean of several slips in half a cycle is the phase of none.
+
+    Parameters
+    ----------
+    count, cosine, sine : array_like
+        Number of starts, and sums of cosine and sine of twice their phases.
+
+    Returns
+    -------
+    array_like
+    """
+    told = (count > 0) & (np.hypot(cosine, sine) >= MIN_ALIGNMENT * count)
     return np.where(told, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)[()]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Run:
-    """A run of an engine: histories, and those of the last cycles; extremes of the output (c, 2) [m] and its part at
-    the drive's frequency (c,) [m] per cycle; energies [J] by name; how it ended, None where its amplitudes tell."""
+    """A run of an engine.
+
+    - response, window: histories of the run and of its last cycles
+    - amplitudes: (c, 2) smallest and largest output of every cycle [m]
+    - phasors: (c,) output at the frequency of the drive [m]
+    - ledger: energies [J] by name
+    - outcome: how it ended, None where its amplitudes tell
+    """
 
     response: Response
     window: Response
@@ -36,10 +54,21 @@ class Run:
 
 
 def accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
-    """Modal accelerations (k, n) [m s-2] relative to the base, eq. 3.4.
+    """Return the modal accelerations (k, n) [m s-2] relative to the base, eq. 3.4.
 
-    push (k,) [m s-2]: the drive; z, rate (k, n) [m], [m/s]; pull (k, n) [N]: what the interfaces resist the coordinates
-    with.
+    Parameters
+    ----------
+    modes : ModalBasis
+    push : ndarray
+        (k,) drive [m s-2].
+    z, rate : ndarray
+        (k, n) [m], [m/s].
+    pull : ndarray
+        (k, n) friction forces on the coordinates [N].
+
+    Returns
+    -------
+    ndarray
     """
     damped = (
         rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
@@ -48,8 +77,24 @@ def accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
 
 
 def histories(modes: ModalBasis, drive, time, motion: tuple, face: tuple, extra: dict) -> Response:
-    """The Response at times (k,) [s] of motion (z, rate), (k, n) each, and of the first interface: face (slide, its
-    speed, force, slip), (k,) each."""
+    """Return the histories of a motion and of the first interface.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive
+    time : ndarray
+        (k,) [s].
+    motion : tuple
+        Coordinates and rates (k, n).
+    face : tuple
+        Relative displacement, velocity, force and slip (k,).
+    extra : dict
+
+    Returns
+    -------
+    Response
+    """
     z, rate = motion
     slide, speed, force, slip = face
     push = drive.values(time)

@@ -1,12 +1,14 @@
-"""Motions that keep themselves up: modes of negative damping beside friction, without a drive.
+"""Limit cycles: motions of modes with negative damping beside friction, without a drive.
 
-Friction limited by F takes up to 4 F A of a cycle of slide A, a damping c < 0 gives pi |c| omega A^2. Where both are
-equal a motion repeats: one mode under Coulomb friction at A = 4 F/(pi |c| omega), to the first order of the damping
-(den Hartog's balance; `of_relay` has all orders). Beyond the largest of these amplitudes friction no longer holds the
-motion: flutter. Below it the motion falls, to rest or to a smaller limit cycle that lasts.
+Friction of at most F takes up to 4 F A of a cycle of amplitude A, and a damping c < 0 gives pi |c|
+omega A^2. Where both are equal a motion repeats: one mode under Coulomb friction at A = 4 F/(pi
+|c| omega), to first order in the damping (den Hartog's balance). Beyond the largest of these
+amplitudes friction no longer holds the motion: flutter. Below it the motion decays, to rest or to
+a smaller limit cycle that lasts.
 
-`of_relay` is exact for rigid friction, which is a relay of the slide's speed (Tsypkin 1984, ch. 6); `of_balance` serves
-every law of a harmonic balance: the motion of `harmonic.backbone` whose damping is 0.
+`of_relay` is exact for rigid friction, which is a relay of the sliding velocity (Tsypkin 1984, ch.
+6); `of_balance` serves every law of harmonic balance: it is the motion of `harmonic.backbone`
+whose damping is 0.
 """
 
 from dataclasses import replace
@@ -43,7 +45,12 @@ FEW = 9  # harmonics of the first answer; the second, of twice as many, shows it
 
 
 class Cycle(NamedTuple):
-    """A limit cycle: amplitude [m], half peak-to-peak at the output, and its error; omega [rad/s]; whether it lasts."""
+    """A limit cycle.
+
+    - amplitude, error: half the range at the output and its error [m]
+    - omega: [rad/s]
+    - lasts: whether it is stable
+    """
 
     amplitude: float
     error: float
@@ -52,23 +59,51 @@ class Cycle(NamedTuple):
 
 
 def unstable_modes(modes: ModalBasis) -> np.ndarray:
-    """Numbers (k,) of the coordinates whose damping gives energy."""
+    """Return the numbers (k,) of the coordinates with negative damping."""
     return np.flatnonzero(np.diagonal(modes.damping_matrix) < 0)
 
 
 def balanced_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float:
-    """4 F s/(pi |d| omega m) [m] of the coordinate `mode`: friction of `limit` F [N] on `row` (n,), damping d < 0."""
+    """Return the amplitude 4 F s/(pi |d| omega m) [m] of a coordinate by den Hartog's balance.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    row : ndarray
+        (n,) slide per coordinate.
+    limit : float
+        Friction F [N].
+    mode : int
+        Number of the coordinate, whose damping d is negative.
+
+    Returns
+    -------
+    float
+    """
     gives = -modes.damping_matrix[mode, mode] * modes.omega[mode] * modes.mass
     return 4 * limit * abs(row[mode]) / (np.pi * gives)
 
 
 def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
-    """Limit cycles under rigid friction on one interface that slides from turn to turn; [] where there is none.
+    """Find the limit cycles under rigid friction on one interface that slides from turn to turn.
 
-    row (n,): its slide per coordinate; no mode is rigid; slides, holds [N]: friction while it slides and the most that
-    it holds. From a turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half period T/2, and
-    that in which the slide comes to rest there is a cycle, if it goes one way all the time and what would hold it is
-    more than `holds`.
+    From a turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
+    period T/2. It is a cycle where the interface comes to rest there, slides one way all the time,
+    and needs more than `holds` to be held.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+        None of them rigid.
+    row : ndarray
+        (n,) slide per coordinate.
+    slides, holds : float
+        Friction in slip, and largest friction in stick [N].
+
+    Returns
+    -------
+    list of Cycle
+        In increasing amplitude.
     """
     return sorted(
         one for mode in unstable_modes(modes) for one in _turning(modes, row, (slides, holds), mode)
@@ -76,7 +111,10 @@ def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
 
 
 def _turning(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
-    """Cycles of `of_relay` whose frequency is near that of the coordinate `mode`; forces (2,) [N] as there."""
+    """Return the cycles of `of_relay` with a frequency near that of a coordinate.
+
+    forces: (2,) as there [N].
+    """
     out = []
     half = np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
     rest = _speeds(modes, row, forces[0], half)
@@ -96,11 +134,25 @@ def _turning(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
 
 
 def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int) -> list:
-    """(Cycle, damping ratio that it balances) at amplitudes (k,) [m] of the output under rigid friction; None where the
-    slide would hold on the way, and of a mode that friction does not act on.
+    """Find the free motions at given amplitudes under rigid friction, with their damping.
 
-    A damping -g of every coordinate keeps the motion of `mode` up (extended periodic motion: Krack 2015); its ratio is
-    g/(2 omega). row, forces (slides, holds) [N]: as of `of_relay`.
+    A damping -g of every coordinate keeps the motion of `mode` up (extended periodic motion: Krack
+    2015); its ratio is g/(2 omega).
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    row : ndarray
+    forces : tuple
+        Friction in slip and in stick [N], as of `of_relay`.
+    amplitudes : array_like
+        (k,) [m].
+    mode : int
+
+    Returns
+    -------
+    list
+        (Cycle, damping ratio), or None where the interface would stick on the way.
     """
 
     def cycle(log_more: float):
@@ -127,7 +179,10 @@ def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int)
 
 
 def _balanced_at(cycle, amplitude: float, own: float, more: float) -> tuple | None:
-    """(Cycle, ratio) of a rate own + g near own + more [1/s], g > 0 what friction takes; by secants of logarithms."""
+    """Return Cycle and damping ratio at an amplitude [m], by secants of logarithms.
+
+    own: rate of the mode [1/s]; more: guess of what friction takes [1/s].
+    """
     g = np.log([more, 1.01 * more])
     found = [cycle(one) for one in g]
     for _ in range(SECANTS):
@@ -142,7 +197,7 @@ def _balanced_at(cycle, amplitude: float, own: float, more: float) -> tuple | No
 
 
 def _flow(modes: ModalBasis, t) -> np.ndarray:
-    """FreeMotion motion (k, 2n, 2n) of (z, z') over times t (k,)."""
+    """Return the free motion (k, 2n, 2n) of (z, z') over times (k,)."""
     blocks = propagator.free_motion(modes, t)
     if modes.damping is None:
         blocks = [part[..., None] * np.eye(modes.omega.size) for part in blocks]
@@ -150,7 +205,10 @@ def _flow(modes: ModalBasis, t) -> np.ndarray:
 
 
 def _speeds(modes: ModalBasis, row, force: float, half) -> np.ndarray:
-    """Slide rate at the turn (k,), over that of its swing, of half periods (k,) [s]: as of `_turn`, all at once."""
+    """Return the velocity at the turn over that of the swing, (k,), of half periods (k,).
+
+    See `_turn`.
+    """
     n = modes.omega.size
     eye = np.eye(2 * modes.omega.size)
     rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
@@ -160,7 +218,10 @@ def _speeds(modes: ModalBasis, row, force: float, half) -> np.ndarray:
 
 
 def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:
-    """(state (2n,) at the turn, slide rate there over that of its swing, state of rest under the force) of T/2 = t."""
+    """Return state and relative velocity at the turn, and the state of rest.
+
+    t: half period [s].
+    """
     n = modes.omega.size
     eye = np.eye(2 * modes.omega.size)
     rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
@@ -170,7 +231,7 @@ def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:
 
 
 def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | None:
-    """The Cycle of half period t [s], None where the slide turns or holds on the way."""
+    """Return the Cycle of half period t [s], None where the interface turns or sticks."""
     slides, holds = forces
     n = modes.omega.size
     y, _, rest = _turn(modes, row, slides, t)
@@ -194,13 +255,16 @@ def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | 
 
 
 def _rates(modes: ModalBasis, y, row, force: float) -> np.ndarray:
-    """Accelerations (n,) of the coordinates in state y (2n,) under a force [N] along `row`."""
+    """Return the accelerations (n,) in a state (2n,) under a force [N] along `row`."""
     n = modes.omega.size
     return row * force / modes.mass - modes.omega**2 * y[:n] - modes.damping_matrix @ y[n:]
 
 
 def _highest(samples) -> float:
-    """Largest of samples (k,) of a motion that repeats with its sign turned, between them by a parabola."""
+    """Return the maximum of samples (k,) of a motion, between them by a parabola.
+
+    The motion changes sign after half a period.
+    """
     k = int(np.argmax(samples))
     if not 0 < k < samples.size - 1:
         k = 1 if k == 0 else samples.size - 2
@@ -210,12 +274,30 @@ def _highest(samples) -> float:
 
 
 def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
-    """(limit cycles of the laws of a Group on the interface `row` (n,), whose friction is at most `limit` [N]; the
-    smallest amplitude at the output [m] that was looked at, 0 where all were).
+    """Find the limit cycles of the laws of a Group on one interface, by harmonic balance.
 
-    Each is known by harmonics and samples twice as many. A law that weakens may have no free motion in micro-slip; the
-    path then begins where the interface slides, at the mode without friction, SLIDING times the amplitude of den
-    Hartog's balance. NotConverged where no free motion is found on this way either.
+    Each is found with harmonics and samples twice as many. A law that weakens may have no free
+    motion in micro-slip; the path then starts where the interface slides, at the mode without
+    friction.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    group : Group
+    row : ndarray
+        (n,) slide per coordinate.
+    limit : float
+        Largest friction [N].
+
+    Returns
+    -------
+    list of Cycle float
+        Smallest amplitude of the output that was looked at [m], 0 where all were.
+
+    Raises
+    ------
+    NotConverged
+        If no free motion is found in either way.
     """
     out = []
     least = 0.0
@@ -230,6 +312,7 @@ def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
 
 
 def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> tuple:
+    """Return the cycles of one mode and the smallest amplitude [m] that was looked at."""
     shape = np.eye(modes.omega.size)[mode]
     paths = (
         (
@@ -262,8 +345,10 @@ def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> tuple:
 
 
 def _crossings(modes: ModalBasis, group: Group, mode: int, path: tuple, harmonics: int) -> list:
-    """Cycles along the free motions of a mode, where their damping changes its sign; path: amplitudes (k,) [m], and
-    the frequency [rad/s] and the shape (n,) of the first of them."""
+    """Return the cycles along the free motions of a mode, where their damping changes sign.
+
+    path: amplitudes (k,) [m], and frequency [rad/s] and shape (n,) of the first motion.
+    """
     amplitudes, (omega, shape) = path
     slides = np.abs(group.rows @ shape) * amplitudes[-1]
     balance = balance_of(modes, group, group.samples_for(harmonics, slides))
@@ -283,13 +368,13 @@ def _crossings(modes: ModalBasis, group: Group, mode: int, path: tuple, harmonic
 
 
 def _unknowns(equations: FreeBalance, one: FreeMotion) -> np.ndarray:
-    """Unknowns of `FreeBalance.solve` at a free motion."""
+    """Return the unknowns of `FreeBalance.solve` at a free motion."""
     y = equations.balance.lift.T @ one.slides[:, : equations.h + 1]
     return np.append(pack(y) / one.amplitude, [one.omega / equations.scale, one.zeta])
 
 
 def _between(equations: FreeBalance, low: FreeMotion, high: FreeMotion) -> FreeMotion:
-    """The free motion without damping between two of unlike sign, by the secant kept between them (Illinois)."""
+    """Return the free motion without damping between two of opposite sign (Illinois method)."""
     ends = [(np.log(one.amplitude), one.zeta, one) for one in (low, high)]
     last = 0
     for _ in range(60):

@@ -1,12 +1,13 @@
-"""Motions that repeat with their drive: Newton's method on the map of an engine over a period, and how they last.
+"""Periodic motions by Newton's method on the map of an engine over a period (shooting).
 
-The numbers x of a motion at phase 0 of the drive repeat where P(x) = x, with P the map over a period, or over half of
-one turned over. Newton's step solves (P' - 1) dx = x - P(x), every number over its size, and is shortened until it
-leads nearer. Where no share of it does, the run goes on, longer every time, and the search continues from there. The
-eigenvalues of P' are Floquet's multipliers: what a period makes of a small disturbance.
+The numbers x of a motion at phase 0 of the drive repeat where P(x) = x, with P the map over a
+period, or over half of one with the sign changed. Newton's step solves (P' - 1) dx = x - P(x),
+every number over its size, and is shortened until it leads nearer. Where no fraction of it does,
+the run goes on, longer every time, and the search continues from there. The eigenvalues of P' are
+Floquet's multipliers: what a period makes of a small disturbance.
 
-An engine gives its map as a `Shooting`. Method: Leine and Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
-Systems, 2004, ch. 7; damping as in Deuflhard 2004.
+An engine gives its map as a `Shooting`. Method: Leine and Nijmeijer, Dynamics and Bifurcations of
+Non-Smooth Mechanical Systems, 2004, ch. 7; damping as in Deuflhard 2004.
 """
 
 from dataclasses import dataclass, field
@@ -17,24 +18,37 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ..core import NotConverged
 
-SHARES = 1.0, 0.5, 0.2, 0.05  # of a step that are tried
-MOST = 40  # steps of Newton's method
-GROWN = 1e-6  # of what the drive moves a free mass: the most that a motion misses when it closes
-FAR = 1e9  # the largest size to which a step leads: that of a mode with a damping ratio of 5e-10
-WATCHED = 60  # periods of a run that may grow
-UNDAMPED = 2e-9  # of the largest multiplier below 1: FAR again
-ROUND = 1e-14  # a miss that a step more would not make smaller
-ROUNDING = 1e-5  # of a multiplier on the unit circle
+# fractions of Newton's step that are tried
+STEP_FRACTIONS = 1.0, 0.5, 0.2, 0.05
+# steps of Newton's method
+MAX_STEPS = 40
+# miss of a motion that repeats, over the motion of a free mass under the drive
+MAX_MISS = 1e-6
+# size of a motion to which a step leads: that of a mode with a damping ratio of 5e-10
+MAX_SIZE = 1e9
+# periods of each run that shows whether the motion grows
+N_GROWTH_PERIODS = 60
+# distance of the largest multiplier from 1, below which nothing is damped: a size of MAX_SIZE
+UNDAMPED_TOL = 2e-9
+# miss that another step would not reduce
+MISS_TOL = 1e-14
+# excess of a multiplier over 1 that is round-off
+UNIT_CIRCLE_TOL = 1e-5
 
 
 @dataclass(eq=False, slots=True)
 class Mapped:
-    """A point and what the map of a period makes of it.
+    """A point and its image under the map of a period.
 
-    point and found are the engine's own; slope (m, m): derivative of the numbers at the end to those at the start;
-    scale (m,): size of every number; gap (m,): start less end over it. size: of the motion over what the drive moves a
-    free mass by. alike: start and end have the same numbers, else gap is of those they share and slope tells no step;
-    same: they are of the same state besides. kept (k,): numbers that no step changes. miss: the largest gap.
+    - point, found: of the engine
+    - slope: (m, m) derivative of the numbers at the end with respect to those at the start
+    - scale: (m,) sizes of the numbers; gap: (m,) start minus end over them
+    - size: of the motion over what the drive moves a free mass by
+    - alike: whether start and end have the same numbers; else gap is of those they share, and
+      slope gives no step
+    - same: whether they are of the same state besides
+    - kept: (k,) numbers that no step changes
+    - miss: the largest gap
     """
 
     point: Any
@@ -52,13 +66,16 @@ class Mapped:
         self.miss = float(np.abs(self.gap).max())
 
     def closed(self, tolerance: float) -> bool:
-        """Whether the motion repeats to a tolerance of its size."""
+        """Return whether the motion repeats to a tolerance of its size."""
         return (
-            self.miss <= tolerance and self.miss * self.size <= GROWN and self.alike and self.same
+            self.miss <= tolerance
+            and self.miss * self.size <= MAX_MISS
+            and self.alike
+            and self.same
         )
 
     def step(self) -> np.ndarray:
-        """Newton's step (m,), least squares where a slide may rest anywhere."""
+        """Return Newton's step (m,), in least squares where an interface may rest anywhere."""
         scale = self.scale
         out = np.zeros(self.scale.size)
         left = (self.slope - np.eye(scale.size)) * scale / scale[:, None]
@@ -69,7 +86,7 @@ class Mapped:
         return out * scale
 
     def multipliers(self) -> np.ndarray:
-        """Floquet multipliers of the numbers that a step may change, the largest first."""
+        """Return the Floquet multipliers of the numbers that a step may change, the largest first."""
         free = self._free()
         return multipliers(self.slope[np.ix_(free, free)])
 
@@ -94,41 +111,59 @@ class Shooting:
     """The map of an engine over a period; `repeating` finds its fixed point."""
 
     def mapped(self, point) -> Mapped:
-        """The map of a point of the engine. NotConverged where the engine does not reach its end."""
+        """Return the map of a point; NotConverged where the engine does not reach its end."""
         raise NotImplementedError
 
     def moved(self, mapped: Mapped, step):
-        """The point that lies a step (m,) from that of a map."""
+        """Return the point that lies a step (m,) from that of a map."""
         raise NotImplementedError
 
     def after(self, mapped: Mapped, periods: int):
-        """The point to which a run from the end of a map comes in some periods."""
+        """Return the point to which a run from the end of a map comes in some periods."""
         raise NotImplementedError
 
     def grows(self, mapped: Mapped) -> bool:
-        """Whether no disturbance dies out, and the motion gains as much in the second of two runs of WATCHED periods
-        as in the first."""
-        if not mapped.alike or np.abs(mapped.multipliers()).max(initial=0.0) < 1 - UNDAMPED:
+        """Return whether no disturbance dies out and the motion grows as much in each of two runs."""
+        if not mapped.alike or np.abs(mapped.multipliers()).max(initial=0.0) < 1 - UNDAMPED_TOL:
             return False
         sizes = [mapped.size]
         for _ in range(2):
-            mapped = self.mapped(self.after(mapped, WATCHED))
+            mapped = self.mapped(self.after(mapped, N_GROWTH_PERIODS))
             sizes.append(mapped.size)
         first, second = np.diff(sizes)
         return bool(first > 1e-6 * sizes[0] and second > 0.99 * first)
 
     def repeating(self, point, periods: tuple = (10, 160), tolerance: float = 1e-12) -> tuple:
-        """(the map of the motion that repeats, steps of Newton's method) from a point near it.
+        """Find the motion that repeats, from a point near it.
 
-        periods: of the run where Newton's method leads away, at first and at most. Grows where that run does;
-        NotConverged where MOST steps and the runs between them do not settle.
+        Parameters
+        ----------
+        point
+            Of the engine.
+        periods : tuple, optional
+            Periods of the run where Newton's method leads away, at first and at most.
+        tolerance : float, optional
+            Of the motion, relative to its size.
+
+        Returns
+        -------
+        mapped : Mapped
+        steps : int
+            Newton steps.
+
+        Raises
+        ------
+        Grows
+            If the run grows.
+        NotConverged
+            If MAX_STEPS steps and the runs between them do not reach it.
         """
         mapped = self.mapped(point)
-        for used in range(MOST):
+        for used in range(MAX_STEPS):
             closed = mapped.closed(tolerance)
-            if closed and mapped.miss <= ROUND:
+            if closed and mapped.miss <= MISS_TOL:
                 return mapped, used
-            better = self._newton(mapped, SHARES[:1] if closed else SHARES)
+            better = self._newton(mapped, STEP_FRACTIONS[:1] if closed else STEP_FRACTIONS)
             if closed:  # the last step squares what is left, where it keeps the numbers
                 return (better if better is not None and better.alike else mapped), used
             if better is not None:
@@ -139,12 +174,12 @@ class Shooting:
             if self.grows(mapped):
                 raise Grows(mapped, used + 1)
         raise NotConverged(
-            f"dynamics: no periodic motion was found in {MOST} steps of Newton's method; start from a "
+            f"dynamics: no periodic motion was found in {MAX_STEPS} steps of Newton's method; start from a "
             'motion closer to the periodic motion, or use accuracy.method = "march"'
         )
 
     def _newton(self, mapped: Mapped, shares) -> Mapped | None:
-        """A better Mapped by the first of some shares of Newton's step that leads to one, None where none does."""
+        """Return a better Mapped by a fraction of Newton's step, None where there is none."""
         if not mapped.alike:
             return None
         step = mapped.step()
@@ -154,14 +189,16 @@ class Shooting:
             except NotConverged:
                 continue
             # what nothing bounds misses ever less of its size, the farther a step leads
-            if other.miss < (1 - 0.4 * share) * mapped.miss and other.size <= FAR:
+            if other.miss < (1 - 0.4 * share) * mapped.miss and other.size <= MAX_SIZE:
                 return other
         return None
 
 
 def solve_linear(matrix):
-    """A function b -> matrix^-1 b; least squares where the matrix (n, n) is singular to round-off, as by a mean or a
-    place at rest that nothing holds."""
+    """Return a function b -> matrix^-1 b; least squares where the matrix (n, n) is singular.
+
+    It is singular by a mean or a place at rest that nothing holds.
+    """
     factors, pivots, _ = dgetrf(matrix)
     sizes = np.abs(factors.diagonal())
     if np.isfinite(sizes).all() and sizes.min(initial=np.inf) > 1e-13 * sizes.max(initial=0.0):
@@ -172,18 +209,19 @@ def solve_linear(matrix):
 
 
 def bound(residual: float, found) -> float:
-    """Relative error of a motion that closes to a residual, over its size: the more, the nearer to 1 a multiplier of
-    `found` (m,) lies."""
+    """Return the relative error of a motion that closes to a residual.
+
+    It grows as a multiplier in `found` (m,) comes close to 1.
+    """
     return residual / max(float(np.abs(1 - np.asarray(found)).min(initial=1.0)), 1e-12)
 
 
 def multipliers(matrix) -> np.ndarray:
-    """Floquet multipliers (s,) complex, the eigenvalues of the map of a period (s, s), largest magnitude first."""
+    """Return the Floquet multipliers (s,) of the map of a period (s, s), the largest first."""
     found = np.linalg.eigvals(matrix)
     return found[np.argsort(-np.abs(found))]
 
 
 def is_stable(found) -> bool:
-    """Whether no disturbance grows from cycle to cycle: no multiplier (s,) exceeds 1 in magnitude, but for
-    round-off."""
-    return bool(np.abs(found).max(initial=0.0) <= 1 + ROUNDING)
+    """Return whether no multiplier (s,) exceeds 1 in magnitude, but for round-off."""
+    return bool(np.abs(found).max(initial=0.0) <= 1 + UNIT_CIRCLE_TOL)

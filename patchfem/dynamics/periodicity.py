@@ -1,8 +1,11 @@
-"""When a motion under a periodic drive has become periodic, so that the rest of its cycles are as the last one.
+"""When a motion under a periodic drive has become periodic.
 
-It is looked at after APART cycles, then after twice as many each time. What it changed by between two looks, and
-between the two before, tells what it will change by yet: less and less by the share by which the changes fell, as what
-dies out does, or as much each time, as what creeps does. A period of two cycles shows in the last cycle alone.
+From there on the remaining cycles equal the last one.
+
+The motion is looked at after APART cycles, then after twice as many each time. Its changes between
+three looks bound what it would still change by: the changes decrease by a constant factor, as of a
+motion that dies out, or stay equal, as of one that creeps. A period of two cycles shows in the
+last cycle alone.
 """
 
 import numpy as np
@@ -11,12 +14,12 @@ APART = 4  # cycles after which a motion is first looked at
 
 
 def looked_at(number: int) -> bool:
-    """Whether a motion is looked at after this number of cycles."""
+    """Return whether a motion is looked at after this number of cycles."""
     return number >= APART and number & (number - 1) == 0
 
 
 def until_look(number: int) -> int:
-    """Cycles from the end of cycle `number` to the next look, or to one cycle before it."""
+    """Return the cycles from the end of cycle `number` to the next look, or one before it."""
     at = APART
     while at <= number:
         at *= 2
@@ -24,9 +27,19 @@ def until_look(number: int) -> int:
 
 
 def ahead(change: float, before: float, left: int, far: int) -> float:
-    """What a motion will change by in `left` cycles, over its size as the changes are.
+    """Return what a motion would still change by in `left` cycles.
 
-    change: between the last two looks, the last one after `far` cycles; before: between the two looks before.
+    Parameters
+    ----------
+    change, before : float
+        Relative changes between the last two looks, and between the two before.
+    left : int
+    far : int
+        Cycles after which the last look was.
+
+    Returns
+    -------
+    float
     """
     if before == 0.0:
         return change * max(1.0, 2 * left / far)

@@ -9,15 +9,21 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..dense_kernels import factor
 from ..dense_kernels import solve as solve_factored
 from ..interfaces.pressed_points_kernels import (
-    press_all,
+    press_points,
     rub_commit,
     rub_force,
     rub_state,
     spring_back,
 )
 from ..interfaces.shear_points_kernels import SLOPE
-from ..interfaces.shear_solve_kernels import GRADIENT, STEP, descend, halfway, hessian
-from ..interfaces.shear_solve_kernels import pulled as drawn
+from ..interfaces.shear_solve_kernels import (
+    GRADIENT,
+    STEP,
+    minimise,
+    project_onto_modes,
+    set_middle_length,
+    write_hessian,
+)
 from .arrays import CLIMB, FLANK
 
 # residual over the friction limit, to which pieces that deform in shear are solved
@@ -27,7 +33,7 @@ SHEAR_GOAL = 1e-13
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_step(c, v, dt):
     """Start a step of dt [s] at the velocity v [m/s] along the flank."""
-    halfway(v, dt, c)
+    set_middle_length(v, dt, c)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -53,7 +59,7 @@ def solve_friction(ds, flat, end, dt, c):
         Its derivative [N/m].
     """
     kind = int(c.flank[FLANK.kind])
-    pulled = 0.0
+    force = 0.0
     gain = 0.0
     at = c.climb
     gives = c.kappa.size > 0
@@ -62,16 +68,16 @@ def solve_friction(ds, flat, end, dt, c):
     missed = 0.0
     for count in range(60):
         before = at[CLIMB.end_normal]
-        press_all(kind, c)
+        press_points(kind, c)
         if gives:
             c.y[0, 0] = ds
-            pulled = descend(
+            force = minimise(
                 ds, 0.0, kind, False, c, SHEAR_GOAL * c.force[0] * c.flank[FLANK.load]
             )[0]
         else:
-            pulled, gain = rub_force(ds, kind, c)
+            force, gain = rub_force(ds, kind, c)
         bound = c.force[0] * before
-        after = min(max(2 * pulled - at[CLIMB.start_force], -bound), bound)
+        after = min(max(2 * force - at[CLIMB.start_force], -bound), bound)
         now = max(flat + after * end, 0.0)
         miss = now - before
         if (
@@ -88,7 +94,7 @@ def solve_friction(ds, flat, end, dt, c):
         missed = miss
         if abs(miss) <= close:
             break
-    return pulled, find_stiffness(c) if gives else gain
+    return force, find_stiffness(c) if gives else gain
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -108,11 +114,11 @@ def find_stiffness(c):
     for j in range(int(c.count[0])):
         total += c.points[SLOPE, j]
     if c.ready[0] == 0.0:
-        hessian(0.0, False, c, hess)
+        write_hessian(0.0, False, c, hess)
         if not factor(hess):
             return total
         c.ready[0] = 1.0
-    drawn(SLOPE, c.psi, c.points, int(c.count[0]), p)
+    project_onto_modes(SLOPE, c.psi, c.points, int(c.count[0]), p)
     p[0] = 0.0
     return max(total - inverse_form(hess, p, c.workspace[GRADIENT]), 0.01 * total)
 

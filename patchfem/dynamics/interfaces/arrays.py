@@ -1,5 +1,4 @@
-"""Arrays of the contacts that a march can meet: one law on one slide, points behind shear modes, points under
-a changing load or on flanks, a list of bonds; of faces beside each other and of a load that changes."""
+"""Arrays of the contacts that a march can have."""
 
 from collections import namedtuple
 from typing import NamedTuple
@@ -8,8 +7,13 @@ import numpy as np
 
 
 class Element(NamedTuple):
-    """num (1, k), mem (1, l) as the law has them; last (2,): the last two slide increments [m]; eps (1,): bond length
-    of the step [m]; bound (1,): largest force [N], infinite where none is."""
+    """One law on one relative displacement.
+
+    - num, mem: (1, k), (1, l) numbers and memory of the law
+    - last: (2,) increments of the last two steps [m]
+    - eps: (1,) bond length of the step [m]
+    - bound: (1,) largest force [N], infinite where there is none
+    """
 
     num: np.ndarray
     mem: np.ndarray
@@ -21,14 +25,19 @@ class Element(NamedTuple):
 class Sheared(NamedTuple):
     """Points (m,) of a law with memory behind r shear modes of the pieces.
 
-    weight (m,) makes a traction of the law a force [N]: mu_s area/eps_0 of bonds under a load in Pa; eps (2,): bond
-    length [m] at the start and in the middle of the step; growth (6,) of eq. 2.10 and of the breakaway share; modes
-    psi (r, m), kappa (r,) [N/m], coordinates b (r,) [m]. points (8, m), rows named in `shear_points_kernels`: m, z, s2
-    and play of bonds, their load, and slide, force and slope in the step. count (1,):
-    how many of its columns, and of those of psi, are points under load. drag (3, 1 + r), flow (2,): of points that all
-    drag under a load that stays, as `shear_kernels` has it. Of the solve: y (2, 1 + r) = (dq, db) of the
-    step and of what springs back, last (2, 1 + r) of the two steps before, scale (1 + r,), workspace (3, 1 + r), hess (2,
-    1 + r, 1 + r) with ready (2,): 1 where it is a factor.
+    - weight: (m,) makes a traction of the law a force [N]: mu_s area/eps_0 of bonds under a load
+      in Pa
+    - eps: (2,) bond length at the start and in the middle of the step [m]
+    - growth: (6,) of eq. 2.10 and of the breakaway fraction
+    - psi, kappa, b: shear modes (r, m), their stiffness [N/m] and coordinates [m] (r,)
+    - points: (8, m) rows named in `shear_points_kernels`
+    - count: (1,) columns of points and psi that are under load
+    - drag, flow: (3, 1 + r), (2,) of points that all drag under a constant load, see
+      `shear_kernels`
+    - y: (2, 1 + r) solution (dq, db) of the step, and of the pieces that spring back
+    - last: (2, 1 + r) those of the two steps before
+    - scale, workspace: (1 + r,), (3, 1 + r)
+    - hess, ready: (2, 1 + r, 1 + r), and (2,) 1 where it is a factor
     """
 
     weight: np.ndarray
@@ -50,9 +59,26 @@ class Sheared(NamedTuple):
 
 
 def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1, load=None) -> dict:
-    """The fields of `Sheared` at rest; psi (m, r), no modes of pieces that are rigid in shear.
+    """Return the fields of `Sheared` at rest.
 
-    lanes: m is filled up to a multiple of it by points that bear and move nothing; load (m,) [Pa]: one that stays.
+    Parameters
+    ----------
+    weight : array_like
+        (m,).
+    length : float
+        Bond length [m].
+    growth : array_like
+        (6,).
+    psi, kappa : ndarray
+        (m, r) and (r,) shear modes; none for pieces that are rigid in shear.
+    lanes : int, optional
+        m is filled up to a multiple of it by points that carry nothing.
+    load : array_like, optional
+        (m,) constant load [Pa].
+
+    Returns
+    -------
+    dict
     """
     m, r = psi.shape
     size = 1 + len(kappa)
@@ -88,36 +114,42 @@ def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1, load=None
 
 
 class Rub(namedtuple("Rub", ("force", "memory", "pressed", "modes", "under", *Sheared._fields))):
-    """Points of a law under a load that changes, `pressed_points_kernels`.
+    """Points of a law under a load that changes, see `pressed_points_kernels`.
 
-    force (6,): mu_s, mu_k, bond length [m], initial density m_0, kind of the law as in `shear_points_kernels`, goal of
-    the solve [N]; memory (3, m): elastic-plastic traction/mu and springs [N]; bonds m, z, s2 [N, N m, N m2]; pressed
-    (2, m): nodal forces at both ends of the step [N]; modes (r, m): shear modes at all points, none of pieces that are
-    rigid in shear; under (m,): numbers of the points under load, in the order in which they come in the rest, which is
-    as of `Sheared`; there they have the memory after half of the change of load, and the mean load.
+    - force: (6,) positions named there
+    - memory: (3, m) elastic-plastic traction/mu and springs [N], or m, z, s2 of bonds [N, N m, N
+      m2]
+    - pressed: (2, m) nodal forces at both ends of the step [N]
+    - modes: (r, m) shear modes at all points, none for pieces that are rigid in shear
+    - under: (m,) numbers of the points under load, in the order in which they stand in the other
+      fields, which are those of `Sheared`; there they have the memory after half of the change of
+      load, and the mean load
     """
 
     __slots__ = ()
 
 
 class Climbing(namedtuple("Climbing", ("flank", "climb", "share", *Rub._fields))):
-    """A law with memory along flanks, `grooves.points_kernels`.
+    """A law with memory along flanks, see `dynamics.grooves`.
 
-    flank (6,): load [N], wave number [rad/m], amplitude [m], phase [rad], lifted mass [kg], kind of the law as in
-    `shear_points_kernels`; now_at (14,): speed of what rises [m/s], vertical force of the step before [N], the last two
-    slides of a step [m], 1 once the vertical force has fallen to zero, then of the step that was tried last: mean force
-    U [N], its slope [N/m], force f along the flank [N], dz/dq, ds/dq, vertical force [N], and the force f at the end of
-    the step before, then the normal force at both ends of the step [N]; share (m,): of the points in the normal force;
-    the rest is as of `Rub`, with their shares of it for the loads.
+    - flank, climb: (6,), (14,) positions named in `grooves.arrays`
+    - share: (m,) fractions of the normal force that the points carry
+
+    The other fields are those of `Rub`, with fractions of the normal force for the loads.
     """
 
     __slots__ = ()
 
 
 class BondList(NamedTuple):
-    """One list of bonds for a slide that all share: force = mu_s N [N]; bondlist (9, capacity), now (6,), status (16,),
-    law (24,), table (k,) as in friction.bonds.list_rows_kernels; growth (6,) of eq. 2.10; last (2,) slide increments [m];
-    bound (1,): largest force [N]."""
+    """One list of bonds that all share a relative displacement.
+
+    - force: (1,) mu_s N [N]
+    - bondlist, now, status, law, table: see `friction.bonds.list_rows_kernels`
+    - growth: (6,) of eq. 2.10
+    - last: (2,) increments of the last two steps [m]
+    - bound: (1,) largest force [N]
+    """
 
     force: np.ndarray
     bondlist: np.ndarray
@@ -149,32 +181,40 @@ class ShearedLists(
         ),
     )
 ):
-    """Points (m,) behind shear modes of which each is a list of bonds, `shear_list_kernels`.
+    """Points (m,) behind shear modes, each a list of bonds, see `shear_list_kernels`.
 
-    bondlist (9, m capacity): the lists beside each other; nows (m, 6), statuses (m, 16): of each, and now, status of the
-    one that is looked at; law, table: as of `BondList`; time (1,): length of the step [s]; the rest is as of `Sheared`,
-    weight (m,) the friction limits [N] and the first four rows of points as `shear_lists_kernels` has them. pressed
-    (2, m): nodal forces at both ends of the step [N], over those of the limits in the row LOAD of points, (2, 0) where
-    they stay; pattern (2, k): of the lower piece, places [m] and pressures over that of the limits, places (m,) [m]: of
-    the points at rest; (2, 0), (0,) where the pressure rides on the upper one.
+    - bondlist: (9, m capacity) the lists beside each other
+    - nows, statuses: (m, 6), (m, 16) of each list; now, status: those of the present one
+    - law, table: as of `BondList`
+    - time: (1,) duration of the step [s]
+    - pressed: (2, m) nodal forces at both ends of the step [N], over the row LOAD of points; (2,
+      0) where they are constant
+    - pattern: (2, k) places [m] and relative pressures of the lower piece, (2, 0) where the
+      pressure moves with the upper one
+    - places: (m,) of the points at rest [m]
+
+    The other fields are those of `Sheared`: weight (m,) has the friction limits [N], the first
+    four rows of points are named in `shear_lists_kernels`.
     """
 
     __slots__ = ()
 
 
 class Single(NamedTuple):
-    """A contact on port 0 with nothing beside it: goal (1,) [N] of its residual."""
+    """A contact on port 0 alone; goal: (1,) of its residual [N]."""
 
     goal: np.ndarray
 
 
 class Stops(NamedTuple):
-    """The m set-valued faces of a march, `march.stops_kernels`.
+    """The m set-valued interfaces of a march, see `march.stops_kernels`.
 
-    element, names (m,): their numbers, room for numbers; limit (4, m): static and kinetic friction [N] at the start of
-    the step, then at its end; gives (3, m, m): what their forces take from their slides [m/N] and rates [m/(s N)] over
-    a step, and from their accelerations [1/kg]; rows (m, n): their slides per coordinate; system (m, m), field (18, m)
-    as `march.stops_kernels` has it.
+    - element, names: (m,) their numbers, and workspace for numbers
+    - limit: (4, m) static and kinetic friction at the start and at the end of the step [N]
+    - gives: (3, m, m) what their forces take from relative displacements [m/N], velocities [m/(s
+      N)] and accelerations [1/kg]
+    - rows: (m, n) relative displacement per coordinate
+    - system, field: (m, m), (18, m) workspace
     """
 
     element: np.ndarray
@@ -187,16 +227,22 @@ class Stops(NamedTuple):
 
 
 class Faces(NamedTuple):
-    """Elements (e,) on ports (p,) beside a contact on port 0, or in its place; rows are named in `march.stops_kernels`.
+    """Elements (e,) on ports (p,) beside a contact on port 0 or in its place.
 
-    rows (p, n): slide of every port per coordinate; gives (2, p, p): what port forces take from the slides [m/N] and
-    rates [m/(s N)] of ports over a step; of (3, e): port, 1 for friction, 0 for springs, and the element of the other
-    direction where both slide in a plane, else its own number; num, mem (e, ...) as the
-    laws have them, num[e, 0] which law; each (10, e): force [N], slide, speed, bond length and slide increment of the
-    step, residual, largest force [N], infinite where nothing bounds it, goal [N], last two slide increments; own (5,):
-    of the contact its force, last increment, force at the sample and goal, and 1 where the stops of the step are known;
-    port (2, p): free slide [m] and rate [m/s] in the step; modal (5, n): give of the coordinates [m/N], accelerations
-    by what pushes the modes besides [m/s2], room; system (e, e), hess (n, n): room; stops: the set-valued elements.
+    Rows are named in `march.stops_kernels`.
+
+    - rows: (p, n) displacement of every port per coordinate
+    - gives: (2, p, p) what port forces take from displacements [m/N] and velocities [m/(s N)] of
+      the ports
+    - of: (3, e) port; 1 for friction, 0 for springs; element of the other direction of a plane,
+      else its own number
+    - num, mem: (e, ...) numbers and memory of the laws; num[e, 0] tells the law
+    - each: (10, e) numbers of each element in the step
+    - own: (5,) force, last increment, force at the sample and goal of the contact, and 1 where the
+      stops are known
+    - port: (2, p) displacement [m] and velocity [m/s] without forces
+    - modal: (5, n), system: (e, e), hess: (n, n) workspace
+    - stops: the set-valued elements
     """
 
     rows: np.ndarray
@@ -214,13 +260,18 @@ class Faces(NamedTuple):
 
 
 class Pressing(NamedTuple):
-    """A load that changes, `march.pressing_kernels`.
+    """A load that changes, see `march.pressing_kernels`.
 
-    sets: `contact.set_arrays.SetArrays`; rows (3, n): slide, heave and pitch per coordinate; beta (3, 3): what
-    constant forces in a step take from them; arm (1,) [m]: half the length of the patch; force (2,): mu_s, mu_k of a
-    law on the resultant load; now (m,): nodal forces [N]; loads (steps + 1,) [N]: prescribed load at the steps, empty
-    where the contact says it; slot (1,): of the present contact set, below 0 where none fits; mean (1,): friction
-    force of the step before [N]; goal (1,) [N]: of the residuals; few (22,): room.
+    - sets: `contact.set_arrays.SetArrays`
+    - rows: (3, n) slide, heave and pitch per coordinate; beta: (3, 3) what constant forces take
+      from them
+    - arm: (1,) half the length of the patch [m]
+    - force: (2,) mu_s, mu_k of a law on the resultant load
+    - now: (m,) nodal forces [N]; loads: (steps + 1,) prescribed load [N], empty where the contact
+      determines it
+    - slot: (1,) number of the contact set, below 0 where none fits
+    - mean, goal: (1,) friction force of the step before, and goal of the residuals [N]
+    - few: (22,) workspace
     """
 
     sets: tuple
@@ -237,14 +288,16 @@ class Pressing(NamedTuple):
 
 
 class Steady(NamedTuple):
-    """A load that stays: loads (0,), none."""
+    """A constant load; loads: (0,)."""
 
     loads: np.ndarray
 
 
 def carried(contact, element=None) -> list | None:
-    """What a contact carries from one step to the next, as rows of numbers of one kind each; None of one whose books
-    grow for ever, as those of a list of bonds. element: the law of an `Element`."""
+    """Return what a contact carries from step to step, as rows of numbers of one kind each.
+
+    It is None for a list of bonds, whose sums grow without end. element: the law of an `Element`.
+    """
     if isinstance(contact, Element):
         return memory_rows(element, contact.mem[0])
     if isinstance(contact, Sheared):
@@ -257,24 +310,27 @@ def carried(contact, element=None) -> list | None:
 
 
 def memory_rows(element, memory) -> list:
-    """The memory (l,) of an element as rows of numbers of one kind each."""
+    """Return the memory (l,) of an element as rows of numbers of one kind each."""
     head = {"parallel": 3, "points": 1, "places": 1}.get(element.form, memory.size)
     kinds = 5 if element.form in ("points", "places") else 1
     return [*memory[:head, None], *memory[head:].reshape(kinds, -1)]
 
 
 def copied(parts):
-    """A tuple of arrays, or of such tuples, with arrays of its own."""
+    """Return a copy of a tuple of arrays, or of such tuples."""
     return type(parts)(
         *(copied(part) if isinstance(part, tuple) else part.copy() for part in parts)
     )
 
 
 class ModalArrays(NamedTuple):
-    """The modes as the compiled loops of a march take them.
+    """The modes as the loops of a march take them.
 
-    omega, damp = 2 zeta omega, slide, base, output: (n,); damping: (n, n) where it couples, else (0, 0); their steps,
-    arrays of `propagator.Propagator`, dt [s] and the beta [m/N] of the first interface; mass [kg]; workspace: (3, n).
+    - omega, damp, slide, base, output: (n,); damp is 2 zeta omega
+    - damping: (n, n) where it couples the modes, else (0, 0)
+    - free, push, dense, reach, loss, dense_loss: of `propagator.Propagator`
+    - dt, beta: step [s], and compliance of the first interface in a step [m/N]
+    - mass: [kg]; workspace: (3, n)
     """
 
     omega: np.ndarray

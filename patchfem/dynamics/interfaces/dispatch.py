@@ -1,4 +1,7 @@
-"""Several compiled laws as one: a module written beside the compiled code that asks numbers[0] which law is meant."""
+"""Several compiled laws as one module that asks numbers[0] for the law.
+
+It is written beside the compiled code.
+"""
 
 from functools import cache
 
@@ -27,9 +30,9 @@ def {name}({signature}):
 
 
 def number_of(laws: tuple) -> dict:
-    """numbers[0] of every compiled law by its module: 0 for Coulomb's, from 1 on for the others.
+    """Return numbers[0] of every law by its module: 0 for Coulomb's law, else from 1 on.
 
-    The loops ask Coulomb's law for its step, as it has no slope.
+    The loops treat Coulomb's law apart, because it has no slope.
     """
     return {COULOMB: 0} | {
         law: k for k, law in enumerate((law for law in laws if law != COULOMB), 1)
@@ -38,9 +41,9 @@ def number_of(laws: tuple) -> dict:
 
 @cache
 def law_of(laws: tuple):
-    """The compiled module of one law, or one written for several that numbers[0] tells apart.
+    """Return the compiled module of one law, or one that is written for several laws.
 
-    laws: modules. The module written is kept beside the compiled code.
+    laws: modules. The written module is kept beside the compiled code.
     """
     if len(laws) == 1:
         return compiled.load(laws[0])

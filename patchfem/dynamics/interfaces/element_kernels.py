@@ -1,7 +1,7 @@
-"""A contact, `arrays.Element`, with one slide and one law on it.
+"""A contact with one relative displacement and one law on it, `arrays.Element` (compiled).
 
-Such are elements side by side, a law of the speed, points that slide alike. The functions are those that
-`march.loop_kernels` asks of every contact.
+Examples are elements side by side, a law of the velocity, and points that slide alike.
+`march.loop_kernels` calls the functions of every contact.
 """
 
 from ...compiled.jit import njit
@@ -12,10 +12,28 @@ from . import element_solve_kernels as solver
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve(free, beta, q, v, dt, c, goal):
-    """(dq [m], path-mean force [N], iterations) of a step with dq = free - beta force; the memory stays as it is.
+    """Solve a step with dq = free - beta force; the memory stays as it is.
 
-    free [m]: slide without friction; beta [m/N]: slide that a newton takes away; q [m], v [m/s]: at the start of the
-    step of dt [s]; c: `arrays.Element`; goal [N]: of the residual. iterations < 0 when it failed.
+    Parameters
+    ----------
+    free, beta : float
+        Increment without friction [m], and what a newton takes of it [m/N].
+    q, v : float
+        Relative displacement [m] and velocity [m/s] at the start.
+    dt : float
+        [s].
+    c : arrays.Element
+    goal : float
+        Of the residual [N].
+
+    Returns
+    -------
+    dq : float
+        [m].
+    force : float
+        Path mean [N].
+    iterations : int
+        Below 0 where it failed.
     """
     c.eps[0] = law.step_bond_length(c.num[0], c.mem[0], v, dt)
     guess = 2 * c.last[0] - c.last[1]
@@ -26,16 +44,16 @@ def solve(free, beta, q, v, dt, c, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def given(dq, q, v, dt, c, goal):
-    """(path-mean force [N], True) over a slide increment dq [m] in dt [s] that is prescribed."""
+    """Return the mean force [N] over a prescribed increment dq [m] in dt [s], and True."""
     c.eps[0] = law.step_bond_length(c.num[0], c.mem[0], v, dt)
     return law.mean_force(c.num[0], c.mem[0], q, dq, c.eps[0], dt)[0], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(dq, force, q, v0, v1, dt, c):
-    """Move the memory by the solved step; (energy dissipated [J], True).
+    """Move the memory by a solved step; returns the energy dissipated [J] and True.
 
-    force [N]: path mean over dq [m]; v0, v1: speeds [m/s] at the ends of the step of dt [s].
+    force: path mean over dq [N]; v0, v1: velocities at both ends of the step [m/s].
     """
     c.last[1] = c.last[0]
     c.last[0] = dq
@@ -44,5 +62,5 @@ def commit(dq, force, q, v0, v1, dt, c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(c, q, v):
-    """(force [N], stored energy [J], irreversible slip [m]) at the slide q [m] and the speed v [m/s]."""
+    """Return force [N], stored energy [J] and slip [m] at q [m] and v [m/s]."""
     return law.read_memory(c.num[0], c.mem[0], q, v)

@@ -1,4 +1,4 @@
-"""Slide of one element over a step: its law against what the modes give, in closed form or for any law with a slope."""
+"""Step of one element, in closed form or by Newton's method (compiled)."""
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
@@ -8,8 +8,30 @@ from ..modal_kernels import narrowed
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_element(free, beta, numbers, memory, q, eps, dt, guess, bound, goal):
-    """(dq, mean force, iterations) with dq = free - beta F(dq), |F| <= bound [N], infinite where nothing bounds it;
-    iterations < 0 when it failed. goal [N]: of the residual over beta, besides the last digit of the slide."""
+    """Solve dq = free - beta F(dq) for one element.
+
+    Parameters
+    ----------
+    free, beta : float
+        As of `element_kernels.solve`.
+    numbers, memory : ndarray
+        Of the law.
+    q, eps, dt : float
+        Relative displacement [m], bond length [m], step [s].
+    guess : float
+        Of dq [m].
+    bound : float
+        Largest |F| [N], infinite where there is none.
+    goal : float
+        Of the residual over beta [N].
+
+    Returns
+    -------
+    dq : float
+    force : float
+    iterations : int
+        Below 0 where it failed.
+    """
     closed = law.solve_step(numbers, memory, free, beta)
     if closed.is_solved:
         return closed.increment, closed.mean_force, 1

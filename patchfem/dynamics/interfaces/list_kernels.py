@@ -1,6 +1,6 @@
-"""A contact, `arrays.BondList`, of one shared list of bonds: force, solve without a slope, commit, energy book.
+"""A contact of one shared list of bonds, `arrays.BondList` (compiled).
 
-The functions are those that `march.loop_kernels` asks of every contact.
+`march.loop_kernels` calls the functions of every contact.
 """
 
 import numpy as np
@@ -12,28 +12,35 @@ from ...friction.bonds.list_rows_kernels import LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..modal_kernels import narrowed
 
-SHORT = 1e-9  # bond lengths of an increment, below which its slope is that of both ways
-OWED = 1e-4  # bond lengths at the friction limit: the most that a list of stretched bonds may owe
+# increment over the bond length, below which its slope is the mean of those in both directions
+SLOPE_STEP = 1e-9
+# energy over that of a bond length at the friction limit, which a list of stretched bonds may owe
+MAX_OWED = 1e-4
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def answer(dq, c, v0, dt):
-    """(path-mean weight [1], its slope over dq [1/m]) of a list over dq [m]; the slope of a law other than that of
-    MOMENTS is that of a mean whose force depends on the slide alone, and may be below 0."""
+def find_mean_and_slope(dq, c, v0, dt):
+    """Return the path-mean weight of a list over dq [m] and its slope [1/m].
+
+    The slope of a form other than MOMENTS is that of a mean whose force depends on the
+    displacement alone; it may be below 0.
+    """
     if c.law[LAW.form] == FORM_MOMENTS:
         mean, slope = list_slope(dq, c, v0, dt)
         return mean, slope
     mean = list_mean(dq, c, v0, dt)
-    short = SHORT * c.law[LAW.length]
+    short = SLOPE_STEP * c.law[LAW.length]
     if abs(dq) > short:
         return mean, (list_force(dq, c, v0, dt) - mean) / dq
     return mean, (list_force(short, c, v0, dt) - list_force(-short, c, v0, dt)) / (4 * short)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pulled(dq, c, v0, dt):
-    """(path-mean force [N], its slope over dq [N/m]) of a bond list over dq [m]; a slope of 0 stands for an unknown
-    one."""
+def find_force_and_slope(dq, c, v0, dt):
+    """Return the path-mean force of a list over dq [m] and its slope [N/m].
+
+    A slope of 0 is unknown.
+    """
     scale = c.force[0]
     if c.law[LAW.form] == FORM_MOMENTS:
         force, slope = list_slope(dq, c, v0, dt)
@@ -43,8 +50,15 @@ def pulled(dq, c, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve(free, beta, q, v, dt, c, goal):
-    """(dq, path-mean force, iterations) of a step with dq = free - beta force, by secants; iterations < 0 when it
-    failed."""
+    """Solve a step with dq = free - beta force by secants, as `element_kernels.solve`.
+
+    Returns
+    -------
+    dq : float
+    force : float
+    iterations : int
+        Below 0 where it failed.
+    """
     here = 2 * c.last[0] - c.last[1]
     gain = 1 + beta * c.force[0] / c.law[LAW.length]
     low = -np.inf
@@ -52,7 +66,7 @@ def solve(free, beta, q, v, dt, c, goal):
     last = here
     last_miss = 0.0
     for count in range(1, 300):
-        force = pulled(here, c, v, dt)[0]
+        force = find_force_and_slope(here, c, v, dt)[0]
         miss = here - free + beta * force
         if abs(miss) <= goal * beta or high - low <= 4e-16 * (abs(free) + beta * c.bound[0]):
             return here, force, count
@@ -67,35 +81,51 @@ def solve(free, beta, q, v, dt, c, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def given(dq, q, v, dt, c, goal):
-    """(path-mean force [N], True) over a slide increment dq [m] in dt [s] that is prescribed."""
-    return pulled(dq, c, v, dt)[0], True
+    """Return the mean force [N] over a prescribed increment dq [m] in dt [s], and True."""
+    return find_force_and_slope(dq, c, v, dt)[0], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(dq, force, q, v0, v1, dt, c):
-    """Move the list by the solved step. Returns (work that is not stored [J], whether the list had room).
+    """Move the list by a solved step.
 
-    That work is dissipated where positive; the printed law also creates energy, and both are summed apart. The stretch
-    reading creates none. What its sums gain in a short step beyond the work, as strips change from one rule of
-    integration to another, was in store before: it is owed, up to OWED, and the next dissipation repays it.
+    The work that is not stored is dissipated where positive; the law as printed also creates
+    energy, and both are summed separately. The stretch reading creates none: what its sums gain in
+    a short step beyond the work, as strips change from one rule of integration to another, was
+    stored before. It is owed, up to MAX_OWED, and the next dissipation repays it.
+
+    Returns
+    -------
+    work : float
+        That is not stored [J].
+    has_room : bool
+        Whether the list had room.
     """
     c.last[1] = c.last[0]
     c.last[0] = dq
     before = c.status[STATUS.energy]
     ok = list_step(dq, c, v0, v1, dt)
-    return booked(force * dq, before, c.force[0], c), ok
+    return book_energy(force * dq, before, c.force[0], c), ok
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def booked(work, before, limit, c):
-    """Add the work [J] of a step that is not stored to the energies of the list c; return it.
+def book_energy(work, before, limit, c):
+    """Add the work [J] of a step that is not stored to the energies of the list c; returns it.
 
-    `before` is the energy in its status before the step, `limit` the friction limit mu_s N [N].
+    Parameters
+    ----------
+    work : float
+        Of the step [J].
+    before : float
+        Energy in the status before the step.
+    limit : float
+        mu_s N [N].
+    c : BondList
     """
     net = work - limit * (c.status[STATUS.energy] - before)
     if c.law[LAW.form] <= FORM_POWER and limit > 0:
         owed = c.status[STATUS.owed] - net / limit
-        c.status[STATUS.owed] = min(max(owed, 0.0), OWED * c.law[LAW.length])
+        c.status[STATUS.owed] = min(max(owed, 0.0), MAX_OWED * c.law[LAW.length])
         net = limit * (c.status[STATUS.owed] - owed)
     if net < 0:
         c.status[STATUS.created] -= net
@@ -106,7 +136,7 @@ def booked(work, before, limit, c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(c, q, v):
-    """(force [N], stored energy [J], irreversible slip [m]) of the list as it stands at the slide q [m]."""
+    """Return force [N], stored energy [J] and slip [m] of the list at q [m]."""
     force = c.force[0] * c.status[STATUS.force]
     return (
         force,

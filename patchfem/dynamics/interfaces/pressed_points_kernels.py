@@ -1,10 +1,13 @@
-"""A contact, `arrays.Rub`, of points under a load that changes in time: elastic-plastic or bonds, each under its own.
+"""A contact of points under a load that changes in time, `arrays.Rub` (compiled).
 
-As on a bench: half of the change of load, the slide under the mean load, the other half. A changing load alone never
-gives energy, and no point keeps more than mu times its load. It leaves the points out of balance with pieces that give
-way in shear, which a mean alone would keep and turn about in every step; so a step ends with the pieces springing back
-while the holder stands. Whoever presses the points writes the nodal forces at both ends of the step, `pressed`. The
-functions whose names do not begin with `rub_` are those that `march.loop_kernels` asks of every contact.
+The points are elastic-plastic or bonds.
+
+A step is half of the change of load, the slide under the mean load, and the other half, as on a
+bench. So a changing load alone never gives energy, and no point keeps more than mu times its load.
+The changing load leaves the points out of balance with pieces that deform in shear; a mean alone
+would keep that and reverse it in every step. So a step ends with the pieces springing back while
+the holder stands. The caller writes the nodal forces at both ends of the step into `pressed`.
+`march.loop_kernels` calls the functions whose names do not begin with `rub_`.
 """
 
 from ...compiled.jit import njit
@@ -20,17 +23,24 @@ from .shear_points_kernels import (
     SLOPE,
     SQUARE,
     STRETCH,
-    respond,
+    write_forces,
 )
-from .shear_solve_kernels import descend, halfway, set_slides, went_on
+from .shear_solve_kernels import accept_step, minimise, set_middle_length, set_slides
 
-MU, MU_KINETIC, LENGTH, INITIAL, KIND, GOAL = range(6)  # of `force`
-TIGHT = 0.01  # share of the goal down to which pieces that give way are solved: their loss is a small difference
+# positions in `Rub.force`: coefficients of friction, bond length [m], initial density, kind of the law, goal [N]
+MU = 0
+MU_KINETIC = 1
+LENGTH = 2
+INITIAL = 3
+KIND = 4
+GOAL = 5
+# residual over the goal, to which pieces that deform in shear are solved; their loss is a small difference
+GOAL_FRACTION = 0.01
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def load_points(part, contact):
-    """Gather the points under load that share of the way through the step, their loads and the modes there."""
+def gather_loaded_points(part, contact):
+    """Gather the points under load at a fraction of the step, their loads and their modes."""
     count = 0
     under = contact.under
     same = True
@@ -49,9 +59,9 @@ def load_points(part, contact):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def press_all(kind, contact):
-    """The memory after half of the change of load, and the mean load, in the points."""
-    load_points(0.5, contact)
+def press_points(kind, contact):
+    """Write the memory after half of the change of load, and the mean load, into the points."""
+    gather_loaded_points(0.5, contact)
     memory = contact.memory
     points = contact.points
     for i in range(contact.count[0]):
@@ -72,9 +82,9 @@ def press_all(kind, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rub_force(dq, kind, contact):
-    """Path-mean friction force [N] and slope [N/m] of a rigid slide increment."""
+    """Return the path-mean friction force [N] and its slope [N/m] for a rigid increment dq [m]."""
     set_slides(dq, contact.b, contact)
-    force = respond(kind, False, contact)
+    force = write_forces(kind, False, contact)
     slope = 0.0
     for i in range(contact.count[0]):
         slope += contact.points[SLOPE, i]
@@ -83,29 +93,43 @@ def rub_force(dq, kind, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve(free, beta, q, v, dt, c, goal):
-    """(dq, path-mean force, iterations) of a step with dq = free - beta force under the mean load, dq = free for beta =
-    0; iterations < 0 when it failed."""
+    """Solve a step with dq = free - beta force under the mean load; dq = free for beta = 0.
+
+    Returns
+    -------
+    dq : float
+    force : float
+    iterations : int
+        Below 0 where it failed.
+    """
     kind = int(c.force[KIND])
     if kind == POINTS:
-        halfway(v, dt, c)
-    press_all(kind, c)
+        set_middle_length(v, dt, c)
+    press_points(kind, c)
     if beta == 0.0:
         c.y[0, 0] = free
-    force, count = descend(free, beta, kind, False, c, TIGHT * goal)
+    force, count = minimise(free, beta, kind, False, c, GOAL_FRACTION * goal)
     return c.y[0, 0], (free - c.y[0, 0]) / beta if beta > 0.0 else force, count
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def given(dq, q, v, dt, c, goal):
-    """(path-mean force [N], whether it was found) over a slide increment dq [m] that is prescribed."""
+    """Return the mean force [N] over a prescribed increment dq [m], and whether it was found."""
     _, force, count = solve(dq, 0.0, q, v, dt, c, goal)
     return force, count >= 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(dq, force, q, v0, v1, dt, c):
-    """Move points and pieces by the solved step; (energy dissipated [J], that of the changing load and of what springs
-    back included, whether the pieces came to balance)."""
+    """Move points and pieces by a solved step.
+
+    Returns
+    -------
+    lost : float
+        Energy dissipated [J], that of the changing load and of the springing back included.
+    is_solved : bool
+        Whether the pieces came to balance.
+    """
     kind = int(c.force[KIND])
     lost = rub_commit(dq, force, v0, v1, dt, kind, c)
     if c.b.size == 0:
@@ -116,17 +140,20 @@ def commit(dq, force, q, v0, v1, dt, c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(c, q, v):
-    """(friction force [N], stored energy [J], irreversible slip [m]) as they stand at the slide q [m]."""
+    """Return friction force [N], stored energy [J] and slip [m] at q [m]."""
     return rub_state(int(c.force[KIND]), c, q)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rub_commit(dq, used, v0, v1, dt, kind, contact):
-    """Move the memory by the solved step; returns the energy dissipated [J], that of the changing load included."""
+    """Move the memory by a solved step; returns the energy dissipated [J].
+
+    It includes that of the changing load.
+    """
     length = contact.force[LENGTH]
     memory = contact.memory
     points = contact.points
-    lost = used * dq + held_energy(kind, contact) if kind == PLASTIC else 0.0
+    lost = used * dq + elastic_energy(kind, contact) if kind == PLASTIC else 0.0
     for i in range(contact.count[0]):
         j = contact.under[i]
         load = points[LOAD, i]
@@ -152,27 +179,36 @@ def rub_commit(dq, used, v0, v1, dt, kind, contact):
                 length,
             )
             lost += 0.5 * contact.weight[i] * (part + s2 - memory[2, j])
-    went_on(contact)
+    accept_step(contact)
     if kind == PLASTIC:
-        return lost - held_energy(kind, contact)
+        return lost - elastic_energy(kind, contact)
     contact.eps[0] = grow(contact.eps[0], v0, v1, abs(dq), dt, contact.growth)[0]
     return lost
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def spring_back(kind, contact, goal):
-    """Bring pieces and points to balance while the holder stands, after the load of the step. Returns (energy lost [J],
-    iterations), < 0: failed."""
+    """Bring pieces and points to balance while the holder stands.
+
+    The load is that at the end of the step.
+
+    Returns
+    -------
+    lost : float
+        Energy [J].
+    iterations : int
+        Below 0 where it failed.
+    """
     memory = contact.memory
     points = contact.points
     y = contact.y[1]
-    load_points(1.0, contact)
-    before = held_energy(kind, contact)
+    gather_loaded_points(1.0, contact)
+    before = elastic_energy(kind, contact)
     for i in range(contact.count[0]):
         points[DENSITY, i] = memory[0, contact.under[i]]
         points[STRETCH, i] = memory[1, contact.under[i]]
     y[:] = 0.0
-    count = descend(0.0, 0.0, kind, True, contact, TIGHT * goal)[1]
+    count = minimise(0.0, 0.0, kind, True, contact, GOAL_FRACTION * goal)[1]
     for i in range(contact.count[0]):
         j = contact.under[i]
         load = points[LOAD, i]
@@ -186,12 +222,12 @@ def spring_back(kind, contact, goal):
             )
     for k in range(contact.b.size):
         contact.b[k] += y[k + 1]
-    return before - held_energy(kind, contact), count
+    return before - elastic_energy(kind, contact), count
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def held_energy(kind, contact):
-    """Elastic energy of the memory and of the pieces [J]."""
+def elastic_energy(kind, contact):
+    """Return the elastic energy of memory and pieces [J]."""
     out = 0.0
     mu = contact.force[MU]
     length = contact.force[LENGTH]
@@ -210,7 +246,7 @@ def held_energy(kind, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rub_state(kind, contact, q):
-    """(friction force [N], stored energy [J], irreversible slip [m]) as they stand."""
+    """Return friction force [N], stored energy [J] and slip [m]."""
     mu = contact.force[MU]
     length = contact.force[LENGTH]
     memory = contact.memory
@@ -218,7 +254,7 @@ def rub_state(kind, contact, q):
     force = 0.0
     slip = 0.0
     total = 0.0
-    load_points(1.0, contact)
+    gather_loaded_points(1.0, contact)
     set_slides(q, contact.b, contact)
     for i in range(contact.count[0]):
         j = contact.under[i]
@@ -230,4 +266,4 @@ def rub_state(kind, contact, q):
             stretch = memory[1, j] / memory[0, j] if memory[0, j] > 0 else 0.0
         slip += points[LOAD, i] * (points[SLIDE, i] - stretch)
         total += points[LOAD, i]
-    return force, held_energy(kind, contact), slip / total if total > 0 else q
+    return force, elastic_energy(kind, contact), slip / total if total > 0 else q

@@ -1,38 +1,56 @@
-"""A contact, `arrays.Sheared`, of bond points behind the shear modes of the pieces, under a load that stays.
+"""A contact of bond points behind shear modes, `arrays.Sheared` (compiled).
 
-The functions are those that `march.loop_kernels` asks of every contact. Most of a cycle of gross slip all points drag:
-their bonds are those of a slide without end, and a further slide the same way has the force weight length load of every
-point, whatever its size. Such a step has a closed form in the modes alone, `dragged`. flow: the way of the drag, +-1 or
-0 where some point does not drag, and the slide of the holder since the start [m]. drag: rows PULL [N] the resultant of
-the forces of the drag and their share of every mode, REACH the largest slide of a point per coordinate, MEAN that of
-the points by their loads. The local slide of a point is that of the holder less psi^T b at all times.
+The load is constant.
+
+For most of a cycle of gross slip all points drag: their bonds are those of a slide without end,
+and a further slide in the same direction has the force weight length load at every point, whatever
+its size. Such a step has a closed form in the modes alone (`drag_all`). The slide of a point is
+that of the holder minus psi^T b at all times. `march.loop_kernels` calls the functions of every
+contact.
 """
 
 from ...compiled.jit import njit
 from ...friction.bonds.point_kernels import bond_step, elastic_bond_step, grow, short_bond_step
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .shear_points_kernels import DENSITY, LOAD, PLAY, POINTS, SLIDE, SQUARE, STRETCH, short
-from .shear_solve_kernels import descend, halfway, went_on
+from .shear_points_kernels import DENSITY, LOAD, PLAY, POINTS, SLIDE, SQUARE, STRETCH, are_short
+from .shear_solve_kernels import accept_step, minimise, set_middle_length
 
-PULL, REACH, MEAN = range(3)  # of `drag`
-WAY, SLID = range(2)  # of `flow`
-SAME = 2e-15  # of the bonds of a drag, by which those of a point that drags may differ, their energy by 100 times that
+# rows of `Sheared.drag`: force, largest slide of a point per coordinate, mean slide of the points
+PULL = 0
+REACH = 1
+MEAN = 2
+# positions in `Sheared.flow`: direction of the drag, and slide of the holder
+WAY = 0
+SLID = 1
+# difference of the bonds of a point from those of a drag, over the latter; that of their energy is 100 times as large
+DRAG_TOL = 2e-15
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def solve(free, beta, q, v, dt, c, goal):
-    """(dq, path-mean force, iterations) of a step with dq = free - beta force; iterations < 0 when it failed."""
-    if c.flow[WAY] != 0.0 and dragged(free, beta, c):
+    """Solve a step with dq = free - beta force, as `element_kernels.solve`.
+
+    Returns
+    -------
+    dq : float
+    force : float
+    iterations : int
+        0 where all points drag, below 0 where it failed.
+    """
+    if c.flow[WAY] != 0.0 and drag_all(free, beta, c):
         return c.y[0, 0], c.flow[WAY] * c.drag[PULL, 0], 0
     c.flow[WAY] = 0.0
-    halfway(v, dt, c)
-    force, count = descend(free, beta, POINTS, False, c, goal)
+    set_middle_length(v, dt, c)
+    force, count = minimise(free, beta, POINTS, False, c, goal)
     return c.y[0, 0], force, count
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def dragged(free, beta, c):
-    """Whether all points drag on in this step; c.y[0] is then its solution, kappa (b + db/2) = psi^T f of the modes."""
+def drag_all(free, beta, c):
+    """Return whether all points drag on in this step; c.y[0] is then its solution.
+
+    It solves kappa (b + db/2) = psi^T f.
+    """
     way = c.flow[WAY]
     y = c.y[0]
     least = 0.0
@@ -48,17 +66,17 @@ def dragged(free, beta, c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def given(dq, q, v, dt, c, goal):
-    """(path-mean force, whether it was found) over a slide increment that is prescribed."""
+    """Return the mean force [N] over a prescribed increment, and whether it was found."""
     c.flow[WAY] = 0.0
-    halfway(v, dt, c)
+    set_middle_length(v, dt, c)
     c.y[0, 0] = dq
-    force, count = descend(dq, 0.0, POINTS, False, c, goal)
+    force, count = minimise(dq, 0.0, POINTS, False, c, goal)
     return force, count >= 0
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def commit(dq, force, q, v0, v1, dt, c):
-    """Move points and pieces by the solved step; (energy dissipated [J], True)."""
+    """Move points and pieces by a solved step; returns the energy dissipated [J] and True."""
     way = c.flow[WAY]
     length = c.eps[1]
     lost = 0.0
@@ -66,37 +84,44 @@ def commit(dq, force, q, v0, v1, dt, c):
     if way != 0.0:
         for k in range(c.y.shape[1]):
             lost += way * c.drag[PULL, k] * c.y[0, k] * (1.0 if k == 0 else -1.0)
-        went_on(c)
+        accept_step(c)
         return lost, True
     loose = c.growth[5] * length
-    lost = moved_short(c, length) if loose == 0.0 and short(c, length) else moved(c, loose, length)
-    went_on(c)
+    lost = (
+        move_points_short(c, length)
+        if loose == 0.0 and are_short(c, length)
+        else move_points(c, loose, length)
+    )
+    accept_step(c)
     c.eps[0] = grow(c.eps[0], v0, v1, abs(dq), dt, c.growth)[0]
     if c.growth[0] < 0.0 and loose == 0.0:
-        c.flow[WAY] = dragging(1.0 if dq > 0.0 else -1.0, c)
+        c.flow[WAY] = find_drag_direction(1.0 if dq > 0.0 else -1.0, c)
     return lost / 2, True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def dragging(way, c):
-    """The way of the drag, 0 where a point does not drag that way."""
+def find_drag_direction(way, c):
+    """Return the direction if all points drag in it, else 0."""
     points = c.points
     length = c.eps[0]
     for j in range(c.weight.size):
         load = points[LOAD, j]
         if not (
-            abs(points[STRETCH, j] - way * length * load) <= SAME * length * load
-            and abs(points[DENSITY, j] - load) <= SAME * load
+            abs(points[STRETCH, j] - way * length * load) <= DRAG_TOL * length * load
+            and abs(points[DENSITY, j] - load) <= DRAG_TOL * load
             and abs(points[SQUARE, j] - 2 * length * length * load)
-            <= 100 * SAME * length * length * load
+            <= 100 * DRAG_TOL * length * length * load
         ):
             return 0.0
     return way
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def moved_short(c, length):
-    """Move all points by their slides, none beyond MAX_SHORT bond lengths [m]; twice the energy that they dissipate [J]."""
+def move_points_short(c, length):
+    """Move all points by slides below MAX_SHORT bond lengths.
+
+    Returns twice the energy dissipated [J].
+    """
     points = c.points
     lost = 0.0
     for j in range(c.weight.size):
@@ -109,10 +134,10 @@ def moved_short(c, length):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def moved(c, loose, length):
-    """Move all points by their slides, of any size; twice the energy that they dissipate [J].
+def move_points(c, loose, length):
+    """Move all points by slides of any size; returns twice the energy dissipated [J].
 
-    loose: half the elastic range of their bonds, length: of a bond [m].
+    loose: half the elastic range of their bonds [m]; length: of a bond [m].
     """
     points = c.points
     lost = 0.0
@@ -136,7 +161,7 @@ def moved(c, loose, length):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def state(c, q, v):
-    """(force [N], stored energy [J], irreversible slip [m]) of points and pieces as they stand."""
+    """Return force [N], stored energy [J] and slip [m] of points and pieces."""
     way = c.flow[WAY]
     energy = 0.0
     slip = c.flow[SLID]
@@ -145,14 +170,16 @@ def state(c, q, v):
         slip -= c.drag[MEAN, k + 1] * c.b[k]
     if way != 0.0:
         return way * c.drag[PULL, 0], energy + c.eps[0] * c.drag[PULL, 0], slip - way * c.eps[0]
-    force, stored, stretch, total = bonds(c)
+    force, stored, stretch, total = sum_bonds(c)
     return force, energy + stored, slip - stretch / total if total > 0 else q
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def bonds(c):
-    """(force [N], stored energy [J], sums of the mean stretch of a point times its load [N m] and of those loads [N])
-    of the points."""
+def sum_bonds(c):
+    """Return the sums of force [N], energy [J], stretch [N m] and load [N] of the points.
+
+    The stretch counts times the load.
+    """
     points = c.points
     force = 0.0
     energy = 0.0

@@ -1,8 +1,9 @@
-"""What points behind shear modes answer to their slides where each is a list of bonds: any order and reading of 2.17.
+"""Forces of points behind shear modes, each a list of bonds (compiled).
 
-Every point has a path, a damage and, where bonds grow, a bond length of its own, at its own speed. Its weight is its
-friction limit [N]. Rows of `points` besides SLIDE, FORCE, SLOPE: the speed [m/s] that its bonds grow at in the step,
-the mean speed of the last one, slide and force of the trial before, nan before the first. Twin:
+The lists have any order and reading of eq. 2.17.
+
+Every point has a path, a damage and, where bonds grow, a bond length of its own, at its own
+velocity. Its weight is its friction limit [N]. The tests compare with
 `friction.bonds.quadrature.Quadrature`, point by point.
 """
 
@@ -11,20 +12,34 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.bonds.list_rows_kernels import CLOCK, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
-from .list_kernels import answer
+from .list_kernels import find_mean_and_slope
 from .shear_points_kernels import FORCE, LOAD, SLIDE, SLOPE
 
-# sums change their rule with the length of a step, by 1e-8 and less
-SLACK = 1e4
-FALLS = True
-CALM = 1 / 16
-PACE, WENT, TRIED, PULLED = range(4)  # of `points`
+# residual over the goal that is accepted where it decreases no further: sums over bonds jump by up to 1e-8
+GOAL_SLACK = 1e4
+# whether a force may decrease as its point slides on
+FORCE_MAY_FALL = True
+# damping of the change of a step over the stiffness of the modes, which forces that jump need
+STEP_DAMPING = 1 / 16
+# rows of `points`: speed at which bonds grow in the step, mean speed of the last step, slide and force of the last trial
+GROWTH_SPEED = 0
+LAST_SPEED = 1
+TRIAL_SLIDE = 2
+TRIAL_FORCE = 3
 
-__all__ = ["CALM", "FALLS", "FORCE", "SLACK", "SLIDE", "SLOPE", "respond"]
+__all__ = [
+    "FORCE",
+    "FORCE_MAY_FALL",
+    "GOAL_SLACK",
+    "SLIDE",
+    "SLOPE",
+    "STEP_DAMPING",
+    "write_forces",
+]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def look_at(j, c):
+def load_list(j, c):
     """Copy the numbers of the list of point j to `now` and `status`."""
     for i in range(c.now.size):
         c.now[i] = c.nows[j, i]
@@ -33,7 +48,7 @@ def look_at(j, c):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def keep(j, c):
+def store_list(j, c):
     """Copy `now` and `status` to the numbers of the list of point j."""
     for i in range(c.now.size):
         c.nows[j, i] = c.now[i]
@@ -42,8 +57,8 @@ def keep(j, c):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def pressure_at(x, pattern):
-    """Pressure of the lower piece at the place x [m], linear between the places of its pattern (2, k), 0 beyond."""
+def interpolate_pressure(x, pattern):
+    """Return the relative pressure of the lower piece at x [m], 0 beyond its places."""
     last = pattern.shape[1] - 1
     if x < pattern[0, 0] or x > pattern[0, last]:
         return 0.0
@@ -60,29 +75,31 @@ def pressure_at(x, pattern):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def varies(c):
-    """Whether the pressure of a point changes in a run."""
+def has_changing_pressure(c):
+    """Return whether the pressure of a point changes in a run."""
     return c.pressed.shape[1] + c.pattern.shape[1] > 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def borne(j, c):
-    """Pressure of point j as it stands, after the step where the load changes."""
+def find_pressure(j, c):
+    """Return the relative pressure of point j, after the step where the load changes."""
     if c.pattern.shape[1] > 0:
-        return pressure_at(c.places[j] + c.nows[j, CLOCK.displacement], c.pattern)
+        return interpolate_pressure(c.places[j] + c.nows[j, CLOCK.displacement], c.pattern)
     return c.pressed[1, j] / c.points[LOAD, j] if c.pressed.shape[1] > 0 else 1.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def begin(dt, c):
-    """Begin the solve of a step of dt [s]: its bonds form under the mean pressure of both its ends, on the lower piece
-    that half way along the slide of the step before."""
+def start_step(dt, c):
+    """Start a step of dt [s]; bonds form under the mean pressure of both its ends.
+
+    On the lower piece that is the pressure half way along the slide of the step before.
+    """
     c.time[0] = dt
     for j in range(c.points.shape[1]):
-        c.points[TRIED, j] = np.nan
+        c.points[TRIAL_SLIDE, j] = np.nan
     if c.pattern.shape[1] > 0:
         for j in range(int(c.count[0])):
-            c.statuses[j, STATUS.pressure] = pressure_at(
+            c.statuses[j, STATUS.pressure] = interpolate_pressure(
                 c.places[j] + c.nows[j, CLOCK.displacement] + 0.5 * c.points[SLIDE, j], c.pattern
             )
     elif c.pressed.shape[1] > 0:
@@ -95,7 +112,7 @@ def begin(dt, c):
 @njit(
     error_model="numpy", forceinline=False, **NJIT_NO_REFCOUNT
 )  # else that of its caller goes on to all that it calls
-def respond(kind, ending, c):
+def write_forces(kind, ending, c):
     """Write path-mean force [N] and slope [N/m] of every point at its slide; returns the friction force [N]."""
     points = c.points
     dt = c.time[0]
@@ -108,14 +125,14 @@ def respond(kind, ending, c):
         if is_empty and is_unpressed:
             points[FORCE, j] = points[SLOPE, j] = 0.0
             continue
-        look_at(j, c)
-        f, s = answer(xi, c, points[PACE, j], dt)
+        load_list(j, c)
+        f, s = find_mean_and_slope(xi, c, points[GROWTH_SPEED, j], dt)
         # many bonds at one place: a mean that ends among them is steeper than s tells
-        if xi != points[TRIED, j]:
-            steep = (f - points[PULLED, j]) / (xi - points[TRIED, j])
+        if xi != points[TRIAL_SLIDE, j]:
+            steep = (f - points[TRIAL_FORCE, j]) / (xi - points[TRIAL_SLIDE, j])
             s = steep if steep > s else s
-        points[TRIED, j] = xi
-        points[PULLED, j] = f
+        points[TRIAL_SLIDE, j] = xi
+        points[TRIAL_FORCE, j] = f
         points[FORCE, j] = c.weight[j] * f
         points[SLOPE, j] = c.weight[j] * s
         force += points[FORCE, j]

@@ -1,7 +1,7 @@
-"""What the points behind shear modes answer to their slides: forces and slopes, by the rows of `arrays.Sheared.points`.
+"""Forces and slopes of points behind shear modes, elastic-plastic or bonds (compiled).
 
-The points are bonds of the stretch reading with p = 1, or elastic-plastic. A step has the path mean of its forces under
-the load in the row LOAD; at its `ending` they are those after the slide.
+The bonds have the stretch reading with p = 1. A step has the path mean of its forces under the
+load in the row LOAD; `ending` asks for the forces after the slide.
 """
 
 from ...compiled.jit import njit
@@ -15,19 +15,28 @@ from ...friction.bonds.point_kernels import (
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
 
+# kinds of the law of the points: elastic-plastic, or bonds
 PLASTIC = 1
 POINTS = 2
-# as `shear_solve_kernels` has them
-SLACK = 100.0
-FALLS = False
-CALM = 0.0
-# elastic-plastic: traction/mu, springs
-DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(8)
+# as in `shear_lists_kernels`, for forces that neither jump nor decrease
+GOAL_SLACK = 100.0
+FORCE_MAY_FALL = False
+STEP_DAMPING = 0.0
+# rows of `Sheared.points`: density, stretch and squared stretch of bonds, or traction/mu and springs; play, load; slide,
+# force and slope in the step
+DENSITY = 0
+STRETCH = 1
+SQUARE = 2
+PLAY = 3
+LOAD = 4
+SLIDE = 5
+FORCE = 6
+SLOPE = 7
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def short(c, length):
-    """Whether no point slides farther than MAX_SHORT bond lengths `length` [m]; not where one slides as far as nan."""
+def are_short(c, length):
+    """Return whether no point slides farther than MAX_SHORT bond lengths; false for nan."""
     points = c.points
     near = 0.0
     for j in range(int(c.count[0])):
@@ -37,13 +46,16 @@ def short(c, length):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def respond(kind, ending, c):
-    """Write force [N] and slope [N/m] >= 0 of every point at its slide; returns the friction force [N]."""
+def write_forces(kind, ending, c):
+    """Write force [N] and slope [N/m] >= 0 of every point at its slide.
+
+    Returns the friction force [N].
+    """
     points = c.points
     weight = c.weight
     length = c.eps[0 if ending else 1]
     force = 0.0
-    if kind == POINTS and not ending and c.growth[5] == 0.0 and short(c, length):
+    if kind == POINTS and not ending and c.growth[5] == 0.0 and are_short(c, length):
         for j in range(int(c.count[0])):
             f, s = short_bond_mean(
                 points[DENSITY, j], points[STRETCH, j], points[SLIDE, j], points[LOAD, j], length
@@ -52,12 +64,12 @@ def respond(kind, ending, c):
             points[SLOPE, j] = weight[j] * max(s, 0.0)
             force += weight[j] * f
         return force
-    return answer(kind, ending, c, length)
+    return write_general_forces(kind, ending, c, length)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def answer(kind, ending, c, length):
-    """`respond` of any law and slide, at a bond length [m]."""
+def write_general_forces(kind, ending, c, length):
+    """Write the forces of `write_forces` for any law and slide, at a bond length [m]."""
     points = c.points
     weight = c.weight
     loose = c.growth[5] * length

@@ -1,15 +1,18 @@
-"""The step solve of points behind shear modes of the pieces: xi_j = dq - sum_k psi_kj db_k.
+"""Step of points behind shear modes of the pieces, by a minimisation (compiled).
 
-Over a step the coordinates b follow kappa (b + db/2) = psi^T f, f the path-mean forces of the points: the work of the
-holder is what the points and the pieces take, so nothing is created. A force that jumps would leave b turning about
-the balance in every step; where a law jumps, kappa CALM (db - db of the step before) stands beside it, which takes two
-thirds of that in a step and changes a smooth motion to second order. `ending`: the pieces spring back while the holder
-stands, kappa (b + db) = psi^T f with the forces f after it, which only loses energy as long as a force grows with the
-slide. Both are minima of convex functions where no slope of a point is below 0, and Newton's method with a line search
-on the slope along the step finds them. The forces of a law that FALLS may fall as its points slide, and then minima
-stand beside each other: what is found lies downhill from where the last steps lead, to which pieces without a mass
-would jump. c: `arrays.Sheared`, or a tuple with its fields from `weight` on. `law` says what the points answer;
-`march.instances` has an instance of this text for points that are lists of bonds.
+The slide of point j in a step is xi_j = dq - sum_k psi_kj db_k, and the coordinates b follow kappa
+(b + db/2) = psi^T f with the path-mean forces f, so the work of the holder is what points and
+pieces take. A force that jumps would leave b oscillating about the balance; for such laws kappa
+STEP_DAMPING (db - db of the step before) is added, which removes two thirds of it in a step and
+changes a smooth motion to second order. With `ending` the pieces spring back while the holder
+stands: kappa (b + db) = psi^T f with the forces after the slide, which only loses energy as long
+as a force grows with the slide.
+
+Both are minima of convex functions where no slope of a point is below 0; Newton's method with a
+line search finds them. The forces of some laws may decrease as their points slide, and then
+several minima exist: the one found lies downhill from where the last steps lead, to which pieces
+without mass would jump. c is an `arrays.Sheared`, or a tuple with its fields from `weight` on.
+`law` has the forces of the points; `march.instances` compiles this text for each.
 """
 
 import numpy as np
@@ -24,25 +27,31 @@ from . import shear_points_kernels as law
 FORCE = law.FORCE
 SLIDE = law.SLIDE
 SLOPE = law.SLOPE
-GRADIENT, STEP, TRIAL = range(3)
-NEAR = 4e-6  # half its square is below the goal of a march, 1e-11
-# times the goal: a residual that round-off keeps from falling further is taken below it
-SLACK = law.SLACK
-FALLS = law.FALLS
-CALM = law.CALM
-# iterations: points that turn to and fro about one place take up to 100
-MOST = 1000 if FALLS else 200
+# rows of `Sheared.workspace`
+GRADIENT = 0
+STEP = 1
+TRIAL = 2
+# step over the bond length, below which Newton's method ends: half its square is below the goal of a march, 1e-11
+LAST_STEP_RATIO = 4e-6
+GOAL_SLACK = law.GOAL_SLACK
+FORCE_MAY_FALL = law.FORCE_MAY_FALL
+STEP_DAMPING = law.STEP_DAMPING
+# iterations; points that move to and fro about one place take up to 100
+MAX_ITERATIONS = 1000 if FORCE_MAY_FALL else 200
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def halfway(v, dt, c):
-    """The bond length in the middle of a step that begins with the speed v [m/s]."""
+def set_middle_length(v, dt, c):
+    """Set the bond length in the middle of a step that begins with the velocity v [m/s]."""
     c.eps[1] = grow(c.eps[0], v, v, abs(v) * dt / 2, dt / 2, c.growth)[0]
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def set_slides(q, moved, c):
-    """Write the slides [m] of the points where the holder slides by q and the coordinates move by `moved` (r,)."""
+    """Write the slides [m] of the points.
+
+    The holder slides by q and the coordinates move by `moved` (r,).
+    """
     psi = c.psi
     points = c.points
     count = int(c.count[0])
@@ -65,8 +74,8 @@ def set_slides(q, moved, c):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def pulled(row, psi, points, count, out):
-    """Write psi^T of a row of the points, (r,), into out (1 + r,) from its second place on."""
+def project_onto_modes(row, psi, points, count, out):
+    """Write psi^T of a row of the points, (r,), into out (1 + r,) from its second entry on."""
     r = psi.shape[0]
     for k in range(0, r - 3, 4):
         one = 0.0
@@ -91,13 +100,16 @@ def pulled(row, psi, points, count, out):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def gradient(y, free, beta, kind, ending, c, out):
-    """Residual (1 + r,) at y = (dq, db); beta = 0 or `ending`: the slide is given. Returns the friction force [N]."""
+def write_gradient(y, free, beta, kind, ending, c, out):
+    """Write the residual (1 + r,) at y = (dq, db); returns the friction force [N].
+
+    With beta = 0 or `ending` the slide of the holder is prescribed.
+    """
     part = 1.0 if ending else 0.5
-    calm = 0.0 if ending else CALM
+    calm = 0.0 if ending else STEP_DAMPING
     set_slides(y[0], y[1:], c)
-    force = law.respond(kind, ending, c)
-    pulled(FORCE, c.psi, c.points, int(c.count[0]), out)
+    force = law.write_forces(kind, ending, c)
+    project_onto_modes(FORCE, c.psi, c.points, int(c.count[0]), out)
     for k in range(c.kappa.size):
         out[k + 1] = (
             c.kappa[k] * (c.b[k] + part * y[k + 1] + calm * (y[k + 1] - c.last[0, k + 1]))
@@ -108,8 +120,11 @@ def gradient(y, free, beta, kind, ending, c, out):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def hessian(beta, ending, c, hess):
-    """Lower half of the Hessian (1 + r, 1 + r) at the slopes of the points, over their forces."""
+def write_hessian(beta, ending, c, hess):
+    """Write the lower half of the Hessian (1 + r, 1 + r) by the slopes of the points.
+
+    It overwrites their forces.
+    """
     psi = c.psi
     points = c.points
     count = int(c.count[0])
@@ -117,7 +132,7 @@ def hessian(beta, ending, c, hess):
     total = 0.0
     for j in range(count):
         total += points[SLOPE, j]
-    pulled(SLOPE, psi, points, count, hess[0])
+    project_onto_modes(SLOPE, psi, points, count, hess[0])
     for k in range(c.kappa.size):
         hess[k + 1, 0] = 0.0 if given else -hess[0, k + 1]
         for j in range(count):
@@ -143,13 +158,16 @@ def hessian(beta, ending, c, hess):
             for j in range(count):
                 dot += points[FORCE, j] * psi[l, j]
             hess[k + 1, l + 1] = dot
-        hess[k + 1, k + 1] += c.kappa[k] * (1.0 if ending else 0.5 + CALM)
+        hess[k + 1, k + 1] += c.kappa[k] * (1.0 if ending else 0.5 + STEP_DAMPING)
     hess[0, 0] = 1.0 if given else 1 / beta + total
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def weighted(out, scale):
-    """Largest residual in force units: modal residuals are multiplied by the slide they stand for."""
+def find_largest_residual(out, scale):
+    """Return the largest residual as a force [N].
+
+    Modal residuals are multiplied by the slide they stand for.
+    """
     worst = abs(out[0])
     for k in range(1, out.size):
         worst = max(worst, abs(out[k]) * scale[k])
@@ -157,24 +175,46 @@ def weighted(out, scale):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def near(p, c):
-    """Whether a Newton step p (1 + r,) moves no point under a load that stays by more than NEAR bond lengths.
+def is_last_step(p, c):
+    """Return whether a Newton step (1 + r,) moves all points by very little.
 
-    The mean of a bond bends by less than its limit over the length squared, so half of NEAR^2 of the limit is left.
+    The limit is LAST_STEP_RATIO bond lengths.
+
+    The curvature of the mean of a bond is below its limit over the length squared, so half of
+    LAST_STEP_RATIO^2 of the limit is left.
     """
     way = abs(p[0])
     for k in range(1, p.size):
         way += c.drag[1, k] * abs(p[k])
-    return way <= NEAR * c.eps[1] and c.drag[0, 0] > 0.0
+    return way <= LAST_STEP_RATIO * c.eps[1] and c.drag[0, 0] > 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def descend(free, beta, kind, ending, c, goal):
-    """Minimum over c.y[ending] = (dq, db) in place, from the guess in it, where dq = free - beta force, dq = free for
-    beta = 0. goal [N]: of the residual. Returns (force [N], iterations), < 0: failed.
+def minimise(free, beta, kind, ending, c, goal):
+    """Minimise over c.y[ending] = (dq, db) in place, from the guess in it.
 
-    The factor of a Hessian serves all solves of a step of the march, until one with it gains less than a factor of ten.
-    A Newton step that is short enough is the last one, and no residual is asked for after it.
+    The factor of a Hessian serves all solves of a step of the march, until an iteration with it
+    gains less than a factor of ten. No residual is computed after a Newton step that is short
+    enough.
+
+    Parameters
+    ----------
+    free, beta : float
+        dq = free - beta force; dq = free for beta = 0.
+    kind : int
+        Of the law of the points.
+    ending : bool
+        Whether the pieces spring back while the holder stands.
+    c : arrays.Sheared
+    goal : float
+        Of the residual [N].
+
+    Returns
+    -------
+    force : float
+        [N].
+    iterations : int
+        Below 0 where it failed.
     """
     which = 1 if ending else 0
     y = c.y[which]
@@ -192,17 +232,17 @@ def descend(free, beta, kind, ending, c, goal):
     for i in range(y.size):
         p[i] = 0.0
     for count in range(
-        MOST
+        MAX_ITERATIONS
     ):  # the first is the guess: one place of the gradient in the code, of two that run it
         if count > 0:
             if c.ready[which] == 0.0:
-                hessian(beta, ending, c, hess)
+                write_hessian(beta, ending, c, hess)
                 if not factor(hess):
-                    if not FALLS:
+                    if not FORCE_MAY_FALL:
                         return force, -count
                     for j in range(int(c.count[0])):
                         c.points[SLOPE, j] = max(c.points[SLOPE, j], 0.0)
-                    hessian(beta, ending, c, hess)
+                    write_hessian(beta, ending, c, hess)
                     if not factor(hess):
                         return force, -count
                 c.ready[which] = 1.0
@@ -210,7 +250,7 @@ def descend(free, beta, kind, ending, c, goal):
             for i in range(y.size):
                 p[i] = -g[i]
             fall = -solve(hess, p)
-            if not stale and not ending and beta > 0.0 and near(p, c):
+            if not stale and not ending and beta > 0.0 and is_last_step(p, c):
                 for i in range(y.size):
                     y[i] += p[i]
                 set_slides(y[0], y[1:], c)
@@ -221,7 +261,7 @@ def descend(free, beta, kind, ending, c, goal):
         for _ in range(40):
             for i in range(y.size):
                 trial[i] = y[i] + part * p[i]
-            force = gradient(trial, free, beta, kind, ending, c, g)
+            force = write_gradient(trial, free, beta, kind, ending, c, g)
             rise = 0.0
             for i in range(y.size):
                 rise += g[i] * p[i]
@@ -231,7 +271,7 @@ def descend(free, beta, kind, ending, c, goal):
             part = safe_point(low, high, max(0.1, -fall / (rise - fall)) * part)
         for i in range(y.size):
             y[i] = trial[i]
-        new = weighted(g, c.scale)
+        new = find_largest_residual(g, c.scale)
         if new <= max(goal, noise + 4e-16 * abs(force)):
             return force, count + 1
         if count > 0:
@@ -239,16 +279,16 @@ def descend(free, beta, kind, ending, c, goal):
                 c.ready[which] = 0.0
             stall = stall + 1 if new >= 0.5 * least and not stale else 0
             stale = c.ready[which] == 1.0
-            if stall >= 4 and new <= SLACK * goal:
+            if stall >= 4 and new <= GOAL_SLACK * goal:
                 return force, count
         size = new
         least = min(least, new)
-    return force, -MOST
+    return force, -MAX_ITERATIONS
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def went_on(c):
-    """Move the coordinates of the pieces by the solved step and leave the next guess, as the last three went on."""
+def accept_step(c):
+    """Move the pieces by a solved step, and extrapolate the next guess from three steps."""
     y = c.y[0]
     last = c.last
     for k in range(c.b.size):

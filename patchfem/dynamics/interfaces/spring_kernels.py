@@ -1,7 +1,10 @@
-"""Compiled springs that are not linear, with the signature of a law: k_3 q^3 + k lambda/(2 pi) sin(2 pi q/lambda).
+"""Nonlinear springs with the signature of a law (compiled).
 
-numbers: k_3 [N/m3] of stiffening, k [N/m] and wavelength lambda [m] of interlocking peaks. The path-mean force is
-(V(q + dq) - V(q))/dq of the potential V, so they neither make nor lose energy at any step.
+The force is k_3 q^3 + k lambda/(2 pi) sin(2 pi q/lambda).
+
+numbers: k_3 [N/m3] of stiffening, k [N/m] and wavelength lambda [m] of interlocking peaks. The
+path-mean force is (V(q + dq) - V(q))/dq of the potential V, so they neither create nor lose energy
+at any step.
 """
 
 from math import cos, pi, sin
