@@ -274,6 +274,7 @@ def _compare_aligned(place: Place, heights, direction: str) -> Comparison:
     left_out = limit_left_out_wear(alignment, section, before, after, heights)
     wear = _measure_wear(alignment, section, left_out)
     is_unchanged = not wear.reference.kind and not wear.has_grown
+    needs_limit = is_unchanged and not wear.reading.headline
     step = _common_step(before, after)
     notes = [*_note_steps(before, after), *_note_stretch(alignment)]
     return Comparison(
@@ -294,9 +295,7 @@ def _compare_aligned(place: Place, heights, direction: str) -> Comparison:
         removed=_count_removed(place),
         is_mirrored=place.is_mirrored,
         gain=find_gain(alignment) if is_unchanged else None,
-        detection_limit=alignment.detection_limit
-        if is_unchanged and not wear.reading.headline
-        else None,
+        detection_limit=alignment.detection_limit if needs_limit else None,
         ambiguity=wear.reading.headline,
     )
 

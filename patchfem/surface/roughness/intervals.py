@@ -28,8 +28,8 @@ from .parameters import Heights, kurtosis, skewness
 from .rows import Parameter
 from .spectrum import BAND, Spectrum, chi_square_factor, estimate_spectrum
 
-LOWER_PROBABILITY = 0.05  # probability of the lower bound
-UPPER_PROBABILITY = 0.95  # probability of the upper bound
+P_LOWER = 0.05  # probability of the lower bound
+P_UPPER = 0.95  # probability of the upper bound
 N_SIMULATED_TRACES = 200  # simulated traces; the probability of a bound is then known to 1.5 %
 MAX_SAMPLES = 2048  # samples of a simulated trace, which keeps all of them below 10 MB
 SPENT_FREEDOM = 2.5  # degrees of freedom that estimating the spectrum takes, from coverage tests
@@ -88,10 +88,7 @@ class Intervals:
             return None, None
         if row.kind in ("power", "slope", "band"):
             freedom = self.freedom(row.kind)
-            low, high = (
-                np.sqrt(chi_square_factor(freedom, p))
-                for p in (UPPER_PROBABILITY, LOWER_PROBABILITY)
-            )
+            low, high = (np.sqrt(chi_square_factor(freedom, p)) for p in (P_UPPER, P_LOWER))
             return value * float(low), value * float(high)
         return self._simulated_interval(row, value)
 
@@ -153,18 +150,13 @@ class Intervals:
             or value <= 0
             or positive.size < N_SIMULATED_TRACES / 2
         ):
-            low, high = (
-                value
-                - np.quantile(values - values.mean(), (UPPER_PROBABILITY, LOWER_PROBABILITY))
-                * spread
-            )
+            low, high = value - np.quantile(values - values.mean(), (P_UPPER, P_LOWER)) * spread
             bounds = {"shift": (-np.inf, np.inf), "fraction": (0.0, 1.0)}.get(
                 row.kind, (0.0, np.inf)
             )
             return max(float(low), bounds[0]), min(float(high), bounds[1])
         low, high = value * np.exp(
-            -np.quantile(np.log(positive / values.mean()), (UPPER_PROBABILITY, LOWER_PROBABILITY))
-            * spread
+            -np.quantile(np.log(positive / values.mean()), (P_UPPER, P_LOWER)) * spread
         )
         return float(low), float(high)
 

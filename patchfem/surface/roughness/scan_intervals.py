@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .intervals import LOWER_PROBABILITY, MAX_DEVIATIONS, UPPER_PROBABILITY
+from .intervals import MAX_DEVIATIONS, P_LOWER, P_UPPER
 from .spectrum import chi_square_factor
 
 SPENT_FRACTION = 0.85  # degrees of freedom left after estimating the spectrum, from 240 scans
@@ -35,10 +35,7 @@ def scan_intervals(z: np.ndarray, values: dict) -> ScanIntervals:
         return ScanIntervals({}, is_uneven=True)
     widening = max(1.0, (values["Sku"] - 1) / 2)
     freedom = max(SPENT_FRACTION * 2 / scatter.variance / widening, 1.0)
-    low, high = (
-        float(np.sqrt(chi_square_factor(freedom, p)))
-        for p in (UPPER_PROBABILITY, LOWER_PROBABILITY)
-    )
+    low, high = (float(np.sqrt(chi_square_factor(freedom, p))) for p in (P_UPPER, P_LOWER))
     bounds = {name: (values[name] * low, values[name] * high) for name in ("Sa", "Sq")}
     for name, variance in (("Ssk", 6 * scatter.cubes), ("Sku", 24 * scatter.fourths)):
         reach = NORMAL_QUANTILE_95 * float(np.sqrt(variance * widening))

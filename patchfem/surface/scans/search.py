@@ -109,15 +109,14 @@ def resample_image(scan: Areal, step: float) -> tuple:
     weight = uniform_filter(known.astype(float), size)
     z = uniform_filter(z, size) / np.maximum(weight, 1e-6)
     places = [
-        np.interp(_make_even_axis(axis, step), axis, np.arange(axis.size))
-        for axis in (scan.y, scan.x)
+        np.interp(_even_axis(axis, step), axis, np.arange(axis.size)) for axis in (scan.y, scan.x)
     ]
     grid = np.meshgrid(*places, indexing="ij")
     known = map_coordinates(weight, grid, order=1, mode="nearest") > 0.5
     return np.where(known, map_coordinates(z, grid, order=1, mode="nearest"), 0.0), known
 
 
-def _make_even_axis(axis, step: float) -> np.ndarray:
+def _even_axis(axis, step: float) -> np.ndarray:
     """Return evenly spaced positions, centred on the middle of the axis; step in [m]."""
     count = max(int(np.ptp(axis) / step + 1e-6) + 1, 2)
     return (axis[0] + axis[-1]) / 2 + step * (np.arange(count) - (count - 1) / 2)
