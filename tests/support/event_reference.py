@@ -1,4 +1,7 @@
-"""An independent twin of the exact engine: DOP853 with events and accelerations by trying every choice."""
+"""Independent version of the exact engine: DOP853 with events.
+
+It tries every choice of signs.
+"""
 
 from collections.abc import Callable
 from itertools import product
@@ -11,7 +14,10 @@ from patchfem.core import ModalBasis
 
 
 class Stretch(NamedTuple):
-    """A smooth stretch of any drive: from `start` [s], value(t); amplitude: its largest, omega: its fastest."""
+    """A smooth stretch of a drive that begins at `start` [s].
+
+    value: function of t; amplitude: largest value; omega: largest angular frequency.
+    """
 
     start: float
     value: Callable
@@ -21,11 +27,11 @@ class Stretch(NamedTuple):
 
 
 def stretches(drive, count: int) -> list:
-    """The first stretches of a drive without segments, each with its own formula beyond its ends."""
+    """Return the first stretches of a drive without segments, each with its own formula."""
     starts = [0.0, *map(float, drive.breaks)][:count]
 
     def value(number):
-        if hasattr(drive, "time"):  # straight lines, the same beyond the row
+        if hasattr(drive, "time"):  # straight lines, which are extended beyond the row
             t, v = (part[number : number + 2] for part in (drive.time, drive.value))
             return lambda x: (
                 v[0] + (v[1] - v[0]) / (t[1] - t[0]) * (x - t[0]) if len(t) == 2 else 0.0
@@ -39,9 +45,10 @@ def stretches(drive, count: int) -> list:
 
 
 def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=False):
-    """Signs of all faces: those in `active` have no slip velocity. pull (n,) without friction.
+    """Choose the signs of all faces; those in `active` have no slip velocity.
 
-    most_sliding: of several choices without a contradiction the one with the most faces that slide, else the fewest.
+    pull (n,) is without friction. Of several choices without a contradiction it is the one in which
+    the fewest faces slide, or the most if `most_sliding` is set.
     """
     options = sorted(
         product((0, 1, -1), repeat=len(active)),
@@ -70,7 +77,7 @@ def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=
 
 
 def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_sliding=False):
-    """[(time, signs, z, v)] at the start of every stretch and at the end."""
+    """Return [(time, signs, z, v)] at the start of every stretch and at the end."""
     faces, mass, n = np.asarray(modes.interfaces), modes.mass, modes.omega.size
     static, kinetic = (
         np.broadcast_to(np.asarray(x, float), (len(faces),)) for x in (static, kinetic)
@@ -173,8 +180,11 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
 
 
 def march_reference(modes, drive, limit, end, z, v, steps):
-    """(time, z) of a Moreau march with theta = 1/2: impulses within +-limit h that leave each face without mean slip
-    or against it, by Gauss-Seidel. static = kinetic = limit (i,)."""
+    """Return (time, z) of a Moreau march with theta = 1/2, solved by Gauss-Seidel.
+
+    Impulses within +-limit h leave each face without mean slip, or act against it; static = kinetic
+    = limit (i,).
+    """
     faces, n, h = np.asarray(modes.interfaces), modes.omega.size, end / steps
     left = np.linalg.inv(
         np.eye(n) + h / 2 * modes.damping_matrix + h * h / 4 * np.diag(modes.omega**2)

@@ -15,8 +15,9 @@ from scipy.spatial import ConvexHull, distance
 
 import patchfem as pf
 
-SAMPLES = 4000  # of a cycle, at which the integration is read
-STEPS = 400  # of a cycle at least: an event and its end between two of them would be missed
+SAMPLES = 4000  # samples per cycle at which the integration is read
+# smallest number of steps per cycle: an event and its end between two of them would be missed
+STEPS = 400
 HEAD = "[structure]\nmasses = {masses}\noutput_mass = {seen}\n"
 LINK = '[[structure.{kind}]]\nbetween = {pair}\n{key} = "{value!r} {unit}"\n'
 RUBS = (
@@ -27,7 +28,10 @@ DRIVE = '[drive]\nkind = "{drive}"\nfrequency = "{frequency!r} Hz"\n{size}\ncycl
 
 
 def chain(seed: int) -> dict:
-    """Numbers of a random chain of 1 to 3 nodes with a mass for x (2 k - 1) and one for y (2 k) each."""
+    """Return the numbers of a random chain of 1 to 3 nodes, two masses each.
+
+    Mass 2 k - 1 moves along x, mass 2 k along y.
+    """
     r = np.random.default_rng(seed)
     nodes = int(r.integers(1, 4))
     masses, links = r.uniform(0.5, 2, 2 * nodes), []
@@ -78,23 +82,23 @@ def chain(seed: int) -> dict:
 
 
 def row(pair, n: int) -> np.ndarray:
-    """Slide of a pair of masses from 1, 0 the base, per motion (n,)."""
+    """Return the slide of a pair of masses, from 1 with 0 for the base, per motion (n,)."""
     unit = np.vstack([np.zeros(n), np.eye(n)])
     return unit[pair[0]] - unit[pair[1]]
 
 
 def matrix(links, n: int) -> np.ndarray:
-    """Sum (n, n) of links (pair, value)."""
+    """Return the sum (n, n) of links (pair, value)."""
     return sum(value * np.outer(row(pair, n), row(pair, n)) for pair, value in links)
 
 
 def dampers_of(springs) -> list:
-    """The dampers that go with springs."""
+    """Return the dampers that belong to springs."""
     return [(pair, 2e-4 * k) for pair, k in springs]
 
 
 def text(s: dict) -> str:
-    """The scene of a chain."""
+    """Return the scene of a chain as text."""
     out = HEAD.format(masses=[f"{m!r} kg" for m in s["masses"].tolist()], seen=s["seen"])
     for kind, links, key, unit in (
         ("spring", s["springs"], "stiffness", "N/m"),
@@ -115,7 +119,10 @@ def text(s: dict) -> str:
 
 
 class Motion:
-    """The rate equations of a chain: y = masses, rates, stretches in turn, then work and loss of every interface."""
+    """Rate equations of a chain.
+
+    y consists of displacements, rates, elongations, and then work and loss of every interface.
+    """
 
     def __init__(self, s: dict):
         self.s, n = s, len(s["masses"])
@@ -130,7 +137,7 @@ class Motion:
         )
 
     def rate(self, t, y, slips):
-        """dy/dt; slips: of every interface, whether it does."""
+        """Return dy/dt; slips: whether each interface slips."""
         n, out = self.n, np.zeros_like(y)
         out[:n] = y[n : 2 * n]
         force = (
@@ -149,7 +156,7 @@ class Motion:
         return out
 
     def event(self, i: int, slips: bool):
-        """What ends the state of interface i."""
+        """Return the event that ends the state of interface i."""
 
         def gap(t, y, *_):
             stretch = y[self.at[i]]
@@ -163,7 +170,7 @@ class Motion:
         return gap
 
     def run(self, end: float, first: float, rtol: float) -> tuple:
-        """(times, y) at SAMPLES a cycle from `first` [s] to the end."""
+        """Return (times, y) at SAMPLES per cycle from `first` [s] to the end."""
         period = 2 * np.pi / self.omega
         times = np.linspace(first, end, round((end - first) / period * SAMPLES) + 1)
         y, slips, t, out = (
@@ -210,18 +217,18 @@ class Motion:
 
 
 def widest(places) -> float:
-    """Largest distance between two of places (k, 1 or 2) [m]."""
+    """Return the largest distance between two positions (k, 1 or 2) [m]."""
     if places.shape[1] == 1:
         return float(np.ptp(places))
     try:
         places = places[ConvexHull(places).vertices]
-    except Exception:  # all on one line
+    except Exception:  # all positions are on a line
         places = places[np.lexsort(places.T)[[0, -1]]]
     return float(distance.pdist(places).max())
 
 
 def measures(motion: Motion, times, y, cycles: float) -> dict:
-    """Measures by name of the last cycles, as MEASURES.md defines them."""
+    """Return the measures of the last cycles by name, as MEASURES.md defines them."""
     s, n, seen = motion.s, motion.n, motion.s["seen"] - 1
     base = s["push"] * np.sin(motion.omega * times) if s["drive"] == "base" else 0.0
     last = -2 * len(motion.rows)
@@ -250,7 +257,7 @@ def measures(motion: Motion, times, y, cycles: float) -> dict:
 
 
 def truth(s: dict, window: int, rtol: float = 1e-10) -> dict:
-    """`measures` of the last `window` cycles of a chain."""
+    """Return the measures of the last `window` cycles of a chain."""
     motion, period = Motion(s), 1 / s["frequency"]
     return measures(
         motion, *motion.run(s["cycles"] * period, (s["cycles"] - window) * period, rtol), window

@@ -1,8 +1,9 @@
-"""An independent program for static patches: the cells of order 4 of studies/contact/order_four.py on grids of its own,
-contact by a plain active set. Nothing of the package is used.
+"""Independent solver of static patches, which uses nothing of the package.
 
-`answer(scene)` regrades its columns to the edges that it finds and gives the measures by name, those of unlike pieces
-with the coupled tangential stiffness. Pieces are rectangles, a longer one overhangs; gaps are tilt, crown and step.
+The cells are those of order 4 of studies/contact/order_four.py, on separate grids; contact is
+solved by a plain active set. `answer(scene)` grades its columns to the contact edges that it finds,
+and gives the measures by name, for unlike pieces with the coupled tangential stiffness. Pieces are
+rectangles, of which a longer one overhangs; gaps are tilt, crown and step.
 """
 
 from __future__ import annotations
@@ -26,7 +27,10 @@ FIRST = (1.0, 1 / 60, 0.6, 16)
 
 @dataclass(frozen=True)
 class PieceInterface:
-    """One piece, lengths [m]; layers: (Young's modulus [Pa], Poisson's ratio) of coating and substrate."""
+    """One piece with lengths [m]; layers: (Young's modulus [Pa], Poisson's ratio) of each layer.
+
+    The layers are coating and substrate.
+    """
 
     length: float
     height: float
@@ -36,8 +40,11 @@ class PieceInterface:
 
 @dataclass(frozen=True)
 class Scene:
-    """A patch under a load [N] at a held tilt [rad]: curvature [1/m] of a crown; step (height, at) [m] or None; skin
-    [Pa/m] or None."""
+    """A patch under a load [N] at a prescribed tilt [rad].
+
+    curvature: of a crown [1/m]; step: (height, position) [m] or None; skin: stiffness of the
+    asperities [Pa/m] or None.
+    """
 
     length: float
     width: float
@@ -52,7 +59,10 @@ class Scene:
 
 
 def spread(points, sizes, begin: float, end: float, growth: float, most: float) -> np.ndarray:
-    """Break points from begin to end: cells of sizes[k] at points[k], growing by `growth` per distance to `most`."""
+    """Return break points from begin to end with cells of sizes[k] at points[k].
+
+    The cells grow by `growth` per distance, up to `most`.
+    """
     points, sizes = np.asarray(points, float), np.asarray(sizes, float)
     stops = np.unique(np.concatenate([[begin, end], points[(points > begin) & (points < end)]]))
     stops = stops[np.concatenate([[True], np.diff(stops)[:-1] > sizes.min() / 4, [True]])]
@@ -71,8 +81,10 @@ def spread(points, sizes, begin: float, end: float, growth: float, most: float) 
 
 
 def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) -> tuple:
-    """(nn, tt, nt) (m, m) [m2/N] of the shared stretch of the face, per unit width, at the nodes of `inner`'s cells;
-    nt: normal motion by shear."""
+    """Return compliances (nn, tt, nt), (m, m) [m2/N], of the common part of the face.
+
+    They are per unit width, at the nodes of the cells of `inner`; nt is the normal motion by shear.
+    """
     x, extra = inner, 0
     if body.length > inner[-1] - inner[0] + 1e-12:
         beyond = spread(
@@ -105,7 +117,7 @@ def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) 
         node = place[
             iy[:, None] * ORDER + local // (ORDER + 1), ix[:, None] * ORDER + local % (ORDER + 1)
         ]
-        last = node >= count - m  # the nodes of the face, all along first
+        last = node >= count - m  # the nodes of the face; all motions along it come first
         dof = np.concatenate(
             [
                 np.where(last, node + count - m, 2 * node),
@@ -132,7 +144,10 @@ def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) 
 
 
 def contact(c, g, load: float, theta_x) -> tuple:
-    """Nodal forces (m,) >= 0 of total `load` and the closing d with c f + g + theta_x - d >= 0, one of both 0."""
+    """Return nodal forces (m,) >= 0 of total `load`, and the approach d.
+
+    The gaps c f + g + theta_x - d are >= 0, and zero where the force is not.
+    """
     gap = g + theta_x
     active = gap <= np.quantile(gap, 0.3)
     for _ in range(400):
@@ -152,8 +167,23 @@ def contact(c, g, load: float, theta_x) -> tuple:
 
 
 def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
-    """(values by name, edges (from, to, free) of every stretch) on columns graded to `edges`; fine: cells at an edge
-    over the shortest stretch; lap: one of LAPS."""
+    """Solve a scene on columns that are graded to `edges`.
+
+    Parameters
+    ----------
+    scene : Scene
+    edges : list
+        Contact edges.
+    fine : float
+        Cell at an edge / shortest stretch.
+    lap : tuple
+        One of LAPS.
+
+    Returns
+    -------
+    tuple
+        Values by name, and the edges (from, to, free) of every stretch.
+    """
     half, (share, corner, growth, inside) = scene.length / 2, lap
     fine *= share
     wide = min((b - a for a, b, _ in edges), default=scene.length)
@@ -179,7 +209,7 @@ def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
     gap = place**2 / 2 * scene.curvature
     if scene.step:
         height, at = scene.step
-        # the corner node of a step belongs to the side that bears, up to its edge
+        # The corner node of a step belongs to the side in contact, up to its edge.
         gap = gap + height * (place > at + 1e-15 if height > 0 else place > at - 1e-15)
     f, d = contact(nn, gap, scene.load / scene.width, scene.tilt * place)
     pressure = f / weight
@@ -198,7 +228,7 @@ def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
     cross = nt[np.ix_(index, index)]
     soft = tt[np.ix_(index, index)] - (cross.T @ own @ cross if scene.upper != scene.lower else 0.0)
     total = scene.width
-    # no curve runs through a jump
+    # A curve cannot follow a jump.
     largest = float(pressure.max()) if scene.step else peak(place, pressure)
     values = {
         "normal_load": scene.load,
@@ -216,7 +246,7 @@ def solve(scene: Scene, edges, fine: float, lap: tuple = FIRST) -> tuple:
 
 
 def peak(x, pressure) -> float:
-    """Largest pressure of the polynomial through the five nodes about the largest one."""
+    """Return the maximum of the polynomial through the five nodes around the largest pressure."""
     top = int(np.argmax(pressure))
     if not 2 <= top < x.size - 2 or (pressure[top - 2 : top + 3] <= 0).any():
         return float(pressure[top])
@@ -226,7 +256,10 @@ def peak(x, pressure) -> float:
 
 
 def edge_of(x, pressure, node: int, side: int, scene: Scene) -> float:
-    """Where the square of the pressure vanishes behind the last node; at a border or a step that place itself."""
+    """Return the position at which the square of the pressure vanishes after the last node.
+
+    At a border or a step it is this position itself.
+    """
     if node in (0, x.size - 1):
         return float(x[node])
     if scene.step and abs(x[node] - scene.step[1]) <= abs(x[node] - x[node - side]):
@@ -249,8 +282,10 @@ def edge_of(x, pressure, node: int, side: int, scene: Scene) -> float:
 
 
 def answer(scene: Scene, fine: float = 5e-4, start=()) -> tuple:
-    """(values by name, their uncertainty by name): the last of LAPS, and the largest of what it changed and a third of
-    what the one before it changed."""
+    """Return values and their uncertainties by name, from the last of LAPS.
+
+    The uncertainty is the largest of the last change and a third of the change before.
+    """
     edges, found = list(start), []
     for size in (0.03, 0.01):
         edges = solve(scene, edges, size)[1]

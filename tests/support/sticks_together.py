@@ -34,14 +34,17 @@ ORDERS = {
     "release": ("fewest", "most"),
     "step": ("fewest", "most"),
 }
-SAME, BALANCED = 1e-6, 1e-9  # of the largest slide; of the energy
-STEPS, NEAR = 3000, 2e-3  # of the march that decides over dependent faces; its own error
+SAME, BALANCED = 1e-6, 1e-9  # relative to the largest slide; relative to the energy
+STEPS, NEAR = 3000, 2e-3  # steps of the march that decides for dependent faces, and its own error
 LONGEST = 20  # CPU seconds of a reference
 
 
 def spec(seed: int) -> dict:
-    """Numbers of a rig in SI units: `links` are (pair, stiffness [N/m], damping [N s/m]), pairs count from 1, 0 is the
-    base."""
+    """Return the numbers of a rig in SI units.
+
+    `links` are (pair, stiffness [N/m], damping [N s/m]); bodies are numbered from 1, and 0 is the
+    base.
+    """
     r, kind = np.random.default_rng(seed), KINDS[seed % len(KINDS)]
     faces, ratio = int(r.integers(2, 4)), RATIOS[int(r.integers(len(RATIOS)))]
     n = int(r.integers(2 if kind == "twins" or (ratio == 1 and kind != "mirror") else faces, 5))
@@ -83,7 +86,7 @@ def spec(seed: int) -> dict:
 
 
 def text(s: dict) -> str:
-    """The scene of a spec."""
+    """Return the scene of a spec as text."""
     each = ", ".join(f'"{one!r} kg"' for one in s["mass"])
     out = f"[structure]\nmasses = [{each}]\n"
     for pair, k, c in s["links"]:
@@ -108,7 +111,7 @@ def text(s: dict) -> str:
 
 
 def row(pair, n: int) -> np.ndarray:
-    """x_i - x_j of a pair (i, j)."""
+    """Return the row of x_i - x_j of a pair (i, j)."""
     out = np.zeros(n + 1)
     out[pair[0]] += 1
     out[pair[1]] -= 1
@@ -116,7 +119,7 @@ def row(pair, n: int) -> np.ndarray:
 
 
 def matrices(s: dict) -> tuple:
-    """Mass, stiffness and damping (n, n), rows of the faces (i, n) of a rig."""
+    """Return mass, stiffness and damping (n, n), and rows of the faces (i, n) of a rig."""
     n = len(s["mass"])
     stiff, damp = (
         sum(link[which] * np.outer(row(link[0], n), row(link[0], n)) for link in s["links"])
@@ -126,8 +129,10 @@ def matrices(s: dict) -> tuple:
 
 
 def marched(s: dict, time, slide) -> float:
-    """Largest distance of slides (i, t) [m] at times (t,) [s], its end the last, from a march of impulses, over the
-    largest slide."""
+    """Return the largest distance of slides (i, t) [m] from a march of impulses.
+
+    It is relative to the largest slide; the last of the times (t,) [s] is the end.
+    """
     mass, stiff, damp, faces = matrices(s)
     square, shapes = eigh(stiff, mass)
     modes = SimpleNamespace(
@@ -156,9 +161,10 @@ def marched(s: dict, time, slide) -> float:
 
 
 def truth(s: dict, end: float, order: str) -> tuple:
-    """(times (t,) [s] of events and the end, slides (t, i) [m], signs (t, i)) by the reference, in modes of unit mass.
+    """Return times (t,) [s] of events and the end, slides (t, i) [m] and signs (t, i).
 
-    order: as in ORDERS; `together`: the alike faces are one that carries the load of all, bodies that are alike one.
+    They are those of the reference, in modes of unit mass. order: as in ORDERS; with `together`,
+    equal faces are one that carries the load of all, and equal bodies are one.
     """
     (mass, stiff, damp, faces), n = matrices(s), len(s["mass"])
     same, bodies = np.arange(len(faces)), np.eye(n)
@@ -201,8 +207,10 @@ def truth(s: dict, end: float, order: str) -> tuple:
 
 
 def compare_rig(seed: int, folder: Path | None = None, earlier: dict | None = None) -> dict:
-    """Compare the slides of a rig with the reference at its events, for each order of its choices until one agrees;
-    see `campaigns`."""
+    """Compare the slides of a rig with the reference at its events; see `campaigns`.
+
+    Each order of choices is tried until one agrees.
+    """
     s = spec(seed)
     line = {"group": f"{s['kind']}, {s['ratio']}", "engine": "events"}
     try:
