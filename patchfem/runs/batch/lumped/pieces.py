@@ -218,7 +218,7 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
     with np.errstate(all="ignore"):
         values = read_off(reading, book, True, True, stiffness, size) | rings
     worked, lost_in = (
-        np.array([getattr(one.end[1], name).sum() for one in done]) for name in ("worked", "lost")
+        np.array([getattr(one.end[1], name).sum() for one in done]) for name in ("work", "loss")
     )
     values |= {
         "normal_load": load,
