@@ -290,7 +290,7 @@ def backbone(
     method gave no curve. Raises PatchfemError for a scene without rig or friction, an unknown mode and amplitudes that
     are not positive lengths.
     """
-    model = joint.freed(build(scene, **sets))
+    model = joint.without_joint(build(scene, **sets))
     ways = backbones.METHODS if _word(method, "backbone: method") == "all" else (method,)
     if unknown := set(ways) - set(backbones.METHODS):
         raise PatchfemError(
@@ -423,8 +423,9 @@ def run_many(
     """
     if isinstance(models, str | Path | Scene | Model | Mapping) or not isinstance(models, Iterable):
         models = [models]
-    return batches.answers(
-        meshes.meshed([build(one) for one in models]), say=_on_stderr if say is None else say
+    return batches.solve_models(
+        meshes.with_shared_meshes([build(one) for one in models]),
+        say=_on_stderr if say is None else say,
     )
 
 

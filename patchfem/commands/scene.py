@@ -102,7 +102,7 @@ def plan(
     answer = found.as_json()
     if probe:
         answer["seconds"] = round(answer["seconds"] * cost_model.measure_machine_time_ratio(), 2)
-    if probe and (solved := faces.probed(found.model)):
+    if probe and (solved := faces.static_measures_without_errors(found.model)):
         chain = answer["stiffness_chain"]
         chain |= {
             name: solved[name.replace("pieces_shear", "tangential_stiffness")]

@@ -10,7 +10,7 @@ from .. import __version__
 from ..core import Missing, NotConverged, PatchfemError
 from ..disk.atomic_write import write_text
 from ..runs.results.result import Result, without_folders
-from ..runs.run import KeptState, marches, run
+from ..runs.run import StateFile, marches, run
 from . import netcdf, report
 from .fields import bodies as body_fields
 from .histories import contents
@@ -70,7 +70,7 @@ def run_into(
     with Folder(target, resume) as folder:
         if folder.dropped and say is not None:
             say(folder.dropped)
-        kept = KeptState(folder.path / STATE, __version__, resume) if keeps(what) else None
+        kept = StateFile(folder.path / STATE, __version__, resume) if keeps(what) else None
         try:
             result = run(what, say, progress, fresh=fresh, kept=kept)
         except NotConverged as error:

@@ -168,7 +168,7 @@ def run_away_of(result: Result) -> dict:
     friction alone does not limit the amplitude at resonance.
     """
     found = (
-        rig_plan.run_away(result.plan.model)
+        rig_plan.drive_and_knee(result.plan.model)
         if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS)
         else {}
     )

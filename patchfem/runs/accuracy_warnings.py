@@ -98,7 +98,11 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
     excess = {name: times for name, times in excess.items() if times > 1}
     has_faces = found.patch is None and model.has_interface_patches
     pressed = (
-        faces.measured(model) if has_faces else patch_rows.TABLE if found.patch is not None else ()
+        faces.static_measures(model)
+        if has_faces
+        else patch_rows.TABLE
+        if found.patch is not None
+        else ()
     )
     static = {name: times for name, times in excess.items() if name in pressed}
     moving = {name: times for name, times in excess.items() if name not in pressed}
@@ -250,7 +254,7 @@ def _refining_tolerance(found: Finding, coarse) -> float | None:
             return None
     if not any(coarse) or asked.mesh.shared is not None:
         return TIGHTER * tolerance
-    return ladder.climbs_at(
+    return ladder.tolerance_of_next_mesh(
         asked, found.climbed or [found.patch, *coarse], asked.mesh.tolerance or tolerance
     )
 
@@ -314,7 +318,11 @@ def _step_remedy(found: Finding, name: str, excess: dict, steps: int) -> str:
     parts = found.extra.get("left_open") or {"parts": {"steps": {name: 1.0}}, "orders": {name: 2.0}}
     order = parts["orders"].get(name)
     exact = ""
-    if model.kind == "rig" and model.accuracy.method != "exact" and not engines.inexact(model):
+    if (
+        model.kind == "rig"
+        and model.accuracy.method != "exact"
+        and not engines.reason_not_exact(model)
+    ):
         pinned = (
             ""
             if model.accuracy.steps_per_cycle is None

@@ -17,7 +17,7 @@ from .patch import result as patch_result
 from .patch.jenkins_elements import elements, strip_elements
 
 
-def freed(model: Model, patch=None) -> Model:
+def without_joint(model: Model, patch=None) -> Model:
     """Return the model with the modes without the joint; any other model unchanged.
 
     Parameters
@@ -54,7 +54,7 @@ def patch_stiffness(model: Model, patch) -> float:
     return float(elements(patch, f.static, length).stiffness.sum())
 
 
-def held_patch(model: Model, patch, apart: tuple):
+def stuck_patch_stiffness(model: Model, patch, apart: tuple):
     """Return the Measure of the stiffness [N/m] of a pressed Patch that sticks, or None.
 
     It is the value that its run prints, extrapolated over the meshes, and exists only if the pieces
@@ -77,5 +77,5 @@ def held_patch(model: Model, patch, apart: tuple):
         or not law_has_trait(model.friction.law, "set-valued")
     ):
         return None
-    found = patch_result.measured(model, patch, tuple(apart)).get("tangential_stiffness")
+    found = patch_result.static_measures(model, patch, tuple(apart)).get("tangential_stiffness")
     return None if found is None or found.value is None or found.error is None else found

@@ -23,7 +23,7 @@ CURES = {
 }
 
 
-def largest(parts: tuple) -> str:
+def describe_largest_part(parts: tuple) -> str:
     """Return a sentence on the largest memory part that a key of the scene sets, with this key.
 
     It is "" if this part is small.
@@ -42,14 +42,14 @@ def free_bytes(compiled: bool = False) -> float:
     The system, its control group and its own limits are considered; inf if none is known. compiled:
     whether the compiler library is needed as well, which counts for address space only.
     """
-    used, mapped = own_bytes()
+    used, mapped = process_bytes()
     beside = mapped - used + MAPPED + (CODE if compiled else 0.0)
     return min(
         _available() + used, free_in_control_group(used), *(limit - beside for limit in _limits())
     )
 
 
-def own_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
+def process_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
     """Return memory in use and address space of this process [bytes]; zeros if not known."""
     try:
         size, resident = map(int, status.read_text("ascii").split()[:2])
@@ -143,7 +143,7 @@ def _left(folder: Path, limit: str, usage: str) -> float:
     )
 
 
-def refusal(parts: tuple, free: float | None = None) -> str:
+def reason_of_refusal(parts: tuple, free: float | None = None) -> str:
     """Return why a run with these memory parts is impossible; "" if it is possible.
 
     The sentence names the required and the free memory, and the largest part with its key.
@@ -161,5 +161,5 @@ def refusal(parts: tuple, free: float | None = None) -> str:
 
 def refuse(parts: tuple) -> None:
     """Raise Missing if a run would need more memory than there is."""
-    if text := refusal(parts):
+    if text := reason_of_refusal(parts):
         raise Missing(text, "")

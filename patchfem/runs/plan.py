@@ -175,10 +175,10 @@ def plan(asked, per_point: bool = False) -> Plan:
     """
     model = asked if isinstance(asked, Model) else build(asked)
     with locate_errors(model.source):
-        return _planned(model, per_point)
+        return _make_plan(model, per_point)
 
 
-def _planned(model: Model, per_point: bool) -> Plan:
+def _make_plan(model: Model, per_point: bool) -> Plan:
     """Return the Plan of a Model."""
     if model.measured is not None:
         try:
@@ -190,13 +190,16 @@ def _planned(model: Model, per_point: bool) -> Plan:
     chain, groups = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}, {}
     if model.rig is not None and model.rig.structure.without_joint is not None:
         model = replace(
-            model, rig=of_rig.foreseen(model.rig, patch_plan.chain(model.patch) | _link(model))
+            model,
+            rig=of_rig.without_expected_joint(
+                model.rig, patch_plan.chain(model.patch) | _link(model)
+            ),
         )
     on_motion, on_patch, on_law = [], [], []
     if model.rig is not None:
         chain = of_rig.chain(model.rig) | chain
         groups |= of_rig.groups(model) if model.kind == "rig" else {}
-        on_motion += engines.knobs_idle(model, engines.engine_of(model, per_point).name)
+        on_motion += engines.unused_settings(model, engines.engine_of(model, per_point).name)
     if model.patch is not None:
         chain |= patch_plan.chain(model.patch)
         groups |= patch_plan.groups(model)
@@ -307,9 +310,9 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
 def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
     """Return the sentences of a plan; said: those on the motion, the patch and the friction law."""
     out = list(said[0])
-    if text := memory.refusal(parts):
+    if text := memory.reason_of_refusal(parts):
         out.append(f"`run` will refuse this scene: {text}")
-    elif text := memory.largest(parts):
+    elif text := memory.describe_largest_part(parts):
         out.append(text)
     out += [*said[1], *said[2]]
     if "slip_length" in groups:
@@ -357,15 +360,15 @@ def _link(model: Model) -> dict:
     others = model.rig.friction.interfaces[1:] if model.rig is not None else ()
     return (
         valley
-        | _of_law(model.friction, load)
+        | _law_link(model.friction, load)
         | {
-            f"bonds_{k}": _of_law(one.numbers, load if one.load is None else one.load)["bonds"]
+            f"bonds_{k}": _law_link(one.numbers, load if one.load is None else one.load)["bonds"]
             for k, one in enumerate(others, 2)
         }
     )
 
 
-def _of_law(f, load: float) -> dict:
+def _law_link(f, load: float) -> dict:
     """Return the link of a law under a load [N]."""
     rigid = "none: it creeps" if law_has_trait(f.law, "creeps") else "rigid until it slips"
     held = record.stick_stiffness(f, load)

@@ -29,19 +29,19 @@ from .rig import engines
 from .self_checks.checks import with_self_checks
 from .wear import evolve, measures
 
-__all__ = ["KeptState", "Plan", "Result", "plan", "run"]
+__all__ = ["Plan", "Result", "StateFile", "plan", "run"]
 # "module function" of this folder that runs each kind of scene; imported and called only in `_run`
 KINDS = {
     "patch": "patch.result static",
-    "bench": "bench.result prescribed",
-    "rig": "rig.rig coupled",
-    "linear": "rig.rig coupled",
+    "bench": "bench.result run_prescribed",
+    "rig": "rig.rig run_coupled",
+    "linear": "rig.rig run_coupled",
 }
 
 AT_REST = "no motion was found; the measures are those of the pressed patch at rest"
 
 
-class KeptState(NamedTuple):
+class StateFile(NamedTuple):
     """File with the state of a long run.
 
     - path: the file.
@@ -61,7 +61,7 @@ def run(
     per_point: bool = False,
     estimate: bool = True,
     fresh: bool = False,
-    kept: KeptState | None = None,
+    kept: StateFile | None = None,
 ) -> Result:
     """Run a Plan, or plan and run a Scene or a Model.
 
@@ -99,14 +99,14 @@ def run(
 
 
 def _run(
-    what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: KeptState | None
+    what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: StateFile | None
 ) -> Result:
     """Run a plan whose size was accepted; the parameters are those of `run`."""
     begin, model = perf_counter(), what.model
     seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
     patch, coarse, climbed, still = None, (None, None), (), ()
     if model.rig is not None:
-        warnings += engines.knobs_idle(model, what.engine)
+        warnings += engines.unused_settings(model, what.engine)
     if model.patch is not None:
         patch, *coarse = patch_result.solve_all(
             model.patch, model.accuracy.tolerance, estimate, fresh
@@ -117,9 +117,9 @@ def _run(
             )
         seconds["contact"] = perf_counter() - begin
         if model.rig is not None and model.rig.structure.without_joint is not None:
-            model = joint.freed(model, patch)
+            model = joint.without_joint(model, patch)
             what = replace(what, model=model)
-        warnings += patch_result.strained(model.patch, patch)
+        warnings += patch_result.warn_of_strains(model.patch, patch)
         if estimate and coarse[0] is None:
             fewer = (
                 "split the elements of contact.mesh"
@@ -130,17 +130,17 @@ def _run(
                 f"the {patch.x.size - 1} elements along the interface are too few for an estimate of the "
                 f"error; {fewer}"
             )
-        notes += patch_result.left_out(model, patch, coarse)
+        notes += patch_result.notes_on_neglected_effects(model, patch, coarse)
     if model.has_interface_patches:
         if fresh:
-            faces.condensed_anew(model)
+            faces.condense_again(model)
         warnings += faces.warnings_of(model)
         notes += faces.notes_of(model)
         seconds["contact"] = perf_counter() - begin
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and model.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
         result = patch_result.static(what, patch, coarse, seconds, warnings)
-    elif _unloaded(model):
+    elif _has_no_load(model):
         warnings += [Outcome.NO_CONTACT.sentence, "no friction acts and no motion was computed"]
         result = Result(
             what,
@@ -166,38 +166,41 @@ def _run(
         module, function = KINDS[what.kind].split()
         solve = getattr(import_module(f"patchfem.runs.{module}"), function)
         try:
-            with _keeping(kept, what, patch):
+            with _saving_context(kept, what, patch):
                 result = solve(
                     here, patch, coarse, seconds, warnings, say, progress, per_point, estimate
                 )
         except NotConverged as error:
             if patch is not None and what.kind != "patch":
                 at_rest = patch_result.static(what, patch, coarse, seconds, [*warnings, AT_REST])
-                error.partial_result = _whole(
+                error.partial_result = _complete_result(
                     replace(at_rest, outcome=Outcome.NOT_CONVERGED), notes, begin, coarse
                 )
             raise
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
-            at_rest = patch_result.measured(
+            at_rest = patch_result.static_measures(
                 model, *((still[0], still[1:]) if still else (patch, coarse))
             )
             result = replace(result, measures=at_rest | found)
         if model.has_interface_patches:
-            own = faces.measured(model)
+            own = faces.static_measures(model)
             result = replace(
                 result,
-                extra=result.extra | {"faces": faces.seen(model, result.extra.get("shots", ()))},
+                extra=result.extra
+                | {"faces": faces.faces_with_frames(model, result.extra.get("shots", ()))},
                 measures=own | {name: m for name, m in result.measures.items() if name not in own},
             )
         if model.wear is not None:
-            result = measures.worn(replace(result, plan=what), evolved, estimate)
+            result = measures.add_wear_measures(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
         compiled.ran(compiled_kind(model, what.engine, what.unknowns))
-    return _whole(with_self_checks(result), notes, begin, coarse, climbed, still)
+    return _complete_result(with_self_checks(result), notes, begin, coarse, climbed, still)
 
 
-def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=(), still=()) -> Result:
+def _complete_result(
+    result: Result, notes: list, begin: float, coarse=(), climbed=(), still=()
+) -> Result:
     """Return the result with its total time, notes, tolerance warnings and meanings.
 
     Parameters
@@ -244,7 +247,7 @@ def _yielding_faces(result: Result) -> dict:
     return strength.yielding_faces(asked, peak.value - (peak.error or 0.0))
 
 
-def _keeping(kept: KeptState | None, what: Plan, patch):
+def _saving_context(kept: StateFile | None, what: Plan, patch):
     """Return a context in which marches save their states, or an empty one.
 
     Raises
@@ -291,7 +294,7 @@ def marches(what: Plan) -> bool:
     return engines.ENGINES[what.engine].resumes
 
 
-def _unloaded(model: Model) -> bool:
+def _has_no_load(model: Model) -> bool:
     """Return whether no interface of a model without a patch carries a load."""
     if model.rig is not None and len(model.rig.friction.names):
         return not any(one.load for one in model.rig.friction.interfaces)

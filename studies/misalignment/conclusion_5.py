@@ -36,7 +36,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import tilted
 from scipy.optimize import brentq
 
-from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.press import press_patch
 
 PORTIONS = (0.9, 0.5, 0.2, 0.05)
 SPRINGS = (None, 1e5, 1e4, 1e3, 300.0, 1e2)  # N m/rad
@@ -58,7 +58,7 @@ def rigid(portion: float, skin: str, halvings: int = 2, *more: str) -> tuple:
     `tilted.case`."""
 
     def press(log_tilt: float):
-        return pressed(tilted.case(10**log_tilt, skin, *more), tilted.pair(halvings))
+        return press_patch(tilted.case(10**log_tilt, skin, *more), tilted.pair(halvings))
 
     tilt = brentq(lambda log_tilt: tilted.rubbed(press(log_tilt)) - portion, -6, -1.3, xtol=1e-5)
     return 10**tilt, -press(tilt).pressure.moment

@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import tilted
 
 from patchfem.core import Measure
-from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 
 SPRINGS = (None, 1e6, 1e5, 1e4, 1e3, 1e2)  # N m/rad; None: a rigid fixture
@@ -70,7 +70,7 @@ def free(offset: float, skin: str = "bare"):
 
 def case(angle: float, spring: float | None) -> dict:
     """Values of the measures at one neutral angle [rad] of the holder and one stiffness [N m/rad] of it."""
-    return values(pressed(held(angle, spring), tilted.pair(1)))
+    return values(press_patch(held(angle, spring), tilted.pair(1)))
 
 
 def tilt_for(fraction: float, spring: float | None, steps: int = 30) -> float:

@@ -15,7 +15,7 @@ import tilted
 from drawing import drawing
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.press import press_patch
 
 HERE = Path(__file__).parent
 TILTS = 10.0 ** np.linspace(-6, -2, 61)
@@ -33,7 +33,7 @@ def portions(spring, skin: str, tilts=TILTS, halvings: int = 1) -> np.ndarray:
     """Rubbed portion at each misalignment [rad] of a holder."""
     return np.array(
         [
-            tilted.rubbed(pressed(fixtures.held(tilt, spring, skin), tilted.pair(halvings)))
+            tilted.rubbed(press_patch(fixtures.held(tilt, spring, skin), tilted.pair(halvings)))
             for tilt in tilts
         ]
     )

@@ -23,7 +23,7 @@ import tilted
 from scipy.optimize import brentq
 
 from patchfem.runs.patch.measures import measures
-from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 
 FRICTION = 0.3  # rig.toml
@@ -41,7 +41,7 @@ def rolled(roll: float, count: int, skin: str):
 
 def case(roll: float, count: int, skin: str = "bare") -> dict:
     """name -> Measure of pieces in strips under a roll [rad], with `yaw` [N m], the moment of sliding friction."""
-    three = [pressed(rolled(roll, count, skin), tilted.pair(k)) for k in (1, 0)]
+    three = [press_patch(rolled(roll, count, skin), tilted.pair(k)) for k in (1, 0)]
     return measures(*three) | {"yaw": abs(three[0].strips.yaw_moment(FRICTION))}
 
 
@@ -49,7 +49,7 @@ def roll_for(centre: float, skin: str, count: int = 16) -> float:
     """Roll [rad] that moves the pressure sideways by `centre` [m]."""
 
     def short(log_roll: float) -> float:
-        found = values(pressed(rolled(10**log_roll, count, skin), tilted.pair(0)))
+        found = values(press_patch(rolled(10**log_roll, count, skin), tilted.pair(0)))
         return abs(found["pressure_centre_lateral"]) - centre
 
     return 10 ** brentq(short, -7, -1.5, xtol=1e-6)

@@ -14,9 +14,9 @@ from patchfem.mesh.grading import Layout, divide_into_columns
 from patchfem.mesh.tensor import TensorGrid, graded_depth
 from patchfem.model.model import build
 from patchfem.model.patch import PatchModel
-from patchfem.runs.patch.condensed import Pair, condensed
+from patchfem.runs.patch.condensed import Pair, condense
 from patchfem.runs.patch.measures import measures
-from patchfem.runs.patch.press import Patch, pressed
+from patchfem.runs.patch.press import Patch, press_patch
 from patchfem.scene import scene
 
 RIG = Path(__file__).parents[1] / "rig" / "rig.toml"
@@ -63,12 +63,12 @@ def pair(halvings: int = 2) -> Pair:
     grid = TensorGrid(x, depth, rows)
     for _ in range(halvings):
         grid = grid.refine()
-    return condensed(asked, grid)
+    return condense(asked, grid)
 
 
 def patches(asked: PatchModel) -> tuple:
     """The Patch of a model of `case` on the finest mesh, on cells twice and four times as long."""
-    return tuple(pressed(asked, pair(k)) for k in (2, 1, 0))
+    return tuple(press_patch(asked, pair(k)) for k in (2, 1, 0))
 
 
 def measured(asked: PatchModel) -> dict:

@@ -14,7 +14,7 @@ from patchfem.response.decay_curve import (
     find_turning_points_outside,
     half_swings_between,
 )
-from patchfem.runs.rig.decays import left_by_mesh
+from patchfem.runs.rig.decays import mesh_errors_of_decay
 
 RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -341,7 +341,7 @@ def test_without_a_static_loop_the_error_of_the_mesh_has_a_reason(old, new, why)
     scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(
         old, new, 1
     )
-    error, said = left_by_mesh(pf.build(scene), None, None, np.array([1e-7, 1e-6]), int)
+    error, said = mesh_errors_of_decay(pf.build(scene), None, None, np.array([1e-7, 1e-6]), int)
     assert said == why and not error.any()
 
 

@@ -10,8 +10,8 @@ from patchfem.core import Missing
 from patchfem.friction.bonds.parameters import MAX_LIST_SECONDS
 from patchfem.friction.record import steady_loop
 from patchfem.runs.bench import bench
-from patchfem.runs.bench.ledger import BLOCK, UNWATCHED, Watch
-from patchfem.runs.bench.stepped import stepped
+from patchfem.runs.bench.ledger import BLOCK, UNWATCHED, PassOptions
+from patchfem.runs.bench.stepped import slide_step_by_step
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -58,7 +58,7 @@ def sum_of(reading, order, growth):
 
 def both(model, steps, patch=None, frames=0):
     time, slide = model.slide.samples(steps)[:2]
-    return bench.run(model, patch, steps, frames), stepped(
+    return bench.run(model, patch, steps, frames), slide_step_by_step(
         model, patch, time, slide, frames, UNWATCHED
     )
 
@@ -168,7 +168,7 @@ def test_exact_the_bar_holds_the_error_of_the_sum(keys, slide):
     assert found.measures["friction_force_peak"].error >= choice.error * 30
     steps = 4 * model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, 2e-6)
     whole = replace(choice, engine="direct", merge=0.0, tail=0.0, error=0.0)
-    truth = bench.run(model, None, steps, watch=Watch(whole))
+    truth = bench.run(model, None, steps, watch=PassOptions(whole))
     for name, measure in found.measures.items():
         if name not in ("work_check", "energy_balance"):
             assert abs(measure.value - truth.values[name]) <= measure.error + measure.floor, name

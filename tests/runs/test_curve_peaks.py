@@ -198,14 +198,14 @@ def test_exact_the_coarser_curve_is_computed_near_the_peak():
     searched as a whole."""
     f = np.linspace(50, 250, 201)
     curve = {"frequency": f, "amplitude": 1 / (1 + ((f - 140) / 10) ** 2)}
-    near = curves.around_the_top(sweep := SweepDrive(50.0, 250.0, 10.0), curve, 140.0)
+    near = curves.sweep_around_peak(sweep := SweepDrive(50.0, 250.0, 10.0), curve, 140.0)
     assert (near.low, near.high, near.duration) == pytest.approx(
         (131.0, 149.0, 10.0)
     ) and near.starts == curves.FEW
-    back = curves.around_the_top(
+    back = curves.sweep_around_peak(
         SweepDrive(250.0, 50.0, 10.0), {name: each[::-1] for name, each in curve.items()}, 140.0
     )
     assert (back.low, back.high) == pytest.approx((149.0, 131.0))
     two = curve | {"amplitude": curve["amplitude"] + 0.85 / (1 + ((f - 220) / 5) ** 2)}
-    assert curves.around_the_top(sweep, two, 140.0) is None
-    assert curves.around_the_top(sweep, curve | {"amplitude": np.ones(201)}, 140.0) is None
+    assert curves.sweep_around_peak(sweep, two, 140.0) is None
+    assert curves.sweep_around_peak(sweep, curve | {"amplitude": np.ones(201)}, 140.0) is None

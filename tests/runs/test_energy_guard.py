@@ -5,7 +5,7 @@ from scene_texts import FORCED
 
 import patchfem as pf
 from patchfem.core import Measure, Outcome
-from patchfem.runs.rig.engines import ENGINES, unbalanced
+from patchfem.runs.rig.engines import ENGINES, describe_balance_error
 
 SCENE = """
 [normal]
@@ -59,7 +59,9 @@ def test_exact_acceleration_of_a_mode_that_its_damping_locks(tmp_path):
     ],
 )
 def test_always_an_energy_balance_above_its_limit_is_reported(engine, value, error, closes):
-    said = unbalanced(ENGINES[engine], {"energy_balance": Measure(value, "1", error, 1e-8)})
+    said = describe_balance_error(
+        ENGINES[engine], {"energy_balance": Measure(value, "1", error, 1e-8)}
+    )
     assert (said == "") is closes
 
 

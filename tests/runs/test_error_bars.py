@@ -11,11 +11,11 @@ from scene_texts import PIECE
 
 from patchfem import build
 from patchfem.runs.patch import ladder
-from patchfem.runs.patch.condensed import condensed
+from patchfem.runs.patch.condensed import condense
 from patchfem.runs.patch.ladder import solve_all
-from patchfem.runs.patch.limits import limit
+from patchfem.runs.patch.limits import extrapolate
 from patchfem.runs.patch.measures import measures
-from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 from patchfem.scene.scene import loads
 
@@ -90,7 +90,7 @@ def compared(seed: int, kind: str) -> dict:
     same = grids[0] is grids[1]
     for _ in range(2):
         grids = [grid.refine() for grid in grids[: 2 - same]]
-        finest.append(values(pressed(model.patch, condensed(model.patch, *grids))))
+        finest.append(values(press_patch(model.patch, condense(model.patch, *grids))))
     return {
         name: (m.value, m.error, truth(*(value[name] for value in finest)))
         for name, m in found.items()
@@ -147,7 +147,7 @@ def campaign(kind: str, first: int, count: int) -> dict:
 def test_exact_the_limit_of_a_geometric_series(ratio):
     """1 + 1/r + 1/r^2 + ... = r/(r - 1); 1.8 times what the finest value lacks is its error."""
     sums = np.cumsum(ratio ** -np.arange(4.0))
-    found, end = limit(sums), ratio / (ratio - 1)
+    found, end = extrapolate(sums), ratio / (ratio - 1)
     assert found.extrapolated == pytest.approx(end, rel=1e-12)
     assert found.error == pytest.approx(1.8 * (end - sums[-1]), rel=1e-12)
     assert found.left == pytest.approx((end - sums[-1]) / (4 if ratio > 2.6 else 2), rel=1e-12)

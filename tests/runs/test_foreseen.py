@@ -58,7 +58,7 @@ def planned(text, *sets):
 def test_refuses_before_anything_is_made_with_the_key_that_drives_it(text, sets, key):
     tracemalloc.start()
     found = planned(text, *sets)
-    said = memory.refusal(found.cost.parts, GIGABYTE)
+    said = memory.reason_of_refusal(found.cost.parts, GIGABYTE)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert said.startswith("about ") and f"{key}" in said and "1 GB are free" in said

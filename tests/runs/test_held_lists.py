@@ -9,7 +9,7 @@ import pytest
 from patchfem import load, plan
 from patchfem.core import Missing
 from patchfem.runs.rig import lists
-from patchfem.runs.rig.lists import chatters, lists_grow, stalls
+from patchfem.runs.rig.lists import chatters, is_stuck_after_release, lists_grow
 from patchfem.runs.run import run
 
 RIG = """[normal]
@@ -128,7 +128,7 @@ def test_exact_the_printed_law_holds_what_a_spring_pulls_with_half_its_limit(rea
     text = RELEASED.replace("11.82", str(start)).replace("report", reading)
     stiff = 0.3877 * (2 * np.pi * 47.05) ** 2 + 176000
     assert (stiff * start * 1e-6 <= 0.53 * 133.2 / 2) == (held or reading == "stretch")
-    assert stalls(plan(text).model) is held
+    assert is_stuck_after_release(plan(text).model) is held
 
 
 @pytest.mark.parametrize(

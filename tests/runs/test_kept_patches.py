@@ -6,7 +6,7 @@ from scene_texts import COATED, MODE, PLASTIC, SHEAR
 
 import patchfem as pf
 from patchfem.runs.batch import one_by_one
-from patchfem.runs.batch.meshes import meshed
+from patchfem.runs.batch.meshes import with_shared_meshes
 from patchfem.runs.patch import store
 from patchfem.runs.patch.store import content_key
 
@@ -15,7 +15,7 @@ TEXT = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + PLASTIC + MODE
 
 
 def models(angles=(2e-5, 3e-4), levels=(3.0, 5.0, 8.0)) -> list:
-    return meshed(
+    return with_shared_meshes(
         [
             pf.build(TEXT, **{"contact.tilt.angle": angle, "drive.acceleration": 9.81 * level})
             for angle in angles
@@ -75,12 +75,14 @@ def test_always_other_patches_are_not_the_same(changed):
 
 def test_always_a_file_that_may_change_is_read_again(tmp_path):
     own = pf.build(TEXT)
-    assert not store.is_shared(own.patch) and store.is_shared(meshed([own, own])[0].patch)
+    assert not store.is_shared(own.patch) and store.is_shared(
+        with_shared_meshes([own, own])[0].patch
+    )
     (tmp_path / "heights.csv").write_text(
         "x [mm],z [um]\n" + "".join(f"{0.1 * k - 7},{k % 2}\n" for k in range(140))
     )
     (tmp_path / "a.toml").write_text(
         TEXT.replace(SHEAR, SHEAR + '[contact.profile]\nfile = "heights.csv"\n')
     )
-    profiled = meshed([pf.build(tmp_path / "a.toml")] * 2)[0].patch
+    profiled = with_shared_meshes([pf.build(tmp_path / "a.toml")] * 2)[0].patch
     assert profiled.mesh.shared is not None and not store.is_shared(profiled)

@@ -13,8 +13,8 @@ from patchfem.core import NotConverged, PatchfemError
 from patchfem.mesh.files import EDGE_TAGS
 from patchfem.mesh.tensor import graded_grid
 from patchfem.model.pieces import make_piece_meshes
-from patchfem.runs.patch.condensed import condensed
-from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.condensed import condense
+from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -186,7 +186,7 @@ def test_refuses_an_approach_whose_middle_opens_as_the_load_grows(offset):
                 )
             ).patch
             closing.append(
-                values(pressed(found, condensed(found, *make_piece_meshes(found))))["approach"]
+                values(press_patch(found, condense(found, *make_piece_meshes(found))))["approach"]
             )
     assert closing[2:] == pytest.approx(2 * np.array(closing[:2]), rel=1e-9)
     assert closing[0] < 0 < closing[1]

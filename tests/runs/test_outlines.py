@@ -25,7 +25,7 @@ from patchfem.model.pieces import extend_grid, find_rounded_edges, make_piece_me
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.press import solve
-from patchfem.runs.patch.result import strained
+from patchfem.runs.patch.result import warn_of_strains
 from patchfem.runs.patch.values import values
 from patchfem.scene.scene import loads
 
@@ -126,7 +126,7 @@ def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
     assert misses[1] < 4e-3 and misses[0] / misses[1] > 1.8
     assert patch.pressure.sigma_n.max() == pytest.approx(wanted.max(), rel=4e-3)
     assert values(patch)["contact_half_width"] == pytest.approx(half, rel=1e-3)
-    assert "steep" not in " ".join(strained(model, patch))
+    assert "steep" not in " ".join(warn_of_strains(model, patch))
 
 
 def test_order_a_stiff_sharp_block_on_a_long_one_is_the_flat_punch():

@@ -11,7 +11,7 @@ from patchfem.core import Measure, Outcome
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.response.measures import relative_gap
 from patchfem.response.rows import LastCycles
-from patchfem.runs.results.notes import creeping
+from patchfem.runs.results.notes import warn_of_creep
 
 BONDS = 'law = "nonlocal"\nbond_length = "{} m"\n'
 RIG = """
@@ -68,7 +68,7 @@ cycles = 6
 )
 def test_exact_a_drift_of_a_steady_motion_is_said_whatever_the_breakaway(outcome, share, said):
     """A breakaway of up to 0.9 left the drift of a found scene, 62 nm a cycle, as it was: it is no cure."""
-    found = creeping(
+    found = warn_of_creep(
         Bonds(0.3, 1e-6, breakaway=share), outcome, {"drift_per_cycle": Measure(1e-7, "m", 1e-9)}
     )
     assert bool(found) == said and "breakaway" not in "".join(found)

@@ -8,7 +8,7 @@ from scene_texts import COATING, CROWNED_JOINT, PIECE
 
 from patchfem import build
 from patchfem.core import PatchfemError
-from patchfem.runs.batch.meshes import meshed
+from patchfem.runs.batch.meshes import with_shared_meshes
 from patchfem.runs.run import run
 from patchfem.scene import scene
 
@@ -41,7 +41,9 @@ def family(*angles, **keys):
 
 @pytest.mark.parametrize("angle", [1e-6, 1e-3])
 def test_exact_a_case_is_the_cold_run_on_the_shared_mesh(angle):
-    one = next(m for m in meshed(family(1e-6, 1e-5, 1e-3)) if m.patch.gap.angle == angle)
+    one = next(
+        m for m in with_shared_meshes(family(1e-6, 1e-5, 1e-3)) if m.patch.gap.angle == angle
+    )
     run(one)
     warm, cold = run(one), run(one, fresh=True)
     assert warm.patch.x.size == cold.patch.x.size
@@ -56,7 +58,9 @@ def test_exact_other_geometries_and_lonely_cases_keep_their_own_mesh():
         family(1e-4, 1e-5, keys='plane = "stress"\n'),
         PatchfemError("a case that was refused"),
     )
-    found = meshed([*family(1e-4), fault, *plane, *family(1e-4, keys='element_size = "0.4 mm"\n')])
+    found = with_shared_meshes(
+        [*family(1e-4), fault, *plane, *family(1e-4, keys='element_size = "0.4 mm"\n')]
+    )
     assert found[1] is fault
     cases = [found[0], *found[2:]]
     assert [one.patch.mesh.shared is None for one in cases] == [True, False, False, True]
@@ -69,8 +73,8 @@ def test_always_a_case_that_cannot_be_pressed_costs_the_others_nothing():
         replace(one, patch=one.patch.with_loading(load=100.0, line_moment=10.0, can_rotate=True))
         for one in good[:1]
     ]
-    found = meshed([*good, *tipped])
-    assert found[0].patch.mesh.shared.name == meshed(good)[0].patch.mesh.shared.name
+    found = with_shared_meshes([*good, *tipped])
+    assert found[0].patch.mesh.shared.name == with_shared_meshes(good)[0].patch.mesh.shared.name
     with pytest.raises(PatchfemError, match="tips over"):
         run(found[2])
 
@@ -91,7 +95,7 @@ tolerance = 1e-2
 
 def test_always_loops_of_a_sweep_have_errors_like_those_of_single_runs():
     cases = [build(scene.loads(JOINT.format(size))) for size in (0.2, 1.4, 10.0)]
-    for own, shared in zip(cases, meshed(cases), strict=True):
+    for own, shared in zip(cases, with_shared_meshes(cases), strict=True):
         alone, found = (run(one).measures["loop_area"] for one in (own, shared))
         assert found.error <= 1.5 * alone.error
         assert abs(found.value - alone.value) <= found.error + alone.error
@@ -101,7 +105,7 @@ def test_always_cases_of_a_sweep_have_the_remedies_of_single_runs():
     """A shared mesh has other nodes, so that errors differ a little; what cures them is the same."""
     text = JOINT.replace("tolerance = 1e-2", "tolerance = 1e-3")
     cases = [build(scene.loads(text.format(size))) for size in (0.2, 1.4)]
-    for own, shared in zip(cases, meshed(cases), strict=True):
+    for own, shared in zip(cases, with_shared_meshes(cases), strict=True):
         alone, found = run(own), run(shared)
         assert any("the mesh (" in one for one in alone.warnings)
         assert [one.rpartition("; ")[2] for one in found.warnings] == [

@@ -14,8 +14,8 @@ from static_scenes import JUDGED, KINDS, drawn, judged_rows, solve_reference, te
 import patchfem as pf
 from patchfem import build
 from patchfem.model.pieces import make_piece_meshes
-from patchfem.runs.patch.condensed import condensed
-from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.condensed import condense
+from patchfem.runs.patch.press import press_patch
 
 TITANIUM = 'substrate = {young = "120 GPa", poisson = 0.32, density = "4370 kg/m^3"}\n'
 NARROW = (
@@ -185,11 +185,11 @@ def test_always_the_bar_of_a_single_jump_holds_the_worn_peak():
 def test_a_ripple_is_said_where_the_pressure_zigzags(worn, said):
     """One join, which is expected to ripple by 6.7 %: a smooth pressure has none, one on alternating nodes has."""
     asked = build(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM).patch
-    pair = condensed(asked, *make_piece_meshes(asked))
+    pair = condense(asked, *make_piece_meshes(asked))
     pair = replace(
         pair, joint=SimpleNamespace(ripple=0.067, reason="is expected to ripple by 6.7 %")
     )
-    patch = pressed(asked, pair, worn * (-1.0) ** np.arange(pair.compliance.interface.x.size))
+    patch = press_patch(asked, pair, worn * (-1.0) ** np.arange(pair.compliance.interface.x.size))
     assert [text for text in patch.notes if "ripple" in text] == said * [
         "contact.mesh: is expected to ripple by 6.7 %"
     ]

@@ -9,7 +9,7 @@ import pytest
 from study_module import study
 
 from patchfem.closed_forms import contact as exact
-from patchfem.runs.patch.press import pressed
+from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 
 LOAD, LENGTH = 26 * 4.4482216152605, 12.7e-3
@@ -49,7 +49,7 @@ def asperities(rough):
 
 
 def coarse(tilted, found):
-    return values(pressed(found, tilted.pair(1)))
+    return values(press_patch(found, tilted.pair(1)))
 
 
 @pytest.mark.share(2)
@@ -90,7 +90,7 @@ def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
     from patchfem.runs.patch.measures import measures
 
     found = fixtures.held(1e-3, None)
-    two = measures(pressed(found, tilted.pair(1)), pressed(found, tilted.pair(0)))
+    two = measures(press_patch(found, tilted.pair(1)), press_patch(found, tilted.pair(0)))
     # an independent program with elements of order 5
     best = {
         "contact_fraction": 0.0239193,
@@ -158,7 +158,7 @@ def test_exact_a_spring_adds_what_it_gives_way(tilted, conclusion, fixtures):
     for skin in tilted.SKINS:
         for spring in (1e4, 300.0):
             angle = conclusion.neutral(0.5, skin, spring, 0)
-            found = pressed(fixtures.held(angle, spring, skin), tilted.pair(0))
+            found = press_patch(fixtures.held(angle, spring, skin), tilted.pair(0))
             assert tilted.rubbed(found) == pytest.approx(0.5, abs=1e-4)
             assert found.pressure.rotation == pytest.approx(
                 conclusion.rigid(0.5, skin, 0)[0], rel=1e-3
@@ -195,10 +195,10 @@ def test_always_holders_that_a_thousandth_of_an_inch_allows(conclusion):
 
 def test_exact_strips_are_a_wedge_on_springs(tilted, roll):
     pair = tilted.pair(0)
-    k = values(pressed(tilted.case(0.0), pair))["normal_stiffness"] / LENGTH**2
+    k = values(press_patch(tilted.case(0.0), pair))["normal_stiffness"] / LENGTH**2
     for angle in (5e-6, 1e-4):
         fraction, centre, _, _ = exact.wedge_linear(angle, LOAD, LENGTH, LENGTH, k)
-        found = values(pressed(roll.rolled(angle, 128, "bare"), pair))
+        found = values(press_patch(roll.rolled(angle, 128, "bare"), pair))
         assert found["pressure_centre_lateral"] == pytest.approx(centre, rel=2e-4)
         assert found["contact_fraction"] == pytest.approx(fraction, abs=1 / 128)
 

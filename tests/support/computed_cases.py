@@ -19,8 +19,8 @@ class ComputedCases:
     def __init__(self, monkeypatch):
         self.models = []
         self.chunks_before_interrupt = math.inf
-        self._compute = batches.answers
-        monkeypatch.setattr(batches, "answers", self)
+        self._compute = batches.solve_models
+        monkeypatch.setattr(batches, "solve_models", self)
 
     def __call__(self, models, *more):
         """Compute a chunk of models as the sweep does."""

@@ -177,7 +177,7 @@ def compare_cases(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     begin = process_time()
     found = pf.run_many(models)
     seconds = process_time() - begin
-    singles = models if group in LAWS else meshes.meshed(models)
+    singles = models if group in LAWS else meshes.with_shared_meshes(models)
     mine = [
         case for case in range(N_SINGLES) if found.numerics.get(case, {}).get("engine") == "lanes"
     ]

@@ -54,7 +54,7 @@ def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float)
     BenchLoop
     """
     path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None, None)
-    alone = replace(decays.steadily(model), kind="bench", rig=None, slide=path)
+    alone = replace(decays.with_automatic_method(model), kind="bench", rig=None, slide=path)
     steps = steps_of(alone)
     return BenchLoop(bench.run(alone, patch, steps), alone, steps)
 

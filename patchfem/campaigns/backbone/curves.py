@@ -11,7 +11,7 @@ from ...formatting import format_length
 from ...model.model import Model
 from ...model.source import locate_errors
 from ...response.errors import finer_errors
-from ...runs.joint import held_patch
+from ...runs.joint import stuck_patch_stiffness
 from . import notes
 from .balance import compute_balance_curve
 from .decay import compute_decay_curve
@@ -200,7 +200,7 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
     free = free / (2 * np.pi)
     if joint.held[0] is None:
         return ModeFrequencies(free, None)
-    measure = held_patch(model, joint.patch, joint.coarser)
+    measure = stuck_patch_stiffness(model, joint.patch, joint.coarser)
     # Modes that were measured with the joint have the stiffness of the joint in them.
     if (
         measure is None

@@ -106,7 +106,7 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
             "at these amplitudes the free decay is no longer a motion of this mode alone: the "
             f"motion of other modes is more than {100 * MAX_OTHER_MODES:.0f} % of its amplitude"
         )
-    mesh_error, reason = decays.left_by_mesh(
+    mesh_error, reason = decays.mesh_errors_of_decay(
         joint.model, joint.patch, joint.coarse, amplitudes, lambda laws: joint.mode
     )
     error = np.fmax(reading.run_error, mesh_error) + reading.reading_error
@@ -427,7 +427,7 @@ def _raise_release(joint: Joint, begin: float, high: float, largest: float) -> f
 
 def release_model(joint: Joint, amplitude: float) -> Model:
     """Return the model of a mode that is released at an amplitude [m] of the output."""
-    model = decays.steadily(joint.model)
+    model = decays.with_automatic_method(joint.model)
     period = 2 * np.pi / (joint.held[0] or joint.modes.omega[joint.mode])
     rig = model.rig.with_signal(
         drives.make_release(period),

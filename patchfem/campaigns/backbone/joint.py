@@ -15,7 +15,7 @@ from ...response.errors import error_of_change
 from ...runs.patch import result as patch_result
 from ...runs.plan import plan
 from ...runs.rig import decays
-from ...runs.rig.plan import held_by
+from ...runs.rig.plan import stuck_stiffness
 from .bench_loops import settle_loop
 
 AMPLITUDES_PER_DECADE = 8  # Number of default amplitudes per decade.
@@ -240,7 +240,7 @@ class Joint(NamedTuple):
             return error
         fine = self.steady_laws()
         if slips_in_parts:
-            error = error + decays.mesh_error(fine, decays.rough_laws(model, self.coarse), read)
+            error = error + decays.mesh_error(fine, decays.coarse_laws(model, self.coarse), read)
         if has_cells:
             best = read(fine)
             changes = [
@@ -284,7 +284,7 @@ def build_joint(model: Model, name: str) -> Joint:
     own = np.eye(modes.omega.size)[number]
     joint = Joint(model, patch, coarser, number, (None, own), np.zeros(len(modes.interfaces)))
     if not joint.is_linear:
-        planned = joint._replace(stiffness=held_by(model.rig, plan(model).chain))
+        planned = joint._replace(stiffness=stuck_stiffness(model.rig, plan(model).chain))
         stiffness = _stuck_stiffness(planned)
         held = modes.stuck_mode(modes.interfaces, stiffness, number)
         joint = joint._replace(held=held, stiffness=stiffness)

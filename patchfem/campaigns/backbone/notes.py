@@ -50,7 +50,7 @@ def note_missing_mesh(joint: Joint) -> list:
     if joint.is_linear:
         return []
     if not model.partial_slip or joint.coarse is not None:
-        has_errors = not model.rig.friction.has_partial_slip or faces.known(model)
+        has_errors = not model.rig.friction.has_partial_slip or faces.has_error_meshes(model)
         return [] if has_errors else [MISSING_ERRORS + faces.UNKNOWN]
     cure = "leave out contact.element_size"
     if model.patch.mesh.file is not None:

@@ -12,8 +12,8 @@ from ...model.model import Model, build
 from ...model.source import locate_errors
 from ...runs.batch import meshes
 from ...runs.bench import bench as law_bench
-from ...runs.bench.engine import smooth_sum_of
-from ...runs.bench.ledger import Watch
+from ...runs.bench.engine import choose_smooth_bond_sum
+from ...runs.bench.ledger import PassOptions
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError
 from .loop_path import count_whole_cycles, prepend_lead_in
@@ -128,7 +128,7 @@ class BenchModel:
         number = np.arange(corner[-1] + 1)
         time = np.interp(number, corner, driven.time)
         displacement = np.interp(number, corner, driven.displacement)
-        watch = Watch(smooth_sum_of(model, displacement), self.say)
+        watch = PassOptions(choose_smooth_bond_sum(model, displacement), self.say)
         run = law_bench.run(model, patch, 4, 0, (time, displacement, 0, 0.0), watch)
         if not run.load[0] > 0:
             raise PatchfemError(

@@ -21,7 +21,7 @@ from ...friction.record import make_law, steady_loop
 from ...identify.least_squares import Fit, fit
 from ...model.model import Model, build
 from ...model.source import locate_errors
-from ...runs.joint import held_patch
+from ...runs.joint import stuck_patch_stiffness
 from ...runs.patch import ladder
 from ...runs.patch.jenkins_elements import elements, strip_elements
 from ...scene.scene import Scene
@@ -226,7 +226,7 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
             if loss_change <= MAX_LOSS_CHANGE or not can_refine:
                 break
             tolerance /= REFINE_FACTOR
-        held = held_patch(model, patch, tuple(others) or (None,))
+        held = stuck_patch_stiffness(model, patch, tuple(others) or (None,))
     loops = PatchLoops(
         load=patch.pressure.load,
         slip_force=parts.slip_force,

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...model.source import locate_errors
 from ...response.spectrum import read_instrument
-from ...runs.batch.watched import Watcher
+from ...runs.batch.watched import MotionObserver
 from ..fits.problem import press_patch
 from .asked import READINGS, Asked
 
@@ -60,11 +60,11 @@ class Computed:
         with locate_errors(model.source):
             patch = self._pressed(model)
             whole = self.reading[0] not in ("peak", "fundamental")
-            watcher = self.watcher = Watcher(model, patch, self.say, whole, self.watcher)
+            watcher = self.watcher = MotionObserver(model, patch, self.say, whole, self.watcher)
             for k in conditions:
                 self.runs += 1
                 if not watcher.by:
-                    watcher = Watcher(self.asked.at(model, k), patch, self.say, whole)
+                    watcher = MotionObserver(self.asked.at(model, k), patch, self.say, whole)
                 seen = watcher(self.asked.sine(k), self.near.get(k) if self.warm else None)
                 if seen is None:
                     self.near.pop(k, None)

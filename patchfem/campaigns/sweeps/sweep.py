@@ -107,7 +107,7 @@ def answer(
     """
     models = _alike(work, numbers) or [_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
-    found = batches.answers(models, keep, say, work.estimate, len(work.cases))
+    found = batches.solve_models(models, keep, say, work.estimate, len(work.cases))
     told = (
         []
         if work.tell is None

@@ -220,7 +220,7 @@ def elements_of(model: Model) -> Elements:
         patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
-    chosen = numerics.by_pieces(model, numerics.choose(model))
+    chosen = numerics.yield_numerics(model, numerics.choose(model))
     groups = pieces.YieldingElements(model, chosen, patch).groups
     stiffness = np.concatenate([one.stiffness for one in groups])
     limit = np.concatenate([one.stiffness * one.yield_displacement for one in groups])

@@ -143,7 +143,7 @@ def batch_of(model: Model, study: int = 1) -> Batch | None:
     return next((one for one in BATCHES if study >= one.least and not one.refuses(model)), None)
 
 
-def answers(
+def solve_models(
     models: Sequence[Model | PatchfemError],
     keep: Callable | None = None,
     say: Callable | None = None,
@@ -167,7 +167,9 @@ def answers(
     study : int
         Number of cases of which these are a part; 0 if they are all.
     """
-    models = models if isinstance(models, SimilarModels) else [_freed(one) for one in models]
+    models = (
+        models if isinstance(models, SimilarModels) else [_without_joint(one) for one in models]
+    )
     found, groups = CaseResults.blank(len(models)), {}
     left, study = np.arange(len(models)), study or len(models)
     if keep is None:
@@ -181,17 +183,17 @@ def answers(
     for (batch, _), cases in groups.items():
         found.place(
             cases,
-            _solved(
+            _solve_cases(
                 batch,
                 select_models(models, cases),
-                partial(one_by_one.solve, keep=_of(keep, cases), estimate=estimate),
+                partial(one_by_one.solve, keep=_with_case_indices(keep, cases), estimate=estimate),
                 say,
             ),
         )
     return found
 
 
-def _freed(model: Model | PatchfemError) -> Model | PatchfemError:
+def _without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
     """Return a model with the modes without the joint, or the error that there are none."""
     if (
         isinstance(model, PatchfemError)
@@ -200,7 +202,7 @@ def _freed(model: Model | PatchfemError) -> Model | PatchfemError:
     ):
         return model
     try:
-        return joint.freed(model)
+        return joint.without_joint(model)
     except PatchfemError as error:
         return error
 
@@ -234,12 +236,12 @@ def _place(model: Model, study: int) -> tuple:
         return None, None
 
 
-def _of(keep: Callable | None, cases: list) -> Callable | None:
+def _with_case_indices(keep: Callable | None, cases: list) -> Callable | None:
     """Return `keep` for a part of the cases, called with indices in this part."""
     return keep and (lambda case, result: keep(cases[case], result))
 
 
-def _solved(
+def _solve_cases(
     batch: Batch | None, models: list, alone: Callable, say: Callable | None
 ) -> CaseResults:
     """Return the results of a group by its batch, or one by one if the batch fails."""

@@ -200,7 +200,9 @@ class CaseResults:
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
 
 
-def joined_answers(count: int, parts: Iterable[tuple[Sequence[int], CaseResults]]) -> CaseResults:
+def join_case_results(
+    count: int, parts: Iterable[tuple[Sequence[int], CaseResults]]
+) -> CaseResults:
     """Return the results of `count` cases from parts, each with the indices of its cases."""
     out = CaseResults.blank(count)
     for cases, part in parts:
@@ -208,7 +210,7 @@ def joined_answers(count: int, parts: Iterable[tuple[Sequence[int], CaseResults]
     return out
 
 
-def unread(model: Model) -> bool:
+def has_unreadable_table(model: Model) -> bool:
     """Return whether a model names a table of measured responses that cannot be read.
 
     Its single run reports the error; a readable table does not change the results.

@@ -34,15 +34,15 @@ from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
 from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as of_patch
 from ..results.result import without_folders
-from ..results.travel import outcome_on_piece, travelled
+from ..results.travel import outcome_on_piece, warn_of_large_slide
 from ..rig.costs import MOST_STEPS
-from ..rig.engines import MARCH, engine_of, knobs_idle
+from ..rig.engines import MARCH, engine_of, unused_settings
 from ..rig.interface import few_points
 from ..rig.lists import quadrature_of
 from ..rig.motion_warnings import law_warnings
 from ..rig.numerics import choose
 from . import one_by_one, patches
-from .case_results import CaseResults, unread
+from .case_results import CaseResults, has_unreadable_table
 from .lumped.columns import MAIN, Runs, batch_answers, known_of
 from .lumped.lumped import take_out
 from .samples import Samples, peaks
@@ -57,7 +57,7 @@ HELD = 1e-3  # slip in bond lengths up to which a case sticks
 RINGS = "ring_frequency", "ring_damping"
 
 
-class _Pressed(NamedTuple):
+class _PressedCase(NamedTuple):
     """Case that marches in a lane.
 
     - fine, coarse: points of its patch, and of the coarser mesh.
@@ -143,7 +143,11 @@ def no_lanes(model: Model) -> str:
         or not law.static > 0
     ):
         return "the bonds of the case change in number or length"
-    if model.heat is not None or model.accuracy.shear_modes is not None or unread(model):
+    if (
+        model.heat is not None
+        or model.accuracy.shear_modes is not None
+        or has_unreadable_table(model)
+    ):
         return (
             "the case has [friction.temperature] or accuracy.shear_modes, or its table of measured responses "
             "cannot be read"
@@ -154,17 +158,19 @@ def no_lanes(model: Model) -> str:
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Return the case results of models of a group."""
     few = [replace(model, patch=model.patch.with_mesh(can_gather_points=True)) for model in models]
-    return patches.pressed_first(few, TOGETHER, lambda part: _solved(part, say))
+    return patches.pressed_first(few, TOGETHER, lambda part: _solve_cases(part, say))
 
 
-def _solved(models: list, say) -> CaseResults:
+def _solve_cases(models: list, say) -> CaseResults:
     """Return the case results of models whose patches are pressed."""
     begin, out, alone = perf_counter(), CaseResults.blank(len(models)), set(range(len(models)))
     held = (
         {}
         if no_lanes(models[0])
         else {
-            case: one for case, model in enumerate(models) if (one := _pressed(model)) is not None
+            case: one
+            for case, model in enumerate(models)
+            if (one := _press_case(model)) is not None
         }
     )
     for steps in sorted({one.numerics.steps for one in held.values()}):
@@ -197,7 +203,7 @@ def _side_by_side(models: list, held: list, steps: int) -> tuple:
     size = max(1, SAMPLES // (steps * held[0].numerics.window * many)) * many
     for first in range(0, len(models), size):
         cases = order[first : first + size]
-        answers, lost[cases], more = _marched(
+        answers, lost[cases], more = _march_cases(
             [models[k] for k in cases], [held[k] for k in cases], steps
         )
         found.place(cases, answers)
@@ -210,7 +216,7 @@ def _side_by_side(models: list, held: list, steps: int) -> tuple:
     return found, lost
 
 
-def _pressed(model: Model) -> _Pressed | None:
+def _press_case(model: Model) -> _PressedCase | None:
     """Return a case with its pressed patch on few points; None if it runs by itself."""
     try:
         with locate_errors(model.source):
@@ -242,15 +248,15 @@ def _pressed(model: Model) -> _Pressed | None:
             ]
             warnings = [
                 *model.source.remarks,
-                *knobs_idle(model, MARCH.name),
-                *of_patch.strained(model.patch, patch),
+                *unused_settings(model, MARCH.name),
+                *of_patch.warn_of_strains(model.patch, patch),
             ]
-            return _Pressed(
+            return _PressedCase(
                 *points,
                 found[0][2],
-                of_patch.measured(model, patch, coarse),
+                of_patch.static_measures(model, patch, coarse),
                 warnings,
-                of_patch.left_out(model, patch, coarse),
+                of_patch.notes_on_neglected_effects(model, patch, coarse),
                 patch,
                 numerics,
             )
@@ -258,7 +264,7 @@ def _pressed(model: Model) -> _Pressed | None:
         return None
 
 
-def _marched(models: list, held: list, steps: int) -> tuple:
+def _march_cases(models: list, held: list, steps: int) -> tuple:
     """March pressed cases with `steps` per cycle.
 
     Returns their results, which (n,) must be run by themselves, and which need twice the steps.
@@ -456,7 +462,7 @@ def _tell(
     found: CaseResults,
     case: int,
     model: Model,
-    one: _Pressed,
+    one: _PressedCase,
     reads: tuple,
     parts: tuple,
     steps: int,
@@ -488,7 +494,7 @@ def _tell(
             *one.warnings,
             *model.rig.structure.notes,
             *law_warnings(model, outcome, drift, 0.0),
-            *travelled(one.patch, reach),
+            *warn_of_large_slide(one.patch, reach),
             *warned,
         ],
         model.source.path,

@@ -42,7 +42,7 @@ class Shared:
         return replace(model, patch=model.patch.with_mesh(shared=meshes))
 
 
-def meshed(models: Sequence[Model | PatchfemError]) -> list:
+def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list:
     """Return the models in their order, with shared meshes for those of one geometry.
 
     A single patch of a geometry keeps the mesh that its own run chooses.

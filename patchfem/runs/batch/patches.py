@@ -103,17 +103,17 @@ def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
     out = CaseResults.blank(len(models))
     for start in range(0, len(models), AT_ONCE):
         cases = range(start, min(start + AT_ONCE, len(models)))
-        out.place(cases, _solved(select_models(models, cases), say))
+        out.place(cases, _solve_cases(select_models(models, cases), say))
     return out
 
 
-def _solved(models: Sequence[Model], say: Callable | None) -> CaseResults:
+def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     """Return the case results of at most AT_ONCE models."""
     begin, first, alike = perf_counter(), models[0], isinstance(models, SimilarModels)
     asked = (
         static.asked_by_columns(models.columns().patch, len(models))
         if alike
-        else static.asked_of([model.patch for model in models])
+        else static.collect_loads([model.patch for model in models])
     )
     found, out = (
         static.pressed_together(asked, first.accuracy.tolerance),
@@ -141,7 +141,7 @@ def _solved(models: Sequence[Model], say: Callable | None) -> CaseResults:
     out.outcome[good & unknown] = str(Outcome.NOT_CONVERGED)
     nodes = {"interface_nodes": found.levels[0].x.size}
     out.numerics.update(dict.fromkeys(np.flatnonzero(good).tolist(), nodes))
-    strained = of_patch.beyond_small_strains(first.patch, found.top, found.approach)
+    strained = of_patch.exceeds_small_strains(first.patch, found.top, found.approach)
     pieces = first.patch.pieces
     mean = found.values["normal_load"] / (pieces.length * pieces.width * pieces.pairs)
     least_peak = found.values["pressure_peak"] - found.errors["pressure_peak"]
@@ -157,7 +157,7 @@ def _solved(models: Sequence[Model], say: Callable | None) -> CaseResults:
             out.warnings[case] = without_folders(warned, model.source.path)
     for case in np.flatnonzero(good).tolist():
         notes = [
-            *of_patch.slender(first.patch, mean[case]),
+            *of_patch.notes_on_tall_pieces(first.patch, mean[case]),
             *found.band(first.patch, case),
             *yielding_faces(first.patch, least_peak[case]).values(),
         ]

@@ -182,7 +182,7 @@ class Samples:
             part = slice(number * steps, (number + 1) * steps + 1)
             slide, speed, force = self.slide[part], self.speed[part], self.found.force[part]
             for k, way in enumerate((-1, 1)):
-                out[k, :, number] = _turned(
+                out[k, :, number] = _largest_slides(
                     way * slide, way * speed, force, rows, self.dt
                 ) * np.array([[way], [1]])
         time = self.angle / self.omega
@@ -289,7 +289,7 @@ def _along(row, motion) -> np.ndarray:
     return out
 
 
-def _turned(slide, speed, force, rows, h: float) -> np.ndarray:
+def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
     """Return the largest slide [m] and the force there [N] (2, n) of a cycle.
 
     As in `loops.find_reversals` with "slide"; the force is NaN if the slide is largest at an end of the

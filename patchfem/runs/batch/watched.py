@@ -1,6 +1,6 @@
 """Motion of a rig at many drives as instruments see it, without errors and events.
 
-In: a model and its patch, then one drive after the other. Out: `Watched`. It serves searches,
+In: a model and its patch, then one drive after the other. Out: `ObservedMotion`. It serves searches,
 which evaluate a model thousands of times. A steady engine finds the motion directly, and may
 start from a motion nearby; any other engine makes its run. Pieces and elements are computed
 once for all drives.
@@ -29,7 +29,7 @@ SAMPLES = 400  # samples of a cycle without friction
 UNBOUNDED = Outcome.GROWS, Outcome.NOT_CONVERGED, Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES
 
 
-class Watched(NamedTuple):
+class ObservedMotion(NamedTuple):
     """Last cycles of a rig.
 
     - window: histories; None if the Watcher does not need them.
@@ -47,7 +47,7 @@ class Watched(NamedTuple):
     fundamental: complex | None = None
 
 
-class Watcher:
+class MotionObserver:
     """Model of kind rig or linear that is evaluated at one drive after the other.
 
     A call with a drive (core.SineDrive), and with the `near` of another result, returns Watched;
@@ -68,7 +68,7 @@ class Watcher:
     """
 
     def __init__(
-        self, model, patch, say=None, windowed: bool = True, before: Watcher | None = None
+        self, model, patch, say=None, windowed: bool = True, before: MotionObserver | None = None
     ):
         self.model, self.patch, self.say, self.windowed = model, patch, say, windowed
         self.numerics = choose(model)
@@ -77,7 +77,7 @@ class Watcher:
         self.by = "" if not steady else "line" if line else steady_by(model).name
         self.made, self.before = {}, before.made if before is not None else {}
 
-    def __call__(self, drive, near=None) -> Watched | None:
+    def __call__(self, drive, near=None) -> ObservedMotion | None:
         """Return the motion at a drive, started from `near` if it is given; None if not found."""
         try:
             return self._gauged(
@@ -93,7 +93,7 @@ class Watcher:
                 return None
         return self(drive)
 
-    def _gauged(self, seen: Watched | None) -> Watched | None:
+    def _gauged(self, seen: ObservedMotion | None) -> ObservedMotion | None:
         """Return the result with the displacement of the gauge, if the rig has one."""
         gauge = self.model.rig.modes.gauge
         if seen is None or gauge is None or seen.window is None:
@@ -111,7 +111,7 @@ class Watcher:
             self.made[name] = make()
         return self.made[name]
 
-    def _line(self, drive, near) -> Watched | None:
+    def _line(self, drive, near) -> ObservedMotion | None:
         """Return the motion without friction: z = (Omega^2 - omega^2 + i omega D)^-1 (i a base)."""
         modes, omega = self.model.rig.modes, drive.omega
         found = harmonic.linear_part(modes, omega, 1)
@@ -137,11 +137,11 @@ class Watcher:
             none,
             none,
         )
-        return Watched(
+        return ObservedMotion(
             window, float(abs(-(omega**2) * modes.output @ z + shift)), float(abs(modes.output @ z))
         )
 
-    def _yields(self, drive, near) -> Watched:
+    def _yields(self, drive, near) -> ObservedMotion:
         """Return the motion of elastic-plastic elements, by the map of yields or else by balance."""
         orbits = self._once("yields", self._orbits)
         try:
@@ -152,7 +152,9 @@ class Watcher:
             # an initial guess for harmonic balance does not serve the map of yields
             return self._balance(drive, None)._replace(near=None)
         window = orbits.window(drive, seen.point) if self.windowed else None
-        return Watched(window, seen.acceleration, seen.displacement, seen.point, seen.fundamental)
+        return ObservedMotion(
+            window, seen.acceleration, seen.displacement, seen.point, seen.fundamental
+        )
 
     def _orbits(self):
         """Return the map of yields, in the workspace of an earlier Watcher if it fits."""
@@ -167,7 +169,7 @@ class Watcher:
             else event_orbits.Orbits(modes, groups)
         )
 
-    def _balance(self, drive, near) -> Watched:
+    def _balance(self, drive, near) -> ObservedMotion:
         """Return the motion by harmonic balance."""
         one = self._once(
             "balance",
@@ -175,44 +177,44 @@ class Watcher:
         )
         found = point.point(one.modes, drive, one.group, one.harmonics, one.tolerance, start=near)
         window = point_balance.periodic_response(found, one.modes, drive, rig_balance.SAMPLES)
-        return Watched(
+        return ObservedMotion(
             window,
             measures.compute_acceleration_peak(window),
             found.amplitude(one.modes.output),
             found,
         )
 
-    def _events(self, drive, near) -> Watched | None:
+    def _events(self, drive, near) -> ObservedMotion | None:
         """Return the motion of Coulomb interfaces by the event map."""
         one = self._once(
             "events", lambda: maps.EventFinder(self.model, self.numerics, self.patch, 0, self.say)
         )
-        return _seen(one.point(drive)[0])
+        return _last_cycles(one.point(drive)[0])
 
-    def _run(self, drive, near) -> Watched | None:
+    def _run(self, drive, near) -> ObservedMotion | None:
         """Return the last cycles of a run."""
         model = replace(self.model, rig=self.model.rig.with_signal(drive))
         # histories from before the window are not kept
         few = replace(self.numerics, whole=False)
         if ENGINES[self.numerics.engine] is not MARCH:
-            return _seen(
+            return _last_cycles(
                 ENGINES[self.numerics.engine].run(model, few, self.patch, 0, self.say, None)
             )
 
-        contact, done, *_ = march.marched(model, few, self.patch, 0, self.say)
+        contact, done, *_ = march.march_model(model, few, self.patch, 0, self.say)
         if done.outcome in UNBOUNDED:
             return None
         values = march.MarchReader(model, few, self.patch, contact).values(done)
-        return _measured(done.window, values)
+        return _observe(done.window, values)
 
 
-def _seen(raw) -> Watched | None:
+def _last_cycles(raw) -> ObservedMotion | None:
     """Return the last cycles of a Solution; None if the motion is unbounded or was not found."""
-    return None if raw.outcome in UNBOUNDED else _measured(raw.window, raw.values)
+    return None if raw.outcome in UNBOUNDED else _observe(raw.window, raw.values)
 
 
-def _measured(window: Response, values: dict) -> Watched:
+def _observe(window: Response, values: dict) -> ObservedMotion:
     """Return the Watched of a window and its measures."""
-    return Watched(
+    return ObservedMotion(
         window, values["absolute_acceleration_peak"], values["relative_displacement_amplitude"]
     )

@@ -26,8 +26,8 @@ from . import rigid, shear
 from . import stepped as stepping
 from .closed import closed_form
 from .engine import CLOSED, STEPPED, BenchEngine, bench_engine
-from .ledger import UNWATCHED, Watch
-from .stepped import stepped
+from .ledger import UNWATCHED, PassOptions
+from .stepped import slide_step_by_step
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -66,7 +66,9 @@ class BenchRun:
     yaw_moment: np.ndarray | None = None
 
 
-def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNWATCHED) -> BenchRun:
+def run(
+    model, patch, steps: int, frames: int = 0, path=None, watch: PassOptions = UNWATCHED
+) -> BenchRun:
     """Slide the interface of a model along its path.
 
     Parameters
@@ -107,14 +109,14 @@ def run(model, patch, steps: int, frames: int = 0, path=None, watch: Watch = UNW
     return BenchRun(time, slide, rate, *out, values, perf_counter() - begin, first, engine, **more)
 
 
-def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Watch) -> tuple:
+def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: PassOptions) -> tuple:
     """Return the Slid of a pass along (time, slide), and histories of the lateral direction."""
     if model.slide.across is not None:
         return stepping.run_plane(model, patch, *path, frames, watch)
     if model.partial_slip:
         return shear.with_shear(model, patch, *path, frames, watch, engine), {}
     if engine.kind == STEPPED:
-        return stepped(model, patch, *path, frames, watch), {}
+        return slide_step_by_step(model, patch, *path, frames, watch), {}
     if engine.kind == CLOSED:
         return closed_form(model, patch, path, frames, watch), {}
 

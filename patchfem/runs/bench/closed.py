@@ -8,12 +8,12 @@ of the slide.
 import numpy as np
 
 from .law import ends_of_rest, law_for, pressure_of
-from .ledger import Slid, Watch, elastic_slip, frame_numbers, ledger_of, local_slip
+from .ledger import PassOptions, SlideHistories, elastic_slip, frame_numbers, ledger_of, local_slip
 
 GAUSS = 8  # Gauss points in a step over a flank
 
 
-def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
+def closed_form(model, patch, path: tuple, frames: int, watch: PassOptions) -> SlideHistories:
     """Slide the interface of a law without memory along a path, in closed form.
 
     Parameters
@@ -31,7 +31,7 @@ def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     Slid
     """
     if model.grooves is not None:
-        return climbed_form(model, patch, path, frames, watch)
+        return closed_form_on_grooves(model, patch, path, frames, watch)
     (time, slide), (sigma, weight), law = path, pressure_of(model, patch), law_for(model, patch)
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
     move = np.diff(slide)
@@ -52,7 +52,7 @@ def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
         tau[at == k] = broken
     watch.tell(1.0)
     load = np.full(slide.size, float(weight @ sigma))
-    return Slid(
+    return SlideHistories(
         force,
         load,
         elastic_slip(model, slide, force, load),
@@ -63,7 +63,9 @@ def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     )
 
 
-def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
+def closed_form_on_grooves(
+    model, patch, path: tuple, frames: int, watch: PassOptions
+) -> SlideHistories:
     """Slide a law without memory slowly over grooves, in closed form.
 
     The force is N (t + phi)/(1 - phi t), with the slope t and phi = f/R along the flank. The lift
@@ -107,7 +109,7 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     watch.tell(1.0)
     losses = np.stack([np.zeros(slide.size), np.append(0.0, own)], axis=1)
     ledger = ledger_of(np.append(0.0, np.cumsum(rise + own)), load * grooves.height(slide), losses)
-    return Slid(
+    return SlideHistories(
         load * ratio,
         np.full(time.size, load),
         slide.copy(),

@@ -93,9 +93,11 @@ def bench_engine(
         modes = model.accuracy.shear_modes or shear_modes.N_SHEAR_MODES
         varies = model.grooves is not None or pressure_changes(model)
         if model.grooves is None and (
-            is_bond_list(f) or engine_named(model) not in ("auto", "recursion")
+            is_bond_list(f) or requested_engine(model) not in ("auto", "recursion")
         ):
-            return _summed(model, slide, points, choice or sum_of(model, slide), points)
+            return _choose_sum_engine(
+                model, slide, points, choice or choose_bond_sum(model, slide), points
+            )
         return BenchEngine(
             POINTS, cost_model.predict_shear_mode_step(points, modes, load_varies=varies)
         )
@@ -104,12 +106,12 @@ def bench_engine(
             ELEMENTS, cost_model.SLIP_NODE_SECONDS * points + cost_model.SAMPLE_SECONDS
         )
     if pressure_changes(model) and model.grooves is None:
-        return _stepped(model, slide, points)
+        return _stepped_engine(model, slide, points)
     if law_has_trait(f.law, "memoryless"):
         return BenchEngine(CLOSED, cost_model.SAMPLE_SECONDS)
     if not law_has_trait(f.law, "bonds"):
         return BenchEngine(ELEMENTS, cost_model.SAMPLE_SECONDS)
-    return _summed(model, slide, points, choice or sum_of(model, slide))
+    return _choose_sum_engine(model, slide, points, choice or choose_bond_sum(model, slide))
 
 
 def steps_of(model) -> int:
@@ -134,23 +136,23 @@ def pressure_changes(model) -> bool:
     return model.load_varies or model.side == "lower"
 
 
-def sum_of(model, slide) -> "bond_engines.EngineChoice":
+def choose_bond_sum(model, slide) -> "bond_engines.EngineChoice":
     """Return the method of the sum over bonds of a rigid slide along samples slide (k,) [m].
 
     It is chosen as in a rig, except that its error is relative to the force that is reached, which
     is small if the stroke is short compared with the bond length.
     """
     law, accuracy = model.bonds, model.accuracy
-    stroke, steps = strokes(slide)
+    stroke, steps = mean_stroke(slide)
     stroke = max(stroke / law.length, 1e-9)
     goal = accuracy.tolerance * min(1.0, stroke)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
     return bond_engines.choose_engine(
-        law, goal, stroke, steps, engine_named(model), tail, accuracy.merge
+        law, goal, stroke, steps, requested_engine(model), tail, accuracy.merge
     )
 
 
-def engine_named(model) -> str:
+def requested_engine(model) -> str:
     """Return the engine of a sum over bonds that the scene names, or "auto".
 
     "merged" replaces it if every point has its own list and bonds keep the pressure at which they
@@ -164,8 +166,8 @@ def engine_named(model) -> str:
     return "merged" if apart and named in ("auto", "recursion") else named
 
 
-def smooth_sum_of(model, slide) -> "bond_engines.EngineChoice | None":
-    """Return `sum_of` without merging, for a fit; None for other laws or a prescribed engine.
+def choose_smooth_bond_sum(model, slide) -> "bond_engines.EngineChoice | None":
+    """Return `choose_bond_sum` without merging, for a fit; None for other laws or a prescribed engine.
 
     With merging, the force would jump by the error of the sum when a value of the scene changes.
     """
@@ -175,7 +177,7 @@ def smooth_sum_of(model, slide) -> "bond_engines.EngineChoice | None":
         or model.accuracy.merge is not None
     ):
         return None
-    found = sum_of(model, slide)
+    found = choose_bond_sum(model, slide)
     return (
         replace(found, engine="truncated", merge=0.0, error=found.tail)
         if found.engine == "merged"
@@ -183,7 +185,7 @@ def smooth_sum_of(model, slide) -> "bond_engines.EngineChoice | None":
     )
 
 
-def strokes(slide) -> tuple:
+def mean_stroke(slide) -> tuple:
     """Return mean path [m] and mean number of moving steps between two reversals of a slide."""
     move = np.diff(slide)
     way = np.sign(move[move != 0])
@@ -191,7 +193,7 @@ def strokes(slide) -> tuple:
     return float(np.abs(move).sum()) / count, max(way.size / count, 1.0)
 
 
-def _summed(
+def _choose_sum_engine(
     model, slide, points: int, found: "bond_engines.EngineChoice", lists: int = 1
 ) -> BenchEngine:
     """Return the engine of a sum over bonds.
@@ -202,7 +204,7 @@ def _summed(
     if found.engine == "recursion":
         return BenchEngine(RECURSION, cost_model.RECURSION_STEP_SECONDS, found)
     if law.breakaway and lists == 1:  # a list cannot represent an elastic range
-        return _stepped(model, slide, points)
+        return _stepped_engine(model, slide, points)
     size = slide.size
     strips = min(
         found.strips, size * max(1.0, 4 * float(np.abs(np.diff(slide)).max()) / law.length)
@@ -222,7 +224,7 @@ def _summed(
     return BenchEngine(LIST if lists == 1 else LISTS, seconds, found)
 
 
-def _stepped(model, slide, points: int) -> BenchEngine:
+def _stepped_engine(model, slide, points: int) -> BenchEngine:
     """Return the engine that evaluates a law sample by sample."""
     return BenchEngine(STEPPED, _stepped_seconds(model, slide, points))
 

@@ -23,7 +23,7 @@ from ...slip import shear_modes
 from . import bench, rigid, shear
 from .engine import ELEMENTS, LIST, LISTS, PLANE, STEPPED, slips_by_elements
 from .law import tail_of
-from .ledger import Watch
+from .ledger import PassOptions
 
 # tolerance that sets the steps of passes on coarser meshes; elements follow any path exactly
 MESH_TOL = 1e-2
@@ -70,7 +70,7 @@ def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
     def solve(variant: Pass):
         """Return the BenchRun of a Pass."""
         on = patches[variant.level]
-        watch = Watch(variant.choice, say, springs=variant.springs, modes=variant.modes)
+        watch = PassOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
         return bench.run(model, on, variant.steps, watch=watch)
 
     ladder, made = ladder_of(model, patches, fine, steps), {}

@@ -11,7 +11,7 @@ import numpy as np
 from ...dynamics.march.capacity import copy_state, enlarge_list, is_full
 from ...dynamics.march.march import GOAL
 from ...dynamics.march.models import load_kernels
-from .ledger import BLOCK, Watch, frame_numbers, ledger_of
+from .ledger import BLOCK, PassOptions, frame_numbers, ledger_of
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,7 +48,9 @@ class Followed:
         return ledger_of(work, self.stored, losses)
 
 
-def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = False) -> Followed:
+def follow_path(
+    model, time, slide, frames: int, watch: PassOptions, paced: bool = False
+) -> Followed:
     """Slide a ContactModel along samples of time and slide.
 
     Parameters

@@ -1,6 +1,6 @@
 """Options of a pass of a bench, its histories, its energy balance and its frames.
 
-In: forces, losses and samples of a pass. Out: `Slid`, the ledger (4, k), and slip of the
+In: forces, losses and samples of a pass. Out: `SlideHistories`, the ledger (4, k), and slip of the
 interface and of its points.
 """
 
@@ -17,7 +17,7 @@ BLOCK = 4096
 ROUND = 1e-13  # relative to the dissipated energy; less created energy is round-off
 
 
-class Slid(NamedTuple):
+class SlideHistories(NamedTuple):
     """Histories of a pass over k samples.
 
     - force, load (k,): [N].
@@ -109,7 +109,7 @@ def _length(model) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
+class PassOptions:
     """Options and callbacks of a pass.
 
     - choice: method of the sum over bonds; None: chosen by the pass.
@@ -132,4 +132,4 @@ class Watch:
             self.progress(share)
 
 
-UNWATCHED = Watch()
+UNWATCHED = PassOptions()

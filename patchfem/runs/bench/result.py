@@ -15,24 +15,29 @@ from ...response.outcome import OPEN_LOOP
 from ...response.rows import set_final_floors
 from ..results.notes import (
     climbing_as_one,
-    of_growth,
+    growth_notes,
+    note_on_heating,
     unbounded_bonds,
-    unripe,
-    warming,
+    warn_of_unformed_bonds,
     work_check_warning,
 )
 from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, without_errors
-from ..results.travel import FAR, largest_slide, outcome_on_piece, travelled
+from ..results.travel import (
+    MAX_SLIDE_FRACTION,
+    largest_slide,
+    outcome_on_piece,
+    warn_of_large_slide,
+)
 from . import bench, shear
 from .engine import steps_of
 from .errors import errors_of
-from .ledger import Watch
+from .ledger import PassOptions
 
 MORE = 4  # further cycles in which a steady loop is searched for
 MOST_TRIED = 2e6  # most evaluations (points times samples) of this search
 
 
-def prescribed(
+def run_prescribed(
     what, patch, coarse, seconds, warnings, say, progress, per_point, estimate
 ) -> Result:
     """Run a plan of kind bench; the parameters are those of `run.run`."""
@@ -41,7 +46,7 @@ def prescribed(
         warnings = [
             *warnings,
             *unbounded_bonds(model.bonds),
-            *unripe(model.bonds, model.speed_scale),
+            *warn_of_unformed_bonds(model.bonds, model.speed_scale),
         ]
         if f.reading == "report" and model.load_varies:
             warnings = [
@@ -52,7 +57,7 @@ def prescribed(
             ]
     steps = steps_of(model)
     frames = FRAMES if patch is not None else 0
-    fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))
+    fine = bench.run(model, patch, steps, frames, watch=PassOptions(None, say, progress))
     seconds["bench"] = fine.seconds
     others, left = [], None
     if estimate:
@@ -73,9 +78,9 @@ def prescribed(
         ]
     warnings = [
         *warnings,
-        *warming(model, patch, fine),
+        *note_on_heating(model, patch, fine),
         *work_check_warning(found, steps),
-        *_still_open(model, patch, fine, steps),
+        *_warn_if_open(model, patch, fine, steps),
     ]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
@@ -92,7 +97,7 @@ def prescribed(
             if f.static > 0 and not model.load_varies
             else None
         )
-        notes = of_growth(model.bonds, peak)
+        notes = growth_notes(model.bonds, peak)
     notes = [*notes, *climbing_as_one(model, patch)]
     known = estimate and on_a_mesh_of_known_error(model, patch, coarse)
     found = without_errors(found, known)
@@ -127,7 +132,7 @@ def _miss(fine) -> float:
     return max(abs(float(change / size)) if size else 0.0 for change, size in shares)
 
 
-def _still_open(model, patch, fine, steps: int) -> list:
+def _warn_if_open(model, patch, fine, steps: int) -> list:
     """Return a warning, as a list, if the last loop does not close and is not the steady one.
 
     It names the number of cycles after which the loop is steady, if MORE cycles with at most
@@ -168,7 +173,7 @@ def _overhang(asked, patch, fine) -> list:
     out = []
     if (
         fine.lateral is not None
-        and (aside := largest_slide(fine.lateral) / asked.pieces.width) > FAR
+        and (aside := largest_slide(fine.lateral) / asked.pieces.width) > MAX_SLIDE_FRACTION
     ):
         out.append(
             f"the slide across the sliding direction is {aside:.2g} of the width of the pieces, but the "
@@ -180,4 +185,4 @@ def _overhang(asked, patch, fine) -> list:
             "the upper piece slides off the pressed area: at worst the computed contact carries "
             f"{100 * lost:.0f} % less than the given load"
         )
-    return [*out, *travelled(patch, fine.slide)]
+    return [*out, *warn_of_large_slide(patch, fine.slide)]

@@ -22,10 +22,12 @@ from ...response.errors import merged_cell_errors
 from .engine import ELEMENTS, BenchEngine
 from .follow import follow_path
 from .law import pressure_of
-from .ledger import Slid, Watch, elastic_slip, local_slip
+from .ledger import PassOptions, SlideHistories, elastic_slip, local_slip
 
 
-def rigid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Watch) -> Slid:
+def rigid(
+    model, patch, path: tuple, frames: int, engine: BenchEngine, watch: PassOptions
+) -> SlideHistories:
     """Slide the interface rigidly along a path by a compiled engine.
 
     Parameters
@@ -63,7 +65,7 @@ def rigid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: Wa
             elastic_slip(model, slide, done.force, loads),
             local_slip(model, slide[done.at], tau, sigma),
         )
-    return Slid(done.force, loads, slip, done.ledger, done.at, tau, local)
+    return SlideHistories(done.force, loads, slip, done.ledger, done.at, tau, local)
 
 
 def climbing(model, load: float, patch=None, count: int | None = None):

@@ -15,14 +15,16 @@ from ...response.errors import ERROR_MEASURES, absolute_change, convergence_erro
 from ...slip.fields import bond_shear_modes, element_fields, point_fields
 from ..patch.jenkins_elements import elements
 from .follow import follow_path
-from .ledger import Slid, Watch
+from .ledger import PassOptions, SlideHistories
 from .rigid import climbing
 
 # fraction of the mean pressure assumed at nodes that the lower piece does not press at first
 OPEN = 1e-3
 
 
-def with_shear(model, patch, time, slide, frames: int, watch: Watch, engine=None) -> Slid:
+def with_shear(
+    model, patch, time, slide, frames: int, watch: PassOptions, engine=None
+) -> SlideHistories:
     """Slide the holders along samples of time and slide.
 
     Parameters
@@ -49,7 +51,7 @@ def with_shear(model, patch, time, slide, frames: int, watch: Watch, engine=None
     return _elements(model, patch, time, slide, frames, watch)
 
 
-def _elements(model, patch, time, slide, frames, watch) -> Slid:
+def _elements(model, patch, time, slide, frames, watch) -> SlideHistories:
     """Slide Coulomb and elastic-plastic points as parallel elements."""
     f = model.friction
     length = make_law(f).element(1.0).length
@@ -58,7 +60,7 @@ def _elements(model, patch, time, slide, frames, watch) -> Slid:
     model = jenkins_model(*(watch.springs(*springs) if watch.springs else springs))
     done = follow_path(model, time, slide, frames, watch)
     tau, local = element_fields(patch, found, done.states, length)
-    return Slid(
+    return SlideHistories(
         done.force,
         np.full(time.size, patch.pressure.load),
         done.slip,
@@ -69,7 +71,7 @@ def _elements(model, patch, time, slide, frames, watch) -> Slid:
     )
 
 
-def _climbing(model, patch, time, slide, frames, watch) -> Slid:
+def _climbing(model, patch, time, slide, frames, watch) -> SlideHistories:
     """Slide pieces over grooves, with points that share the height and have shear modes."""
     load = patch.pressure.load
     contact = climbing(model, load, patch, model.accuracy.shear_modes)
@@ -78,7 +80,9 @@ def _climbing(model, patch, time, slide, frames, watch) -> Slid:
     )
     refuse_missed(done)
     tau, local = climbed_fields(patch, contact, done.states)
-    return Slid(done.force, np.full(time.size, load), done.slip, done.ledger, done.at, tau, local)
+    return SlideHistories(
+        done.force, np.full(time.size, load), done.slip, done.ledger, done.at, tau, local
+    )
 
 
 def refuse_missed(done) -> None:
@@ -116,11 +120,11 @@ def climbed_fields(patch, contact, states) -> tuple:
     return tau, local
 
 
-def _points(model, patch, time, slide, frames, watch, engine) -> Slid:
+def _points(model, patch, time, slide, frames, watch, engine) -> SlideHistories:
     """Slide bond points, or lists of bonds, with shear modes."""
-    law, shear, found = model.bonds, reduced(model, patch, watch.modes), engine.choice
+    law, shear, found = model.bonds, shear_modes_of_points(model, patch, watch.modes), engine.choice
     if model.side == "lower":
-        contact = on_the_lower(model, patch, found, shear)
+        contact = lists_on_lower_piece(model, patch, found, shear)
     else:
         weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
         contact = (
@@ -131,7 +135,7 @@ def _points(model, patch, time, slide, frames, watch, engine) -> Slid:
     done = follow_path(contact, time, slide, frames, watch, law.has_growth)
     refuse_missed(done)
     tau, local = point_fields(patch, law, contact.reduction, done.states)
-    return Slid(
+    return SlideHistories(
         done.force,
         np.full(time.size, patch.pressure.load),
         done.slip,
@@ -142,7 +146,7 @@ def _points(model, patch, time, slide, frames, watch, engine) -> Slid:
     )
 
 
-def reduced(model, patch, count: int | None = None):
+def shear_modes_of_points(model, patch, count: int | None = None):
     """Return the ShearModes of the points of a sum over bonds.
 
     If the pressure belongs to the lower piece, the points are all nodes; a node without pressure at
@@ -176,10 +180,10 @@ def modes_of(model, patch) -> int | None:
     behind = (
         model.partial_slip and law_has_trait(model.friction.law, "bonds") and model.grooves is None
     )
-    return reduced(model, patch).stiffness.size if behind else None
+    return shear_modes_of_points(model, patch).stiffness.size if behind else None
 
 
-def on_the_lower(model, patch, found, shear):
+def lists_on_lower_piece(model, patch, found, shear):
     """Return lists of bonds, one per node, under the pressure of the lower piece.
 
     Parameters

@@ -12,8 +12,8 @@ from ...core import Missing
 from .law import ends_of_rest, law_for, pressure_of
 from .ledger import (
     BLOCK,
-    Slid,
-    Watch,
+    PassOptions,
+    SlideHistories,
     elastic_slip,
     frame_numbers,
     gains_and_losses,
@@ -24,7 +24,9 @@ from .ledger import (
 MOST_WORK = 2e11  # most strip-point products of a direct quadrature; a bench with more is refused
 
 
-def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
+def slide_step_by_step(
+    model, patch, time, slide, frames: int, watch: PassOptions
+) -> SlideHistories:
     """Slide every point along samples of time and slide.
 
     The pressure moves with the upper piece, belongs to the lower one, or the load changes with
@@ -52,7 +54,7 @@ def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
     law, (weight, pressure) = law_for(model, patch), _pressures(model, patch, time, slide)
     refuse_long_sum(model, law, time.size, weight.size, slide)
     peaks, at = ends_of_rest(model, slide), frame_numbers(time.size, frames)
-    found = _walked(
+    found = _evaluate_law(
         (law, _under_load if model.load_varies else _along),
         (time, slide[:, None]),
         (weight, pressure),
@@ -61,7 +63,7 @@ def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
         watch,
     )
     force, tau = found.force[:, 0], found.tau[:, 0]
-    return Slid(
+    return SlideHistories(
         force,
         found.load,
         elastic_slip(model, slide, force, found.load),
@@ -72,7 +74,7 @@ def stepped(model, patch, time, slide, frames: int, watch: Watch) -> Slid:
     )
 
 
-def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
+def run_plane(model, patch, time, slide, frames: int, watch: PassOptions) -> tuple:
     """Slide an interface in two directions, along the displacement and `lateral` of slide.file.
 
     The pressure of a rigid upper piece is constant at every point, and the law is linear in it, so
@@ -100,7 +102,7 @@ def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
     refuse_long_sum(model, law, time.size, 1, slide)
     across, one = np.interp(time, model.slide.corners[0], model.slide.across), np.ones(1)
     at = frame_numbers(time.size, frames)
-    found = _walked(
+    found = _evaluate_law(
         (law, _along),
         (time, np.stack([slide, across], axis=1)),
         (one, lambda k: one),
@@ -120,7 +122,7 @@ def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
     }
     if patch is not None:
         more["yaw_moment"] = roll * unit[:, 0] - moment * unit[:, 1]
-    return Slid(
+    return SlideHistories(
         load * unit[:, 0],
         np.full(time.size, load),
         slip,
@@ -131,7 +133,7 @@ def run_plane(model, patch, time, slide, frames: int, watch: Watch) -> tuple:
     ), more
 
 
-class _Walked(NamedTuple):
+class _LawHistories(NamedTuple):
     """Histories of k samples in d directions.
 
     - force (k, d), load (k,): [N].
@@ -145,7 +147,9 @@ class _Walked(NamedTuple):
     tau: np.ndarray
 
 
-def _walked(laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: Watch) -> _Walked:
+def _evaluate_law(
+    laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: PassOptions
+) -> _LawHistories:
     """Evaluate a law along a path, sample by sample.
 
     Parameters
@@ -189,7 +193,7 @@ def _walked(laws: tuple, path: tuple, points: tuple, at, peaks: dict, watch: Wat
             tau.append(here)
         if k % BLOCK == 0 or k == size - 1:
             watch.tell(k / (size - 1))
-    return _Walked(
+    return _LawHistories(
         force,
         load,
         ledger_of(work, stored, losses),

@@ -17,7 +17,9 @@ MISSED = 1e-6  # largest remaining distance to the approach, over the approach
 GAP_ROUND = 1e-9  # the same over the range of the gap, whose round-off limits the search
 
 
-def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple:
+def press_to_approach_with_rotation(
+    asked, pieces: Compliance, gap, under, stiff: Compliance
+) -> tuple:
     """Solve the contact under a prescribed approach with free rotation.
 
     The load is searched at which the approach is reached. If even a millionth of the load that flat

@@ -106,7 +106,7 @@ def compliance_of(body, piece, fresh: bool) -> InterfaceCompliance:
     return compliance
 
 
-def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
+def condense(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     """Assemble and condense the pieces of a `PatchModel`.
 
     Parameters
@@ -159,7 +159,7 @@ def shared_pair(asked, level: int) -> Pair:
     bodies = asked.mesh.shared.levels[level]
     return store.reuse(
         _pair_key(asked, asked.mesh.shared.name, level),
-        lambda: without_factors(condensed(asked, *bodies)),
+        lambda: without_factors(condense(asked, *bodies)),
     )
 
 
@@ -196,7 +196,7 @@ def without_factors(pair: Pair) -> Pair:
     return pair
 
 
-def pair_beside(asked, pair: Pair) -> Pair:
+def pair_on_same_meshes(asked, pair: Pair) -> Pair:
     """Return the pieces of a `PatchModel` condensed on the meshes of another Pair.
 
     Shared pieces are reused if the meshes are shared.
@@ -206,7 +206,7 @@ def pair_beside(asked, pair: Pair) -> Pair:
             pair.upper is pair.piece
         ):
             return shared_pair(asked, k)
-    return condensed(asked, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
+    return condense(asked, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
 
 
 def _rise(body, x) -> np.ndarray:

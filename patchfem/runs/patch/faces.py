@@ -96,7 +96,7 @@ def patches_of(one, tolerance: float) -> tuple:
         raise
 
 
-def condensed_anew(model) -> None:
+def condense_again(model) -> None:
     """Condense the pieces of every interface again, ignoring all kept results."""
     store.clear()
     for one in model.rig.friction.interfaces if model.rig is not None else ():
@@ -133,7 +133,7 @@ def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
     return found.stiffness, found.yield_displacement, found
 
 
-def meshed(model) -> list:
+def interfaces_with_coarse_mesh(model) -> list:
     """Return the indices of interfaces that have a coarser mesh, one tuple per distinct patch."""
     out = {}
     for face in faces_of(model):
@@ -142,7 +142,7 @@ def meshed(model) -> list:
     return [tuple(numbers) for numbers in out.values()]
 
 
-def seen(model, shots) -> tuple:
+def faces_with_frames(model, shots) -> tuple:
     """Return the Faces of a model with their frames.
 
     The frames of a patch without elements, or without shots, show the pressed state only.
@@ -173,15 +173,15 @@ def seen(model, shots) -> tuple:
     return tuple(out)
 
 
-def known(model) -> bool:
+def has_error_meshes(model) -> bool:
     """Return whether every patch that slips in part has a coarser mesh for its error."""
     return all(face.patches[1] is not None for face in faces_of(model) if face.partial_slip)
 
 
-def probed(model) -> dict:
+def static_measures_without_errors(model) -> dict:
     """Return static measures by name of all patches of a model, without errors."""
     if model.patch is not None:
-        return result.probed(model)
+        return result.static_measures_without_errors(model)
     with locate_errors(model.source):
         return {
             rows.add_interface_number(name, face.number): found
@@ -190,7 +190,7 @@ def probed(model) -> dict:
         }
 
 
-def measured(model) -> dict:
+def static_measures(model) -> dict:
     """Return the static measures of the patches by name.
 
     Those of an interface after the first have its number after the name.
@@ -198,7 +198,7 @@ def measured(model) -> dict:
     return {
         rows.add_interface_number(name, face.number): found
         for face in faces_of(model)
-        for name, found in result.measured(face.model, face.patch, face.patches[1:]).items()
+        for name, found in result.static_measures(face.model, face.patch, face.patches[1:]).items()
     }
 
 
@@ -207,7 +207,7 @@ def warnings_of(model) -> list:
     return together(
         model,
         lambda face: [
-            *result.strained(face.model.patch, face.patch),
+            *result.warn_of_strains(face.model.patch, face.patch),
             *([UNKNOWN] if face.patches[1] is None else []),
         ],
     )
@@ -218,7 +218,10 @@ UNKNOWN = "the interface has too few elements for an estimate of the error; leav
 
 def notes_of(model) -> list:
     """Return notes on what the static model of the patches neglects."""
-    return together(model, lambda face: result.left_out(face.model, face.patch, face.patches[1:]))
+    return together(
+        model,
+        lambda face: result.notes_on_neglected_effects(face.model, face.patch, face.patches[1:]),
+    )
 
 
 def together(model, told: Callable) -> list:

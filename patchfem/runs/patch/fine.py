@@ -26,7 +26,7 @@ from ...elasticity.lapack import one_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...model import profile
 from ...model.pieces import make_elastic_layers
-from .measures import OFFSET, Hidden, combined, least_of
+from .measures import OFFSET, Hidden, least_of, measures_from_series
 from .press import Surface
 from .values import vertex
 
@@ -121,7 +121,7 @@ def solve_on_points(asked, enough) -> PointSolution:
             series = coarse[-1:]
             while len(series) < MIN_LEVELS or not (enough(found) or _dear(series[-1])):
                 series.append(_level(asked, cells[-1], 2 * series[-1].force.size, series[-1].force))
-                found = _summed(coarse, series) if len(series) >= MIN_LEVELS else {}
+                found = _add_series(coarse, series) if len(series) >= MIN_LEVELS else {}
         except (NotConverged, np.linalg.LinAlgError):
             pass
     return (
@@ -142,15 +142,17 @@ def _dear(last: PointLevel) -> bool:
     return 2 * last.force.size > MAX_POINTS or 3 * last.work * last.force.size > MAX_WORK
 
 
-def _summed(coarse: list, series: list) -> dict:
+def _add_series(coarse: list, series: list) -> dict:
     """Return (value, error) by name from two series of levels.
 
     The first series has ever finer cells at the ends, the second ever more points with the finest
     of these cells. The extrapolation and the error of the first are added to the second.
     """
     mine = series[-1].values
-    found = combined([one.values for one in series], least_of(series[-1].hidden, mine), True, 0.0)
-    ends = combined([one.values for one in coarse], {}, True, 0.0)
+    found = measures_from_series(
+        [one.values for one in series], least_of(series[-1].hidden, mine), True, 0.0
+    )
+    ends = measures_from_series([one.values for one in coarse], {}, True, 0.0)
     unknown = ("pressure_peak", "loaded_fraction") if series[-1].cornered else ()
     return {
         name: (one.value + ends[name].value - coarse[-1].values[name], one.error + ends[name].error)
@@ -242,7 +244,7 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
         np.linspace(-asked.pieces.length / 2, asked.pieces.length / 2, 2 * count + 1),
     )
     gap = asked.gap.at(between).heights[1::2]
-    force, closing, theta, work = _pressed(asked, normal, gap, start)
+    force, closing, theta, work = _solve_forces(asked, normal, gap, start)
     moved = normal.product(force)
     opening, touches = gap + theta * x - closing + moved, force > 0
     if not opening.min() >= -MAX_OVERLAP * np.abs(moved).max():
@@ -270,7 +272,7 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     return PointLevel(force, surface, stretches, values, hidden, work, bool(cornered))
 
 
-def _pressed(asked, normal: PointCompliance, gap, start) -> tuple:
+def _solve_forces(asked, normal: PointCompliance, gap, start) -> tuple:
     """Solve for the forces of a level.
 
     Returns forces (n,) [N], approach [m], rotation [rad] in addition to that in the gap, and

@@ -18,8 +18,8 @@ from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import extend_grid, find_rounded_edges
 from . import slip_zones, store
-from .condensed import Pair, condensed, without_factors
-from .press import Patch, pressed
+from .condensed import Pair, condense, without_factors
+from .press import Patch, press_patch
 from .values import contact_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
@@ -102,7 +102,7 @@ def search_pair(asked) -> Pair:
         asked.mesh.is_static,
         asked.gap.jumps,
     )
-    return store.reuse(key, lambda: without_factors(condensed(asked, *grids_of(asked, layout))))
+    return store.reuse(key, lambda: without_factors(condense(asked, *grids_of(asked, layout))))
 
 
 class BaseGrids(NamedTuple):
@@ -139,9 +139,11 @@ def _search_grids(asked) -> BaseGrids:
     contact = None
     # without a load there is no contact to search for
     for search in range(MAX_SEARCHES if asked.nominal_load > 0 else 0):
-        pair = condensed(asked, *grids_of(asked, layout)) if search else search_pair(asked)
+        pair = condense(asked, *grids_of(asked, layout)) if search else search_pair(asked)
         x = pair.grid.x
-        seen = [contact_extent(pressed(each, pair), asked.mesh.slip) for each in (asked, *sweep)]
+        seen = [
+            contact_extent(press_patch(each, pair), asked.mesh.slip) for each in (asked, *sweep)
+        ]
         contact = seen[0]
         last = layout
         layout = layout_of(asked, seen)

@@ -2,7 +2,7 @@
 
 In: a `PatchModel` and a tolerance. Out: pressed patches from fine to coarse. A mesh that the
 scene does not prescribe is refined until the static measures meet the tolerance or the next
-mesh is too expensive (`climb`).
+mesh is too expensive (`solve_on_ladder`).
 """
 
 from dataclasses import replace
@@ -11,10 +11,10 @@ from functools import partial
 from ...core import NotConverged, Outcome
 from ...model.pieces import make_piece_meshes
 from . import fine, slip_zones, store
-from .condensed import condensed, shared_pairs
+from .condensed import condense, shared_pairs
 from .grids import MAX_SECONDS, MIN_LEVELS, base_grids, seconds_of
-from .measures import measures, met
-from .press import pressed, solve
+from .measures import is_within_tolerance, measures
+from .press import press_patch, solve
 
 # Down to this tolerance, a patch that slips may take the seconds of a moving mesh; at a tenth of
 # it, 3.2 times as many.
@@ -59,22 +59,22 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
         return asked.solved.patches
     if asked.mesh.shared is not None:
         if fresh:
-            return on_pairs(
+            return solve_on_pairs(
                 asked,
-                [condensed(asked, *level, fresh=True) for level in asked.mesh.shared.levels],
+                [condense(asked, *level, fresh=True) for level in asked.mesh.shared.levels],
                 estimate,
             )
         if store.is_shared(asked):
             return store.reuse(
                 ("patches", store.content_key(asked), estimate),
-                lambda: on_pairs(asked, shared_pairs(asked), estimate),
+                lambda: solve_on_pairs(asked, shared_pairs(asked), estimate),
             )
-        found = on_pairs(asked, shared_pairs(asked), estimate)
+        found = solve_on_pairs(asked, shared_pairs(asked), estimate)
         if estimate and _misses_trace(asked, found, asked.mesh.tolerance or tolerance):
-            return climb(asked.with_mesh(shared=None), asked.mesh.tolerance or tolerance)
+            return solve_on_ladder(asked.with_mesh(shared=None), asked.mesh.tolerance or tolerance)
         return found
     if asked.mesh.is_automatic:
-        return climb(asked, asked.mesh.tolerance or tolerance, estimate, fresh)
+        return solve_on_ladder(asked, asked.mesh.tolerance or tolerance, estimate, fresh)
     return _with_coarser(asked, *make_piece_meshes(asked), estimate, fresh)
 
 
@@ -82,15 +82,15 @@ def _misses_trace(asked, patches: tuple, tolerance: float) -> bool:
     """Return whether a patch with a profile misses its tolerance on shared meshes."""
     if not asked.mesh.is_automatic or asked.gap.profile is None or patches[1] is None:
         return False
-    return not met(measures(*patches, tolerance=tolerance), tolerance)
+    return not is_within_tolerance(measures(*patches, tolerance=tolerance), tolerance)
 
 
-def on_pairs(asked, pairs, estimate: bool = True) -> tuple:
+def solve_on_pairs(asked, pairs, estimate: bool = True) -> tuple:
     """Solve a patch on condensed pieces, from fine to coarse (see `solve_all`)."""
-    return _filled(pressed(asked, pair) for pair in pairs[: None if estimate else 1])
+    return _pad_to_three(press_patch(asked, pair) for pair in pairs[: None if estimate else 1])
 
 
-def _filled(patches) -> tuple:
+def _pad_to_three(patches) -> tuple:
     """Return patches, padded with None to at least three."""
     out = tuple(patches)
     return out + (None,) * (3 - len(out))
@@ -98,8 +98,8 @@ def _filled(patches) -> tuple:
 
 def _with_coarser(asked, low, high, estimate: bool, fresh: bool) -> tuple:
     """Solve a patch on given bodies and on coarser ones (see `solve_all`)."""
-    found = [(low, high), *(meshes_beside(low, high) if estimate else ())]
-    return _filled(solve(asked, *level, fresh) for level in found)
+    found = [(low, high), *(comparison_meshes(low, high) if estimate else ())]
+    return _pad_to_three(solve(asked, *level, fresh) for level in found)
 
 
 def meshes_of_file(asked) -> list:
@@ -108,10 +108,10 @@ def meshes_of_file(asked) -> list:
     The order is that of `solve_all`.
     """
     low, high = make_piece_meshes(asked)
-    return [(low, high), *meshes_beside(low, high)]
+    return [(low, high), *comparison_meshes(low, high)]
 
 
-def meshes_beside(low, high) -> list:
+def comparison_meshes(low, high) -> list:
     """Return the meshes (lower, upper or None) that show the error of given ones.
 
     They are coarser grids, or the unstructured mesh with every edge halved; empty for few columns.
@@ -127,7 +127,7 @@ def meshes_beside(low, high) -> list:
     return out
 
 
-def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
+def solve_on_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
     """Solve a patch on a ladder of nested meshes until it meets its tolerance.
 
     If the next mesh is expensive, points as fine as the profile give more accurate measures, and
@@ -153,7 +153,9 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -
     while True:
         try:
             wanted = estimate or len(out) == MIN_LEVELS - 1
-            out.insert(0, pressed(asked, condensed(asked, *grids, fresh=fresh)) if wanted else None)
+            out.insert(
+                0, press_patch(asked, condense(asked, *grids, fresh=fresh)) if wanted else None
+            )
         # the cells are too short for double precision: the coarser meshes are kept
         except NotConverged:
             if not out or out[0] is None:
@@ -175,10 +177,14 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -
                 stretches=on_points.stretches,
             )
         found, shows_slip = measures(*out, tolerance=tolerance), _shows_slip(asked, out, tolerance)
-        if dear > MAX_SECONDS[False] and not met(found, tolerance) and _finer(asked):
+        if (
+            dear > MAX_SECONDS[False]
+            and not is_within_tolerance(found, tolerance)
+            and _finer(asked)
+        ):
             on_points = out[0] = _on_points(asked, out, tolerance)
             found = measures(*out, tolerance=tolerance)
-        enough = bool(out[0].sharper) or met(found, tolerance)
+        enough = bool(out[0].sharper) or is_within_tolerance(found, tolerance)
         if dear > most_seconds(asked, tolerance) or (shows_slip and enough):
             return tuple(out)
 
@@ -212,7 +218,7 @@ def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = 
     ):
         return ()
     static = asked.with_mesh(is_static=True, slip=None)
-    return climb(static, asked.mesh.tolerance or tolerance, estimate, fresh)
+    return solve_on_ladder(static, asked.mesh.tolerance or tolerance, estimate, fresh)
 
 
 def _shows_slip(asked, patches: list, tolerance: float) -> bool:
@@ -242,14 +248,14 @@ def _on_points(asked, patches: list, tolerance: float):
     )
 
 
-def climbs_at(asked, patches, tolerance: float) -> float | None:
+def tolerance_of_next_mesh(asked, patches, tolerance: float) -> float | None:
     """Return the loosest tolerance / 10^k at which a patch would be solved on a finer mesh.
 
     Parameters
     ----------
     asked : PatchModel
     patches : sequence of Patch
-        As `climb` returns them at that tolerance.
+        As `solve_on_ladder` returns them at that tolerance.
     tolerance : float
 
     Returns
@@ -262,13 +268,13 @@ def climbs_at(asked, patches, tolerance: float) -> float | None:
     if seconds > most_seconds(asked):
         return None
     if asked.gap.profile is not None and patches[0].sharper:
-        ended = not met(
+        ended = not is_within_tolerance(
             measures(*(one for one in patches if one is not None), tolerance=tolerance), tolerance
         )
         return None if ended else tolerance / 10
     known = [one for one in patches if one is not None]
     for tighter in (tolerance * 10.0**-k for k in range(1, MAX_DECADES + 1)):
-        enough = met(measures(*known, tolerance=tighter), tighter) and _shows_slip(
+        enough = is_within_tolerance(measures(*known, tolerance=tighter), tighter) and _shows_slip(
             asked, known, tighter
         )
         if not enough and seconds <= most_seconds(asked, tighter):
@@ -289,6 +295,6 @@ def _grids(patch) -> tuple:
 
 def _enough(patches: list, tolerance: float, sharp: dict) -> bool:
     """Return whether patches meet the tolerance with measures `sharp` on points of a profile."""
-    return met(
+    return is_within_tolerance(
         measures(replace(patches[0], sharper=sharp), *patches[1:], tolerance=tolerance), tolerance
     )

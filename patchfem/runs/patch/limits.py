@@ -8,15 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-SECOND = 4.0  # ratio of successive changes at second order, the largest that is used
-DOUBTFUL = 2.5  # largest ratio that is used for meshes that are not nested
+MAX_RATIO = 4.0  # ratio of successive changes at second order, the largest that is used
+MAX_RATIO_NOT_NESTED = 2.5  # largest ratio that is used for meshes that are not nested
 REGULAR = (2.6, 6.0)  # range of ratios in which a series converges with its order
 SLOWEST = 1.6  # smallest ratio from which the remainder is computed
 GROWING = 1.3  # series with smaller ratios do not converge yet
 # error over the remainder, for a steady ratio; the interval fails in less than 2 of 100 random
 # scenes
-SAFE = 1.8
-WILD = 2.0  # error over the largest change, for a series without a steady ratio
+STEADY_FACTOR = 1.8
+UNSTEADY_FACTOR = 2.0  # error over the largest change, for a series without a steady ratio
 
 
 class Limit(NamedTuple):
@@ -34,7 +34,7 @@ class Limit(NamedTuple):
     left: np.ndarray
 
 
-def limit(values, nested: bool = True) -> Limit:
+def extrapolate(values, nested: bool = True) -> Limit:
     """Return the limits of series of two or more values on meshes of successively halved cells.
 
     Three values give a ratio of successive changes. If it is steady, the remainder of the geometric
@@ -51,24 +51,26 @@ def limit(values, nested: bool = True) -> Limit:
     values = np.asarray(values, float)
     last, size = values[-1] - values[-2], np.abs(values[-1] - values[-2])
     if len(values) < 3:
-        return Limit(values[-1], WILD * size, values[-1], WILD * size)
+        return Limit(values[-1], UNSTEADY_FACTOR * size, values[-1], UNSTEADY_FACTOR * size)
     before = values[-2] - values[-3]
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         ratio = np.where(last != 0, before / last, np.where(before >= 0, np.inf, -np.inf))
     if not nested:
-        rest = np.maximum(size, np.abs(before) / DOUBTFUL) / (np.clip(ratio, SLOWEST, DOUBTFUL) - 1)
-        return Limit(values[-1], WILD * rest, values[-1], WILD * rest)
-    rest = last / (np.clip(ratio, SLOWEST, SECOND) - 1)
+        rest = np.maximum(size, np.abs(before) / MAX_RATIO_NOT_NESTED) / (
+            np.clip(ratio, SLOWEST, MAX_RATIO_NOT_NESTED) - 1
+        )
+        return Limit(values[-1], UNSTEADY_FACTOR * rest, values[-1], UNSTEADY_FACTOR * rest)
+    rest = last / (np.clip(ratio, SLOWEST, MAX_RATIO) - 1)
     # above the largest regular ratio, the last change is small by chance
-    wild = WILD * np.where(
+    wild = UNSTEADY_FACTOR * np.where(
         ratio > REGULAR[1],
-        np.maximum(size / (SECOND - 1), np.abs(before) / SECOND**2 * 2),
-        np.maximum(size, np.abs(before) / SECOND),
+        np.maximum(size / (MAX_RATIO - 1), np.abs(before) / MAX_RATIO**2 * 2),
+        np.maximum(size, np.abs(before) / MAX_RATIO),
     )
     falls = (ratio >= GROWING) & (ratio <= REGULAR[1])
     return Limit(
         values[-1],
-        np.where(falls, SAFE * np.abs(rest), wild),
+        np.where(falls, STEADY_FACTOR * np.abs(rest), wild),
         np.where(falls, values[-1] + rest, values[-1]),
         np.where(falls, _left(values, rest, ratio), wild),
     )
@@ -83,4 +85,4 @@ def _left(values, rest, ratio) -> np.ndarray:
     least = np.abs(rest) / np.where(ratio >= REGULAR[0], 4, 2)
     if len(values) < 4:
         return 2 * least
-    return np.maximum(least, np.abs(values[-1] + rest - limit(values[:-1]).extrapolated))
+    return np.maximum(least, np.abs(values[-1] + rest - extrapolate(values[:-1]).extrapolated))

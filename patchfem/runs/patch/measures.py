@@ -18,9 +18,9 @@ from ...response import errors
 from ...scene.keys.contact import outermost_strip_distance
 from ..results import patch_rows
 from ..results.patch_rows import DECISIVE, TABLE
-from .condensed import pair_beside
-from .limits import limit
-from .press import Patch, pressed
+from .condensed import pair_on_same_meshes
+from .limits import extrapolate
+from .press import Patch, press_patch
 from .values import edge_cells, open_ends, unresolved_rounding, values
 
 # width over height of a piece that is clearly in plane strain; its inverse: in plane stress
@@ -48,10 +48,13 @@ def plane_band(asked, patch: Patch) -> list:
     if other is None:
         return []
     try:
-        mine, theirs = values(patch), values(pressed(other, pair_beside(other, patch.pair)))
+        mine, theirs = (
+            values(patch),
+            values(press_patch(other, pair_on_same_meshes(other, patch.pair))),
+        )
     except PatchfemError as error:
         return [
-            f"{_assumed(asked)}; the true state lies between plane strain and plane stress; how much the two "
+            f"{_plane_state_clause(asked)}; the true state lies between plane strain and plane stress; how much the two "
             f"differ is not known, because for plane {other.pieces.plane} the contact could not be solved ({error})"
         ]
     return band_words(asked, mine, theirs)
@@ -66,7 +69,7 @@ def other_plane(asked):
     return replace(asked, pieces=replace(asked.pieces, plane=plane))
 
 
-def _assumed(asked) -> str:
+def _plane_state_clause(asked) -> str:
     """Return the clause on the assumed plane state."""
     pieces = asked.pieces
     ratio = pieces.width / pieces.height
@@ -94,7 +97,8 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
     other = "stress" if asked.pieces.plane == "strain" else "strain"
     return (
         [
-            f"{_assumed(asked)}; the true state lies between plane strain and plane stress; plane {other} would change "
+            f"{_plane_state_clause(asked)}; the true state lies between plane strain and plane stress; "
+            f"plane {other} would change "
             f"the results by these amounts: {', '.join(parts)}"
         ]
         if parts
@@ -118,7 +122,7 @@ def strip_error(asked, patch: Patch, found: dict) -> dict:
     other, ratio = other_strips(asked)
     if other is asked:
         return found
-    beside, here = values(pressed(other, patch.pair)), values(patch)
+    beside, here = values(press_patch(other, patch.pair)), values(patch)
     added = {
         name: errors.error_of_change(here[name] - beside[name], ratio, errors.MAX_ORDER)
         for name in here
@@ -163,25 +167,25 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     """
     series, mine = [one for one in coarse if one is not None], values(fine)
     if not series:
-        return _bounded(_unbounded(fine), combined([mine], {}))
+        return _remove_unbounded(_why_unbounded(fine), measures_from_series([mine], {}))
     missed_peak = unresolved_rounding(fine)
     found = [values(one) for one in reversed(series)]
     nested = all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
     # none of several meshes that do not resolve a rounding shows its effect
     rough = 2.0 if missed_peak else 1.0
-    least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
-    out = combined(
+    least = least_of(_hidden_by_mesh(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
+    out = measures_from_series(
         [*found, mine], least, nested, tolerance, max(MIN_ERROR, fine.pair.rounding), rough
     )
     if fine.averaging is not None:
-        out = _cornered(out, fine, series[0])
+        out = _with_corner_errors(out, fine, series[0])
     for name, (value, error) in fine.sharper.items():
         if error < out[name].error:
             out[name] = replace(out[name], value=value, error=error, engine=patch_rows.ON_POINTS)
-    return _bounded(_unbounded(fine), out)
+    return _remove_unbounded(_why_unbounded(fine), out)
 
 
-def _cornered(found: dict, fine: Patch, coarse: Patch) -> dict:
+def _with_corner_errors(found: dict, fine: Patch, coarse: Patch) -> dict:
     """Return the measures with an error of the peak that contains the pressure at a corner.
 
     Under a profile, the pressure at a corner may still increase with refinement, although the
@@ -234,7 +238,7 @@ def converge(
         hidden[row], floors[row] = least.get(name, 0.0), TABLE[name].floor
     enough = np.inf if wanted is None else compute_allowed_error(wanted, known[-1], floors)
     with np.errstate(invalid="ignore", divide="ignore"):  # patches that were not solved have NaN
-        seen = limit(known, nested)
+        seen = extrapolate(known, nested)
         plain = np.maximum(rough * seen.error, hidden)
         is_extrapolated = (seen.extrapolated != seen.value) & (plain > enough)
         left = np.where(
@@ -251,7 +255,7 @@ def converge(
     return found
 
 
-def combined(
+def measures_from_series(
     series: list,
     least: dict,
     nested: bool = True,
@@ -288,15 +292,15 @@ def mesh_engine(value: float, finest: float) -> str:
     return patch_rows.ON_FINEST_MESH if value == finest else patch_rows.EXTRAPOLATED
 
 
-def met(found: dict, tolerance: float) -> bool:
+def is_within_tolerance(found: dict, tolerance: float) -> bool:
     """Return whether the errors of the decisive measures are within the tolerance.
 
     A measure without a value counts as within.
     """
-    return missed(found, tolerance) <= 1
+    return max_error_ratio(found, tolerance) <= 1
 
 
-def missed(found: dict, tolerance: float) -> float:
+def max_error_ratio(found: dict, tolerance: float) -> float:
     """Return the largest error of the decisive measures over the allowed error [1].
 
     A missing error counts as 0.
@@ -304,7 +308,7 @@ def missed(found: dict, tolerance: float) -> float:
     return max(found[name].error_ratio(tolerance) for name in DECISIVE)
 
 
-def _bounded(why: str, found: dict) -> dict:
+def _remove_unbounded(why: str, found: dict) -> dict:
     """Return the measures, with those that no mesh bounds replaced by the reason `why`.
 
     These are the peak pressure next to a loaded step or at a free corner, and the loaded fraction;
@@ -319,7 +323,7 @@ def _bounded(why: str, found: dict) -> dict:
     }
 
 
-def _unbounded(patch: Patch) -> str:
+def _why_unbounded(patch: Patch) -> str:
     """Return the reason why the pressure of a patch is unbounded; "" if it is bounded.
 
     A contact that ends at the edge of a step has the pressure of a punch with a sharp corner; a
@@ -436,7 +440,7 @@ def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
     )
 
 
-def _hidden(patch: Patch, missed_peak: float) -> Hidden:
+def _hidden_by_mesh(patch: Patch, missed_peak: float) -> Hidden:
     """Return what the meshes hide of a Patch under load.
 
     missed_peak: pressure [Pa] of `unresolved_rounding`.

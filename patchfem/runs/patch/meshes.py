@@ -17,10 +17,10 @@ from ...mesh.grading import Layout
 from ...mesh.tensor import TensorGrid
 from ...model.patch import SharedMeshes
 from . import grids, ladder
-from .condensed import condensed, keep_pairs
-from .measures import measures, missed
-from .press import pressed
-from .static import missed_on, patches_on
+from .condensed import condense, keep_pairs
+from .measures import max_error_ratio, measures
+from .press import press_patch
+from .static import max_error_ratios, patches_on
 
 MAX_CASES = 48  # most cases that choose the mesh; of more, those that lie farthest apart are taken
 CLIMBED_CASES = 5  # cases that are solved on their own ladders if a patch slips in part
@@ -79,7 +79,7 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
     asked = patches[0]
     if not asked.mesh.is_automatic:
         return with_digest(ladder.meshes_of_file(asked))
-    cases, every = farthest_apart(patches)
+    cases, every = select_distinct_patches(patches)
     swept = [
         one.with_loading(load=share * one.loading.load)
         for one in cases
@@ -105,7 +105,7 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
             own = own or grids.grids_of(asked, layout)
             if bodies[0].x.size >= own[0].x.size:  # both already have the largest number of columns
                 continue
-        pairs, missed_by = _climbed(
+        pairs, missed_by = _refine_until_met(
             cases, bodies, tolerance, bool(shares), grids.MIN_LEVELS + common
         )
         if missed_by <= 1 or not shares:
@@ -143,7 +143,7 @@ def with_digest(levels) -> SharedMeshes:
     return SharedMeshes(tuple(levels), digest.hexdigest()[:32])
 
 
-def farthest_apart(patches, most: int = MAX_CASES) -> tuple:
+def select_distinct_patches(patches, most: int = MAX_CASES) -> tuple:
     """Return the patches that differ most in loads and shapes, and whether these are all.
 
     Farthest-point selection; the result does not depend on their order.
@@ -202,10 +202,10 @@ def _halvings(cases: list, tolerance: float) -> dict:
     The keys are `_numbers`. CLIMBED_CASES cases are tried.
     """
     out = {}
-    for one in farthest_apart(cases, CLIMBED_CASES)[0]:
+    for one in select_distinct_patches(cases, CLIMBED_CASES)[0]:
         try:
             out[_numbers(one)] = (
-                len(ladder.climb(one, one.mesh.tolerance or tolerance)) - grids.MIN_LEVELS
+                len(ladder.solve_on_ladder(one, one.mesh.tolerance or tolerance)) - grids.MIN_LEVELS
             )
         except PatchfemError:  # the single run of this case reports the error
             continue
@@ -228,17 +228,17 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     layout = None
     for _ in range(MAX_SEARCHES):
         pair = (
-            condensed(first, *grids.grids_of(first, layout)) if layout else grids.search_pair(first)
+            condense(first, *grids.grids_of(first, layout)) if layout else grids.search_pair(first)
         )
         known = patches_on(cases, pair)
         seen = [
             (one, found)
             for one, patch in zip(cases, known)
-            if (found := _loaded(one, pair, patch)) is not None
+            if (found := _contact_of_case(one, pair, patch)) is not None
         ]
         if not seen:
             return None
-        layout = _merged(
+        layout = _merge_layouts(
             [
                 grids.layout_of(one, [found]).scale_cells(0.5 ** halvings.get(_numbers(one), 0))
                 for one, found in seen
@@ -250,22 +250,22 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     return layout
 
 
-def _loaded(asked, pair, patch):
+def _contact_of_case(asked, pair, patch):
     """Return the contact of a case, from `patch` or solved by itself; None if that fails.
 
     The single run of the case then reports the error.
     """
     try:
-        return grids.contact_extent(patch or pressed(asked, pair), asked.mesh.slip)
+        return grids.contact_extent(patch or press_patch(asked, pair), asked.mesh.slip)
     except PatchfemError:
         return None
 
 
-def _merged(layouts: list, between: bool) -> Layout:
+def _merge_layouts(layouts: list, between: bool) -> Layout:
     """Return the layout whose cells are nowhere longer than those of any of `layouts`."""
     bands = {band for one in layouts for band in (*one.bands, (*one.span, one.max_loaded_length))}
     if between:
-        bands |= set(_filled(layouts))
+        bands |= set(_bands_between(layouts))
     first, bands = layouts[0], sorted(bands, key=lambda band: (band[2], band))
     out = Layout(
         first.start,
@@ -287,7 +287,7 @@ def _merged(layouts: list, between: bool) -> Layout:
     return replace(out, bands=tuple(kept))
 
 
-def _filled(layouts: list) -> list:
+def _bands_between(layouts: list) -> list:
     """Return bands from each edge of a contact to that of the next case, with cells in between."""
     out, half = [], max(one.stop for one in layouts)
     for side in (-1, 1):
@@ -311,7 +311,7 @@ def _filled(layouts: list) -> list:
     return out
 
 
-def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> tuple:
+def _refine_until_met(cases: list, bodies, tolerance: float, once: bool, least: int) -> tuple:
     """Refine nested meshes until every case meets the tolerance or they are too expensive.
 
     Parameters
@@ -333,18 +333,18 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> t
     """
     pairs, tolerance = [], cases[0].mesh.tolerance or tolerance
     while True:
-        pairs.insert(0, condensed(cases[0], *bodies))
+        pairs.insert(0, condense(cases[0], *bodies))
         bodies = [body.refine() for body in bodies]
         if len(pairs) < least:
             continue
-        known = missed_on(cases, pairs, tolerance)
+        known = max_error_ratios(cases, pairs, tolerance)
         missed_by = max((by for by in known if by is not None), default=0.0)
         if missed_by <= 1:
             missed_by = next(
                 (
                     by
                     for one, seen in zip(cases, known)
-                    if seen is None and (by := _missed(one, pairs, tolerance)) > 1
+                    if seen is None and (by := _error_ratio(one, pairs, tolerance)) > 1
                 ),
                 missed_by,
             )
@@ -355,9 +355,11 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> t
             return pairs, missed_by
 
 
-def _missed(asked, pairs: list, tolerance: float) -> float:
+def _error_ratio(asked, pairs: list, tolerance: float) -> float:
     """Return the largest error of a case over the tolerance; 0 if it cannot be solved at all."""
     try:
-        return missed(measures(*ladder.on_pairs(asked, pairs), tolerance=tolerance), tolerance)
+        return max_error_ratio(
+            measures(*ladder.solve_on_pairs(asked, pairs), tolerance=tolerance), tolerance
+        )
     except PatchfemError:
         return 0.0

@@ -24,7 +24,7 @@ from .grids import (
     node_counts,
     seconds_of,
 )
-from .ladder import meshes_beside
+from .ladder import comparison_meshes
 
 PACKAGES = 2e7  # bytes of the packages that elastic pieces import
 CONDENSED = 0.8  # measured bytes over the predicted bytes of condensing
@@ -87,7 +87,7 @@ def _expected_levels(asked, tolerance: float) -> list:
         return list(asked.mesh.shared.levels)
     if not asked.mesh.is_automatic:
         low, high = make_piece_meshes(asked.with_mesh(file=None))
-        return [(low, high), *meshes_beside(low, high)]
+        return [(low, high), *comparison_meshes(low, high)]
     bodies, contact = base_grids(asked)
     has_edges = bool(asked.gap.jumps or (contact is not None and contact.places))
     levels = [bodies]
@@ -213,7 +213,7 @@ def face_words(name: str, one) -> list:
     return [f"interface {name} has a patch of its own: {found}"]
 
 
-def assembled(asked) -> str:
+def assembly_sentence(asked) -> str:
     """Return the sentence on how the stiffness of the pieces of a `PatchModel` is assembled."""
     if asked.mesh.file is not None:
         return (
@@ -235,15 +235,15 @@ def verdict(found: dict, asked) -> list:
     rough = (
         []
         if asked.interface.skin is None
-        else skin.ranged(
+        else skin.note_on_peak_stiffness(
             asked,
             asked.nominal_load / (asked.pieces.length * asked.pieces.width * asked.pieces.pairs),
         )
     )
-    return [*_of_tilt(found, asked), *rough, assembled(asked)]
+    return [*_tilt_sentence(found, asked), *rough, assembly_sentence(asked)]
 
 
-def _of_tilt(found: dict, asked) -> list:
+def _tilt_sentence(found: dict, asked) -> list:
     """Return the sentence on the tilt, as a list."""
     tilt, gap = found.get("tilt_over_first_opening"), asked.gap
     if tilt is None:

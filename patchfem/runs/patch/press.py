@@ -17,8 +17,8 @@ from ...contact.unilateral import press, press_to_approach
 from ...core import Compliance, ContactState, frozen_array
 from . import skin as skin_press
 from . import strips as strip_press
-from .approach import closed_by
-from .condensed import Pair, condensed
+from .approach import press_to_approach_with_rotation
+from .condensed import Pair, condense
 
 # ripples over the peak pressure on pieces whose nodes do not match, above which a note states them
 RIPPLE = 1e-2
@@ -132,12 +132,12 @@ def solve(asked, grid, upper_grid=None, fresh: bool = False) -> Patch:
     Raises
     ------
     PatchfemError
-        As in `pressed`, and by the contact solver.
+        As in `press_patch`, and by the contact solver.
     """
-    return pressed(asked, condensed(asked, grid, upper_grid, fresh))
+    return press_patch(asked, condense(asked, grid, upper_grid, fresh))
 
 
-def pressed(asked, pair: Pair, worn=None) -> Patch:
+def press_patch(asked, pair: Pair, worn=None) -> Patch:
     """Solve the contact of a pair with the shapes, the load and the holder of a `PatchModel`.
 
     A pair serves any number of models.
@@ -222,7 +222,7 @@ def zigzags(x, sigma) -> float:
 def _on(asked, pair: Pair, gap, notes: tuple, seconds: dict) -> Patch:
     """Solve the contact of a pair on the gap (m,) [m]."""
     begin = perf_counter()
-    how = _how(asked)(asked, pair.compliance, gap)
+    how = _choose_solver(asked)(asked, pair.compliance, gap)
     return as_patch(asked, pair, gap, notes, seconds | {"press": perf_counter() - begin}, how)
 
 
@@ -288,7 +288,7 @@ def presser(asked, pair: Pair):
     """
     gap = asked.gap.at(pair.compliance.interface.x).heights
     gap, bare = gap + pair.rise, pair.compliance
-    how = _how(asked)
+    how = _choose_solver(asked)
     if asked.interface.strips is not None:
         return PressedStrips(asked, bare, gap)
 
@@ -324,10 +324,10 @@ class PressedStrips:
 
     def __call__(self, worn, softening) -> np.ndarray:
         """Return the contact forces (s, m) [N] for worn depth [m] and softening [m/N], (s, m) each."""
-        how = _how(
+        how = _choose_solver(
             self.asked,
             partial(
-                _under,
+                _solve_under_load,
                 added=softening if softening.any() else None,
                 warm_start=self.warm_start,
             ),
@@ -335,13 +335,13 @@ class PressedStrips:
         return how(self.asked, self.bare, self.gap + worn)[3].force
 
 
-def _how(asked, under=None):
+def _choose_solver(asked, under=None):
     """Return the function (asked, pieces, gap) that solves the contact of a `PatchModel`.
 
     It returns (Compliance with its skin, ContactState, skin, strips). under: function for a given
-    load; None for `_under`.
+    load; None for `_solve_under_load`.
     """
-    under = under or _under
+    under = under or _solve_under_load
     if asked.loading.approach is None or not (
         asked.loading.can_rotate or asked.loading.rotational_stiffness > 0
     ):
@@ -351,12 +351,12 @@ def _how(asked, under=None):
         if asked.interface.skin is not None and asked.interface.skin.law == "linear"
         else lambda skin, pieces: pieces
     )
-    return lambda asked, pieces, gap: closed_by(
+    return lambda asked, pieces, gap: press_to_approach_with_rotation(
         asked, pieces, gap, under, bare(asked.interface.skin, pieces)
     )
 
 
-def _under(asked, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
+def _solve_under_load(asked, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
     """Solve the contact under a load, or under an approach with fixed rotation.
 
     Returns (Compliance with its skin, ContactState, skin, strips). added, warm_start: parameters of
@@ -369,11 +369,13 @@ def _under(asked, pieces: Compliance, gap, added=None, warm_start=None) -> tuple
         asked.loading.rotational_stiffness,
     )
     if asked.interface.strips is not None:
-        pieces, pressure, skin, strips = strip_press.in_strips(
+        pieces, pressure, skin, strips = strip_press.press_strips_of_patch(
             asked, pieces, gap, (angle, moment, spring), added, warm_start
         )
     elif asked.interface.skin is not None and asked.interface.skin.law != "linear":
-        pieces, pressure, skin = skin_press.behind_skin(asked, pieces, gap, angle, moment, spring)
+        pieces, pressure, skin = skin_press.press_through_asperities(
+            asked, pieces, gap, angle, moment, spring
+        )
     else:
         if asked.interface.skin is not None:
             pieces = with_linear_skin(asked.interface.skin, pieces)

@@ -28,13 +28,13 @@ SMALL = 0.02  # largest small strain; effects of its second order are neglected
 
 __all__ = [
     "bodies",
-    "left_out",
-    "measured",
-    "probed",
+    "notes_on_neglected_effects",
     "solve_all",
     "static",
     "static_ladder",
-    "strained",
+    "static_measures",
+    "static_measures_without_errors",
+    "warn_of_strains",
 ]
 COUPLED = 0.02  # closing by shear over the tangential compliance, above which a note states it
 # load over the buckling load of a tall piece; its sideways motion lacks about this fraction
@@ -43,7 +43,7 @@ BENT = 0.02
 WHOLE = 1 - 1e-6
 
 
-def probed(model) -> dict:
+def static_measures_without_errors(model) -> dict:
     """Return the static measures of the patch of a model, without errors."""
     with locate_errors(model.source):
         return values(solve_all(model.patch, model.accuracy.tolerance, False)[0])
@@ -61,7 +61,7 @@ def bodies(model) -> tuple:
         return pair.grid, None if pair.upper is pair.piece else pair.upper_grid
 
 
-def measured(model, patch, coarse) -> dict:
+def static_measures(model, patch, coarse) -> dict:
     """Return the static measures of the patch of a model.
 
     If the tolerance chose the mesh, measures that miss it are extrapolated. The floor of a measure
@@ -80,15 +80,15 @@ def measured(model, patch, coarse) -> dict:
     tolerance = (
         (asked.mesh.tolerance or model.accuracy.tolerance) if asked.mesh.is_automatic else None
     )
-    found = floored(model, derived.static_measures(asked, patch, coarse, tolerance))
+    found = set_floors(model, derived.static_measures(asked, patch, coarse, tolerance))
     # `wear.measures` adds the error by the number of strips for worn strips
     if patch.strips is None or coarse[0] is None or model.wear is not None:
         return found
     return strip_error(model.patch, coarse[0], found)
 
 
-def floored(model, found: dict) -> dict:
-    """Return measures with the floors described in `measured`."""
+def set_floors(model, found: dict) -> dict:
+    """Return measures with the floors described in `static_measures`."""
     least = floors(
         model.patch, model.accuracy.tolerance, {name: one.value for name, one in found.items()}
     )
@@ -127,13 +127,13 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
     )
     if p.outcome is Outcome.NO_CONTACT:
         warnings = [*warnings, Outcome.NO_CONTACT.sentence]
-    found = measured(what.model, patch, coarse)
+    found = static_measures(what.model, patch, coarse)
     return Result(
         what, p.outcome, found, None, None, patch, at_rest(patch), seconds, warnings, extra
     )
 
 
-def strained(asked, patch) -> list:
+def warn_of_strains(asked, patch) -> list:
     """Return warnings on large strains, on cells of a given size that lock, and on the gap."""
     beyond = (
         [
@@ -152,7 +152,7 @@ def strained(asked, patch) -> list:
 
 
 def strained_by(asked, top: float, approach: float, beyond=()) -> list:
-    """Return the warnings of `strained` on strains and locking.
+    """Return the warnings of `warn_of_strains` on strains and locking.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
     return out
 
 
-def beyond_small_strains(asked, top, approach):
+def exceeds_small_strains(asked, top, approach):
     """Return whether `strained_by` may have a warning, for one patch or arrays of many."""
     return (
         np.maximum(*_strains(asked, top, approach)) > SMALL
@@ -216,7 +216,7 @@ def _materials(asked) -> list:
     ]
 
 
-def left_out(model, patch, coarse) -> list:
+def notes_on_neglected_effects(model, patch, coarse) -> list:
     """Return notes on a pressed patch that hold for any motion.
 
     Parameters
@@ -241,8 +241,8 @@ def left_out(model, patch, coarse) -> list:
         else []
     )
     out += [
-        *drawn_otherwise(patch.pair),
-        *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum()),
+        *notes_on_mesh_file(patch.pair),
+        *notes_on_tall_pieces(asked, patch.pressure.load / patch.pieces.interface.weight.sum()),
     ]
     if patch.sharper:
         out.append(
@@ -257,7 +257,7 @@ def left_out(model, patch, coarse) -> list:
         )
     if asked.interface.skin is not None and patch.pressure.load > 0:
         bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
-        out += skin.ranged(asked, float(patch.pressure.load / bears))
+        out += skin.note_on_peak_stiffness(asked, float(patch.pressure.load / bears))
     if patch.strips is not None:
         out.append(patch.strips.note)
     if patch.pair.coupling > COUPLED and model.kind != "patch":
@@ -324,7 +324,7 @@ def _dundurs(asked) -> float:
     return (a * (q - 1) - b * (k - 1)) / (a * (q + 1) + b * (k + 1))
 
 
-def drawn_otherwise(pair) -> list:
+def notes_on_mesh_file(pair) -> list:
     """Return notes on pieces of a mesh file with holes or a partly clamped far face."""
     out = []
     for side, body in (("lower", pair.grid), ("upper", pair.upper_grid)):
@@ -346,7 +346,7 @@ def drawn_otherwise(pair) -> list:
     return out
 
 
-def slender(asked, mean: float) -> list:
+def notes_on_tall_pieces(asked, mean: float) -> list:
     """Return a note for each tall piece whose bending moves the load sideways, as a list.
 
     The model neglects that the lever arm increases. The measure is the load over the buckling load

@@ -47,7 +47,7 @@ def mean_stiffness(asked, pressure: float) -> float:
     return float(law.stiffness(law.separation(np.array([pressure])))[0]) if pressure > 0 else 0.0
 
 
-def ranged(asked, pressure: float) -> list:
+def note_on_peak_stiffness(asked, pressure: float) -> list:
     """Return a sentence, as a list, on how reliable the stiffness of peaks from a profile is.
 
     Also for peaks from root mean squares; [] for any other skin. pressure: mean pressure [Pa].
@@ -91,7 +91,7 @@ def _half(asked, coarse, pressure: float) -> str:
     return f"{mean_stiffness(replace(asked, interface=interface), pressure):.3g} Pa/m"
 
 
-def borne(pressure) -> np.ndarray:
+def cut_off_pressure(pressure) -> np.ndarray:
     """Return the pressure (..., m) [Pa] of a smooth skin, with 0 below MIN_RELATIVE_PRESSURE.
 
     The law never reaches 0, but the pressure that is cut off is below the residual of the load
@@ -100,7 +100,9 @@ def borne(pressure) -> np.ndarray:
     return np.where(pressure > MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
 
 
-def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: float) -> tuple:
+def press_through_asperities(
+    asked, pieces: Compliance, gap, angle: float, moment, spring: float
+) -> tuple:
     """Solve the contact of a pair through a smooth skin.
 
     The gap of the ContactState is the separation of the mean planes, which is negative if the skin
@@ -142,7 +144,7 @@ def behind_skin(asked, pieces: Compliance, gap, angle: float, moment, spring: fl
         asperities=skin_law(asked),
     )
     answer = ContactState(
-        frozen_array(borne(state.pressure[0])),
+        frozen_array(cut_off_pressure(state.pressure[0])),
         state.gap[0],
         state.delta,
         state.theta,

@@ -40,7 +40,7 @@ class SolvedPatch(NamedTuple):
     patches: tuple
 
 
-class Asked(NamedTuple):
+class PatchLoads(NamedTuple):
     """Loads and shapes of q patches that are alike in their pieces and in `pressing_kind`.
 
     - first: PatchModel of the first one.
@@ -87,7 +87,7 @@ class Level(NamedTuple):
         return self.contacts.residual <= RESIDUAL_TOL
 
 
-class Together(NamedTuple):
+class BatchSolution(NamedTuple):
     """Static measures of q patches that were solved together.
 
     - values, errors: (q,) by name.
@@ -178,13 +178,13 @@ def _kind(asked) -> tuple:
     return numbers, asked.loading.moment is None
 
 
-def asked_of(patches: Sequence) -> Asked:
-    """Return the `Asked` of some `PatchModel`s."""
+def collect_loads(patches: Sequence) -> PatchLoads:
+    """Return the `PatchLoads` of some `PatchModel`s."""
     loadings = [one.loading for one in patches]
     moment = None
     if loadings[0].moment is not None:
         moment = np.array([one.moment for one in loadings], float)
-    return Asked(
+    return PatchLoads(
         patches[0],
         np.array([one.load for one in loadings], float),
         moment,
@@ -194,15 +194,15 @@ def asked_of(patches: Sequence) -> Asked:
     )
 
 
-def asked_by_columns(patch, count: int) -> Asked:
-    """Return the `Asked` of `count` patches, given as one PatchModel with columns of numbers."""
+def asked_by_columns(patch, count: int) -> PatchLoads:
+    """Return the `PatchLoads` of `count` patches, given as one PatchModel with columns of numbers."""
 
     def column(number) -> np.ndarray:
         """Return a number as a column (q,)."""
         return np.broadcast_to(np.asarray(number, float), count)
 
     moment = patch.loading.moment
-    return Asked(
+    return PatchLoads(
         patch,
         column(patch.loading.load),
         None if moment is None else column(moment),
@@ -228,7 +228,7 @@ def patches_on(patches, pair: Pair) -> list:
             groups.setdefault(_kind(asked), []).append(k)
     for cases in groups.values():
         with one_thread():
-            level = pressed_on(asked_of([patches[k] for k in cases]), pair)
+            level = solve_on_pair(collect_loads([patches[k] for k in cases]), pair)
         for place, k in enumerate(cases):
             if (
                 level.is_solved[place]
@@ -243,7 +243,7 @@ def solved_patches(patches, tolerance: float) -> list:
 
     They are alike in their pieces and in `pressing_kind`. tolerance: see `pressed_together`.
     """
-    pairs, found = shared_pairs(patches[0]), pressed_together(asked_of(patches), tolerance)
+    pairs, found = shared_pairs(patches[0]), pressed_together(collect_loads(patches), tolerance)
     return [
         SolvedPatch(
             found.measures(k),
@@ -256,7 +256,7 @@ def solved_patches(patches, tolerance: float) -> list:
     ]
 
 
-def missed_on(patches, pairs: list, tolerance: float) -> list:
+def max_error_ratios(patches, pairs: list, tolerance: float) -> list:
     """Return the largest error over the tolerance of each `PatchModel`; None if not solved here.
 
     Parameters
@@ -275,13 +275,15 @@ def missed_on(patches, pairs: list, tolerance: float) -> list:
         if asked.gap.profile is None and not _not_of_one_stretch(asked):
             groups.setdefault((asked.mesh.tolerance, *_kind(asked)), []).append(k)
     for cases in groups.values():
-        found = pressed_together(asked_of([patches[k] for k in cases]), tolerance, pairs)
+        found = pressed_together(collect_loads([patches[k] for k in cases]), tolerance, pairs)
         for place in np.flatnonzero(found.good).tolist():
-            out[cases[place]] = one_by_one.missed(found.measures(place), tolerance)
+            out[cases[place]] = one_by_one.max_error_ratio(found.measures(place), tolerance)
     return out
 
 
-def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None) -> Together:
+def pressed_together(
+    asked: PatchLoads, tolerance: float, pieces: list | None = None
+) -> BatchSolution:
     """Solve patches on the meshes that they share, and estimate their errors.
 
     Parameters
@@ -296,7 +298,7 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
     pairs, first, level, levels = pieces or shared_pairs(asked.first), asked.first, None, []
     with one_thread():
         for pair in reversed(pairs):
-            level = pressed_on(asked, pair, level)
+            level = solve_on_pair(asked, pair, level)
             levels.insert(0, level)
         theirs = () if pieces else _in_other_plane(asked, levels[1])
     fine, pair = levels[0], pairs[0]
@@ -306,7 +308,7 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
     )
     hidden = one_by_one.hidden_by_meshes(
         pair,
-        _with_skin(first, pair),
+        _with_asperities(first, pair),
         fine.contacts.force,
         fine.gap_range,
         first.loading.moment is not None,
@@ -318,7 +320,7 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
         all(one_by_one.cells_halved(a, b) for a, b in pairwise(pairs)),
         max(one_by_one.MIN_ERROR, pair.rounding),
     )
-    return Together(
+    return BatchSolution(
         found.values,
         found.errors,
         good,
@@ -330,7 +332,7 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
 
 
 def _patch_of(asked, pair: Pair, level: Level, k: int):
-    """Return the k-th patch of a level, of PatchModel `asked`, as `press.pressed` returns it."""
+    """Return the k-th patch of a level, of PatchModel `asked`, as `press.press_patch` returns it."""
     gap, notes, seconds = asked.gap.at(level.x)
     rows = level.pressure
     pressure = ContactState(
@@ -350,27 +352,27 @@ def _patch_of(asked, pair: Pair, level: Level, k: int):
         gap + pair.rise,
         notes,
         seconds,
-        (_with_skin(asked, pair), pressure, None, None),
+        (_with_asperities(asked, pair), pressure, None, None),
     )
 
 
-def _with_skin(asked, pair: Pair):
+def _with_asperities(asked, pair: Pair):
     """Return the Compliance of a pair, in series with a linear skin if the model has one."""
     skin = asked.interface.skin
     return pair.compliance if skin is None else with_linear_skin(skin, pair.compliance)
 
 
-def _in_other_plane(asked: Asked, known: Level) -> tuple:
+def _in_other_plane(asked: PatchLoads, known: Level) -> tuple:
     """Return the patches on the second mesh in the other plane state; () if it is not needed."""
     other = one_by_one.other_plane(asked.first)
     return (
         ()
         if other is None
-        else (pressed_on(asked._replace(first=other), shared_pair(other, 1), known),)
+        else (solve_on_pair(asked._replace(first=other), shared_pair(other, 1), known),)
     )
 
 
-def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
+def solve_on_pair(asked: PatchLoads, pair: Pair, coarse: Level | None = None) -> Level:
     """Solve patches on one Pair.
 
     Parameters
@@ -380,7 +382,7 @@ def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
     coarse : Level, optional
         The same patches on coarser cells, near whose ends of contact the search starts.
     """
-    bare, pieces = pair.compliance, _with_skin(asked.first, pair)
+    bare, pieces = pair.compliance, _with_asperities(asked.first, pair)
     x, held = bare.interface.x, asked.moment is None
     gap = asked.gaps(x) + pair.rise
     gap_range = np.ptp(gap, axis=1)

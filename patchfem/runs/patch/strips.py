@@ -11,10 +11,12 @@ from ...contact.asperity_laws import LinearAsperities, SmoothAsperities
 from ...contact.strip_compliance import StripCompliance
 from ...contact.strips import press_strips, split_into_strips, strip_offsets, strips_stiffness
 from ...core import Compliance, ContactState, frozen_array
-from .skin import MIN_RELATIVE_PRESSURE, borne, skin_law
+from .skin import MIN_RELATIVE_PRESSURE, cut_off_pressure, skin_law
 
 
-def in_strips(asked, pieces: Compliance, gap, held: tuple, added=None, warm_start=None) -> tuple:
+def press_strips_of_patch(
+    asked, pieces: Compliance, gap, held: tuple, added=None, warm_start=None
+) -> tuple:
     """Solve the contact of a pair in strips.
 
     The Compliance is that of the pieces in full contact over the width; measures of stiffness are
@@ -60,9 +62,9 @@ def in_strips(asked, pieces: Compliance, gap, held: tuple, added=None, warm_star
         skin,
         roll_moment=None if offset is None else asked.loading.load * offset,
     )
-    mean = (borne(state.pressure) if isinstance(skin, SmoothAsperities) else state.pressure).mean(
-        axis=0
-    )
+    mean = (
+        cut_off_pressure(state.pressure) if isinstance(skin, SmoothAsperities) else state.pressure
+    ).mean(axis=0)
     answer = ContactState(
         frozen_array(mean),
         frozen_array(state.gap.min(axis=0)),

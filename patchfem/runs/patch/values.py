@@ -209,11 +209,11 @@ def contact_ends(patch: Patch) -> list:
     """
     if patch.strips is not None:
         return []
-    found = _between(patch)
+    found = _ends_without_steps(patch)
     return edges.snap_to_steps(found, patch.x, patch.gap, patch.jumps) if patch.jumps else found
 
 
-def _between(patch: Patch) -> list:
+def _ends_without_steps(patch: Patch) -> list:
     """Return the ends of `contact_ends` without regard to steps of the gap."""
     if patch.skin is not None:
         return edges.find_pressure_edges(
@@ -260,7 +260,7 @@ def unresolved_rounding(patch: Patch) -> float:
     rounding smaller than these cells has the peak of `rounded_corner`.
     """
     pair, x, sigma = patch.pair, patch.x, patch.pressure.sigma_n
-    rounded = _rounded(pair)
+    rounded = _rounded_bodies(pair)
     loaded = np.flatnonzero(patch.active)
     # a skin smooths the pressure
     if not rounded or not loaded.size or patch.pieces is not pair.compliance:
@@ -290,7 +290,7 @@ def open_ends(patch: Patch) -> float:
 
     It counts an end whose last node is in contact.
     """
-    rounded = _rounded(patch.pair)
+    rounded = _rounded_bodies(patch.pair)
     return (
         patch.active[[0, -1]].sum() * (patch.x[-1] - min(body.half_flat_length for body in rounded))
         if rounded
@@ -307,7 +307,7 @@ def beyond_gentle(patch: Patch) -> bool:
     return bool((patch.active[[0, -1]] & (cells < open_ends(patch))).any())
 
 
-def _rounded(pair) -> list:
+def _rounded_bodies(pair) -> list:
     """Return the bodies with a rounding at the end of the interface."""
     return [
         body

@@ -40,7 +40,7 @@ def climbing_as_one(model, patch) -> list:
     ]
 
 
-def warming(model, patch, response, work: float | None = None) -> list:
+def note_on_heating(model, patch, response, work: float | None = None) -> list:
     """Return the line on the rise of the surface temperature, as a list.
 
     It is empty if the scene does not ask for it.
@@ -60,10 +60,10 @@ def warming(model, patch, response, work: float | None = None) -> list:
         work = float(np.trapezoid(response.force, response.slide))
         if response.lateral is not None:
             work += float(np.trapezoid(response.lateral_force, response.lateral))
-    return heating(model, patch, work, float(response.time[-1]))
+    return heating_sentences(model, patch, work, float(response.time[-1]))
 
 
-def unripe(law, speed: float) -> list:
+def warn_of_unformed_bonds(law, speed: float) -> list:
     """Return a warning, as a list, if bonds of the printed law break before they are formed.
 
     speed: peak speed [m/s].
@@ -81,7 +81,7 @@ def unripe(law, speed: float) -> list:
     ]
 
 
-def creeping(law, outcome, found) -> list:
+def warn_of_creep(law, outcome, found) -> list:
     """Return a warning, as a list, of a bounded motion whose mean position drifts.
 
     This is Dahl's creep, not a property of the joint. found: measures by name.
@@ -111,7 +111,7 @@ def unbounded_bonds(law) -> list:
     ]
 
 
-def of_growth(law, peak: float | None) -> list:
+def growth_notes(law, peak: float | None) -> list:
     """Return notes, as a list, on the effects of growing bonds.
 
     peak: largest friction force of the run over mu_s N [1]; None if the load changes.
@@ -188,7 +188,7 @@ def more_harmonics(found: int, sharp: float = 0.0) -> str:
     return f"set accuracy.harmonics = {max(MORE * found, LEAST, min(ceil(sharp), MOST_HARMONICS))}"
 
 
-def heating(model, patch, work: float, duration: float) -> list:
+def heating_sentences(model, patch, work: float, duration: float) -> list:
     """Return a line, as a list, on the rise of the surface temperature.
 
     It is empty if nothing is loaded or nothing moves. All heat is assumed to flow into one

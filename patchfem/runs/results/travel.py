@@ -9,7 +9,9 @@ import numpy as np
 from ...formatting import format_length
 from ...response.outcome import check_piece_length
 
-FAR = 0.1  # fraction of the contact length above which an unchanged pressure is inaccurate
+MAX_SLIDE_FRACTION = (
+    0.1  # fraction of the contact length above which an unchanged pressure is inaccurate
+)
 
 
 def largest_slide(slide) -> float:
@@ -28,15 +30,16 @@ def contact_length(patch) -> float:
     return float(ends[touching[-1] + 1] - ends[touching[0]])
 
 
-def travelled(patch, slide) -> list:
-    """Return a warning, as a list, if the slide (k,) [m] exceeds FAR of the contact length."""
+def warn_of_large_slide(patch, slide) -> list:
+    """Return a warning, as a list, if the slide (k,) [m] exceeds MAX_SLIDE_FRACTION of the contact length."""
     largest, contact = largest_slide(slide), contact_length(patch)
-    if not contact > 0 or largest < FAR * contact:
+    if not contact > 0 or largest < MAX_SLIDE_FRACTION * contact:
         return []
     return [
         f"the slide amplitude, {format_length(largest, 3)}, is {largest / contact:.2g} of the "
         f"contact length {format_length(contact)} "
-        f"(limit {FAR:g}): the computation keeps the pressure unchanged and neglects that the ends of the pieces "
+        f"(limit {MAX_SLIDE_FRACTION:g}): the computation keeps the pressure unchanged and "
+        "neglects that the ends of the pieces "
         "no longer overlap"
     ]
 

@@ -37,9 +37,13 @@ from ..cost import EVENT_CODE, LINEAR_CODE, SMOOTH_CODE, Cost, MemoryPart
 if TYPE_CHECKING:
     from ...friction.protocol import Element
 
-WORTH = 5.0  # CPU seconds that an exact solution may take if a march, which has errors, takes less
-PATIENCE = 60.0  # CPU seconds that it may take if the finest march does not resolve the modes
-LONGEST = 600.0  # CPU seconds of an exact solution above which it is refused
+MAX_EXACT_SECONDS_OVER_MARCH = (
+    5.0  # CPU seconds that an exact solution may take if a march, which has errors, takes less
+)
+MAX_EXACT_SECONDS_UNRESOLVED = (
+    60.0  # CPU seconds that it may take if the finest march does not resolve the modes
+)
+MAX_EXACT_SECONDS = 600.0  # CPU seconds of an exact solution above which it is refused
 MOST_STEPS = 6400  # steps per cycle of the finest automatic march
 # an element sticks for the fraction (friction limit / force of the drive)**HELD of the time
 # (measured: .01)
@@ -120,7 +124,7 @@ def steps_per_cycle(model: Model) -> int:
     return model.accuracy.steps_per_cycle or min(max(steps_wanted(model), 100), MOST_STEPS)
 
 
-def pairs_of(model: Model) -> int:
+def count_merges(model: Model) -> int:
     """Return how often neighbouring cells of a density are merged in pairs in the first run.
 
     The error of cells falls with the square of their width. If the error of the run is too large,
@@ -149,7 +153,7 @@ def expected_elements(model: Model) -> tuple:
             most, mine = inf, 1
         else:
             element = record.make_law(one.numbers, load).element(load)
-            mine = int(element.numbers[1]) >> pairs_of(model)
+            mine = int(element.numbers[1]) >> count_merges(model)
             most = float(element.numbers[2 : 2 + int(element.numbers[1])].sum())
         if model.partial_slip or one.partial_slip:
             patch = one.patch or model.patch
@@ -210,13 +214,13 @@ def seconds_of_pieces(model: Model) -> float:
 
     The elements are assumed to stick all the time.
     """
-    cycles, each = model.rig.drive.cycles, cost_model.MAX_PIECE_SECONDS + _of_size(model)
+    cycles, each = model.rig.drive.cycles, cost_model.MAX_PIECE_SECONDS + _size_seconds(model)
     return (each * cycles + cost_model.READ_PIECE_SECONDS * min(cycles, 10.0)) * pieces_per_cycle(
         model
     )
 
 
-def _of_size(model: Model) -> float:
+def _size_seconds(model: Model) -> float:
     """Return the additional CPU seconds of a piece with several modes and interfaces."""
     modes = model.rig.modes
     return cost_model.PIECE_MODE_SECONDS * (
@@ -238,7 +242,7 @@ def expected_seconds(model: Model) -> float:
     ringing, events = ringing_and_events(model)
     share = min(1.0, limit / push) ** HELD if stiff and push else 1.0
     return (
-        (cost_model.PIECE_SECONDS + _of_size(model) + cost_model.PIECE_ELEMENT_SECONDS * count)
+        (cost_model.PIECE_SECONDS + _size_seconds(model) + cost_model.PIECE_ELEMENT_SECONDS * count)
         * (ringing * share + events)
         * rig.drive.cycles
     )
@@ -255,38 +259,42 @@ def seconds_of_steps(model: Model) -> float:
     )
 
 
-def dear_events(model: Model) -> str:
+def reason_to_march_events(model: Model) -> str:
     """Return the reason to march instead of solving from event to event; "" if there is none.
 
     Its events cost more than time steps, and more than an exact solution is worth.
     """
-    worth = PATIENCE if steps_wanted(model) > MOST_STEPS else max(WORTH, seconds_of_steps(model))
+    worth = (
+        MAX_EXACT_SECONDS_UNRESOLVED
+        if steps_wanted(model) > MOST_STEPS
+        else max(MAX_EXACT_SECONDS_OVER_MARCH, seconds_of_steps(model))
+    )
     return (
         "time steps are faster than the exact solution" if seconds_of_pieces(model) > worth else ""
     )
 
 
-def dear_elements(model: Model) -> str:
+def reason_to_march_elements(model: Model) -> str:
     """Return the reason to march with elements that stick or slip; "" if there is none.
 
-    Either the scene prescribes the steps, or see `dear_events`.
+    Either the scene prescribes the steps, or see `reason_to_march_events`.
     """
     return (
         "accuracy.steps_per_cycle is set"
         if model.accuracy.steps_per_cycle is not None
-        else dear_events(model)
+        else reason_to_march_events(model)
     )
 
 
 def refuse_endless(model: Model, numerics=None) -> None:
-    """Raise Missing if a run from event to event would take longer than LONGEST CPU seconds."""
+    """Raise Missing if a run from event to event would take longer than MAX_EXACT_SECONDS CPU seconds."""
     seconds = seconds_of_pieces(model)
-    if seconds > LONGEST:
+    if seconds > MAX_EXACT_SECONDS:
         march = ', or use accuracy.method = "march"' * (seconds_of_steps(model) < seconds)
         raise Missing(
             f"the exact solution (about {pieces_per_cycle(model):.2g} time intervals per cycle, set by "
             "events, rows of the drive and the fastest free vibration) would need a computing time of about "
-            f"{seconds:.0f} s, more than the limit of {LONGEST:.0f} s; lower drive.cycles or the stiffness "
+            f"{seconds:.0f} s, more than the limit of {MAX_EXACT_SECONDS:.0f} s; lower drive.cycles or the stiffness "
             f"of modes and elements{march}",
             "",
         )
@@ -328,7 +336,7 @@ def _python_seconds(model: Model) -> float:
     each = events_cost.python_seconds(
         model.rig.modes, model.rig.drive.signal, stiffness, count if stiffness else 0
     )
-    return model.rig.drive.cycles * each * 2 ** pairs_of(model)
+    return model.rig.drive.cycles * each * 2 ** count_merges(model)
 
 
 def _is_loop_kept(model: Model) -> bool:
@@ -382,7 +390,7 @@ def exact_words(model: Model, engine: str) -> list:
     ]
 
 
-def not_smooth(model: Model) -> str:
+def reason_to_march_smooth_law(model: Model) -> str:
     """Return the reason to march a rig instead of integrating it at high order, or ""."""
     rig, accuracy = model.rig, model.accuracy
     pinned = next((f"accuracy.{key}" for key in PINNED if getattr(accuracy, key) is not None), "")
@@ -436,7 +444,7 @@ def smooth_steps(model: Model, element: "Element") -> float:
     rigid = (
         0.0
         if element.length
-        else element.limit / model.friction.reference_speed * ease * clings(model, element)
+        else element.limit / model.friction.reference_speed * ease * stiff_fraction(model, element)
     )
     path = 4 * model.speed_scale / omega
     states = path / element.length if element.state_scales and element.length else 0.0
@@ -446,7 +454,7 @@ def smooth_steps(model: Model, element: "Element") -> float:
     return 24 + 1.2 * pace * period + (states + rigid * period) / STABLE
 
 
-def clings(model: Model, element: "Element") -> float:
+def stiff_fraction(model: Model, element: "Element") -> float:
     """Return the fraction [1] of the time that a law of the speed spends in its stiff range.
 
     With a single mode it is 1 for a ratio r of the force to the limit up to 1, and less for larger

@@ -49,14 +49,14 @@ def decay_of(raw: Solution) -> DecayCurve | None:
     found = _read(raw)
     if not found.time.size:
         return None
-    found = _compared(found, raw)
+    found = _add_coarse_changes(found, raw)
     known = (found.frequency_error <= MOST * found.frequency) & (
         found.damping_error <= MOST * np.abs(found.damping)
     )
     return found.at(known) if known.any() else None
 
 
-def _compared(found: DecayCurve, raw: Solution) -> DecayCurve:
+def _add_coarse_changes(found: DecayCurve, raw: Solution) -> DecayCurve:
     """Return a curve of a run with the changes by its coarse runs added to the errors."""
     for run, beside in raw.coarser:
         one, other = (
@@ -109,7 +109,7 @@ def laws_on(model, patch, meshed: tuple = ()):
     rig = model.rig
     if len(rig.friction.interfaces) < 2:
         return balance.BalanceFinder(
-            model, replace(numerics.choose(steadily(model)), meshed=meshed), patch
+            model, replace(numerics.choose(with_automatic_method(model)), meshed=meshed), patch
         ).group
     load("dynamics.harmonic.cycle_kernels", None)
     return forces.Group(
@@ -117,18 +117,18 @@ def laws_on(model, patch, meshed: tuple = ()):
     )
 
 
-def rough_laws(model, coarse) -> list:
+def coarse_laws(model, coarse) -> list:
     """Return the Groups of the laws in which one patch after the other has a coarser mesh.
 
     coarse: Patch of its [contact] on a coarser mesh, or None.
     """
     return [
         *([] if coarse is None else [laws_on(model, coarse)]),
-        *(laws_on(model, None, numbers) for numbers in faces.meshed(model)),
+        *(laws_on(model, None, numbers) for numbers in faces.interfaces_with_coarse_mesh(model)),
     ]
 
 
-def steadily(model):
+def with_automatic_method(model):
     """Return the model with the automatic choice of the method."""
     return replace(model, accuracy=model.accuracy.model_copy(update={"method": "auto"}))
 
@@ -201,7 +201,7 @@ def _spread(stiffness, slide) -> tuple:
     return spread_elements(stiffness[order], slide[order])
 
 
-def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:
+def mesh_errors_of_decay(model, patch, coarse, amplitudes, mode) -> tuple:
     """Return the errors of frequency [Hz] and damping by the mesh at amplitudes of the output.
 
     Parameters
@@ -232,7 +232,7 @@ def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:
         number = mode(fine)
         error = mesh_error(
             fine,
-            rough_laws(model, coarse),
+            coarse_laws(model, coarse),
             lambda laws: static_rows(rig.modes, laws, number, amplitudes, balance.SAMPLES)[1:3],
         )
     except NotConverged as reason:
@@ -248,7 +248,7 @@ def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:
 
 
 def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
-    """Return `left_by_mesh` at many amplitudes for the stuck mode nearest to a frequency.
+    """Return `mesh_errors_of_decay` at many amplitudes for the stuck mode nearest to a frequency.
 
     Parameters
     ----------
@@ -258,18 +258,18 @@ def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
         [Hz].
     model : Model
     patch, coarse : Patch or None
-        See `left_by_mesh`.
+        See `mesh_errors_of_decay`.
     """
     low, high = np.log10([amplitude.min(), amplitude.max()])
     at = np.logspace(low, high, 2 + int(APART * (high - low)))
-    wide, why = left_by_mesh(
+    wide, why = mesh_errors_of_decay(
         model, patch, coarse, at, lambda laws: _mode(model.rig.modes, laws, frequency)
     )
     return np.array([np.interp(np.log(amplitude), np.log(at), one) for one in wide]), why
 
 
 def without_slip_between_nodes(whys: dict, ways) -> list:
-    """Return sentences on errors to which `left_by_mesh` could not be added.
+    """Return sentences on errors to which `mesh_errors_of_decay` could not be added.
 
     Parameters
     ----------

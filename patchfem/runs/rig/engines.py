@@ -30,8 +30,13 @@ from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
 from ..patch import faces
-from .costs import dear_elements, dear_events, not_smooth, pieces_per_cycle
-from .solution import gauged
+from .costs import (
+    pieces_per_cycle,
+    reason_to_march_elements,
+    reason_to_march_events,
+    reason_to_march_smooth_law,
+)
+from .solution import seen_by_gauge
 
 FINER = 0.5  # factor of the merge width in the coarse run that shows the error of merging
 # tail over the tolerance, above which a run with a smaller tail checks it; the automatic tail is a
@@ -92,7 +97,7 @@ class Engine(NamedTuple):
     dearer: Callable = lambda model: ""
     chosen: str = ""
     refuse: str = ""
-    words: str = "plan summed_words"
+    words: str = "plan bond_sum_sentences"
     notes: str = ""
     least: float = 1e-9
     closes: float | None = CLOSED
@@ -119,7 +124,7 @@ class Engine(NamedTuple):
     def run(self) -> Callable:
         """Function that solves, imported on first use."""
         solve = function_of(self.solve)
-        return lambda model, *given: gauged(model, solve(model, *given))
+        return lambda model, *given: seen_by_gauge(model, solve(model, *given))
 
     def lacks(self, model: Model, steady: bool = False) -> str:
         """Return the first property of a model that the engine cannot compute, as text; "" if none.
@@ -134,7 +139,7 @@ class Engine(NamedTuple):
         return function_of(where)(*given) if where else None
 
 
-def inexact(model: Model, steady: bool = False) -> str:
+def reason_not_exact(model: Model, steady: bool = False) -> str:
     """Return the reason why no engine of accuracy.method = "exact" can compute a model, or "".
 
     steady: see `Engine.lacks`.
@@ -263,7 +268,7 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the coarse runs of the engine of yields: coarser meshes, fewer cells of a density."""
-    meshes = [Variant(one, patch) for one in _meshed(model, numerics)]
+    meshes = [Variant(one, patch) for one in _numerics_of_meshes(model, numerics)]
     if coarse is not None and model.partial_slip:
         meshes = [Variant(numerics, coarse), *meshes]
     out = [CoarserRuns((variant,), coarser_errors, of="mesh") for variant in meshes]
@@ -274,11 +279,11 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     return [*out, CoarserRuns(merged, merged_cell_errors, of="cells")]
 
 
-def _meshed(model: Model, numerics) -> list:
+def _numerics_of_meshes(model: Model, numerics) -> list:
     """Return Numerics in which one patch of the interfaces after the other has a coarser mesh."""
     if not model.rig.friction.has_partial_slip:
         return []
-    return [replace(numerics, meshed=one) for one in faces.meshed(model)]
+    return [replace(numerics, meshed=one) for one in faces.interfaces_with_coarse_mesh(model)]
 
 
 def _fewer(numerics, share: int):
@@ -312,7 +317,9 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
         # the number of shear modes is fixed, so that only the mesh changes
         fixed = few if shape is None else replace(few, shear_modes=shape.size)
         out.append(make_coarser_space(Variant(fixed, coarse), quarter))
-    out += [make_coarser_space(Variant(one, patch), quarter) for one in _meshed(model, few)]
+    out += [
+        make_coarser_space(Variant(one, patch), quarter) for one in _numerics_of_meshes(model, few)
+    ]
     climbs, gathers = (
         model.grooves is not None,
         model.patch is not None and model.patch.mesh.can_gather_points,
@@ -324,10 +331,10 @@ def _march_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     ):
         other = replace(few, shear_modes=shear_modes.comparison_mode_count(shape.size))
         out.append(make_coarser_space(Variant(other, patch), quarter, "modes"))
-    return [*out, *_summed(model, few, patch, solution)]
+    return [*out, *_coarse_sums(model, few, patch, solution)]
 
 
-def _summed(model: Model, few, patch, solution) -> list:
+def _coarse_sums(model: Model, few, patch, solution) -> list:
     """Return the coarse runs of a list of bonds, at the steps of `few`.
 
     They are its bound on forces and energies and, if it merges bonds or its tail is large, the
@@ -403,7 +410,7 @@ EXACT = Engine(
     _none,
     _exact_in_space,
     "costs exact_cost",
-    dearer=dear_events,
+    dearer=reason_to_march_events,
     refuse="costs refuse_endless",
 )
 PIECES = Engine(
@@ -413,8 +420,8 @@ PIECES = Engine(
     _none,
     _pieces_in_space,
     "costs exact_cost",
-    dearer=dear_elements,
-    chosen="numerics by_pieces",
+    dearer=reason_to_march_elements,
+    chosen="numerics yield_numerics",
     refuse="costs refuse_endless",
 )
 SMOOTH = Engine(
@@ -424,8 +431,8 @@ SMOOTH = Engine(
     _smooth_in_time,
     _own_errors,
     "costs smooth_cost",
-    dearer=not_smooth,
-    chosen="numerics by_error",
+    dearer=reason_to_march_smooth_law,
+    chosen="numerics smooth_numerics",
     least=3e-8,
     closes=None,
     tells=("iterations",),
@@ -437,7 +444,7 @@ MARCH = Engine(
     _march_in_time,
     _march_in_space,
     "plan march_cost",
-    chosen="numerics by_steps",
+    chosen="numerics march_numerics",
     refuse="lists refuse_long_list",
     notes="motion_warnings marched_elements",
     tells=("steps_per_cycle", "iterations"),
@@ -459,7 +466,7 @@ ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARM
 AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # engines in the order in which they are tried
 
 
-def unbalanced(engine: Engine, measures: dict) -> str:
+def describe_balance_error(engine: Engine, measures: dict) -> str:
     """Return the sentence on an energy balance with too large an error for the engine, or "".
 
     measures: measures of the run by name, with their errors.
@@ -496,7 +503,7 @@ def engine_of(model: Model, per_point: bool = False) -> Engine:
     )
 
 
-def knobs_idle(model: Model, engine: str) -> list:
+def unused_settings(model: Model, engine: str) -> list:
     """Return sentences on the settings in [accuracy] of a rig that its engine does not use."""
     by = steady_by(model).like if ENGINES[engine].steady else engine
     where = {

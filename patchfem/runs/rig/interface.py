@@ -176,11 +176,13 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
     """
     law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
     if model.side == "lower" and (model.partial_slip or found.engine != "recursion"):
-        return shear.on_the_lower(
+        return shear.lists_on_lower_piece(
             model,
             patch,
             found,
-            shear.reduced(model, patch, numerics.shear_modes) if model.partial_slip else None,
+            shear.shear_modes_of_points(model, patch, numerics.shear_modes)
+            if model.partial_slip
+            else None,
         )
     if found.engine != "recursion" and not model.partial_slip:
         return models.list_model(law, limit, found.reach(law.order), found.merge)

@@ -188,7 +188,7 @@ def _size(rig) -> float:
     return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
 
-def by_levels(reader, go, state, end, progress=None) -> tuple:
+def run_levels(reader, go, state, end, progress=None) -> tuple:
     """Run all levels of a drive, each from the state at the end of the previous one.
 
     Parameters

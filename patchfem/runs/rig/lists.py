@@ -64,7 +64,7 @@ def quadrature_of(model: Model, numerics: Numerics):
     from sliding is HELD times that of the drive.
     """
     return numerics.choice or _summed_by(
-        model, numerics, _stretch(model), bench_engine.engine_named(model)
+        model, numerics, _stretch(model), bench_engine.requested_engine(model)
     )
 
 
@@ -191,12 +191,12 @@ def chatters(model: Model) -> bool:
     )
 
 
-def stalls(model: Model) -> bool:
+def is_stuck_after_release(model: Model) -> bool:
     """Return whether growing bonds of the printed law hold a released block from its start on."""
     return model.rig.drive.kind == "free" and held_by_bonds(model) >= MIN_STUCK_RATIO
 
 
-def limp(model: Model) -> bool:
+def is_held_without_stiffness(model: Model) -> bool:
     """Return whether bonds of order 0 hold the block."""
     return lists_grow(model) and model.friction.reading != "report"
 
@@ -209,11 +209,11 @@ def lists_grow(model: Model) -> bool:
     """
     if model.partial_slip:
         return False
-    most = held_by_bonds(model, gentlest(model.rig))
+    most = held_by_bonds(model, find_min_drive(model.rig))
     return most > 0 and most >= least_held(model)
 
 
-def gentlest(rig) -> float:
+def find_min_drive(rig) -> float:
     """Return the smallest acceleration [m s-2] at which the drive of a Rig stays.
 
     For levels it is half the first one, where the bisection of the onset starts, or the smallest
@@ -267,7 +267,7 @@ def _held_with(rig, omega: float, push, slides) -> float:
         return inf
 
 
-def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
+def is_list_too_long(model: Model, numerics: Numerics, book: dict) -> bool:
     """Return whether the list of bonds of the printed law is too long to halve the time step.
 
     It is too long if it grows by a strip in every few steps. Bonds that grow leave a strip in each
@@ -290,7 +290,7 @@ def crowded(model: Model, numerics: Numerics, book: dict) -> bool:
     )
 
 
-def in_vain(book: dict, bars: list) -> bool:
+def doubling_does_not_help(book: dict, bars: list) -> bool:
     """Return whether two doublings of the steps have not reduced the error of a list of bonds.
 
     The list of a released block that reverses in almost every step is different for any step

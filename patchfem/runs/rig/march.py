@@ -28,7 +28,7 @@ from . import strips
 from .interface import contact_of
 from .lists import ListGuard, has_list, quadrature_of
 from .reading import Reader
-from .solution import Solution, borne, sampled_loop
+from .solution import Solution, normal_load, sampled_loop
 
 LATE = 1.5  # factor on the first-order change by an end that is not the requested one
 
@@ -46,11 +46,11 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
     """
-    contact, done, seconds, prepare = marched(model, numerics, patch, frames, say, progress)
+    contact, done, seconds, prepare = march_model(model, numerics, patch, frames, say, progress)
     return MarchReader(model, numerics, patch, contact).solution(done, seconds, prepare)
 
 
-def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
+def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None) -> tuple:
     """Return the contact, the MarchResult, and the CPU seconds of a march and its preparation.
 
     The seconds of the preparation are a dict by name. The parameters are those of `run_march`.
@@ -198,7 +198,7 @@ class MarchReader(Reader):
             or model.rig.friction.strips_slide_apart
         ):
             return window
-        load = borne(model, self.patch) if one.load is None else one.load
+        load = normal_load(model, self.patch) if one.load is None else one.load
         return motion_inside_steps(window, make_law(one.numbers, load), load)
 
     def _loop(self, part, drive) -> tuple | None:

@@ -13,18 +13,18 @@ from ...structure.drive_sizes import find_min_decay_rate
 from ..patch import faces
 from ..results.notes import (
     climbing_as_one,
-    creeping,
-    of_growth,
+    growth_notes,
+    note_on_heating,
     unbounded_bonds,
-    unripe,
-    warming,
+    warn_of_creep,
+    warn_of_unformed_bonds,
     work_check_warning,
 )
-from ..results.travel import travelled
+from ..results.travel import warn_of_large_slide
 from . import pieces, strips
-from .costs import dear_elements
+from .costs import reason_to_march_elements
 from .engines import ENGINES, PIECES
-from .solution import borne
+from .solution import normal_load
 
 # relative excess of the largest motion in the window over the amplitude, from which the motion
 # decays
@@ -49,7 +49,7 @@ def warnings_of(run) -> list:
     out = [
         *model.rig.structure.notes,
         *_as_one_point(model, patch, run.numerics),
-        *warming(model, patch, raw.response, book["friction"]),
+        *note_on_heating(model, patch, raw.response, book["friction"]),
     ]
     if run.rubs:
         out += law_warnings(model, run.outcome, found, float(np.abs(raw.window.slide_rate).max()))
@@ -78,7 +78,7 @@ def warnings_of(run) -> list:
         )
     if raw.message and raw.outcome is not Outcome.LEAVES_GROOVES:
         out.append(raw.message)
-    out += travelled(patch, raw.response.slide) if patch is not None else ()
+    out += warn_of_large_slide(patch, raw.response.slide) if patch is not None else ()
     return (
         out
         if not model.has_interface_patches
@@ -88,7 +88,7 @@ def warnings_of(run) -> list:
                 model,
                 lambda face: [
                     *([] if face.partial_slip else [AS_ONE_POINT]),
-                    *travelled(face.patch, face.slide(raw.response)),
+                    *warn_of_large_slide(face.patch, face.slide(raw.response)),
                 ],
             ),
         ]
@@ -108,7 +108,7 @@ def peak_at_an_end(run, modes) -> list:
     at = (
         None
         if found is None or found.value is None
-        else at_an_end(found.value, drive.low, drive.high)
+        else nearest_sweep_end(found.value, drive.low, drive.high)
     )
     if at is None or not run.measures["relative_displacement_amplitude"].value > 0:
         return []
@@ -126,7 +126,7 @@ def peak_at_an_end(run, modes) -> list:
     ]
 
 
-def at_an_end(frequency: float, *ends: float) -> float | None:
+def nearest_sweep_end(frequency: float, *ends: float) -> float | None:
     """Return the end of a sweep that equals a frequency, all in [Hz]; None if there is none."""
     return next((end for end in ends if abs(frequency - end) <= AT * end), None)
 
@@ -170,7 +170,10 @@ def notes_of(run) -> list:
             "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
             *ended,
         ]
-    out, f = [*_of_bonds(model, run.patch, raw), *climbing_as_one(model, run.patch)], model.friction
+    out, f = (
+        [*_bond_notes(model, run.patch, raw), *climbing_as_one(model, run.patch)],
+        model.friction,
+    )
     if len(rig.friction.interfaces):
         out += ENGINES[run.numerics.engine].call("notes", model, run.numerics, run.patch, raw) or []
     if raw.levels and rig.drive.levels.onset[0] == "slip" and raw.held > 0:
@@ -178,10 +181,16 @@ def notes_of(run) -> list:
             f"onset_level: slip counts only if its amplitude is above {format_length(raw.held)}, a thousandth of the "
             "elastic range of the interface; a part of the interface may slip earlier"
         )
-    return [*rig.structure.reduction_notes, *out, *creeping_note(f), *_of_release(run), *ended]
+    return [
+        *rig.structure.reduction_notes,
+        *out,
+        *creeping_note(f),
+        *_release_sentence(run),
+        *ended,
+    ]
 
 
-def _of_release(run) -> list:
+def _release_sentence(run) -> list:
     """Return the sentence on the time span of the measures of a release that still decays."""
     rig, window, main = (
         run.model.rig,
@@ -212,7 +221,7 @@ def _across(run) -> list:
         or not run.patch.strips.load
     ):
         return []
-    swing, share = strips.across(run.patch, run.raw.window, run.drive.period)
+    swing, share = strips.lateral_motion(run.patch, run.raw.window, run.drive.period)
     return (
         [
             f"the yaw moves the ends of the patch by up to {format_length(swing)} across x, but the "
@@ -254,14 +263,14 @@ def _as_one_point(model, patch, numerics) -> list:
     return [AS_ONE_POINT]
 
 
-def _of_bonds(model, patch, raw) -> list:
+def _bond_notes(model, patch, raw) -> list:
     """Return notes, as a list, on bonds that grow."""
     f = model.friction
     if f is None or not law_has_trait(f.law, "bonds"):
         return []
-    limit = f.static * borne(model, patch)
+    limit = f.static * normal_load(model, patch)
     steady = limit > 0 and not model.rig.friction.load_varies
-    return of_growth(
+    return growth_notes(
         model.bonds, float(np.abs(raw.response.force).max()) / limit if steady else None
     )
 
@@ -279,7 +288,7 @@ def marched_elements(model, numerics, patch, raw) -> list:
         return []
     pinned = patch is not None and not model.patch.mesh.is_automatic
     return [
-        f"the motion is computed in time steps, because {dear_elements(model)}; "
+        f"the motion is computed in time steps, because {reason_to_march_elements(model)}; "
         f'{"on a coarser mesh, or " * pinned}with accuracy.method = "exact" the motion is computed exactly'
     ]
 
@@ -321,8 +330,8 @@ def law_warnings(model, outcome, found, peak: float) -> list:
         return []
     return [
         *unbounded_bonds(model.bonds),
-        *unripe(model.bonds, peak),
-        *creeping(model.bonds, outcome, found),
+        *warn_of_unformed_bonds(model.bonds, peak),
+        *warn_of_creep(model.bonds, outcome, found),
     ]
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ...effects import law_has_trait
 from ...model.model import Model
 from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, is_sinusoidal
-from .costs import pairs_of, steps_per_cycle
+from .costs import count_merges, steps_per_cycle
 from .engines import engine_of
 
 # fraction of a cycle by which a run may differ from whole cycles: a record of 30 periods has 30
@@ -118,7 +118,7 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     return engine.call("chosen", model, found) or found
 
 
-def by_steps(model: Model, found: Numerics) -> Numerics:
+def march_numerics(model: Model, found: Numerics) -> Numerics:
     """Return the settings of a march: steps with a unique solution that end where the run ends."""
     if "steps_per_cycle" in found.pinned:
         return found
@@ -127,14 +127,14 @@ def by_steps(model: Model, found: Numerics) -> Numerics:
     )
 
 
-def by_error(model: Model, found: Numerics) -> Numerics:
+def smooth_numerics(model: Model, found: Numerics) -> Numerics:
     """Return the settings of the smooth engine: the error of a step."""
     return replace(found, local=local_of(model.accuracy.tolerance))
 
 
-def by_pieces(model: Model, found: Numerics) -> Numerics:
+def yield_numerics(model: Model, found: Numerics) -> Numerics:
     """Return the settings of the engine of yields: the merging of cells of a density."""
-    return replace(found, pairs=pairs_of(model))
+    return replace(found, pairs=count_merges(model))
 
 
 def local_of(tolerance: float) -> float:

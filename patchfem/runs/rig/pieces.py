@@ -31,9 +31,9 @@ from ...structure.drive_sizes import (
 )
 from ..bench import averaged
 from . import interface, strips
-from .levels import by_levels, without_part_of_cycle
+from .levels import run_levels, without_part_of_cycle
 from .reading import Reader
-from .solution import Solution, borne, mode_stiffness
+from .solution import Solution, mode_stiffness, normal_load
 
 # measures that are known without an interface
 OF_MOTION = (
@@ -69,7 +69,7 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     Solution
     """
     return _run(
-        Pieces(model, numerics, patch, RigidElements(model, numerics, patch)), 0, say, progress
+        PieceReader(model, numerics, patch, RigidElements(model, numerics, patch)), 0, say, progress
     )
 
 
@@ -91,7 +91,7 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
     Solution
     """
     return _run(
-        Pieces(model, numerics, patch, YieldingElements(model, numerics, patch)),
+        PieceReader(model, numerics, patch, YieldingElements(model, numerics, patch)),
         frames,
         say,
         progress,
@@ -122,7 +122,7 @@ def _run(reader, frames: int, say, progress) -> Solution:
         return reader.over_strips(done)
 
     if rig.drive.levels.amplitudes:
-        done, more = by_levels(reader, go, (rig.start, None), lambda run: run.end, progress)
+        done, more = run_levels(reader, go, (rig.start, None), lambda run: run.end, progress)
     else:
         done = without_part_of_cycle(
             go(rig.drive.signal, (rig.start, None), progress, True, numerics.cycles)
@@ -131,7 +131,7 @@ def _run(reader, frames: int, say, progress) -> Solution:
     return reader.solution(done, perf_counter() - begin, **more)
 
 
-class Pieces(Reader):
+class PieceReader(Reader):
     """Reader of a finished run from event to event; found: RigidElements or YieldingElements."""
 
     def __init__(self, model, numerics, patch, found):
@@ -147,7 +147,7 @@ class Pieces(Reader):
             return run
         loads, offsets = strips.strip_loads(self.patch), self.patch.strips.offsets
         response, window = (
-            strips.as_one(one, loads, offsets) for one in (run.response, run.window)
+            strips.average_strips(one, loads, offsets) for one in (run.response, run.window)
         )
         return replace(run, response=response, window=window)
 
@@ -164,11 +164,11 @@ class Pieces(Reader):
 
         `more` returns all else that the series of the pieces give.
         """
-        return IntegratedMeasures(loops=(_of_strips(run, drive),) if self.apart else run.loops)
+        return IntegratedMeasures(loops=(_strips_loop(run, drive),) if self.apart else run.loops)
 
     def more(self, run, drive, stuck: bool) -> dict:
         """Return measures from the series of the pieces; work on rigid elements is all dissipated."""
-        found = read_off(
+        found = measures_of_reading(
             run.reading,
             run.ledger,
             is_sinusoidal(drive),
@@ -276,12 +276,12 @@ class Pieces(Reader):
             and not self.sticks(run)
             and unsettled
         ):
-            steady = settles(self.model.rig.modes, drive, self.groups, run)
+            steady = find_steady_motion(self.model.rig.modes, drive, self.groups, run)
             more |= {} if steady is None else {"steady": steady, "bounded": True}
         return super().solution(run, seconds, drive, **more)
 
 
-def _of_strips(run, drive) -> InterfaceLoop:
+def _strips_loop(run, drive) -> InterfaceLoop:
     """Return the loop of strips averaged to one interface, from the samples of the window.
 
     The samples are those on both sides of every event; the yaw does work in addition to the mean
@@ -331,7 +331,7 @@ def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool
     )
 
 
-def settles(modes, drive, groups, done) -> tuple | None:
+def find_steady_motion(modes, drive, groups, done) -> tuple | None:
     """Return the amplitude [m] and its error [m] of the stable motion that a run converges to.
 
     It is found by the map of the yields over a period.
@@ -364,11 +364,11 @@ def settles(modes, drive, groups, done) -> tuple | None:
         one = steady_events.find_steady_state_from(modes, sine, groups, *done.end)
     except NotConverged:
         return None
-    amplitude, error = settled_of(one.amplitude, one.residual, one.multipliers)
+    amplitude, error = find_stable_amplitude(one.amplitude, one.residual, one.multipliers)
     return None if np.isnan(amplitude) else (amplitude, error)
 
 
-def settled_of(amplitude: float, residual: float, multipliers) -> tuple:
+def find_stable_amplitude(amplitude: float, residual: float, multipliers) -> tuple:
     """Return the amplitude [m] of a stable periodic motion and its error [m]; NaN if unstable.
 
     Parameters
@@ -441,7 +441,7 @@ def coulomb_limits(model, patch) -> list:
         return [tuple(map(float, one.friction_limits(one.load))) for one in rig.friction.interfaces]
     if law_has_trait(model.friction.law, "averaged"):
         share = averaged.limit_share(model, patch)
-    static, kinetic = model.friction_limits(borne(model, patch))
+    static, kinetic = model.friction_limits(normal_load(model, patch))
     return [
         (
             float(static * share),
@@ -458,7 +458,9 @@ def elements_of_law(element) -> elements.Elements:
     )
 
 
-def read_off(reading: Reading, book: dict, sine: bool, whole: bool, stiffness, size) -> dict:
+def measures_of_reading(
+    reading: Reading, book: dict, sine: bool, whole: bool, stiffness, size
+) -> dict:
     """Return measures of the first interface and the motion by name, of one run or (n,) of many.
 
     Parameters

@@ -93,7 +93,7 @@ def held_stiffness(chain: dict, number: int = 0) -> float:
     return 1 / soft if soft else inf
 
 
-def held_by(rig, chain: dict) -> np.ndarray:
+def stuck_stiffness(rig, chain: dict) -> np.ndarray:
     """Return `held_stiffness` (i,) of every slide of a Rig; inf without friction.
 
     Strips have that of their patch.
@@ -107,7 +107,7 @@ def held_by(rig, chain: dict) -> np.ndarray:
     )
 
 
-def foreseen(rig, links: dict):
+def without_expected_joint(rig, links: dict):
     """Return a Rig without the joint that was present when its modes were measured.
 
     The patch that forms the joint is not pressed yet, so that its stiffness follows from the links
@@ -127,7 +127,7 @@ def modes_of(rig, chain: dict) -> list:
     The stuck frequency is that with the contact held by the links of a chain; None if no link is
     compliant, and without friction.
     """
-    modes, rows, stiffness = rig.modes, rig.modes.interfaces, held_by(rig, chain)
+    modes, rows, stiffness = rig.modes, rig.modes.interfaces, stuck_stiffness(rig, chain)
     if modes.lateral_faces is not None:
         rows, stiffness = np.concatenate([rows, modes.lateral_faces]), np.tile(stiffness, 2)
     named = rig.structure.lists_modes and modes.shapes is None
@@ -276,7 +276,7 @@ def groups(model: Model) -> dict:
     return out
 
 
-def run_away(model: Model) -> dict:
+def drive_and_knee(model: Model) -> dict:
     """Return the drive and the drive above which friction does not limit the amplitude.
 
     Both are accelerations of the base [m s-2], "drive" and "knee", of a single mode that a sine
@@ -364,7 +364,7 @@ def steady_words(model: Model, numerics) -> list:
     return [f"the steady motion is found by {steady_by(model).words}"]
 
 
-def summed_words(model: Model, numerics) -> list:
+def bond_sum_sentences(model: Model, numerics) -> list:
     """Return sentences on the sum over bonds of law 'nonlocal', or on the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
@@ -375,7 +375,7 @@ def summed_words(model: Model, numerics) -> list:
     if lists.lists_grow(model):
         stiff = (
             "set friction.order above 0 to give the block a stiffness"
-            if lists.limp(model)
+            if lists.is_held_without_stiffness(model)
             else 'set friction.reading = "stretch" to give the block a finite stiffness'
         )
         out.append(
@@ -392,9 +392,9 @@ def summed_words(model: Model, numerics) -> list:
 
 def _held_words(model: Model) -> str:
     """Return how bonds hold the block whose list of bonds grows."""
-    if lists.limp(model):
+    if lists.is_held_without_stiffness(model):
         held = "bonds of order 0 keep the block from sliding, but they have no stiffness"
-    elif lists.stalls(model):
+    elif lists.is_stuck_after_release(model):
         held = "with the law as printed in the report the block does not slide after its release"
     else:
         held = (

@@ -19,7 +19,7 @@ from ...response.measures import slip_round_off, window_amplitudes, window_end_v
 from ...response.outcome import estimate_steady
 from ...response.rows import NEEDS_RUN, compute_measures, find_row
 from ...structure.drive_sizes import choose_samples_per_cycle
-from .solution import Solution, decaying, last_cycles
+from .solution import Solution, last_cycle_amplitude, last_cycles
 
 
 class Reader:
@@ -84,7 +84,7 @@ class Reader:
             last_cycles(self.model, self.patch, window, last, book, drive=drive, **given)
         )
         if self.model.rig.drive.kind == "free":
-            found["relative_displacement_amplitude"] = decaying(
+            found["relative_displacement_amplitude"] = last_cycle_amplitude(
                 window, drive.period, found["relative_displacement_amplitude"]
             )
         return found
@@ -114,7 +114,7 @@ class Reader:
 
     def fewer(self, run):
         """Return the run with every second one of its samples."""
-        return replace(run, window=every_second(run.window))
+        return replace(run, window=thin_samples(run.window))
 
     def sampled(self, run, drive, values: dict) -> dict:
         """Return the errors by sampling of the measures of an exact motion, by name.
@@ -246,7 +246,7 @@ def _between_reversals(histories, parity: int):
     return histories.select(kept)
 
 
-def every_second(window):
+def thin_samples(window):
     """Return a window without every second one of its equally spaced samples.
 
     The last sample, and those of events between the others, are kept.

@@ -1,6 +1,6 @@
 """Coupled run from its plan to its result: the solution of an engine, then several passes.
 
-In: a plan with a rig, and its pressed patch. Out: a Result. `_solved` computes the Solution
+In: a plan with a rig, and its pressed patch. Out: a Result. `_solve` computes the Solution
 with its errors from coarse runs; the passes add measures over levels, the outcome, reasons for
 missing values, the decay curve, and final floors.
 """
@@ -25,7 +25,7 @@ from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_e
 from ..results.travel import outcome_on_piece
 from . import decays, flutter, levels, lists, motion_warnings
 from .costs import MOST_STEPS
-from .engines import ENGINES, Variant, unbalanced
+from .engines import ENGINES, Variant, describe_balance_error
 from .fields import fields_of
 from .numerics import choose
 from .solution import Solution, curve_measures
@@ -63,7 +63,9 @@ class Coupled:
         return self.model.friction is not None
 
 
-def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
+def run_coupled(
+    what, patch, coarse, seconds, warnings, say, progress, per_point, estimate
+) -> Result:
     """Run a plan of kind rig or linear.
 
     The parameters are those of `run.run`; patch and coarse belong to its [contact].
@@ -77,23 +79,23 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     numerics = choose(model, per_point)
     engine = ENGINES[numerics.engine]
     engine.call("refuse", model, numerics)
-    raw, numerics, measures = _solved(
+    raw, numerics, measures = _solve(
         model, numerics, patch, coarse[0], seconds, say, progress, estimate
     )
-    if wrong := unbalanced(engine, measures):
+    if wrong := describe_balance_error(engine, measures):
         raw = replace(raw, outcome=Outcome.NOT_CONVERGED, message=raw.message or wrong)
     known = (
         estimate
         and raw.outcome is not Outcome.NOT_CONVERGED
         and on_a_mesh_of_known_error(model, patch, coarse)
-        and (not rig.friction.has_partial_slip or faces.known(model))
+        and (not rig.friction.has_partial_slip or faces.has_error_meshes(model))
     )
     run = Coupled(
         model, numerics, patch, raw, raw.extra.get("at", rig.drive.signal), known, measures
     )
-    for go in (_levelled, _settled, _reasoned):
+    for go in (_add_level_measures, _add_outcome, _add_reasons):
         run = go(run)
-    run, decay, left_out = _decayed(run, coarse[0])
+    run, decay, left_out = _add_decay(run, coarse[0])
     warned = [
         *motion_warnings.warnings_of(run),
         *motion_warnings.peak_at_an_end(run, lambda: what.modes(what.chain)),
@@ -102,7 +104,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     if find_decay_rate(rig.modes) < 0 and run.rubs:
         fluttering, more = flutter.flutter_of(run)
         run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]
-    run = _judged(run)
+    run = _set_floors(run)
     outcome = outcome_on_piece(run.outcome, model.patch, patch, raw.response.slide)
     for face in faces.faces_of(model) if model.has_interface_patches else ():
         outcome = outcome_on_piece(outcome, face.model.patch, face.patch, face.slide(raw.response))
@@ -121,7 +123,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     )
 
 
-def _levelled(run: Coupled) -> Coupled:
+def _add_level_measures(run: Coupled) -> Coupled:
     """Return the run with the measures over all levels of its drive."""
     raw, model = run.raw, run.model
     if not raw.levels:
@@ -135,7 +137,7 @@ def _levelled(run: Coupled) -> Coupled:
     )
 
 
-def _settled(run: Coupled) -> Coupled:
+def _add_outcome(run: Coupled) -> Coupled:
     """Return the run with its outcome, and errors that include those the run itself states."""
     found = without_errors(run_events.add_uncertainty(run.measures, run.raw.own), run.estimated)
     rig = run.model.rig
@@ -154,7 +156,7 @@ def _settled(run: Coupled) -> Coupled:
     return replace(run, outcome=outcome, measures=found)
 
 
-def _reasoned(run: Coupled) -> Coupled:
+def _add_reasons(run: Coupled) -> Coupled:
     """Return the run with a reason for each measure that it could have but has not."""
     found, window, rig = run.measures, run.raw.window, run.model.rig
     rigid = (
@@ -176,7 +178,7 @@ def _reasoned(run: Coupled) -> Coupled:
     )
 
 
-def _decayed(run: Coupled, coarse) -> tuple:
+def _add_decay(run: Coupled, coarse) -> tuple:
     """Return the run, its decay curve and notes, with errors not below those by the mesh.
 
     The ringing has the error at half the swing in the last stick. The curve is None without a
@@ -226,7 +228,7 @@ def _decayed(run: Coupled, coarse) -> tuple:
     )
 
 
-def _judged(run: Coupled) -> Coupled:
+def _set_floors(run: Coupled) -> Coupled:
     """Return the run with the final floors of its measures, without values if no motion exists."""
     found = set_final_floors(run.measures, run.model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].steady and run.outcome is Outcome.GROWS:
@@ -266,7 +268,7 @@ def _extra(run: Coupled, notes: list) -> dict:
     return out | {"book": raw.book, "period": run.drive.period, "notes": notes}
 
 
-def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -> tuple:
+def _solve(model, numerics, patch, coarse, seconds, say, progress, estimated) -> tuple:
     """Return the Solution of the engine, its Numerics, and measures with errors by coarse runs.
 
     Steps per cycle that the scene does not fix are doubled until the error of the displacement is
@@ -275,7 +277,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
     engine, made = ENGINES[numerics.engine], {}
     has_fields = patch is not None and not model.patch.mesh.can_gather_points
     frames = FRAMES if has_fields or model.rig.friction.has_partial_slip else 0
-    passes = Passes(progress, _foreseen(engine, model, numerics, patch, coarse, estimated))
+    passes = Passes(progress, _expected_steps(engine, model, numerics, patch, coarse, estimated))
     size = model.rig.displacement_scale
 
     def go(meant, numerics, patch, frames=0, say=None):
@@ -301,7 +303,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         )
         # the decay curve and some measures need the histories of the whole run
         how = replace(variant.numerics, whole=model.rig.drive.kind == "free" or bool(NEEDS_RUN))
-        near = _at_the_top(meant, found, lambda narrow: go(narrow, how, variant.patch))
+        near = _rerun_around_peak(meant, found, lambda narrow: go(narrow, how, variant.patch))
         return near or go(meant, how, variant.patch)
 
     meshed = [
@@ -316,9 +318,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         spent += more
         measures = add_errors(found.values, *time, *space, least=engine.least, size=size)
         if numerics.pairs and not errors_met(measures, model.accuracy.tolerance):
-            return _solved(
-                model, numerics.finer(), patch, coarse, seconds, say, progress, estimated
-            )
+            return _solve(model, numerics.finer(), patch, coarse, seconds, say, progress, estimated)
         if found.levels or model.rig.drive.kind == "free":
             # otherwise the levels have errors of their own
             apart = [one for one in (*ways, *meshed) if one.runs or found.errors is None]
@@ -339,7 +339,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
                 seconds["error"] = spent
             runs = [
                 found.values,
-                *(made[one].values for one in _halved(engine, model, numerics, patch)),
+                *(made[one].values for one in _halved_variants(engine, model, numerics, patch)),
             ]
             late = [one for one in (found.extra.get("late"),) if one]
             kinds = [*(one.of for one in (*ways, *meshed)), *["end"] * len(late)]
@@ -353,7 +353,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         seconds["march"] = found.seconds
 
 
-def _at_the_top(model, found: Solution, go) -> Solution | None:
+def _rerun_around_peak(model, found: Solution, go) -> Solution | None:
     """Return a coarse or richer run of a curve, computed only around its largest amplitude.
 
     Parameters
@@ -375,9 +375,9 @@ def _at_the_top(model, found: Solution, go) -> Solution | None:
         or model.rig.springs.is_nonlinear
     ):
         return None
-    from .steady.curves import around_the_top
+    from .steady.curves import sweep_around_peak
 
-    drive = around_the_top(
+    drive = sweep_around_peak(
         model.rig.drive.signal, found.extra["curve"], found.extra["at"].omega / (2 * np.pi)
     )
     if drive is None:
@@ -390,7 +390,9 @@ def _at_the_top(model, found: Solution, go) -> Solution | None:
     if (
         "at" not in near.extra
         or name not in near.values
-        or motion_warnings.at_an_end(near.extra["at"].omega / (2 * np.pi), drive.low, drive.high)
+        or motion_warnings.nearest_sweep_end(
+            near.extra["at"].omega / (2 * np.pi), drive.low, drive.high
+        )
         is not None
     ):
         return None
@@ -430,7 +432,7 @@ class Passes:
         self.progress(self.shown)
 
 
-def _foreseen(engine, model, numerics, patch, coarse, estimated: bool) -> float:
+def _expected_steps(engine, model, numerics, patch, coarse, estimated: bool) -> float:
     """Return the steps per cycle of a run and of its coarse runs together.
 
     A run on a coarser mesh has the smallest number of steps.
@@ -442,12 +444,12 @@ def _foreseen(engine, model, numerics, patch, coarse, estimated: bool) -> float:
         run.numerics: run.numerics.steps for way in ways for run in way.runs
     }
     meshed = (coarse is not None and bool(model.partial_slip)) + (
-        len(faces.meshed(model)) if model.rig.friction.has_partial_slip else 0
+        len(faces.interfaces_with_coarse_mesh(model)) if model.rig.friction.has_partial_slip else 0
     )
     return sum(each.values()) + meshed * min(each.values())
 
 
-def _halved(engine, model, numerics, patch) -> tuple:
+def _halved_variants(engine, model, numerics, patch) -> tuple:
     """Return the Variants at half and a quarter of the steps, for `left_open`; () without steps."""
     ways = engine.in_time(model, numerics, patch)
     return ways[0].runs if ways and not numerics.local else ()
@@ -482,7 +484,7 @@ def _enough(model, numerics, found, measures, bars) -> bool:
         or "steps_per_cycle" in numerics.pinned
         or again > MOST_STEPS
         or again * numerics.cycles > 1e7
-        or lists.crowded(model, numerics, found.book)
-        or lists.in_vain(found.book, bars)
+        or lists.is_list_too_long(model, numerics, found.book)
+        or lists.doubling_does_not_help(found.book, bars)
         or found.outcome in ENDED
     )

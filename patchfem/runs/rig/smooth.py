@@ -12,7 +12,7 @@ from ...dynamics.smooth import run as engine
 from ...response.measures import slip_round_off
 from ...response.rows import NEEDS_RUN, find_row
 from .interface import contact_of
-from .reading import Reader, every_second
+from .reading import Reader, thin_samples
 from .solution import Solution
 
 # factor on the round-off of the slip, above which the fraction of slip is known inside a step
@@ -98,7 +98,7 @@ class SmoothReader(Reader):
 
     def fewer(self, run):
         """Return the run with every second one of its samples."""
-        return replace(super().fewer(run), turned=every_second(run.turned))
+        return replace(super().fewer(run), turned=thin_samples(run.turned))
 
     def left_open(self, run, values: dict) -> dict:
         """Return the errors of measures by name that a SmoothResult states itself.

@@ -73,7 +73,7 @@ class Solution:
     extra: dict = field(default_factory=dict)
 
 
-def gauged(model, raw: Solution) -> Solution:
+def seen_by_gauge(model, raw: Solution) -> Solution:
     """Return the Solution as seen by a gauge that is not at the accelerometer.
 
     Displacement and histories are those of the gauge. How the motion settles is judged at the
@@ -95,7 +95,7 @@ def gauged(model, raw: Solution) -> Solution:
         )
     seen = measure_half_swing(raw.window.time, moved[1].output, moved[1].output_rate)
     if model.rig.drive.kind == "free":
-        seen = decaying(moved[1], model.rig.drive.signal.period, seen)
+        seen = last_cycle_amplitude(moved[1], model.rig.drive.signal.period, seen)
     share = max(1.0, seen / max(raw.values[name], 1e-300))
     errors = raw.errors and raw.errors | {name: share * raw.errors.get(name, 0.0)}
     values = {key: value for key, value in raw.values.items() if key != f"{name}_steady"}
@@ -109,7 +109,7 @@ def gauged(model, raw: Solution) -> Solution:
     )
 
 
-def decaying(window, period: float, whole: float) -> float:
+def last_cycle_amplitude(window, period: float, whole: float) -> float:
     """Return the amplitude [m] of a release in its last whole cycle.
 
     `whole` is the amplitude of the window, returned if it contains no whole cycle.
@@ -118,7 +118,7 @@ def decaying(window, period: float, whole: float) -> float:
     return whole if found is None else found
 
 
-def borne(model, patch) -> float | None:
+def normal_load(model, patch) -> float | None:
     """Return the normal load [N] on the first interface; None without friction."""
     if model.friction is None:
         return None
@@ -146,7 +146,7 @@ def last_cycles(model, patch, window, extremes, book: dict, **more) -> LastCycle
         drive,
         extremes,
         book,
-        borne(model, patch),
+        normal_load(model, patch),
         mode_stiffness(model, window),
         is_sinusoidal(drive),
         **more,

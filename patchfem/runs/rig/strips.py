@@ -15,12 +15,12 @@ def strip_loads(patch) -> np.ndarray:
 
 
 def run_of_strips(done, patch):
-    """Return a MarchResult of strips as that of the patch, averaged by `as_one`."""
+    """Return a MarchResult of strips as that of the patch, averaged by `average_strips`."""
     loads, offsets = strip_loads(patch), patch.strips.offsets
-    window = as_one(done.window, loads, offsets)
+    window = average_strips(done.window, loads, offsets)
     return replace(
         done,
-        response=as_one(done.response, loads, offsets),
+        response=average_strips(done.response, loads, offsets),
         window=window,
         marks=tuple(mark_as_one(mark, patch) for mark in done.marks),
         step_force=(window.force[1:] + window.force[:-1]) / 2,
@@ -28,12 +28,12 @@ def run_of_strips(done, patch):
 
 
 def mark_as_one(mark, patch):
-    """Return a Mark of strips as that of the patch, averaged by `as_one`."""
-    window = as_one(mark.window, strip_loads(patch), patch.strips.offsets)
+    """Return a Mark of strips as that of the patch, averaged by `average_strips`."""
+    window = average_strips(mark.window, strip_loads(patch), patch.strips.offsets)
     return replace(mark, window=window, step_force=(window.force[1:] + window.force[:-1]) / 2)
 
 
-def as_one(response, loads, offsets):
+def average_strips(response, loads, offsets):
     """Return histories of strips as those of the patch.
 
     Slide, speed and slip are means weighted by the loads, the force is the resultant. `extra` keeps
@@ -61,7 +61,7 @@ def as_one(response, loads, offsets):
     )
 
 
-def across(patch, window, period: float) -> tuple:
+def lateral_motion(patch, window, period: float) -> tuple:
     """Return the lateral amplitude of the ends of a patch that yaws, and the neglected path.
 
     The yaw rotates the patch about its middle: a point slides by s_j along x, and by the rotation

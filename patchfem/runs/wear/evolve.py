@@ -22,10 +22,10 @@ from ...effects import describe_unsupported
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, replay_jumps, start_wear, take_jump
 from ..patch.measures import other_strips
-from ..patch.press import areas, pressed, presser
+from ..patch.press import areas, press_patch, presser
 from ..patch.values import values
 from ..rig import numerics
-from .slip import Rubbed, apart, even, frames_for, rubbed
+from .slip import CycleSlip, frames_for, slip_of_cycle, slips_uniformly, strips_slide_independently
 
 STATE = tuple(WearState.__slots__)
 # fraction of the thickness of a coating that may remain where it counts as worn through
@@ -99,17 +99,17 @@ class _Motion:
         self.same = (
             model.grooves is None
             and model.wear.friction is None
-            and not apart(model)
-            and even(model, model.rig is not None and numerics.choose(model).per_point)
+            and not strips_slide_independently(model)
+            and slips_uniformly(model, model.rig is not None and numerics.choose(model).per_point)
         )
-        self.last: Rubbed | None = None
+        self.last: CycleSlip | None = None
 
     def __call__(self, worn) -> np.ndarray:
         """Return the slip path (m,), of strips (s, m) [m], per cycle at a worn depth [m]."""
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
-            patch = pressed(self.model.patch, self.pair, worn)
-            found = rubbed(worn_model(self.model, patch, worn), patch, self.frames)
+            patch = press_patch(self.model.patch, self.pair, worn)
+            found = slip_of_cycle(worn_model(self.model, patch, worn), patch, self.frames)
             if found.outcome is not None:
                 raise _Unbounded(found.outcome.sentence)
             self.last = found
@@ -187,15 +187,16 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         wear.cycles,
     )
     patch = (
-        _before(model, patch, asked.area)
+        _with_earlier_wear(model, patch, asked.area)
         if begin is None
-        else pressed(model.patch, patch.pair, frozen_array(begin[0].depth))
+        else press_patch(model.patch, patch.pair, frozen_array(begin[0].depth))
     )
     try:
         state, moments = begin or _first(model, patch, asked, motion)
     except _Unbounded as why:
         coarse = (
-            one and _before(model, one, areas(model.patch, one.pieces.interface)) for one in coarse
+            one and _with_earlier_wear(model, one, areas(model.patch, one.pieces.interface))
+            for one in coarse
         )
         return Evolved(
             patch,
@@ -210,13 +211,13 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         )
     while state.cycle < wear.cycles and worn_through(model, state.depth) is None:
         try:
-            state = _jumped(model, asked, state)
+            state = _jump(model, asked, state)
         except _Unbounded as why:
             stopped = (
                 f"wear was computed only up to cycle {state.cycle:.6g} of {wear.cycles:.6g}: {why}"
             )
             break
-        patch = pressed(model.patch, patch.pair, frozen_array(state.depth))
+        patch = press_patch(model.patch, patch.pair, frozen_array(state.depth))
         moments = (*moments, _moment(patch, state, motion))
         if keep is not None:
             keep(state, moments)
@@ -224,13 +225,15 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
             progress(state.cycle / wear.cycles)
     others = [one for one in coarse if one is not None]
     worn, depths = (
-        zip(*(_on(model.patch, model, patch, other, moments) for other in others))
+        zip(*(_replay_on(model.patch, model, patch, other, moments) for other in others))
         if others
         else ((), ())
     )
     other, _ = other_strips(model.patch)
     stripped = (
-        _on(other, model, patch, patch, moments) if other is not model.patch and others else None
+        _replay_on(other, model, patch, patch, moments)
+        if other is not model.patch and others
+        else None
     )
     return Evolved(
         patch,
@@ -250,11 +253,11 @@ def worn_through(model, depth) -> tuple | None:
 
     depth: depth worn off both pieces, (m,) or (s, m) [m].
     """
-    share, name, thickness = max(_taken(model, depth), default=(0.0, "", 0.0))
+    share, name, thickness = max(_wear_fractions(model, depth), default=(0.0, "", 0.0))
     return (name, thickness) if share >= 1 - THIN else None
 
 
-def _taken(model, depth) -> list:
+def _wear_fractions(model, depth) -> list:
     """Return (worn fraction of the coating at the deepest point, name, thickness [m]) per piece.
 
     Only coated pieces are listed.
@@ -270,7 +273,7 @@ def _taken(model, depth) -> list:
     ]
 
 
-def _jumped(model, asked: WearProblem, state: WearState) -> WearState:
+def _jump(model, asked: WearProblem, state: WearState) -> WearState:
     """Return the state after the next jump, or where a coating is worn through.
 
     The latter is found by the Illinois variant of regula falsi.
@@ -278,7 +281,7 @@ def _jumped(model, asked: WearProblem, state: WearState) -> WearState:
 
     def ahead(one: WearState) -> float:
         """Return the largest worn fraction of a coating minus 1."""
-        return max(_taken(model, one.depth), default=(0.0,))[0] - 1
+        return max(_wear_fractions(model, one.depth), default=(0.0,))[0] - 1
 
     if model.patch.interface.strips is not None:
         asked.press.begin(state.force)
@@ -336,7 +339,7 @@ def next_row(wear, asked: WearProblem, state: WearState) -> float:
     return state.cycle + (ahead[near] - mean) / rate if rate > 0 else np.inf
 
 
-def _before(model, patch, area):
+def _with_earlier_wear(model, patch, area):
     """Return the patch with the depth that was worn before the first cycle.
 
     It is unchanged if there is none.
@@ -357,11 +360,11 @@ def _before(model, patch, area):
             "run in which this coating was not worn through",
             "wear.start",
         )
-    return pressed(model.patch, patch.pair, depth)
+    return press_patch(model.patch, patch.pair, depth)
 
 
 def _first(model, patch, asked: WearProblem, motion: _Motion) -> tuple:
-    """Return (state, moments) before any wear except that of `_before`."""
+    """Return (state, moments) before any wear except that of `_with_earlier_wear`."""
     state = start_wear(asked, model.wear.depth_before(patch.x, asked.area))
     return state, (_moment(patch, state, motion),)
 
@@ -393,7 +396,7 @@ def _moment(patch, state: WearState, motion: _Motion) -> Moment:
     )
 
 
-def _on(asked, model, patch, other, moments) -> tuple:
+def _replay_on(asked, model, patch, other, moments) -> tuple:
     """Return (patch, worn depth) on another mesh, or in other strips, by the same slip paths.
 
     The jumps are the same, too.
@@ -416,7 +419,7 @@ def _on(asked, model, patch, other, moments) -> tuple:
         legs,
         model.wear.depth_before(other.x, area),
     )
-    return pressed(asked, other.pair, frozen_array(depth)), depth
+    return press_patch(asked, other.pair, frozen_array(depth)), depth
 
 
 def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved:

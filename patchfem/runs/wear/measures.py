@@ -13,11 +13,11 @@ from ...core import Measure, Outcome, frozen_array
 from ...formatting import format_length, format_number
 from ...response.errors import convergence_errors, error_of_change
 from ..patch.measures import other_strips
-from ..patch.press import areas, pressed
+from ..patch.press import areas, press_patch
 from ..patch.values import values
 from ..results.patch_rows import TABLE, WORN
 from .evolve import THIN, mean_depth, worn_through
-from .slip import UNBOUNDED, of_point
+from .slip import UNBOUNDED, slip_path_of_point
 
 FRAMES = 24  # frames of the interface during the wear
 # name of the peak at an edge of the contact in the history; nodes next to an edge that count as the
@@ -29,7 +29,7 @@ EDGE_PEAK, BESIDE = (
 HOLDER = {"closing": "approach", "rotation": "rotation"}
 
 
-def worn(result, found, estimate: bool = True):
+def add_wear_measures(result, found, estimate: bool = True):
     """Return the Result of a run on the worn patch with the measures of wear.
 
     Parameters
@@ -54,11 +54,14 @@ def worn(result, found, estimate: bool = True):
     period = period_of(model, result)
     fields = frames(found, result.fields, period)
     shown = {"period": period, "states": len(fields["time"]) - len(result.fields["time"])}
-    static = jumped(model, found, result.measures) if estimate else {}
-    lost = of_patch(model, found, result.measures, estimate)
+    static = widen_by_jumps(model, found, result.measures) if estimate else {}
+    lost = measure_patch_wear(model, found, result.measures, estimate)
     if model.wear.friction is not None:
         lost |= friction_of(model, found, result.measures, lost["worn_volume"].error)
-    gone, notes = _gone(model, found, lost["worn_depth_max"].error), result.extra.get("notes", [])
+    gone, notes = (
+        _worn_through_cycle(model, found, lost["worn_depth_max"].error),
+        result.extra.get("notes", []),
+    )
     outcome = Outcome.WORN_THROUGH if gone and result.outcome not in UNBOUNDED else result.outcome
     return replace(
         result,
@@ -66,17 +69,17 @@ def worn(result, found, estimate: bool = True):
         measures=result.measures | static | lost | gone,
         fields=fields,
         seconds=seconds,
-        warnings=[*warnings, *_deep(model, found), *_beyond_table(model, found)],
+        warnings=[*warnings, *_warn_of_depth(model, found), *_beyond_table(model, found)],
         extra=result.extra
         | {
             "wear": history(found),
             "wear_shown": shown,
-            "notes": [*notes, *_begun(model), *_ended(model, found, gone)],
+            "notes": [*notes, *_note_on_start(model), *_note_on_coating(model, found, gone)],
         },
     )
 
 
-def _gone(model, found, error: float | None) -> dict:
+def _worn_through_cycle(model, found, error: float | None) -> dict:
     """Return worn_through_cycle by name if a coating is worn through.
 
     error: of the largest depth [m].
@@ -93,12 +96,12 @@ def _gone(model, found, error: float | None) -> dict:
     return {row.name: Measure(last.cycle, row.unit, off, row.floor)}
 
 
-def _begun(model) -> list:
+def _note_on_start(model) -> list:
     """Return a note on the earlier run from which this one continues."""
     return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
-def _ended(model, found, gone: dict) -> list:
+def _note_on_coating(model, found, gone: dict) -> list:
     """Return a note on the coating that is worn through."""
     if not gone:
         return []
@@ -117,7 +120,7 @@ def _ended(model, found, gone: dict) -> list:
     ]
 
 
-def jumped(model, found, measures: dict) -> dict:
+def widen_by_jumps(model, found, measures: dict) -> dict:
     """Return measures of the worn patch whose errors include those by the length of the jumps.
 
     They are the change if the depth is computed by the same jumps without subdivision, and the
@@ -131,7 +134,9 @@ def jumped(model, found, measures: dict) -> dict:
     measures : dict
         Measures by name.
     """
-    rough = values(pressed(model.patch, found.patch.pair, frozen_array(found.state.coarse_depth)))
+    rough = values(
+        press_patch(model.patch, found.patch.pair, frozen_array(found.state.coarse_depth))
+    )
     here = values(found.patch)
     other, ratio = (
         values(found.stripped[0]) if found.stripped else here,
@@ -159,7 +164,7 @@ def period_of(model, result) -> float:
     return model.slide.period or float(result.response.time[-1])
 
 
-def _deep(model, found) -> list:
+def _warn_of_depth(model, found) -> list:
     """Return warnings of a worn depth that invalidates the stiffness of the unworn pieces."""
     depth, asked, out = float(found.state.depth.max(initial=0.0)), model.patch, []
     for share, piece, name in (
@@ -187,7 +192,7 @@ def slip_miss(measures: dict) -> float:
     return 0.0
 
 
-def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
+def measure_patch_wear(model, found, motion: dict, estimate: bool = True) -> dict:
     """Return worn_volume and worn_depth_max with errors that include earlier runs.
 
     Parameters
@@ -340,7 +345,7 @@ def volume_of_point(model, result, estimate: bool = True) -> dict:
     estimate : bool
         Whether the error is computed.
     """
-    path, miss = of_point(
+    path, miss = slip_path_of_point(
         model, result.window, {name: m.value for name, m in result.measures.items()}
     )
     value = model.wear.coefficient * model.point.load * path * model.wear.cycles

@@ -12,18 +12,20 @@ from ...wear.jumps import WearProblem, start_wear, take_jump
 from ..cost import Cost
 from .evolve import next_row
 
-PRESSED = 20  # contact solutions per jump, with its corrections
-FEWER = 7  # contact solutions per jump and strip, because each starts from the previous one
+SOLVES_PER_JUMP = 20  # contact solutions per jump, with its corrections
+SOLVES_PER_STRIP = (
+    7  # contact solutions per jump and strip, because each starts from the previous one
+)
 # fraction of the cost of a motion with its coarse runs that the fine run has; includes more active
 # nodes by wear
-AGAIN = 0.7
+FINE_RUN_FRACTION = 0.7
 # CPU seconds per squared number of interface points of a contact solution, including its measures
-SOLVE = 1.2e-8
+SOLVE_SECONDS = 1.2e-8
 # springs of the row whose jumps are counted; most of them for a prescribed mesh
 ROW, FINE = 192, 1000
 # thickness of the springs over the length in contact, inside a patch; factor of the same at an end
 # of it
-NJIT_INTERNAL, END = (
+INNER_THICKNESS, END_THICKNESS = (
     0.3,
     0.44,
 )
@@ -121,15 +123,15 @@ def _springs(asked, x, area):
         share = (
             share
             + (
-                END * (long / height) ** 0.5
+                END_THICKNESS * (long / height) ** 0.5
                 if bears[0] or bears[-1]
-                else NJIT_INTERNAL * long / height
+                else INNER_THICKNESS * long / height
             )
         ) / 2
     return press
 
 
-def _anew(model) -> bool:
+def _changes_motion(model) -> bool:
     """Return whether wear changes the motion."""
     return (
         bool(model.partial_slip)
@@ -152,16 +154,18 @@ def cost(model, points: int, motion: float) -> Cost:
         run.
     """
     jumps, strips = jumps_about(model), model.patch.interface.strips
-    again = AGAIN * motion if _anew(model) else 0.0
-    pressings = PRESSED if strips is None else max(PRESSED, FEWER * strips.count)
-    seconds = jumps * (pressings * SOLVE * points**2 + 5e-3 + again)
+    again = FINE_RUN_FRACTION * motion if _changes_motion(model) else 0.0
+    pressings = (
+        SOLVES_PER_JUMP if strips is None else max(SOLVES_PER_JUMP, SOLVES_PER_STRIP * strips.count)
+    )
+    seconds = jumps * (pressings * SOLVE_SECONDS * points**2 + 5e-3 + again)
     number = (
         f"{jumps} jumps"
         if model.wear.jumps
         else f"about {jumps} jumps (the run chooses their number)"
     )
     once = "with the motion computed only once, because wear does not change it"
-    shared = "with the motion computed again after each jump" if _anew(model) else once
+    shared = "with the motion computed again after each jump" if _changes_motion(model) else once
     return Cost(
         {"wear": seconds}, words=(f"wear: {model.wear.cycles:.6g} cycles in {number} {shared}",)
     )

@@ -1,6 +1,6 @@
 """Slip path of every interface node in one cycle of a converged bench or rig.
 
-In: a model and its worn patch. Out: `Rubbed` with the path, its error and the outcome.
+In: a model and its worn patch. Out: `CycleSlip` with the path, its error and the outcome.
 """
 
 from math import ceil, sqrt
@@ -21,7 +21,7 @@ UNBOUNDED = (Outcome.GROWS, Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES, Outc
 LEAST_FRAMES, MOST_FRAMES = 64, 800
 
 
-class Rubbed(NamedTuple):
+class CycleSlip(NamedTuple):
     """Slip of the interface in one cycle of a motion.
 
     - path: slip path of each node (m,), of strips (s, m) [m]. With form 'energy' it is friction
@@ -46,7 +46,7 @@ def frames_for(tolerance: float) -> int:
     return int(np.clip(ceil(np.pi / sqrt(0.02 * tolerance)), LEAST_FRAMES, MOST_FRAMES))
 
 
-def even(model, per_point: bool = False) -> bool:
+def slips_uniformly(model, per_point: bool = False) -> bool:
     """Return whether all points of the patch, or of each of its strips, have the same slip."""
     return (
         not model.partial_slip
@@ -55,12 +55,12 @@ def even(model, per_point: bool = False) -> bool:
     )
 
 
-def apart(model) -> bool:
+def strips_slide_independently(model) -> bool:
     """Return whether strips slide independently, which changes with wear."""
     return model.rig is not None and model.rig.friction.strips_slide_apart
 
 
-def rubbed(model, patch, frames: int) -> Rubbed:
+def slip_of_cycle(model, patch, frames: int) -> CycleSlip:
     """Return the slip of one converged cycle of a model on a patch.
 
     frames: number of frames of the interface from which it is computed.
@@ -68,11 +68,11 @@ def rubbed(model, patch, frames: int) -> Rubbed:
     return _bench(model, patch, frames) if model.rig is None else _rig(model, patch, frames)
 
 
-def _bench(model, patch, frames: int) -> Rubbed:
+def _bench(model, patch, frames: int) -> CycleSlip:
     """Return the slip of the last cycle of a bench."""
     cycles = max(1, round(model.slide.cycles or 1))
     steps = steps_of(model)
-    shaped = not even(model)
+    shaped = not slips_uniformly(model)
     found = bench.run(model, patch, steps, frames * cycles if shaped else 0)
     outcome = outcome_on_piece(None, model.patch, patch, found.slide)
     if shaped:
@@ -91,13 +91,13 @@ def _bench(model, patch, frames: int) -> Rubbed:
             )
         return _read(model, patch, local, tau, False, found.values, outcome)
     last = [part[found.first :] for part in (found.slide, found.slip, found.force, found.load)]
-    return _alike(model, patch, last, last[-1][0], found.values, outcome)
+    return _uniform_slip(model, patch, last, last[-1][0], found.values, outcome)
 
 
-def _rig(model, patch, frames: int) -> Rubbed:
+def _rig(model, patch, frames: int) -> CycleSlip:
     """Return the slip of the last cycle of a rig."""
     chosen = numerics.choose(model)
-    shaped = not even(model, chosen.per_point and model.grooves is None)
+    shaped = not slips_uniformly(model, chosen.per_point and model.grooves is None)
     found = engines.ENGINES[chosen.engine].run(
         model, chosen, patch, frames if shaped else 0, None, None
     )
@@ -125,10 +125,10 @@ def _rig(model, patch, frames: int) -> Rubbed:
             )
             local, tau = slip_path_of(model, patch, slide, lifted, local, tau)
         out = _read(model, patch, local, tau, True, found.values, outcome)
-    elif apart(model):
-        out = _in_strips(model, patch, found, outcome)
+    elif strips_slide_independently(model):
+        out = _slip_of_strips(model, patch, found, outcome)
     else:
-        out = _alike(model, patch, last, patch.pressure.load, found.values, outcome)
+        out = _uniform_slip(model, patch, last, patch.pressure.load, found.values, outcome)
     return out._replace(miss=out.miss + beat)
 
 
@@ -141,7 +141,7 @@ def _beat(values: dict, slip) -> float:
     return abs(whole / own - 1) if whole is not None and own > 0 else 0.0
 
 
-def of_point(model, window, values: dict) -> tuple:
+def slip_path_of_point(model, window, values: dict) -> tuple:
     """Return the slip path [m] of one cycle of a point under [normal], and its relative error.
 
     It is weighted with the load if that changes. The error is that by differences between the
@@ -163,7 +163,7 @@ def of_point(model, window, values: dict) -> tuple:
         last = [
             part[window.first :] for part in (window.slide, window.slip, window.force, window.load)
         ]
-    found = _alike(model, None, last, last[-1][0], {}, None)
+    found = _uniform_slip(model, None, last, last[-1][0], {}, None)
     return float(found.path[0]), found.miss + beat
 
 
@@ -177,7 +177,7 @@ def _last_cycle(model, window, load: float) -> list:
     return [part[last] for part in (window.slide, window.slip, window.force, loads)]
 
 
-def _in_strips(model, patch, found, outcome) -> Rubbed:
+def _slip_of_strips(model, patch, found, outcome) -> CycleSlip:
     """Return the slip of every strip of a rig with yaw, along x.
 
     An open strip has the slip of the nearest strip in contact. Every third sample shows the error
@@ -198,7 +198,7 @@ def _in_strips(model, patch, found, outcome) -> Rubbed:
     def path(some) -> np.ndarray:
         """Return the slip path (s,) [m] of the strips from some samples."""
         return np.array(
-            [_summed(slip, heavy) for slip, heavy in zip(slips[some].T, weight[some].T)]
+            [_integrate(slip, heavy) for slip, heavy in zip(slips[some].T, weight[some].T)]
         )
 
     whole, ends = path(np.arange(len(slips))), [0, len(slips) - 1]
@@ -207,7 +207,7 @@ def _in_strips(model, patch, found, outcome) -> Rubbed:
         for first in range(3)
     ]
     total, nearest = float(whole @ loads), _nearest(patch.strips.offsets, loads > 0)
-    return Rubbed(
+    return CycleSlip(
         np.repeat(whole[nearest, None], patch.x.size, axis=1),
         1.5 * float(np.mean(np.abs(lost))) / total if total > 0 else 0.0,
         found.values,
@@ -215,7 +215,7 @@ def _in_strips(model, patch, found, outcome) -> Rubbed:
     )
 
 
-def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rubbed:
+def _uniform_slip(model, patch, last: list, scale: float, values: dict, outcome) -> CycleSlip:
     """Return the slip that is the same at every point, over `scale` [N].
 
     last: slide, slip, force and load (k,) of the last cycle.
@@ -226,10 +226,10 @@ def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rub
     miss = 0.0
     if model.grooves is not None:
         weight = along_flanks(model, slide, force, load)
-    path = _summed(slip, weight) / scale if scale > 0 else 0.0
+    path = _integrate(slip, weight) / scale if scale > 0 else 0.0
     if model.grooves is not None and path > 0:
-        miss = abs(path - _summed(slip[::2], weight[::2]) / scale) / path
-    return Rubbed(
+        miss = abs(path - _integrate(slip[::2], weight[::2]) / scale) / path
+    return CycleSlip(
         np.full(1 if patch is None else areas(model.patch, patch.pieces.interface).shape, path),
         miss,
         values,
@@ -237,7 +237,7 @@ def _alike(model, patch, last: list, scale: float, values: dict, outcome) -> Rub
     )
 
 
-def _summed(slip, weight) -> float:
+def _integrate(slip, weight) -> float:
     """Return the integral of the weight over |slip| by the trapezoidal rule."""
     return float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2))
 
@@ -293,7 +293,7 @@ def slip_path_of(model, patch, slide, vertical, local, tau) -> tuple:
     return path[:, None] - (slide[:, None] - local) * long, worn / long
 
 
-def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubbed:
+def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> CycleSlip:
     """Return the slip path of every node from frames of local slip and shear stress.
 
     Over grooves, the frames are those of `slip_path_of`. A reversal between two frames hides f(d)
@@ -322,7 +322,9 @@ def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> Rubb
         for at in thirds
     ]
     total = float(path @ force)
-    return Rubbed(path, 1.5 * float(np.mean(lost)) / total if total > 0 else 0.0, values, outcome)
+    return CycleSlip(
+        path, 1.5 * float(np.mean(lost)) / total if total > 0 else 0.0, values, outcome
+    )
 
 
 def _path(model, patch, local, tau, closed: bool) -> np.ndarray:

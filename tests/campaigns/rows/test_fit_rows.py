@@ -16,7 +16,7 @@ from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
 from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits.rows import Starts, describe_answer
-from patchfem.runs.batch.watched import Watcher
+from patchfem.runs.batch.watched import MotionObserver
 from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import load, loads
 
@@ -232,7 +232,7 @@ def test_exact_a_marched_motion_is_watched_as_it_runs():
             RUBS, sets=["accuracy.method=march", "accuracy.steps_per_cycle=40", "drive.cycles=30"]
         )
     )
-    seen, measures = Watcher(model, None)(model.rig.drive.signal), run(model).measures
+    seen, measures = MotionObserver(model, None)(model.rig.drive.signal), run(model).measures
     assert seen.acceleration == measures["absolute_acceleration_peak"].value
     assert seen.displacement == measures["relative_displacement_amplitude"].value
 

@@ -23,7 +23,7 @@ from patchfem.campaigns.sweeps.parse_request import Request, asked_of
 from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Clock, Work, solved
 from patchfem.core import Missing, PatchfemError
 from patchfem.export.sweeps.run import Place, sweep_into
-from patchfem.runs.batch.case_results import FAILED, CaseResults, joined_answers
+from patchfem.runs.batch.case_results import FAILED, CaseResults, join_case_results
 from patchfem.scene.axes import read_axes
 
 SUPPORT = Path(__file__).parents[2] / "support"
@@ -41,7 +41,7 @@ def all_of(asked: Work, executor) -> tuple:
     parts = list(solved(asked, range(count), executor))
     assert sorted(number for numbers, *_ in parts for number in numbers) == list(range(count))
     pairs = dict(pair for one in parts for pair in zip(one[0], one[2] or ()))
-    return joined_answers(count, [part[:2] for part in parts]), pairs
+    return join_case_results(count, [part[:2] for part in parts]), pairs
 
 
 def same(found: CaseResults, want: CaseResults, cases) -> None:

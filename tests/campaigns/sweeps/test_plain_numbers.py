@@ -211,7 +211,7 @@ def test_exact_columns_of_models_are_the_numbers_of_each(name):
         alike = asked.alike(keys, values, partial(written, keys, values), np.arange(7))
         single = list(alike)
         smooth = name in ("tanh", "nonlocal", "bouc-wen", "lugre")
-        for row in (numbers_of_rig, numbers_of_contact, *([lanes.of_law] if smooth else [])):
+        for row in (numbers_of_rig, numbers_of_contact, *([lanes.law_numbers] if smooth else [])):
             np.testing.assert_array_equal(collect_columns(alike, row), collect_columns(single, row))
         for mine, theirs in zip(columns.sizes_of(alike), columns.sizes_of(single)):
             np.testing.assert_array_equal(mine, theirs)

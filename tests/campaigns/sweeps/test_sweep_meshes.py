@@ -11,7 +11,7 @@ from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import Work, solved, with_meshes
-from patchfem.runs.batch.case_results import joined_answers
+from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene.axes import read_axes
 
 WORK = Work(
@@ -27,9 +27,9 @@ def test_exact_meshes_are_made_once_and_travel_with_the_work():
 
 @pytest.mark.slow
 def test_exact_processes_that_begin_before_the_meshes_are_chosen_take_them():
-    here = joined_answers(4, [part[:2] for part in solved(WORK, range(4), LocalExecutor())])
+    here = join_case_results(4, [part[:2] for part in solved(WORK, range(4), LocalExecutor())])
     pool = Pool(2)
-    found = joined_answers(4, [part[:2] for part in solved(WORK, range(4), pool)])
+    found = join_case_results(4, [part[:2] for part in solved(WORK, range(4), pool)])
     assert pool.ready == [] and found.numerics == here.numerics
     for name, values in here.values.items():
         np.testing.assert_allclose(found.values[name], values, rtol=1e-9)

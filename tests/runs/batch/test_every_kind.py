@@ -6,7 +6,7 @@ from scene_texts import COATED, MODE, PLASTIC, SHEAR, SLIDE
 
 import patchfem as pf
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.runs.batch.meshes import meshed
+from patchfem.runs.batch.meshes import with_shared_meshes
 from patchfem.runs.patch import store
 
 PATCH = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'
@@ -49,7 +49,7 @@ def cases(kind: str, seed: int, count: int) -> list:
         if "bench" in kind:
             sets |= {"slide.amplitude": float(10 ** r.uniform(-5.3, -4.3))}
         out.append(pf.build(TEXTS[kind], **sets))
-    return meshed(out)
+    return with_shared_meshes(out)
 
 
 def alone(model):
@@ -61,7 +61,7 @@ def alone(model):
 def held_against_own_runs(kind: str, seed: int, count: int) -> int:
     """Cases whose answers, bars, floors, reasons and words in the batch were those of their own runs: all are held."""
     models = cases(kind, seed, count)
-    found = batches.answers(models)
+    found = batches.solve_models(models)
     for case, model in enumerate(models):
         own = alone(model)
         assert found.outcome[case] == own.outcome[0] != "failed", (case, found.messages.get(case))

@@ -8,7 +8,7 @@ from scene_texts import COATED, MODE, SECOND, SHEAR
 
 import patchfem as pf
 from patchfem.runs.batch import batches, gathered, one_by_one
-from patchfem.runs.batch.meshes import meshed
+from patchfem.runs.batch.meshes import with_shared_meshes
 
 BONDS = '[friction]\nlaw = "nonlocal"\nreading = "stretch"\nstatic = 0.3\nkinetic = 0.3\nbond_length = "1 um"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
@@ -29,7 +29,7 @@ NARROW = 0.1  # of the sum of both bars
 def models(seed: int, count: int) -> list:
     """Random tilts, loads, frictions and levels, on meshes that they share."""
     r = np.random.default_rng(seed)
-    return meshed(
+    return with_shared_meshes(
         [
             pf.build(
                 SCENE,
@@ -98,7 +98,7 @@ def test_a_table_of_measured_responses_keeps_no_batch_away_unless_it_cannot_be_r
     assert gathered.no_lanes(beside) == ""
     lost = replace(beside, measured=beside.measured._replace(path=tmp_path / "none.csv"))
     assert "table of measured responses cannot be read" in gathered.no_lanes(lost)
-    found = batches.answers([lost], study=32)
+    found = batches.solve_models([lost], study=32)
     assert "none.csv" in found.messages[0]
 
 
@@ -108,6 +108,6 @@ def test_always_what_lanes_do_not_take_runs_by_itself():
     fewer = pf.build(SCENE, **{"friction.initial_bonds": 0.5})
     assert gathered.group(fewer) is None and gathered.group(held_fast) is not None
     for one in (held_fast, fewer):
-        cases = meshed([one, one])[:1]
+        cases = with_shared_meshes([one, one])[:1]
         found, real = gathered.solve(cases), one_by_one.solve(cases)
         assert (found.outcome == real.outcome).all() and beside(found, real)[2] == 0

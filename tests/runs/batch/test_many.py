@@ -41,7 +41,7 @@ def test_exact_cases_are_single_runs_in_the_order_they_were_asked():
     texts = [RIG, BENCH, POINT + PLASTIC + SHORT, RIG.replace("26 lbf", "1 N")]
     models = [pf.build(text) for text in texts]
     models.insert(1, PatchfemError("friction.static: refused here"))
-    found = batches.answers(models)
+    found = batches.solve_models(models)
     assert found.outcome[1] == FAILED and found.messages == {1: "friction.static: refused here"}
     for case, text in zip((0, 2, 3, 4), texts):
         single = pf.run(text)
@@ -63,7 +63,7 @@ def test_exact_a_failing_batch_is_made_up_for_by_single_runs(use_batches):
     )
     use_batches(batch)
     said = []
-    found = batches.answers(models, say=said.append)
+    found = batches.solve_models(models, say=said.append)
     same(found, 0, pf.run(RIG))
     same(found, 1, pf.run(BENCH))
     assert "breaks: ZeroDivisionError" in said[0]
@@ -72,7 +72,7 @@ def test_exact_a_failing_batch_is_made_up_for_by_single_runs(use_batches):
 def test_exact_a_batch_that_fails_to_look_at_a_model_leaves_it_to_a_single_run(use_batches):
     batch = batches.Batch("blind", lambda model: 1 / 0, lambda model: 0, lambda models, say: 1 / 0)
     use_batches(batch)
-    same(batches.answers([pf.build(BENCH)]), 0, pf.run(BENCH))
+    same(batches.solve_models([pf.build(BENCH)]), 0, pf.run(BENCH))
 
 
 def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(use_batches):
@@ -89,7 +89,7 @@ def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(use_batches):
     models = [pf.build(BENCH, **{"normal.load": load}) for load in loads]
     batch = batches.Batch("parity", lambda model: "", lambda model: model.point.load % 2, solve)
     use_batches(batch)
-    assert batches.answers(models).values["load"].tolist() == loads
+    assert batches.solve_models(models).values["load"].tolist() == loads
     assert seen == [[1.0, 3.0], [2.0, 4.0]]
 
 
@@ -102,6 +102,6 @@ def test_always_a_fault_of_one_case_leaves_the_others(monkeypatch):
         "run",
         lambda what, say, **more: 1 / 0 if what.kind == "bench" else real(what, say, **more),
     )
-    found = batches.answers([pf.build(BENCH), pf.build(RIG)])
+    found = batches.solve_models([pf.build(BENCH), pf.build(RIG)])
     assert found.outcome.tolist()[0] == FAILED and "ZeroDivisionError" in found.messages[0]
     same(found, 1, pf.run(RIG))

@@ -12,7 +12,7 @@ from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.export.sweeps.run import swept
 from patchfem.runs.batch import batches, one_by_one, patches
-from patchfem.runs.batch.meshes import meshed
+from patchfem.runs.batch.meshes import with_shared_meshes
 from patchfem.runs.patch.grids import contact_extent
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.scene import scene
@@ -36,14 +36,14 @@ PINNED = 'element_size = "0.2 mm"\n'  # no mesh has to be chosen
 
 def family(tables, *values, loads=(100.0, 600.0), size=PINNED):
     texts = [TEXT.format(size, load, tables.format(value)) for value in values for load in loads]
-    return meshed([build(scene.loads(text)) for text in texts])
+    return with_shared_meshes([build(scene.loads(text)) for text in texts])
 
 
 def same(models, together=None):
     """Answers of both ways; every case is held against its own run."""
     if together is None:
         messages = []
-        mine = batches.answers(models, say=messages.append)
+        mine = batches.solve_models(models, say=messages.append)
         assert not any("run one by one" in message for message in messages), messages
     else:
         mine = together(models)
@@ -117,7 +117,7 @@ def test_exact_cases_of_every_kind_beside_each_other():
         tall.replace("2e7", "2e6"),
     ]
     texts.append(texts[0] + 'quadrature = "merged"\n')
-    mine = same(meshed([build(scene.loads(text)) for text in texts]))
+    mine = same(with_shared_meshes([build(scene.loads(text)) for text in texts]))
     said = [
         " ".join(mine.warnings.get(case, []) + mine.notes.get(case, []))
         for case in range(len(texts))
@@ -165,13 +165,13 @@ def test_exact_a_sweep_in_columns_is_that_of_its_models():
     }
     cases = Cases(tuple(make_axis(key, texts, distinct=False) for key, texts in keys.items()), True)
     found = swept(Asked(Path("patch.toml"), text), cases, LocalExecutor())
-    models = meshed(
+    models = with_shared_meshes(
         [
             build(scene.loads(text, sets=[f"{key}={texts[k]}" for key, texts in keys.items()]))
             for k in range(3)
         ]
     )
-    wanted = batches.answers(models)
+    wanted = batches.solve_models(models)
     for name, column in wanted.values.items():
         for mine, other in (
             (found.values[name], column),
@@ -186,7 +186,9 @@ def test_refuses_a_profile_to_be_pressed_with_others(tmp_path):
         "x [mm],z [um]\n" + "".join(f"{0.1 * k},{k % 3}\n" for k in range(-70, 71))
     )
     text = TEXT.format(PINNED, 100.0, '[contact.profile]\nfile = "waves.csv"\n')
-    models = meshed([build(scene.loads(text, tmp_path / "patch.toml")) for _ in range(2)])
+    models = with_shared_meshes(
+        [build(scene.loads(text, tmp_path / "patch.toml")) for _ in range(2)]
+    )
     assert "profile" in patches.refuses(models[0])
 
 

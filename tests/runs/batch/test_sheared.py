@@ -7,7 +7,7 @@ from scene_texts import COATED, MODE, PLASTIC, SHEAR
 
 import patchfem as pf
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.runs.batch.meshes import meshed
+from patchfem.runs.batch.meshes import with_shared_meshes
 
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 30\n'
 SCENE = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + PLASTIC + MODE + DRIVE
@@ -38,7 +38,7 @@ def models(law: str, seed: int, count: int) -> list:
         if k % 3 == 1:
             sets["contact.element_size"] = 3e-4
         out.append(pf.build(LAWS[law] + SKIN * (k % 4 == 3), **sets))
-    return meshed(out) if seed % 2 else out
+    return with_shared_meshes(out) if seed % 2 else out
 
 
 def held(law: str, seed: int, count: int) -> int:
@@ -51,7 +51,7 @@ def held(law: str, seed: int, count: int) -> int:
             "solve",
             lambda models, *given, **more: alone.extend(models) or real(models, *given, **more),
         )
-        found = batches.answers(cases)
+        found = batches.solve_models(cases)
     held_against(cases, real(cases), found)
     return count - len(alone)
 

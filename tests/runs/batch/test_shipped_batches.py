@@ -13,7 +13,7 @@ import pytest
 
 import patchfem as pf
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.runs.batch.meshes import meshed
+from patchfem.runs.batch.meshes import with_shared_meshes
 
 RIG = (Path(__file__).parents[3] / "studies/rig/rig.toml").read_text().split("[measured]")[0]
 CLOSE = "[accuracy]\ntolerance = 1e-3\n"
@@ -52,14 +52,14 @@ def models(kind: str, seed: int, count: int) -> list:
         if kind == "rig":
             sets["friction.kinetic"] = sets["friction.static"]
         out.append(pf.build(SCENES[kind], **sets))
-    return meshed(out)
+    return with_shared_meshes(out)
 
 
 def held(kind: str, seed: int, count: int) -> tuple:
     """(measures compared, those outside, cases with one outside or another outcome)."""
     cases = models(kind, seed, count)
     assert all(batches.batch_of(one, 64).name == BATCHES[kind] for one in cases)
-    found, ones = batches.answers(cases, study=max(count, 64)), one_by_one.solve(cases)
+    found, ones = batches.solve_models(cases, study=max(count, 64)), one_by_one.solve(cases)
     assert not found.messages and not ones.messages
     compared, outside, apart = 0, 0, found.outcome != ones.outcome
     for name, column in found.values.items():

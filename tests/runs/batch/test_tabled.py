@@ -16,7 +16,7 @@ from patchfem.scene.sets import format_assignments
 
 def missed(family: str, seed: int, count: int) -> tuple:
     """(Answers of random cases in lanes, measures beyond the sum of both bars, all that were compared)."""
-    models = meshes.meshed(draw_patches(family, seed, count))
+    models = meshes.with_shared_meshes(draw_patches(family, seed, count))
     assert all(batches.batch_of(one, 64).name == "lumped.tabled" for one in models)
     assert all(batches.batch_of(one, 63).name == "lumped.sheared" for one in models)
     found, ones = tabled.solve(models), sheared.solve(models)
@@ -34,7 +34,7 @@ def test_always_97_of_100_measures_lie_within_both_bars(family):
 
 def test_always_a_set_beyond_the_table_is_exact(monkeypatch):
     """Sets of more elements than a table has room for, as of a finer mesh, march from yield to yield."""
-    models = meshes.meshed(draw_patches("frequency x load", 9, 3))
+    models = meshes.with_shared_meshes(draw_patches("frequency x load", 9, 3))
     monkeypatch.setattr(tabled, "load", lambda _: type("Few", (), {"YIELDS": 8}))
     found, ones = tabled.solve(models), sheared.solve(models)
     assert all(one["engine"] == "piecewise" for one in found.numerics.values())
@@ -53,7 +53,9 @@ def test_always_a_patch_that_sticks_is_answered_in_lanes():
         }
         for static, tilt in ((0.57, 3.7e-6), (0.54, 1.2e-6), (0.59, 4e-6))
     ]
-    models = meshes.meshed([pf.build(base.override(format_assignments(one))) for one in sets])
+    models = meshes.with_shared_meshes(
+        [pf.build(base.override(format_assignments(one))) for one in sets]
+    )
     found, ones = tabled.solve(models), sheared.solve(models)
     assert all(one["engine"] == "lanes" for one in found.numerics.values())
     assert list(found.outcome) == list(ones.outcome) == 3 * ["stuck"]

@@ -43,7 +43,7 @@ from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...accuracy_warnings import Finding, tolerance_warnings
 from ...results.notes import BOOKS
 from ...results.result import without_folders
-from ...rig.engines import knobs_idle
+from ...rig.engines import unused_settings
 from ...rig.motion_warnings import law_warnings
 from ..case_results import CaseResults
 
@@ -231,7 +231,9 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         said = remarks if alike else _remarks(model, numerics["engine"])
         if warnings := [
             *said,
-            *warned(model, outcome[case], found, case, wide_of[case], rings.get(case, ())),
+            *warnings_of_case(
+                model, outcome[case], found, case, wide_of[case], rings.get(case, ())
+            ),
         ]:
             found.warnings[case] = without_folders(warnings, model.source.path)
     return found, alone, resolved
@@ -239,7 +241,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
 
 def _remarks(model, engine: str) -> list:
     """Return the warnings on a model that do not depend on its run."""
-    return [*model.source.remarks, *knobs_idle(model, engine), *model.rig.structure.notes]
+    return [*model.source.remarks, *unused_settings(model, engine), *model.rig.structure.notes]
 
 
 def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
@@ -355,7 +357,7 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
             found.floors[name][cases] = measure.floor
 
 
-def warned(model, outcome, found: CaseResults, case: int, wide: bool, rings=()) -> list:
+def warnings_of_case(model, outcome, found: CaseResults, case: int, wide: bool, rings=()) -> list:
     """Return the warnings of a case that a single run would give.
 
     They concern its friction law and, if `wide`, the errors that exceed the tolerance.

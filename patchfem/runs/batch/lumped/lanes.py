@@ -43,7 +43,7 @@ from ....response.settling import extrapolate_steady_amplitudes, window_amplitud
 from ....scene.rules.accuracy import list_fixed_settings
 from ....structure.drive_sizes import find_max_acceleration
 from ...rig.motion_warnings import creeping_note
-from ...rig.pieces import CHANGES, read_off
+from ...rig.pieces import CHANGES, measures_of_reading
 from .. import one_by_one
 from ..case_results import CaseResults
 from . import lumped
@@ -183,11 +183,11 @@ def _creates(model: Model):
     if law_has_trait(f.law, "bonds"):
         return np.not_equal(f.breakaway or 0.0, 0.0) | np.not_equal(f.initial_bonds, 1.0)
     if f.law == "lugre":  # from this damping on, its power may be negative
-        return np.greater(f.micro_damping * model.rig.speed_scale, 4 * of_law(model)[1])
+        return np.greater(f.micro_damping * model.rig.speed_scale, 4 * law_numbers(model)[1])
     return np.less(f.shape, 0.5) if f.law == "bouc-wen" else False
 
 
-def of_law(model: Model) -> tuple:
+def law_numbers(model: Model) -> tuple:
     """Return the numbers of a stretch law for its `rate_equation`, and its length [m].
 
     The length is 0 for a law without one.
@@ -284,7 +284,7 @@ def _contact(model: Model) -> tuple:
             half,
         )
     if march.has_one_stretch(KINDS[friction.law]):
-        *numbers, length = of_law(model)
+        *numbers, length = law_numbers(model)
         return 0.0 if friction.law == "tanh" else static / length, length, *numbers
     return (
         (static / friction.bond_length, friction.bond_length)
@@ -320,12 +320,12 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
     found = CaseResults.blank(len(models))
     for first in range(0, len(models), TOGETHER):
         part = select_models(models, range(first, min(first + TOGETHER, len(models))))
-        found.place(range(first, first + len(part)), _solved(part, say))
+        found.place(range(first, first + len(part)), _solve_cases(part, say))
     return found
 
 
-def _solved(models: Sequence[Model], say) -> CaseResults:
-    """Return the case results of models by `answered`, with the notes of law 'tanh'."""
+def _solve_cases(models: Sequence[Model], say) -> CaseResults:
+    """Return the case results of models by `solve_and_check`, with the notes of law 'tanh'."""
     law = models[0].friction.law
 
     def exact(places, check: bool) -> CaseResults:
@@ -334,7 +334,7 @@ def _solved(models: Sequence[Model], say) -> CaseResults:
             select_models(models, places), say, FINER_CELLS if law == "iwan" and check else 0
         )
 
-    found, others, _ = answered(models, (*cases_of(models), None), steps_of(models), exact)
+    found, others, _ = solve_and_check(models, (*cases_of(models), None), steps_of(models), exact)
     if law == "tanh":
         speeds, first = (
             collect_columns(models, lambda model: (model.friction.reference_speed,))[0],
@@ -348,7 +348,7 @@ def _solved(models: Sequence[Model], say) -> CaseResults:
     return found
 
 
-def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) -> tuple:
+def solve_and_check(models: Sequence[Model], cases: tuple, steps, exactly: Callable) -> tuple:
     """Return the results of models by lanes, of which a few are checked with the exact engine.
 
     If these differ, cases of a stretch law are marched with twice the steps, and more cases are
@@ -373,25 +373,25 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
     found, exact, steps, reach = _side_by_side(models, cases, steps)
     found.seconds[:] = (perf_counter() - begin) / len(models)
     marks = np.column_stack(cases[0])
-    looked = checked(marks, ~exact)
+    looked = select_checked_cases(marks, ~exact)
     ones = exactly(looked, True) if looked else None
     times, again = (
         SHORT if law == "masing" else 1.0,
         np.flatnonzero(~exact & (2 * steps <= SMOOTH[-1])),
     )
-    wrong = contradicted(found, ones, looked, exact, times)
+    wrong = find_differences(found, ones, looked, exact, times)
     if wrong and again.size and march.has_one_stretch(law):
         finer, exact[again], *_ = _side_by_side(
-            select_models(models, again), _of(cases, again), 2 * steps[again]
+            select_models(models, again), _select(cases, again), 2 * steps[again]
         )
         lumped.take_out(found, again)
         found.place(again, finer)
-        wrong = contradicted(found, ones, looked, exact, times)
+        wrong = find_differences(found, ones, looked, exact, times)
     if wrong:  # more checks show whether these differences are exceptions
         free = ~exact
         free[looked] = False
-        more = checked(marks, free, IN_DOUBT)
-        others = contradicted(found, exactly(more, True) if more else None, more, exact, times)
+        more = select_checked_cases(marks, free, IN_DOUBT)
+        others = find_differences(found, exactly(more, True) if more else None, more, exact, times)
         looked, wrong = [*looked, *more], wrong | others
     whole = len(wrong) > WRONG * len(looked)
     exact[list(wrong)] = True
@@ -425,7 +425,7 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     ----------
     models : sequence of Model
     cases : tuple
-        See `answered`.
+        See `solve_and_check`.
     steps : (n,)
         First number of steps per cycle.
 
@@ -444,13 +444,13 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
 
     def tell_mesh(places, fine: dict) -> None:
         """Store the errors by the mesh of some cases."""
-        rough = _measured(law, *_of(cases[2], places), cycles, now)[0]
-        for name, error in _of_mesh(fine, rough).items():
+        rough = _march_and_measure(law, *_select(cases[2], places), cycles, now)[0]
+        for name, error in _mesh_errors(fine, rough).items():
             meshed.setdefault(name, np.zeros(len(models)))[places] = error
 
     def measured(places, count: int) -> tuple:
         """March some cases, and store their measures by the number of steps."""
-        seen = _measured(law, *_of(cases[:2], places), cycles, count)
+        seen = _march_and_measure(law, *_select(cases[:2], places), cycles, count)
         for name, column in seen[0].items():
             known.setdefault(count, {}).setdefault(name, np.full(len(models), np.nan))[places] = (
                 column
@@ -459,9 +459,9 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
 
     def tell(places, seen: tuple, *shares: int) -> np.ndarray:
         """Store the results of some cases; return which have too large errors."""
-        fewer = [_of(known[now // share], places) for share in shares]
-        some_cases = *_of(cases[:2], places), _of(meshed, places)
-        answers, exact[places], wide = _marched(
+        fewer = [_select(known[now // share], places) for share in shares]
+        some_cases = *_select(cases[:2], places), _select(meshed, places)
+        answers, exact[places], wide = _march_cases(
             select_models(models, places), some_cases, now, seen, fewer
         )
         lumped.take_out(found, places)  # the results with fewer steps are replaced
@@ -475,17 +475,17 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
             seen, places = measured(here, now), here[ready]
             tells = fewest[here] == now
             if meshed and ready.size:
-                own = _of(seen[0], ready)
-                tells[ready] |= _wild(own, _of(meshed, places)) | ~_loops(own)
+                own = _select(seen[0], ready)
+                tells[ready] |= _needs_finer_mesh(own, _select(meshed, places)) | ~_loops(own)
             if cases[2] is not None and tells.any():
-                tell_mesh(here[tells], _of(seen[0], tells))
+                tell_mesh(here[tells], _select(seen[0], tells))
         if ready.size:
             reach[places] = np.abs(seen[3][ready]).max(axis=(1, 2))
-            wide = tell(places, _of(seen, ready), 2)
+            wide = tell(places, _select(seen, ready), 2)
             if flows and wide.any():
                 if (lack := places[wide & (2 * fewest[places] == now)]).size:
                     measured(lack, now // 4)
-                wide[wide] = tell(places[wide], _of(seen, ready[wide]), 2, 4)
+                wide[wide] = tell(places[wide], _select(seen, ready[wide]), 2, 4)
             more = wide & (2 * now <= finest) & (smooth | ~exact[places])
             steps[places[more]] = 2 * now
             exact[places[wide]] = ~more[wide]
@@ -493,7 +493,7 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     return found, exact, steps, reach
 
 
-def _wild(values: dict, meshed: dict) -> np.ndarray:
+def _needs_finer_mesh(values: dict, meshed: dict) -> np.ndarray:
     """Return which cases (n,) a coarser mesh changes more than a mesh that is fine enough.
 
     values, meshed: measures and errors by the mesh, (n,) by name.
@@ -504,17 +504,17 @@ def _wild(values: dict, meshed: dict) -> np.ndarray:
     )
 
 
-def _of(found, places):
+def _select(found, places):
     """Return the rows of some cases from arrays in a dict or a tuple; other entries are common."""
     if isinstance(found, dict):
-        return {name: _of(one, places) for name, one in found.items()}
+        return {name: _select(one, places) for name, one in found.items()}
     if isinstance(found, tuple):
-        parts = [_of(one, places) for one in found]
+        parts = [_select(one, places) for one in found]
         return type(found)(*parts) if hasattr(found, "_fields") else tuple(parts)
     return found[places] if np.ndim(found) else found
 
 
-def _marched(
+def _march_cases(
     models: Sequence[Model], cases: tuple, steps: int, seen: tuple, coarser: list
 ) -> tuple:
     """Return the results of models from a march with `steps` per cycle.
@@ -522,7 +522,10 @@ def _marched(
     Also returns which cases (n,) must be run otherwise, and which need more steps. The parameters
     are those of `runs_of`.
     """
-    window, wide_of = window_of(group(models[0])[0]), partial(too_wide, models, meshed=cases[2])
+    window, wide_of = (
+        window_of(group(models[0])[0]),
+        partial(has_large_error, models, meshed=cases[2]),
+    )
     runs, exact, lost = runs_of(models, cases, steps, seen, coarser)
     found, alone, _ = batch_answers(
         models, runs, {"engine": "exact", "window_cycles": window}, wide_of
@@ -557,7 +560,7 @@ def exactly(models: Sequence[Model], say, finer: int = 0) -> CaseResults:
     return found
 
 
-def too_wide(models, found: CaseResults, meshed: dict | None = None) -> np.ndarray:
+def has_large_error(models, found: CaseResults, meshed: dict | None = None) -> np.ndarray:
     """Return whether an error of a case exceeds its tolerance, (n,).
 
     The tolerance applies to a measure or to the larger terms of which it is the difference. The
@@ -584,12 +587,14 @@ def too_wide(models, found: CaseResults, meshed: dict | None = None) -> np.ndarr
         floors = np.fmax(found.floors[name], tolerance * larger_term(name, found.values))
         # it is the loop area over an energy, and not more accurate than this area
         if name == "equivalent_damping" and "loop_area" in found.values:
-            floors = np.fmax(floors, found.floors["loop_area"] * _of_loop(found.values))
+            floors = np.fmax(
+                floors, found.floors["loop_area"] * _damping_per_loop_area(found.values)
+            )
         out |= found.errors[name] - of_mesh > tolerance * np.abs(values) + floors
     return out
 
 
-def checked(marks, free, least: int = FEWEST) -> list:
+def select_checked_cases(marks, free, least: int = FEWEST) -> list:
     """Return the indices of the cases that the exact engine checks.
 
     They are chosen by a hash of each case, so that the choice does not depend on other cases.
@@ -609,7 +614,7 @@ def checked(marks, free, least: int = FEWEST) -> list:
     return order[: max(few, least)]
 
 
-def contradicted(
+def find_differences(
     found: CaseResults, ones: CaseResults | None, looked: list, exact, times: float = 1.0
 ) -> dict[int, str]:
     """Return the first measure of each case that differs from its exact result, by case.
@@ -655,7 +660,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
     steps : int
         Steps per cycle.
     seen : tuple
-        From `_measured` with these steps.
+        From `_march_and_measure` with these steps.
     coarser : list of dict
         Measures with half, and perhaps a quarter, of the steps.
 
@@ -671,7 +676,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
         seen,
     )
     window = window_of(cycles)
-    errors = bars(values, coarser)
+    errors = step_errors(values, coarser)
     errors |= {
         name: errors[name] + error for name, error in (meshed or {}).items() if name in errors
     }
@@ -686,7 +691,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
     rings, told, untold, faint = _rings(law, cases, c, found, (stuck, window, steps))
     errors, exact, steady = errors | told, exact | untold, None
     if law in MARCH_ON:
-        steady, open_ones = _settled(
+        steady, open_ones = _march_until_settled(
             law, cases, found, steps, window_amplitude_means(extremes, window)[0], ~stuck
         )
         steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | open_ones
@@ -722,7 +727,7 @@ def may_ring(cases, found) -> np.ndarray:
     return found.reading("LONGEST_STICK") * own >= RINGS
 
 
-def stays(cases, found) -> np.ndarray:
+def start_may_remain(cases, found) -> np.ndarray:
     """Return whether the start or a ringing may remain at the end, (n,).
 
     The last two cycles differ by its decay in one cycle, at least by that of the damper.
@@ -768,14 +773,14 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     rings, marched = may_ring(cases, found), found.n_before >= found.history.shape[1] - window
     held = found.reading("STICK_ANGLE") > 2 * np.pi * (found.n_observed - 1e-6)
     if law == "yielding":
-        _of_springs(cases, c, found, held & rings & marched, out)
+        _ring_on_springs(cases, c, found, held & rings & marched, out)
         return *out, rings & ~held, faint
     # a periodic motion does not ring, but the start may remain in a stick of all cycles
     may = (
         (rings & marched & (march.law_state(law, found.motion, "EVER_SLIPPED") > 0))
-        | (stays(cases, found) & stuck)
+        | (start_may_remain(cases, found) & stuck)
         if law in march.MASING
-        else stays(cases, found) & (stuck | rings)
+        else start_may_remain(cases, found) & (stuck | rings)
     )
     untold, told = may & ~held, may & held
     strides = steps / (
@@ -786,7 +791,7 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     where = np.flatnonzero(told)
     every = (
         march.output_accelerations(
-            law, _of(cases, where), found.observed_start[where], window, steps
+            law, _select(cases, where), found.observed_start[where], window, steps
         )
         if where.size
         else ()
@@ -802,7 +807,7 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     return *out, untold, faint
 
 
-def _of_springs(cases, c: dict, found, held, out: tuple) -> None:
+def _ring_on_springs(cases, c: dict, found, held, out: tuple) -> None:
     """Compute the ringing of cases (n,) `held` that a spring holds in all evaluated cycles.
 
     It is known in closed form, with the criteria of `response.ringing`; `out` is filled: values and
@@ -836,7 +841,7 @@ def _of_springs(cases, c: dict, found, held, out: tuple) -> None:
         out[0][name][told], out[1][name][told] = value[told], 0.0
 
 
-def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
+def _march_until_settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
     """March cases on until they settle, and return their amplitudes.
 
     They march on by a fraction of their cycles at first, later by all of these, each until it
@@ -869,23 +874,23 @@ def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
     for share in PACES:
         if not where.size:
             break
-        here, before = _of(cases, where), motion
+        here, before = _select(cases, where), motion
         more, motion = march.continue_march(law, here, before, max(1, int(share * part)), steps)
         history = np.concatenate([history, more], axis=1)
         late = history.shape[1] > MORE * part
         least = _left(here, before, motion, more.shape[1])
-        value, error = _known(history, part, least, (LATE if late else 1) * SETTLED)
+        value, error = _steady_half_range(history, part, least, (LATE if late else 1) * SETTLED)
         near = (LATE if late else 2) * SETTLED
         ranges = np.ptp(history[:, -part:, :2], axis=2) / 2
         known = error < near * ranges[:, -1]
         if law == "yielding":
-            known &= _goes_on(ranges, cases.yield_length[where], value, error)
+            known &= _slips_until_steady(ranges, cases.yield_length[where], value, error)
         out[:, where[known]], lost[where[known]] = (value[known], error[known]), False
         where, motion, history = where[~known], motion[~known], history[~known]
     return tuple(out), lost
 
 
-def _goes_on(ranges, length, value, error) -> np.ndarray:
+def _slips_until_steady(ranges, length, value, error) -> np.ndarray:
     """Return whether a motion slips in all cycles up to its steady state, or in none, (n,).
 
     If slip ceases in between, its free motion decays differently from then on.
@@ -922,7 +927,7 @@ def _left(cases, before, motion, cycles: int) -> np.ndarray:
     return step * (1 - goes) / np.maximum(goes, 1e-300)
 
 
-def _known(history, part: int, least, near: float) -> tuple:
+def _steady_half_range(history, part: int, least, near: float) -> tuple:
     """Return half the range of the slide in the steady state and its error, (n,) each [m].
 
     It is the last range if it hardly changes in `part` cycles, not more than in those before, and
@@ -963,13 +968,13 @@ def _known(history, part: int, least, near: float) -> tuple:
 def cases_of(models, contacts=None) -> tuple:
     """Return the Cases of models, and further numbers (n,) by name in SI units.
 
-    contacts: numbers (m, n) of the contacts as from `_of_contact`; None: those of single points.
+    contacts: numbers (m, n) of the contacts as from `_contact_numbers`; None: those of single points.
     """
     own, damping, slide, share, output, mass, drive, w, moving, z, v, stiffness, size = (
-        collect_columns(models, _of_rig)
+        collect_columns(models, _rig_numbers)
     )
     static, kinetic, load, spring, length, *numbers = (
-        collect_columns(models, _of_contact) if contacts is None else contacts
+        collect_columns(models, _contact_numbers) if contacts is None else contacts
     )
     law, scale, numbers = kind_of(models[0]), slide**2 / (mass * w**2), np.array(numbers).T
     numbers = (
@@ -1002,7 +1007,7 @@ def cases_of(models, contacts=None) -> tuple:
     }
 
 
-def _of_rig(model: Model) -> tuple:
+def _rig_numbers(model: Model) -> tuple:
     """Return the numbers of a model, except its contact, for `cases_of`."""
     modes, drive, start = model.rig.modes, model.rig.drive.signal, model.rig.start
     return (
@@ -1021,7 +1026,7 @@ def _of_rig(model: Model) -> tuple:
     )
 
 
-def _of_contact(model: Model) -> tuple:
+def _contact_numbers(model: Model) -> tuple:
     """Return the numbers of the contact of a model for `cases_of`.
 
     They are static and kinetic friction [N], load [N], and those of `_contact`.
@@ -1038,7 +1043,7 @@ def kind_of(model: Model) -> str:
     return KINDS[model.friction.law] if model.patch is None else "table"
 
 
-def _of_mesh(fine: dict, rough: dict) -> dict:
+def _mesh_errors(fine: dict, rough: dict) -> dict:
     """Return the errors (n,) by name of a mesh from a coarser one.
 
     The error of a measure that the coarser mesh does not have is its absolute value.
@@ -1055,7 +1060,7 @@ def window_of(cycles: int) -> int:
     return min(10, cycles // 10)
 
 
-def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
+def _march_and_measure(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
     """March cases, and evaluate the last cycles.
 
     Returns the measures by name, energies [J], Marched, extremes of the output (n, c, 2) [m], and
@@ -1069,7 +1074,7 @@ def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
         law, cases, found, c["energy"], c["omega"], extremes[:, -window:]
     )
     with np.errstate(all="ignore"):
-        values = read_off(seen, book, True, True, c["stiffness"], c["size"])
+        values = measures_of_reading(seen, book, True, True, c["stiffness"], c["size"])
     values |= {
         "normal_load": c["load"],
         "friction_work": book["friction"],
@@ -1080,7 +1085,7 @@ def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
     return values, book, found, extremes, seen.rise
 
 
-def bars(values: dict, coarser: list) -> dict:
+def step_errors(values: dict, coarser: list) -> dict:
     """Return the error (n,) of each measure from its values at half and a quarter of the steps.
 
     Parameters
@@ -1105,7 +1110,7 @@ def _loops(values: dict) -> np.ndarray:
     )
 
 
-def _of_loop(values: dict) -> np.ndarray:
+def _damping_per_loop_area(values: dict) -> np.ndarray:
     """Return equivalent_damping over loop_area (n,) [1/J]; 0 without a loop."""
     loop = values["loop_area"]
     return np.divide(

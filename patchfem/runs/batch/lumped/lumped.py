@@ -12,7 +12,7 @@ from ....core import SineDrive
 from ....model.model import Model
 from ...rig.engines import engine_of
 from .. import one_by_one
-from ..case_results import CaseResults, unread
+from ..case_results import CaseResults, has_unreadable_table
 from . import pieces
 from .columns import batch_answers
 
@@ -27,7 +27,12 @@ def refuses(model: Model) -> str:
 def not_one_point(model: Model) -> str:
     """Return why a model is not one mode under a sine with one constantly loaded point, or ""."""
     rig = model.rig
-    if model.kind != "rig" or model.patch is not None or model.wear is not None or unread(model):
+    if (
+        model.kind != "rig"
+        or model.patch is not None
+        or model.wear is not None
+        or has_unreadable_table(model)
+    ):
         return "the contact of the case is not a single point, or its table of measured responses cannot be read"
     if (
         model.heat is not None
@@ -67,7 +72,7 @@ def not_one_sine(rig) -> str:
 
 def group(model: Model) -> tuple:
     """Return a key that is equal for models of one compiled call."""
-    return int(model.rig.drive.cycles), model.friction.law, pieces.coarsened(model)
+    return int(model.rig.drive.cycles), model.friction.law, pieces.count_first_merges(model)
 
 
 def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
@@ -85,12 +90,12 @@ def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
     found = CaseResults.blank(len(models))
     for first in range(0, len(models), TOGETHER):
         part = models[first : first + TOGETHER]
-        pairs = max(0, pieces.coarsened(part[0]) - finer)
-        found.place(range(first, first + len(part)), _solved(part, say, pairs, finer > 0))
+        pairs = max(0, pieces.count_first_merges(part[0]) - finer)
+        found.place(range(first, first + len(part)), _solve_cases(part, say, pairs, finer > 0))
     return found
 
 
-def _solved(models, say, pairs: int, check: bool = False) -> CaseResults:
+def _solve_cases(models, say, pairs: int, check: bool = False) -> CaseResults:
     """Return the case results of at most TOGETHER models."""
     begin, cycles = perf_counter(), int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)
@@ -105,7 +110,7 @@ def _solved(models, say, pairs: int, check: bool = False) -> CaseResults:
         (np.flatnonzero(alone).tolist(), lambda these: one_by_one.solve(these, say)),
         (
             [] if check else np.flatnonzero(finer).tolist(),
-            lambda these: _solved(these, say, max(0, pairs - 2)),
+            lambda these: _solve_cases(these, say, max(0, pairs - 2)),
         ),
     ):
         if cases:

@@ -19,9 +19,15 @@ from ....response.errors import merged_cell_errors
 from ....response.measures import COORDINATE_ROUND_OFF, energy_balance
 from ....response.ringing import make_ring
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
-from ...rig.costs import pairs_of
+from ...rig.costs import count_merges
 from ...rig.engines import EXACT, PIECES, engine_of
-from ...rig.pieces import RigidElements, elements_of_law, read_off, settles, still_changes
+from ...rig.pieces import (
+    RigidElements,
+    elements_of_law,
+    find_steady_motion,
+    measures_of_reading,
+    still_changes,
+)
 from .columns import ENDS, MAIN, Runs
 from .threads import in_threads
 
@@ -68,9 +74,9 @@ def _holds(model) -> bool:
     )
 
 
-def coarsened(model) -> int:
+def count_first_merges(model) -> int:
     """Return how often neighbouring cells are merged in pairs in a first run."""
-    return 0 if _holds(model) else pairs_of(model)
+    return 0 if _holds(model) else count_merges(model)
 
 
 def case_of(model, pairs: int = 0) -> Case:
@@ -212,11 +218,13 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
             and not stuck[k]
             and still_changes(one.amplitudes, window, tolerance[k], decay)
         ):
-            found = settles(model.rig.modes, model.rig.drive.signal, cases[k].groups, one)
+            found = find_steady_motion(
+                model.rig.modes, model.rig.drive.signal, cases[k].groups, one
+            )
             lost[k] |= found is None
             known[:, k] = (np.nan, np.nan) if found is None else found
     with np.errstate(all="ignore"):
-        values = read_off(reading, book, True, True, stiffness, size) | rings
+        values = measures_of_reading(reading, book, True, True, stiffness, size) | rings
     worked, lost_in = (
         np.array([getattr(one.end[1], name).sum() for one in done]) for name in ("work", "loss")
     )

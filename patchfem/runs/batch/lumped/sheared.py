@@ -21,12 +21,12 @@ from ....response.errors import coarser_errors
 from ...accuracy_warnings import Finding, tolerance_warnings
 from ...patch import result as of_patch
 from ...results.result import without_folders
-from ...results.travel import outcome_on_piece, travelled
+from ...results.travel import outcome_on_piece, warn_of_large_slide
 from ...rig.engines import PIECES, engine_of
 from ...rig.numerics import choose
 from ...rig.pieces import YieldingElements
 from .. import one_by_one, patches
-from ..case_results import CaseResults, unread
+from ..case_results import CaseResults, has_unreadable_table
 from . import pieces
 from .columns import batch_answers, known_of
 from .lumped import not_one_sine, take_out
@@ -36,7 +36,7 @@ TOGETHER = 128
 LEAST = 2  # cases of a thread: a single one takes as long as hundreds of single points
 
 
-class Pressed(NamedTuple):
+class PressedCase(NamedTuple):
     """Case whose patch is pressed.
 
     - fine, coarse: elements on its mesh and on the coarser one.
@@ -61,7 +61,7 @@ def refuses(model: Model) -> str:
         or model.grooves is not None
     ):
         return "the case is not a patch that slips part by part"
-    if model.wear is not None or model.heat is not None or unread(model):
+    if model.wear is not None or model.heat is not None or has_unreadable_table(model):
         return "the case has [wear] or [friction.temperature], or its table of measured responses cannot be read"
     if why := not_one_sine(model.rig):
         return why
@@ -86,10 +86,10 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Return the case results of models of one group; cases that need it are run by themselves."""
-    return solved(models, say, moved, TOGETHER)
+    return solve_cases(models, say, move_cases, TOGETHER)
 
 
-def solved(models: Sequence[Model], say, move: Callable, together: int) -> CaseResults:
+def solve_cases(models: Sequence[Model], say, move: Callable, together: int) -> CaseResults:
     """Return the case results of models of one group.
 
     Parameters
@@ -98,21 +98,23 @@ def solved(models: Sequence[Model], say, move: Callable, together: int) -> CaseR
     say : callable, optional
         Callback for a line of text.
     move : callable
-        Function like `moved`.
+        Function like `move_cases`.
     together : int
         Number of cases per call.
     """
-    return patches.pressed_first(models, together, lambda part: _solved(part, say, move))
+    return patches.pressed_first(
+        models, together, lambda part: _solve_pressed_cases(part, say, move)
+    )
 
 
-def _solved(models, say, move: Callable) -> CaseResults:
+def _solve_pressed_cases(models, say, move: Callable) -> CaseResults:
     """Return the case results of models whose patches are pressed."""
     begin, out = perf_counter(), CaseResults.blank(len(models))
     held = dict.fromkeys(range(len(models)))
     for case in sorted(
         held, key=lambda case: id(models[case].patch.solved)
     ):  # cases of one patch are neighbours, because they share its elements
-        held[case] = _pressed(models[case])
+        held[case] = _press_case(models[case])
     moves = [case for case, one in held.items() if one is not None]
     alone = set(range(len(models))) - set(moves)
     if moves:
@@ -128,28 +130,28 @@ def _solved(models, say, move: Callable) -> CaseResults:
     return out
 
 
-def _pressed(model: Model) -> Pressed | None:
+def _press_case(model: Model) -> PressedCase | None:
     """Return a case with its pressed patch; None if it is run by itself."""
     try:
         with locate_errors(model.source):
             patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
             if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
                 return None
-            warnings = [*model.source.remarks, *of_patch.strained(model.patch, patch)]
+            warnings = [*model.source.remarks, *of_patch.warn_of_strains(model.patch, patch)]
             numerics = choose(model)
-            return Pressed(
+            return PressedCase(
                 YieldingElements(model, numerics, patch),
                 YieldingElements(model, numerics, coarse[0]),
-                of_patch.measured(model, patch, coarse),
+                of_patch.static_measures(model, patch, coarse),
                 warnings,
-                of_patch.left_out(model, patch, coarse),
+                of_patch.notes_on_neglected_effects(model, patch, coarse),
                 patch,
             )
     except Exception:  # the case is run by itself, which reports the error
         return None
 
 
-def moved(models, held: list, say) -> tuple:
+def move_cases(models, held: list, say) -> tuple:
     """Return the results of pressed cases, and which (n,) must be run by themselves.
 
     Parameters
@@ -181,11 +183,13 @@ def moved(models, held: list, say) -> tuple:
     found, alone, _ = batch_answers(models, runs, {"engine": PIECES.name, "window_cycles": window})
     alone = alone | runs.stuck | coarse.lost
     for case in np.flatnonzero(~alone).tolist():
-        tell(found, case, models[case], held[case], np.abs(runs.extremes[case]).max())
+        add_patch_results(found, case, models[case], held[case], np.abs(runs.extremes[case]).max())
     return found, alone
 
 
-def tell(found: CaseResults, case: int, model: Model, one: Pressed, reach: float) -> None:
+def add_patch_results(
+    found: CaseResults, case: int, model: Model, one: PressedCase, reach: float
+) -> None:
     """Add the measures of the patch, outcome, warnings and notes, as in a single run.
 
     Parameters
@@ -213,7 +217,7 @@ def tell(found: CaseResults, case: int, model: Model, one: Pressed, reach: float
         [
             *one.warnings,
             *model.rig.structure.notes,
-            *travelled(one.patch, slide),
+            *warn_of_large_slide(one.patch, slide),
             *tolerance_warnings(seen),
         ],
         model.source.path,

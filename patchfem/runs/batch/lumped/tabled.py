@@ -2,7 +2,7 @@
 
 In: models of a group. Out: `CaseResults`. Under a constant load such a patch is a set of
 Jenkins elements, whose force follows from one curve by Masing's rule. The curves of each case
-and of its coarser mesh are marched as tables (`lanes.answered`). Cases that lanes cannot finish
+and of its coarser mesh are marched as tables (`lanes.solve_and_check`). Cases that lanes cannot finish
 go to `sheared`.
 """
 
@@ -32,10 +32,10 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Return the case results of models of one group."""
-    return sheared.solved(models, say, moved, TOGETHER)
+    return sheared.solve_cases(models, say, move_cases, TOGETHER)
 
 
-def moved(models, held: list, say) -> tuple:
+def move_cases(models, held: list, say) -> tuple:
     """Return the results of pressed cases, and which (n,) must be run by themselves.
 
     Parameters
@@ -54,7 +54,9 @@ def moved(models, held: list, say) -> tuple:
 
     def exactly(places) -> CaseResults:
         """Return the results of some cases by the exact batch or by single runs."""
-        answers, alone = sheared.moved([models[k] for k in places], [held[k] for k in places], say)
+        answers, alone = sheared.move_cases(
+            [models[k] for k in places], [held[k] for k in places], say
+        )
         answers.place(
             np.flatnonzero(alone),
             one_by_one.solve([models[places[k]] for k in np.flatnonzero(alone)], say),
@@ -69,7 +71,7 @@ def moved(models, held: list, say) -> tuple:
             lanes.cases_of(these, _contacts([sets[k][mesh] for k in here], [held[k] for k in here]))
             for mesh in range(2)
         ]
-        answers, exact, reach = lanes.answered(
+        answers, exact, reach = lanes.solve_and_check(
             these,
             (*cases[0], cases[1]),
             steps[here],
@@ -81,7 +83,7 @@ def moved(models, held: list, say) -> tuple:
                 "elements": int(sets[case][0].stiffness.size),
                 "interface_nodes": int(held[case].patch.x.size),
             }
-            sheared.tell(answers, place, models[case], held[case], reach[place])
+            sheared.add_patch_results(answers, place, models[case], held[case], reach[place])
         found.place(here, answers)
     return found, lost
 

@@ -27,7 +27,7 @@ from ....response.spectrum import odd_harmonics, wave_measures
 from ..interface import contact_model
 from ..reading import Reader, friction_works
 from ..solution import Solution, sampled_loop
-from .curves import LAST, SHOWN, Shown, unlasting
+from .curves import LAST, SHOWN, CurvePoint, describe_instability
 
 SAMPLES = 4096  # samples of the cycle from which measures are computed
 
@@ -129,7 +129,7 @@ class BalanceFinder:
         amplitude = np.array([values["relative_displacement_amplitude"]])
         outcome, message = Outcome.STUCK if held else Outcome.STEADY, ""
         if not stable.stable:
-            outcome, message = Outcome.NOT_CONVERGED, unlasting(stable.multipliers)
+            outcome, message = Outcome.NOT_CONVERGED, describe_instability(stable.multipliers)
         return Solution(
             values,
             response,
@@ -196,18 +196,18 @@ class BalanceFinder:
         )
         return found, with_stability(found, self.modes), (note,)
 
-    def shown(self, drive, near=None) -> Shown:
+    def shown(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve without its errors."""
         found = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
         return self._shown(with_stability(found, self.modes))
 
-    def _shown(self, found) -> Shown:
+    def _shown(self, found) -> CurvePoint:
         """Return the point of a curve of a Periodic with its multipliers."""
         kind, stable = balanced_regime(found)[0], bool(found.stable)
         drive = SineDrive(found.level, found.omega, self.model.rig.drive.signal.moving)
-        return Shown(
+        return CurvePoint(
             drive,
             self._read(found, drive),
             {},
@@ -263,14 +263,14 @@ class BalanceFinder:
         )
         return [self._of_branch(one, first) for one in branch.points], branch.folds
 
-    def apart(self, one: Shown, other: Shown) -> float:
+    def apart(self, one: CurvePoint, other: CurvePoint) -> float:
         """Return the arc length along a curve between two of its points.
 
         The frequency is scaled by the swept range.
         """
         return branches.distance(one.near, other.near, self._range)
 
-    def between(self, one: Shown, other: Shown, share: float) -> Shown:
+    def between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
         """Return the point of a curve at a fraction of the arc length between two of its points.
 
         It is solved in the plane normal to the line between them.
@@ -287,7 +287,7 @@ class BalanceFinder:
         drive = self.model.rig.drive.signal
         return 2 * np.pi * abs(drive.high - drive.low)
 
-    def _of_branch(self, found, drive) -> Shown:
+    def _of_branch(self, found, drive) -> CurvePoint:
         """Return a Periodic of a branch as a point of a curve with its errors."""
         found = with_stability(found, self.modes) if found.stable is None else found
         point = self._shown(found)._replace(regime="stable" if found.stable else "unstable")

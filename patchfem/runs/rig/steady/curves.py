@@ -12,7 +12,7 @@ import numpy as np
 from ....core import NotConverged, Outcome, SineDrive
 from ....dynamics.curve_points import adapted
 from ....response.levels import LEVEL_MEASURES, Level
-from ..solution import gauged
+from ..solution import seen_by_gauge
 
 # measure of each column of a curve
 SHOWN = {
@@ -36,7 +36,7 @@ FALLEN, NARROW, FEW = (
 SHARE = 0.01  # largest relative error of the linear interpolation between the points of a curve
 
 
-class Shown(NamedTuple):
+class CurvePoint(NamedTuple):
     """Point of a curve.
 
     - drive: its sine.
@@ -85,7 +85,7 @@ def exact_errors(values: dict, left: float) -> dict:
     }
 
 
-def unlasting(multipliers) -> str:
+def describe_instability(multipliers) -> str:
     """Return the sentence on an unstable steady motion; multipliers: Floquet multipliers (m,)."""
     size = np.abs(multipliers).max()
     return (
@@ -94,7 +94,7 @@ def unlasting(multipliers) -> str:
     )
 
 
-def curve_point(drive, raw, near=None) -> Shown:
+def curve_point(drive, raw, near=None) -> CurvePoint:
     """Return the Solution of a steady motion as a point of a curve.
 
     Parameters
@@ -106,7 +106,7 @@ def curve_point(drive, raw, near=None) -> Shown:
     """
     size = float(np.abs(np.asarray(raw.extra["multipliers"])).max(initial=0.0))
     bounded = raw.outcome not in (Outcome.GROWS, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
-    return Shown(
+    return CurvePoint(
         drive,
         raw.values if bounded else {},
         raw.errors if bounded else {},
@@ -118,27 +118,27 @@ def curve_point(drive, raw, near=None) -> Shown:
     )
 
 
-def lost(drive) -> Shown:
+def make_missing_point(drive) -> CurvePoint:
     """Return a point at which no steady motion was found."""
-    return Shown(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
+    return CurvePoint(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
 
 
 class Followed:
-    """Curve over frequency whose points `shown` finds; leaves: see `top.highest`."""
+    """Curve over frequency whose points `shown` finds; leaves: see `top.refine_peak`."""
 
     leaves = 1e-2, 0.1
 
-    def apart(self, one: Shown, other: Shown) -> float:
+    def apart(self, one: CurvePoint, other: CurvePoint) -> float:
         """Return the distance [rad/s] of two points along the curve."""
         return abs(other.drive.omega - one.drive.omega)
 
-    def between(self, one: Shown, other: Shown, share: float) -> Shown:
+    def between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
         """Return the point of the curve at a fraction of the distance between two of its points."""
         omega = one.drive.omega + share * (other.drive.omega - one.drive.omega)
         return self.shown(replace(one.drive, omega=omega), one.near)
 
 
-def traced(modes, drive, find) -> list:
+def trace_curve(modes, drive, find) -> list:
     """Return the points of the curve of a sweep, refined where it bends.
 
     The curve starts with POINTS frequencies and those of the modes, and is refined until linear
@@ -180,7 +180,7 @@ def starts_of(modes, drive) -> np.ndarray:
     return places if drive.low < drive.high else places[::-1]
 
 
-def around_the_top(drive, curve: dict, at: float):
+def sweep_around_peak(drive, curve: dict, at: float):
     """Return a Sweep over the neighbourhood of the largest amplitude of a curve.
 
     The neighbourhood ends where the curve has fallen to FALLEN of the largest amplitude, plus a
@@ -270,10 +270,10 @@ def motion_at_levels(finder, drive):
         except NotConverged as why:
             if finder.tries_another:
                 raise
-            points.append(lost(sine))
+            points.append(make_missing_point(sine))
             said.append(why)
             continue
-        points.append(curve_point(sine, gauged(finder.model, raw), near))
+        points.append(curve_point(sine, seen_by_gauge(finder.model, raw), near))
         if best is None or largest_of(points) == len(points) - 1:
             best = raw, sine
         said += [raw.message] if raw.message else []

@@ -21,11 +21,11 @@ from ....response.measures import measure_half_swing
 from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import find_max_acceleration
 from ....structure.response import compute_receptance
-from ..pieces import Pieces, RigidElements, YieldingElements
-from .curves import SHOWN, Followed, Shown, exact_errors, traced, unlasting
+from ..pieces import PieceReader, RigidElements, YieldingElements
+from .curves import SHOWN, CurvePoint, Followed, describe_instability, exact_errors, trace_curve
 
 
-class Repeating(NamedTuple):
+class PeriodicMotion(NamedTuple):
     """Periodic motion that a map finds.
 
     - start, memory: state and memory of the elements at phase 0 of the drive.
@@ -81,14 +81,14 @@ class Maps(Followed):
         self.found = self.elements(model, numerics, patch)
         self.groups = self.found.groups
 
-    def repeating(self, drive, near) -> Repeating:
+    def repeating(self, drive, near) -> PeriodicMotion:
         """Return the motion that repeats with a sine, as Repeating."""
         raise NotImplementedError
 
     def point(self, drive, near=None) -> tuple:
         """Return the Solution of two cycles of the steady motion, and a start for a motion nearby."""
         begin, one = perf_counter(), self.repeating(drive, near)
-        reader = Pieces(
+        reader = PieceReader(
             self.model, replace(self.numerics, cycles=2.0, window=1), self.patch, self.found
         )
         done = reader.over_strips(
@@ -116,7 +116,7 @@ class Maps(Followed):
         )
         message = raw.message
         if not one.lasting:
-            outcome, message = Outcome.NOT_CONVERGED, unlasting(one.multipliers)
+            outcome, message = Outcome.NOT_CONVERGED, describe_instability(one.multipliers)
         extra = {
             "regime": one.words,
             "multipliers": one.multipliers,
@@ -137,11 +137,11 @@ class Maps(Followed):
         """Return the memory of elements with which a run begins, with energies counted from there."""
         return memory
 
-    def shown(self, drive, near=None) -> Shown:
+    def shown(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve."""
         one = self.repeating(drive, near)
         if not one.bounded:
-            return Shown(drive, {}, {}, one.words, one.size, False, Outcome.GROWS)
+            return CurvePoint(drive, {}, {}, one.words, one.size, False, Outcome.GROWS)
         done = histories.simulate(
             self.modes, drive, self.groups, 1, 1, start=one.start, memory=one.memory
         )
@@ -151,13 +151,13 @@ class Maps(Followed):
             if gauge is None
             else measure_half_swing(window.time, window.modal @ gauge, window.modal_rate @ gauge)
         )
-        values = _of_curve(
+        values = _curve_measures(
             amplitude,
             done.acceleration,
             wave_measures(*map(float, done.reading.waves), find_max_acceleration(drive)),
         )
-        holds = Pieces(self.model, self.numerics, self.patch, self.found).sticks(done)
-        return Shown(
+        holds = PieceReader(self.model, self.numerics, self.patch, self.found).sticks(done)
+        return CurvePoint(
             drive,
             values,
             exact_errors(values, one.error),
@@ -173,10 +173,10 @@ class Maps(Followed):
 
         Each point starts from the motion at the previous one.
         """
-        return traced(self.modes, drive, self.shown), ()
+        return trace_curve(self.modes, drive, self.shown), ()
 
 
-def _of_curve(amplitude: float, acceleration: float, waves: dict) -> dict:
+def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
     """Return the measures of a curve, by name."""
     values = {SHOWN["amplitude"]: amplitude, SHOWN["acceleration_peak"]: acceleration, **waves}
     return {name: value for name, value in values.items() if value is not None}
@@ -195,10 +195,10 @@ class YieldFinder(Maps):
         """Return the memory with energies counted from the start (see `Maps.begun`)."""
         return event_elements.reset_work(memory)
 
-    def repeating(self, drive, near) -> Repeating:
+    def repeating(self, drive, near) -> PeriodicMotion:
         """Return the motion that repeats, started from the Point `near` or from rest."""
         one = steady.solve_steady(self.modes, drive, self.groups, near)
-        return Repeating(
+        return PeriodicMotion(
             one.start,
             one.memory,
             one.point,
@@ -222,7 +222,7 @@ class EventFinder(Maps):
         """Static and kinetic friction limits (2, i) [N]."""
         return np.array([(one.static, one.kinetic) for one in self.groups]).T
 
-    def repeating(self, drive, near) -> Repeating:
+    def repeating(self, drive, near) -> PeriodicMotion:
         """Return the motion that repeats.
 
         If friction falls with the first slip, several motions exist, and the search starts from the
@@ -234,7 +234,7 @@ class EventFinder(Maps):
             self.modes, drive, self.groups, start=near if falls else None
         )
         bounded = one.regime != "unbounded"
-        return Repeating(
+        return PeriodicMotion(
             one.start,
             None,
             one.start,
@@ -249,9 +249,9 @@ class EventFinder(Maps):
 
     def curve(self, drive) -> tuple:
         """Return the curve as `Maps.curve` does; without friction it is known in closed form."""
-        return traced(self.modes, drive, self.shown), ()
+        return trace_curve(self.modes, drive, self.shown), ()
 
-    def shown(self, drive, near=None) -> Shown:
+    def shown(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve; without friction it is known in closed form.
 
         The exception is an undamped resonance.
@@ -270,8 +270,10 @@ class EventFinder(Maps):
         except PatchfemError:
             return super().shown(drive)
         size = drive.acceleration * float(abs(drive.moving + drive.omega**2 * felt))
-        values = _of_curve(drive.acceleration * float(abs(seen)), size, wave_measures(size, 0.0))
-        return Shown(
+        values = _curve_measures(
+            drive.acceleration * float(abs(seen)), size, wave_measures(size, 0.0)
+        )
+        return CurvePoint(
             drive,
             values,
             exact_errors(values, 0.0),

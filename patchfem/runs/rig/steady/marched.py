@@ -18,7 +18,7 @@ from ....response.measures import peak_sampling_errors
 from ..interface import contact_of
 from ..march import MarchReader
 from ..solution import Solution
-from .curves import Followed, Shown, curve_point, traced, unlasting
+from .curves import CurvePoint, Followed, curve_point, describe_instability, trace_curve
 
 STEPS, MOST = 256, 4096  # steps per cycle at the start, and at most
 EXACT = 1024  # samples per cycle for a law without memory, whose steps are chosen by their error
@@ -144,7 +144,7 @@ class MarchFinder(Followed):
         if not stuck and np.abs(found).max(initial=0.0) > 1 + ROUGH:
             outcome, message, regime = (
                 Outcome.NOT_CONVERGED,
-                unlasting(found),
+                describe_instability(found),
                 f"{regime}, unstable",
             )
         errors = {
@@ -183,7 +183,7 @@ class MarchFinder(Followed):
         """Return whether the amplitude changes by more than the tolerance if the steps are halved."""
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
-    def shown(self, drive, near=None) -> Shown:
+    def shown(self, drive, near=None) -> CurvePoint:
         """Return a point of a curve; if the search from `near` fails, from rest."""
         try:
             return curve_point(drive, *self.point(drive, near))
@@ -197,4 +197,4 @@ class MarchFinder(Followed):
 
         Each point starts from the motion at the previous one.
         """
-        return traced(self.model.rig.modes, drive, self.shown), ()
+        return trace_curve(self.model.rig.modes, drive, self.shown), ()

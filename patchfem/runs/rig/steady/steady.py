@@ -11,7 +11,7 @@ from ....core import NotConverged, SineDrive
 from ..engines import FINDERS, PIECES, function_of, steady_by
 from ..solution import Solution
 from .curves import motion_at_levels
-from .top import at_the_top
+from .top import solve_peak
 
 
 def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -50,4 +50,4 @@ def _found(finder, model) -> Solution:
         return finder.point(drive)[0]
     if model.rig.drive.levels.amplitudes:
         return motion_at_levels(finder, drive)
-    return at_the_top(*finder.curve(drive), finder)
+    return solve_peak(*finder.curve(drive), finder)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ....core import NotConverged
 from ....response.errors import absolute_change
-from ..solution import Solution, gauged
+from ..solution import Solution, seen_by_gauge
 from .curves import SHOWN, curve_columns, largest_of
 
 AMPLITUDE = SHOWN["amplitude"]
@@ -30,7 +30,7 @@ SHIFT = 10.0  # shift of a peak over (its width times the relative error of the 
 # errors that tilt a flat peak move it a tenth of its height down its flank
 
 
-class Top(NamedTuple):
+class RefinedPeak(NamedTuple):
     """Refined curve and its largest point.
 
     - points: those of the curve and those added.
@@ -44,7 +44,7 @@ class Top(NamedTuple):
     above: float
 
 
-def highest(points: list, finder, tolerance: float) -> Top:
+def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
     """Find the largest amplitude of a curve by adding points that `finder` computes.
 
     Parameters
@@ -66,27 +66,27 @@ def highest(points: list, finder, tolerance: float) -> Top:
     for left in range(MOST, -1, -1):
         s = np.cumsum([0.0, *(finder.apart(a, b) for a, b in pairwise(points))])
         y, lasting = _heights(points), np.array([one.stable for one in points])
-        best, (reach, at) = largest_of(points), ceilings(s, y)
+        best, (reach, at) = largest_of(points), concave_bounds(s, y)
         if not y[best] > 0 or not reach.size:
-            return Top(points, best, 0.0)
+            return RefinedPeak(points, best, 0.0)
         if lasting.any():
             reach[~(lasting[:-1] | lasting[1:])] = 0.0
             at[lasting[:-1] != lasting[1:]] = 0.5  # the limit of stability is found by bisection
         if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
-            return Top(points, best, np.inf)
+            return RefinedPeak(points, best, np.inf)
         above = max(float(reach.max()) - y[best], 0.0)
         reach[np.diff(s) <= NEAREST * s[-1]] = 0.0
         k = int(np.argmax(reach))
         if reach[k] <= y[best] * (1 + finder.leaves[0] * tolerance):
             k, at[k] = _closer(s, y, best, max(finder.leaves[1] * tolerance, CLOSE)) or (-1, 0.0)
         if not left or k < 0:
-            return Top(points, best, above)
+            return RefinedPeak(points, best, above)
         try:
             points.insert(
                 k + 1, finder.between(points[k], points[k + 1], float(np.clip(at[k], 0.05, 0.95)))
             )
         except NotConverged:
-            return Top(points, best, above)
+            return RefinedPeak(points, best, above)
 
 
 def _closer(s, y, best: int, share: float) -> tuple | None:
@@ -129,7 +129,7 @@ def _heights(points) -> np.ndarray:
     return np.array([one.values.get(AMPLITUDE, np.nan) for one in points])
 
 
-def ceilings(s, y) -> tuple:
+def concave_bounds(s, y) -> tuple:
     """Return the bound of a concave curve in each interval, and where in it the bound lies.
 
     A line from points below CAP of the larger end is not used, because a curve may be convex there;
@@ -169,12 +169,12 @@ def ceilings(s, y) -> tuple:
     return reach, np.where(inside, meet, 0.5)
 
 
-def at_the_top(points: list, folds, finder) -> Solution:
+def solve_peak(points: list, folds, finder) -> Solution:
     """Return the Solution of the largest motion of a curve, with the curve.
 
     Its errors include those by the position of the peak.
     """
-    points, best, above = highest(points, finder, finder.model.accuracy.tolerance)
+    points, best, above = refine_peak(points, finder, finder.model.accuracy.tolerance)
     top = points[best]
     raw = finder.point(top.drive, top.near)[0]
     errors, extra = dict(raw.errors or {}), {"curve": curve_columns(points, folds), "at": top.drive}
@@ -183,7 +183,7 @@ def at_the_top(points: list, folds, finder) -> Solution:
         # None means that there is no peak
         return replace(raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0})
     # difference from the point of the curve, which is computed with fewer samples
-    missed = abs(gauged(finder.model, raw).values[AMPLITUDE] - height)
+    missed = abs(seen_by_gauge(finder.model, raw).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
     places, off = np.array([one.drive.omega for one in points]) / (2 * np.pi), 0.0
     open_ones = dict.fromkeys(raw.values, 0.0)
