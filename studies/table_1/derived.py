@@ -59,7 +59,7 @@ class DerivedAsked(Asked):
         keys = [k for k in self.inner if not isinstance(self.wanted[k], Number)]
         numbers = [float(values[k]) for k in self.inner if k not in keys]
         return [
-            *(self.wanted[k].assigned(values[k]) for k in keys),
+            *(self.wanted[k].format_assignment(values[k]) for k in keys),
             *(self.derive(*numbers) if self.derive else ()),
         ]
 

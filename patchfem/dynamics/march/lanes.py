@@ -54,7 +54,7 @@ class Marched(NamedTuple):
 
 def fits(modes: ModalBasis) -> bool:
     """Return whether lanes can march a rig."""
-    return modes.omega.size <= load(KERNELS).RIG and modes.damping is None
+    return modes.omega.size <= load(KERNELS).N_RIG_MODES and modes.damping is None
 
 
 def _rig(kernels, modes: ModalBasis, prop) -> np.ndarray:

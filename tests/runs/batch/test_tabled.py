@@ -35,7 +35,7 @@ def test_always_97_of_100_measures_lie_within_both_bars(family):
 def test_always_a_set_beyond_the_table_is_exact(monkeypatch):
     """Sets of more elements than a table has room for, as of a finer mesh, march from yield to yield."""
     models = meshes.with_shared_meshes(draw_patches("frequency x load", 9, 3))
-    monkeypatch.setattr(tabled, "load", lambda _: type("Few", (), {"YIELDS": 8}))
+    monkeypatch.setattr(tabled, "load", lambda _: type("Few", (), {"N_YIELDS": 8}))
     found, ones = tabled.solve(models), sheared.solve(models)
     assert all(one["engine"] == "piecewise" for one in found.numerics.values())
     for name, column in ones.values.items():
