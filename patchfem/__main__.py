@@ -15,27 +15,27 @@ import re
 import signal
 from types import ModuleType
 
-# what asks a process to end: a person, a batch queue, a terminal that is closed (unless nohup lets it pass)
+# Signals that end the process: from a user, a batch queue or a closed terminal, unless nohup ignores the last.
 ENDINGS = [
     one
     for one in (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP"))
     if one is not None and signal.getsignal(one) is not signal.SIG_IGN
 ]
 for one in ENDINGS:
-    signal.signal(one, lambda *_: os._exit(130))  # until main() takes over, it just leaves
+    signal.signal(one, lambda *_: os._exit(130))  # the process ends at once until main() runs
 
-os.environ["PYTHONSAFEPATH"] = "1"  # nor does a process that is started from here look there
-# looking for some costs every command 30 ms
+os.environ["PYTHONSAFEPATH"] = "1"  # child processes do not import from the current folder either
+# The search for plugins costs every command 30 ms.
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-# everything large holds BLAS to one thread anyway; others would only wait and cost a small run 0.1 s of CPU
+# All large computations limit BLAS to one thread; more threads would only cost a small run 0.1 CPU seconds.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# looking for cycles of objects takes a tenth of a short command, which makes few of them: 110,000 objects stand at the
-# end of a run of the rig, nearly all of them imported, and what is beyond twice as many is searched
+# Number of new objects before the first garbage collection and before later ones, because collections take a tenth of
+# the time of a short command. A run of the rig ends with 110,000 objects, nearly all from imports.
 FIRST, LATER = 200_000, 50_000
 
 
 def _searched(phase: str, _) -> None:
-    """The first search is under way: the others come sooner."""
+    """Lower the threshold of the garbage collector once its first collection starts."""
     gc.set_threshold(LATER, *gc.get_threshold()[1:])
     if phase == "stop":
         gc.callbacks.remove(_searched)
@@ -46,8 +46,11 @@ gc.callbacks.append(_searched)
 
 
 class _Later(ModuleType):
-    """importlib.metadata until something of it is used. pydantic only takes its `entry_points` to look for plugins, and
-    its parser of mails, sockets and calendars would cost every command a tenth of the time that an answer may take."""
+    """Stand-in for importlib.metadata that imports it when an attribute is used.
+
+    pydantic only uses its `entry_points` to search for plugins, and its imports of `email`, `socket` and `calendar`
+    would cost every command a tenth of the time that an answer may take.
+    """
 
     def __getattr__(self, name: str):
         if sys.modules.get(self.__name__) is self:
@@ -130,7 +133,7 @@ app = App(
 
 
 def first_screen() -> str:
-    """The verbs in their groups: an example of each and what it does, 80 columns wide."""
+    """Return the list of verbs in groups, each with an example and a description."""
     lines = [f"patchfem {__version__}: {app.help}"]
     for group, verbs in SCREEN.items():
         lines += ["", group]
@@ -147,7 +150,7 @@ def first_screen() -> str:
 
 
 def _unexpected(verb: str, left: list) -> str:
-    """What is said of words that a verb does not take, or of a verb that there is not."""
+    """Return the message on arguments that a verb does not take, or on an unknown verb."""
     if verb in VERBS or verb in app:
         return f"unexpected '{' '.join(left)}'; see `patchfem {verb} --help`"
     near, what = get_close_matches(verb, VERBS, 1), "option" if verb.startswith("-") else "verb"
@@ -155,7 +158,7 @@ def _unexpected(verb: str, left: list) -> str:
 
 
 def _removed_option(words: list) -> str:
-    """State what replaces the first option among the words that was removed; "" without such an option."""
+    """Return what replaces the first removed option among the arguments; "" if there is none."""
     from .scene.keys.removed import describe_removed_option
 
     for word in words[1:]:
@@ -167,7 +170,7 @@ def _removed_option(words: list) -> str:
 
 
 def known(words: list) -> None:
-    """Make the verb that is asked for known to the command line; all of them where it is none, as for their help."""
+    """Register the requested verb with the command line, or all verbs if it names none."""
     for verb in words[:1] if words[:1] and words[0] in VERBS else VERBS:
         if verb not in app:
             app.command(getattr(VERBS[verb], "import_" if verb == "import" else verb), name=verb)
@@ -193,7 +196,10 @@ def completion(
 
 
 def main(argv: list | None = None) -> None:
-    """Entry point: exit codes 0 done, 2 bad input, 3 not converged, 4 missing or out of a resource, 130 interrupted."""
+    """Run the command line and end the process with its exit code.
+
+    The codes are 0 done, 2 bad input, 3 not converged, 4 missing or out of a resource, and 130 interrupted.
+    """
     if argv is not None:
         sys.exit(run_command(argv))
     code = run_command(sys.argv[1:], ready)
@@ -202,8 +208,11 @@ def main(argv: list | None = None) -> None:
 
 
 def _leave(code: int) -> None:
-    """End the process without taking its modules apart, which takes 50 ms and changes nothing; the usual end is left to
-    a process in which threads work, which a profiler or a debugger watches, or whose last words cannot be written."""
+    """End the process without the clean-up of its modules, which takes 50 ms.
+
+    The function returns, so the process ends as usual, if other threads run, if a profiler or a debugger is active, or
+    if the output cannot be flushed.
+    """
     gc.freeze()
     if threading.active_count() > 1 or _watched() or sys.flags.inspect:
         return
@@ -211,7 +220,7 @@ def _leave(code: int) -> None:
         sys.stdout.flush()
         sys.stderr.flush()
         for one in ENDINGS:
-            signal.signal(one, signal.SIG_IGN)  # all is said and done, and it ends by itself
+            signal.signal(one, signal.SIG_IGN)  # a signal must not change the exit code now
     except (OSError, ValueError, AttributeError):
         return
     except KeyboardInterrupt:
@@ -221,21 +230,23 @@ def _leave(code: int) -> None:
 
 
 def _watched() -> bool:
-    """Whether a profiler, a debugger or a tool of line coverage watches this process; from Python 3.12 on most of them
-    do it by sys.monitoring, whose six places of tools are looked at."""
+    """Return whether a profiler, a debugger or a coverage tool watches this process.
+
+    From Python 3.12 on, most of them use sys.monitoring, which has six tool numbers.
+    """
     seen = getattr(sys, "monitoring", None)
     return bool(sys.getprofile() or sys.gettrace() or (seen and any(map(seen.get_tool, range(6)))))
 
 
 def run_command(words: list, before=lambda: None) -> int:
-    """Run a command and return its exit code; what went wrong is said on stderr.
+    """Run a command and return its exit code; errors are printed to stderr.
 
     Parameters
     ----------
     words : list
         Words of the command line after `patchfem`.
     before : callable
-        Called first, so that its faults are said in the same way.
+        Called first; its errors are printed in the same way.
     """
     if there := sys.modules.get(f"{__package__}.disk.atomic_write"):
         there.forget_placed_paths()
@@ -255,7 +266,7 @@ def run_command(words: list, before=lambda: None) -> int:
         known(words)
         try:
             app(words, exit_on_error=False, print_error=False)
-        except SystemExit as end:  # how cyclopts ends a verb and its help
+        except SystemExit as end:  # cyclopts ends a verb and its help by SystemExit
             if end.code or isinstance(end.__context__, BrokenPipeError):
                 raise
         sys.stdout.flush()
@@ -273,7 +284,7 @@ def run_command(words: list, before=lambda: None) -> int:
     except MemoryError:
         say(OUT_OF_MEMORY)
         return 4
-    except SystemExit as end:  # what shows help ends so where nobody reads on
+    except SystemExit as end:  # the help ends in this way if its reader closes the pipe
         if isinstance(end.__context__, BrokenPipeError):
             return 0
         raise
@@ -281,7 +292,7 @@ def run_command(words: list, before=lambda: None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        # of what asks where it is
+        # the error comes from a query of the working folder, which names no file
         gone = isinstance(error, FileNotFoundError) and not error.filename
         say(
             plain(
@@ -293,11 +304,11 @@ def run_command(words: list, before=lambda: None) -> int:
         )
         return 4
     except Exception as error:
-        # a library that finds no room
+        # a shared library does not fit into memory
         if isinstance(error, ImportError) and "failed to map" in str(error):
             say(OUT_OF_MEMORY)
             return 4
-        # SceneError, which is not named: words are read 20 ms faster before pydantic is
+        # this is a SceneError; importing the class would import pydantic, which takes 20 ms
         if hasattr(error, "mistakes"):
             for line in error.mistakes:
                 say(plain(rewrite_powers_of_ten(line)))
@@ -318,9 +329,9 @@ def run_command(words: list, before=lambda: None) -> int:
 
 
 def _place_of_fault(error: Exception) -> str:
-    """Return " in FILE:LINE (FUNCTION)" of the innermost frame of this package; "" if there is none.
+    """Return " in FILE:LINE (FUNCTION)" of the innermost frame of this package, or "".
 
-    An error of another process carries the frames of that process as the text of its cause.
+    An error of another process carries the frames of that process as the string of its cause.
     """
     root, place = Path(__file__).resolve().parent, ""
     frames = [
@@ -336,7 +347,7 @@ def _place_of_fault(error: Exception) -> str:
 
 
 def _interrupted() -> str:
-    """What an interrupted command leaves."""
+    """Return the message on an interrupt, with the files that are complete."""
     there = sys.modules.get(f"{__package__}.disk.atomic_write")
     placed = there.list_placed_paths() if there else []
     kept = [one for one in dict.fromkeys(there.RESUMABLE_FOLDERS) if one.is_dir()] if there else []
@@ -351,13 +362,15 @@ def _interrupted() -> str:
 
 
 def _once_more(lost) -> None:
-    """Where an exception is dropped, as in what LLVM calls while it compiles, an interrupt comes again in a moment."""
+    """Repeat an interrupt that was lost where Python drops exceptions.
+
+    An example is a callback that LLVM calls during a compilation.
+    """
     if lost.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(lost)
         return
     while True:
-        # on a busy machine the interrupt comes before the thread is seen to run, and would be
-        # dropped here again
+        # on a busy machine the interrupt may come before the timer thread has started, and would be lost again
         try:
             again = threading.Timer(0.05, _thread.interrupt_main, ENDINGS[:1])
             again.daemon = True
@@ -368,7 +381,7 @@ def _once_more(lost) -> None:
 
 
 sys.unraisablehook = _once_more
-for one in ENDINGS:  # as late as can be: from here to the try above there is nothing that waits
+for one in ENDINGS:  # the last statement before main(), whose `try` handles the interrupt
     signal.signal(one, signal.default_int_handler)
 
 if __name__ == "__main__":

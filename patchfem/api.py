@@ -106,13 +106,13 @@ __all__ = [
     "sweep",
     "view",
 ]
-TEXT, TABLES = "<text>", "<dict>"  # the names of a scene that came as a text, and as a dict
-# that a Python program does not have
+TEXT, TABLES = "<text>", "<dict>"  # names of a scene that was given as a string, and as a dict
+# start of messages that locates a mistake in --set or a dict; a Python program has neither
 PLACES = re.compile(rf"^(--set: |{TABLES}(:\d+)?: )", re.MULTILINE)
 
 
 def _by_key(function: Callable) -> Callable:
-    """The function, whose errors name the key alone where a dict, and no file, was given for it."""
+    """Decorate a function so that its errors on a dict name only the key, not a file and line."""
 
     @wraps(function)
     def called(*args: Any, **more: Any) -> Any:
@@ -166,7 +166,10 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
 
 
 def base_of(scene: Scene) -> BaseScene:
-    """Return what this scene shares with scenes that differ from it in a few keys; kept for the last scene."""
+    """Return the `BaseScene` of a scene, from which scenes with a few other keys are made.
+
+    It is cached for the last scene.
+    """
     found = next((one for one in _bases if one.scene is scene), None) or BaseScene(scene)
     _bases[:] = [found]
     return found
@@ -493,7 +496,10 @@ def fit(
 
 
 def _ends_of(key: str, ends: Any) -> str:
-    """ "low..high" of such a text or of two values; PatchfemError for anything else."""
+    """Return the string "low..high" of two values or of a range given as a string.
+
+    Raises PatchfemError for anything else.
+    """
     pair = [ends] if isinstance(ends, str) else format_values(key, ends)
     if not isinstance(ends, str) and len(pair) != 2:
         raise PatchfemError(
@@ -503,7 +509,7 @@ def _ends_of(key: str, ends: Any) -> str:
 
 
 def _lengths(given: float | str | Iterable) -> str:
-    """Lengths [m], or a text of them, as the text that an option reads."""
+    """Return lengths [m] as the string that a command-line option reads."""
     return given if isinstance(given, str) else ",".join(format_values(axes.LENGTH_KEY, given))
 
 
@@ -717,7 +723,7 @@ def compare(
 
 
 def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
-    """(path, text, --set strings) of a scene as `load` takes it, whether it is valid or not."""
+    """Return path, text and --set strings of a scene that `load` takes, valid or not."""
     if isinstance(scene, Mapping):
         return Path(TABLES), format_scene(dict(scene)), ()
     if isinstance(scene, Scene):
@@ -728,7 +734,7 @@ def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
 
 
 def _path(given: Any, what: str) -> Path:
-    """The path of a file or folder; PatchfemError for anything else."""
+    """Return a file or folder as a Path; raise PatchfemError for anything else."""
     if not isinstance(given, str | Path):
         needed = "a path, a text, a dict of tables or a Scene" if what == "a scene" else "a path"
         raise PatchfemError(f"{what}: {needed} is needed, not {given!r:.60}")
@@ -736,13 +742,16 @@ def _path(given: Any, what: str) -> Path:
 
 
 def _paths(given: Any, what: str) -> list:
-    """The paths of a list, or of one alone."""
+    """Return the paths of a list, or a single path as a list."""
     listed = given if isinstance(given, Iterable) and not isinstance(given, str) else [given]
     return [_path(one, what) for one in listed]
 
 
 def _metres(given: Any, what: str) -> float | None:
-    """A length [m], from a number or from a text with its unit; None stays. PatchfemError for anything else."""
+    """Return a length [m] from a number or a string with a unit, or None if it is None.
+
+    Raises PatchfemError for anything else.
+    """
     try:
         return (
             parse_quantity(given, "length")
@@ -763,7 +772,7 @@ def _metres(given: Any, what: str) -> float | None:
 
 
 def _word(given: Any, what: str) -> str:
-    """A text; PatchfemError for anything else."""
+    """Return a value that must be a string; raise PatchfemError for anything else."""
     if not isinstance(given, str):
         raise PatchfemError(f"{what}: a text is needed, not {given!r:.60}")
     return given

@@ -1,4 +1,6 @@
-"""CPU seconds that parts of a run take on one core, for plans, refusals and the choice of an engine.
+"""CPU seconds of the stages of a run on one core, by which engines are chosen.
+
+Plans state them, and runs that would take too long are refused.
 
 All constants were measured on one machine with plain scenes and compiled code; `measure_machine_time_ratio` compares another
 machine with it. The modules that count the work define its units: `runs.rig.costs`, `runs.rig.lists`,
@@ -11,7 +13,7 @@ import numpy as np
 
 START_SECONDS = 0.5  # start of a run, its files and its page
 
-# event-driven solution, whose motion consists of pieces between events
+# event-driven solution, whose motion consists of closed-form pieces between events
 PIECE_SECONDS = 2.5e-7  # per piece of one mode and one interface
 PIECE_MODE_SECONDS = 1.5e-7  # per piece and further mode
 PIECE_INTERFACE_SECONDS = 3e-7  # per piece and further interface
@@ -19,8 +21,8 @@ PIECE_ELEMENT_SECONDS = 3e-9  # per piece and element
 MAX_PIECE_SECONDS = 1e-6  # upper bound per piece, used to choose the engine
 READ_PIECE_SECONDS = 4e-6  # per piece of the last cycles, whose histories are kept
 PYTHON_PIECE_SECONDS = 7e-5  # per piece without compilation, times (modes + 1)(interfaces + 1)
-PYTHON_SAMPLE_TIME_RATIO = 0.1  # time of a sample without compilation / that of a piece
-PYTHON_READ_TIME_RATIO = 0.5  # time of reading a piece without compilation / that of the piece
+PYTHON_SAMPLE_TIME_RATIO = 0.1  # time of a sample of the motion / time of a piece, as Python
+PYTHON_READ_TIME_RATIO = 0.5  # time to read the histories of a piece / time of the piece
 
 # march in time
 CYCLE_SECONDS = 3e-4  # per cycle of a march with elements
@@ -33,7 +35,7 @@ INTERFACE_STEP_FACTOR = 2.5  # factor on the time of a step for each of several 
 GROOVE_STEP_SECONDS = 3e-6  # per step over grooves
 PRESSING_STEP_SECONDS = 4.5e-5  # per step of pieces that heave or pitch
 PRESSING_NODE_SECONDS = 1.7e-7  # per step and node of pieces that heave or pitch
-BOND_NODE_SECONDS = 6e-8  # per step and node, if every node has its own bonds
+BOND_NODE_SECONDS = 6e-8  # per step and node, if each node has separate bonds
 SLIP_NODE_SECONDS = 3e-9  # per step and node of elements in partial slip
 
 SMOOTH_RUN_SECONDS = 0.02  # per run of high order, besides its steps
@@ -56,9 +58,9 @@ BALANCE_UNKNOWN_SECONDS = 8e-10  # per cubed number of unknowns of a balance
 MULTIPLIER_SECONDS = (2.5e-6, 4e-6)
 
 # condensation of the pieces of a patch to their interface, fitted to 15 grids of 21 x 20 to 301 x 201 nodes in both
-# directions, which took 0.85 to 1.07 of this
+# directions, which took 0.85 to 1.07 of the predicted time
 CONDENSE_CALL_SECONDS = 1.4e-3  # per call
-CONDENSE_SHAPE_SECONDS = 9.8e-5  # per shape of the fronts
+CONDENSE_SHAPE_SECONDS = 9.8e-5  # per stack of equal frontal matrices
 CONDENSE_FRONT_SECONDS = 4.5e-6  # per front
 CONDENSE_ENTRY_SECONDS = 1.38e-8  # per entry of the factors
 CONDENSE_OPERATION_SECONDS = 1.22e-11  # per floating-point operation
@@ -72,7 +74,7 @@ LIST_STEP_SECONDS = 5e-7  # per step besides its passes
 RECURSION_STEP_SECONDS = 3e-8  # per step of the recursion
 
 # slide of a bench
-SAMPLE_SECONDS = 1e-7  # per sample in closed form or of one element
+SAMPLE_SECONDS = 1e-7  # per sample, for a closed-form solution and for a law with one element
 LAW_STEP_SECONDS = 6e-5  # per sample of a law that NumPy integrates step by step
 PATH_STEP_SECONDS = 1.2e-3  # per sample of a sum over the strips of the path
 PATH_STRIP_SECONDS = 2e-6  # per sample and strip of the path
@@ -91,9 +93,9 @@ REFERENCE_WORK_SECONDS = 0.0214
 
 
 def predict_shear_mode_step(points: int, modes: int, *, load_varies: bool = False) -> float:
-    """Return the seconds of a time step of bonds behind shear modes.
+    """Predict the CPU seconds of a time step of bonds at points that shear modes couple.
 
-    Steps of the rig of the report and of its bench with 65 to 425 points took 0.7 to 1.5 of this.
+    Time steps of the rig of the report and of its bench with 65 to 425 points took 0.7 to 1.5 times as long.
 
     Parameters
     ----------

@@ -110,7 +110,7 @@ class Waveform(NamedTuple):
 
     @property
     def is_random(self) -> bool:
-        """Whether the drive is a stationary random record; `drive.file` then holds its spectral density."""
+        """Whether the drive is a random record, whose spectral density is in `drive.file`."""
         return self._has("random")
 
     @property
@@ -419,7 +419,10 @@ BOND_LIST_SUPPORT = "two-directions"
 
 
 def find_waveform(drive) -> Waveform:
-    """Return the waveform of a [drive] table; NO_WAVEFORM without a drive, of a release and of an unknown name."""
+    """Return the waveform of a [drive] table.
+
+    It is NO_WAVEFORM if there is no drive, for free motion, and if the name is unknown.
+    """
     if drive is None or drive.kind == "free":
         return NO_WAVEFORM
     return WAVEFORMS.get(drive.waveform, NO_WAVEFORM)
@@ -436,12 +439,12 @@ def law_takes_key(law: str | None, key: str) -> bool:
 
 
 def takes_stiffness_or_length(law: str | None) -> bool:
-    """Return whether a law takes either its stiffness or the bond length that its stiffness follows from."""
+    """Return whether a law takes either a stiffness or the bond length that determines it."""
     return law in LAWS and "bond_length|stiffness" in LAWS[law].keys[0].split()
 
 
 def is_bond_list(friction) -> bool:
-    """Return whether the law of a [friction] table sums over all bonds, not by the recursion of order 1."""
+    """Return whether a law sums over all bonds instead of using the recursion of order 1."""
     return law_has_trait(friction.law, "bonds") and (
         friction.reading == "report" or friction.order not in (1, None)
     )
@@ -454,7 +457,10 @@ def law_supports(friction, feature: str) -> bool:
 
 
 def describe_law(friction) -> str:
-    """Name the law of a [friction] table, with the reading or the order that needs the sum over all bonds."""
+    """Name the law of a [friction] table.
+
+    The name includes the reading or the order that needs the sum over all bonds.
+    """
     if not is_bond_list(friction):
         return f"law '{friction.law}'"
     if friction.reading == "report":
@@ -509,7 +515,10 @@ REMEDIES = {  # word -> remedy for two effects that cannot be combined yet
 
 
 def describe_unsupported(combination: str, alternative: str) -> str:
-    """Return the message for a combination that is not supported yet; `alternative` is a key of REMEDIES or text."""
+    """Return the message for a combination of effects that is not supported yet.
+
+    `alternative` is a key of REMEDIES or the remedy itself.
+    """
     remedy = REMEDIES.get(alternative, alternative)
     if combination.startswith(("beside ", "with ", "in ")):
         return f"not supported yet {combination}; {remedy}"

@@ -1,4 +1,4 @@
-"""Text of numbers: the unit by the size of the value, the number of digits by its numerical error.
+"""Formatting of numbers with a unit that suits the value and digits that suit its error.
 
 This is the only place where a value and its error become text. A number ends at the second digit of its error. A
 number whose first MAX_SIGNIFICANT_DIGITS digits are exact is shown without an error. A value within its floor is shown as 0.
@@ -128,7 +128,7 @@ def round_to_error(
 
 
 def format_number(value: float, digits: int) -> str:
-    """Format a number with so many significant digits, without trailing zeros, and with an exponent only if needed."""
+    """Format a number with significant digits, without trailing zeros or a needless exponent."""
     if value == 0 or not isfinite(value):
         return "0" if value == 0 else f"{value:g}"
     rounded_value = float(f"{value:.{digits}g}")
@@ -175,7 +175,10 @@ def format_value(
 
 
 def format_with_error(value: str, error: str, unit: str) -> str:
-    """Join the texts of `round_to_error` and a unit; a common power of ten is written once: `(0.5 ± 1.0)e-8`."""
+    """Join the strings of `round_to_error` and a unit, such as `(0.5 ± 1.0)e-8`.
+
+    A common power of ten is written once.
+    """
     if not error:
         return f"{value} {unit}".strip()
     mantissa, _, power = value.partition("e")
@@ -219,7 +222,7 @@ def format_length(length: float, digits: int = 4) -> str:
 
 
 def rewrite_powers_of_ten(text: str) -> str:
-    """Rewrite the numbers of a sentence in readable units: 1.1e+02 % becomes 110 %, 3.02e-07 J becomes 302 nJ."""
+    """Rewrite the numbers of a sentence in readable units, such as 3.02e-07 J as 302 nJ."""
 
     def rewrite(match) -> str:
         number, unit = match.groups()
@@ -232,7 +235,7 @@ def rewrite_powers_of_ten(text: str) -> str:
 
 
 def _is_zero(value: float, error: float | None, floor: float, is_ratio: bool) -> bool:
-    """Return whether a value and its error lie below the floor and the value is uncertain or round-off."""
+    """Return whether a value is zero within its error and the floor of the measure."""
     if abs(value) > floor or (error or 0.0) > floor:
         return False
     round_off = (MAX_RATIO_ROUND_OFF if is_ratio else MAX_ROUND_OFF_FRACTION) * floor

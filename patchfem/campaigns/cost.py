@@ -512,7 +512,7 @@ def sentence(runs: list, tolerance: float) -> str:
 
 
 def _effect(runs: list, tolerance: float) -> str:
-    """Return a clause that says that the settings change nothing, or nothing relevant; else ""."""
+    """Return a clause on settings that change nothing relevant; "" if they change something."""
     turned = turned_by(runs)
     if len(runs) < 2 or any(
         one.distances.get(name, 0.0)

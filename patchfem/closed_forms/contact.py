@@ -1,4 +1,4 @@
-"""Exact answers to small problems of plane contact: crowns, punches, waves, layers, shear and tilted pads.
+"""Exact solutions of plane contact problems, from crowns and punches to tilted pads.
 
 Lengths [m], pressures and moduli [Pa], loads per metre of width [N/m]; compression > 0, x = 0 in the middle. `modulus`
 is E* of `combined_modulus`; a rigid partner is one of infinite Young's modulus. Bodies are half planes in plane
@@ -10,7 +10,7 @@ import numpy as np
 
 
 def require_positive(**values) -> None:
-    """Raise ValueError, naming the first of `values` that is not positive throughout; numbers or arrays by name."""
+    """Raise ValueError for the first number or array of `values` that is not positive."""
     for name, value in values.items():
         if not np.all(np.asarray(value, float) > 0):
             raise ValueError(f"{name} must be positive, got {value}")
@@ -29,22 +29,28 @@ def combined_modulus(young, poisson, young_lower=None, poisson_lower=None) -> fl
 
 
 def hertz_half_width(line_load, radius, modulus):
-    """Half width [m] of the line contact of a crown, gap x^2/(2 radius): a = sqrt(4 P R/(pi E*)) (Hertz 1882).
+    """Half width a [m] of the line contact of a crown (Hertz 1882).
 
-    line_load P [N/m], radius R [m], modulus E* [Pa] of `combined_modulus`; bodies thick against a.
-    ValueError unless all are positive.
+    The gap is x^2/(2 R), and a = sqrt(4 P R/(pi E*)). line_load P [N/m], radius R [m], modulus E* [Pa] of
+    `combined_modulus`; bodies thick against a. ValueError unless all are positive.
     """
     require_positive(line_load=line_load, radius=radius, modulus=modulus)
     return np.sqrt(4 * line_load * radius / (np.pi * modulus))
 
 
 def hertz_peak(line_load, radius, modulus):
-    """Largest pressure [Pa] of the line contact, p_0 = 2 P/(pi a) (Hertz 1882); arguments as in `hertz_half_width`."""
+    """Largest pressure p_0 = 2 P/(pi a) [Pa] of the line contact of a crown (Hertz 1882).
+
+    The arguments are those of `hertz_half_width`.
+    """
     return 2 * line_load / (np.pi * hertz_half_width(line_load, radius, modulus))
 
 
 def hertz_pressure(x, line_load, radius, modulus):
-    """Pressure [Pa] at x [m] from the middle, p_0 sqrt(1 - x^2/a^2), 0 outside; arguments as in `hertz_half_width`."""
+    """Pressure [Pa] of the line contact of a crown at x [m] from the middle.
+
+    It is p_0 sqrt(1 - x^2/a^2), and 0 outside the contact. The other arguments are those of `hertz_half_width`.
+    """
     half = hertz_half_width(line_load, radius, modulus)
     return hertz_peak(line_load, radius, modulus) * np.sqrt(
         np.maximum(1 - (np.asarray(x) / half) ** 2, 0)
@@ -63,7 +69,7 @@ def _check_offset(offset, half) -> None:
 
 
 def punch_contact(half, offset=0.0) -> tuple:
-    """Ends (left, right) [m] of the contact of a flat rigid punch whose load acts at x = offset [m].
+    """Ends (left, right) [m] of the contact of a flat rigid punch under a load at x = offset [m].
 
     The whole punch, |x| <= half, touches while |offset| <= half/2; beyond it a length 4 (half - |offset|) does, up to
     the loaded corner. ValueError unless half is positive and |offset| < half.
@@ -87,7 +93,9 @@ def punch_rotation(line_load, half, modulus, offset=0.0) -> float:
 
 
 def punch_pressure(x, line_load, half, offset=0.0):
-    """Pressure [Pa] at x [m] under a flat rigid punch; the same for every modulus, infinite at its loaded corners.
+    """Pressure [Pa] at x [m] under a flat rigid punch.
+
+    It does not depend on the modulus and is infinite at the loaded corners.
 
     Full contact: P/pi (1 + 2 e x/b^2)/sqrt(b^2 - x^2). Partial, over 2 c with xi from its middle towards the corner:
     P/(pi c) sqrt((c + xi)/(c - xi)). 0 outside. Arguments and refusals as in `punch_rotation`.
@@ -99,7 +107,7 @@ def punch_pressure(x, line_load, half, offset=0.0):
     with np.errstate(divide="ignore", invalid="ignore"):
         if abs(offset) <= half / 2:
             p = line_load / np.pi * (1 + 2 * offset * x / half**2) / np.sqrt(half**2 - x**2)
-            if abs(offset) == half / 2:  # 0/0 at the corner that is just leaving
+            if abs(offset) == half / 2:  # 0/0 at the corner that begins to lift off
                 p = np.where(x == -2 * offset, 0.0, p)
         else:
             near, far = (right - x, x - left) if offset > 0 else (x - left, right - x)
@@ -108,7 +116,7 @@ def punch_pressure(x, line_load, half, offset=0.0):
 
 
 def _subtract_sine(x):
-    """x - sin x without cancellation."""
+    """Compute x - sin x without cancellation."""
     return (
         x**3 / 6 * (1 - x**2 / 20 * (1 - x**2 / 42 * (1 - x**2 / 72))) if x < 0.1 else x - np.sin(x)
     )
@@ -135,7 +143,9 @@ def _rounded_angle(line_load, flat, radius, modulus) -> float:
 
 
 def rounded_punch_half_width(line_load, flat, radius, modulus) -> float:
-    """Contact half width b [m] of a flat punch of half width `flat` a_f [m] with edges of radius R [m].
+    """Contact half width b [m] of a flat punch with rounded edges of radius R [m].
+
+    `flat` a_f [m] is the half width of its flat part.
 
     Gap (|x| - a_f)^2/(2 R) beyond the flat; sin phi_0 = a_f/b and
     2 P R/(a_f^2 E*) = (pi - 2 phi_0)/(2 sin^2 phi_0) - cot phi_0 (Ciavarella, Hills and Monno 1998).
@@ -145,7 +155,7 @@ def rounded_punch_half_width(line_load, flat, radius, modulus) -> float:
 
 
 def rounded_punch_pressure(x, line_load, flat, radius, modulus):
-    """Pressure [Pa] at x [m] under the punch of `rounded_punch_half_width`, finite everywhere, 0 outside.
+    """Pressure [Pa] at x [m] under the punch of `rounded_punch_half_width`, finite everywhere.
 
     With x = b sin phi: (2 P/(pi b))/(pi - 2 phi_0 - sin 2 phi_0) {(pi - 2 phi_0) cos phi + sin phi
     ln|sin(phi + phi_0)/sin(phi - phi_0)| + sin phi_0 ln|tan((phi + phi_0)/2) tan((phi - phi_0)/2)|}; the logarithms
@@ -173,7 +183,7 @@ def rounded_punch_pressure(x, line_load, flat, radius, modulus):
 
 
 def rounded_corner(intensity, radius, modulus) -> tuple:
-    """How far [m] contact reaches onto a rounding of radius R [m], small beside all else, and the peak [Pa] there.
+    """Extent [m] of the contact on a small rounded edge of radius R [m], and its peak [Pa].
 
     Away from it the pressure is K/sqrt(r), r from the end of the flat: intensity K [Pa m^0.5]; modulus E* [Pa]. The
     limit of `rounded_punch_half_width` for a long flat: e = (3 sqrt(2) pi K R/E*)^(2/3)/2, peak 1.7995 K/sqrt(e), 0.305
@@ -188,10 +198,10 @@ def rounded_corner(intensity, radius, modulus) -> tuple:
 
 
 def westergaard_full_pressure(wavelength, amplitude, modulus):
-    """Mean pressure [Pa] that closes the wavy gap A (1 - cos(2 pi x/lambda)) altogether: p* = pi E* A/lambda.
+    """Mean pressure p* [Pa] that closes a wavy gap completely.
 
-    wavelength lambda [m], amplitude A [m] (half of valley to peak), modulus E* [Pa] (Westergaard 1939).
-    ValueError unless all are positive.
+    The gap is A (1 - cos(2 pi x/lambda)), and p* = pi E* A/lambda. wavelength lambda [m], amplitude A [m] (half of
+    valley to peak), modulus E* [Pa] (Westergaard 1939). ValueError unless all are positive.
     """
     require_positive(wavelength=wavelength, amplitude=amplitude, modulus=modulus)
     return np.pi * modulus * amplitude / wavelength
@@ -203,16 +213,19 @@ def _find_load_fraction(mean, wavelength, amplitude, modulus):
 
 
 def westergaard_half_width(mean, wavelength, amplitude, modulus):
-    """Contact half width [m] of one crest, (lambda/pi) asin sqrt(p/p*); lambda/2 from full contact on.
+    """Contact half width [m] of each crest of a wavy gap.
 
-    mean p [Pa] averaged over a wavelength; the rest as in `westergaard_full_pressure`.
+    It is (lambda/pi) asin sqrt(p/p*), and lambda/2 from full contact on. mean p [Pa] averaged over a wavelength;
+    the rest as in `westergaard_full_pressure`.
     """
     share = _find_load_fraction(mean, wavelength, amplitude, modulus)
     return wavelength / np.pi * np.arcsin(np.sqrt(np.minimum(share, 1)))
 
 
 def westergaard_pressure(x, mean, wavelength, amplitude, modulus):
-    """Pressure [Pa] at x [m], crests at whole wavelengths; `mean` [Pa] a number.
+    """Pressure [Pa] at x [m] in a wavy gap with crests at whole wavelengths.
+
+    `mean` [Pa] is a number.
 
     With s = sin(pi a/lambda): 2 p cos(pi x/lambda)/s^2 sqrt(s^2 - sin^2(pi x/lambda)), 0 outside the contact; above
     full contact p + p* cos(2 pi x/lambda). Arguments as in `westergaard_half_width`.
@@ -231,18 +244,19 @@ def westergaard_pressure(x, mean, wavelength, amplitude, modulus):
 
 
 def westergaard_approach(mean, wavelength, amplitude, modulus):
-    """Mean gap closed [m] by the mean pressure: A f (1 - ln f), f = p/p*, and A from full contact on.
+    """Approach [m] of two wavy bodies: the mean gap that the mean pressure closes.
 
-    Arguments and refusals as in `westergaard_half_width`.
+    It is A f (1 - ln f) with f = p/p*, and A from full contact on. Arguments and errors as in `westergaard_half_width`.
     """
     share = np.minimum(_find_load_fraction(mean, wavelength, amplitude, modulus), 1)
     return amplitude * share * (1 - np.log(share))
 
 
 def westergaard_stiffness(mean, wavelength, amplitude, modulus):
-    """Slope dp/d(mean gap closed) [Pa/m]: pi E*/(lambda ln(p*/p)), infinite from full contact on.
+    """Contact stiffness dp/d(approach) [Pa/m] of two wavy bodies.
 
-    Arguments and refusals as in `westergaard_half_width`.
+    It is pi E*/(lambda ln(p*/p)), and infinite from full contact on. Arguments and errors as in
+    `westergaard_half_width`.
     """
     share = np.minimum(_find_load_fraction(mean, wavelength, amplitude, modulus), 1)
     with np.errstate(divide="ignore"):
@@ -250,7 +264,9 @@ def westergaard_stiffness(mean, wavelength, amplitude, modulus):
 
 
 def layered_compliance(k, coating, substrate, thickness):
-    """Displacement of the face of a coated half plane per pressure cos(k x) [m/Pa], plane strain, bonded layer.
+    """Surface displacement of a coated half plane per pressure cos(k x) [m/Pa] in plane strain.
+
+    The coating is bonded to the substrate.
 
     k [1/m] > 0 of any shape; coating, substrate: (Young's modulus [Pa], Poisson's ratio); thickness h [m] >= 0.
     With q = k h, g = mu_1/mu_2, L = 1 - 4 (1 - nu_1)/(1 + g (3 - 4 nu_2)), K = (g - 1)/(g + 3 - 4 nu_1):
@@ -281,7 +297,9 @@ def layered_compliance(k, coating, substrate, thickness):
 
 
 def cattaneo_stick_half_width(shear_load, line_load, radius, modulus, friction):
-    """Half width c [m] of the stick zone of a sheared crown, a sqrt(1 - |Q|/(mu P)) (Cattaneo 1938, Mindlin 1949).
+    """Half width c [m] of the stick zone of a sheared crown (Cattaneo 1938, Mindlin 1949).
+
+    It is a sqrt(1 - |Q|/(mu P)).
 
     shear_load Q [N/m] of either sign, after the normal load P [N/m]; friction mu; alike bodies. Others as in
     `hertz_half_width`. ValueError where |Q| exceeds mu P.
@@ -298,7 +316,9 @@ def cattaneo_stick_half_width(shear_load, line_load, radius, modulus, friction):
 
 
 def cattaneo_shear(x, shear_load, line_load, radius, modulus, friction):
-    """Shear traction [Pa] at x [m], of the sign of Q: mu p_0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)].
+    """Shear traction [Pa] at x [m] of a sheared crown, of the sign of Q.
+
+    It is mu p_0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)].
 
     Arguments as in `cattaneo_stick_half_width`, shear_load a number.
     """
@@ -313,7 +333,7 @@ def cattaneo_shear(x, shear_load, line_load, radius, modulus, friction):
 
 
 def wedge_opening(load, length, width, stiffness):
-    """Tilt [rad] at which a rigid pad begins to open: 2 p/(k_n L), p = N/(L b) the mean pressure.
+    """Tilt 2 p/(k_n L) [rad] at which a rigid pad begins to open; p = N/(L b).
 
     load N [N], length L across the wedge and width b along it [m], stiffness k_n [Pa/m] of a linear foundation.
     ValueError unless all are positive.
@@ -344,7 +364,7 @@ def wedge_linear(rotation, load, length, width, stiffness) -> tuple:
 
 
 def wedge_skin(rotation, length, decay) -> tuple:
-    """Contact of a tilted rigid pad on an exponential rough skin, p ~ exp(-gap/u_0).
+    """Contact of a tilted rigid pad on a layer of asperities, p ~ exp(-gap/u_0).
 
     Returns (mean over largest pressure, centre of pressure [m]). With B = |theta| L/u_0: f = (1 - e^-B)/B, centre L
     (1/2 - 1/B + 1/(e^B - 1)) towards the closed edge. Neither depends on the load. rotation (any shape) [rad], length L
@@ -360,7 +380,9 @@ def wedge_skin(rotation, length, decay) -> tuple:
 
 
 def wedge_loop(amplitude, friction, tangential, area, least, largest):
-    """Area [J] of the friction loop of a pad whose pressure falls linearly from `largest` to `least` [Pa].
+    """Area [J] of the friction loop of a pad under a linear pressure distribution.
+
+    The pressure falls from `largest` to `least` [Pa].
 
     amplitude U [m] half peak to peak; friction mu; tangential k_t [Pa/m] of the part in contact, whose area is `area`
     [m2]. Each strip is an elastic-plastic element that slips at u = mu p/k_t, u spread evenly between u_1 and u_2:
@@ -382,9 +404,10 @@ def wedge_loop(amplitude, friction, tangential, area, least, largest):
 
 
 def kern_fraction(offset, length):
-    """Fraction in contact of a pad free to rotate on a linear foundation, load line `offset` [m] from its middle.
+    """Contact fraction of a pad on a linear foundation whose load line is off its middle.
 
-    1 up to L/6 (the kern), then 3 (1/2 - |e|/L). ValueError unless length is positive and |e| < L/2 throughout.
+    The pad is free to rotate, and `offset` [m] is the distance of the load line. The fraction is 1 up to L/6 (the
+    kern), then 3 (1/2 - |e|/L). ValueError unless length is positive and |e| < L/2 throughout.
     """
     require_positive(length=length)
     share = np.abs(np.asarray(offset, float)) / length

@@ -1,21 +1,22 @@
-"""Compiled functions of the package and their files, kept in one folder per state of the kernel sources.
+"""Compiled kernels and the cache of their machine code, one folder per state of the sources.
 
-In: the name of a module of kernels, and modules to exchange in it. Out: a `Kernels`, which imports the module, and with
-it numba, only if a function is called whose machine code is not stored yet. `jit` has the decorator `njit` of all
-kernels, `machine` stores and loads machine code, `no_jit` runs kernels as Python, `prebuilt` finds the code of a wheel,
-`cache_files` and `cache_limit` keep the folders. Read `load`, `instance` and `Entry` first.
+`load` returns a kernel module by name as a `Kernels` object, and `instance` returns a variant of it in which some
+imports are replaced. The module, and with it numba, is imported only if a function is called whose machine code is not
+stored. `jit` contains the decorator `njit` of all kernels, `machine` stores and loads machine code, `no_jit` runs
+kernels as Python, `prebuilt` finds the machine code of a wheel, `cache_files` and `cache_limit` manage the cache. Read
+`load`, `instance` and `Entry` first.
 
-The cache of numba notices a change of the file of a function, but not of the files that it calls, and it stores no
-function that takes another function as an argument. So the folder is named by a hash of all kernel sources, and a loop
-for any friction law is written out once per law by `instance`, with the import of the law exchanged.
+The cache of numba detects a change of the file of a function, but not of the modules whose functions it calls, and it
+stores no function that takes another function as an argument. So the folder is named by a hash of all kernel sources,
+and a loop for any friction law is written out once per law by `instance`, with the import of the law replaced.
 
-NUMBA_DISABLE_JIT=1 runs every kernel as Python, so that debuggers and coverage see its lines. NUMBA_BOUNDSCHECK=1
-compiles all kernels anew and checks every index. A function whose caller estimates its cost as Python (`Entry.expect`)
-runs as Python while the cost is small, because compiling takes longer.
+NUMBA_DISABLE_JIT=1 runs every kernel as Python for debuggers and coverage tools. NUMBA_BOUNDSCHECK=1 compiles all
+kernels again with checks of every index. If the caller of a function predicts its cost as Python (`Entry.expect`), the
+function runs as Python as long as this is cheaper than compiling it.
 
 The optimisation level is 3, the default of numba. Levels 2 and 1 save no compile time: the rig and five laws took 64
-and 61 CPU seconds instead of 63, most of it in the Python of numba. At level 2 the loop of Iwan's law takes 10.1 ms
-instead of 7.9 ms.
+and 61 CPU seconds instead of 63, most of it in the Python code of numba. At level 2 the loop of Iwan's law takes 10.1
+ms instead of 7.9 ms.
 """
 
 import ast
@@ -43,8 +44,8 @@ from ..disk.installed import find_package_version
 from . import cache_limit, machine, prebuilt
 from .no_jit import plain
 
-HERE = Path(__file__).parents[1]  # the package
-# tuples that kernels take: numba's cache would not notice two of their fields that change places
+HERE = Path(__file__).parents[1]  # folder of the package
+# Modules of tuples that kernels take. They belong to the hash because the machine code depends on the field order.
 TUPLES = (
     "contact/batch/arrays.py",
     "contact/set_arrays.py",
@@ -53,23 +54,25 @@ TUPLES = (
     "dynamics/events/modal_system.py",
     "dynamics/events/elements.py",
 )
-# numba's own switch: all runs as the Python it is
+# Numba's environment variable that disables compilation; all kernels then run as Python.
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in (
     "",
     "0",
 )
-LEAST = 1 << 21  # bytes of the machine code of a run
-PATIENCE = 2.0  # CPU seconds of a function as Python in a process, from which on it is compiled: a tenth of that
-# s that a process waits at most for what another compiles: ten times the largest; how often
+LEAST = 1 << 21  # bytes; the machine code of a run needs this disk space
+# CPU seconds; a function that would take longer as Python in this process is compiled. This is about a tenth of the
+# compile time (10 to 30 s), because later processes reuse the machine code.
+PATIENCE = 2.0
+# Maximum time [s] to wait for another process that compiles, ten times the longest compilation; interval [s] of checks.
 WAIT, LOOK = (
     300.0,
     0.05,
 )
-# functions called here whose machine code cannot be kept: every process brings up numba for them
+# Functions called by this process whose machine code cannot be stored, so every process imports numba for them.
 UNKEPT = set()
-# one thread at a time brings code: two that load the same function at once end the process
+# One thread at a time loads code, because loading a function twice at the same time crashes the process.
 LOADING = RLock()
-_LISTENERS = []  # who is told when something is compiled
+_LISTENERS = []  # callbacks that receive a message when a function is compiled
 ARITHMETIC = {
     ast.Add: add,
     ast.Sub: sub,
@@ -82,7 +85,7 @@ ARITHMETIC = {
 
 
 def sources():
-    """Return the hash object of all kernels of the package, of the tuples that they take and of their compiler."""
+    """Return the hash object of all kernels, of the tuples that they take and of their compiler."""
     digest = hashlib.sha256()
     for source in (
         *(HERE / "compiled" / name for name in ("jit.py", "pass_by_reference.py")),
@@ -94,7 +97,7 @@ def sources():
 
 
 def kernel_key() -> str:
-    """Return a hash of the kernels, of numba and llvmlite, and of the CPU with its instruction sets."""
+    """Return a hash of the kernels, the versions of numba and llvmlite, and the CPU."""
     digest = sources()
     checked = os.environ.get("NUMBA_BOUNDSCHECK", "")
     made_by = f"{find_package_version('numba')} {find_package_version('llvmlite')} {sys.version_info[:2]} {checked}"
@@ -107,7 +110,7 @@ def _cpu() -> str:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return platform.processor()
-    # the same model offers fewer instructions where a virtual machine hides some
+    # the flags are needed because a virtual machine may hide some instruction sets of a CPU model
     found = [
         line
         for line in dict.fromkeys(lines)
@@ -143,15 +146,15 @@ def _place() -> tuple[Path, str]:
         return user_cache.find_cache_base() / name, ""
     if session and not user_cache.prepare_folder(Path(session) / name):
         return Path(session) / name, first
-    user_cache.prepare_folder(user_cache.make_process_folder() / name)  # makes it where it can
+    user_cache.prepare_folder(user_cache.make_process_folder() / name)  # makes it if possible
     return user_cache.make_process_folder() / name, first
 
 
 class Kernels:
-    """Module of compiled code that is imported when it is needed.
+    """Kernel module that is imported when it is needed.
 
-    An attribute is a function to call or a constant, both read from the text of the module; for any other attribute the
-    module is imported.
+    Its attributes are compiled functions (`Entry`) and constants, which are read from the source without an import. Any
+    other attribute imports the module.
     """
 
     def __init__(self, name: str, text: Path | str, bring):
@@ -177,7 +180,7 @@ class Kernels:
         return self._bring()
 
 
-SPENT = [0.0]  # s for which this process compiled code, or waited for another process that did
+SPENT = [0.0]  # s; time in which this process compiled code or waited for another process that did
 
 
 @contextmanager
@@ -192,7 +195,7 @@ def spending():
 
 @contextmanager
 def tidied_later():
-    """Pause the search for cyclic garbage in the block, which takes a seventh of the time of a compilation."""
+    """Pause the garbage collection in the block; it takes a seventh of the compile time."""
     was = gc.isenabled()
     gc.disable()
     try:
@@ -204,8 +207,9 @@ def tidied_later():
 
 @contextmanager
 def alone(path: Path):
-    """Let one process at a time run the block, by a lock on a file, which the system releases if the process is killed.
+    """Let one process at a time run the block, by a lock on a file.
 
+    The operating system releases the lock if the process is killed.
     Other processes wait for at most `WAIT` seconds, because the lock of a machine that has disappeared may remain on a
     network file system. On a file system without locks no process waits.
     """
@@ -233,10 +237,10 @@ def alone(path: Path):
 
 
 class Entry:
-    """Function of a module of compiled code.
+    """Function of a kernel module.
 
-    A call runs its stored machine code. If there is none, numba compiles the function, or it runs as Python while that
-    costs little.
+    A call runs its stored machine code. If there is none, numba compiles the function, or it runs as Python if its
+    predicted cost is small.
     """
 
     def __init__(self, home: Kernels, name: str, kept: str):
@@ -244,7 +248,7 @@ class Entry:
         self.words, self.codes, self.as_python = machine.Words(), {}, inf
 
     def expect(self, seconds: float) -> None:
-        """Announce calls that would take this time as Python [CPU s].
+        """Add the predicted cost of calls as Python [CPU s].
 
         The estimate must be the same in every process, so that all of them choose the same form of the function.
         """
@@ -258,9 +262,15 @@ class Entry:
         )
 
     def held(self, *arguments) -> tuple:
-        """(kinds, words, arguments) of last arguments that stay the same objects from call to
-        call, for `call_with_bound_args`:
-        their words are made once. What is in their arrays may change."""
+        """Convert the last arguments of many calls once, for `call_with_bound_args`.
+
+        They must be the same objects in every call, but the content of their arrays may change.
+
+        Returns
+        -------
+        tuple
+            Type codes, words and the arguments themselves. The type codes are None if there are no words.
+        """
         if PLAIN:
             return None, b"", arguments
         try:
@@ -270,7 +280,7 @@ class Entry:
         return kinds, b"".join(words), arguments
 
     def call_with_bound_args(self, held: tuple, *first):
-        """The function of some first arguments and those of `pass_by_reference`."""
+        """Call the function with first arguments and the last arguments that `held` has converted."""
         kinds, words, last = held
         if kinds is None:
             return self(*first, *last)
@@ -289,13 +299,13 @@ class Entry:
         code = self.codes.get(kinds)
         if code is None:
             with LOADING:
-                code = self.codes.get(kinds)  # another thread may have brought it meanwhile
+                code = self.codes.get(kinds)  # another thread may have loaded it in the meantime
                 if code is None:
                     return self._first(kinds, words, arguments)
         return code(b"".join(words)) if code else self.function()(*arguments)
 
     def _first(self, kinds: tuple, words: tuple, arguments: tuple):
-        """Return the result of the first call with arguments of these types, for which code is loaded or made."""
+        """Load or compile the code for arguments of these types, and return the result of the call."""
         path = _prepared() / "code" / f"{self.kept}{digest(','.join(kinds))}.code"
         code = machine.found(path) or _generic(path)
         if code is None and self.as_python <= PATIENCE:
@@ -315,18 +325,21 @@ class Entry:
         return code(b"".join(words))
 
     def _made(self, path: Path, arguments: tuple):
-        """Return code compiled for arguments of these types, here or by another process in the meantime; None on failure."""
+        """Compile code for arguments of these types, or load it if another process has compiled it.
+
+        Returns None if the function cannot be compiled in this way.
+        """
         with alone(path.with_suffix(".lock")):
             code = machine.found(path)
             if code is None:
                 _tell()
                 with tidied_later():
-                    optimised = import_module(f"{__name__}.jit").optimised  # brings numba
+                    optimised = import_module(f"{__name__}.jit").optimised  # imports numba
                     code = machine.make(path, self.function(), arguments, optimised)
         return code
 
     def function(self):
-        """Return the function of the module, which numba compiles or finds in its cache."""
+        """Return the dispatcher of the function, which numba compiles or loads from its cache."""
         function = getattr(self.home.module(), self.name)
         return function.alone() if hasattr(function, "alone") else function
 
@@ -338,7 +351,7 @@ class Entry:
 
 @cache
 def _names(text: Path | str) -> tuple:
-    """Read the constants and the names of the compiled functions of a module from its text or its file."""
+    """Read the constants and the names of the compiled functions of a module from its source."""
     out, functions = {}, set()
     for line in ast.parse(text.read_text("utf-8") if isinstance(text, Path) else text).body:
         if isinstance(line, ast.FunctionDef) and any(
@@ -357,7 +370,10 @@ def _names(text: Path | str) -> tuple:
 
 
 def _value(node: ast.expr, names: dict):
-    """Evaluate an expression of constants, known names, arithmetic and ranges; raise KeyError for any other."""
+    """Evaluate an expression of constants, known names, arithmetic and ranges.
+
+    Raises KeyError for any other expression.
+    """
     match node:
         case ast.Constant():
             return node.value
@@ -375,10 +391,10 @@ def _value(node: ast.expr, names: dict):
 
 
 def load(module: str, say=None):
-    """Load a module of the package, such as "dynamics.modal_kernels", with its compiled code cached on disk.
+    """Load a module of the package, whose compiled code is cached on disk.
 
-    A module named *kernels is returned as `Kernels`. The callback `say` receives a message if nothing is stored yet, so
-    that the code has to be compiled first.
+    `module` is its name without that of the package, such as "dynamics.modal_kernels". A module named *kernels is
+    returned as `Kernels`. The callback `say` receives a message if the cache is empty, so the code must be compiled.
     """
     _prepared(say)
     return kernels(module) if module.endswith("kernels") else import_module(f"patchfem.{module}")
@@ -386,7 +402,7 @@ def load(module: str, say=None):
 
 @cache
 def kernels(module: str) -> Kernels:
-    """Return the module of compiled code of this name without importing it."""
+    """Return the kernel module of this name without importing it."""
     name = f"patchfem.{module}"
     return Kernels(
         name, HERE.joinpath(*module.split(".")).with_suffix(".py"), lambda: import_module(name)
@@ -394,9 +410,9 @@ def kernels(module: str) -> Kernels:
 
 
 def instance(module: str, parts: dict, say=None):
-    """Write out a module of compiled code with other modules in place of some of its imports.
+    """Write a kernel module in which other modules replace some of its imports.
 
-    The text differs from the file in these imports only, so the line numbers of tracebacks are those of the file. It is
+    The source differs from the file in these imports only, so the line numbers of tracebacks are those of the file. It is
     written atomically into the folder of the compiled code, under a name with the hash of its content, because several
     processes may need it at the same time and the package may be read-only.
 
@@ -405,8 +421,8 @@ def instance(module: str, parts: dict, say=None):
     module : str
         Name as in `load`.
     parts : dict
-        Name under which the module imports another one (`from . import other as name`) -> the module that takes its
-        place, or its name as in `load`. It must have the same functions.
+        Name under which the module imports another one (`from . import other as name`) -> the module that replaces it,
+        or its name as in `load`. It must have the same functions.
     say : callable or None
         Callback as in `load`.
 
@@ -436,12 +452,12 @@ def instance(module: str, parts: dict, say=None):
 
 
 def digest(text: str) -> str:
-    """Return a short hash of a text."""
+    """Return a short hash of a string."""
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def written(module: str, text: str, say=None, parts=()):
-    """Write the text of a module into the folder of the compiled code, and return the module as `Kernels`.
+    """Write the source of a kernel module into the cache folder, and return it as `Kernels`.
 
     Parameters
     ----------
@@ -451,7 +467,7 @@ def written(module: str, text: str, say=None, parts=()):
     say : callable or None
         Callback as in `load`.
     parts : sequence of Kernels
-        Modules that the text imports; they are imported before it.
+        Modules that the source imports; they are imported before it.
 
     Returns
     -------
@@ -469,7 +485,7 @@ def written(module: str, text: str, say=None, parts=()):
             sys.modules[name] = module_from_spec(spec)
             if kept:
                 spec.loader.exec_module(sys.modules[name])
-            else:  # it lives as long as the process
+            else:  # without a file, the module exists only in this process
                 exec(compile(text, str(path), "exec"), sys.modules[name].__dict__)
         return sys.modules[name]
 
@@ -477,23 +493,23 @@ def written(module: str, text: str, say=None, parts=()):
 
 
 def ran(kind: str) -> None:
-    """Record that a run of this kind was completed, so that its compiled code is stored."""
+    """Record that a run of this kind was completed, so its compiled code is stored."""
     if not PLAIN:
         user_cache.write_cache_file(_folder() / "kinds" / digest(kind), kind.encode())
 
 
 def has_run(kind: str) -> bool:
-    """Return whether a run of this kind was completed with the present kernels, so that nothing has to be compiled."""
+    """Return whether a run of this kind needs no compilation, since one was completed before."""
     return PLAIN or any((one / "kinds" / digest(kind)).is_file() for one in _kept())
 
 
 def _kept(own_code: Path | None = None) -> list:
-    """List the folders that may have compiled code: the one of this machine, and the one of the wheel."""
+    """List the folders of compiled code: that of this machine and, if any, that of the wheel."""
     return [own_code or _placed()[0], *filter(None, [prebuilt.folder(sources)])]
 
 
 def _generic(path: Path) -> machine.Code | None:
-    """Load the code of the wheel for a file of this name; None if there is none."""
+    """Load the code from the file of this name in the wheel; return None if there is none."""
     found = prebuilt.folder(sources)
     return found and machine.found(found / "code" / path.name)
 
@@ -506,7 +522,10 @@ def _bytes_of(path: Path) -> bytes | None:
 
 
 def _prepared(say=None) -> Path:
-    """Return the folder of the compiled code, also for numba; `say` receives a message, once, if it is empty."""
+    """Set the cache folder for numba too, and return it.
+
+    The callback `say` receives a message, once per process, if the folder is empty.
+    """
     folder = _folder()
     if say is not None:
         _told(say)
@@ -517,7 +536,7 @@ def _prepared(say=None) -> Path:
 def _folder() -> Path:
     folder, elsewhere = _placed()
     if elsewhere:
-        os.environ["PATCHFEM_CACHE"] = str(folder.parents[1])  # for processes that this one starts
+        os.environ["PATCHFEM_CACHE"] = str(folder.parents[1])  # for child processes
     else:
         cache_limit.mark_used(folder)
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
@@ -527,7 +546,7 @@ def _folder() -> Path:
 
 
 def when_compiling(say) -> None:
-    """Give `say` the message of `load`, but only when something is compiled."""
+    """Register a callback that receives the message of `load` when a function is compiled."""
     if say is not None:
         _LISTENERS[:] = [say]
 

@@ -1,4 +1,7 @@
-"""Numba's files of machine code, sealed: one that is damaged is made again, one that cannot be written is no fault."""
+"""Numba's cache files with a checksum, by which damaged files are found and replaced.
+
+A file that cannot be written is no error.
+"""
 
 import hashlib
 import os
@@ -7,29 +10,30 @@ from contextlib import suppress
 
 from numba.core import caching
 
-SEAL = 32  # bytes of the hash before the content
-# numba 0.61 keeps the name of the class to itself
+SEAL = 32  # bytes of the SHA-256 hash at the start of a file
+# The class is private in numba 0.61.
 LOCATOR = getattr(caching, "UserProvidedCacheLocator", None) or caching._UserProvidedCacheLocator
-PARTS = ("_index_path", "_version", "_source_stamp")  # of numba's file, which this stands on
+# Private attributes of IndexDataCacheFile that Sealed uses; another version of numba may lack them.
+PARTS = ("_index_path", "_version", "_source_stamp")
 
 
 class Damaged(Exception):
-    """A file whose content is not what was written."""
+    """Cache file whose content does not match its checksum."""
 
 
 def kept_on_disk(function):
-    """The numba dispatcher, keeping its machine code in the folder of the compiled code."""
-    with suppress(Exception):  # of a source that is no file: it is compiled by each process
+    """Make a numba dispatcher store its machine code in the cache folder, and return it."""
+    with suppress(Exception):  # source that is no file, which every process compiles
         function._cache = Kept(function.py_func)
     return function
 
 
 class Place(LOCATOR):
-    """The folder of the compiled code, whether or not it can be written and whatever the environment names to numba."""
+    """Locator that stores numba's files in the cache folder of this package."""
 
     @classmethod
     def from_function(cls, py_func, py_file):
-        """The place of the files of a function."""
+        """Return the locator of the cache files of a function."""
         from . import _folder
 
         here = cls(py_func, py_file)
@@ -38,13 +42,13 @@ class Place(LOCATOR):
 
 
 class Placed(caching.CompileResultCacheImpl):
-    """What numba keeps of a function, at that place."""
+    """Description of what numba stores of a function, with `Place` as its only locator."""
 
     _locator_classes = (Place,)
 
 
 class Sealed(caching.IndexDataCacheFile):
-    """Numba's index and data files with a hash of the content before it."""
+    """Index and data files of numba that start with a hash of their content."""
 
     def _load_index(self) -> dict:
         try:
@@ -77,17 +81,20 @@ def _opened(path: str) -> bytes:
 
 
 class Kept(caching.FunctionCache):
-    """Numba's cache of a function, whose faults are never those of a run."""
+    """Numba's cache of a function, whose errors never stop a run."""
 
     _impl_class = Placed
 
     def __init__(self, py_func):
         super().__init__(py_func)
-        if all(hasattr(self._cache_file, name) for name in PARTS):  # else it is another numba's
+        if all(hasattr(self._cache_file, name) for name in PARTS):
             self._cache_file.__class__ = Sealed
 
     def load_overload(self, sig, target_context):
-        """The kept code for these types, None where there is none or it is damaged, which is removed."""
+        """Load the code for these types; return None if there is none or its file is damaged.
+
+        The index of a damaged file is removed, so numba compiles the function again.
+        """
         try:
             return super().load_overload(sig, target_context)
         except Exception:
@@ -96,6 +103,6 @@ class Kept(caching.FunctionCache):
             return None
 
     def save_overload(self, sig, data) -> None:
-        """Keep the code for these types, where there is room for it."""
+        """Store the code for these types if it can be written."""
         with suppress(Exception):
             super().save_overload(sig, data)

@@ -1,7 +1,7 @@
-"""Limit of the compiled code that is kept: folders of other states of the kernels go, the longest unused first.
+"""Limit of the disk space of compiled code: the least recently used folders are removed.
 
-Every edit of a kernel, every release and every kind of CPU has a folder of its own with 5 MB to 20 MB of machine code.
-Whether the sources of a folder still exist cannot be known, so the last use decides: each process marks its folder.
+Every edit of a kernel, every release and every kind of CPU makes another folder with 5 MB to 20 MB of machine code. The
+program cannot know whether the sources of a folder still exist, so the last use decides: each process marks its folder.
 """
 
 import os
@@ -11,18 +11,18 @@ from contextlib import suppress
 from pathlib import Path
 from time import time
 
-# beside the one in use: a few releases, environments and machines that share a home
+# folders kept besides the one in use: a few releases, environments and machines may share a home folder
 MAX_OTHER_FOLDERS = 8
-MIN_UNUSED_TIME = 3600.0  # s; a folder used later may be that of a running process
-MARK_INTERVAL = 60.0  # s after which a use is marked again
+MIN_UNUSED_TIME = 3600.0  # s; a folder used more recently may belong to a running process
+MARK_INTERVAL = 60.0  # s; a mark that is younger is not renewed
 STATE_NAME = re.compile(r"[0-9a-f]{16}")
 REMOVED_NAME = re.compile(r"\.[0-9a-f]{16}\.\d+\.gone")  # a folder that is being removed
 
 
 def mark_used(folder: Path) -> None:
-    """Mark a folder of compiled code as used now; make room beside it if it is new.
+    """Mark a folder of compiled code as used now; if it is new, remove old folders.
 
-    What cannot be marked or removed is left as it is.
+    Folders that cannot be marked or removed stay unchanged.
     """
     with suppress(OSError):
         is_new = not any(folder.iterdir())
@@ -33,14 +33,14 @@ def mark_used(folder: Path) -> None:
 
 
 def make_room(folder: Path, max_others: int = MAX_OTHER_FOLDERS) -> None:
-    """Remove folders of other states beside this one, but those used last and those used in the last hour.
+    """Remove the least recently used folders of compiled code beside this one.
 
-    Several processes may do so at once: a folder is renamed before it is removed, and gets its name back if it was
-    marked in the meantime.
+    The `max_others` most recently used ones and those used in the last hour stay. Several processes may do this at
+    once: a folder is renamed before it is removed, and gets its name back if it was marked in the meantime.
     """
     others = {}
     for entry in os.scandir(folder.parent):
-        if REMOVED_NAME.fullmatch(entry.name):  # left by a process that was killed
+        if REMOVED_NAME.fullmatch(entry.name):  # a killed process left it
             shutil.rmtree(entry.path, ignore_errors=True)
         elif (
             STATE_NAME.fullmatch(entry.name)
@@ -54,7 +54,7 @@ def make_room(folder: Path, max_others: int = MAX_OTHER_FOLDERS) -> None:
 
 
 def last_use(folder: Path) -> float:
-    """Return when a folder of compiled code was last marked or written to [s]; 0 if it does not exist."""
+    """Return the time [s] of the last mark of a folder or change in it; 0 if it does not exist."""
     times = [0.0]
     with suppress(OSError):
         times.append(folder.stat().st_mtime)
@@ -63,9 +63,9 @@ def last_use(folder: Path) -> float:
 
 
 def _remove(folder: Path) -> None:
-    """Remove a folder unless it is used in the meantime."""
+    """Remove a folder unless another process used it in the meantime."""
     removed = folder.with_name(f".{folder.name}.{os.getpid()}.gone")
-    with suppress(OSError):  # another process was first
+    with suppress(OSError):  # another process removed it first
         os.rename(folder, removed)
         if time() - last_use(removed) < MIN_UNUSED_TIME and not folder.exists():
             os.rename(removed, folder)

@@ -1,9 +1,10 @@
-"""Hatchling's hook of the wheel: with PATCHFEM_MACHINE_CODE=1 in the environment it holds machine code (`prebuilt`).
+"""Build hook of hatchling that adds machine code to a wheel (`prebuilt`) on request.
 
     PATCHFEM_MACHINE_CODE=1 pip wheel --no-deps --no-build-isolation .
 
-Python must have hatchling and the packages of a run, numba among them, and the CPU must be able to run the code, for it
-is made by runs. Without the variable the wheel is made of the sources alone, for any machine.
+The environment must contain hatchling and all packages that a run needs, including numba. The code is compiled by runs
+of the program, so this CPU must be able to execute it. Without the variable PATCHFEM_MACHINE_CODE, the wheel contains
+only the sources and suits any machine.
 """
 
 import os
@@ -21,7 +22,7 @@ from patchfem.compiled import prebuilt, sources
 if not prebuilt.runs_here():
     raise SystemExit('this CPU lacks what the machine code asks for')
 print(prebuilt.CPUS[platform.machine()].name, prebuilt.key(sources))"""
-# a command that compiles what it calls, however little there is to do
+# command that compiles every kernel that it calls, even if running it as Python would cost less
 RUN = """import sys
 from patchfem import compiled
 from patchfem.__main__ import main
@@ -59,23 +60,34 @@ LAWS = (
 
 
 def usual(place: Path):
-    """Words of the commands whose kernels are the usual ones: the shipped rig, rigs of each law, sweeps.
+    """Yield the arguments of commands that call the usual kernels.
 
-    place: a folder for the scenes that they take.
+    These are runs of the rig in `studies`, runs of rigs with each friction law, and two sweeps. Their scenes are written
+    into the folder `place`.
     """
     yield "run", ROOT / "studies" / "rig" / "rig.toml"
     for at, (modes, law) in enumerate(product(("", SECOND), LAWS)):
         scene = place / f"{at}.toml"
         scene.write_text(f"{RIG}{modes}{DRIVEN}{law}\n", "utf-8")
         yield "run", scene
-    for at in range(2):  # laws whose many cases march side by side
+    for at in range(2):  # laws for which a sweep integrates many cases at once
         yield "sweep", place / f"{at}.toml", "--over", "drive.acceleration=3 g..6 g:64"
 
 
 def made(place: Path, commands=usual) -> None:
-    """Make the code that commands call for the common CPU of this kind of machine, in the folder `place`/KEY.
+    """Compile the kernels that some commands call for a common CPU, into the folder `place`/KEY.
 
-    commands: a function of a folder for their scenes. CalledProcessError where one fails.
+    Parameters
+    ----------
+    place : Path
+        Folder; KEY is the hash `prebuilt.key`.
+    commands : callable
+        Generator of the arguments of the commands, which takes a folder for their scenes.
+
+    Raises
+    ------
+    CalledProcessError
+        If a command fails.
     """
     with TemporaryDirectory() as work:
         cache = Path(work) / "cache"
@@ -105,14 +117,17 @@ def made(place: Path, commands=usual) -> None:
 
 
 def get_build_hook():
-    """The hook, as hatchling asks for it."""
+    """Return the class of the build hook; hatchling calls this function."""
     from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
     class MachineCode(BuildHookInterface):
-        """Puts machine code into a wheel that is asked to have some, which then is one for this kind of machine."""
+        """Build hook that adds machine code to a wheel if PATCHFEM_MACHINE_CODE is set."""
 
         def initialize(self, version: str, build_data: dict) -> None:
-            """Make the code and name it to hatchling; version: "editable" of one that only points to the sources."""
+            """Compile the kernels, add their files to the wheel and tag it for this platform.
+
+            `version` is "editable" for an installation that refers to the source folder; it gets no machine code.
+            """
             if version == "editable" or os.environ.get("PATCHFEM_MACHINE_CODE", "0") in ("", "0"):
                 return
             self.work = TemporaryDirectory()

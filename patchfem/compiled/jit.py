@@ -1,9 +1,9 @@
-"""`njit` of all compiled code: a function that others call becomes machine code together with them, not before.
+"""Decorator `njit` of all kernels, which compiles helper functions only within their callers.
 
-Numba optimises every function for itself, makes it callable from Python and from C and turns it into machine code, then
-does most of that again in each function that calls it: a loop is compiled about as often as it is deep. Here a function
-that is not kept on disk gets none of that. Its code goes as it was written into the functions that call it, where all
-is optimised once. A call of it from Python compiles it for itself.
+Numba optimises every function separately, adds wrappers for calls from Python and C and emits machine code, and repeats
+most of this work in every caller: the body of a nested call is compiled about once per level of the nesting. A function
+without `cache=True` skips these steps here. Its LLVM code is linked into its callers without optimisation, and each
+caller is optimised once with all that it calls. If Python calls such a function, it is compiled separately.
 """
 
 from functools import wraps
@@ -21,17 +21,17 @@ from numba.core.types.functions import BaseFunction
 from .cache_files import kept_on_disk
 from .pass_by_reference import held
 
-# who does not call it
+# options of numba that omit the wrappers through which C and Python call a function
 NO_C, NO_PYTHON = (
     {flag: True} if hasattr(DefaultOptions, flag) else {}
     for flag in ("no_cfunc_wrapper", "no_cpython_wrapper")
 )
-# no counting of references in functions that allocate nothing: 1.3 of the 1.6 us of a step of a march
+# Functions that allocate nothing need no reference counting, which took 1.3 of the 1.6 us of a time step.
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-# of functions that compiled code alone calls: their wrappers for Python take most of the time of compiling them
+# Functions that only compiled code calls need no wrappers, which take most of their compile time.
 NJIT_INTERNAL = NJIT_NO_REFCOUNT | NO_C | NO_PYTHON
-# of numba's passes those that our texts need: no closure, generator, `with`, list, raise or expression of arrays is in
-# them, and what numba would look for in vain took a seventh of the time of compiling a loop
+# Numba's passes that the kernels need. The omitted ones handle closures, generators, `with`, lists, raise and array
+# expressions, which no kernel contains; they took a seventh of the compile time of a loop.
 PASSES = [
     getattr(home, name, None)
     for home, names in (
@@ -69,9 +69,15 @@ HOOKS = (
 
 
 def njit(cache: bool = False, **options):
-    """numba.njit for functions kept on disk, cache=True; for others one that compiles them inside their callers alone.
+    """Return `numba.njit`, or a decorator that compiles a function only within its callers.
 
-    options: those of numba.njit. Where numba's compiler is not the one this was written for, it is numba.njit.
+    Parameters
+    ----------
+    cache : bool
+        Whether the machine code is stored on disk, as by `numba.njit`. Other functions are compiled only within their
+        callers; if this version of numba lacks the methods `HOOKS`, `numba.njit` compiles them.
+    **options
+        Options of `numba.njit`.
     """
     if numba.config.DISABLE_JIT:
         return lambda function: function
@@ -84,11 +90,11 @@ def njit(cache: bool = False, **options):
 
 
 def _remembered(ask):
-    """Numba's answer to what a call of one of its own functions means, kept for the next call with the same types.
+    """Memoize the method `get_call_type`, by which numba resolves a call of a built-in function.
 
-    It goes through all functions of that name, some dozens for a sum of two numbers, at each of the 4000 calls of a
-    loop: a seventh of the time of compiling it. What depends on more than the types, its functions in Python that it
-    compiles along with ours under their flags, is asked each time.
+    Numba tries all overloads of the function, some dozens for a sum of two numbers, at each of the 4000 calls of a
+    loop, which took a seventh of its compile time. A signature that depends on more than the types of the arguments is
+    not stored: that of an overload written in Python, which numba compiles with the flags of the caller.
     """
     known = {}
 
@@ -116,14 +122,17 @@ if all(hasattr(BaseFunction, name) for name in ("get_call_type", "get_impl_key")
 
 
 class Inner(CPUDispatcher):
-    """A function for other compiled functions."""
+    """Dispatcher of a function that is compiled only within the compiled functions that call it."""
 
     def __init__(self, function, names, options, compiler):
         super().__init__(function, names, options | NO_C | NO_PYTHON, compiler)
         self._alone, self._kept = CPUDispatcher(function, names, options | NO_C), False
 
     def get_call_template(self, args, kws):
-        """As numba's, of the types alone: else a call with another constant would be another function to compile."""
+        """Resolve a call by the types of its arguments, not by the values of constants.
+
+        Otherwise numba would compile the function again for every constant argument.
+        """
         if not self.targetoptions.get("forceinline"):
             args = tuple(map(types.unliteral, args))
         return super().get_call_template(args, kws)
@@ -132,21 +141,38 @@ class Inner(CPUDispatcher):
         return self._alone(*arguments)
 
     def enable_caching(self):
-        """Keep on disk what calls from Python compile."""
+        """Store the machine code for calls from Python on disk."""
         if not self._kept:
             kept_on_disk(self._alone)
             self._kept = True
 
     def alone(self) -> CPUDispatcher:
-        """The function for itself, for calls from Python, kept on disk."""
+        """Return the dispatcher for calls from Python, whose machine code is stored on disk."""
         self.enable_caching()
         return self._alone
 
 
 def optimised(function, arguments: tuple) -> tuple:
-    """(target, numba's result) of compiling a function, numba's dispatcher, for arguments of these types up to code
-    that is optimised and not yet that of the machine: a tenth of the time less. NotImplementedError where numba's
-    compiler is not the one this was written for."""
+    """Compile a function to optimised LLVM code, but not to machine code.
+
+    This saves a tenth of the compile time.
+
+    Parameters
+    ----------
+    function : numba dispatcher
+    arguments : tuple
+        Arguments by whose types the function is compiled.
+
+    Returns
+    -------
+    target : numba target context
+    result : numba CompileResult
+
+    Raises
+    ------
+    NotImplementedError
+        If this version of numba lacks the methods `HOOKS`.
+    """
     if not all(hasattr(JITCodeLibrary, name) for name in HOOKS):
         raise NotImplementedError
     bare = CPUDispatcher(
@@ -158,9 +184,9 @@ def optimised(function, arguments: tuple) -> tuple:
 
 
 class Inside(Compiler):
-    """Numba's compiler up to the code that others take in."""
+    """Compiler that stops at LLVM code without optimisation, which callers link in."""
 
-    part = property(lambda self: Part)  # what holds it
+    part = property(lambda self: Part)  # class of the library that holds the LLVM code
 
     def define_pipelines(self):
         self.state.library = self.part(
@@ -176,19 +202,19 @@ class Inside(Compiler):
 
 
 class Whole(Inside):
-    """Numba's compiler up to code that is optimised with all that it calls."""
+    """Compiler that stops at optimised LLVM code of a function and all that it calls."""
 
     part = property(lambda self: Optimised)
 
 
 class Part(JITCodeLibrary):
-    """Code of a function that is not optimised yet and has no address."""
+    """LLVM code of a function before optimisation, which is linked into its callers."""
 
-    # there is no machine code that could look it up
+    # Without machine code, no environment of Python objects has to be registered.
     codegen = SimpleNamespace(set_env=lambda name, environment: None)
 
     def _optimize_functions(self, module):
-        """The passes of a function alone, of those that have a body."""
+        """Run the LLVM passes for single functions on every function that has a body."""
         module.data_layout = self._codegen._data_layout
         for one in module.functions:
             if not one.is_declaration:
@@ -208,9 +234,9 @@ class Part(JITCodeLibrary):
 
 
 class Optimised(Part):
-    """Code of a function and of all that it calls, optimised, without an address."""
+    """LLVM code of a function and of all that it calls; it is optimised but has no address."""
 
     def _optimize_final_module(self):
-        """All passes of LLVM, without the cheap ones that numba has before them for its counting of references."""
+        """Run all LLVM passes, but not the preceding ones that numba needs for reference counting."""
         passes, builder = self._codegen._module_pass_manager()
         passes.run(self._final_module, builder)

@@ -1,11 +1,12 @@
-"""Machine code of compiled functions in files of its own, which run without numba.
+"""Files of machine code that run without importing numba.
 
-Numba needs half a second before it can load a function from its cache: it brings up a compiler, though nothing is left
-to compile. So the machine code of a function is kept once more, with one function around it that takes the arguments
-from a row of 8-byte words (status, results, then arguments as numba flattens them), and `found` loads it by llvmlite.
+Numba takes half a second before it can load a function from its cache, because it imports its whole compiler. So the
+machine code of a function is stored a second time, together with an entry function that reads the arguments from a
+buffer of 8-byte words (status, results, then arguments as numba flattens them). `found` loads this file by llvmlite.
 
-It serves functions of floats, whole numbers, arrays and tuples of these that call nothing but the C library; for any
-other `keep` writes nothing and numba goes on to load it. A file is one line of JSON, then an object file.
+This is possible for functions of floats, integers, arrays and tuples of these that call only the C library. For other
+functions `keep` writes nothing, and numba loads them from its cache. A file consists of one line of JSON and an object
+file.
 """
 
 import ctypes
@@ -21,26 +22,26 @@ import numpy as np
 
 from ..disk import user_cache
 
-FINE = (0, -2)  # numba's status of a function that returned something, or nothing
+FINE = (0, -2)  # status codes of numba for success: the function returned a value, or None
 NUMBERS = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
-_KINDS = {}  # (dtype, dimensions, flags) of an array -> its kind, what packs its words, whether it lends its memory
-PARTS = 12  # tuples of arguments whose words are remembered: a run calls with the same ones again and again
+_KINDS = {}  # (dtype, dimensions, flags) of an array -> (type code, packer of words, is C-contiguous and writeable)
+PARTS = 12  # number of tuples whose words are cached, because a run passes the same tuples in many calls
 
 
 class Unfit(Exception):
-    """An argument that is no number, array or tuple of these."""
+    """Function or argument that this module does not support."""
 
 
 class Words:
-    """Arguments as words; tuples are remembered, for their fields never change."""
+    """Conversion of arguments to words, with a cache of tuples, whose fields never change."""
 
     def __init__(self):
         self.known, self.lock = {}, threading.Lock()
 
     def of(self, value) -> tuple:
-        """(kind, bytes) of an argument: its type in short, its words. Unfit where it has none.
+        """Return the type code and the words (bytes) of an argument; raise Unfit for other types.
 
-        A tuple of numbers alone is not remembered.
+        A tuple that contains only numbers is not cached.
         """
         kind = NUMBERS.get(type(value))
         if kind is not None:
@@ -53,7 +54,7 @@ class Words:
         if held is None:
             kinds, words = zip(*(self.of(one) for one in value)) if value else ((), ())
             held = value, f"{type(value).__name__}({','.join(kinds)})", b"".join(words)
-            # made for one call: it would push others out
+            # a tuple of numbers is made for a single call and would displace others from the cache
             if all(map(NUMBERS.__contains__, map(type, value))):
                 return held[1:]
             with self.lock:
@@ -72,7 +73,7 @@ def _of_array(value) -> tuple:
         held = kind, struct.Struct(f"{5 + 2 * count}q").pack, order == "C" and flags.writeable
         _KINDS[value.dtype, count, flags.num] = held
     kind, pack, plain = held
-    # numpy describes an array at length for its interface: 3 us, which a short call would feel
+    # `__array_interface__` takes 3 us, which matters in a short call
     there = (
         ctypes.addressof(ctypes.c_char.from_buffer(value))
         if plain and value.size
@@ -82,17 +83,17 @@ def _of_array(value) -> tuple:
 
 
 class Code:
-    """A function of machine code: called with the words of its arguments."""
+    """Loaded machine code of a function; a call takes the words of its arguments as bytes."""
 
     def __init__(self, address: int, results, nogil: bool = False):
-        # the first lets other threads of Python run
+        # CFUNCTYPE releases the global interpreter lock during the call, PYFUNCTYPE keeps it
         kind = ctypes.CFUNCTYPE if nogil else ctypes.PYFUNCTYPE
         self.call = kind(None, ctypes.c_void_p)(address)
         self.results, self.leaves = results, _leaves(results)
         self.front = bytes(8 * (1 + max(len(self.leaves), 1)))
 
     def __call__(self, words: bytes):
-        """What the function returns; RuntimeError where it raised."""
+        """Call the function and return its result; raise RuntimeError if it raised an exception."""
         row = bytearray(self.front + words)
         self.call(ctypes.addressof(ctypes.c_char.from_buffer(row)))
         status = struct.unpack_from("q", row)[0]
@@ -114,7 +115,10 @@ def _shaped(results, values):
 
 
 def found(path: Path) -> Code | None:
-    """The function of a file; None where there is no file, or one that is damaged or that this machine cannot run."""
+    """Load the function of a file; return None if there is no usable file.
+
+    The file may be missing or damaged, or contain code that this machine cannot run.
+    """
     try:
         return loaded(path.read_bytes())
     except OSError:
@@ -122,7 +126,7 @@ def found(path: Path) -> Code | None:
 
 
 def loaded(content: bytes) -> Code | None:
-    """The function of the content of a file; None as of `found`."""
+    """Load a function from the content of its file; return None if this machine cannot use it."""
     try:
         line, _, code = content.partition(b"\n")
         about = json.loads(line)
@@ -141,7 +145,10 @@ def loaded(content: bytes) -> Code | None:
 
 @cache
 def _engine() -> tuple:
-    """What holds loaded code, and llvmlite's binding; both live as long as the process."""
+    """Return the engine that owns loaded code and the binding module of llvmlite.
+
+    Both are kept until the process ends, because loaded functions need them.
+    """
     from llvmlite import binding
 
     binding.initialize_native_target()
@@ -151,7 +158,10 @@ def _engine() -> tuple:
 
 
 def _in_c_library(name: str) -> bool:
-    """Whether a name is one of the process itself, and not of Python or of numba, which need more than a call."""
+    """Return whether a function is in the C library and does not belong to Python or numba.
+
+    Functions of Python and numba need more than a call: the interpreter or the run-time library of numba.
+    """
     return not name.lstrip("_").startswith(("Py", "NRT", "numba")) and hasattr(_process(), name)
 
 
@@ -164,40 +174,74 @@ def _process():
 
 
 def keep(path: Path, function, arguments: tuple) -> bool:
-    """Write the code of a compiled function for arguments of these types; False where it is of no use without numba.
+    """Write the machine code of a compiled function to a file; return False on failure.
 
-    function: a numba dispatcher that has been called with them.
+    Parameters
+    ----------
+    path : Path
+    function : numba dispatcher
+        Function that has been called with these arguments.
+    arguments : tuple
+        Arguments whose types select the compiled version.
+
+    Returns
+    -------
+    bool
+        False if the file cannot be written or the code needs numba to run.
     """
     try:
         made = function.overloads[tuple(map(function.typeof_pyval, arguments))]
         return user_cache.write_cache_file(
             path, _content(path.name, function.targetctx, made, function.targetoptions)
         )
-    except (
-        Exception
-    ):  # of numba's and llvmlite's insides: whatever they refuse, the run has its function already
+    except Exception:  # numba and llvmlite may raise any; the run already has its function
         return False
 
 
 def make(path: Path, function, arguments: tuple, optimised) -> Code | None:
-    """The code of a function, which numba makes for this alone, also written where there is room; None where it is not
-    to be had so.
+    """Compile a function for such a file, write the file if possible, and load the code.
 
-    function: a numba dispatcher; optimised: that of the module `inner`.
+    Parameters
+    ----------
+    path : Path
+    function : numba dispatcher
+    arguments : tuple
+        Arguments whose types select the version to compile.
+    optimised : callable
+        `jit.optimised`; a parameter because importing `jit` imports numba.
+
+    Returns
+    -------
+    Code or None
+        None if the function cannot be compiled in this way.
     """
     if os.name != "posix":
         return None
     try:
         content = _content(path.name, *optimised(function, arguments), function.targetoptions)
-    except Exception:  # of their insides: what they refuse is told by the call itself
+    except Exception:  # numba reports an error of the function at the call
         return None
     user_cache.write_cache_file(path, content)
     return loaded(content)
 
 
 def _content(name: str, target, made, options: dict) -> bytes:
-    """Content of the file of this name: numba's result of a compilation for a target. Unfit where it calls more than
-    the C library."""
+    """Return the content of the file of this name for a function that numba compiled.
+
+    Parameters
+    ----------
+    name : str
+        File name, from which the name of the entry function is made.
+    target : numba target context
+    made : numba CompileResult
+    options : dict
+        Options of the function.
+
+    Raises
+    ------
+    Unfit
+        If the function calls others than those of the C library.
+    """
     name = "patchfem_" + hashlib.sha256(name.encode()).hexdigest()[:16]
     results = _results(made.signature.return_type)
     code, calls = _code(target, made, name, max(len(_leaves(results)), 1))
@@ -214,7 +258,10 @@ def _content(name: str, target, made, options: dict) -> bytes:
 
 
 def _results(kind, inside: bool = False):
-    """Results of a function as "d", "q", "" or a list of these, "?" of one that answers yes or no; Unfit for others."""
+    """Return the format of the result of a function; raise Unfit for other types.
+
+    It is "d" for a float, "q" for an integer, "" for None, "?" for a boolean, and a list of formats for a tuple.
+    """
     from numba.core import types
 
     if kind == types.boolean and not inside:
@@ -231,9 +278,23 @@ def _results(kind, inside: bool = False):
 
 
 def _code(target, made, name: str, results: int) -> tuple:
-    """Object code of a compiled function behind `name`, and the functions that it calls elsewhere.
+    """Emit the object code of a function with an entry function, and list its external calls.
 
-    made: numba's result of the compilation; results: words that they take.
+    Parameters
+    ----------
+    target : numba target context
+    made : numba CompileResult
+    name : str
+        Name of the entry function.
+    results : int
+        Number of words of the results.
+
+    Returns
+    -------
+    code : bytes
+        Object file.
+    calls : list of str
+        Names of the external functions and variables that the code needs.
     """
     from llvmlite import binding, ir
 
@@ -274,7 +335,7 @@ def _code(target, made, name: str, results: int) -> tuple:
             part.linkage = "internal"
     machine = target.codegen()._tm
     passes = binding.create_new_module_pass_manager()
-    passes.add_global_dead_code_eliminate_pass()  # what wraps the function for Python
+    passes.add_global_dead_code_eliminate_pass()  # removes the wrapper for Python
     passes.run(
         whole, binding.create_pass_builder(machine, binding.create_pipeline_tuning_options())
     )

@@ -1,7 +1,7 @@
-"""Modules of kernels as the Python that they are written in: nothing of numba is imported, nothing is compiled.
+"""Kernel modules run as plain Python, without importing numba or compiling anything.
 
-The text is the one that is compiled. Alone its decorators are others, which leave a function as it is, and the modules
-of kernels that it imports are plain as well.
+The source is the same that numba compiles. It is executed with a decorator `njit` that returns the function unchanged,
+and the kernel modules that it imports are executed in the same way.
 """
 
 import builtins
@@ -11,30 +11,44 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 PACKAGE = __name__.partition(".")[0]
-ROOT = Path(__file__).parents[2]  # where the package lies
+ROOT = Path(__file__).parents[2]  # folder that contains the package
 
 
 def _untouched(function=None, **options):
-    """In place of `inner.njit`: the function itself."""
+    """Return the function unchanged; this replaces the decorator `jit.njit`."""
     return function if function is not None else lambda one: one
 
 
-# in place of the module `inner`
+# stands for the module `jit` in kernel modules that are not compiled
 NJIT_INTERNAL = SimpleNamespace(njit=_untouched, NJIT_NO_REFCOUNT={}, NJIT_INTERNAL={})
 
 
-PLAIN = {}  # plain modules by name
+PLAIN = {}  # uncompiled kernel modules by full name
 
 
 def plain(name: str) -> ModuleType:
-    """The module of kernels of this full name, such as "patchfem.dynamics.modal_kernels", uncompiled."""
+    """Return a kernel module without compilation.
+
+    `name` is its full name, such as "patchfem.dynamics.modal_kernels".
+    """
     return retold(name, NJIT_INTERNAL, PLAIN)
 
 
 def retold(name: str, inner, known: dict[str, ModuleType]) -> ModuleType:
-    """The module of kernels of this full name with another compiler, `inner`, in place of the module `inner`.
+    """Execute the source of a kernel module with another object in place of the module `jit`.
 
-    known: modules told to it before, by name, to which this one and those that it imports are added.
+    Parameters
+    ----------
+    name : str
+        Full name of the module.
+    inner : object
+        Replacement of `jit`, with its attributes that kernels import.
+    known : dict
+        Modules executed with this replacement, by full name; receives this module and those that it imports.
+
+    Returns
+    -------
+    ModuleType
     """
     if name not in known:
         path = ROOT.joinpath(*name.split(".")).with_suffix(".py")
@@ -46,7 +60,10 @@ def retold(name: str, inner, known: dict[str, ModuleType]) -> ModuleType:
 
 
 def _bring(inner, known: dict, name: str, names=None, locals=None, parts=(), level: int = 0):
-    """What an import of such a module gives: kernels told alike, else what Python's own import does."""
+    """Import a module for a kernel module that `retold` executes, in place of `__import__`.
+
+    Kernel modules are executed with the same replacement `inner` of `jit`; Python imports all other modules.
+    """
     full = resolve_name("." * level + name, names["__package__"]) if level else name
     if full == f"{PACKAGE}.compiled.jit":
         return inner

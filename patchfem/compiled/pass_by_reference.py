@@ -1,9 +1,9 @@
-"""Named tuples of arrays and numbers as compiled code takes them: by their address, not field by field.
+"""Named tuples of arrays and numbers that compiled functions receive by reference.
 
-Numba hands a tuple from function to function as its parts, eight words an array: four hundred words at every call of a
-loop over events, each of them a line or two of what LLVM reads. Here the tuple lies in memory and a field is loaded
-where it is used. Nothing changes a tuple while compiled code runs, so its fields are marked as constant memory and a
-loop loads each of them once.
+Numba passes a tuple by value as its flattened fields, eight words per array: 400 words at every call of the event loop,
+each of which is a line or two of LLVM code to compile. Here the tuple lies in memory, and a field is loaded where it is
+used. Compiled code never changes a tuple, so its fields are marked as constant memory, and LLVM loads each of them once
+per loop.
 """
 
 from llvmlite import ir
@@ -13,11 +13,11 @@ from numba.core.extending import register_model
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 
-WORD = 8  # bytes of what a tuple consists of: numbers, and the words of arrays
+WORD = 8  # bytes of a number in a tuple, and of each word that describes an array
 
 
 class Held(types.Type):
-    """A named tuple in memory; whole: numba's type of it."""
+    """Numba type of a named tuple passed by reference; `whole` is its type passed by value."""
 
     def __init__(self, whole):
         self.whole = whole
@@ -25,12 +25,12 @@ class Held(types.Type):
 
 
 def held(kind):
-    """The type by which a function takes an argument of this type."""
+    """Return the type by which a function receives an argument: `Held` for a named tuple."""
     return Held(kind) if isinstance(kind, types.BaseNamedTuple) else kind
 
 
 def words(kind) -> int:
-    """Words of a value in memory."""
+    """Return the number of 8-byte words of a value of this type in memory."""
     if isinstance(kind, Held):
         return words(kind.whole)
     if isinstance(kind, types.BaseTuple):
@@ -40,7 +40,7 @@ def words(kind) -> int:
 
 @register_model(Held)
 class Address(models.PrimitiveModel):
-    """Its model: where it lies."""
+    """Data model of `Held`: the address of the tuple."""
 
     def __init__(self, manager, kind):
         super().__init__(manager, kind, ir.IntType(8).as_pointer())
@@ -48,12 +48,12 @@ class Address(models.PrimitiveModel):
 
 @infer_getattr
 class Fields(AttributeTemplate):
-    """Types of its fields."""
+    """Typing of the attributes of `Held`."""
 
     key = Held
 
     def generic_resolve(self, kind, name):
-        """That of the field of this name, None where it has none."""
+        """Return the type of the field of this name; None if the tuple has no such field."""
         return (
             held(kind.whole.types[kind.whole.fields.index(name)])
             if name in kind.whole.fields
@@ -63,7 +63,7 @@ class Fields(AttributeTemplate):
 
 @lower_getattr_generic(Held)
 def field(context, builder, kind, value, name):
-    """Code that loads a field."""
+    """Generate the LLVM code that loads a field of a tuple passed by reference."""
     at = kind.whole.fields.index(name)
     place = builder.gep(
         value, [ir.Constant(ir.IntType(64), WORD * sum(map(words, kind.whole.types[:at])))]

@@ -1,10 +1,11 @@
-"""Machine code that comes with a wheel, for a common kind of CPU, so that a first run compiles nothing.
+"""Machine code in the wheel for a common CPU, which spares the first run the compilation.
 
-A wheel made with PATCHFEM_MACHINE_CODE=1 (`hook`) has the code of the usual kernels for x86-64-v3 or for any aarch64
-in `generic/KEY/`. KEY is a hash of the kernels, of how they are called, of numba, llvmlite and the kind of machine; if
-it differs, if this CPU lacks an instruction, or if numba checks every index, the code is compiled here instead.
+A wheel built with PATCHFEM_MACHINE_CODE=1 (`hook`) contains the code of the usual kernels for x86-64-v3 or for any
+aarch64 in `generic/KEY/`. KEY is a hash of the kernels, of the calling convention (`machine`), of the versions of numba
+and llvmlite and of the kind of machine. If KEY differs, if this CPU lacks an instruction set, or if numba checks every
+index, the kernels are compiled on this machine.
 
-Code that was compiled on this machine is taken first. Otherwise the code of the wheel stays in use: rigs took 0.6 to
+Code that was compiled on this machine has priority over that of the wheel. With the code of the wheel, rigs took 0.6 to
 1.0 times the CPU seconds that they take with code compiled for the machine itself.
 """
 
@@ -21,13 +22,13 @@ HERE = Path(__file__).parent
 
 
 class CommonCpu(NamedTuple):
-    """A common CPU: LLVM's name, and the instruction sets that its code needs."""
+    """Common CPU: its name in LLVM and the instruction sets that its code needs."""
 
     name: str
     needs: tuple
 
 
-CPUS = {  # by kind of machine
+CPUS = {  # common CPU for each value of `platform.machine()`
     "x86_64": CommonCpu(
         "x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
     ),
@@ -37,7 +38,10 @@ CPUS = {  # by kind of machine
 
 
 def key(sources) -> str:
-    """Return the name of the folder of code for this kind of machine; sources: returns the hash of the kernels."""
+    """Return the name KEY of the folder of code for this kind of machine.
+
+    `sources` is a function that returns the hash object of the kernels.
+    """
     digest = sources()
     digest.update((HERE / "machine.py").read_bytes())
     digest.update(
@@ -48,7 +52,7 @@ def key(sources) -> str:
 
 @cache
 def folder(sources) -> Path | None:
-    """Return the folder of code that came with these kernels, None if there is none that this CPU can run."""
+    """Return the folder of code in the wheel; None if there is none that this CPU can run."""
     if not (HERE / "generic").is_dir() or os.environ.get("NUMBA_BOUNDSCHECK"):
         return None
     found = HERE / "generic" / key(sources)
@@ -56,7 +60,7 @@ def folder(sources) -> Path | None:
 
 
 def runs_here() -> bool:
-    """Check whether this CPU has the instructions of the common CPU of its kind."""
+    """Return whether this CPU has the instruction sets of the common CPU of its kind."""
     from llvmlite import binding
 
     try:

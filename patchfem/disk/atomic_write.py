@@ -1,4 +1,4 @@
-"""Atomic writing of files: a partial file beside the target is renamed to it when it is complete.
+"""Atomic writing of files: a partial file is renamed to the target when it is complete.
 
 If the disk is full, the error states the space that is needed and available, and no partial file remains. The name of
 a partial file begins with a dot, contains the number of its process, and ends with the suffix of the target, which
@@ -23,9 +23,9 @@ from .lock import HOST_HASH, is_running
 NO_SPACE_ERRNOS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 # bytes; numpy and HDF5 raise errors without a number, which mean a full disk if less than this is free
 MIN_FREE_BYTES = 65536
-PLACED_PATHS = deque(maxlen=100)  # last files put in place; the message on an interrupt names them
+PLACED_PATHS = deque(maxlen=100)  # last completed files; the message on an interrupt names them
 RESUMABLE_FOLDERS = []  # folders in which this process left a checkpoint
-MAX_NAME_LENGTH = 150  # letters of a name kept in a partial name; file systems allow 255 bytes
+MAX_NAME_LENGTH = 150  # characters of a name in its partial name; file systems allow 255 bytes
 
 
 class WriteError(Missing):
@@ -47,7 +47,7 @@ class FreeSpace(NamedTuple):
 
 @contextmanager
 def write_atomically(path, need: int | None = None) -> Iterator[Path]:
-    """Yield a partial path beside `path`, and rename it to `path` on success or remove it on an error.
+    """Yield the path of a partial file, which is renamed to `path` on success and else removed.
 
     A device or a pipe is written directly.
 
@@ -118,13 +118,13 @@ def write_in_partial_folder(path: Path, text: str) -> None:
 
 
 def forget_placed_paths() -> None:
-    """Clear the lists of files put in place and of folders with a checkpoint, at the start of a command."""
+    """Clear the lists of completed files and of folders with a checkpoint when a command starts."""
     PLACED_PATHS.clear()
     RESUMABLE_FOLDERS.clear()
 
 
 def list_placed_paths() -> list[str]:
-    """List the files that this process put in place and that still exist."""
+    """List the files that this process completed and that still exist."""
     return [
         format_path(path)
         for path in dict.fromkeys(PLACED_PATHS)
@@ -145,7 +145,7 @@ def is_partial_name(name: str) -> bool:
 
 
 def find_free_space(path: Path) -> FreeSpace:
-    """Return the space for a file at `path`: the free space of its disk or the limit on file sizes."""
+    """Return the space for a file: the free space of its disk or the limit on file sizes."""
     folder = Path(os.path.abspath(path)).parent
     while not folder.exists():
         folder = folder.parent
@@ -192,7 +192,7 @@ def explain_write_error(
         States the path and the reason, and for a full disk the space that is needed and available.
     """
     name = format_path(path)
-    # a device has its own size, which is not the free space of a disk
+    # the size of a device is not the free space of a disk
     if partial == path and error.errno in NO_SPACE_ERRNOS:
         return WriteError(f"{name}: not enough space ({error.strerror})")
     with suppress(OSError):
@@ -227,7 +227,7 @@ def explain_mkdir_error(error: OSError) -> str:
 
 
 def _has_free_inodes(path: Path) -> bool:
-    """Return whether the disk has an entry for another file; disks without a table of entries always have."""
+    """Return whether the disk has an inode for another file; disks without inodes always do."""
     disk = os.statvfs(path.parent)
     return disk.f_files == 0 or disk.f_favail > 0
 

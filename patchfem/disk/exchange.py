@@ -1,4 +1,4 @@
-"""Replacement of a folder in one step; signals that end the process are deferred until it is done."""
+"""Replacement of a folder in one step, during which signals to the process are deferred."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ END_SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
 RENAME_EXCHANGE = 2  # flag of renameat2(2) of Linux
-AT_FDCWD = -100  # stands for the working folder in renameat2(2)
+AT_FDCWD = -100  # value of renameat2(2) for the working folder
 # errors of a system or a disk that cannot exchange two folders
 UNSUPPORTED_ERRNOS = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP)
 
@@ -34,7 +34,7 @@ def replace_folder(new: Path, target: Path) -> None:
             os.rename(new, target)
         elif exchange_folders(new, target):
             os.rename(new, old)
-        else:  # for an instant there is no folder; if the process is killed then, `restore_folder` helps
+        else:  # for an instant the folder does not exist; if the process is killed then, `restore_folder` helps
             os.rename(target, old)
             try:
                 os.rename(new, target)
@@ -46,7 +46,7 @@ def replace_folder(new: Path, target: Path) -> None:
 
 
 def restore_folder(target: Path) -> None:
-    """Restore the previous folder if a writer was killed between two renames, else remove its remains."""
+    """Restore the previous folder if a writer was killed between two renames, or remove it."""
     old = make_old_folder_path(target)
     if old.is_dir() and not old.is_symlink():
         if target.exists():
@@ -74,7 +74,7 @@ def exchange_folders(first: Path, second: Path) -> bool:
 
 @contextmanager
 def defer_signals() -> Iterator[None]:
-    """Defer signals that ask this process to end until the block is done."""
+    """Defer signals that end this process until the block is done."""
     # signals reach the main thread only
     if threading.current_thread() is not threading.main_thread():
         yield

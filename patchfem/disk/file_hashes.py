@@ -1,4 +1,4 @@
-"""Hashes of the files that the texts of a scene name, so that a cached result is not used after such a file changed.
+"""Hashes of the files that a scene names, which tell whether a cached result is valid.
 
 This module loads neither numpy nor the tables of a scene.
 """
@@ -15,7 +15,7 @@ _QUOTED_PATTERN = re.compile(r"\"([^\"\n]*)\"|'([^'\n]*)'")
 
 
 def iterate_texts(value: Any) -> Iterator[str]:
-    """Iterate over all texts in the tables of a scene, in their order."""
+    """Iterate over all strings in the tables of a scene, in their order."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict):
@@ -27,7 +27,7 @@ def iterate_texts(value: Any) -> Iterator[str]:
 
 
 def hash_named_files(texts: Iterable[str], *folders: Path) -> list[list[str]]:
-    """Return [name, SHA-256] of every file in the folders that a text names.
+    """Return [name, SHA-256] of every file in the folders that a string names.
 
     A text names a file alone, in a list or a table, after `table.key=`, or in a row of cells.
 
@@ -51,7 +51,7 @@ def hash_named_files(texts: Iterable[str], *folders: Path) -> list[list[str]]:
 
 
 def _iterate_candidate_names(text: str) -> Iterator[str]:
-    """Iterate over the parts of a text that may be names of files."""
+    """Iterate over the parts of a string that may be names of files."""
     yield text
     yield text.partition("=")[2].strip()
     for double_quoted, single_quoted in _QUOTED_PATTERN.findall(text):
@@ -61,7 +61,7 @@ def _iterate_candidate_names(text: str) -> Iterator[str]:
 
 
 def _is_file(path: str) -> bool:
-    """Return whether a path is a file; a text with a null byte is not."""
+    """Return whether a path is a file; a string with a null byte never is."""
     try:
         return os.path.isfile(path)
     except ValueError:

@@ -12,7 +12,7 @@ METADATA_PATTERN = re.compile(r"(.+?)-(\d[^-]*)(?:\.dist-info|(?:-py\d.*)?\.egg-
 
 
 def find_package_version(name: str) -> str:
-    """Return the version of an installed package by its name in a package registry, "" if there is none."""
+    """Return the version of a package by its registry name; "" if it is not installed."""
     return list_installed_versions().get(_normalise_name(name), "")
 
 

@@ -1,4 +1,4 @@
-"""Lock file of a folder, so that one process at a time writes to it.
+"""Lock file of a folder, which lets one process at a time write to it.
 
 The file contains the number, the start time and the machine of its owner. It is read, taken over and removed under a
 lock of the kernel, so that two processes cannot take it at the same time. If its owner is killed, the file remains; the
@@ -21,7 +21,7 @@ _THREAD_LOCK = threading.Lock()
 
 
 def _hash_host() -> str:
-    """Return a short hash of this machine, its last boot and its process namespace (containers have their own)."""
+    """Return a short hash of this machine, its last boot and its process namespace."""
     parts = [platform.node()]
     with suppress(OSError):
         parts += [
@@ -47,7 +47,10 @@ def read_start_ticks(pid: int) -> str:
 
 
 def is_running(pid: int, start: str = "") -> bool:
-    """Return whether a process of this machine runs; `start` tells it from a later process with the same number."""
+    """Return whether a process of this machine runs.
+
+    `start` distinguishes it from a later process with the same number.
+    """
     try:
         os.kill(pid, 0)
     except PermissionError:

@@ -1,4 +1,4 @@
-"""Folders for files that are kept between runs.
+"""Folders for files that remain between runs.
 
 Only folders of the user are used, because the code and the numbers in them are trusted.
 """
@@ -47,7 +47,7 @@ def prepare_folder(folder: Path) -> str:
 
 
 def _find_distrust_reason(folder: Path) -> str:
-    """Return why other users may have written to a folder; the group loses its permission to write."""
+    """Return why other users may have written to a folder, and remove write access of the group."""
     status = os.stat(folder)
     if status.st_uid != os.geteuid():
         return f"{folder} belongs to another user"
@@ -60,7 +60,10 @@ def _find_distrust_reason(folder: Path) -> str:
 
 @cache
 def make_process_folder() -> Path:
-    """Return a folder of this process, removed at its end; a path that never exists if none can be made."""
+    """Return a folder that is removed when this process ends.
+
+    If it cannot be made, the path is one that never exists.
+    """
     try:
         folder = Path(tempfile.mkdtemp(prefix="patchfem-"))
     except OSError:
@@ -70,7 +73,7 @@ def make_process_folder() -> Path:
 
 
 def write_cache_file(path: Path, data: bytes) -> bool:
-    """Write a file of a cache atomically, and make its folder; return False if it cannot be written."""
+    """Write a cache file atomically and make its folder; return False if this fails."""
     partial = path.with_name(f".{path.name[:100]}.{os.getpid()}.partial")
     try:
         path.parent.mkdir(mode=0o700, exist_ok=True)

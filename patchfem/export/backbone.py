@@ -73,7 +73,7 @@ def answer_of(found: Backbone) -> dict:
 
 
 def contents(found: Backbone, title: str = "") -> Contents:
-    """Return backbone.nc: each curve under the name of its method, over its own amplitudes."""
+    """Return backbone.nc: each curve under the name of its method, over its amplitudes."""
     variables, coordinates = {}, {}
     for method, curve in found.curves.items():
         prefix = method.replace("-", "_")

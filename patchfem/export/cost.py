@@ -53,7 +53,7 @@ MIN_ERROR_RATIO = 10.0  # smallest ratio of the ends of the error axis, for equa
 
 
 def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
-    """Format the runs of a curve for the screen: one line per tolerance, or per value of a setting.
+    """Format the runs of a curve as lines, one per tolerance or per value of a setting.
 
     Parameters
     ----------

@@ -105,8 +105,8 @@ def histories(result: Result) -> tuple:
     elif kind == "rig":
         still = np.full(r.time.size, result.measures["normal_load"].value)
         out |= {"friction_force": r.force, "normal_load": r.extra.get("normal_load", still)}
-        # If modes move the interface differently from the output, the slide is a history of its
-        # own.
+        # If modes move the interface differently from the output, the slide is a separate
+        # history.
         if not np.array_equal(r.slide, r.output):
             out["slide"] = r.slide
     return out, (list(rig.modes.names), structure.compute_named_motions(rig.modes, r.modal))

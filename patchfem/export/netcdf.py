@@ -119,7 +119,7 @@ class Contents:
 
 
 def _variable(xr, dimensions, values, attributes=None):
-    """Return an xarray variable of numbers or texts without conversion.
+    """Return an xarray variable of numbers or strings without conversion.
 
     To look for arrays of other packages, xarray would import all of Dask, which takes a quarter of
     its own import time.
@@ -447,7 +447,7 @@ def with_surfaces(data: Contents, gap) -> Contents:
 
 
 def with_faces(data: Contents, faces) -> Contents:
-    """Return the content with the patches of interfaces, each on its own nodes, frame by frame.
+    """Return the content with the patches of interfaces, each on separate nodes, frame by frame.
 
     faces: list of `runs.patch.faces.Face`. The number at the end of a name is that of the
     interface, from 1.

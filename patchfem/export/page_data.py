@@ -1,4 +1,4 @@
-"""Data of the page and the pictures of a run, as plain arrays and texts in SI units."""
+"""Data of the page and the pictures of a run, as plain arrays and strings in SI units."""
 
 import tomllib
 from dataclasses import dataclass, field, replace
@@ -32,7 +32,7 @@ class SceneText:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Verdict:
-    """How a run ended.
+    """Summary of a run and the sentence on its outcome.
 
     Attributes
     ----------

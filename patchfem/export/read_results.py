@@ -13,7 +13,7 @@ import numpy as np
 from ..core import PatchfemError
 
 HUGE = 1e100  # largest number; the squares of larger ones overflow
-# Coordinates, which contain finite numbers along their own dimension.
+# Coordinates, which contain finite numbers along the dimension of the same name.
 ALONG = (
     "time",
     "frame_time",
@@ -114,6 +114,6 @@ def numeric(values) -> bool:
 
 
 def wanted(fine: bool, text: str) -> None:
-    """Raise ValueError with a text unless a condition is true."""
+    """Raise ValueError with a message unless a condition is true."""
     if not fine:
         raise ValueError(text)

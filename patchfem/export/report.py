@@ -189,7 +189,7 @@ def _decay(data: RunData) -> Picture | None:
 
 
 def _levels(data: RunData) -> Picture | None:
-    """Return the picture of a run in levels."""
+    """Return the picture of the amplitude at the end of each level of a drive with levels."""
     if data.evaluations.levels is None:
         return None
     return Picture(
@@ -274,7 +274,7 @@ def _interface(data: RunData) -> Picture | None:
 
 
 def _faces(data: RunData) -> Picture | None:
-    """Return the picture of the stresses on interfaces that have their own patch."""
+    """Return the picture of the stresses on interfaces that have a patch."""
     found = [one for one in data.patch.faces if np.any(one[1]["normal_stress"][0] > 0)]
     part = any(charts.part_in_contact(x, fields["normal_stress"][0]) for x, fields, _ in found)
     shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in found)
@@ -711,7 +711,7 @@ def page_of(result: Result, bodies: dict | None = None, film: dict | None = None
 
 
 def axes(result: Result, names: tuple, onto=None, bodies: dict | None = None):
-    """Draw the first of the named pictures in which a run has something to show, as matplotlib Axes.
+    """Draw the first of the named pictures for which a run has data, as matplotlib Axes.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from ..disk.exchange import defer_signals, make_old_folder_path, replace_folder,
 from ..disk.lock import FolderLock
 
 PAGE = "report.html"
-# Folder with the fields of interfaces that have their own patch, and how many of them are written.
+# Folder with the fields of interfaces that have a patch, and the largest number that is written.
 INTERFACES, MOST = (
     "interfaces",
     6,

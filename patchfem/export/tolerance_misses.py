@@ -15,7 +15,7 @@ FIRST = (
     "pressure_peak",
     "contact_fraction",
 )
-# Text for a measure whose label alone is not clear in a sentence.
+# Text for a measure whose label is not clear in a sentence.
 LONGER = {
     "relative_displacement_amplitude_steady": "the displacement amplitude to which the motion would settle"
 }

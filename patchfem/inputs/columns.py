@@ -24,7 +24,7 @@ _NUMERIC_TEXT_PATTERN = re.compile(r"[0-9eE+.,\t -]*")
 class Columns:
     """Columns of a table; row i is on line i + 2 of the file, below the header on line 1.
 
-    values: column -> (k,) in SI; labels: column that is not known as a number -> k texts; rows: k.
+    values: column -> (k,) in SI; labels: column that is not known as a number -> k strings; rows: k.
     """
 
     values: dict
@@ -105,7 +105,7 @@ def _read_plain_block(lines: list, names: list, factors: dict) -> np.ndarray | N
 
 
 def _read_block(path: Path, line_number: int, lines: list, names: list, factors: dict) -> tuple:
-    """Read rows cell by cell: numbers in SI (rows, columns), and the texts of the other columns."""
+    """Read rows cell by cell: numbers in SI (rows, columns), and strings of other columns."""
     numbers = []
     texts = []
     for number, line in enumerate(lines, line_number):

@@ -27,10 +27,10 @@ DAMAGE_ERRORS = (
 
 @contextmanager
 def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
-    """Replace an exception that damaged bytes cause by PatchfemError ``message (reason)remedy``.
+    """Convert exceptions of code that reads a damaged file into a PatchfemError.
 
-    These are `DAMAGE_ERRORS`, and a plain Exception, the only one that pyuff raises. It encloses code
-    that reads a file.
+    Its message is `message`, the reason in brackets and `remedy`. Damaged bytes raise `DAMAGE_ERRORS`,
+    or in pyuff a plain Exception.
     """
     try:
         yield

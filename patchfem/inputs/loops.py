@@ -13,7 +13,7 @@ from .slides import require_increasing_time
 from .units import FORCE_UNITS, SLIDE_UNITS
 
 LOOP_HEADER = "time [s],displacement [um],force [N]"
-# Columns of `patchfem export` that stand for a quantity, the preferred one first.
+# Columns of `patchfem export` for each quantity, the preferred one first.
 EXPORTED_NAMES = {
     "displacement": ("slide", "relative_displacement"),
     "force": ("friction_force",),
@@ -25,7 +25,7 @@ class Loop:
     """A measured friction loop.
 
     time: (k,) [s] or None; displacement: (k,) [m], 0 in the first row; reading: (k,), a "force" [N] or a
-    "friction_ratio" [1], as `quantity` says; labels: other column, such as `run` -> k texts.
+    "friction_ratio" [1], as `quantity` says; labels: other column, such as `run` -> k strings.
     """
 
     path: Path
@@ -67,7 +67,7 @@ class Loop:
 
 
 def read_loop(path, units: Mapping = SLIDE_UNITS) -> Loop:
-    """Read a friction loop; its displacement is counted from the first row.
+    """Read a friction loop; its displacement is measured from the first row.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ VARIABLE_DAMAGE = "a variable of the MATLAB file is damaged"
 
 
 class DataType(IntEnum):
-    """Data types of elements; the names of numbers are those of NumPy."""
+    """Data types of elements; numeric types have the names of NumPy."""
 
     INT8 = 1
     UINT8 = 2
@@ -86,9 +86,9 @@ _ENCODINGS = {
 
 
 class Array(NamedTuple):
-    """Array of a variable of the file.
+    """Value of a MATLAB variable, whose numbers are read on request.
 
-    kind: "number", "sparse" or "text"; values(): full array of floats, or texts (k,); sparse(): sparse
+    kind: "number", "sparse" or "text"; values(): full array of floats, or strings (k,); sparse(): sparse
     array of a sparse variable, None for others.
     """
 
@@ -197,7 +197,7 @@ class _MatFile(NamedTuple):
         return variable
 
     def list_arrays(self, variable: _Variable | None, depth: int = 0) -> dict:
-        """Return a variable by name, or the fields of a structure with one element."""
+        """List the arrays of a variable by name: itself, or the fields of a structure."""
         if variable is None:
             return {}
         if variable.kind != ArrayClass.STRUCT:
@@ -246,7 +246,7 @@ class _MatFile(NamedTuple):
         return Array("text", variable.shape, partial(read, self.read_texts))
 
     def unpack(self, variable: _Variable) -> bytes:
-        """Return the bytes of a variable, unpacked and of the announced length."""
+        """Return the uncompressed bytes of a variable, whose length must be the declared one."""
         body = variable.body
         if not variable.is_packed:
             return body
@@ -381,7 +381,7 @@ def make_sparse_array(path, shape: tuple, read: Callable) -> Array:
 
 
 def make_texts(texts) -> np.ndarray:
-    """Make an array of texts without blanks at their ends."""
+    """Make an array of strings without blanks at their ends."""
     texts = [text.rstrip() for text in texts]
     array = np.empty(len(texts), dtype=object)
     array[:] = texts

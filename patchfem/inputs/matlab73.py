@@ -1,7 +1,7 @@
 """Arrays of a MATLAB file of version 7.3, which is an HDF5 file.
 
 MATLAB stores an array with its dimensions in reverse order, a text as the codes of its letters, a cell
-array of texts as references to them, and a sparse matrix or a structure as a group. The attribute
+array of strings as references to them, and a sparse matrix or a structure as a group. The attribute
 MATLAB_class distinguishes them. Links to other files are not followed, and sizes are limited before
 anything is unpacked.
 """

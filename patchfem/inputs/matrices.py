@@ -26,16 +26,16 @@ MATRIX_NAMES = {
 MAX_SKEW = 1e-8  # |A - A^T| / |A| of a matrix that counts as symmetric
 SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
 MAX_LISTED_ARRAYS = 12  # arrays that an error message lists
-# Numbers of a matrix by which its rounding is recognised, and the fewest distinct ones that suffice.
+# Number of entries of a matrix from which its rounding is estimated; with fewer distinct ones it stays unknown.
 N_SAMPLED_NUMBERS = 500
 MIN_DISTINCT_NUMBERS = 10
 SINGLE_PRECISION_DIGITS = 7  # decimal digits of single precision
 DOUBLE_PRECISION_DIGITS = 15  # decimal digits that double precision always keeps
 # If at least this fraction of the numbers need nearly all digits, all numbers were rounded to these digits.
 MIN_FULL_DIGITS_FRACTION = 0.6
-# digits by which a number may be shorter: a sign or an exponent takes their place in the field
+# digits by which a number may be shorter: a sign or an exponent takes their room in the field
 N_DROPPED_DIGITS = 2
-ROUNDING_DEVIATION = 12**-0.5  # standard deviation of a rounding error of a unit
+ROUNDING_DEVIATION = 12**-0.5  # standard deviation of the error of rounding to a multiple of 1
 
 
 class Matrix(NamedTuple):
@@ -164,7 +164,7 @@ def _append_empty_rows(values, n: int) -> sparse.csr_array:
 
 
 def _insert_empty_rows(values, rows: np.ndarray, n: int) -> sparse.csr_array:
-    """Return a matrix (n, n) that has the given one in some of its rows and columns."""
+    """Expand a matrix to (n, n) by empty rows and columns between those it has."""
     matrix = values.tocoo()
     i, j = matrix.coords
     return sparse.coo_array((matrix.data, (rows[i], rows[j])), (n, n)).tocsr()
@@ -196,7 +196,7 @@ def _symmetrize(path, values, wanted: str) -> sparse.csr_array:
 
 
 def _find_matrix_name(path, names, wanted: str) -> str:
-    """Return the name of the requested matrix in a file: one of `MATRIX_NAMES`, or the only name in it."""
+    """Return the name of the requested matrix: one of `MATRIX_NAMES`, or the only one."""
     short_names = {name.rpartition(".")[2].lower(): name for name in reversed(list(names))}
     for known in MATRIX_NAMES[wanted]:
         if known in short_names:

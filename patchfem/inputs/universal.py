@@ -80,7 +80,7 @@ def read_datasets(path, where: str = "") -> list[dict]:
 
 
 def make_channels(path, datasets: list, notes: list) -> list[Channel]:
-    """Return the channels of the records over time among the datasets.
+    """Return the time records among the datasets as channels.
 
     A record along a negative axis is reversed, so that it points along the positive one.
 

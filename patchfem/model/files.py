@@ -146,7 +146,7 @@ def _check_slide(path: Path, tables, whole: bool) -> None:
 
 
 def _check_drive(path: Path, tables, whole: bool) -> None:
-    """Read a recorded drive or its spectrum."""
+    """Check the file of a recorded drive or of its spectrum by reading it."""
     if find_waveform(tables.drive).is_random:
         drive.signals.read_spectrum(path)
     elif whole or tables.drive.kind is not None:

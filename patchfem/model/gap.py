@@ -85,7 +85,10 @@ class Gap:
 
     @property
     def wave(self) -> float:
-        """Shortest wavelength [m] of the shapes, which the cells have to resolve; inf without waves."""
+        """Shortest wavelength [m] of the wavy shapes; inf without waves.
+
+        The cells of the mesh have to resolve it.
+        """
         return min((wave for _, wave in self._values("wave")), default=inf)
 
     def _values(self, quantity: str) -> list:

@@ -55,7 +55,7 @@ class InterfaceLaw:
 
     @property
     def partial_slip(self) -> str:
-        """Key of the scene that allows partial slip of the patch, "" without partial slip."""
+        """Name of the key that makes partial slip of the patch possible; "" without partial slip."""
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     def friction_limits(self, load: float) -> FrictionLimits:
@@ -106,7 +106,7 @@ def make_effective_law(
 
 
 def _scale_growth_rates(law: Friction, where: Callable) -> tuple:
-    """Return the rates of growth at rest and in slip at the surface temperature."""
+    """Return the growth rates of bonds at rest and in slip at the surface temperature."""
     heat = law.temperature
     try:
         return import_effect("friction.temperature").growth_at_temperature(
@@ -164,7 +164,9 @@ def make_bond_parameters(law: Friction, peak_speed: float, min_rest_speed: float
 
 
 def build_interface_laws(scene: Scene) -> tuple:
-    """Build the interfaces of a rig: those of [[structure.interface]], or that of [friction].
+    """Build the friction laws of all interfaces of a rig.
+
+    They come from [[structure.interface]], or from [friction] for the only interface.
 
     Returns
     -------

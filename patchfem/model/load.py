@@ -13,7 +13,7 @@ from .slide import SlidePath
 MAX_SLIDE_SAMPLES = 5_000_000  # samples of a slide; more take too much memory
 # fraction of the largest load; a smaller load is round-off of zero, so the contact is lost
 MIN_LOAD_FRACTION = 1e-12
-# periods of the load; samples that are closer differ only by round-off of the same instant
+# periods of the load; samples that are closer are the same instant with different round-off
 MIN_SAMPLE_SPACING = 1e-9
 
 

@@ -103,7 +103,7 @@ class Model:
 
     @property
     def partial_slip(self) -> str:
-        """Key of the scene that allows partial slip of the patch, "" without partial slip."""
+        """Name of the key that makes partial slip of the patch possible; "" without partial slip."""
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     @property
@@ -132,7 +132,7 @@ class Model:
 
     @property
     def bonds(self) -> Bonds:
-        """Bond parameters (2.10-2.17) of the law 'nonlocal'."""
+        """Bond parameters of the law 'nonlocal' (report, equations 2.10-2.17)."""
         min_rest_speed = 0.0 if self.rig is None else MIN_RIG_REST_SPEED
         return make_bond_parameters(self.friction, self.speed_scale, min_rest_speed)
 

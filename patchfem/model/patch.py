@@ -154,7 +154,7 @@ class PatchStrips(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PatchInterface:
-    """Asperity layer between the pieces, strips of the patch, and compliance in shear.
+    """Interface of a patch: layer of asperities, strips, and compliance in shear.
 
     - has_shear: whether the pieces deform in shear.
     - partial_slip: key of the scene that allows partial slip, "" without partial slip.
@@ -417,7 +417,7 @@ def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLength
 
 
 def find_shortest_wave(contact: Contact, length: float) -> float | None:
-    """Return the shortest wave [m] of a profile that belongs to the gap.
+    """Return the shortest wavelength [m] of a profile that belongs to the gap.
 
     Shorter waves belong to [contact.asperities]; None if all waves do. `length` [m] is that of the
     interface.

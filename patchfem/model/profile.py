@@ -19,7 +19,7 @@ CURVE_POINTS_PER_CELL = 16  # line segments per cell that represent a smooth pro
 # m; heights with a smaller standard deviation are round-off of a straight line
 MIN_HEIGHT_DEVIATION = 1e-10
 STRAIGHT_TOL = 1e-5  # standard deviation over range of heights; a straighter profile is a line
-# height difference between the ends due to the removed slope over the range of heights; a note reports a larger one
+# (removed slope x length of the trace) / range of the heights; a note reports a larger ratio
 MAX_UNREPORTED_SLOPE = 1e-2
 SAMPLES_PER_CUTOFF = 16  # minimum number of samples per cut-off on which a trace is filtered
 SPACING_TOL = 1e-9  # spacings that differ by a smaller fraction of the interface are equal
@@ -199,7 +199,7 @@ def _smooth_profile(trace: Profile, nodes) -> Profile:
 
 
 def _read_without_spikes(path: Path, x, max_gap: float) -> Profile:
-    """Read a trace over the nodes and remove its spikes; gaps up to `max_gap` [m] are interpolated linearly."""
+    """Read a trace over the nodes, remove spikes and interpolate gaps up to `max_gap` [m]."""
     trace = read_trace(path)
     try:
         return clean(place_over_patch(trace, x), max_gap)

@@ -159,7 +159,7 @@ class FirstMode:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RigStructure:
-    """How the modes of a rig were obtained.
+    """Origin of the modes of a rig: listed in the scene or computed from its structure.
 
     - frequencies: natural frequencies [Hz], with the bonded spring, shape (n,).
     - lists_modes: whether the scene lists the modes.

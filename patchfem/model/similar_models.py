@@ -56,7 +56,7 @@ class SimilarModels(Sequence):
         return replace(self, values=self.values[indices], cases=self.cases[indices])
 
     def columns(self) -> Model:
-        """Return all models as one, in which each number that differs is an array (n,)."""
+        """Merge all models into one, in which each number that differs is an array (n,)."""
         return replace_numbers(self.first, self.plain_numbers, list(self.values.T))
 
 

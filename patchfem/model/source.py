@@ -1,4 +1,4 @@
-"""Origin of a model: path, text and effects of the scene, and line numbers for messages."""
+"""Origin of a model: path, content and effects of the scene, and line numbers for messages."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -94,7 +94,7 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
 
 
 def has_pressed_joint(scene) -> bool:
-    """Return whether the joint stiffness depends on a pressed patch and not on the law alone."""
+    """Return whether the joint stiffness depends on a pressed patch and not only on the law."""
     contact = scene.contact
     if scene.friction is None or contact is None:
         return False

@@ -84,7 +84,7 @@ def _read_file(path: Path):
 def _build_modes(
     path: Path, structure, drive_kind: str, mass: int | None, needs_interface: bool
 ) -> FileModes:
-    """Build the modes of a file."""
+    """Build modes from a file."""
     content = _read_file(path)
     is_forced = drive_kind == "force"
     if not is_universal_file(path):

@@ -56,7 +56,7 @@ _OPENING_BRACKETS = {"]": "[", "}": "{"}
 
 
 class FormattedNumbers(Sequence):
-    """Numbers formatted on access as in a scene; millions of texts would fill the memory.
+    """Numbers formatted on access as in a scene; millions of strings would fill the memory.
 
     Parameters
     ----------
@@ -87,8 +87,8 @@ class Axis:
 
     - key: dotted key of the scene.
     - texts: values as a scene writes them.
-    - values: floats in SI; the texts if these are not numbers.
-    - unit: SI unit of the values; "1" for plain numbers, "" for texts.
+    - values: floats in SI; the strings if they are not numbers.
+    - unit: SI unit of the values; "1" for plain numbers, "" for strings.
     """
 
     key: str
@@ -136,7 +136,7 @@ class _RangeEnds(NamedTuple):
 
 
 class _WrittenRange(NamedTuple):
-    """A range as it is written: its ends, the number of values, and "log", "lin" or None."""
+    """Range in its written form: its ends, the number of values, and "log", "lin" or None."""
 
     low: str
     high: str
@@ -147,7 +147,7 @@ class _WrittenRange(NamedTuple):
 def read_axes(
     texts: Iterable[str], *, sampled: bool = False
 ) -> tuple[list[Axis | SampledRange], list[str]]:
-    """Read texts ``table.key=v1,v2,...``, where a value may be a range ``low..high:n``.
+    """Read strings ``table.key=v1,v2,...``, where a value may be a range ``low..high:n``.
 
     Parameters
     ----------
@@ -297,7 +297,7 @@ def _read_axis(key: str, text: str, *, sampled: bool = False) -> Axis | SampledR
 
 
 def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | None:
-    """Return the range that a text such as ``1..9 mm:5`` stands for; None for a single value."""
+    """Parse a range such as ``1..9 mm:5``; return None for a single value."""
     if not piece:
         raise ValueError("there is no value between two commas")
     if not _holds_number(key):
@@ -332,7 +332,7 @@ def _range_about(text: str) -> str:
     try:
         middle = Fraction(number)
         half = Fraction(width)
-    except ValueError:  # the text is not a number, such as 1.2.3
+    except ValueError:  # the string is not a number, such as 1.2.3
         return ""
     if width_unit not in ("%", "", unit):
         unit_of_value = f" ({unit})" if unit else ""
@@ -386,7 +386,7 @@ def _holds_number(key: str) -> bool:
 
 
 def _split_at_commas(text: str) -> list[str]:
-    """Split a text at its commas, except those inside brackets and quotes.
+    """Split a string at its commas, except those inside brackets and quotes.
 
     A quote opens at the start of a value or inside brackets; anywhere else it is a character like others.
     """
@@ -474,7 +474,7 @@ def _is_log(ends: _RangeEnds, spacing: str | None) -> bool:
 
 
 def _list_range_values(key: str, written: _WrittenRange) -> list[str]:
-    """Return the values of a range as texts in the unit of its first end."""
+    """Return the values of a range as strings in the unit of its first end."""
     ends = _read_ends(key, written)
     count = int(written.count) if written.count else 0
     if not 2 <= count <= MAX_RANGE_VALUES:

@@ -63,7 +63,7 @@ def find_key_lines(text: str) -> dict[str, int]:
     """Return dotted key -> line, from 1, of a TOML text.
 
     A table has the line of its header; a table without a header that of the first key in it. Items of an array of
-    tables count from 0, as in ``structure.mode.0.name``. A text that is not TOML gives the keys before the first error.
+    tables count from 0, as in ``structure.mode.0.name``. A string that is not TOML gives the keys before the first error.
     Raises TooManyKeyParts for a key of more than MAX_KEY_PARTS parts.
     """
     scanner = _Scanner(text)
@@ -79,7 +79,7 @@ def find_key_lines(text: str) -> dict[str, int]:
 
 
 class _SyntaxError(Exception):
-    """Error for a text that is not TOML at the cursor."""
+    """Error for a string that is not TOML at the cursor."""
 
 
 class TooManyKeyParts(ValueError):

@@ -1,4 +1,4 @@
-"""Scenes that differ from a base scene in a few keys, made without parsing its text again."""
+"""Scenes that differ from a base scene in a few keys, made without parsing its TOML again."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class BaseScene:
         for assignment in scene.sets:
             apply_set(self._draft, assignment)
         read_tables(self._draft)
-        # assignments to the keys of one table -> that table as it was read
+        # assignments to the keys of a table -> the resulting table
         self._known: dict[tuple[str, ...], _ReadTable] = {}
 
     def override(self, sets: Iterable[str]) -> Scene:
@@ -187,7 +187,7 @@ class PlainNumbers:
         return _update_table(table, changed)
 
     def replace_sets(self, sets: Sequence[str]) -> tuple:
-        """Return all ``table.key=value`` of a scene whose keys are set by `sets`."""
+        """Return the ``table.key=value`` strings of the scene, those of the keys from `sets`."""
         return (*self.scene.sets[: len(self.scene.sets) - len(self.keys)], *sets)
 
     def make_scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene:
@@ -245,7 +245,7 @@ def _is_plain_motion(scene: Scene) -> bool:
 
 
 def _find_plain_key(scene: Scene, key: str) -> PlainKey | None:
-    """Return the PlainKey of a key of PLAIN_KEYS; None if the key or the value is not plain."""
+    """Find a key of PLAIN_KEYS in a scene; None for others and for a value out of range."""
     pieces = split_key(key)
     table = getattr(scene, pieces[0], None)
     part: int | str | None = None

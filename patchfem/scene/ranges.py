@@ -34,7 +34,7 @@ class Range:
 
 
 def read_ranges(texts: Iterable[str]) -> tuple[list[Range], list[str]]:
-    """Read texts that hold one or more ``table.key=low..high``, separated by commas.
+    """Read strings that hold one or more ``table.key=low..high``, separated by commas.
 
     Returns
     -------

@@ -146,7 +146,7 @@ def _list_inner_tables(model: type[Table]) -> list[str]:
 def _suggest_name(
     draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, at: str
 ) -> str:
-    """Return the key or table that an unknown one probably stands for; "" if none is similar."""
+    """Return the key or table that was probably meant by an unknown one; "" if none is similar."""
     is_table = _is_table(raw[key])
     if not at and not is_table:
         # --set may be given a key without its table; the key then belongs to a table that has a key of this name.
@@ -154,7 +154,7 @@ def _suggest_name(
         present = [name for name in owners if name in raw]
         if owners:
             return "' or '".join(f"{name}.{key}" for name in present[:1] or owners)
-    # A key of the file is not a misspelling of another key of the file, but one of --set may be meant to change it.
+    # A file that contains both keys did not misspell one for the other; a key of --set may be meant for one of the file.
     is_set = (f"{at}.{key}" if at else key) in draft.sets
     written = {
         name: raw[name]
@@ -255,7 +255,7 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written: str) -> 
 
 
 def read_set_value(key: str, text: str) -> Any:
-    """Return the plain value of a text of --set; a text that is not TOML stays a string."""
+    """Return the plain value of a string of --set; a string that is not TOML stays a string."""
     model, name = find_key(key)
     is_text_key = model is not None and str in list_key_types(model, name)
     if _PLAIN_TEXT_PATTERN.fullmatch(text):

@@ -1,4 +1,4 @@
-"""Values from Python as the texts of a scene, and as the ``table.key=value`` of --set."""
+"""Values from Python as the strings of a scene, and as the ``table.key=value`` of --set."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def _is_length(key: str, value: Any) -> bool:
 
 
 def _to_plain_value(value: Any) -> Any:
-    """Return a NumPy array or scalar as Python values, and any other value as it is."""
+    """Return a NumPy array or scalar as Python values, and any other value unchanged."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 

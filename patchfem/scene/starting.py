@@ -1,4 +1,4 @@
-"""Scenes to start from, one for each kind of question; each runs as it is, within seconds."""
+"""Scenes to start from, one for each kind of question; each runs unchanged within seconds."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ NEXT_VERBS = {
 
 
 def read_template(kind: str) -> str:
-    """Return the text of a scene of one of TEMPLATE_DESCRIPTIONS; PatchfemError for any other word."""
+    """Return a template of TEMPLATE_DESCRIPTIONS; raise PatchfemError for any other word."""
     if kind not in TEMPLATE_DESCRIPTIONS:
         raise PatchfemError(
             f"{kind}: unknown kind of scene; {advise_on_name(kind, TEMPLATE_DESCRIPTIONS)}"

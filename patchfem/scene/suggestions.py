@@ -19,7 +19,7 @@ from .rules.selectors import SELECTORS, split_keys
 def suggest_key(
     model: type[Table], at: str, written: dict, key: str, *, is_set: bool = False
 ) -> str:
-    """Return the key of a table that an unknown key probably stands for; "" if none is similar.
+    """Return the key of a table that is most similar to an unknown key; "" if none is similar.
 
     A key with a similar name, or with a word in common, comes first, then a key that the table lacks. Keys that accept
     the value come before those that do not.
@@ -57,7 +57,7 @@ def suggest_key(
 
 
 def suggest_table(model: type[Table], written: dict, key: str) -> str:
-    """Return the table that an unknown table probably stands for; "" if none is similar.
+    """Return the table that is most similar to an unknown table; "" if none is similar.
 
     A table with a similar name is taken unless another has more of the keys inside.
 

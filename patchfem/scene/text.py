@@ -1,4 +1,4 @@
-"""A scene as text: TOML in SI with every default, and the names of its effects."""
+"""Formatting of a scene: TOML in SI with every default, and the names of its effects."""
 
 from __future__ import annotations
 

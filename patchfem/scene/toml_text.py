@@ -15,7 +15,7 @@ from .rules.scene_draft import SceneDraft, SceneError
 # bytes; maximum size of a scene file, because larger data belong in files that the scene names
 MAX_BYTES = 32 * 2**20
 MAX_QUOTED_CHARACTERS = 60  # characters of a value that the advice on missing quotes repeats
-# Memory [B] and time [s] of a full matrix of n modes are these times 3 n^2 and n^3 (measured on one core).
+# n modes with full matrices need 3 n^2 BYTES_PER_ENTRY of memory and n^3 SECONDS_PER_CUBED_MODE on one core.
 BYTES_PER_ENTRY = 8
 SECONDS_PER_CUBED_MODE = 1.5e-9
 # A key with a value that opens neither quotes nor a bracket.

@@ -292,7 +292,7 @@ def _build_basis_from_modes(
 
 
 def _read_damping(data: dict, omega) -> tuple:
-    """Return damping ratios (n,), and the damping matrix (n, n) [1/s] if it couples modes, else None."""
+    """Return damping ratios (n,), and the damping matrix (n, n) [1/s] or None if it is diagonal."""
     n = omega.size
     damping = _read_numbers(data, "damping", (n,), (n, n))
     if damping.ndim == 1:
@@ -333,7 +333,7 @@ def _read_numbers(data: dict, name: str, *shapes) -> np.ndarray:
 
 
 def _has_shape(values, shape: tuple) -> bool:
-    """Return whether an array has a shape, in which None stands for any length."""
+    """Return whether an array has a shape; None in the shape means any length."""
     if len(shape) != values.ndim:
         return False
     return all(length in (None, size) for length, size in zip(shape, values.shape))
@@ -343,7 +343,7 @@ def _read_names(data: dict, n: int) -> tuple | None:
     """Return the names of n coordinates, None if the file has none."""
     if "names" not in data:
         return None
-    # a cell of a .mat file is an array with one text
+    # a cell of a .mat file is an array with one string
     texts = [name if isinstance(name, str) else np.ravel(name)[0] for name in data["names"]]
     names = tuple(str(text).strip() for text in texts)
     if len(names) != n or len(set(names)) != n:

@@ -75,7 +75,10 @@ def find_min_decay_rate(modes: ModalBasis) -> float:
 
 
 def find_decay_rate(modes: ModalBasis) -> float:
-    """Return `find_min_decay_rate`, or minus the largest growth rate [1/s] if a coordinate grows."""
+    """Return the decay rate [1/s] of the slowest mode; negative if a coordinate grows.
+
+    It is `find_min_decay_rate`, or minus the largest growth rate.
+    """
     lowest = float(np.diagonal(modes.damping_matrix).min(initial=0.0)) / 2
     return lowest if lowest < 0 else float(find_min_decay_rate(modes))
 
@@ -116,7 +119,10 @@ def find_max_frequency_ratio(drive) -> float:
 
 
 def is_sinusoidal(drive) -> bool:
-    """Return whether a drive ends as a sine, which phases and ratios of first harmonics need."""
+    """Return whether the last segment of a drive is a sine.
+
+    Phases and ratios of first harmonics are defined only then.
+    """
     return bool(drive.segments) and drive.segments[-1].amplitude != 0
 
 

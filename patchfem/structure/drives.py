@@ -34,7 +34,7 @@ MIN_TAYLOR_RATE = 40
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PiecewiseDrive:
-    """Drive that consists of constants and sines, the first of which begins at t = 0.
+    """Drive that consists of constant and sinusoidal segments, the first from t = 0 on.
 
     - period: duration [s] of a cycle.
     - is_periodic: whether the segments repeat after each period until the run ends; a drive that ends
@@ -132,7 +132,10 @@ class SweepDrive:
 
     @property
     def rate(self) -> float:
-        """Rate [1/s] of the Taylor series: that of the highest frequency, or of a fast sweep."""
+        """Largest rate of change [1/s] of the drive, which limits the step of a Taylor series.
+
+        It is the highest circular frequency, or a larger rate if the sweep is short.
+        """
         change = abs(np.log(self.high / self.low)) if self.logarithmic else 1.0
         sweep_rate = MIN_TAYLOR_RATE * max(1.0, change) / self.duration
         return max(2 * np.pi * max(self.low, self.high), sweep_rate)

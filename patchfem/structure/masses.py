@@ -1,4 +1,4 @@
-"""Modes of masses that are joined by springs and dampers to each other and to the base (report, figure 16)."""
+"""Modes of masses on springs and dampers between them and to the base (report, figure 16)."""
 
 from dataclasses import replace
 

@@ -1,4 +1,6 @@
-"""Modes of a rig from its matrices: M x'' + C x' + K x = -M r a(t) + p F(t) - B^T f (report, 3.2-3.3).
+"""Modes of a rig from its mass, damping and stiffness matrices (report, 3.2-3.3).
+
+The equation of motion is M x'' + C x' + K x = -M r a(t) + p F(t) - B^T f.
 
 The displacements x are relative to the base, which moves all of them by r a(t); f are the friction
 forces. Mass-normalised shapes Phi (Phi^T M Phi = 1) give z'' + D z' + omega^2 z = ... with D = Phi^T C Phi.

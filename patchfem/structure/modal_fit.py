@@ -172,14 +172,14 @@ class ModalFit:
         return np.stack(changes, axis=1)
 
     def refine(self, theta, tolerance=1e-6) -> tuple:
-        """Minimize the residual from a start.
+        """Minimize the residual from starting values of the poles.
 
         w stays between half the lowest and twice the highest frequency, zeta between 1e-7 and 0.9.
 
         Parameters
         ----------
         theta : (2n,) ndarray
-            Start.
+            Starting values.
         tolerance : float
             Relative change at which the iteration ends.
 

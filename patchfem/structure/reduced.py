@@ -26,7 +26,7 @@ from . import masses, matrices
 
 # coordinates; the modes of a larger structure come from Lanczos iteration
 MAX_DENSE_COORDINATES = 600
-# modes in addition to twice the number that is kept; the run for the error estimate keeps more
+# modes computed beyond twice the retained number, because the run for the error estimate retains more
 N_EXTRA_MODES = 4
 # relative; round-off of a projected matrix entry, compared with the sum of its absolute terms
 PROJECTION_TOL = 64 * np.finfo(float).eps
@@ -58,7 +58,9 @@ class ComputedModes(NamedTuple):
 
 
 class Reduction(NamedTuple):
-    """Matrices in p shapes: m modes, then a static shapes, the first b of the boundary.
+    """Matrices of a structure projected on m modes and p - m static shapes.
+
+    The first b static shapes are those of the boundary coordinates.
 
     - stiffness, mass: projected matrices (p, p) [N/m, kg].
     - damping: projected damping matrix (p, p) [N s/m], or None.
@@ -321,7 +323,7 @@ def _subtract_modes(static, modes, M) -> tuple:
 
 
 def _expand_rows(shapes, rows, n: int) -> np.ndarray:
-    """Insert the rows of shapes at the given rows of shapes over n coordinates, zero elsewhere."""
+    """Insert rows of shapes into shapes over n coordinates, which are zero elsewhere."""
     expanded = np.zeros((n, shapes.shape[1]))
     expanded[rows] = shapes
     return expanded
@@ -414,7 +416,7 @@ def _factor_stiffness(stiffness, mass) -> np.ndarray:
 
 
 def _compute_elastic_modes(stiffness, mass) -> tuple:
-    """Compute the modes of dense matrices (c, c) that are not rigid, of unit modal mass.
+    """Compute the elastic modes of dense matrices (c, c), normalised to unit modal mass.
 
     Returns the squares (k,) [1/s^2] of the circular frequencies, ascending, and the shapes (c, k).
 

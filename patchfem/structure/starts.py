@@ -6,7 +6,7 @@ from ..core import InitialState, ModalBasis, PatchfemError, frozen_array
 
 
 def start_at_rest(basis: ModalBasis) -> InitialState:
-    """Return the start at rest, without displacement."""
+    """Return the initial state at rest without displacement."""
     zero = frozen_array(np.zeros(basis.omega.size))
     return InitialState(zero, zero)
 
@@ -54,7 +54,7 @@ def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
 
 
 def start_from_output_displacement(basis: ModalBasis, displacement: float) -> InitialState:
-    """Start at rest from a displacement [m] of the output, in the shape of a static force there.
+    """Start at rest from a displacement [m] of the output, deflected by a static force there.
 
     The coordinates are proportional to output_i / omega_i^2. If rigid modes move the output, a force
     moves only these, in proportion to output_i.

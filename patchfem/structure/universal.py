@@ -197,7 +197,7 @@ def _fit_responses(datasets: list, factors: _UnitFactors) -> MeasuredModes:
 
 
 def _check_response(dataset: dict, name: str, frequency) -> int:
-    """Check a response of dataset 58; return its time derivative of the displacement."""
+    """Check a response of dataset 58; return its order as a time derivative of the displacement."""
     kind = dataset["ordinate_spec_data_type"]
     input_kind = dataset["orddenom_spec_data_type"]
     if kind not in DERIVATIVE_ORDERS or input_kind not in FORCE_TYPES:

@@ -96,6 +96,6 @@ def describe_lost_waves(profile: Profile, element: float, max_lost: float = MAX_
 
 
 def _round_down(length: float) -> float:
-    """Round a length down to two digits, so that the suggestion suffices."""
+    """Round a suggested element size down to two digits, since a larger one would not suffice."""
     unit = 10.0 ** (np.floor(np.log10(length)) - 1)
     return float(np.floor(length / unit * (1 + 1e-12)) * unit)

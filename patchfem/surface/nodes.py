@@ -13,7 +13,7 @@ CENTRED = "the trace is centred on the patch"
 NOTES = (AS_LONG, CENTRED, "is rounded to")  # parts of sentences that cast no doubt on a result
 ROUND_OFF = 1e-3  # fraction of the step; shorter lengths are round-off of x in the file
 MAX_MISSING_ELEMENTS = 0.5000001  # elements that a trace may lack at either end, with round-off
-MAX_STEP_ELEMENTS = 1.5  # elements; a larger distance of the samples gets a note
+MAX_STEP_ELEMENTS = 1.5  # elements; a larger sample spacing gets a note
 
 
 def is_note(text: str) -> bool:
@@ -125,7 +125,7 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
 
 
 def _integrate(profile: Profile, places) -> np.ndarray:
-    """Integrate the trace exactly from its first sample to places [m2], flat beyond its ends."""
+    """Integrate the trace exactly from its first sample to positions [m2], flat beyond its ends."""
     x, z = profile.x, profile.z
     steps = np.diff(x)
     total = np.concatenate([[0.0], np.cumsum(steps * (z[1:] + z[:-1]) / 2)])

@@ -1,4 +1,4 @@
-"""Checks of samples from a file: finite, plausible, increasing x, one height for each place."""
+"""Checks of samples from a file: finite and plausible, with increasing x."""
 
 from typing import NamedTuple
 
@@ -12,22 +12,22 @@ MAX_LENGTH = 10.0  # [m] a longer trace, or a larger coordinate, has a wrong uni
 MIN_LENGTH = 1e-9  # [m] a shorter trace has a wrong unit
 ATOM_WIDTH = 1e-10  # [m] heights that span less have a wrong unit
 OUTLIER_FRACTION = 0.01  # fraction of the heights at either end, which may be measurement faults
-MIN_ROUNDED = 10  # places; fewer do not show whether they are even apart from rounding
-MAX_ROUNDING = 0.75  # printed digits between a place and the fitted line, half of it by rounding
+MIN_ROUNDED = 10  # positions; fewer do not show whether they are even apart from rounding
+MAX_ROUNDING = 0.75  # printed digits between a position and the fitted line, half of it by rounding
 DIGIT_TOL = 1e-4  # relative to the last printed digit; a smaller deviation from it is round-off
 METRES = "in the file, heights and length are in metres"  # sentence on the origin of the units
 GIVEN = "heights and length were read in the given units"
 
 
 class Places(NamedTuple):
-    """Places (n,) in the unit of the file, with notes."""
+    """Coordinates x (n,) in the unit of the file, with notes."""
 
     x: np.ndarray
     notes: tuple = ()
 
 
 def make_trace(path, x, z, lines, factors: tuple, stated: str = "") -> Profile:
-    """Make a trace of samples, with increasing x and one height for each place.
+    """Make a trace of samples, with increasing x and one height for each position.
 
     Its notes state every change of the samples.
 
@@ -106,7 +106,7 @@ def _sample_place(path, lines, k: int) -> str:
 
 
 def undo_rounding(path, x, factor: float, name: str = "x") -> Places:
-    """Replace places that are even apart from the rounding of printed digits by even ones.
+    """Replace positions that are even apart from the rounding of printed digits by even ones.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large.
 
@@ -143,7 +143,7 @@ def undo_rounding(path, x, factor: float, name: str = "x") -> Places:
 
 
 def printed_digit(x) -> float:
-    """Return the largest power of ten that divides all increasing places (n,), 0 if there is none."""
+    """Return the largest power of ten that divides all positions (n,); 0 if there is none."""
     largest = int(np.floor(np.log10((x[-1] - x[0]) / 5)))
     for digit in 10.0 ** np.arange(largest, largest - 8, -1):
         if np.abs(x / digit - np.rint(x / digit)).max() < DIGIT_TOL:
@@ -152,12 +152,12 @@ def printed_digit(x) -> float:
 
 
 def _min_step(x) -> float:
-    """Return the distance below which two places are the same."""
+    """Return the distance below which two positions are the same."""
     return 1e-6 * (x[-1] - x[0]) / x.size
 
 
 def _require_increasing(path, x, lines, factor: float) -> None:
-    """Raise PatchfemError for places (n,) that reverse or are all the same."""
+    """Raise PatchfemError for positions (n,) that reverse or are all the same."""
     steps = np.diff(x)
     reverses = steps < -_min_step(x)
     if reverses.any():
@@ -178,7 +178,7 @@ def _require_increasing(path, x, lines, factor: float) -> None:
 
 
 class Merged(NamedTuple):
-    """Strictly increasing places (k,) and heights (k,) in the units of the file, with notes."""
+    """Strictly increasing positions (k,) and heights (k,) in the units of the file, with notes."""
 
     x: np.ndarray
     z: np.ndarray
@@ -186,7 +186,7 @@ class Merged(NamedTuple):
 
 
 def _merge_equal_places(path, x, z, lines) -> Merged:
-    """Replace samples at one place by their mean."""
+    """Replace samples at one position by their mean."""
     is_new = np.diff(x) > _min_step(x)
     if is_new.all():
         return Merged(x, z, ())

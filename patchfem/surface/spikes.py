@@ -74,7 +74,7 @@ def _scatter_about_medians(z, known) -> float:
 
 
 def _far_distances(z, known, threshold: float) -> np.ndarray:
-    """Return how far heights (m, n) stand off their medians, 0 if all neighbours are near."""
+    """Return the deviation of heights (m, n) from their medians, 0 if all neighbours are near."""
     from scipy.ndimage import maximum_filter, minimum_filter
 
     span = np.maximum(z - minimum_filter(z, WINDOW), maximum_filter(z, WINDOW) - z)
@@ -85,7 +85,7 @@ def _far_distances(z, known, threshold: float) -> np.ndarray:
 
 
 def _select_isolated(z, far, threshold: float) -> np.ndarray:
-    """Select groups of far heights (m, n) that differ from all neighbours by half a threshold [m]."""
+    """Select groups of far heights (m, n) that differ from all neighbours by threshold/2 [m]."""
     from scipy.ndimage import find_objects, label
 
     groups, _ = label(far, np.ones((3, 3)))

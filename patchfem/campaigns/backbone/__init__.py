@@ -1,4 +1,4 @@
-"""Backbone of a mode with its joint: frequency and damping against amplitude, by three methods.
+"""Backbone of a jointed mode: frequency and damping against amplitude by three methods.
 
 In: a rig, a mode, amplitudes at the output. Out: a `records.Backbone`, one curve per method.
 

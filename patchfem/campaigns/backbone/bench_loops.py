@@ -35,7 +35,7 @@ class SettledLoop(NamedTuple):
 
 
 def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float) -> BenchLoop:
-    """Run the contact alone under a sine.
+    """Compute the friction loop of the contact under a sinusoidal displacement.
 
     Parameters
     ----------

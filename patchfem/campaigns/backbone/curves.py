@@ -1,4 +1,4 @@
-"""Backbone of a mode: its curves by all methods, exponents of the loss, amplitude of flutter."""
+"""Backbone of a mode: curves by all methods, loss exponents and amplitude of flutter."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ from .records import METHODS, Backbone, Curve, LossExponents, ModeFrequencies
 
 ROUND = 1e-9  # Relative error of a value by round-off.
 AMPLITUDE_TOL = 1e-7  # Relative tolerance of the first and last amplitudes of two curves.
-# Amplitude / that at which all of the contact slips, above which it is gross slip.
+# Amplitude / amplitude at which the whole contact begins to slip; above this ratio a point counts as gross slip.
 GROSS_SLIP_BEGIN = 3.0
 FLUTTER_TOL = 1e-8  # Relative error of the amplitude of flutter, below the digits that are printed.
 

@@ -40,7 +40,7 @@ MAX_CYCLES_TURNS = 102400  # For one mode with elastic elements, of which only r
 N_START_STEPS = 12
 MAX_RAISED = 3  # Repeated releases from a higher amplitude.
 MAX_RAISE_FACTOR = 8.0  # Largest ratio of the amplitudes of two successive releases.
-# End of a decay / smallest amplitude, so that coarser runs reach this amplitude as well.
+# End of a decay / smallest amplitude, by which coarser runs reach this amplitude as well.
 END_FACTOR = 0.8
 N_FREE_SWINGS = 3.0  # Periods of the free mode within which the first swings of a decay appear.
 MAX_DOUBLINGS = 3  # Largest number of times that the time steps are halved.

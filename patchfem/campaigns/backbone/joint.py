@@ -1,4 +1,4 @@
-"""A mode with its contact: its shape while the contact sticks, and the scales of its amplitudes."""
+"""Mode with its contact: its shape in sticking contact and the scales of its amplitudes."""
 
 from collections.abc import Callable
 from functools import partial
@@ -19,8 +19,8 @@ from ...runs.rig.plan import stuck_stiffness
 from .bench_loops import settle_loop
 
 AMPLITUDES_PER_DECADE = 8  # Number of default amplitudes per decade.
-MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude / that at which all of the contact slips.
-MAX_AMPLITUDE_FACTOR = 15.0  # Largest amplitude / that at which all of the contact slips.
+MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude / amplitude at which the whole contact slips.
+MAX_AMPLITUDE_FACTOR = 15.0  # Largest amplitude / amplitude at which the whole contact slips.
 # Smallest amplitude under rigid friction / the static deflection by friction.
 MIN_RIGID_FACTOR = 2.0
 # Largest amplitude / amplitude at which a softening spring no longer returns the block.

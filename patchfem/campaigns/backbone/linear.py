@@ -50,7 +50,9 @@ def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
 
 
 def _find_root(joint: Joint, negative_damping: float) -> complex:
-    """Return the root of z'' + (D - g) z' + Omega^2 z = 0 in which the mode moves most.
+    """Return the eigenvalue of z'' + (D - g) z' + Omega^2 z = 0 that belongs to the mode.
+
+    It is the one whose eigenvector has the largest component of the mode.
 
     negative_damping: g [1/s].
     """

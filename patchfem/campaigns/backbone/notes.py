@@ -7,7 +7,7 @@ from ...model.model import Model
 from ...runs.patch import faces
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
 
-# Amplitude / that at which all of the contact slips, below which it is micro-slip.
+# Amplitude / amplitude at which the whole contact begins to slip; below this ratio it is in micro-slip.
 MICRO_SLIP_END = 0.3
 MIN_LOSS_RATIO = 4.0  # Loss / error of the loss, above which a loss counts for an exponent.
 MAX_LISTED = 6  # Amplitudes that a sentence lists one by one.

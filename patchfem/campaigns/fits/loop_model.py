@@ -1,4 +1,4 @@
-"""Force of a prescribed slide along a measured motion, as a function of free keys of the scene."""
+"""Friction force along a measured displacement, as a function of free keys of the scene."""
 
 from itertools import product
 
@@ -115,8 +115,8 @@ class BenchModel:
             with locate_errors(scene):
                 return build(scene)
         except PatchfemError as error:
-            # Building reads files of the scene; other values of the free keys would not avoid such
-            # an error.
+            # Building reads files of the scene; other values of the free keys would not avoid
+            # the error.
             self.refused = self.refused or error
             raise
 

@@ -1,4 +1,4 @@
-"""Laws of a single point in place of a patch, fitted to the patch's own friction loops.
+"""Friction laws of a single point, fitted to the friction loops of a patch.
 
 Points under a constant load that stick or slip are elastic-plastic elements in parallel
 (`slip.shear_modes`): their curve of first loading is exact, and Masing's rule gives the loops. Each law
@@ -99,7 +99,7 @@ class Curves(NamedTuple):
 
 
 class FittedLaw(NamedTuple):
-    """A law in place of the patch.
+    """Friction law of a point that replaces the patch.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ class PatchLoops(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedPatch:
-    """Fitted laws by name in place of the patch of a scene.
+    """Fitted laws, by name, that can replace the patch of a scene.
 
     best: the law with the smallest sum of squares.
     """

@@ -138,7 +138,10 @@ class Problem:
 
 
 def parse_ranges(texts: Iterable) -> list:
-    """Read the Range of each free key from "table.key=low..high" texts; SceneError names mistakes."""
+    """Parse the Range of each free key from "table.key=low..high" strings.
+
+    Raises SceneError with all mistakes.
+    """
     found, mistakes = read_ranges(texts)
     if mistakes:
         raise SceneError(mistakes)

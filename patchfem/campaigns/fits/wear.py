@@ -91,7 +91,7 @@ class WearCurve(NamedTuple):
 
 
 def read_depth(text: str) -> MeasuredDepth:
-    """Read a measured depth from a text or from a JSON file that compare writes.
+    """Read a measured depth from a string or from a JSON file that compare writes.
 
     The text is "worn_depth_max=2.5 um..3.5 um", or a single value. PatchfemError and Missing name what
     is wrong.
@@ -157,7 +157,7 @@ def _numbers_of(measure) -> list | None:
 
 
 def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
-    """Find the wear coefficient with which a scene gives a measured depth.
+    """Find the wear coefficient with which the computed depth equals a measured one.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ READINGS = ("measured.acceleration_gain", "measured.displacement_gain")
 
 
 class Question:
-    """What is fitted: a scene of a rig, Ranges of its free keys, and a file of rows."""
+    """Problem of a fit: the scene of a rig, the ranges of its free keys, and a file of rows."""
 
     def __init__(self, scene: Scene, wanted, measured):
         self.scene, self.wanted, self.measured = scene, wanted, measured

@@ -12,7 +12,7 @@ from ...scene.keys.quantities import parse_quantity
 
 # Smallest displacement [m] in a ratio: one digit of the printed displacements, 0.01 mil.
 FLOOR = 0.01 * 25.4e-6
-# Largest size of a logarithm; it stands for a motion that grows without bound or is zero.
+# Largest absolute logarithm; a motion that grows without bound or is zero gets this value.
 MOST = log(1e3)
 ALIKE = 1e-9  # relative difference below which two inputs are the same condition
 KINDS = {"frequency": "frequency", "input": "acceleration"}
@@ -73,7 +73,7 @@ class Cells:
         return [getattr(self.rows[k], name) for k in self.row]
 
     def chosen(self, one: str) -> np.ndarray:
-        """Return which readings (n,) are selected by a text.
+        """Return which readings (n,) a selector such as "column=value" selects.
 
         The text is like "frequency=135 Hz,150 Hz" or "run=143 Hz repeat". PatchfemError for a value
         without its unit, and for a value that no row has.
@@ -97,7 +97,7 @@ class Cells:
 
     @staticmethod
     def _is(name: str, value, text: str) -> bool:
-        """Return whether a value of a column equals that of a text."""
+        """Return whether a value of a column equals that of a selector."""
         if name not in KINDS:
             return text in value if name == "flag" else text == value
         try:

@@ -1,4 +1,6 @@
-"""Fit of a rig to rows of measured responses, with scores of readings fitted, held out and left out.
+"""Fit of a rig to rows of measured responses, with scores of the readings.
+
+There are scores of the readings that were fitted, held out and left out.
 
 A score is the root mean square of ln(computed/measured). It is given for the rig and for models without
 mechanics that are fitted to the same readings (`nulls`). A search does not see the readings that are
@@ -114,7 +116,7 @@ class FittedRows:
         logs : (n,) array
             ln(computed/measured) of any prediction.
         left : (n,) array
-            Those of the readings left out, by a prediction that did not see them.
+            ln(computed/measured) of the readings left out, by a fit without them; NaN for others.
         stable : bool
             Whether to leave out the readings flagged U.
 
@@ -133,10 +135,10 @@ class FittedRows:
 
 @dataclass(frozen=True, slots=True)
 class RowsOptions:
-    """What is computed besides a fit, and how the fit searches.
+    """Options of a fit: readings to hold or leave out, placebos, and settings of the search.
 
     hold: rows held out, "column=value,value"; leave_out: the column of which each value is left out in
-    turn; placebos: "key=value,value" texts; how: the Search.
+    turn; placebos: "key=value,value" strings; how: the Search.
     """
 
     hold: tuple = ()
@@ -193,7 +195,7 @@ def fit_rows(
         )
     for _, part in parts:
         _require_enough_readings(cells, ~held & ~part, count, how)
-    # The texts of placebos are checked before the search, which can take hours.
+    # The strings of placebos are checked before the search, which can take hours.
     texts = [text for given in options.placebos for text in _split_placebo(given, question.wanted)]
     placebos = [(text, question.asked(cells.conditions, text)) for text in texts]
     tell = _count_starts(progress, how.starts * (1 + len(parts) + len(placebos)))
@@ -247,7 +249,7 @@ def _require_enough_readings(cells: Cells, training, count: int, how: Search) ->
 
 
 def _predict_from_rest(computed: Computed, values, conditions) -> np.ndarray:
-    """Compute the conditions (2, c) from motions that begin at rest, as a run does."""
+    """Predict the readings (2, c) of all conditions from motions that begin at rest."""
     computed.forget()
     return np.array(computed(values, list(conditions)))
 

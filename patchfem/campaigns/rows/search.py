@@ -42,7 +42,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Search:
-    """How values are searched for.
+    """Settings of the search for the best values.
 
     Attributes
     ----------

@@ -28,7 +28,7 @@ from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """Scene of a sweep as text.
+    """Scene of a sweep in its written form.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Asked:
         return base.override(sets) if base is not None else self._read(sets)
 
     def _read(self, sets: Sequence[str]) -> Scene:
-        """Read the scene with `table.key=value` strings from its text."""
+        """Parse the scene with `table.key=value` strings."""
         return replace(require_files(loads(self.text, self.path, (*self.sets, *sets))), sweep=())
 
     def model(self, sets: Sequence[str], values: Sequence[float | str] = ()) -> Model:

@@ -85,7 +85,7 @@ class Cases:
     def values(self, number: int) -> tuple:
         """Return the values of a case, axis by axis.
 
-        They are floats in SI, or texts if a key has no number.
+        They are floats in SI, or strings if a key has no number.
         """
         return tuple(axis.values[place] for axis, place in zip(self.axes, self.places(number)))
 
@@ -176,7 +176,7 @@ class Cases:
         )
 
         def signs(shared: str, of: Sequence[int]) -> np.ndarray:
-            """Return a hash (n,) of each case, from what all cases share and from its own values."""
+            """Return a hash (n,) of each case, from the data that all cases share and its values."""
             placed = (self.places(number) for number in of)
             own = ("\n".join([shared, *(mark(k, places[k]) for k in order)]) for places in placed)
             return np.fromiter(

@@ -14,18 +14,18 @@ from ...scene.axes import Axis
 from .case_models import Asked
 from .cases import Cases
 
-LOOKED = 9  # cases that are planned, spread over the sweep
+LOOKED = 9  # number of cases, spread over the sweep, whose plans estimate the cost of all
 ONCE = 0.75  # seconds that a sweep needs in total to start and to write its files and its page
-ALONE = 8e-3  # seconds of a case that runs alone, in addition to those of its plan
-RANKED = 0.8  # seconds of the ranking of the keys of random cases
-# Number of groups among the planned cases up to which all cases are assumed to form no more groups.
+ALONE = 8e-3  # seconds of a case that is not computed in a batch, in addition to those of its plan
+RANKED = 0.8  # seconds to rank the keys by their influence, from random cases
+# If the planned cases form at most this number of groups, all cases are assumed to form no more groups.
 FIXED = 3
-# Seconds from the values of a batched case to its columns (0.8 to 1.5 ms of 2000 lumped cases).
+# Seconds to compute the columns of a case in a batch from its values (0.8 to 1.5 ms of 2000 lumped cases).
 TOGETHER = 1.2e-3
-FEW = 1000  # cases up to which a sweep by default has a summary of each case
-TABLED = 200_000  # cases up to which a sweep by default has its tables
-# Bytes per case with a summary, and without: tables, page and columns (10 000 cases), columns alone
-# (a million).
+FEW = 1000  # maximum number of cases of which a sweep writes a summary each by default
+TABLED = 200_000  # maximum number of cases for which a sweep writes tables by default
+# Bytes per case: with a summary; with tables, page and columns (10 000 cases); with only the columns
+# (a million cases).
 DISK, COLUMNS, BARE = 6000, 1600, 400
 
 
@@ -115,5 +115,5 @@ def _alone(plans: list) -> tuple[float, list]:
 
 
 def _values(axis: Axis) -> int:
-    """Return the number of distinct values of a key; numbers are compared in SI, not as texts."""
+    """Return the number of distinct values of a key; numbers are compared in SI, not as strings."""
     return np.unique(axis.values).size if axis.unit else len(set(axis.texts))

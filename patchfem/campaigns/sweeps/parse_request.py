@@ -168,7 +168,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
 
 
 def _words(request: Request, folder: Path) -> tuple[str, ...]:
-    """Return the words of a command that gives the same cases again from a folder.
+    """Return the arguments of a command that computes the same cases again from a folder.
 
     They are () if the file of cases is a pipe, which cannot be read again.
     """

@@ -20,8 +20,8 @@ MOST = 640  # number of cases that a surface interpolates, because its equations
 POINTS = 1024  # points of a Sobol sequence per key, which give an index to about 0.01
 HALVES = 6  # number of surfaces through half of the cases
 SMOOTH = (1e-8, 1e-4, 1e-2, 1.0)  # smoothing of a surface, from interpolation to almost a plane
-LEAST = 16  # cases per key, below which half of the cases say nothing about an index
-CLOSE = 0.005  # error of an index by POINTS
+LEAST = 16  # cases per key; with fewer, surfaces through half of the cases do not show the error of an index
+CLOSE = 0.005  # error of an index due to the finite number POINTS
 # fraction of the variance that a surface has to explain in cases that it was not fitted to
 TOLD = 0.5
 

@@ -12,7 +12,7 @@ from .cases import Cases
 
 
 def drawn(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, seed: int) -> Cases:
-    """Draw cases from ranges and lists of values; the same seed gives the same cases.
+    """Draw cases from ranges and lists of values; the same seed draws the same cases.
 
     A range is sampled uniformly between its ends, or uniformly in its logarithm; the values of a
     list are equally likely.

@@ -25,7 +25,7 @@ from ...runs.batch.meshes import Shared
 from .case_models import Asked
 from .cases import Cases
 
-TRIES = 3  # deaths of a case after which it is given up, the last of them in a chunk of its own
+TRIES = 3  # failures of a case, the last as the only case of a chunk, after which it is abandoned
 # Seconds that a chunk should take: long compared with its transfer to a worker, short compared with
 # a sweep.
 SPAN = 1.0
@@ -35,7 +35,7 @@ LOOKED = 256  # cases from which the meshes of a sweep are chosen
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """What every worker needs to compute any case; it is sent to each worker once.
+    """Data that a worker needs to compute any case; each worker receives them once.
 
     All functions are functions of a module or objects that can be pickled.
 
@@ -120,7 +120,7 @@ def answer(
 
 
 def timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple:
-    """Return the seconds of a chunk and what `answer` returns.
+    """Compute a chunk with `answer`, and return its seconds and the result.
 
     The seconds do not include compilation, which no later case needs.
     """
@@ -232,9 +232,9 @@ class Chunks:
         self.each = seconds / len(numbers)
 
     def died(self, numbers: Sequence[int]) -> list:
-        """Return the cases that are given up; hand out the others of a dead chunk again in halves.
+        """Return the cases to abandon; split the other cases of a failed chunk into halves.
 
-        A case is given up if it was alone in its chunk and has died TRIES times.
+        A case is abandoned if it was the only one of its chunk and has failed TRIES times.
         """
         for number in numbers:
             self.deaths[number] = self.deaths.get(number, 0) + 1

@@ -78,7 +78,7 @@ def read(path: Path) -> tuple[Cases | None, list[str]]:
 
 
 def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
-    """Return the axis of a column of (line, cell), and its mistakes as (line or 0, text)."""
+    """Return the axis of a column of (line, cell), and its mistakes as (line or 0, message)."""
     known, wrong = {}, []
     for number, cell in cells:
         if cell in known:

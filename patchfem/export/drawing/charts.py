@@ -2,7 +2,7 @@
 
 `pictures` draws them on matplotlib Axes, `curves.js` on a page. A chart is a dict. `title`; `x`,
 `y`: {label, unit, log}, and `range` [low, high] if not all is shown; `marks`: what is drawn, from
-back to front; `labels`: texts at points, only in `pictures`; `frame`: its size [px] if both axes
+back to front; `labels`: strings at points, only in `pictures`; `frame`: its size [px] if both axes
 have the same scale. A mark has a `kind` (line, dots, band, span, rule, arrow, cells), a `name` for
 the legend ("" for none), a `colour` (accent, warm, soft, or #rrggbb) and its numbers, in the units
 of the axes.
@@ -15,9 +15,9 @@ import numpy as np
 from ...core import G_N
 from ...formatting import choose_axis_unit, format_number, needs_log_scale
 
-# points of a line; frames of the shear stress behind the one with the largest resultant
+# Points of a line; number of frames of the shear stress that are drawn faintly.
 LINE, FRAMES = 6000, 24
-FAINT, FEWEST = 400, 200  # points of such a frame; points that every line keeps
+FAINT, FEWEST = 400, 200  # points of a faint frame; minimum number of points of a reduced line
 GRID = 6000  # cells of a piece in a picture
 NUMBER = 13  # characters of a number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
@@ -117,9 +117,9 @@ def _slim(one: dict, share: float) -> dict:
 
 
 def part_in_contact(x, sigma) -> tuple | None:
-    """Return the ends x [m] of the part to show; None if all of it is worth showing.
+    """Return the ends x [m] of the pressed part of a patch; None if the whole patch is shown.
 
-    A part is shown if less than half of the length is pressed.
+    Only this part is shown if less than half of the length is pressed.
     """
     used = np.flatnonzero(sigma > 0)
     if not used.size or used.size >= 0.5 * x.size:
@@ -180,7 +180,10 @@ def interface(x, fields: dict, name: str = "") -> list:
 
 
 def faces(found: list) -> list:
-    """Return `interface` of every interface with its own patch; each entry has its arguments."""
+    """Return the charts of all interfaces that have a patch.
+
+    Each entry of `found` contains the arguments of `interface`.
+    """
     return [one for each in found for one in interface(*each)]
 
 
@@ -615,7 +618,7 @@ def curve(found: dict) -> list:
         for first, last in np.flatnonzero(np.diff(lost)).reshape(-1, 2)
     ]
     for regime, first, last in parts:
-        stop = min(last + 1, along.size)  # up to the next stretch, so that the line has no gap
+        stop = min(last + 1, along.size)  # up to the next stretch, so the line has no gap
         marks.append(
             line(
                 along[first:stop],
@@ -665,7 +668,7 @@ def spectra(found, frequency: float | None) -> list:
     frequency : float or None
         Frequency [Hz] of the mode that was fitted to the peak of H1.
     """
-    # outside the band of the drive there is only leakage
+    # outside the band of the drive the spectrum is only leakage
     driven, out = np.isfinite(found.coherence), []
     found = type(found)(*(column[driven] for column in found))
     hertz = found.frequency

@@ -32,7 +32,7 @@ LEAST, MOST = 0.04, 0.3  # shortest and longest duration of a frame [s]
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """What all frames of a film have in common.
+    """Data and settings that all frames of an animation share.
 
     Attributes
     ----------

@@ -23,7 +23,7 @@ class GifWriter(AbstractMovieWriter):
     """
 
     def setup(self, fig, outfile, dpi=None):
-        """Start the film of a figure."""
+        """Start the animation of a figure."""
         super().setup(fig, outfile, dpi=dpi)
         self.frames = []
         self.palette = Image.new("P", (1, 1))

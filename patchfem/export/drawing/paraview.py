@@ -22,7 +22,7 @@ MPA = 1e-6
 # Fraction of the cells whose stress the colours of a component cover; the others are peaks in
 # corners.
 SHARPEST = 0.998
-# name -> (title, index in the stored stress xx, yy, zz, xy, yz, xz; None for an array of its own)
+# name -> (title, index in the stored stress xx, yy, zz, xy, yz, xz; None for a separate array)
 STRESSES = {
     "von_mises": ("von Mises stress", None),
     "sigma_xx": ("stress sigma_xx", 0),
@@ -197,7 +197,7 @@ def stress_of(cell_data: dict, of: str) -> np.ndarray:
 
 
 def script(out: Path, film: Film, of: str, ends: tuple, status: bool = False) -> str:
-    """Return the text of the script that plays a film.
+    """Return the ParaView script that plays an animation.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Charts and other pictures drawn by matplotlib as SVG; equal numbers give equal bytes."""
+"""Charts and other pictures drawn by matplotlib as SVG; equal numbers produce equal bytes."""
 
 import io
 import re
@@ -164,7 +164,7 @@ def _write_plain_numbers(axis) -> None:
 
 
 def _write_label(axis, label: dict) -> None:
-    """Write a text at a point (x, y), `raised` [points] above it, to its left or right."""
+    """Write a label at a point (x, y), `raised` [points] above it, to its left or right."""
     on_left = label.get("side") == "left"
     axis.annotate(
         label["text"],

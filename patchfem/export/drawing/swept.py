@@ -1,4 +1,4 @@
-"""A measure of a sweep against its key as a chart: a line for each combination of the other keys."""
+"""Chart of a measure of a sweep against a key, a line per combination of the other keys."""
 
 import numpy as np
 

@@ -183,9 +183,9 @@ def stepped(values, step: float) -> np.ndarray:
 
 
 def _nearest(dataset, step: float, bits: int):
-    """Return the rounding of an array, and state it in its attributes.
+    """Return the function that rounds an array, and state the rounding in its attributes.
 
-    It is to the power of two at or below `step`, or to `bits` if the step is 0 or outside the range
+    It rounds to the power of two at or below `step`, or to `bits` if the step is 0 or outside the range
     of float32.
     """
     if not 1e-30 < step < 1e30:

@@ -1,4 +1,4 @@
-"""Files of a fit to rows of measured responses, and the file from which an interrupted fit continues."""
+"""Files of a fit to rows of measured responses, and the checkpoint of an interrupted fit."""
 
 import hashlib
 import json
@@ -155,7 +155,7 @@ def _starts(fitted: FittedRows) -> list:
 
 
 def _folds(fitted: FittedRows) -> list:
-    """Return the fit without each value that was left out, and its score on the readings left out."""
+    """Return the fits without the readings of each value, and their scores on these readings."""
     names = [bound.key for bound in fitted.keys.ranges]
     return [
         {
@@ -170,7 +170,10 @@ def _folds(fitted: FittedRows) -> list:
 
 
 def _placebos(fitted: FittedRows) -> list:
-    """Return the scores of each repeated fit; no reading is left out of it."""
+    """Return the scores of each placebo, a fit repeated with another value of a fixed key.
+
+    Placebos leave out no readings, so they have no score "left_out".
+    """
     out = []
     for placebo in fitted.placebos:
         score = fitted.score(placebo.logs, np.full(placebo.logs.size, np.nan))

@@ -28,7 +28,7 @@ from ...scene.rules import methods
 ENDINGS = (".mat", ".npz")
 # Smallest / largest singular value of the slides, below which they depend on one another.
 DEPEND = 1e-6
-# Features that matrices with friction as a function of the speed alone can describe.
+# Features that matrices can describe if friction is a function of the speed only.
 OF_SPEED = methods.EngineSupport("", "no-law faces levels")
 NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 
@@ -171,7 +171,7 @@ def _motions(slides) -> np.ndarray:
 
 
 def _speeds(rig) -> bool:
-    """Return whether the friction depends on the speed alone."""
+    """Return whether the friction depends only on the speed."""
     return all(one.numbers.law == "tanh" for one in rig.friction.interfaces)
 
 

@@ -34,7 +34,7 @@ INKS = {
 
 
 class Section(NamedTuple):
-    """A part of a page: its anchor, heading and HTML, in which texts are already escaped."""
+    """A part of a page: its anchor, heading and HTML, in which strings are already escaped."""
 
     anchor: str
     heading: str
@@ -179,7 +179,7 @@ def figure(number: int | str, svg: str, caption: str, alternative: str) -> str:
 
 
 def encoded(value) -> str:
-    """Return JSON of arrays, numbers, texts and containers of them.
+    """Return JSON of arrays, numbers, strings and containers of them.
 
     Numbers have DIGITS digits, and null stands for those that are not finite.
     """

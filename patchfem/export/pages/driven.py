@@ -30,7 +30,7 @@ def size(text) -> str:
 
 
 def driven(resolved: dict) -> str:
-    """Describe what moves a run, as a part of a sentence; "" if nothing does.
+    """Describe the drive of a run in a phrase; "" without a drive.
 
     resolved: the scene with all defaults, as nested tables.
     """

@@ -36,7 +36,7 @@ FIRST = (
 
 
 class Sentences(NamedTuple):
-    """Sentences of the summary of a sweep; "" if there is nothing to say.
+    """Sentences of the summary of a sweep; "" for those that do not apply.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ class SweepHeadline(NamedTuple):
         return f"{text.rstrip('.')} ({first}{notes[1:].rstrip('.')})."
 
     def _answer_parts(self) -> list:
-        """Return the sentences of which the answer is made."""
+        """Return the sentences of the answer."""
         said = self.said
         drawn = [one for one in (said.rank, said.scatter) if one]
         over_key = said.limit or said.peak
@@ -255,7 +255,7 @@ def _unsettled(measures: dict, outcome: np.ndarray) -> str:
 
 
 def _peaks_at_ends(table: dict) -> str:
-    """State in how many cases the peak frequency is an end of the swept frequencies; "" for none."""
+    """State in how many cases the peak frequency is an end of the frequency range, or ""."""
     measures, name = columns(table), "peak_frequency"
     if name not in measures:
         return ""

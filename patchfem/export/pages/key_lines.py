@@ -14,7 +14,7 @@ def varies(key: dict) -> bool:
 
 
 def shown_of(key: dict) -> Callable[[int], str]:
-    """Return a function that gives the value of a key in a case as text.
+    """Return a function that formats the value of a key in a case.
 
     It shows enough digits to distinguish neighbouring values.
     """

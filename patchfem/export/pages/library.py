@@ -17,7 +17,7 @@ def bokeh() -> str:
 
 
 def packed(text: str) -> str:
-    """Return a text as gzip in base64, which `unpack.js` reads; equal texts give equal results."""
+    """Return a string as gzip in base64 for `unpack.js`; equal strings have equal results."""
     return b64encode(compress(text.encode(), 6, mtime=0)).decode()
 
 

@@ -23,7 +23,7 @@ from .sentences import linked, short, zero_below
 
 # Relative change at which a measure reaches its limit; engineers call a change of 5 % negligible.
 LARGEST_CHANGE = 0.05
-DOUBLING = 1.0  # relative change of the peak pressure at its limit
+DOUBLING = 1.0  # relative change at which the peak pressure reaches its limit, twice its value
 MOTION_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
@@ -93,7 +93,7 @@ class Limits(NamedTuple):
     Attributes
     ----------
     key : dict or None
-        The key, with the texts of its values in `unit`; None if no numerical key varies along lines
+        The key, with the strings of its values in `unit`; None if no numerical key varies along lines
         of cases.
     found : sequence of KeyLimit
         One for each measure of CHANGE_AT_LIMIT that the cases have.
@@ -398,7 +398,7 @@ def _digits(limits: Limits, limit: KeyLimit) -> int:
 
 
 def _gap(limits: Limits, limit: KeyLimit) -> str:
-    """Write the gap that an angle opens over the patch; "" for another key or a patch of unknown size."""
+    """Write the gap that an angle opens over the patch; "" for other keys or an unknown size."""
     side = (limits.patch or {}).get(GAP_OF_ANGLE.get(limits.key["name"], ("", ""))[1])
     if not side or not limit.value:
         return ""
@@ -451,7 +451,7 @@ def _unit(limits: Limits) -> tuple:
 
 
 def _in_unit(key: dict, unit: str, scale: float) -> dict:
-    """Return a key with the texts of its values in a unit."""
+    """Return a key with the strings of its values in a unit."""
     if all(str(text).partition(" ")[2] in ("", unit) for text in key["texts"]):
         return key
     return key | {

@@ -17,7 +17,7 @@ from .sentences import linked, zero_below
 KEYS = ("drive.frequency",)
 HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 LEAST = 5  # smallest number of frequencies that show a peak
-SURE = 3.0  # factor on the differences between polynomials, which gives the error
+SURE = 3.0  # error / difference between the polynomials, a safety factor
 NEWTON = 30  # Newton steps from the vertex of a parabola, or from the crossing of a straight line
 OPEN = "not resolved by these cases"
 # Error / value of a steady estimate, up to which the estimate is used as the height in a case.
@@ -324,7 +324,7 @@ def table(peaks: list) -> str:
 
 
 def _cells(peak: Peak) -> list:
-    """Return the texts of frequency, height and half-power width."""
+    """Return the strings of frequency, height and half-power width."""
     swept = peak.swept
     if not swept.height.is_known():
         return ["not known", "not known", "&ndash;"]

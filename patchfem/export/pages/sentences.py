@@ -1,6 +1,6 @@
 """Results of a run as sentences, and its measures in groups, in the units that people use.
 
-In: the summary of a run, as in summary.json. Out: texts, among them the verdict (`verdict`), the
+In: the summary of a run, as in summary.json. Out: strings, among them the verdict (`verdict`), the
 headline (`headline`) and the table of measures (`table_of`).
 """
 
@@ -52,7 +52,7 @@ OF_WHAT = {  # Added to a value that would otherwise be mistaken for another qua
     "stick_fraction": "of the interface as a whole",
     "equivalent_damping": "a damping ratio of mode 1",
 }
-# Suffix of the measure that says how much a result of a random drive differs between records.
+# Suffix of the measure that states how much a result of a random drive differs between records.
 SCATTER = "_scatter"
 SHAKEN = {
     "relative_displacement_rms": "the displacement of the output is {} rms",
@@ -113,7 +113,7 @@ def units(name: str, value: float, unit: str, error: float | None = None) -> lis
 
 
 def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
-    """Return value and error of a measure as texts.
+    """Return value and error of a measure as strings.
 
     They are in the first unit of the measure, or in SI times `scale`.
     """
@@ -671,7 +671,7 @@ def in_order(measures: dict) -> dict:
 
 
 def of_records(name: str, measures: dict) -> tuple:
-    """Return a measure of a random drive and its 95 % interval over records, as texts.
+    """Return a measure of a random drive and its 95 % interval over records, as strings.
 
     They have the digits that the scatter of records allows; ("", "") for any other measure.
     """
@@ -748,7 +748,7 @@ def fragment(summary: dict, sentence: str, cycles: float | None, released: str =
 
 
 def _records(name: str, measures: dict) -> str:
-    """Write the interval over other records in brackets; it says that ± is the numerical error."""
+    """Write the interval over other records in brackets, and state that ± is the numerical error."""
     text = of_records(name, measures)[1]
     numerics = "± is the numerical error; " if "±" in pair(name, measures[name]) else ""
     return f" ({numerics}{text} for other records)" if text else ""

@@ -20,7 +20,7 @@ from .sweep import label
 
 TALL = 410  # height of a figure [px]
 POINTS = 4000  # points of a line in a figure
-MANY = 10.0  # ratio to the first value from which a change is given as a factor
+MANY = 10.0  # ratio to the first value; a larger change is written as a factor
 CYCLES = 2.0  # last cycles that are shown; result.nc stores this many completely
 # title, x: (variable, label), y: (variable, label); of variables over time only the last cycles
 CHARTS = (
@@ -260,7 +260,7 @@ def _differences(runs: list, names: list) -> str:
 
 
 def _written(value) -> str:
-    """Write a value of a resolved scene as HTML; long texts are cut."""
+    """Write a value of a resolved scene as HTML; long strings are cut."""
     text = (
         "&ndash;"
         if value is None

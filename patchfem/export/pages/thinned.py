@@ -1,4 +1,4 @@
-"""Coarser meshes for a page: some lines are kept; a cell has the mean of those it covers."""
+"""Coarser meshes for a page, with means over the cells that a coarse cell covers."""
 
 from dataclasses import dataclass
 

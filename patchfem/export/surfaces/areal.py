@@ -1,4 +1,4 @@
-"""Heights as files that other programs read: X3P (ISO 5436-2, ISO 25178-72), and text in columns."""
+"""Heights as files for other programs: X3P (ISO 5436-2, ISO 25178-72) and text in columns."""
 
 import hashlib
 from datetime import UTC, datetime
@@ -65,7 +65,7 @@ def write_x3p(path: Path, x, y, z, text: str) -> None:
 
 
 def write_columns(path: Path, x, y, z) -> None:
-    """Write the known heights of a scan as columns x, y, z [um], unless they are too many for a text.
+    """Write the known heights of a scan as columns x, y, z [um] unless they are too many.
 
     Parameters
     ----------

@@ -107,7 +107,7 @@ def _words(name: str) -> str:
 
 
 def _title(group: str, direction: str, kind: str) -> str:
-    """Return the title of a group of pairs that has its own means."""
+    """Return the title of a group of pairs over which means are taken."""
     along = f"along {direction}" if direction else ""
     return ", ".join(filter(None, (group, pairs.KINDS[kind], along)))
 
@@ -170,7 +170,7 @@ def _direction(row: dict) -> str:
 
 
 def _main_texts(row: dict) -> list:
-    """Return the main quantities of a pair that have an interval as texts."""
+    """Return the main quantities of a pair that have an interval as strings."""
     if row["outcome"] == "failed":
         return []
     out = []

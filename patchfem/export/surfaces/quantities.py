@@ -15,12 +15,12 @@ MAX_PLAIN = 1e6  # larger numbers are written with a power of ten
 MIN_DIGITS = 3  # digits of a value with a wide interval
 MAX_DIGITS = 6  # digits of a value with a narrow interval
 DIGITS_ALONE = 5  # digits of a value without an interval
-MISSING = "-"  # stands for a quantity without a value
+MISSING = "-"  # shown for a quantity without a value
 UNITS = {**UNIT_LADDERS, "m2": (("um^2", 1e12),), "1": (("", 1.0),)}
 
 
 class QuantityText(NamedTuple):
-    """Value, interval ("" if there is none) and unit of a quantity as texts."""
+    """Value, interval ("" if there is none) and unit of a quantity as strings."""
 
     value: str
     interval: str

@@ -273,7 +273,7 @@ def _draw_gaps(x, gaps: tuple) -> str:
 
 
 def _draw_worn_depth(x, depth) -> str:
-    """Draw the worn depth and its part that a trace alone could not show."""
+    """Draw the worn depth, with the wear that a single trace could not show."""
     place, mm = _place_axis(x)
     hidden = np.array(hidden_line(x, depth))
     unit, scale = choose_axis_unit(depth, "m")

@@ -343,7 +343,7 @@ def joined(tables: list, names: list) -> dict:
     for key in keys[0]:
         own = [next(one for one in table["keys"] if one["name"] == key) for table in tables]
         texts = [text for one in own for text in one["texts"]]
-        words = not any(map(NUMBER.match, texts))  # each table numbered the words in its own order
+        words = not any(map(NUMBER.match, texts))  # each table numbers the words in another order
         columns.append(
             {
                 "name": key,

@@ -252,7 +252,7 @@ def sign_of(asked: Asked, cases: Cases, folder: Folder, page: bool) -> str:
 
 
 def _shown(axis: Axis) -> tuple:
-    """Return what the tables contain of an axis: its texts, or a hash of its numbers."""
+    """Return what the tables contain of an axis: its strings, or a hash of its numbers."""
     texts = axis.texts
     return (
         (texts.unit, sha256(texts.numbers).hexdigest())
@@ -307,7 +307,7 @@ def write_tables(
         write_page(table, lead, folder.target)
     else:
         (folder.target / WHOLE).unlink(missing_ok=True)
-    # This file comes last, because it contains the hash that stands for the others.
+    # This file comes last, because it contains the hash of the others.
     write_answer(
         answer_of(lead, table["outcome"], sign, signed_of(asked, cases)),
         folder.target / "sweep.json",

@@ -26,8 +26,8 @@ from ...scene.keys.lookup import find_key
 from .. import netcdf
 from ..summary import versions
 
-BLOCK = 4000  # cases whose texts are in memory at the same time
-TRIED = 3  # cases that are tried to find what all cases have in common
+BLOCK = 4000  # cases whose strings are in memory at the same time
+TRIED = 3  # maximum number of cases to read until one is valid, for the facts that all cases share
 ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 FACTS = {
     "tolerance": ("accuracy", "tolerance"),
@@ -79,13 +79,13 @@ def head(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> list[str
 
 
 def lines(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> Iterator[list[str]]:
-    """Yield a line of sweep.csv per case; "" stands for a missing value.
+    """Yield a line of sweep.csv per case; a missing value is "".
 
     A line contains the swept keys as written, the outcome, every measure with its error in SI, the
     message of a failed case, and the name of its folder if `keys` are given.
     """
     columns = [column for name in names_of(found) for column in columns_of(found, name)]
-    for first in range(0, len(cases), BLOCK):  # the texts of all cases would fill the memory
+    for first in range(0, len(cases), BLOCK):  # the strings of all cases would fill the memory
         numbers = range(first, min(first + BLOCK, len(cases)))
         block = [
             [
@@ -212,7 +212,7 @@ def facts(asked: Asked, cases: Cases) -> dict:
 
 
 def _numbers(values: Sequence) -> np.ndarray:
-    """Return values as an array of numbers or of texts."""
+    """Return values as an array of numbers or of strings."""
     return np.asarray(values, float if isinstance(values[0], float) else str)
 
 

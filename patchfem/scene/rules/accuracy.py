@@ -13,7 +13,7 @@ from .scene_draft import SceneDraft
 
 
 class SettingScope(NamedTuple):
-    """Where a numerical setting has an effect; texts are words separated by blanks.
+    """Where a numerical setting has an effect; strings are words separated by blanks.
 
     - kinds: kinds of scenes.
     - methods: methods and engines. "auto" stands for the engines that the program may choose, "bench" for

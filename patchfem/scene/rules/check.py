@@ -31,7 +31,7 @@ class SimpleFacts(Facts):
 
     @property
     def is_law_independent_of_rest_time(self) -> bool:
-        """Whether the friction law does not change at rest."""
+        """Whether the friction force does not depend on the time at rest."""
         law = self.draft.tables.friction
         return law is not None and _is_independent_of_rest_time(law)
 

@@ -35,7 +35,7 @@ class DriveFacts(Facts):
 
     @property
     def has_length(self) -> bool:
-        """Whether the scene says when the run ends."""
+        """Whether the scene states when the run ends."""
         return self.has_any("cycles", "duration")
 
     @property

@@ -37,7 +37,7 @@ class GrooveFacts(Facts):
 
     @property
     def key_against_recursion(self) -> str:
-        """Key of the law that prevents the recursion over bonds; "" if nothing does."""
+        """Key of [friction] that rules out the recursion over bonds; "" if none does."""
         law = self.scene.friction
         if not self.has_bonds or not (is_bond_list(self.law_table) or law.breakaway):
             return ""

@@ -191,7 +191,7 @@ def find_compliance_key(law: Any, tables: Tables) -> str:
 
 
 def list_lower_shapes(contact: Any, at: str = "contact") -> list[str]:
-    """Return the keys `on` of the shapes that lie on the lower piece."""
+    """List the keys that place a gap shape on the lower piece, such as `contact.crown.on`."""
     shapes = contact.shapes if contact is not None else {}
     return [f"{at}.{name}.on" for name, shape in shapes.items() if shape.on == "lower"]
 

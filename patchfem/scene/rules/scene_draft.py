@@ -127,7 +127,7 @@ class SceneDraft:
             raise SceneError(self.mistake_lines())
 
     def display_key(self, key: str) -> str:
-        """Return a key as the user writes it: a mode has its name in place of its number."""
+        """Return a key as the user writes it: a mode has its name instead of its number."""
         pieces = key.split(".")
         if pieces[:2] != ["structure", "mode"] or len(pieces) < 4 or pieces[3] == "name":
             return key

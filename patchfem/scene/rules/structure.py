@@ -340,7 +340,7 @@ def advise_modes(draft: SceneDraft) -> str:
 
 
 def _check_modes(draft: SceneDraft) -> None:
-    """Report modes of the same name, heavy damping and impossible participations."""
+    """Report modes of the same name, heavy damping and impossible participation factors."""
     modes = draft.values.structure.mode
     names: set[str] = set()
     for index, mode in enumerate(modes):

@@ -364,7 +364,7 @@ def _fit_line_through_ends(
 
 
 def _are_straight(depth, ends) -> bool:
-    """Whether both ends lie on a common line within their noise and its correlation."""
+    """Whether both ends follow the common line, with allowance for correlated noise."""
     for part in np.split(np.flatnonzero(ends), 2):
         rest = depth[part]
         base = np.linalg.qr(np.vander(np.linspace(-1, 1, part.size), 3, True))[0]

@@ -17,7 +17,7 @@ from ..profile import Profile, level, resample_evenly
 MIN_HEIGHTS = 12  # number of common heights; fewer do not determine the parameters
 N_BLOCKS = 20  # number of blocks of a trace, whose modes give the starting points of a fit
 ROUNDING = 1e-5  # fraction of the rms height; a smaller scale is round-off of the file
-MAX_WINDOW = 51  # number of samples of the longest parabola that gives a slope
+MAX_WINDOW = 51  # number of samples of the longest parabola from which a slope is taken
 SLOPE_NOISE = 0.05  # noise / rms slope that the smoothed slopes should reach
 MAX_STEP = 4.0  # samples or pixels; largest displacement in one step of the fit
 
@@ -107,7 +107,7 @@ class TraceModel:
         return depth, np.column_stack(columns)
 
     def limit_step(self, step, free) -> np.ndarray:
-        """Limit a step of shift and stretch so that no sample moves by more than a few samples."""
+        """Limit a step of shift and stretch so no height moves by more than a few samples."""
         limits = {
             Parameter.SHIFT: MAX_STEP * self.step,
             Parameter.STRETCH: MAX_STEP * self.step / self.half,

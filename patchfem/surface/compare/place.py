@@ -32,7 +32,7 @@ MAX_WHITE_LENGTH = 1.5  # correlation length in samples; noise with a longer one
 # (lost - grown) / (lost + grown) area; above it, wear alone explains the change
 MIN_WEAR_BALANCE = 0.9
 MIN_AGREED = 0.6  # fraction of the heights that agree; most traces of different surfaces have fewer
-# noise / rms height where so many heights agree; pairs of one place reach 0.19, saw teeth of two places 0.29
+# noise / rms height where so many heights agree; pairs at one position reach 0.19, saw teeth at two positions 0.29
 MAX_AGREED_NOISE = 0.2
 USE_SAME_MARK = "if both traces were measured from the same mark, use --shift '0 mm'"
 
@@ -41,9 +41,9 @@ class Place(NamedTuple):
     """Common part of two traces, or the reason why there is none.
 
     - match: result of the search; None if the shift is given.
-    - alignment: alignment at this place, None if the traces share no place.
+    - alignment: alignment of the common part, None if there is none.
     - reason: reason why there is no alignment.
-    - is_reversed: whether the traces share a place if the second one is taken as the unworn
+    - is_reversed: whether the traces have a common part if the second one is taken as the unworn
       one.
     - before, after: traces as they were compared.
     - is_mirrored: whether the second trace was mirrored.
@@ -201,7 +201,7 @@ def _has_high_agreement(alignment: Alignment) -> bool:
 
 
 def _agrees_closely(alignment: Alignment, match: Match, max_height: float = np.inf) -> bool:
-    """Whether the noise is so small that it need not be white.
+    """Whether the traces agree so closely that they need not pass the test of white noise.
 
     max_height [m] limits the height that the noise is compared with: the depth of a track does not
     count as roughness.

@@ -62,7 +62,10 @@ def _measure_heights(z, step: float, band: tuple) -> Size:
 
 
 def resample(trace: Profile, step: float) -> tuple:
-    """Resample a levelled trace to about a step [m]; return the heights (n,) [m] and the step."""
+    """Resample a trace to a step [m] if its step is smaller, and level it.
+
+    Returns the heights (n,) [m] and their step.
+    """
     flat = level(resample_evenly(trace))
     if step < flat.step * 1.01:
         return flat.z, flat.step

@@ -101,7 +101,7 @@ def _has_wear(alignment: Alignment, relative, places: list) -> bool:
 
 
 def _is_wide(relative, places: list) -> bool:
-    """Whether one of the deep runs is wider than an interpolation error."""
+    """Whether a deep run has more samples above half its depth than interpolation errors have."""
     parts = [relative[first : last + 1] for first, last in places]
     return any((deep > deep.max() / 2).sum() >= SPECK_SAMPLES for deep in parts)
 

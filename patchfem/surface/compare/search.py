@@ -187,7 +187,7 @@ def _overlapping_lags(count: int, other: int) -> np.ndarray:
 
 
 def _resample(trace: Profile, step: float) -> np.ndarray:
-    """Return the heights at a constant step, averaged over it where it is coarser than the samples."""
+    """Return the heights at a constant step, as means over the step if it is the coarser one."""
     count = int(trace.length / step * (1 + 1e-9)) + 1
     z = running_mean(trace.z, max(1, round(step / trace.step)))
     return np.interp(trace.x[0] + step * np.arange(count), trace.x, z)

@@ -164,7 +164,7 @@ def median_of_five(values) -> np.ndarray:
 
 
 def find_worn_heights(section: Section) -> np.ndarray:
-    """Find the worn heights, (n,) bool, by single heights and by means of 4, 16 and 64 of them."""
+    """Find the worn heights (n,) bool by tests of single heights and averages of 4, 16 and 64."""
     relative = section.depth / section.noise
     threshold = noise_threshold(relative.size)
     worn = median_of_five(relative) > threshold

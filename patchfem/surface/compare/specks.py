@@ -112,9 +112,10 @@ def limit_left_out_wear(
 def _min_wall_step(
     alignment: Alignment, at: int, height: float, step: float, *, is_deep: bool
 ) -> float:
-    """Return the smallest step [m] at both walls from which a height [m] is a speck.
+    """Return the jump [m] that both walls of a peak or dip must reach to make it a speck.
 
-    step [m]: robust deviation of the steps of the surface there.
+    The jump is between neighbouring samples; height [m] is that of the peak or dip. step [m]: robust
+    deviation of the differences of neighbouring heights around it.
     """
     depth = alignment.depth[at]
     first = alignment.first[at]

@@ -38,7 +38,10 @@ def judge_files(
     keep_spikes: bool = False,
     datum: str = "",
 ) -> Judgement:
-    """Compare the files before and after wear and judge them; parameters as in `compare_files`."""
+    """Compare files before and after wear, and state in sentences whether the surface wore.
+
+    The parameters are those of `compare_files`.
+    """
     parts = compare_files(paths, direction, units, shift, keep_spikes=keep_spikes, datum=datum)
     directions = compare_directions(parts)
     return Judgement(parts, compose_verdict(parts, directions), directions)
@@ -73,7 +76,7 @@ class _Facts(NamedTuple):
 
     @property
     def change(self) -> str:
-        """Headline on wear and waviness, without place and order of the surfaces."""
+        """Headline on wear and waviness, without position and order of the surfaces."""
         if self.scan_headline and self.waves == "not known":
             is_plain = self.scan_headline in (scans.WORN, scans.NONE)
             return self.scan_headline if is_plain else "waves not known"

@@ -60,7 +60,7 @@ class Extent(NamedTuple):
 
     @property
     def known(self) -> "Extent":
-        """Extent in which an end is unknown if only the common part of the traces ends there."""
+        """Extent with unknown ends where only the common part of the traces ends."""
         reason = "the wear reaches the end of the common part of the traces here and may go on"
         sides = []
         for ends in (self.before, self.after):
@@ -167,16 +167,16 @@ def measure_worn(
 
 
 def limit_slight_wear(alignment: Alignment, section: Section) -> float:
-    """Estimate by how much [m] the floor may be too low because noise hides slight wear.
+    """Limit the error [m] of the reference level that slight wear below the noise causes.
 
-    Heights that wore less than the noise shows are taken as unworn. They lower the floor, from which
-    all depths are measured, by their sum / the number of unworn heights. As many heights may have worn
+    Heights that wore less than the noise shows are taken as unworn. They lower the level from which
+    all depths are measured by their sum / the number of unworn heights. As many heights may have worn
     by up to 2.5 standard deviations of the noise as have worn by 2.5 to 5 of them.
     """
     relative = section.depth / section.noise
     distance = np.abs(relative)
     is_slight = (distance > MAX_UNWORN) & (distance < 2 * MAX_UNWORN)
-    # noise alone is as often above the floor as below it
+    # noise alone is as often above the reference level as below it
     n_slight = max(float(np.sign(relative[is_slight]).sum()), 0.0)
     deepest = MAX_UNWORN * float(np.median(section.noise))
     return n_slight * deepest / max(int(alignment.unworn.sum()), 1)

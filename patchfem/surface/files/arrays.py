@@ -1,6 +1,6 @@
-"""Arrays in NumPy's .npy and MATLAB's .mat: columns x, z or x, y, z, or variables of these names.
+"""Surfaces in .npy and .mat files: columns x, z or x, y, z, or variables of these names.
 
-Such files state no units, so the caller does. Nothing in them is executed.
+These files state no units, so the caller does. Nothing in them is executed.
 """
 
 import io

@@ -1,7 +1,7 @@
 """Line scan that a Dektak stylus instrument exported as CSV.
 
 The lateral column is printed to 0.1 um, so the step that it shows is wrong by half of that; the
-true step is the length of the scan over the number of its points. Heights and places stay as the
+true step is the length of the scan over the number of its points. Heights and positions stay as the
 instrument wrote them: raw, not levelled, from 0 on.
 """
 
@@ -22,7 +22,7 @@ from .units import parse_length_unit
 
 FIRST_WORDS = b"Scan Parameters"  # every export begins with these
 MIN_DIGIT = 1e-5  # smallest printed digit of x, in the unit of the file
-MAX_STEP_ERROR = 0.6  # printed digits between a rounded and a true place: half, and round-off
+MAX_STEP_ERROR = 0.6  # printed digits between a rounded and a true position: half, and round-off
 _LENGTH = re.compile(
     r"^Length,\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d_]*)\s*$", re.MULTILINE
 )
@@ -70,9 +70,9 @@ def _parse_unit(word: str) -> float | None:
 
 
 def _restore_places(x, length: float, factor: float) -> tuple[np.ndarray, str]:
-    """Replace rounded places by equal steps of the length [m] in the header, with a note.
+    """Replace rounded positions by equal steps of the length [m] in the header, with a note.
 
-    The printed places stay if the steps do not fit them. factor: of x to metres.
+    The printed positions stay if the steps do not fit them. factor: of x to metres.
     """
     if x.size < 3 or not np.isfinite(x).all() or not x[-1] > x[0]:
         return x, ""

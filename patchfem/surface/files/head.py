@@ -1,4 +1,4 @@
-"""Head of a text file: names and units of its columns, or size and units of a matrix of heights.
+"""Header of a text file: names and units of columns, or size and units of a matrix.
 
 A line above the first row of numbers is a comment (#, % or //) or text. A line that names x and z
 with their units ends the head. Otherwise names and units may stand in lines of their own, and `#
@@ -103,7 +103,7 @@ class ColumnNames(NamedTuple):
 
 
 class Head(NamedTuple):
-    """Lines above the rows of a text.
+    """Header of a text file: the lines above its rows.
 
     lines: of `Line`; names: cells of the line that names x and z with their units, [] without such
     a line; row: cells of the first row of numbers, [] with one; delimiter: of either; number: lines
@@ -118,7 +118,7 @@ class Head(NamedTuple):
     start: int
 
     def column_names(self) -> ColumnNames:
-        """Find the names of the columns, and their units in a line of their own."""
+        """Find the names of the columns, and their units if these are in a separate line."""
         if self.names:
             return ColumnNames(self.number, self.names, [])
         found = ColumnNames(0, [], [])
@@ -167,7 +167,7 @@ class Head(NamedTuple):
 
 
 def read_head(path, text: str) -> Head:
-    """Read the head of a text; raises PatchfemError if no row of numbers follows it."""
+    """Read the header of a text file; raises PatchfemError if no row of numbers follows it."""
     start = 0
     number = 0
     lines = []

@@ -150,7 +150,7 @@ def _find_height_factor(path, facts: dict, units: tuple | None) -> Scale:
 
 
 def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) -> Scale:
-    """Return the sample spacing [m] along x or y: the pixel size, or scan size / number of pixels."""
+    """Return the sample spacing [m] along x or y: pixel size, or scan size / number of pixels."""
     size, step = ("width", "step_x") if axis == "x" else ("height", "step_y")
     pixel = None if units is None else parse_pixel_size(units[0])
     if pixel is not None:
@@ -160,7 +160,7 @@ def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) ->
         )
         return Scale(pixel, (note,) if size in facts or step in facts else ())
     if axis == "y" and step not in facts and size not in facts:
-        step = "step_x"  # a size of one number is that of square pixels
+        step = "step_x"  # a single pixel size holds for both axes, as for square pixels
     number, word = facts.get(step, facts.get(size, UNKNOWN))
     if number is None or not 0 < number < math.inf:
         name = "width" if axis == "x" else "height"
@@ -172,7 +172,7 @@ def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) ->
         word = facts.get("unit_y", UNKNOWN).word
     word = word or facts.get("lateral", UNKNOWN).word
     if not word and facts.get("format", UNKNOWN).word.lower() == "ascii":
-        word = "nm"  # SPIP writes places in nanometres
+        word = "nm"  # SPIP writes coordinates in nanometres
     if units is None and parse_length_unit(word) is None:
         raise PatchfemError(
             f"{path}: the unit of the scan's width and height, '{shorten(word)}', is not known; "

@@ -1,4 +1,4 @@
-"""Points with their places as an areal scan, if they lie on the rows and columns of a raster."""
+"""Areal scans of points that lie on the rows and columns of a raster."""
 
 from typing import NamedTuple
 
@@ -12,11 +12,11 @@ from ..samples import check_span, make_trace, require_finite, undo_rounding
 from .raw import MAX_POINTS
 
 MAX_CELLS_PER_POINT = 4  # cells of the raster / points; scattered points have more
-ROUND_OFF = 1e-9  # relative to the length of an axis; nearer places are the same
+ROUND_OFF = 1e-9  # relative to the length of an axis; nearer positions are the same
 
 
 class Axis(NamedTuple):
-    """Distinct increasing places along an axis, and the index of the place of each point."""
+    """Distinct increasing positions along an axis, and the index of the position of each point."""
 
     places: np.ndarray
     numbers: np.ndarray
@@ -78,7 +78,7 @@ def make_scan_of_points(
 
 
 def make_scan_of_matrix(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal:
-    """Make an areal scan of heights on a grid, or a trace if y has one place.
+    """Make an areal scan of heights on a grid, or a trace if y has one position.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def make_scan_of_matrix(path, x, y, z, stated: str = "", notes: tuple = ()) -> P
 
 
 def _find_axis(values) -> Axis:
-    """Find the distinct places along an axis; places within round-off are the same."""
+    """Find the distinct positions along an axis; positions within round-off are the same."""
     order = np.argsort(values, kind="stable")
     is_new = np.diff(values[order]) > ROUND_OFF * max(float(np.ptp(values)), 1e-300)
     numbers = np.empty(values.size, np.int64)

@@ -129,7 +129,7 @@ def _unpack(path: Path, name: Path, data: bytes) -> Raw:
 
 
 def _gunzip(path, data: bytes) -> bytes:
-    """Unpack a gzip file after counting its content, so that a zip bomb takes no memory."""
+    """Unpack a gzip file after counting its content, so a zip bomb takes no memory."""
     limit = min(MAX_BYTES, max(MIB, MAX_UNPACK_RATIO * len(data)))
     try:
         with gzip.open(io.BytesIO(data)) as file:
@@ -155,7 +155,7 @@ def _gunzip(path, data: bytes) -> bytes:
 
 
 def _unzip(raw: Raw, *, is_unpacked: bool = False) -> Raw:
-    """Return an X3P file as it is, and the content of any other zip file with a single member."""
+    """Return an X3P file unchanged, and the content of any other zip file with a single member."""
     archive = open_zip(raw)
     members = [member for member in archive.infolist() if not member.filename.endswith("/")]
     if any(Path(member.filename).name == "main.xml" for member in members):
@@ -234,7 +234,7 @@ def _check_ratio(raw: Raw, info: zipfile.ZipInfo) -> None:
 
 
 def shorten(text: str, length: int = 40) -> str:
-    """Make a text from a file printable and at most 40 characters long, for a message."""
+    """Make a string of a file printable and at most 40 characters long, for a message."""
     if not text.isprintable():
         text = text.encode("unicode_escape").decode()
     return text if len(text) <= length else f"{text[: length - 3]}..."

@@ -1,4 +1,4 @@
-"""Rows of numbers below the head of a text file."""
+"""Rows of numbers below the header of a text file."""
 
 import io
 import re
@@ -135,7 +135,7 @@ def read_matrix(path, body: str, head: Head) -> np.ndarray:
 
 
 def _iterate_lines(body: str) -> Iterator[str]:
-    """Iterate over the lines of a text without holding all of them."""
+    """Iterate over the lines of a text file without storing all of them."""
     start = 0
     while start < len(body):
         stop = body.find("\n", start)
@@ -159,7 +159,7 @@ def _find_delimiter(line: str, expected: str | None, count: int) -> str | None:
 
 
 def _load_table(body: str, delimiter: str | None, *, has_comma: bool) -> np.ndarray | None:
-    """Load rows of plain numbers at once; None for any other text, which is read line by line."""
+    """Load rows of plain numbers at once; None for other rows, which are read line by line."""
     if has_comma and "." in body:
         return None
     if has_comma:

@@ -31,7 +31,7 @@ _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
 class Places(NamedTuple):
-    """Index of each wanted column by role, in the order x, (y,) z, (valid), with notes."""
+    """Index of each column that is read, by role, in the order x, (y,) z, (valid), with notes."""
 
     columns: dict
     notes: tuple = ()
@@ -45,7 +45,7 @@ class Factors(NamedTuple):
 
 
 def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
-    """Read the trace or areal scan in a text file of two or three columns, or the scan in a matrix.
+    """Read the trace or areal scan in a text file of two or three columns or a matrix.
 
     units: units of x (and y) and of z, which complete what the file states and overrule it with a
     note. Samples at one x become their mean, and x that are even but for their printed digits are
@@ -137,7 +137,7 @@ def _find_encoding(raw: Raw) -> str:
 
 
 def _find_places(line: str, names: list, *, has_units: bool) -> Places:
-    """Find the wanted columns by name, or by order if the user gave units and names are unknown."""
+    """Find the columns to read by name, or by order if units are given and names are unknown."""
     roles = {k: parse_column(name).role for k, name in enumerate(names)}
     valid = {role: k for k, role in roles.items() if role == "valid"}
     data = {k: role for k, role in roles.items() if role not in ("valid", "index")}

@@ -149,7 +149,7 @@ def _make_grid(
 
 
 def _make_raster(package: Package, columns: list, axes: list, shape: Shape) -> Profile | Areal:
-    """Arrange points that store their places as a raster."""
+    """Arrange points with stored coordinates on a raster."""
     numbers = np.arange(shape.count)
     stored = iter(columns)
     places = []

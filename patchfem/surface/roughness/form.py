@@ -57,7 +57,7 @@ def parse_form(text: str) -> int | str:
 
 
 def subtract_form(surface: Profile | Areal, form: int | str = 1) -> tuple[Profile | Areal, str]:
-    """Subtract the least-squares form of a surface and return the rest with the name of the form.
+    """Subtract the least-squares form of a surface; return the remainder and the form's name.
 
     form: degree of a polynomial (of a scan: total degree in x and y), or "cylinder": a circle along
     a trace, a cylinder of any direction and tilt under a scan. Distances count along z. A scan of
@@ -138,7 +138,7 @@ def _estimate_circle(points) -> Cylinder:
 
 
 def _estimate_cylinder(points) -> Cylinder:
-    """Return the least-squares quadric of a scan, bent across one axis alone."""
+    """Return the least-squares quadric of a scan, curved only across one axis."""
     x, y, z = points
     columns = np.column_stack([np.ones(x.size), x, y, x * x / 2, x * y, y * y / 2])
     base = np.linalg.lstsq(columns, z, rcond=None)[0]

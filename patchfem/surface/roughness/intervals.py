@@ -1,4 +1,4 @@
-"""Interval of a parameter that one trace allows: 5 to 95 %, from the spectrum of the trace itself.
+"""Interval (5 to 95 %) of a roughness parameter, from the spectrum of a single trace.
 
 The interval holds the mean that the parameter has over all traces of this length on a surface with
 Gaussian heights and the spectrum of this trace, in 90 of 100 traces:
@@ -113,7 +113,7 @@ class Intervals:
 
     @cached_property
     def is_short(self) -> bool:
-        """Whether the trace is too short to contain many of its longest waves, so that Rq would grow with length."""
+        """Whether the trace is too short for its longest waves, so Rq would grow with its length."""
         wave = self.spectrum.dominant
         if wave is None or wave * MIN_WAVES <= self.heights.length:
             return False
@@ -127,7 +127,7 @@ class Intervals:
             density = density * np.sin(np.pi * spectrum.frequency * self.heights.step) ** 2
         if not density.any():
             return 1.0
-        squares = float(density @ density) / (1 + 1 / spectrum.tapers)  # less its own scatter
+        squares = float(density @ density) / (1 + 1 / spectrum.tapers)  # minus the scatter
         total = 2 * spectrum.length * float(density.sum()) ** 2 * spectrum.step / squares
         widening = self._slope_widening if kind == "slope" else self._height_widening
         return max((total - SPENT_FREEDOM) / widening**2, 1.0)
@@ -168,7 +168,7 @@ def _estimate_widening(heights: Heights) -> float:
 
 
 def simulate_traces(spectrum: Spectrum, heights: Heights, degree: int | None) -> list[Heights]:
-    """Simulate Gaussian traces with a spectrum; each call gives the same ones.
+    """Simulate Gaussian traces with a spectrum; each call returns the same traces.
 
     They are as long as the trace where MAX_SAMPLES samples suffice, on its step or a multiple of it
     that resolves all waves but 1 % of the mean square by six samples. Each is cut from a period of

@@ -1,4 +1,4 @@
-"""Heights of an evenly sampled profile and the quantities that several roughness parameters share.
+"""Quantities of an evenly sampled profile that several roughness parameters share.
 
 These are the moments, the spacing of hills and dales (ISO 21920-2), the Abbott curve, its core (ISO
 13565-2) and its volumes (ISO 25178-2).
@@ -130,7 +130,7 @@ def mean_spacing(heights: Heights) -> float | None:
 
 
 def mean_element_height(heights: Heights) -> float | None:
-    """Compute Rc, the mean height of the elements of `mean_spacing` [m]; None if there is no element."""
+    """Compute Rc, the mean height [m] of the elements of `mean_spacing`; None without elements."""
     places = crossings(heights)
     if places.size < 3:
         return None
@@ -140,7 +140,7 @@ def mean_element_height(heights: Heights) -> float | None:
 
 
 def crossings(heights: Heights) -> np.ndarray:
-    """Find the places [m] where a hill ends and a dale begins, or the reverse.
+    """Find the positions [m] where a hill ends and a dale begins, or the reverse.
 
     The mean line cuts the trace into hills and dales. Those lower than 10 % of Rz or narrower than
     1 % of the section do not count, and neighbours of one sign become one. Without a section the
@@ -158,7 +158,7 @@ def crossings(heights: Heights) -> np.ndarray:
     first = np.concatenate([[0], starts + 1])
     extent = np.maximum.reduceat(np.abs(z), first)
     width = np.diff(np.concatenate([[0.0], places, [(z.size - 1) * heights.step]]))
-    width[[0, -1]] = np.inf  # the ends of the trace cut these two, so that their width is unknown
+    width[[0, -1]] = np.inf  # the ends of the trace cut these two, so their width is unknown
     is_high = extent >= MIN_HEIGHT_FRACTION * rough
     is_wide = width >= MIN_WIDTH_FRACTION * (heights.section or 0.0)
     kept = np.flatnonzero(is_high & is_wide)

@@ -48,7 +48,7 @@ class Moments(NamedTuple):
 
 
 class Peaks(NamedTuple):
-    """Peaks of a surface: radius of their mean curvature [m], density [1/m2], height deviation [m]."""
+    """Peaks of a surface: radius of mean curvature [m], density [1/m2], height deviation [m]."""
 
     radius: float
     density: float
@@ -159,7 +159,7 @@ def _describe_dust(trace: Profile) -> tuple:
 
 
 def _describe_skew(z, moments: Moments, length: float) -> str:
-    """State the skewness and kurtosis of heights z (n,) [m] that are not Gaussian, "" if they are.
+    """State skewness and kurtosis of heights z (n,) [m]; "" if they are Gaussian.
 
     A Gaussian trace has slope length/(pi height) crossings of its mean line, each taken as one
     independent height.

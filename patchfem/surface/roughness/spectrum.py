@@ -71,7 +71,7 @@ class Spectrum:
         return float(ends[1] - ends[0])
 
     def within(self, low: float, high: float) -> np.ndarray:
-        """Return the density (k,) [m3] of the waves from `low` to `high` [m] alone, 0 elsewhere."""
+        """Return the density (k,) [m3] of the waves from `low` to `high` [m], 0 elsewhere."""
         return np.where(
             (self.frequency >= 1 / high) & (self.frequency <= 1 / low), self.density, 0.0
         )

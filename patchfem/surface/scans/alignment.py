@@ -1,6 +1,6 @@
-"""Alignment of a second scan on a first one: rotation, shift and plane of the unworn heights.
+"""Alignment of a second scan on a first: rotation, shift and plane of the unworn heights.
 
-The search (`search`) gives the place to a pixel of its images. The model (`model`) is fitted by
+The search (`search`) finds the position to a pixel of its images. The model (`model`) is fitted by
 Tukey's biweight to images of increasing resolution without long waves, as smooth wear and slow errors
 of an instrument have long waves. The plane of the unworn heights then comes from least trimmed
 squares over the modes of tiles (`compare.robust`, as for traces), and all six parameters from a
@@ -119,7 +119,7 @@ def _find_place(before: Areal, after: Areal) -> tuple:
 
 
 def _fit_images(before: Areal, after: Areal, state, step: float) -> tuple:
-    """Register two images of the given pixel size [m]; return their relative noise and the parameters."""
+    """Register two images of a pixel size [m]; return their relative noise and the parameters."""
     rasters = []
     for scan in (before, after):
         z, known = resample_image(scan, step)

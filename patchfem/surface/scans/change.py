@@ -1,4 +1,4 @@
-"""Changes between two areal scans: alignment, depth map, volumes, and the verdict on wear in sentences."""
+"""Changes between two areal scans: alignment, depth map, volumes and sentences on wear."""
 
 from dataclasses import dataclass, field, replace
 
@@ -32,8 +32,8 @@ PLACEMENT = {  # name: (unit, definition)
     ),
 }
 HIDDEN = "mean depth of uniform or wedge-shaped wear that may have remained hidden"
-MIN_CORRELATION = 0.95  # correlation of the unworn heights of scans of the same place
-MIN_CORRELATION_UNSURE = 0.98  # the same where the search found no significant place
+MIN_CORRELATION = 0.95  # correlation of the unworn heights of scans of the same area
+MIN_CORRELATION_UNSURE = 0.98  # the same if the search found no significant position
 MIN_UNMEASURED = 0.1  # fraction of the worn part without heights that a sentence reports
 HALF_TURN_TOL = 0.2  # [rad] difference from pi below which a scan counts as turned by 180 degrees
 N_DIGITS = 4  # significant digits of volumes in sentences
@@ -119,7 +119,7 @@ def compare_scans(before: Areal, after: Areal, keep_spikes: bool = False) -> Cha
 
 
 def _align_and_measure(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
-    """Return alignment, volumes and number of specks; raises PatchfemError without a common place."""
+    """Return alignment, volumes and number of specks; PatchfemError without a common part."""
     alignment = align_scans(before, after)
     is_significant = alignment.placement.significance > MIN_SIGNIFICANCE
     min_correlation = MIN_CORRELATION if is_significant else MIN_CORRELATION_UNSURE
@@ -137,7 +137,7 @@ def _align_and_measure(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
 
 
 def remove_specks(alignment: ScanAlignment) -> tuple:
-    """Remove isolated outliers from the depth; return the alignment and the number of removed heights.
+    """Remove isolated outliers from the depth; return the alignment and the number removed.
 
     A speck is a small group of heights that differs from all of its neighbours, such as dust, a
     dropout or the remainder of a spike. Worn asperities do not differ like this.

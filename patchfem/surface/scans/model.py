@@ -32,7 +32,7 @@ BLOCK = 1 << 20  # heights of a depth map that are computed at a time, which lim
 
 
 class Parameter(IntEnum):
-    """Positions of the parameters in a state; slopes are heights [m] at the edges of the first scan."""
+    """Indices of the parameters in a state; slopes are heights [m] at the edges of the scan."""
 
     OFFSET = 0
     SLOPE_X = 1
@@ -81,7 +81,7 @@ def rotation(angle: float) -> np.ndarray:
 
 
 class _Linearized(NamedTuple):
-    """Difference (k,) [m] of both scans without a plane, and Jacobian (k, 6), at a place.
+    """Difference (k,) [m] of both scans without a plane, and Jacobian (k, 6), at a position.
 
     place: rotation [rad] and shifts [m] of the second scan.
     """
@@ -101,7 +101,7 @@ class ScanModel:
         Size of the sample.
     """
 
-    shifts = ()  # the robust fit of the plane keeps the place, which the fit to images determined
+    shifts = ()  # the robust fit of the plane keeps the position, which the fit to images determined
 
     def __init__(self, before: Raster, after: Raster, n_points: int = N_POINTS):
         from scipy.ndimage import binary_erosion, gaussian_filter, spline_filter
@@ -138,7 +138,7 @@ class ScanModel:
         """Compute slopes of the short waves of the first scan by Gaussian derivatives.
 
         Smooth wear and slow errors of an instrument have long waves, whose slopes would shift the
-        place. sigma: standard deviation of the Gaussian in pixels.
+        position. sigma: standard deviation of the Gaussian in pixels.
         """
         from scipy.ndimage import gaussian_filter
 
@@ -169,7 +169,7 @@ class ScanModel:
         )
 
     def overlap(self, places) -> np.ndarray:
-        """Return whether all four neighbours of each place in the second scan were measured."""
+        """Return whether all four neighbours of each position in the second scan were measured."""
         from scipy.ndimage import map_coordinates
 
         return map_coordinates(self.known, places, order=1, mode="constant", cval=0.0) > 0.999
@@ -183,7 +183,7 @@ class ScanModel:
     def linearize(self, state) -> tuple:
         """Return the depth (k,) [m] and its Jacobian (k, 6) at the sampled heights in the overlap.
 
-        A fit of the plane alone calls this many times with the same place of the second scan, so the
+        A fit of the plane alone calls this many times with the same position of the second scan, so the
         heights that were read there are kept.
         """
         place = tuple(state[3:])
@@ -193,7 +193,7 @@ class ScanModel:
         return difference + (state[0] + jacobian[:, 1:3] @ state[1:3]), jacobian
 
     def _linearize_place(self, state, place: tuple) -> "_Linearized":
-        """Read the second scan at a place, and compute the Jacobian there."""
+        """Read the second scan at a position, and compute the Jacobian there."""
         at, slopes, z = self.at, self.slopes, self.before.z[self.rows, self.columns]
         places = self.places(at, state)
         if not self.is_cut:
@@ -226,7 +226,7 @@ class ScanModel:
         return [part for part in parts if part.size >= MIN_TILE_HEIGHTS]
 
     def _select(self, chosen) -> "ScanModel":
-        """Return the model of the chosen heights alone."""
+        """Return the model of the chosen heights only."""
         out = copy(self)
         out.rows = self.rows[chosen]
         out.columns = self.columns[chosen]

@@ -1,9 +1,9 @@
-"""Coarse search for the place of a second scan on a first one.
+"""Coarse search for the position of a second scan on a first one.
 
 Shifts, rotations by some degrees and by 180 degrees, mirrored and inverted scans are tried. Heights
 are averaged over pixels, and long waves are subtracted. Heights above the median are clipped, as
 wear removes them. The spectrum is whitened, so that a periodic lay does not hide the valleys that
-mark a place (phase correlation; Kuglin and Hines, Proc. IEEE Conf. Cybernetics and Society (1975)
+mark a position (phase correlation; Kuglin and Hines, Proc. IEEE Conf. Cybernetics and Society (1975)
 163). The masked correlation at every shift is computed by Fourier transforms for each rotation.
 """
 
@@ -21,11 +21,11 @@ ANGLES = np.radians(np.arange(-12, 13) / 2)  # [rad] -6 to 6 degrees; half a deg
 FINE_ANGLES = np.radians(np.arange(-3, 4) / 8)  # [rad] added to the best angle
 MIN_OVERLAP = 0.35  # fraction of the smaller image that must lie on the other one
 LONG_WAVES = 0.03  # fraction of the shorter side; Gaussian filter whose mean is subtracted
-MAX_VALLEY_DEPTH = 3.0  # standard deviations; deeper grooves and scratches mark no place
+MAX_VALLEY_DEPTH = 3.0  # standard deviations; deeper grooves and scratches mark no position
 WHITENING_FLOOR = 0.3  # fraction of the rms of a spectrum; weaker waves are not amplified
 WHITENING_WIDTH = 1.5  # pixels of the spectrum over which its power is averaged
 TAPER = 0.25  # exponent of the Hann window, whose tapered rim stays narrow
-MIN_SIGNIFICANCE = 10.0  # standard deviations; false places on a periodic lay reach 9
+MIN_SIGNIFICANCE = 10.0  # standard deviations; false positions on a periodic lay reach 9
 MAX_PLACEMENTS = 8  # placements that are fitted to images, which limits the time
 MAX_PER_VARIANT = 3  # placements of one mirrored or inverted variant
 MIN_ANGLE_DISTANCE = 0.02  # [rad] two placements nearer than this are one
@@ -33,7 +33,7 @@ MIN_PIXEL_DISTANCE = 4  # pixels; the same for their shifts
 
 
 class Placement(NamedTuple):
-    """Coarse place of the second scan on the first one.
+    """Coarse position of the second scan on the first one.
 
     angle [rad], shift (2,) [m]: as defined in `model`; mirrored: axis of the second scan that was
     mirrored first, "x", "y" or ""; is_inverted: whether its heights changed sign; correlation: of

@@ -13,13 +13,13 @@ from .alignment import ScanAlignment
 SMOOTHING = 0.025  # fraction of the shorter side; Gaussian filter before the gradient is taken
 N_DIRECTION = 400  # heights along the shorter side from which the direction is found
 MIN_COHERENCE = 0.5  # coherence of the gradients: 1 for a straight track, 0 for a round pit
-MIN_DEVIATIONS = 5.0  # standard deviations of the mean section that a deep place exceeds
-MIN_DEPTH = 0.2  # fraction of the largest depth of the mean section that a deep place exceeds
-MIN_MEASURED = 0.3  # fraction of the sections that must be measured at a place of the mean section
+MIN_DEVIATIONS = 5.0  # standard deviations of the mean section that a deep position exceeds
+MIN_DEPTH = 0.2  # fraction of the largest depth of the mean section that a deep position exceeds
+MIN_MEASURED = 0.3  # fraction of the sections that must be measured at each of its positions
 MIN_MARGIN = 0.1  # fraction of the width of the track that must be measured beside it
 MIN_AREA = 0.6  # fraction of the lost area of the mean section that a single track holds
 MAX_SECTIONS = 1000  # sections of the rotated map, which limits the memory
-MAX_PLACES = 4000  # places of a section, which limits the memory
+MAX_PLACES = 4000  # positions of a section, which limits the memory
 END_FRACTION = 0.1  # fraction of the length of a track whose sections at each end are left out
 N_GROUPS = 16  # groups of neighbouring sections, each of which is measured once
 MIN_GROUPS = 6  # fewer groups give no interval by their scatter
@@ -67,7 +67,7 @@ class ScanTrack:
 
     - values: sizes by the names of TEXTS.
     - scatter: standard deviation of a single group of sections by name.
-    - across, section, spread: places across the track, mean depth of the sections, and their
+    - across, section, spread: positions across the track, mean depth of the sections, and their
       standard deviation; NaN where too few sections are measured, (k,) [m].
     - sections: number of sections.
     - why: reason why there is no track, "" with one.
@@ -83,7 +83,10 @@ class ScanTrack:
 
 
 class _RotatedMap(NamedTuple):
-    """Depth (v, u) [m] at places along (v,) and across (u,) [m] a track, from the middle of the map."""
+    """Depth (v, u) [m] at positions along (v,) and across (u,) [m] a track.
+
+    The positions are measured from the middle of the map.
+    """
 
     depth: np.ndarray
     along: np.ndarray
@@ -91,7 +94,7 @@ class _RotatedMap(NamedTuple):
 
     @property
     def step(self) -> float:
-        """Distance of neighbouring places of a section [m]."""
+        """Distance of neighbouring positions of a section [m]."""
         return float(self.across[1] - self.across[0])
 
 
@@ -248,7 +251,7 @@ def _mean_section(depth, min_measured: float = MIN_MEASURED) -> np.ndarray:
 
 
 def _find_deep_span(section, noise: float) -> tuple | None:
-    """Find the first and last place of the deepest part of a mean section.
+    """Find the first and last position of the deepest part of a mean section.
 
     None if no unworn part lies on either side of it, or if other parts lost as much in total.
     """
@@ -268,7 +271,7 @@ def _find_deep_span(section, noise: float) -> tuple | None:
 
 
 def _measure_length(rotated: _RotatedMap, span: tuple, complete) -> _Length:
-    """Measure the length between the places where the lost area is half of its median.
+    """Measure the length between the positions where the lost area is half of its median.
 
     The bounds are the lengths between three quarters and between one quarter of the median.
     """
@@ -308,7 +311,7 @@ def _measure_group(rotated: _RotatedMap, rows, span: tuple) -> dict | None:
 
 
 def _widen_by_plane_error(means: dict, error: float, step: float) -> dict:
-    """Widen the intervals of the means by the error of the plane, which all groups have in common.
+    """Widen the intervals of the means by the error of the plane, which all groups share.
 
     Parameters
     ----------
@@ -316,7 +319,7 @@ def _widen_by_plane_error(means: dict, error: float, step: float) -> dict:
     error : float
         Standard deviation [m] of the mean depth due to the plane.
     step : float
-        Distance [m] of neighbouring places, to half of which the ends are known.
+        Distance [m] of neighbouring positions, to half of which the ends are known.
 
     Returns
     -------

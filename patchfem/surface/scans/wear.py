@@ -1,4 +1,4 @@
-"""Detection of worn and grown heights in a depth map, by means over squares of increasing size."""
+"""Detection of worn and grown heights in a depth map by averages over growing squares."""
 
 import numpy as np
 
@@ -67,7 +67,7 @@ def detection_limit(depth, unworn) -> float:
 
 
 def mean_of_square(values, side: int) -> tuple:
-    """Return the mean of the measured values in the square around each point, and their fraction."""
+    """Return mean and fraction of the measured values in the square around each point."""
     from scipy.ndimage import uniform_filter
 
     measured = np.isfinite(values)

@@ -22,8 +22,8 @@ from ..sweep import Died, Work, handed, timed
 
 _TLS = "DASK_DISTRIBUTED__COMM__TLS__"
 CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
-AHEAD = 2  # chunks sent ahead per worker, so that no worker waits for the next one
-PATIENCE = "10s"  # time for a scheduler to answer
+AHEAD = 2  # chunks that each worker holds beyond the present one, so it never waits for the next
+PATIENCE = "10s"  # maximum time to wait for the scheduler
 
 
 class Cluster:
@@ -204,7 +204,7 @@ def own_of(work: Work | None = None) -> dict:
 
 
 def _as_it_is(work: Work) -> Work:
-    """Return the work unchanged, so that it is stored on the cluster."""
+    """Return the work unchanged; a call of this function stores the work on the cluster."""
     return work
 
 

@@ -56,7 +56,7 @@ class Worker:
         self.process = subprocess.Popen(
             words, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL, env=os.environ | ONE_THREAD
         )
-        there.close()  # so that the pipe closes when the process dies
+        there.close()  # the pipe then closes when the process dies
         self.pipe: Connection = here
         self.chunk = None
         self.pipe.send(work)
@@ -77,7 +77,7 @@ class Worker:
             pass  # The process is dead, which `taken` notices next.
 
     def taken(self) -> tuple:
-        """Return (chunk, seconds, answer), with Died in place of the answer if the process died."""
+        """Return (chunk, seconds, answer), with Died instead of the answer if the process died."""
         try:
             seconds, found = self.pipe.recv()
         except (EOFError, OSError):
@@ -140,8 +140,8 @@ class Pool:
                         workers.remove(one)
                         one.end()
                     elif (chunk := take()) is not None:
-                        # The next chunk is sent before this answer is written, which takes some
-                        # time.
+                        # The worker receives its next chunk before the result is written, which
+                        # takes time.
                         one.give(chunk)
                     yield taken
         finally:
