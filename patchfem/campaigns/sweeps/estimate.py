@@ -22,8 +22,8 @@ RANKED = 0.8  # seconds to rank the keys by their influence, from random cases
 FIXED = 3
 # Seconds to compute the columns of a case in a batch from its values (0.8 to 1.5 ms of 2000 lumped cases).
 TOGETHER = 1.2e-3
-FEW = 1000  # a sweep with more cases writes no summary of each case by default
-TABLED = 200_000  # a sweep with more cases writes no tables by default
+FEW = 1000  # maximum number of cases of which a sweep writes a summary each by default
+TABLED = 200_000  # maximum number of cases for which a sweep writes tables by default
 # Bytes per case: with a summary; with tables, page and columns (10 000 cases); with only the columns
 # (a million cases).
 DISK, COLUMNS, BARE = 6000, 1600, 400
