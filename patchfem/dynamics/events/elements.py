@@ -1,6 +1,6 @@
-"""Elements of an interface side by side: a rigid one (Coulomb) and elastic-plastic ones, and what they remember.
+"""Parallel elements of an interface, rigid (Coulomb) and elastic-plastic, and their memory.
 
-Every element feels the relative displacement of its interface. The elastic-plastic ones are sorted by yield slide, the
+All elements share the relative displacement of their interface. The elastic-plastic ones are sorted by yield slide, the
 stretch at which they slip.
 """
 
@@ -19,7 +19,7 @@ YIELD_TOL = 1e-14
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Elements:
-    """Elements of one interface: F = sum k_j e_j with stretches |e_j| <= y_j, and a rigid element before them.
+    """Elements of one interface: F = sum k_j e_j with stretches |e_j| <= y_j, and a rigid element.
 
     - stiffness: (t,) k_j [N/m]
     - yield_displacement: (t,) y_j [m], in increasing order
@@ -129,7 +129,7 @@ def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elemen
     begins = np.r_[0, np.arange(first, k.size - n_last, count), [k.size - 1] * n_last]
     begins = np.unique(begins).astype(int)
     stiffness = np.add.reduceat(k, begins)
-    # each yield slide lies between those of its parts, so they are in increasing order
+    # each yield slide lies between those of the merged elements, so they are in increasing order
     yield_slide = np.add.reduceat(k * elements.yield_displacement, begins) / stiffness
     return Elements(
         frozen_array(stiffness),

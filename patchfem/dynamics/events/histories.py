@@ -266,7 +266,8 @@ def simulate(
         )
     run = start_run(modes, drive, groups, cycles, window, travel, start, memory)
     done = run.run(frames, progress, even=even)
-    # the travel ends the run: the same again to there, for the last cycles before it
+    # the output exceeded the travel: the run is repeated up to that time, because only a run whose end is known
+    # keeps the samples of its last cycles
     if done is None:
         again = start_run(
             modes, drive, groups, run.now / drive.period, window, np.inf, start, memory

@@ -55,7 +55,10 @@ def next_yield_slide(interface, direction, table, memory):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def release_next_element(interface, direction, table, memory):
-    """Let the next element slip in a direction, or the whole innermost group that slipped this way before."""
+    """Let the next element slip in a direction.
+
+    If the innermost group slipped in this direction before, the whole group slips.
+    """
     group = memory.n_groups[interface] - 1
     if memory.group_sign[interface, group] == direction:
         memory.n_slipping[interface] = memory.group_end[interface, group]

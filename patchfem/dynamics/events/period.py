@@ -126,7 +126,7 @@ class PeriodMap:
         self.seconds = 0.0
 
     def _set_system(self, modes: ModalBasis, groups) -> None:
-        """Take modes and elements."""
+        """Set the modes and the elements, and build the arrays that depend on them."""
         self.modes = modes
         self.groups = tuple(groups)
         self.modal_system = make_modal_system(modes)
@@ -136,7 +136,7 @@ class PeriodMap:
         self.still = unstretched_memory(self.table, np.zeros(len(self.groups)))
 
     def replace_system(self, modes: ModalBasis, groups) -> bool:
-        """Take other modes and elements.
+        """Replace the modes and the elements.
 
         Returns False where their numbers differ from the present ones.
         """

@@ -103,7 +103,7 @@ MAX_DROPPED_GAP = (
     LAW_STATE + 17
 )  # largest gap, over its size, of a loop that was dropped from a full stack
 N_REVERSALS = LAW_STATE + 18  # number of reversals on the stack
-STICK_FRACTION = LAW_STATE + 19  # fraction of the step before its event without a slip
+STICK_FRACTION = LAW_STATE + 19  # fraction of the segment before the event in which it sticks
 INVERSE_LENGTH = LAW_STATE + 20  # DIRECTION over m YIELD_LENGTH
 FORCE_RATIO = LAW_STATE + 21  # SPRING YIELD_LENGTH over KINETIC
 REVERSALS = (
@@ -543,7 +543,10 @@ def restore_reversal(k, workspace, lane):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def drop_smallest_loop(workspace, lane):
-    """Drop the loop from a full stack whose closing changes the least: the one beside a loop of nearly its size."""
+    """Drop the loop from a full stack whose loss changes the motion least.
+
+    It is the loop that is nearest in size to the next one.
+    """
     best = 1
     smallest_gap = BEYOND_ALL
     for k in range(1, MAX_REVERSALS - 2):

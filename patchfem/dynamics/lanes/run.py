@@ -235,7 +235,10 @@ def case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
 
 
 def step_coefficients(cases: Cases, spring, angle: float) -> np.ndarray:
-    """Return the coefficients (n, 10) of an exact step with a spring beside the mode; see `rows_kernels`."""
+    """Return the coefficients (n, 10) of an exact step with `spring` added to the modal stiffness.
+
+    `rows_kernels` names the columns.
+    """
     quarters = np.arange(N_TERMS) * np.pi / 2
     sines = np.round(np.sin(quarters)).tolist()
     cosines = np.round(np.cos(quarters)).tolist()

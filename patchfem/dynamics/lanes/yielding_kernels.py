@@ -79,7 +79,8 @@ __all__ = [
 STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = False
 PROOF_TOL = 1e-7
-MIN_SLIP = 1e-3  # path of slip over YIELD_LENGTH of a cycle that determines the memory anew
+# slip path of a cycle over YIELD_LENGTH, above which earlier cycles do not affect the memory
+MIN_SLIP = 1e-3
 N_NEWTON = 4  # Newton steps for the place of an event, which is then exact to round-off
 AFTER_EVENT = 2  # instant of a step as in `observation_kernels`
 TINY = 1e-300  # keeps a divisor above 0
@@ -367,7 +368,7 @@ def find_yield(curve, memory, side, length, top, highest):
     reserve = side * (curve.x - memory) - length
     u = top * min(max(-reserve / (highest - length - reserve), 0.0), 1.0)
     if top < 1.0:
-        # Beside a reversal the slide is a parabola, from which its secant is far.
+        # Near a reversal the slide is a parabola, which a secant does not approximate.
         bend = abs(curve.m0 + top * (2 * curve.c2 + 3 * curve.c3 * top))
         bow = curve.angle * max(bend, TINY)
         u = max(top - sqrt(2 * (highest - length) / bow), 0.0)

@@ -1,4 +1,4 @@
-"""Several interfaces and springs that are not linear beside, or instead of, the patch: the march of many elements."""
+"""Interfaces and nonlinear springs in addition to the patch or in its place, in a march."""
 
 from dataclasses import dataclass, replace
 
@@ -59,7 +59,7 @@ def in_planes(joints, planes) -> list:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JointsModel:
-    """Elements beside a contact, or in its place.
+    """Elements in addition to a contact, or in its place.
 
     A patch with set-valued friction becomes the first of the joints, because all set-valued elements are
     solved together.
@@ -77,7 +77,7 @@ class JointsModel:
     rows: np.ndarray
     scale: float
     also: tuple = ()
-    loading = ""  # the loads stay
+    loading = ""  # the loads are constant
 
     def __post_init__(self):
         if self.patch is not None and self.patch.set_valued:

@@ -102,7 +102,7 @@ NEWTON_TOL = 4e-6  # last step of Newton's method, in bond lengths, as in `shear
 MAX_TURNS = 60  # turns of Newton's method
 BEND_TOL = 1e-9  # bend of the forces over the last step of Newton's method that is neglected, over the limit
 MAX_SERIES = 0.5  # slide, in bond lengths, up to which the series is used
-MAX_EXPONENT = 40.0  # slide, in bond lengths, after which nothing is left of a bond
+MAX_EXPONENT = 40.0  # slide, in bond lengths, beyond which exp(-x) of the bonds is below round-off
 
 
 @njit(**NJIT_INLINE)
@@ -248,7 +248,7 @@ def take_newton_turn(workspace, lane, beta, far):
         0.0,
         two,
     )
-    # one after the other: a loop over them is not taken in several lanes at once
+    # unrolled, because the compiler does not vectorise a loop over them across the lanes
     s = add_point(s, workspace, lane, 0, y, over, far)
     s = add_point(s, workspace, lane, 1, y, over, far)
     s = add_point(s, workspace, lane, 2, y, over, far)
@@ -271,7 +271,8 @@ def take_newton_turn(workspace, lane, beta, far):
     slopes = h00 - 1 / beta
     size = abs(n0) + one * abs(n1) + two * abs(n2)
     least = abs(y0) - one * abs(y1) - two * abs(y2)
-    # where no point turns over in this step, what the forces bend in it is told by their slopes, which a drag has not
+    # where no point reverses in this step, the curvature of the forces over it follows from their slopes, which are 0
+    # while all points slip
     near = size <= NEWTON_TOL * length or (
         least > size and slopes * size * size <= BEND_TOL * workspace[LIMIT * LANES + lane] * length
     )
@@ -383,7 +384,7 @@ def commit_step(workspace, lane, beta, far):
     workspace[CREATED * LANES + lane] -= gone if gone < -noise else 0.0
     workspace[FRICTION * LANES + lane] = force
     workspace[INTERFACE_ENERGY * LANES + lane] = energy
-    # the next guess, as the last three steps went on
+    # the next guess is a quadratic extrapolation of the last three steps
     for k in range(3):
         here = workspace[(INCREMENTS + k) * LANES + lane]
         last = workspace[(LAST_INCREMENTS + k) * LANES + lane]
@@ -451,7 +452,7 @@ def move_mode(workspace, lane, k, mode, push):
 
 @njit(**NJIT_INLINE)
 def start_sums(workspace, lane, work, lost, cosine, sine):
-    """Start the sums of a step over the modes with what the drive alone does.
+    """Start the sums over the modes in a step with the terms that depend on the drive alone.
 
     Parameters
     ----------
@@ -459,11 +460,11 @@ def start_sums(workspace, lane, work, lost, cosine, sine):
         Rows of the lanes, named at the top of the module.
     lane : int
     work : float
-        Constant part of its work [J].
+        Constant part of the work of the drive [J].
     lost : float
         Constant part of the viscous loss [J].
     cosine : float
-        Of the drive at the start of the step.
+        Cosine of the drive at the start of the step.
     sine : float
     """
     out = workspace[OUTPUT * LANES + lane]
@@ -545,7 +546,7 @@ def set_free_slide(workspace, lane, rig, row):
 
 @njit(**NJIT_INLINE)
 def count_long_slides(workspace, lengths):
-    """Return the number of lanes in which a point may slide further than so many bond lengths, or by nan."""
+    """Return the number of lanes in which a point may slide `lengths` bond lengths or more."""
     near = 0.0
     for lane in range(LANES):
         far = (

@@ -165,7 +165,7 @@ def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) 
         _WARM.update({kind} - {None})
 
 
-_WARM = set()  # kinds of patches that have marched: their code is there
+_WARM = set()  # kinds of patches that have marched, so that their compiled code is loaded
 
 
 def fresh(
@@ -487,8 +487,9 @@ class Run:
         self.outcome = None
         self.message = ""
         self.totals = np.zeros(3)
-        self.second = np.zeros(2)  # friction work off the samples, and what went to and fro [J]
-        self.ledger[0] = self.motion()  # what is released at the start counts as work in
+        # friction work from the samples, and energy exchanged in both directions [J]
+        self.second = np.zeros(2)
+        self.ledger[0] = self.motion()  # energy that is stored at the start counts as work input
         self.modal_system = modal_arrays(modes, self.prop)
         self.faces, self.load = (
             faces_of(model, self.prop, self.modal_system, modes.mass),
@@ -502,7 +503,7 @@ class Run:
         self.periodic = (
             self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
         )
-        # of `repeats`: states at the last look and one cycle before the next, their sizes; the books a cycle before
+        # used by `repeats`: states at the last check and one cycle before the next, their sizes, and energies a cycle before
         self.looks = np.zeros((3, sum(map(len, self._carried_state()))))
         self.books = np.zeros(14)
         self.change = np.inf
@@ -565,7 +566,8 @@ class Run:
         before = self.change
         self.change = change
         self.looks[0] = now
-        known = left > 0 and number >= 4 * APART  # two changes between looks
+        # changes over two intervals between checks are known
+        known = left > 0 and number >= 4 * APART
         return (
             known
             and max(change, last) <= PERIODIC_TOL
@@ -641,7 +643,7 @@ class Run:
         rubs = (rubs == 1) & ~second
         push = -np.einsum("ke,en->kn", parts[:, :, 2], faces.rows[ports]) / modes.mass
         if self.model.patch is None:
-            # of the first element, counted already
+            # that of the first element is counted already
             push += np.outer(out.force, modes.slide) / modes.mass
         extra = out.extra | {"spring_forces": parts[:, ~(rubs | second), 2]}
         names = ("slides", "slide_rates", "forces", "slips")
@@ -838,7 +840,7 @@ class Run:
         edges = np.linspace(0, size, max(min(frames, size), 1) + 1).round().astype(int)
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, self.width))
-            rows[-1] = 0.0  # what belongs to the step after the last one is nothing yet
+            rows[-1] = 0.0  # the entries of the step that follows the last one are not known yet
             kept = copy_state(self.contact, *self._changing_arrays())
             begin = self._before_a_fling()
             did, status = self._steps(int(piece), rows)
@@ -943,7 +945,7 @@ class Run:
         if lost.min(initial=0.0) == 0.0:
             parts[1] = lost
             return parts
-        # of the step solve, and of the slide's last digit
+        # error of the work due to the tolerance of the step solution and to round-off of the slide
         noise = self.model.limit * (
             1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n])
         )
@@ -1054,7 +1056,8 @@ class Run:
             for one, part in zip(self.model.joints, self._elements(rows)[0])
             if one.potential is not None
         ]
-        normal = rows[0, -3] if self.model.loading else 0.0  # of the preloaded contact
+        # normal energy of the preloaded contact
+        normal = rows[0, -3] if self.model.loading else 0.0
         return float(rows[0, n + 5] + normal + sum(springs))
 
     def book(self) -> dict:

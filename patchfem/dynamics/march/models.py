@@ -18,12 +18,12 @@ from ..interfaces.dispatch import COULOMB
 
 HERE = "dynamics.interfaces"
 ELEMENTS = f"{HERE}.element_kernels"
-MOST_AT_FIRST = (
-    256  # entries of the list of a point before it is enlarged, besides those of one step
-)
-WIDE = 1e-6  # bond lengths over which the first bonds of a point lie: one may rest where their force turns
+MOST_AT_FIRST = 256  # initial entries of the list of a point, in addition to those of one step
+# width [bond lengths] over which the initial bonds of a point are distributed, so that their force has no jump
+WIDE = 1e-6
 LANES = 16  # number of points that compiled loops take at once; points are filled up to a multiple of it
-IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"  # kind of a contact that nothing asks
+# kind of a contact that is never evaluated
+IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"
 
 
 def load_kernels(say=None):
@@ -70,7 +70,7 @@ class ContactModel:
     element: Element | None = None
     tuple_of: type = arrays.Element
 
-    loading = ""  # the load stays
+    loading = ""  # the load is constant
 
     @property
     def kind(self) -> tuple:

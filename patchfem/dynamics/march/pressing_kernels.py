@@ -233,7 +233,7 @@ def sample_load(i, last, motion, mass, interface, faces, press, row):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def set_loads(before, after, interface, faces, press):
-    """Give the loads at both ends of a step to what rubs; those of points at the later end are in press.now.
+    """Set the loads of friction at both ends of a step; press.now has those of points at its end.
 
     Parameters
     ----------
@@ -341,7 +341,7 @@ def solve_friction_step(
             force[0], force[1], modal_system.mass, press, faces.modal[OTHER_ACCELERATION]
         )
         faces.port[FREE_SLIDE, 0] = free
-        if press.beta[0, 0] == 0.0:  # nothing slides
+        if press.beta[0, 0] == 0.0:  # no interface slides
             return coupling.slide_freely(0.0, faces), 0.0, 1
         faces.port[FREE_SPEED, 0] = (
             free_rate(motion, modal_system.slide, modal_system.free, modal_system.dense, table, at)

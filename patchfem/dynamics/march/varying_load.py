@@ -34,7 +34,7 @@ PLASTIC = 1
 POINTS = 2
 LISTS = 3
 RATE = 4
-LIST_TOL_FACTOR = 1e4  # residual that sums over bonds keep, over that of other laws
+LIST_TOL_FACTOR = 1e4  # residual that sums over bonds can reach, over the tolerance of other laws
 FLOOR = 1.0  # smallest pressure of a node in the weights of the shear modes, over the mean of the preload
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
@@ -267,7 +267,7 @@ class VaryingLoadModel:
 
     @property
     def kind(self) -> tuple:
-        """Contact and law of what rubs beside the joints, by which `instances` makes an instance of the loop."""
+        """Contact and law without the joints, for which `instances` makes a loop."""
         if self.law.kind == LISTS:
             return SHEARED_LISTS, ""
         if self.pointed:

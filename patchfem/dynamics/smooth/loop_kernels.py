@@ -72,7 +72,7 @@ def distance_to_end(motion, what, y, slopes, travel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def can_end(motion, what, travel):
-    """Return whether a motion can meet such an end at all."""
+    """Return whether this event can occur in the motion."""
     if what == END.kink:
         return motion.turn[TURN.kink_path] < np.inf
     if what == END.knee:
@@ -84,11 +84,11 @@ def can_end(motion, what, travel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_first_end(motion, h, travel, skip):
-    """Return what ends a step of h [s] first, and a guess of its fraction.
+    """Return the first event inside a step of h [s], and a guess of its fraction of the step.
 
     Cubics through both ends of the step give the guess.
 
-    skip: an end that is left out. Without an end they are END.none and 1.
+    skip: an event that is ignored. Without an event END.none and 1 are returned.
     """
     found = END.none
     where = 1.0
@@ -566,7 +566,8 @@ def advance(motion, record, until, edge, tolerance, travel):
             fresh = FLIPPED
             continue
         taken, what = locate_first_end(motion, taken, what, share, travel)
-        # the stages of the step that was tried may have passed by what bends beside its end
+        # the stages of the longer tried step may have missed strong curvature near the event, so the error of the
+        # shortened step is checked as well
         if what != END.none:
             error = steps.estimate_error(motion, taken, tolerance)
             if error > 1:

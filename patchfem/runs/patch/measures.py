@@ -309,7 +309,7 @@ def max_error_ratio(found: dict, tolerance: float) -> float:
 
 
 def _remove_unbounded(why: str, found: dict) -> dict:
-    """Return the measures, with those that no mesh bounds replaced by the reason `why`.
+    """Return the measures, with `why` in place of values that diverge under mesh refinement.
 
     These are the peak pressure next to a loaded step or at a free corner, and the loaded fraction;
     "" changes nothing.

@@ -229,7 +229,7 @@ def _size_seconds(model: Model) -> float:
 
 
 def expected_seconds(model: Model) -> float:
-    """Return the expected CPU seconds of a run from event to event, for a plan.
+    """Estimate the CPU seconds of an event-driven run before it starts.
 
     The pieces of ringing during stick count for the fraction of the time of stick.
     """
