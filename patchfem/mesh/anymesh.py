@@ -453,7 +453,7 @@ def _check_connections(mesh: PieceMesh, side: str, source) -> None:
 
 
 def _check_hanging_nodes(mesh: PieceMesh, border, side: str, source) -> None:
-    """Raise PatchfemError if a node of the border lies inside another edge (e, 2) of the border."""
+    """Raise PatchfemError if a boundary node lies inside a boundary edge (e, 2)."""
     nodes = np.unique(border)
     begin = mesh.points[border[:, 0]]
     along = mesh.points[border[:, 1]] - begin

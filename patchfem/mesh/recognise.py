@@ -11,7 +11,7 @@ from .tensor import TensorGrid
 
 # Fraction of the size of the piece; coordinates that differ by less lie on the same grid line.
 GRID_LINE_TOL = 1e-7
-# Successive edges of the border that turn by more than 30 degrees belong to different faces.
+# Successive boundary edges that turn by more than 30 degrees belong to different faces.
 MIN_FACE_COSINE = np.cos(np.radians(30.0))
 
 

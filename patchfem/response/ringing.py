@@ -1,4 +1,4 @@
-"""Ringing of a rig while an interface sticks: a decaying sinusoid besides the forced motion.
+"""Free vibration of a rig while an interface sticks: a decaying sinusoid and forced motion.
 
 In: a signal during the sticks of a window. Out: `ring_frequency` and `ring_damping` with their
 errors. The model is a sum of decaying sinusoids, the forced sine and a constant. Frequency and

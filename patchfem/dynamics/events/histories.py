@@ -401,7 +401,7 @@ class _Run:
         still = self.kernels.stored_energy(
             np.zeros_like(self.motion), self.modal_system, self.table, self.memory
         )
-        # [J] before the books began
+        # energy [J] of the stretched elements minus their work and loss so far, before the energy balance of the run begins
         self.start_stretch_energy = still - float(np.sum(self.memory.work - self.memory.loss))
         self.rows = (
             np.empty((ROWS_PER_CALL, self.n_columns))
@@ -493,7 +493,7 @@ class _Run:
         """Keep the turning points and slips among rows from before the window."""
         self.is_marked = self._log_events(rows) | (rows[:, ROW.begin] == BEGIN.reversal)
         if not self.n_kept and len(rows):
-            self.is_marked[0] = True  # the start
+            self.is_marked[0] = True  # the first row is the start of the run
         if self.n_kept < MAX_TURNING_ROWS:
             self.early_rows.append(rows[self.is_marked])
             self.n_kept += int(self.is_marked.sum())
@@ -532,7 +532,7 @@ class _Run:
         k = int(self.time_state.now[TIME.segment]) + 1
         if k < len(self.time_state.segments):
             end = min(end, int(self.time_state.segments[k, SEGMENT.cycle]))
-        end -= 1  # the last one is run: it crosses the border
+        end -= 1  # the last cycle is marched, because it crosses the border
         many = end - begin - 1
         if many < 1:
             return
@@ -692,7 +692,7 @@ class _Run:
             row[self._column(0, column) :: N_COLUMNS] = values
         rows = np.concatenate([*late, row[None]])
         if self.has_rigid:
-            # an event at the start of the window, to the last digits, lies before it
+            # an event within round-off of the start of the window counts as before it
             is_long = rows[:, ROW.duration] > SAME_TIME_TOL * self.period
             rows = rows[min(int(np.argmax(is_long)), len(rows) - 2) :]
         return rows

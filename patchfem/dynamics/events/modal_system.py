@@ -224,7 +224,7 @@ def _record_segments(record) -> np.ndarray:
 
 
 def copy_into(old, new):
-    """Copy a tuple of arrays, or of such tuples, into the arrays of another one.
+    """Copy a nested tuple of arrays into the arrays of another one.
 
     Compiled code knows where the old arrays are, which takes most of the time of a short call.
 

@@ -226,7 +226,7 @@ class YieldShooting(Shooting):
 
 
 def _have_same_numbers(point: Point, end: Point) -> bool:
-    """Return whether two Points have the same numbers: turning places of the same kind."""
+    """Return whether two Points have the same numbers: turning points of the same kind."""
     a = point.memory
     b = end.memory
     deep = a.n_groups.tolist()

@@ -44,7 +44,7 @@ class GroovesModel(FlankModel):
 
     @property
     def length(self) -> float:
-        """Bond length [m], none."""
+        """Bond length [m]; 0, as the law has no bonds."""
         return 0.0
 
     @property
@@ -58,7 +58,7 @@ class GroovesModel(FlankModel):
         return SampledRun
 
     def build(self):
-        """Return a contact that nothing uses."""
+        """Return a contact without friction, which no kernel reads."""
         return coulomb_model(0.0, 0.0).build()
 
 

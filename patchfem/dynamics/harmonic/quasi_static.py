@@ -178,7 +178,7 @@ def static_motions_from_loops(modes: ModalBasis, row, held: tuple, slides, found
 
 
 def _solve_equilibrium(modes, group, held: tuple, share: float, near, samples: int) -> np.ndarray:
-    """Return z/share and alpha/(omega^2 share) of the equilibrium at a share [m].
+    """Return z/share and alpha/(omega^2 share) at the equilibrium with amplitude `share` [m].
 
     held: frequency, shape and `of`.
     """

@@ -317,7 +317,7 @@ def memory_rows(element, memory) -> list:
 
 
 def copied(parts):
-    """Return a copy of a tuple of arrays, or of such tuples."""
+    """Return a copy of a nested tuple of arrays."""
     return type(parts)(
         *(copied(part) if isinstance(part, tuple) else part.copy() for part in parts)
     )

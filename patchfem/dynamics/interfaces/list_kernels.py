@@ -111,7 +111,7 @@ def commit(dq, force, q, v0, v1, dt, c):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def book_energy(work, before, limit, c):
-    """Add the work [J] of a step that is not stored to the energies of the list c; returns it.
+    """Add the work [J] of a step that is not stored to the energies of the list; return it.
 
     Parameters
     ----------

@@ -233,7 +233,7 @@ def minimise(free, beta, kind, ending, c, goal):
         p[i] = 0.0
     for count in range(
         MAX_ITERATIONS
-    ):  # the first is the guess: one place of the gradient in the code, of two that run it
+    ):  # the first pass evaluates the guess, so that the code contains the gradient once
         if count > 0:
             if c.ready[which] == 0.0:
                 write_hessian(beta, ending, c, hess)

@@ -84,7 +84,8 @@ N_LAW_STATE = 4
 N_KEPT = 2  # the friction and the mean square of the stretches follow the map of a cycle
 
 MAX_PARTS = 4  # a step has at most a reversal, and a kink on either side of it
-N_CORRECTIONS = 2  # Newton steps for the place of an event, which a cubic across a kink misses by the second order
+# Newton steps for the time of an event, because a cubic across a kink has an error of second order
+N_CORRECTIONS = 2
 MAX_LAYER_PARTS = 64  # number of parts of a step through a layer
 LAYER_EDGE = 5.0  # speed over that of the layer beyond which the force is taken as constant
 LAYER_STEP = (
@@ -209,7 +210,7 @@ def irreversible_slide(x, memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def slip_increment(memory, event_memory, memory1, workspace, lane):
-    """Return the friction work of the last step over the mass [m^2], in place of a path of slip."""
+    """Return the friction work of the last step over the mass [m^2], which replaces the slip path."""
     return workspace[STEP_WORK * LANES + lane]
 
 

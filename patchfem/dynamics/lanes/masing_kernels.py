@@ -115,7 +115,7 @@ N_KEPT = MAX_KEPT
 FORM_ROWS = (DIRECTION, BRANCH_SCALE, KEEPS_FIRST_LOADING, ALL_SLIP, N_REVERSALS)
 N_LAW_STATE = CURVE_STATE - LAW_STATE + curve.N_CURVE_STATE
 
-MIN_PLACE = 1e-30  # smallest place on the curve, whose logarithm a power needs
+MIN_PLACE = 1e-30  # smallest abscissa on the curve, because a power needs its logarithm
 EVENT_TOL = 1e-9  # last Newton step, as a fraction of a step; the error left is its square
 N_NEWTON = 6
 MAX_EVENTS = 32  # number of events in a step
@@ -183,7 +183,7 @@ def place_on_curve(x, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def clamped_place(x, workspace, lane):
-    """Return the place of a slide on the curve, between MIN_PLACE and the slip of all sliders.
+    """Return the abscissa of a slide on the curve, limited to [MIN_PLACE, slip of all sliders].
 
     A branch whose sliders do not all slip yet goes on to 2, so that a step beyond 1 finds where its event is.
     """

@@ -11,7 +11,7 @@ from . import rows_kernels as rows
 HERE = "dynamics.lanes"
 MASING = ("masing", "table")  # laws of Masing's rule, named by the curve of their first loading
 N_TERMS = 24  # terms of a Taylor series over a step; the rest is below round-off for rates up to 2 per step
-NO_YIELD = 1e300  # place of the entries of a table after its last yield
+NO_YIELD = 1e300  # yield slide of the unused entries of a table after its last yield
 MAX_SLIDE = 1e100  # a larger slide [m] is that of a march that ran away with too long steps; its energies overflow
 N_PERIODIC = 3  # number of cycles that are read of a motion that repeats
 
@@ -70,7 +70,10 @@ class Marched(NamedTuple):
 
 
 def has_one_stretch(law: str) -> bool:
-    """Return whether a law is one of one stretch, which is named as its kernels: "friction.laws.tanh_kernels"."""
+    """Return whether the memory of a law is one stretch.
+
+    The law is then named by the module of its kernels, such as "friction.laws.tanh_kernels".
+    """
     return "." in law
 
 
@@ -373,7 +376,7 @@ def output_accelerations(law: str, cases: Cases, motion, cycles: int, steps: int
 
 
 def make_workspace(numbers, motion) -> tuple:
-    """Return the workspace of the lanes for cases with such numbers and motions, and numbers of lanes."""
+    """Return the workspace of the lanes for cases, and an array for the numbers of lanes."""
     n_law_state = motion.shape[1] - rows.N_STATE
     table_size = numbers.shape[1] - rows.N_NUMBERS
     n_rows = rows.LAW_STATE + n_law_state + table_size

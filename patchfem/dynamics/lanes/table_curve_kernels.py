@@ -37,7 +37,7 @@ PART_STARTS = N_COLUMNS * N_YIELDS
 FIRST_YIELD = PART_STARTS + N_PARTS
 PARTS_PER_SLIDE = PART_STARTS + N_PARTS + 1
 TABLE_SIZE = PART_STARTS + N_PARTS + 2
-TABLE_START = N_ROWS * LANES  # place of the first table in the workspace
+TABLE_START = N_ROWS * LANES  # index of the first table in the workspace
 N_CURVE_STATE = N_ROWS - CURVE_STATE  # number of rows that the curve has in the state of the law
 MAX_STEP = (
     0.25  # longest step, over YIELD_LENGTH; Newton's method finds the end of a longer one badly

@@ -81,7 +81,7 @@ EVENT_KEEPS_STICK = False
 PROOF_TOL = 1e-7
 # slip path of a cycle over YIELD_LENGTH, above which earlier cycles do not affect the memory
 MIN_SLIP = 1e-3
-N_NEWTON = 4  # Newton steps for the place of an event, which is then exact to round-off
+N_NEWTON = 4  # Newton steps for the time of an event, which is then exact to round-off
 AFTER_EVENT = 2  # instant of a step as in `observation_kernels`
 TINY = 1e-300  # keeps a divisor above 0
 
@@ -323,7 +323,7 @@ def continue_in_stick(start, damping, stiffness, force, angle):
 
 @njit(**NJIT_INLINE)
 def slide_on(curve, u):
-    """Return the slide at a place of a `SpeedCurve`."""
+    """Return the slide at a fraction of the step of a `SpeedCurve`."""
     return curve.x + curve.angle * u * (
         curve.v + u * (curve.m0 / 2 + u * (curve.c2 / 3 + u * curve.c3 / 4))
     )
@@ -331,13 +331,16 @@ def slide_on(curve, u):
 
 @njit(**NJIT_INLINE)
 def speed_on(curve, u):
-    """Return the speed at a place of a `SpeedCurve`."""
+    """Return the speed at a fraction of the step of a `SpeedCurve`."""
     return curve.v + u * (curve.m0 + u * (curve.c2 + u * curve.c3))
 
 
 @njit(**NJIT_INLINE)
 def event_on(curve, u, speed, factor):
-    """Return the `CurveEvent` at a place of a `SpeedCurve`, with a speed that is known better than the curve gives it."""
+    """Return the `CurveEvent` at a fraction of the step of a `SpeedCurve`, with a given speed.
+
+    The speed is known more accurately than from the curve.
+    """
     rate = (curve.m0 + u * (2 * curve.c2 + 3 * curve.c3 * u)) / curve.angle
     second_rate = (2 * curve.c2 + 6 * curve.c3 * u) / (curve.angle * curve.angle)
     return CurveEvent(u, speed, rate, second_rate, factor)
@@ -345,7 +348,7 @@ def event_on(curve, u, speed, factor):
 
 @njit(**NJIT_INLINE)
 def find_yield(curve, memory, side, length, top, highest):
-    """Find the place on a `SpeedCurve` where the spring reaches its yield length.
+    """Find the fraction of the step of a `SpeedCurve` at which the spring reaches its yield length.
 
     Parameters
     ----------

@@ -65,7 +65,8 @@ MAX_TURNS = 1000  # sweeps over all elements after which a step has failed
 MAX_EVENT_TURNS = (
     60  # the same with stops and releases inside the step; the first half settles which they are
 )
-ROUND_OFF = 4e-15  # smallest residual that can be reached, as a fraction of a free slide over its give and of a force
+# smallest residual that can be reached, as a fraction of a free slide over its compliance, and of a force
+ROUND_OFF = 4e-15
 ELEMENT_COLUMNS = (
     5  # slide, speed, force, slip, and mean force of the step that follows, of an element in a row
 )

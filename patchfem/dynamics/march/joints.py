@@ -123,5 +123,5 @@ class JointsModel:
         return self.patch.shown(contact) if self.patch is not None else {}
 
     def build(self):
-        """Return the contact of the patch with arrays of its own; an idle point if there is none."""
+        """Return the contact of the patch with newly allocated arrays; an idle point without a patch."""
         return (self.patch or free_model()).build()

@@ -74,7 +74,7 @@ N_UNSOLVED = WORK_IN + 14  # number of steps without a solution
 MAX_SLIDE = WORK_IN + 15  # largest slide of the run [m]
 N_NUMBERS = WORK_IN + 16
 
-# Rows of a mode of the rig: its step as `propagator.Propagator` has it, for forces in place of accelerations.
+# Rows of a mode of the rig: its step as `propagator.Propagator` has it, for forces instead of accelerations.
 ZZ = 0
 ZV = 1
 VZ = 2
@@ -87,7 +87,7 @@ LOSS = 8  # six coefficients of the quadratic form of the viscous loss
 SLIDE_SHAPE = 14  # slide per coordinate
 OUTPUT_SHAPE = 15  # output per coordinate
 OMEGA_SQUARE = 16  # square of the angular frequency
-N_RIG_ROWS = 17  # after them: give of the slide [m/N], mass [kg], length of a step [s]
+N_RIG_ROWS = 17  # after them: compliance of the slide [m/N], mass [kg], length of a step [s]
 # Columns of the table of a step, for a drive of 1 m s-2.
 BY_DRIVE = 0  # what it adds to coordinates and rates
 WORK_FORMS = 2 * N_RIG_MODES  # coefficients of its work
@@ -164,7 +164,7 @@ def path_shapes(x, far):
 
 @njit(**NJIT_INLINE)
 def add_point(s, workspace, lane, j, y, over, far):
-    """Add a point to the residual and to the lower half of the Hessian, s (9,), at the increments y.
+    """Add a point to the residual and to the lower triangle of the Hessian, s (9,), at the increments y.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def add_point(s, workspace, lane, j, y, over, far):
 
 @njit(**NJIT_INLINE)
 def take_newton_turn(workspace, lane, beta, far):
-    """Take a turn of Newton's method in a lane; if the last step went too far, half of it is taken back.
+    """Take a Newton step in a lane, or take back half of the last step if it went too far.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ MAX_PIECE_STEPS = 8000  # number of steps of a piece of a march
 MAX_PIECE_CYCLES = 16  # number of cycles of a piece of a march
 PASSING = "dynamics.march.passing_kernels"
 PERIODIC_TOL = 1e-12  # change of a periodic motion in all cycles that are left, over its size
-SUMS = [0, 1, 2, 3, 5, 7, 8]  # places of the ledger that grow from cycle to cycle
+SUMS = [0, 1, 2, 3, 5, 7, 8]  # indices of the ledger that grow from cycle to cycle
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -132,7 +132,7 @@ def modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
 
 
 def _runner(model):
-    """Return the class that marches a model: `Run`, or its own."""
+    """Return the class that marches a model: `Run`, or the one that the model names."""
     return getattr(model, "runner", None) or Run
 
 
@@ -978,7 +978,7 @@ class Run:
         return out if smooth else out + blows
 
     def _changing_arrays(self) -> tuple:
-        """Return the arrays that a step changes besides those of the contact."""
+        """Return the arrays that a step changes, without those of the contact."""
         faces = self.faces
         return self.state, self.ledger, *faces[:-1], *(faces.stops if self.model.joints else ())
 

@@ -27,7 +27,7 @@ IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"
 
 
 def load_kernels(say=None):
-    """Load the module `instances`; `say` is told if its loops have to be compiled first."""
+    """Load the module `instances`; `say` is called if its loops have to be compiled first."""
     return load("dynamics.march.instances", say)
 
 
@@ -102,7 +102,7 @@ class ContactModel:
         if not hasattr(contact, "psi"):
             return {}
         if hasattr(contact, "bondlist"):
-            # as if all bonds of a point were stretched alike
+            # all bonds of a point count as equally stretched
             load = contact.points[4]
             share = contact.statuses[:, STATUS.force]
             here = load * point_pressures(contact)
@@ -125,7 +125,7 @@ class ContactModel:
         }
 
     def build(self):
-        """Return the contact with arrays of its own."""
+        """Return the contact with newly allocated arrays."""
         made = {k: np.array(v, dtype=np.float64, order="C") for k, v in self.fields.items()}
         return self.tuple_of(**made)
 

@@ -99,7 +99,7 @@ TINY = 1e-300  # keeps a divisor above 0
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def friction_bound(which, e, x, stops):
-    """Return the static or kinetic friction [N] of a face at a place of the step.
+    """Return the static or kinetic friction [N] of a face at a fraction of the step.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def release_face(e, way, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def choose_states(x, stops):
-    """Choose which faces rest, slide or carry at a place of the step; return whether it succeeds."""
+    """Choose which faces rest, slide or carry at a fraction of the step; return whether it succeeds."""
     f = stops.field
     for e in range(stops.names.size):
         if abs(f[SLIP_STATE, e]) == 2.0:
@@ -325,7 +325,7 @@ def speed_rates(e, x, dt, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_next_event(x, dt, stops):
-    """Find the next stop or release after a place of the step.
+    """Find the next stop or release after a fraction of the step.
 
     Parameters
     ----------
@@ -376,7 +376,7 @@ def find_next_event(x, dt, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def advance_faces(x, y, who, dt, stops):
-    """Move all faces on from a place of the step up to an event.
+    """Move all faces on from a fraction of the step up to an event.
 
     Parameters
     ----------
@@ -536,7 +536,7 @@ def follow_step(dt, stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def match_mean_forces(stops):
-    """Find mean forces of all faces that give the slides of stops.field; return whether they exist."""
+    """Find mean forces of all faces that cause the slides in stops.field; return whether they exist."""
     f = stops.field
     count = 0
     for e in range(stops.names.size):
@@ -574,7 +574,7 @@ def match_mean_forces(stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_blows(stops):
-    """Find the blows that give the faces their speeds; return the work of all friction [J]."""
+    """Find the impulses that cause the speeds of the faces; return the friction work [J]."""
     f = stops.field
     count = 0
     work = 0.0

@@ -299,7 +299,7 @@ def newton_step(faces, dt, known):
     count = faces.of.shape[1]
     miss = faces.each[ELEMENT_RESIDUAL]
     force_equations(faces, dt, known)
-    # pivots in place: 1 + slope beta leads its row for laws that resist
+    # no row exchanges are needed: 1 + slope beta dominates its row for laws that resist the slide
     if not eliminate(faces.system, miss):
         return False
     for e in range(count):

@@ -275,7 +275,7 @@ class VaryingLoadModel:
         return IDLE if self.set_valued else (IDLE[0], "friction.laws.tanh_kernels")
 
     def build(self):
-        """Return the contact with arrays of its own, under the preload."""
+        """Return the contact with newly allocated arrays, under the preload."""
         law = self.law
         if self.pointed:
             return self.points(
@@ -331,7 +331,7 @@ def shear_of(
     ShearModes
     """
     limit = law.static * (force + FLOOR * force.sum() * weight / weight.sum())
-    # a patch that could jump by itself is refused, under its preload as where the load stays
+    # a patch that could jump without a change of the drive is refused, by its preload as under a constant load
     if law.growth[0] >= 0:
         shear_modes(
             giving,
@@ -468,7 +468,7 @@ class VaryingLoadRun(Run):
         nodal = self.load.now.copy()
         found = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
         c = self.contact
-        if self.model.law.kind == LISTS:  # as if all bonds of a point were stretched alike
+        if self.model.law.kind == LISTS:  # all bonds of a point count as equally stretched
             force = self.model.law.static * c.points[4] * c.statuses[:, STATUS.force]
             law = self.model.law
             found = {

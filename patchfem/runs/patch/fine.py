@@ -138,7 +138,7 @@ def _first(asked) -> int:
 
 
 def _dear(last: PointLevel) -> bool:
-    """Return whether twice the points of a level are too many, or take too many iterations."""
+    """Return whether doubling the points of a level exceeds the limit of points or iterations."""
     return 2 * last.force.size > MAX_POINTS or 3 * last.work * last.force.size > MAX_WORK
 
 

@@ -423,7 +423,7 @@ def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
     longest = cells.max(axis=1)
     spread = gap_range + np.abs(force @ pieces.normal).max(axis=1)
     corner = 0.0
-    if pieces is pair.compliance:  # a skin smooths the pressure
+    if pieces is pair.compliance:  # a compliant layer of asperities (skin) bounds the pressure
         corner = corner_layer(
             pair, (force / interface.weight)[:, [0, -1]], np.diff(interface.x)[[0, -1]]
         )

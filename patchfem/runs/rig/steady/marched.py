@@ -185,7 +185,7 @@ class MarchFinder(Followed):
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
     def shown(self, drive, near=None) -> CurvePoint:
-        """Return a point of a curve; if the search from `near` fails, from rest."""
+        """Return a point of a curve, found from the state `near` or, if that fails, from rest."""
         try:
             return curve_point(drive, *self.point(drive, near))
         except NotConverged:
