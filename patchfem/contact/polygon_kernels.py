@@ -47,7 +47,10 @@ def write_limits(sets, slot):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def clip_polygon(old, new, n_corners, c0, c1, c2, node):
-    """Clip a polygon by the half plane c0 + c1 d + c2 t >= 0; return its number of corners, -1 if too many.
+    """Clip a polygon by the half plane c0 + c1 d + c2 t >= 0; return its number of corners.
+
+    The result is -1 if the corners are too many.
+
 
     old, new: (3, k) corners before and after. A corner has two coordinates and the node whose line
     leads to the next corner, -1 for the box. The method is that of Sutherland and Hodgman (Comm. ACM
@@ -126,14 +129,20 @@ def write_polygon(sets, slot):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def is_in_box(sets, d, t):
-    """Return whether a rigid displacement lies in the box in which polygons are computed."""
+    """Return whether a rigid displacement lies in the box in which polygons are computed.
+
+    d: displacement [m]; t: rotation [rad].
+    """
     unit_d, unit_t = polygon_units(sets)
     return abs(d) <= BOX_HALF_WIDTH * unit_d and abs(t) <= BOX_HALF_WIDTH * unit_t
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def side_margin(sets, slot, side, d, t):
-    """Return how far the force [N] or gap [m] of the node of a side is above its limit."""
+    """Return how far the force [N] or gap [m] of the node of a side is above its limit.
+
+    d: displacement [m]; t: rotation [rad].
+    """
     i = sets.polygons.nodes[slot, side]
     limit = sets.polygons.limits[slot, 0 if sets.stored.in_contact[slot, i] else 1]
     unknowns = sets.stored.unknowns
@@ -143,6 +152,8 @@ def side_margin(sets, slot, side, d, t):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def is_inside(sets, slot, d, t):
     """Return whether a displacement lies in the polygon of a set; False without a polygon.
+
+    d: displacement [m]; t: rotation [rad].
 
     Cost: a few multiplications per side, instead of one pass over the nodes.
     """

@@ -394,7 +394,7 @@ def _check_strips(
 
 
 def _strip_opening(asperities, compliance, layout: StripLayout, gap, solution, position):
-    """Return the gap (s, m) [m] of pressed strips; separations of the mean planes with asperities.
+    """Return the gap (s, m) [m] of pressed strips; with asperities, of their mean planes.
 
     gap: (s, m) [m] before loading, with the rotation about x; position: HolderPosition beyond that in
     the gap.

@@ -87,7 +87,7 @@ def balanced_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
 
 
 def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
-    """Find the limit cycles under rigid friction on one interface that slides from reversal to reversal.
+    """Find the limit cycles under rigid friction on an interface that never sticks.
 
     From a turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
     period T/2. It is a cycle where the interface comes to rest there, slides one way all the time,

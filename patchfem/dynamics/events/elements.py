@@ -107,7 +107,7 @@ def coulomb(static: float, kinetic: float | None = None) -> Elements:
 
 
 def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elements:
-    """Return fewer elements, each of which has the stiffness and the limit of some of the given ones together.
+    """Return fewer elements, each of which has the total stiffness and limit of several given ones.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
 
 
 class ElementTable(NamedTuple):
-    """Elements of all interfaces (i) as the kernels take them; t is the length of the longest list.
+    """Elements of all interfaces (i), padded to the longest list (t), as arrays for the kernels.
 
     - n_elements: (i,) number of elements
     - yield_slide: (i, t + 1) [m], infinite after the last element
@@ -197,7 +197,7 @@ def make_table(groups) -> ElementTable:
 
 
 class Memory(NamedTuple):
-    """What the elements of all interfaces (i) remember.
+    """Memory of the elements of all interfaces (i).
 
     - slide: (i,) relative displacement [m]
     - n_slipping, direction: (i,) number of elements that slip, the first ones of the list, and the sign of their slip
@@ -255,7 +255,7 @@ def reset_work(memory: Memory) -> Memory:
 
 
 def element_stretches(group: Elements, memory: Memory, interface: int) -> np.ndarray:
-    """Return the stretch (a,) [m] of every element in the order in which `make_elements` got them.
+    """Return the stretch (a,) [m] of every element in the order given to `make_elements`.
 
     Parameters
     ----------

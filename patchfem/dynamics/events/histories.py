@@ -580,7 +580,10 @@ class _Run:
         self.n_events += many * (self.n_events - count)
 
     def _log_events(self, rows) -> np.ndarray:
-        """Log stops, releases, reversals and borders of the drive; returns which rows (k,) begin with one."""
+        """Log stops, releases, reversals and borders of the drive.
+
+        Returns which rows (k,) begin with one.
+        """
         is_event = np.zeros(len(rows), bool)
         if not len(rows):
             return is_event

@@ -104,7 +104,7 @@ def rigid_friction(interface, table, memory):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def interface_force(interface, table, memory):
-    """Return the friction force [N] of an interface, without the reaction of a rigid element that sticks."""
+    """Return the friction force [N] of an interface without the reaction of its rigid element."""
     return (
         rigid_friction(interface, table, memory)
         + find_force_and_energy(interface, table, memory)[0]
@@ -113,7 +113,7 @@ def interface_force(interface, table, memory):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_force_and_energy(interface, table, memory):
-    """Return force [N] and elastic energy [J] of the elastic-plastic elements, added group by group."""
+    """Sum force [N] and elastic energy [J] of the elastic-plastic elements, group by group."""
     first = memory.n_slipping[interface]
     slide = memory.slide[interface]
     force = memory.direction[interface] * table.limit_sum[interface, first]

@@ -12,7 +12,7 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .memory_kernels import is_held, next_yield_slide
 
-# what ends a piece
+# kinds of events that end a piece
 from .positions_kernels import EVENT
 from .series_kernels import EPS, NO_ROOT, SINGLE_INTEGRAL, find_first_root, refine_root
 

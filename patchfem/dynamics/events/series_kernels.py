@@ -111,7 +111,7 @@ def bound_fastest_rate(modal_system, springs):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bound_modal_rate(modal_system, workspace):
-    """Return the bound of `bound_fastest_rate` for workspace.stiffness, 0 where nothing can move."""
+    """Return the bound of `bound_fastest_rate` for workspace.stiffness; 0 without free motions."""
     if workspace.constraint.status[HOLD.is_immobile] == 1.0:
         return 0.0
     return bound_fastest_rate(modal_system, workspace.stiffness)

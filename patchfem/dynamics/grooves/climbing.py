@@ -127,7 +127,7 @@ def with_shear_modes(
 
 
 class FlankModel:
-    """What `march.march` needs to know of a contact along the flanks of `grooves`.
+    """Description of a contact along the flanks of `grooves` for `march.march`.
 
     It is under a `load` [N] and has the coefficient of friction `static` [1].
     """

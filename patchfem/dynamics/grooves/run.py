@@ -141,7 +141,7 @@ class SampledRun(GroovesRun):
         return np.array([y[-3], y[-2], own[COUNT.drive_power], y[n], own[COUNT.accepted], y[-1]])
 
     def fork(self, drive):
-        """Return a copy that goes on by itself, as a Run does."""
+        """Return an independent copy, as a Run does."""
         twin = super().fork(drive)
         twin.smooth_motion = self.smooth_motion.fork(drive)
         return twin

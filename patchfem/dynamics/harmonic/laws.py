@@ -380,7 +380,7 @@ class Nodes(NamedTuple):
         return np.exp(since) / forgets if forgets > 1e-12 else np.zeros_like(since)
 
     def by_cell(self) -> tuple:
-        """Return the fraction of the stretch that every cell keeps, and its slope over the slide (N,)."""
+        """Return the fraction of the stretch kept by every cell, and its slope over the slide (N,)."""
         kept, by_slide, _ = self.steps
         first = np.flatnonzero(self.own)
         turns = ~self.own

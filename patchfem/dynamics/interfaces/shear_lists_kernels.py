@@ -113,7 +113,10 @@ def start_step(dt, c):
     error_model="numpy", forceinline=False, **NJIT_NO_REFCOUNT
 )  # without this option the caller's forced inlining would extend to all functions called here
 def write_forces(kind, ending, c):
-    """Write path-mean force [N] and slope [N/m] of every point at its slide; returns the friction force [N]."""
+    """Write path-mean force [N] and slope [N/m] of every point at its slide.
+
+    Returns the friction force [N].
+    """
     points = c.points
     dt = c.time[0]
     force = 0.0

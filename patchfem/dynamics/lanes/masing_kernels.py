@@ -1,4 +1,6 @@
-"""A step behind sliders side by side, of one case: of the fourth order between reversals of the slide and closings of loops.
+"""Step of one case behind parallel sliders (Masing's rule).
+
+It has order 4 between reversals of the slide and closings of loops.
 
 The equation in the angle of the drive is x'' + D x' + W x = P sin - f. With the slide x_t and the friction f_t of the last
 reversal, and the direction s = +-1 since then, Masing's rule is
@@ -315,7 +317,9 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def stick_fractions(start, end, workspace, lane, angle):
-    """Return the `StickReading` of a segment of a step; it sticks while less than half of the friction slips.
+    """Return the `StickReading` of a segment of a step.
+
+    It sticks while less than half of the friction slips.
 
     Parameters
     ----------
@@ -337,7 +341,10 @@ def stick_fractions(start, end, workspace, lane, angle):
 
 @njit(**NJIT_INLINE)
 def slip_increment(memory, event_memory, memory1, workspace, lane):
-    """Return the path of slip of the last step [m]; arguments as of `rigid_kernels.slip_increment`."""
+    """Return the path of slip of the last step [m].
+
+    The arguments are those of `rigid_kernels.slip_increment`.
+    """
     return workspace[STEP_SLIP * LANES + lane]
 
 
@@ -365,7 +372,10 @@ def branch_state(workspace, lane):
 
 @njit(**NJIT_INLINE)
 def prepare_step(workspace, s0, c0):
-    """Look up the curves of all lanes at the slides that a Taylor series predicts for the end of the next step."""
+    """Look up the curves of all lanes at the predicted slides at the end of the next step.
+
+    A Taylor series predicts the slides.
+    """
     if curve.LOOKS_AHEAD:
         for lane in range(LANES):
             t = workspace[STEP * LANES + lane]

@@ -94,7 +94,10 @@ def load_loop(law: str):
 
 
 def law_kernels(law: str):
-    """Return the kernels that name the rows of the state of a law; None if a law has no state of its own."""
+    """Return the kernels that name the rows of the state of a law.
+
+    The result is None if a law has no state of its own.
+    """
     if law in ("rigid", "yielding"):
         return None
     if law == "table":
@@ -238,7 +241,7 @@ def case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
 
 
 def step_coefficients(cases: Cases, spring, angle: float) -> np.ndarray:
-    """Return the coefficients (n, 10) of an exact step with `spring` added to the modal stiffness.
+    """Return the coefficients (n, 10) of an exact step with a spring parallel to the mode.
 
     `rows_kernels` names the columns.
     """
@@ -308,7 +311,9 @@ def law_state(law: str, motion, name: str) -> np.ndarray:
 
 
 def continue_march(law: str, cases: Cases, motion, cycles: int, steps: int) -> tuple:
-    """March cases over more cycles, or until they repeat; the last cycle then stands for those that follow.
+    """March cases over more cycles, or until they repeat.
+
+    The last cycle then stands for those that follow.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The force of a first loading of parallel Jenkins elements, which is straight between their yields.
+"""Force of parallel Jenkins elements in their first loading, linear between yields.
 
 With the force over the stiffness and YIELD_LENGTH, and the slide over YIELD_LENGTH w,
 

@@ -1,4 +1,6 @@
-"""A step behind one elastic-plastic element, of one case: exact between yields and stops, each found inside its step.
+"""Step of one case behind an elastic-plastic element, exact between yields and stops.
+
+Yields and stops are located inside their steps.
 
 The equation in the angle of the drive is x'' + D x' + W x = P sin - f. In a stick f = SPRING (x - memory), in a slip
 f = +-KINETIC; a slip starts at |x - memory| = YIELD_LENGTH. A reference is the engine `dynamics.events`.
@@ -144,7 +146,9 @@ def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
-    """Return the rate of the friction; 0 after an event, because a stick that starts there moves with its slip.
+    """Return the rate of the friction.
+
+    The result is 0 after an event, because a stick that starts there moves with its slip.
 
     Parameters
     ----------
@@ -252,7 +256,7 @@ def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
 
 @njit(**NJIT_INLINE)
 def slip_correction(angle, damping, stiffness, event):
-    """Return the `Motion` that is to be added an angle after an event, where the spring changes its action.
+    """Return the `Motion` to add at an angle after an event that engages or releases the spring.
 
     It solves d'' + damping d' + stiffness d = factor (speed t + rate t^2/2 + second_rate t^3/6) from rest, with the fields
     of the `CurveEvent`, by its Taylor series.
@@ -279,7 +283,9 @@ def slip_correction(angle, damping, stiffness, event):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_reversal_in_slip(event, spring, angle):
-    """Find the angle from a yield to the reversal of the slip by Newton's method; at most `angle`.
+    """Find the angle from a yield to the reversal of the slip by Newton's method.
+
+    The result is at most `angle`.
 
     The speed of the stick goes on as a parabola, and the slip adds the force that the spring lacks.
     """
@@ -466,7 +472,10 @@ def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
 
 @njit(**NJIT_INLINE)
 def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
-    """Compute a step from a stick, in which the element may yield; arguments as of `resolve_slip`."""
+    """Compute a step from a stick, in which the element may yield.
+
+    The arguments are those of `resolve_slip`.
+    """
     memory = workspace[MEMORY * LANES + lane]
     spring = workspace[SPRING * LANES + lane]
     length = workspace[YIELD_LENGTH * LANES + lane]

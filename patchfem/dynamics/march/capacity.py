@@ -30,7 +30,10 @@ class Kept(NamedTuple):
 
 
 def copy_state(contact, *others) -> Kept | None:
-    """Return copies of a contact with a list of bonds and of other arrays; None for a contact without a list."""
+    """Return copies of a contact with a list of bonds and of other arrays.
+
+    The result is None for a contact without a list.
+    """
     if not hasattr(contact, "bondlist"):
         return None
     fields = {name: array.copy() for name, array in contact._asdict().items() if name != "bondlist"}

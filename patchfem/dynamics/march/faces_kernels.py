@@ -492,7 +492,10 @@ def set_free_motion(faces):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def take_stop_forces(faces):
-    """Take the forces of the stops into faces.each; return their largest change over the tolerance."""
+    """Take the forces of the stops into faces.each.
+
+    Returns their largest change over the tolerance.
+    """
     stops = faces.stops
     worst = 0.0
     for i in range(stops.names.size):
@@ -748,7 +751,9 @@ def friction_work(dq, row, faces):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def strike_modes(motion, mass, faces):
-    """Strike the modes by the blows of set-valued elements; return the energy that they take [J].
+    """Strike the modes by the blows of set-valued elements.
+
+    Returns the energy that they take [J].
 
     If no stops are known, the elements that do not slide are brought to rest.
 
@@ -881,7 +886,10 @@ def cap_forces(faces):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def slide_freely(used, faces):
-    """Let the only set-valued element slide through the step under a mean force; return its slide."""
+    """Let the only set-valued element slide through the step under a mean force.
+
+    Returns its slide.
+    """
     f = faces.stops.field
     faces.each[ELEMENT_FORCE, 0] = used
     faces.each[INCREMENT, 0] = faces.port[FREE_SLIDE, 0] - faces.gives[BETA, 0, 0] * used

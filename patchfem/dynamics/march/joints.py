@@ -98,7 +98,10 @@ class JointsModel:
 
     @property
     def reduction(self):
-        """What the arrays of the patch were reduced from (`ContactModel.reduction`); None without a patch."""
+        """ShearModes from which the patch was reduced (`ContactModel.reduction`).
+
+        The result is None without patch.
+        """
         return self.patch.reduction if self.patch is not None else None
 
     @property
@@ -119,7 +122,7 @@ class JointsModel:
         return self.patch.kind if self.patch is not None else IDLE
 
     def shown(self, contact) -> dict:
-        """Return what a picture needs of the patch's memory (`ContactModel.shown`); empty without a patch."""
+        """Return the fields of the patch's memory for pictures (`ContactModel.shown`)."""
         return self.patch.shown(contact) if self.patch is not None else {}
 
     def build(self):

@@ -1,4 +1,6 @@
-"""Patches with bonds behind shear modes marched side by side, one case in a lane: the steps of `passing_kernels`.
+"""March of patches with bonds behind shear modes, one case per lane.
+
+The steps are those of `passing_kernels`.
 
 The cases share the modes of their rig and the frequency of their drive, and have N_POINTS points behind N_PIECE_MODES modes
 of the pieces each. In every step all lanes take as many turns of Newton's method as the slowest of them needs. The workspace
@@ -164,7 +166,7 @@ def path_shapes(x, far):
 
 @njit(**NJIT_INLINE)
 def add_point(s, workspace, lane, j, y, over, far):
-    """Add a point to the residual and to the lower triangle of the Hessian, s (9,), at the increments y.
+    """Add a point to the residual and the lower triangle of the Hessian, s (9,), at increments y.
 
     Parameters
     ----------

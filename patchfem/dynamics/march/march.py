@@ -322,7 +322,7 @@ class _Plan(NamedTuple):
 
 
 class _Recorder:
-    """What a march keeps of its cycles: all samples of the last ones, and before them those worth keeping.
+    """Recorder of a march: all samples of the last cycles, and selected earlier samples.
 
     - `samples`: the `checkpoint.Samples` that are kept.
     - `keeps_samples`, `keeps_extremes`: whether samples from before the last cycles are kept, and extremes and phasors
@@ -388,7 +388,9 @@ def _march_recorded(run, recorder: _Recorder, plan: _Plan, slot, progress) -> li
 
 
 def _keep_samples(samples: Samples, run, cycle, pick=None) -> int:
-    """Keep samples of a cycle (first step, rows, work) that is none of the last ones; return how many.
+    """Keep samples of a cycle (first step, rows, work) that is none of the last ones.
+
+    Returns how many.
 
     `pick` has their numbers if they are known.
     """
@@ -399,7 +401,9 @@ def _keep_samples(samples: Samples, run, cycle, pick=None) -> int:
 
 
 def _repeat_last_cycle(samples: Samples, run, count: int) -> int:
-    """Skip `count` cycles that are equal to the last one; return how many samples may still be kept.
+    """Skip `count` cycles that are equal to the last one.
+
+    Returns how many samples may still be kept.
 
     The samples of the last cycle are kept again for the skipped ones, with the sums that have grown since.
     """
@@ -583,7 +587,10 @@ class Run:
         self.done += count * self.prop.steps
 
     def placed(self, place, rate) -> None:
-        """Move the march to coordinates and rates (n,) at the start of a cycle; the contact slides there slowly."""
+        """Move the march to coordinates and rates (n,) at the start of a cycle.
+
+        The contact slides there slowly.
+        """
         path = np.array([self.modes.slide @ self.state[0], self.modes.slide @ place])
         if path[0] != path[1]:
             self._slid(path)
@@ -663,7 +670,9 @@ class Run:
         )
 
     def passed(self, steps: int, tell=None) -> bool:
-        """March to a step in long pieces without keeping samples; return whether the march got there.
+        """March to a step in long pieces without keeping samples.
+
+        Returns whether the march got there.
 
         `tell` is called after each piece.
         """
@@ -825,7 +834,9 @@ class Run:
         return first, rows[0], works[0]
 
     def _march_rows(self, size: int, frames: int, snapshots: list) -> np.ndarray:
-        """Return the rows (steps + 1, width) of `size` steps as the loop writes them; arguments as of `cycles`.
+        """Return the rows (steps + 1, width) of `size` steps as the loop writes them.
+
+        The arguments are those of `cycles`.
 
         Parameters
         ----------
@@ -895,7 +906,10 @@ class Run:
             return abs(float(self.modes.output @ row[: self.modes.omega.size]))
 
     def _steps(self, count: int, rows) -> tuple:
-        """March `count` steps into rows (count + 1, width); return the number of steps done and the status."""
+        """March `count` steps into rows (count + 1, width).
+
+        Returns the number of steps done and the status.
+        """
         table, row = self.table(count)
         return self.loops.march(
             self.model,

@@ -50,7 +50,7 @@ class Joint:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactModel:
-    """What the loop needs to know of an interface; `build` makes fresh arrays, so a model can be run many times.
+    """Description of an interface for the loop; every `build` allocates new arrays.
 
     - `contact`: module of the compiled contact.
     - `limit`: friction limit [N].

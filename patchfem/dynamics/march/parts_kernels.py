@@ -1,4 +1,4 @@
-"""The flags of the loop of a rig; here those of one contact under a constant load. `instances` writes others.
+"""Flags of the loop for one contact under a constant load; `instances` writes others.
 
 Numba leaves out the branches of a flag that is False, so nothing is compiled that a rig does not have.
 """

@@ -1,4 +1,6 @@
-"""Cycles of bonds behind shear modes of which no sample is stored: extremes, phasors and energies are folded as they pass.
+"""March of bonds behind shear modes without stored samples.
+
+Extremes, phasors and energies of the cycles are accumulated in the march.
 
 The steps are those of `loop_kernels.march` with the contact `interfaces.shear_kernels`; a test compares both. While all
 points slip one way the friction is constant, and the modes of the pieces alternate about their mean from one step to the

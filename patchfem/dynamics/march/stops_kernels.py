@@ -1,4 +1,4 @@
-"""Stops and releases of set-valued faces inside a step: which rest, slide or carry, and the forces that this needs.
+"""Stops and releases of set-valued faces inside a step, and the forces on the faces.
 
 A march moves the modes under mean forces, so a stop or a release inside the step would be off by up to a step, and a slide
 that is held would keep a speed. Here the forces h(x) that would hold all faces change linearly over the step, 0 <= x <= 1,
@@ -181,7 +181,10 @@ def list_resting(stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_forces(x, stops):
-    """Write the forces of all faces and their slopes into stops.field; return whether they exist."""
+    """Write the forces of all faces and their slopes into stops.field.
+
+    Returns whether they exist.
+    """
     f = stops.field
     count = list_resting(stops)
     for e in range(stops.names.size):
@@ -243,7 +246,10 @@ def release_face(e, way, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def choose_states(x, stops):
-    """Choose which faces rest, slide or carry at a fraction of the step; return whether it succeeds."""
+    """Choose which faces rest, slide or carry at a fraction of the step.
+
+    Returns whether it succeeds.
+    """
     f = stops.field
     for e in range(stops.names.size):
         if abs(f[SLIP_STATE, e]) == 2.0:
@@ -432,7 +438,10 @@ def follow_events(dt, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def check_all_slide(stops):
-    """Return whether all faces slide on to the end of the step; stops.field then has their speeds."""
+    """Return whether all faces slide on to the end of the step.
+
+    If so, stops.field gets their speeds.
+    """
     f = stops.field
     count = stops.names.size
     for e in range(count):
@@ -455,7 +464,9 @@ def check_all_slide(stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_holding_forces(dt, stops):
-    """Find the forces that would hold the faces at both ends of the step; return whether they exist.
+    """Find the forces that would hold the faces at both ends of the step.
+
+    Returns whether they exist.
 
     They are found for all faces at once, and then for the resting ones as the step itself asks of them beside
     those that slide: accelerations are known to the first order of the step only, which would place a release
@@ -536,7 +547,10 @@ def follow_step(dt, stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def match_mean_forces(stops):
-    """Find mean forces of all faces that cause the slides in stops.field; return whether they exist."""
+    """Find mean forces of all faces that cause the slides in stops.field.
+
+    Returns whether they exist.
+    """
     f = stops.field
     count = 0
     for e in range(stops.names.size):

@@ -1,4 +1,4 @@
-"""Modes under the normal force, the moment and the friction of a contact, each under the present load.
+"""March of modes under normal force, moment and friction of a contact with varying load.
 
 The upper holder moves from its solved preload by the heave h = normal . z and the pitch th = pitch . z. The nodal forces are
 those of the unilateral contact at approach delta0 - h and rotation theta0 + th (`contact.contact_sets`). The modes are
@@ -75,7 +75,10 @@ def plastic(static: float, length: float) -> Rubbing:
 
 
 def bonds(law) -> Rubbing:
-    """Return the stretch reading of bonds with order 1 at every point; PatchfemError for other bonds."""
+    """Return the stretch reading of bonds with order 1 at every point.
+
+    PatchfemError is raised for other bonds.
+    """
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
         raise PatchfemError(
             describe_unsupported(
@@ -95,7 +98,9 @@ def bonds(law) -> Rubbing:
 
 
 def lists(law, reach: float, merge: float) -> Rubbing:
-    """Return the printed reading of bonds, a list of bonds at every point; PatchfemError for the stretch reading.
+    """Return the printed reading of bonds, a list of bonds at every point.
+
+    PatchfemError is raised for the stretch reading.
 
     Bonds keep the pressure under which they formed. In the stretch reading bonds are released as the load
     falls.
@@ -196,7 +201,7 @@ def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class VaryingLoadModel:
-    """What `march.march` needs to know of a load that varies.
+    """Description of a varying load for `march.march`.
 
     - `law`: what rubs.
     - `sets`: contact sets.

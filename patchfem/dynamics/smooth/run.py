@@ -36,7 +36,7 @@ LAST_TOLERANCE_RATIO = 0.01
 N_PHASOR_WINDOWS = 8
 # length of the first step over the shortest time of modes and drive
 FIRST_STEP_RATIO = 1e-3
-# change that a motion that repeats may still make, in tolerances of a step
+# largest change per cycle of a motion that counts as periodic, over the tolerance of a step
 MAX_REPEAT_CHANGE = 10.0
 # change of the extremes between two cycles over MAX_REPEAT_CHANGE, as their steps lie at other times
 MAX_CYCLE_RATIO = 10.0
@@ -217,7 +217,7 @@ class Motion:
         self.begun = float(self.record.counters[COUNT.max_stored])
 
     def fork(self, drive):
-        """Return a copy of the motion that goes on by itself, under another drive."""
+        """Return an independent copy of the motion, under another drive."""
         twin = copy(self)
         twin.progress = None
         twin.arrays = type(self.arrays)(*(array.copy() for array in self.arrays))

@@ -90,7 +90,7 @@ def skin_of(asked):
 
 
 def rotational_stiffness(state, c, x, weight) -> float:
-    """Return the rotational stiffness -dM/d(rotation) [N m/rad] of strips with a smooth asperity layer.
+    """Return the rotational stiffness [N m/rad] of strips with a smooth asperity layer.
 
     The approach is fixed.
 
