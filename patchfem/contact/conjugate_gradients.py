@@ -100,7 +100,7 @@ def project_forces(
 
 
 def _line_search(start: np.ndarray, change: np.ndarray, wanted: float) -> float:
-    """Return t > 0 with change . max(0, start + t change) equal to the given value.
+    """Return t > 0 for which change . max(0, start + t change) has the given value.
 
     The left-hand side is piecewise linear in t.
     """

@@ -15,7 +15,7 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .list_kernels import find_mean_and_slope
 from .shear_points_kernels import FORCE, LOAD, SLIDE, SLOPE
 
-# residual over the goal that is accepted where it does not decrease further, because sums over bonds jump by 1e-8
+# residual over the goal that is accepted where it does not decrease further, because sums over bonds jump by up to 1e-8
 GOAL_SLACK = 1e4
 # whether a force may decrease as its point slides on
 FORCE_MAY_FALL = True

@@ -138,7 +138,7 @@ def accept_step(workspace, lane, before, s1, c1, tried, extreme):
 def try_lane_step(workspace, lane, s0, c0, s1, c1, angle):
     """Move a lane over a step without an event.
 
-    A lane that has one stays where it is and is marked.
+    A lane with an event stays where it is and is marked.
     """
     before = lane_state(workspace, lane)
     tried = law.try_step(workspace, lane, s0, c0, s1, c1, False)
@@ -152,7 +152,7 @@ def try_lane_step(workspace, lane, s0, c0, s1, c1, angle):
 def collect_marked_lanes(workspace, marked, n_busy):
     """Write the numbers of the marked lanes among the first `n_busy` into marked (LANES + 1,).
 
-    Returns how many.
+    Returns the number of these lanes.
     """
     count = 0
     for lane in range(n_busy):

@@ -105,7 +105,8 @@ MAX_DROPPED_GAP = (
     LAW_STATE + 17
 )  # largest gap, over its size, of a loop that was dropped from a full stack
 N_REVERSALS = LAW_STATE + 18  # number of reversals on the stack
-STICK_FRACTION = LAW_STATE + 19  # fraction of the segment before the event in which it sticks
+# fraction of the segment before the event in which the interface sticks
+STICK_FRACTION = LAW_STATE + 19
 INVERSE_LENGTH = LAW_STATE + 20  # DIRECTION over m YIELD_LENGTH
 FORCE_RATIO = LAW_STATE + 21  # SPRING YIELD_LENGTH over KINETIC
 REVERSALS = (
@@ -319,7 +320,7 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
 def stick_fractions(start, end, workspace, lane, angle):
     """Return the `StickReading` of a segment of a step.
 
-    It sticks while less than half of the friction slips.
+    The interface sticks while less than half of the friction slips.
 
     Parameters
     ----------

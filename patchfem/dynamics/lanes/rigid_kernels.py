@@ -240,7 +240,7 @@ def records_own_peaks():
 def slide_at_reversal(x, v, x1, v1, angle):
     """Return the slide at a reversal in a step without an event.
 
-    There is none, so it is that of the end.
+    Such a step has no reversal, so the result is the slide at its end.
 
     Parameters
     ----------
