@@ -100,7 +100,7 @@ def project_forces(
 
 
 def _line_search(start: np.ndarray, change: np.ndarray, wanted: float) -> float:
-    """Return t > 0 with change . max(0, start + t change) = wanted.
+    """Return t > 0 for which change . max(0, start + t change) has the given value.
 
     The left-hand side is piecewise linear in t.
     """
@@ -207,7 +207,7 @@ def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bo
 
 
 def _energy_slope(program: _QuadraticProgram, in_contact, displacement) -> np.ndarray:
-    """Return the slope of the energy by each force (n,) [m], without the rigid motion that fits it."""
+    """Return the gradient of the energy (n,) [m] without its least-squares rigid motion."""
     slope = program.gap + displacement
     motion = _fit_motion(program.rigid[in_contact], slope[in_contact])
     return slope - program.rigid @ motion

@@ -24,10 +24,10 @@ MAX_SLOTS = 100_000  # largest number of stored contact sets; more are not neede
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactSet:
-    """One contact set, with its forces and gaps as affine functions of the motion.
+    """One contact set, with its forces and gaps as affine functions of the rigid displacement.
 
     - in_contact (m,): whether a node is in contact.
-    - unknowns (3, m): force [N] of nodes in contact and gap [m] of the others, per (1, d, t).
+    - unknowns (3, m): force [N] of nodes in contact and gap [m] of the others, coefficients of 1, d, t.
     - energy (6,): energy of the preloaded contact, E - E0 - N0 d + M0 t, as coefficients of 1, d, t, d^2/2,
       d t and t^2/2.
     """
@@ -37,14 +37,14 @@ class ContactSet:
     energy: np.ndarray
 
     def values(self, d: float, t: float) -> np.ndarray:
-        """Return forces [N] of nodes in contact and gaps [m] of the others (m,) at a motion.
+        """Return forces [N] of nodes in contact, gaps [m] of others (m,) at a rigid displacement.
 
         d [m], t [rad]: motion of the holder.
         """
         return self.unknowns[0] + d * self.unknowns[1] + t * self.unknowns[2]
 
     def forces(self, d: float, t: float) -> np.ndarray:
-        """Return the nodal forces (m,) [N] at a motion, with rounding errors below 0 cut off.
+        """Return the nodal forces (m,) [N] at a rigid displacement; negative round-off becomes 0.
 
         d [m], t [rad]: motion of the holder.
         """
@@ -118,7 +118,7 @@ class ContactSets:
         )
 
     def make_arrays(self, max_bytes: float = MAX_STORED_BYTES) -> SetArrays:
-        """Return the arrays of a search from the reference set.
+        """Return the arrays of the compiled search, which starts from the reference contact set.
 
         max_bytes: size of the contact sets that can be stored [bytes].
         """

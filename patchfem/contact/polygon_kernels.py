@@ -1,4 +1,4 @@
-"""Compiled polygons of contact sets: the motions (d, t) of the holder at which a set holds.
+"""Compiled polygons of the rigid displacements (d, t) at which a contact set holds.
 
 Each node of a set limits these motions to one side of a line. The lines enclose a convex polygon, of
 which only a few are sides, so comparing a motion with the sides is faster than checking all nodes.
@@ -13,7 +13,7 @@ from .set_arrays import MAX_POLYGON_SIDES, REFERENCE_OPENING
 
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 ROUND_OFF = 1e-13  # rounding error of a force or gap over the largest of its terms
-# half width of the box in which polygons are computed, over the openings of the reference state
+# half width of the box in which polygons are computed, in the units of `polygon_units`
 BOX_HALF_WIDTH = 100.0
 
 
@@ -30,7 +30,7 @@ def polygon_units(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_limits(sets, slot):
-    """Write the force and the gap below which a node fails inside the polygon of a set."""
+    """Write the force and gap below which a node violates its contact condition in the polygon."""
     unit_d, unit_t = polygon_units(sets)
     constant = sets.stored.unknowns[slot, 0]
     by_d = sets.stored.unknowns[slot, 1]
@@ -47,7 +47,10 @@ def write_limits(sets, slot):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def clip_polygon(old, new, n_corners, c0, c1, c2, node):
-    """Clip a polygon by the half plane c0 + c1 d + c2 t >= 0; return its number of corners, -1 if too many.
+    """Clip a polygon by the half plane c0 + c1 d + c2 t >= 0; return its number of corners.
+
+    The result is -1 if the corners are too many.
+
 
     old, new: (3, k) corners before and after. A corner has two coordinates and the node whose line
     leads to the next corner, -1 for the box. The method is that of Sutherland and Hodgman (Comm. ACM
@@ -75,7 +78,7 @@ def clip_polygon(old, new, n_corners, c0, c1, c2, node):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_polygon(sets, slot):
-    """Compute the polygon of motions at which the contact set in a storage slot holds.
+    """Compute the polygon of rigid displacements at which the contact set in a slot holds.
 
     It is a box of motions, clipped by one line for each node: that of the motions at which the node
     would enter or leave the contact. Nodes at the ends of the contact come first, because they cut off
@@ -126,14 +129,20 @@ def write_polygon(sets, slot):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def is_in_box(sets, d, t):
-    """Return whether a motion lies in the box in which polygons are computed."""
+    """Return whether a rigid displacement lies in the box in which polygons are computed.
+
+    d: displacement [m]; t: rotation [rad].
+    """
     unit_d, unit_t = polygon_units(sets)
     return abs(d) <= BOX_HALF_WIDTH * unit_d and abs(t) <= BOX_HALF_WIDTH * unit_t
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def side_margin(sets, slot, side, d, t):
-    """Return how far the force [N] or gap [m] of the node of a side is above its limit."""
+    """Return how far the force [N] or gap [m] of the node of a side is above its limit.
+
+    d: displacement [m]; t: rotation [rad].
+    """
     i = sets.polygons.nodes[slot, side]
     limit = sets.polygons.limits[slot, 0 if sets.stored.in_contact[slot, i] else 1]
     unknowns = sets.stored.unknowns
@@ -142,7 +151,9 @@ def side_margin(sets, slot, side, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def is_inside(sets, slot, d, t):
-    """Return whether a motion lies in the polygon of a set; False for a set without polygon.
+    """Return whether a displacement lies in the polygon of a set; False without a polygon.
+
+    d: displacement [m]; t: rotation [rad].
 
     Cost: a few multiplications per side, instead of one pass over the nodes.
     """
@@ -157,7 +168,7 @@ def is_inside(sets, slot, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_exit(sets, slot, d, t, dd, dt):
-    """Find where an increment of motion leaves the polygon of a set.
+    """Find where an increment of the rigid displacement leaves the polygon of a set.
 
     Parameters
     ----------

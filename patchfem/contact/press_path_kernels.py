@@ -16,7 +16,7 @@ BORDER_STEP = 1e-10
 
 @njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
 def find_first_failure(sets, slot, d, t, dd, dt, min_force, min_gap):
-    """Return the fraction of an increment of motion at which a node of a set fails first.
+    """Return the fraction of an increment at which a node first violates contact conditions.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def find_first_failure(sets, slot, d, t, dd, dt, min_force, min_gap):
     Returns
     -------
     float
-        inf if no node fails.
+        inf if no node violates its condition.
     """
     constant = sets.stored.unknowns[slot, 0]
     by_d = sets.stored.unknowns[slot, 1]
@@ -50,7 +50,7 @@ def find_first_failure(sets, slot, d, t, dd, dt, min_force, min_gap):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def cross_side(sets, slot, side, d, t):
-    """Return the slot of the contact set beyond a side of a set; -1 if none is found.
+    """Return the slot of the set beyond a side of the polygon of a set; -1 if none is found.
 
     d, t: motion just beyond the side. side: -1 if the side is not known. The set is stored with the
     side, so the next crossing needs no search.
@@ -71,7 +71,7 @@ def cross_side(sets, slot, side, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_border(sets, slot, start, heave, rotation, heave_change, rotation_change):
-    """Find where an increment of motion leaves a set, from the fraction `start` of the increment on.
+    """Find where an increment ends the validity of a contact set, beyond its fraction `start`.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def find_border(sets, slot, start, heave, rotation, heave_change, rotation_chang
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
-    """Average the slopes of the energy of the preloaded contact along an increment of motion.
+    """Average the derivatives of the energy of the preloaded contact along an increment.
 
     The mean times the increment is the difference of the energies (a discrete gradient), and the mean
     is itself the gradient of a convex function.
@@ -167,7 +167,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
         following = cross_side(sets, slot, side, d, rotation + beyond * rotation_change)
         if following < 0:
             return following
-        # a search that returns the same set is repeated farther on
+        # if the search beyond the border returns the same set, it is repeated farther beyond it
         if following == slot:
             border_step *= 10
             start = beyond

@@ -61,7 +61,7 @@ class StoredSets(NamedTuple):
 
 
 class Polygons(NamedTuple):
-    """Polygons of the motions at which the sets in k slots hold.
+    """Polygons of the rigid displacements at which the sets in k slots hold.
 
     - n_sides (k,): number of sides; 0 without a polygon, and then all nodes have to be checked.
     - nodes (k, MAX_POLYGON_SIDES): node of each side.
@@ -78,7 +78,7 @@ class Polygons(NamedTuple):
 
 
 class SetArrays(NamedTuple):
-    """Interface of m nodes, the search for its contact sets, and the sets found so far.
+    """Arrays of an interface of m nodes, of its stored contact sets, and of the search for them.
 
     - compliance (m, m) [m/N]; x (m,) [m].
     - opening (m,): openings of the reference state without forces [m].
@@ -98,7 +98,7 @@ class SetArrays(NamedTuple):
 
 
 def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int) -> SetArrays:
-    """Return the arrays of a search that has not stored any contact set.
+    """Return the arrays of a search for contact sets, in which no set is stored yet.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..elasticity.lapack import dpotrf, dpotrs
 
-# bytes of cached Cholesky factors; a sequence of pressings of 16 strips needs fewer
+# bytes of cached Cholesky factors; 16 strips that are pressed repeatedly need fewer
 MAX_CACHE_BYTES = 1e8
 
 
@@ -28,10 +28,10 @@ def factorise(matrix: np.ndarray) -> np.ndarray:
 
 @dataclass(eq=False, slots=True)
 class WarmStart:
-    """Contact set and Cholesky factors that one pressing of strips leaves for the next one.
+    """Contact set and Cholesky factors that are reused when strips are pressed again.
 
     - contact_set (s, m): Nodes in contact, from which the next pressing starts.
-    - factors: Cholesky factors by the active nodes of a strip and its own diagonal, oldest first.
+    - factors: Cholesky factors by the active nodes of a strip and by the diagonal added to it, oldest first.
     """
 
     contact_set: np.ndarray | None = None

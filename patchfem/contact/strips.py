@@ -221,7 +221,7 @@ def compute_strip_residuals(
     moment=None,
     spring: float = 0.0,
 ) -> MappingProxyType:
-    """Compute the relative residuals of pressed strips from the definitions alone.
+    """Compute the relative residuals of the contact conditions for pressed strips.
 
     The mismatch of the law is relative to the largest force and to what the law gains over the depth of the gap (1e-5
     of it for a smooth law); pressures that count as none are left out.
@@ -394,7 +394,7 @@ def _check_strips(
 
 
 def _strip_opening(asperities, compliance, layout: StripLayout, gap, solution, position):
-    """Return the gap (s, m) [m] of pressed strips; separations of the mean planes with asperities.
+    """Return the gap (s, m) [m] of pressed strips; with asperities, of their mean planes.
 
     gap: (s, m) [m] before loading, with the rotation about x; position: HolderPosition beyond that in
     the gap.
@@ -426,7 +426,7 @@ def _holder_problem(layout: StripLayout, gap, loads: HolderLoads) -> ContactProb
 
 
 def _holder_position(motion, loads: HolderLoads) -> HolderPosition:
-    """Return the position of the holder from the motion (r,) of the rotations that are free."""
+    """Return the position of the holder from its approach and free rotations (r,)."""
     theta = -float(motion[1]) if loads.moment is not None else 0.0
     roll = -float(motion[-1]) if loads.roll_moment is not None else 0.0
     return HolderPosition(float(motion[0]), theta, roll)

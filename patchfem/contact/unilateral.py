@@ -218,7 +218,7 @@ def compute_residuals(
     moment: float | None = None,
     spring: float = 0.0,
 ) -> MappingProxyType:
-    """Compute the relative residuals of a solution from the definition of contact alone.
+    """Compute the relative residuals of the contact conditions for a solution.
 
     An opening is relative to the sum of the magnitudes of its terms at the same node, so a spike of the gap elsewhere
     hides no error.

@@ -1,8 +1,8 @@
-"""A march that takes long keeps its state on disk from time to time, from which it goes on to the same bits.
+"""Checkpoints of a long march on disk, from which it continues with bitwise equal results.
 
-`keeping` says where for all marches within it, one file each by the order in which they begin. A march that ends sooner
-than the first SECONDS writes nothing. What is kept are the arrays and numbers of the Run, which a fresh one takes over,
-and the samples so far.
+`keeping` sets the files of all marches in its context, one per march in the order in which they begin. A march that
+ends within SECONDS writes nothing. A checkpoint holds the arrays and numbers of the Run, which are copied into a new
+Run, and the samples so far.
 """
 
 import hashlib
@@ -19,18 +19,20 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_atomically
 
-SECONDS = 20.0  # between two states on disk
-SHARE = 0.02  # of the time, at most, for writing them
-CONSTANT = "periodic", "workspace"  # arrays that a fresh Run makes again, and room for a step
-UNSET = ("sets",)  # arrays that a fresh Run has not filled yet
+SECONDS = 20.0  # smallest time [s] between two checkpoints
+SHARE = 0.02  # largest fraction of the computing time that writing checkpoints may take
+# arrays that are not stored, as a new Run computes them or a step overwrites them
+CONSTANT = "periodic", "workspace"
+UNSET = ("sets",)  # arrays that a new Run has not filled yet, so they do not identify it
 WITHOUT = "run without --resume"
 _KEEPER = ContextVar("keeper", default=None)
 
 
 class Keeper:
-    """Where the marches of a run keep their states.
+    """Files in which the marches of a run store their checkpoints.
 
-    path: number of a march -> its file; key: of what the run computes; resume: whether files that are there count.
+    path: function from the number of a march to its file; key: identifies the scene and numerics; resume: whether
+    existing files are read.
     """
 
     def __init__(self, path, key: str, resume: bool):
@@ -42,7 +44,7 @@ class Keeper:
 
 @contextmanager
 def keeping(keeper: Keeper | None) -> Iterator[None]:
-    """Marches within keep their states as `keeper` says; None: they keep nothing."""
+    """Let the marches in this context store checkpoints by `keeper`; None: they store nothing."""
     token = _KEEPER.set(keeper)
     try:
         yield
@@ -50,14 +52,17 @@ def keeping(keeper: Keeper | None) -> Iterator[None]:
         _KEEPER.reset(token)
 
 
-MOST_KEPT = 400_000  # samples kept outside the last cycles
+MOST_KEPT = 400_000  # largest number of samples that are kept from before the last cycles
 
 
 class Samples:
-    """What a march collects: last cycles, samples kept before them, their step numbers, extremes and phasors.
+    """Samples that a march has collected so far, which are stored with its checkpoint.
 
-    again: the march has begun a second time, cycle by cycle; marks: of each mark passed the march as it stood, the
-    cycles (first step, rows, work) and their extremes before it.
+    - last: the last cycles (first step, rows, work)
+    - kept, kept_at: blocks of samples from before the last cycles, and their step numbers
+    - extremes, phasors: smallest and largest output, and phasor, of every cycle
+    - again: whether the march was started a second time, cycle by cycle
+    - marks: for each mark passed, the march at that time, the cycles before it and their extremes
     """
 
     def __init__(self, last):
@@ -71,16 +76,16 @@ class Samples:
 
     @property
     def capacity(self) -> int:
-        """Samples that may be kept yet before the last cycles."""
+        """Number of samples from before the last cycles that may still be kept."""
         return MOST_KEPT - sum(map(len, self.kept_at))
 
     def early(self, rows, numbers) -> None:
-        """Keep samples from before the last cycles, with the numbers of their steps."""
+        """Keep samples from before the last cycles, with their step numbers."""
         self.kept.append(rows)
         self.kept_at.append(numbers)
 
     def arrays(self) -> dict:
-        """All of it as arrays by name."""
+        """Return all samples as arrays by name."""
         out = _of_cycles("last", self.last, self.extremes)
         if self.kept:
             out |= {"kept": np.concatenate(self.kept), "kept_at": np.concatenate(self.kept_at)}
@@ -89,7 +94,7 @@ class Samples:
         return out | {"phasors": np.array(self.phasors, complex), "again": np.array(self.again)}
 
     def take(self, found: dict, fresh) -> None:
-        """Take over what `arrays` gave; fresh(): a march at its start."""
+        """Restore the samples from their `arrays`; fresh() returns a march at its start."""
         cycles, self.extremes = _cycles("last", found)
         self.last.extend(cycles)
         if "kept" in found:
@@ -105,7 +110,7 @@ class Samples:
 
 
 def _of_cycles(name: str, cycles, extremes) -> dict:
-    """Cycles (first step, rows, work) and extremes as arrays by name."""
+    """Return cycles (first step, rows, work) and their extremes as arrays by name."""
     return {f"{name}.{k}": rows for k, (_, rows, _) in enumerate(cycles)} | {
         f"{name}.first": np.array([one[0] for one in cycles], np.int64),
         f"{name}.work": np.array([one[2] for one in cycles], float),
@@ -114,7 +119,7 @@ def _of_cycles(name: str, cycles, extremes) -> dict:
 
 
 def _cycles(name: str, found: dict) -> tuple:
-    """(cycles, extremes) as they were."""
+    """Return the cycles and extremes that `_of_cycles` stored."""
     firsts = found[f"{name}.first"].tolist()
     works = found[f"{name}.work"].tolist()
     return [
@@ -123,7 +128,7 @@ def _cycles(name: str, found: dict) -> tuple:
 
 
 class Slot:
-    """The file of one march; without a path nothing is kept."""
+    """Checkpoint file of one march; without a path nothing is stored."""
 
     def __init__(self, path: Path | None, key: str):
         self.path = path
@@ -131,7 +136,7 @@ class Slot:
         self.next = perf_counter() + SECONDS
 
     def offer(self, run, samples: Samples) -> None:
-        """Write the state between two cycles where it is time to; where there is no room nothing is kept any more."""
+        """Write a checkpoint between two cycles if it is due; a full disk ends the checkpoints."""
         if self.path is None or perf_counter() < self.next or run.outcome is not None:
             return
         begin = perf_counter()
@@ -146,7 +151,7 @@ class Slot:
 
 
 def slot_of(run, asked: tuple, samples: Samples, fresh) -> Slot:
-    """The Slot of a march that begins, which takes over a state that is there.
+    """Return the Slot of a march that begins; an existing checkpoint is loaded into the march.
 
     run: fresh, as fresh() makes another; asked: numbers that say what is marched. PatchfemError for the state of
     another march.
@@ -163,7 +168,7 @@ def slot_of(run, asked: tuple, samples: Samples, fresh) -> Slot:
 
 
 def _key_of(key: str, run, asked: tuple) -> str:
-    """What the state of a march belongs to: all numbers of the fresh Run, its drive and what is asked."""
+    """Return a digest of the new Run, its drive and its request, which identifies a checkpoint."""
     digest = hashlib.sha256(f"{key} {type(run).__name__} {asked}".encode())
     for name, array in _arrays(run, UNSET).items():
         digest.update(f"{name} {array.shape} ".encode() + array.tobytes())
@@ -173,7 +178,7 @@ def _key_of(key: str, run, asked: tuple) -> str:
 
 
 def _arrays(run, besides=()) -> dict:
-    """Arrays of a Run by name, those in its tuples too, but for attributes of these names."""
+    """Return the arrays of a Run and of its tuples by name, without the attributes `besides`."""
     out = {}
 
     def walk(name: str, value) -> None:
@@ -190,7 +195,7 @@ def _arrays(run, besides=()) -> dict:
 
 
 def _of_run(name: str, run) -> dict:
-    """Arrays and numbers of a Run by name."""
+    """Return the arrays and numbers of a Run by name."""
     numbers = {
         each: value for each, value in vars(run).items() if type(value) in (int, float, bool, str)
     }
@@ -200,7 +205,7 @@ def _of_run(name: str, run) -> dict:
 
 
 def _into(run, name: str, found: dict) -> None:
-    """Put what `_of_run` gave into a fresh Run."""
+    """Copy the arrays and numbers of `_of_run` into a new Run."""
     numbers = json.loads(str(found[f"{name}:"]))
     for each in vars(run):
         if each not in CONSTANT:
@@ -210,7 +215,10 @@ def _into(run, name: str, found: dict) -> None:
 
 
 def save(path: Path, key: str, run, samples: Samples) -> None:
-    """Write the state of a march whole to path, under the key of its scene and numerics; Missing where it cannot be."""
+    """Write the checkpoint of a march atomically; raise Missing if it cannot be written.
+
+    key: identifies its scene and numerics.
+    """
     arrays = _of_run("run", run) | samples.arrays()
     need = sum(one.nbytes for one in arrays.values())
     with write_atomically(path, need) as partial, open(partial, "wb") as file:
@@ -220,7 +228,10 @@ def save(path: Path, key: str, run, samples: Samples) -> None:
 
 
 def load(path: Path, key: str, run, samples: Samples, fresh) -> None:
-    """Put a kept state into a fresh Run and fresh Samples. PatchfemError where it is not theirs or cannot be read."""
+    """Load a checkpoint into a new Run and its Samples.
+
+    PatchfemError is raised if the file belongs to another march or cannot be read.
+    """
     try:
         with np.load(path, allow_pickle=False) as file:
             found = {name: file[name] for name in file.files}
@@ -240,7 +251,10 @@ def load(path: Path, key: str, run, samples: Samples, fresh) -> None:
 
 
 def _taken(value, name: str, found: dict, number):
-    """A value of a fresh Run with what was kept under its name, in place where it fits: others may look at it."""
+    """Return the stored value of an attribute; an array of equal shape is overwritten in place.
+
+    Other objects may refer to the array of the new Run.
+    """
     if isinstance(value, np.ndarray):
         new = found[name]
         if new.shape != value.shape or new.dtype != value.dtype:

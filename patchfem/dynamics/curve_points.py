@@ -1,19 +1,19 @@
-"""Points of a curve as dense as its curvature needs.
+"""Adaptive points of a curve, denser where its curvature is larger.
 
-Where the point b of three points a, b, c lies off the line from a to c by e, a parabola through
-them leaves the middle of ab off its line by e h_ab^2/(4 h_ab h_bc). An interval is halved while
-that exceeds three quarters of the error of the largest of the three: a curve bends more on one
-side of b than on the other. A peak is found wherever it lies, if its flanks show at the first
-points.
+If the point b of three points a, b, c deviates by e from the line from a to c, a parabola through
+them deviates by e h_ab^2/(4 h_ab h_bc) from its chord in the middle of ab. An interval is halved
+while this exceeds three quarters of the permitted error of the largest of the three values, because
+a curve may bend more on one side of b than on the other. Any peak is found whose flanks show at the
+first points.
 """
 
 from collections.abc import Callable
 
 import numpy as np
 
-# value over the largest one, below which errors are relative to this fraction: a curve may start from 0
+# value over the largest one, below which errors are relative to this fraction, because a curve may start from 0
 MIN_VALUE_RATIO = 1e-3
-# smallest interval over its place; a jump of the curve is not followed further
+# smallest interval over its abscissa; at a jump of the curve the refinement ends there
 MIN_INTERVAL_RATIO = 1e-6
 
 
@@ -38,7 +38,7 @@ def adapted(find: Callable, places, share: float = 0.01, most: int = 2000) -> tu
     places : ndarray
         (k,).
     found : list
-        What `find` returned at each. A value that is not finite bends nothing.
+        What `find` returned at each. Next to a value that is not finite no point is added.
     """
     places = [float(place) for place in places]
     found = []
@@ -50,14 +50,14 @@ def adapted(find: Callable, places, share: float = 0.01, most: int = 2000) -> tu
             return np.array(places), found
         for k in wide[::-1][
             : most - len(places)
-        ]:  # from the end, so that the numbers before it stay
+        ]:  # from the end, so that the indices before it stay valid
             middle = 0.5 * (places[k] + places[k + 1])
             places.insert(k + 1, middle)
             found.insert(k + 1, find(middle, found[k]))
 
 
 def coarse(places, values, share: float) -> np.ndarray:
-    """Return the intervals k between places k and k + 1 that need a point between.
+    """Return the numbers k of the intervals from point k to k + 1 that are to be halved.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def coarse(places, values, share: float) -> np.ndarray:
     with np.errstate(invalid="ignore"):
         line = (values[:-2] * h[1:] + values[2:] * h[:-1]) / (h[:-1] + h[1:])
         bend = np.abs(values[1:-1] - line) / (4 * h[:-1] * h[1:])
-        # 0.75: on the worst flank of a peak a straight line misses by 1.25 of what the parabola says
+        # 0.75, because on the worst flank of a peak the error of a straight line is 1.25 times the estimate
         scale = np.maximum(np.maximum(values[:-2], values[1:-1]), values[2:])
         scale = (
             0.75
@@ -85,7 +85,7 @@ def coarse(places, values, share: float) -> np.ndarray:
                 scale, MIN_VALUE_RATIO * np.max(values, initial=0.0, where=np.isfinite(values))
             )
         )
-        # a comparison with nan is false
+        # a comparison with nan is false, so no point is added there
         bent = [
             bend * h[:-1] ** 2 > scale,
             bend * h[1:] ** 2 > scale,

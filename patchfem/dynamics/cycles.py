@@ -1,4 +1,4 @@
-"""What is read off the samples of one cycle of a march: those worth keeping, extremes, the part at its frequency."""
+"""Samples to keep, extremes and phasors of the cycles of a march."""
 
 from functools import lru_cache
 
@@ -6,16 +6,20 @@ import numpy as np
 
 from ..core import STICK_SPEED_RATIO
 
-SIGNS = np.array([[1.0], [-1.0]])  # of the root of a square
-REST = 1e-12  # of the square of the largest rate of a cycle, the size of a product of two rates that is round-off
-MOST_TURNS = 100  # samples of a cycle that are kept outside the last ones
+SIGNS = np.array([[1.0], [-1.0]])  # signs of both roots of a quadratic equation
+# product of two rates over the square of the largest rate of the cycle, below which it is round-off
+REST = 1e-12
+MOST_TURNS = 100  # largest number of samples that are kept of a cycle before the last ones
 
 
 def thinned(rows, run, even: int = 0) -> list:
-    """Numbers of the samples worth keeping of each cycle, rows (c, k, width): its first, every reversal of the output
-    and of a slide, every stop and release (slip speed falls below or rises above 1e-2 of its peak in the cycle).
+    """Return the indices of the samples to keep of each cycle.
 
-    even: equally spaced samples of a whole cycle that are kept besides, at least.
+    They are the first sample, every reversal of the output and of a slide, and every stop and release, where the slip
+    speed falls below or rises above 1e-2 of its peak in the cycle.
+
+    rows: (c, k, width) samples of c cycles; even: smallest number of equally spaced samples of a cycle that are kept in
+    addition.
     """
     n = run.modes.omega.size
     output = run.modes.output
@@ -39,7 +43,7 @@ def thinned(rows, run, even: int = 0) -> list:
 
 
 def extremes_of(rows, modes, dt) -> list:
-    """(smallest, largest) output [m] of each cycle, found between the samples by the cubic through values and rates.
+    """Return the smallest and largest output [m] of each cycle, by cubics between the samples.
 
     rows: (c, k, >= 2n) of a march, modal displacements and velocities first; dt [s] between them.
     """
@@ -57,10 +61,10 @@ def extremes_of(rows, modes, dt) -> list:
 
 
 def phasors_of(rows, modes, first: int, around: int) -> list:
-    """Complex amplitude c [m] of the output Re(c exp(i omega t)) over each cycle of samples, omega that of the drive.
+    """Return the phasor c [m] of the output Re(c exp(i omega t)) in each cycle of the drive.
 
-    rows: (c, k, >= n), modal displacements first, the last row that of the next cycle; first: number of the first step,
-    whose phase is 2 pi first/around; around: steps in a cycle. 0 of no samples.
+    rows: (c, k, >= n), modal displacements first; the last row belongs to the next cycle. first: number of the first
+    step, whose phase is 2 pi first/around; around: steps in a cycle. Without samples the phasor is 0.
     """
     y = rows[:, :-1, : modes.omega.size] @ modes.output
     return (2 * (y @ _carrier(first % around, y.shape[1], around)) / max(y.shape[1], 1)).tolist()
@@ -68,19 +72,21 @@ def phasors_of(rows, modes, first: int, around: int) -> list:
 
 @lru_cache(maxsize=4)
 def _carrier(first: int, count: int, around: int) -> np.ndarray:
-    """exp(-i phase) of samples from number `first` on, `around` of them in a cycle."""
+    """Return exp(-i phase) of `count` samples from number `first` on, `around` per cycle."""
     return np.exp(-2j * np.pi * (first + np.arange(count)) / around)
 
 
 def hermite_extremes(y, v, dt) -> tuple:
-    """Smallest and largest value (...) of the piecewise cubic through values y (..., k) with rates v at spacing dt
-    [s]."""
+    """Return the minimum and maximum (...) of the piecewise cubic through samples of a function.
+
+    y, v: values and rates (..., k); dt: spacing [s].
+    """
     before = y.shape[:-1]
     y = y.reshape(-1, y.shape[-1])
     v = v.reshape(-1, y.shape[-1])
     low = y.min(axis=1)
     high = y.max(axis=1)
-    # a rate that is zero but for round-off, as at a stop, turns nothing: the cubic would swing beyond it
+    # where a rate is zero within round-off, as at a stop, its sign is no reversal, and the cubic would overshoot
     row, at = np.nonzero(v[:, :-1] * v[:, 1:] < -REST * (v**2).max(axis=1, keepdims=True))
     if at.size:
         a = y[row, at]

@@ -8,7 +8,7 @@ from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def factor(a):
-    """Factorise a (n, n) in place in its lower half (Cholesky); false if not positive.
+    """Compute the Cholesky factor of a (n, n) in its lower triangle; False if not positive.
 
     Returns False if it is not positive definite.
 
@@ -55,7 +55,7 @@ def solve(a, b):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def eliminate(a, b):
-    """Solve a x = b in place of b (n,), with pivots in place.
+    """Solve a x = b in place of b (n,) by elimination without row exchanges.
 
     Returns False where one is below 1e-12.
     """

@@ -1,9 +1,9 @@
-"""A step of modes that are stiff beside it, from a short step that is doubled.
+"""Exact step of modes much faster than the step, by repeated doubling of a short step.
 
-Numerical integration over a step resolves nothing of a motion that dies out in a millionth of it.
-Over a short step it is exact to round-off, and two steps in a row are one of twice the length: the
-motion by a product, the energies by a sum. The motion is kept as its difference from standing
-still, so slow modes lose no digits however often it is doubled.
+Numerical integration over a step does not resolve a motion that decays in a millionth of it. Over a
+short step it is exact to round-off. Two successive steps make one of twice the length, whose motion
+is a product and whose energies are a sum. The map is stored as its difference from the identity, so
+slow modes lose no digits in the doublings.
 """
 
 from dataclasses import dataclass
@@ -13,12 +13,12 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Step:
-    """What a step does to y = (z, z', f, a).
+    """Linear map and energies of a step as functions of y = (z, z', f, a).
 
-    These are coordinates, rates and constant accelerations (n,), and the drive (m,) at nodes.
+    The entries of y are coordinates, rates and constant accelerations (n,), and the drive (m,) at nodes.
 
-    - change: (2 n, 2 n) of (z, z') by themselves
-    - push, drive: (2 n, n), (2 n, m) by f and by a
+    - change: (2 n, 2 n) change of (z, z') per (z, z') at the start
+    - push, drive: (2 n, n), (2 n, m) change of (z, z') per f and per a
     - work, lost: (3 n + m, 3 n + m) work of the drive and viscous loss [J] as quadratic forms of y
     """
 
@@ -46,7 +46,7 @@ def short_step(square, damping, push, parts: dict, quadratic) -> Step:
     Step
     """
     far, near = push
-    stay = -far @ square  # what z keeps falls short of 1 by this: no difference of large numbers
+    stay = -far @ square  # z keeps 1 + stay of its value; computed without cancellation
     change = np.block([[stay, near], [-near @ square, stay - near @ damping]])
     n = len(far)
     m = len(parts["z"])

@@ -1,4 +1,4 @@
-"""Limit cycles: motions of modes with negative damping beside friction, without a drive.
+"""Limit cycles of modes with negative damping and friction, without a drive.
 
 Friction of at most F takes up to 4 F A of a cycle of amplitude A, and a damping c < 0 gives pi |c|
 omega A^2. Where both are equal a motion repeats: one mode under Coulomb friction at A = 4 F/(pi
@@ -24,24 +24,26 @@ from .harmonic.forces import Group
 from .harmonic.harmonic import pack
 from .harmonic.point import balance_of
 
-SAMPLES = 4096  # of a cycle, that its largest motion is read from
-PLACES = 48  # amplitudes at which the damping of a free motion is looked at
-# the first and the last of them, over 4 F/(pi |c| omega)
+SAMPLES = 4096  # samples of a cycle from which its largest motion is found
+PLACES = 48  # number of amplitudes at which the damping of a free motion is evaluated
+# the smallest and the largest of these amplitudes over 4 F/(pi |c| omega)
 LOW = 1e-6
 HIGH = 4.0
-# the first amplitude where smaller motions cannot be followed, and how many are looked at
+# smallest amplitude (same unit) and number of amplitudes where smaller motions cannot be followed
 SLIDING = 0.02
 FEWER = 16
 LOST = (
     "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
     "amplitude at which friction dissipates what the mode gains"
 )
-ROUND = 1e-9  # of an amplitude, what round-off and the tolerances of the solves leave
-SHUT = 1e-8  # share of the swing in a half period, by which a slide at rest moves on
-SECANTS = 12  # steps to the rate that balances an amplitude
+# relative error of an amplitude that round-off and the tolerances of the solvers leave
+ROUND = 1e-9
+# fraction of the range by which a slide that counts as resting may move in a half period
+SHUT = 1e-8
+SECANTS = 12  # largest number of secant steps to the damping that balances an amplitude
 MAX_FIRST_RATIO = 2.0  # damping ratio of friction by den Hartog's balance; where it is larger, friction is 3 times
-# the elastic force at the turn or more, and the slide sticks there
-FEW = 9  # harmonics of the first answer; the second, of twice as many, shows its error
+# the elastic force at the reversal or more, and the interface sticks there
+FEW = 9  # harmonics of the first solution; a second one with twice as many estimates its error
 
 
 class Cycle(NamedTuple):
@@ -85,7 +87,7 @@ def balanced_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
 
 
 def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
-    """Find the limit cycles under rigid friction on one interface that slides from turn to turn.
+    """Find the limit cycles under rigid friction on an interface that never sticks.
 
     From a turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
     period T/2. It is a cycle where the interface comes to rest there, slides one way all the time,
@@ -126,7 +128,7 @@ def _turning(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
             xtol=1e-16,
             rtol=1e-14,
         )
-        # not so where a mode without damping is in resonance
+        # this does not hold where a mode without damping is in resonance
         shut = abs(_turn(modes, row, forces[0], t)[1]) < SHUT
         if shut and (found := _slides_through(modes, row, forces, t)) is not None:
             out.append(found)
@@ -205,7 +207,7 @@ def _flow(modes: ModalBasis, t) -> np.ndarray:
 
 
 def _speeds(modes: ModalBasis, row, force: float, half) -> np.ndarray:
-    """Return the velocity at the turn over that of the swing, (k,), of half periods (k,).
+    """Return velocity at the reversal times half period over the swing (k,), for half periods.
 
     See `_turn`.
     """
@@ -218,7 +220,7 @@ def _speeds(modes: ModalBasis, row, force: float, half) -> np.ndarray:
 
 
 def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:
-    """Return state and relative velocity at the turn, and the state of rest.
+    """Return the state at the reversal, its velocity times t over the swing, and the rest state.
 
     t: half period [s].
     """
@@ -231,7 +233,7 @@ def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:
 
 
 def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | None:
-    """Return the Cycle of half period t [s], None where the interface turns or sticks."""
+    """Return the Cycle of half period t [s], None where the interface reverses or sticks."""
     slides, holds = forces
     n = modes.omega.size
     y, _, rest = _turn(modes, row, slides, t)
@@ -246,7 +248,7 @@ def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | 
     cycle = np.concatenate([motion, -motion[1:]])
     found = _highest(cycle)
     coarse = _highest(cycle[::2])
-    # a turn later or earlier takes part of what is off with it: the map from turn to turn
+    # a shift of the reversal in time absorbs part of the deviation, so the map goes from reversal to reversal
     speed = np.concatenate([path[-1, n:], _rates(modes, path[-1], row, slides)])
     face = np.concatenate([np.zeros(n), row])
     turned = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ _flow(modes, [t])[0]
@@ -261,7 +263,7 @@ def _rates(modes: ModalBasis, y, row, force: float) -> np.ndarray:
 
 
 def _highest(samples) -> float:
-    """Return the maximum of samples (k,) of a motion, between them by a parabola.
+    """Return the maximum of a motion sampled at (k,), between samples by a parabola.
 
     The motion changes sign after half a period.
     """
@@ -312,7 +314,7 @@ def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
 
 
 def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> tuple:
-    """Return the cycles of one mode and the smallest amplitude [m] that was looked at."""
+    """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
     shape = np.eye(modes.omega.size)[mode]
     paths = (
         (
@@ -385,7 +387,7 @@ def _between(equations: FreeBalance, low: FreeMotion, high: FreeMotion) -> FreeM
             return found
         side = int(np.sign(found.zeta) == np.sign(above))
         ends[side] = (at, found.zeta, found)
-        if side == last:  # the other end stays: half its weight
+        if side == last:  # Illinois rule: the value at the end that stays is halved
             k = 1 - side
             ends[k] = (ends[k][0], ends[k][1] / 2, ends[k][2])
         last = side

@@ -1,7 +1,7 @@
-"""Compiled pieces of the march: motion of the modes over a step and the energy that the step moves.
+"""Compiled motion of the modes over a step of the march, and the energies of the step.
 
-state (2, n): coordinates and rates; row: one line of `propagator.Propagator.tables`; forces enter as `accel` (n,), the
-modal accelerations that are constant over the step.
+state (2, n): coordinates and rates; table[at]: a row of `propagator.Propagator.tables`; accel (n,): modal accelerations
+due to interface forces, which are constant over the step.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_slide(state, reach, port, table, at):
-    """Increment of the slide of a port [m] over a step without interface forces."""
+    """Return the increment [m] of the slide of a port in a step without interface forces."""
     n = state.shape[1]
     out = table[at, 8 * n + 3 + port]
     for i in range(n):
@@ -22,7 +22,7 @@ def free_slide(state, reach, port, table, at):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_rate(state, row, free, dense, table, at):
-    """Rate of the slide `row` (n,) at the end of a step without interface forces [m/s]."""
+    """Return the rate [m/s] of the slide `row` (n,) after a step without interface forces."""
     n = row.size
     out = 0.0
     for i in range(n):
@@ -38,8 +38,10 @@ def free_rate(state, row, free, dense, table, at):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def struck(state, row, speed, now, mass):
-    """Change the rate of the slide `row` (n,) from `now` to `speed` [m/s] by a blow along it, in place; energy that it
-    takes [J]."""
+    """Change the rate of a slide from `now` to `speed` [m/s] by an impulse along it, in place.
+
+    row: (n,) slide per coordinate. Returns the energy [J] that the modes lose.
+    """
     share = 0.0
     for i in range(row.size):
         share += row[i] * row[i]
@@ -50,17 +52,18 @@ def struck(state, row, speed, now, mass):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def push_back(force, row, mass, accel):
-    """Modal accelerations (n,) of one interface force [N] that resists the slide row (n,)."""
+    """Write the modal accelerations (n,) of a force [N] that resists the slide `row` (n,)."""
     for i in range(accel.size):
         accel[i] = -row[i] * force / mass
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def move(state, free, push, loss, dense, dense_loss, table, at, accel, scratch, ledger):
-    """Advance the modes in place by one step and book its energies.
+    """Advance the modes in place by one step, and add its energies to the ledger.
 
-    ledger[0]: work of the drive, ledger[1]: viscous loss, ledger[2]: work in magnitude [J]. scratch: (2, n) room. The
-    arrays of a step are passed one by one, because a tuple of them would be counted anew in every step.
+    ledger[0]: work of the drive, ledger[1]: viscous loss, ledger[2]: sum of the absolute works [J]. scratch: (2, n)
+    workspace. The arrays of a step are passed separately, because the reference counts of a tuple of them would be
+    updated in every step.
     """
     n = state.shape[1]
     work = table[at, 8 * n]
@@ -92,8 +95,10 @@ def move(state, free, push, loss, dense, dense_loss, table, at, accel, scratch, 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _move_coupled(state, dense, loss, table, at, accel, scratch):
-    """Advance the modes as `move` does where damping couples the coordinates; quadratic part of the viscous loss
-    [J]."""
+    """Advance modes whose damping couples the coordinates, as `move` does.
+
+    Returns the quadratic part of the viscous loss [J].
+    """
     n = state.shape[1]
     lost = 0.0
     for i in range(3 * n):
@@ -121,7 +126,7 @@ def _move_coupled(state, dense, loss, table, at, accel, scratch):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def stored(state, omega, mass):
-    """Kinetic and elastic energy [J] of the modes."""
+    """Return the kinetic and elastic energy [J] of the modes."""
     out = 0.0
     for i in range(omega.size):
         out += state[1, i] * state[1, i] + omega[i] * omega[i] * state[0, i] * state[0, i]
@@ -130,9 +135,9 @@ def stored(state, omega, mass):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def accelerations(state, omega, damp, damping, base, drive, accel, out):
-    """Modal accelerations (n,) [m s-2] at an instant, relative to the base.
+    """Write the modal accelerations (n,) [m s-2] at an instant, relative to the base.
 
-    drive [m s-2]; accel: (n,) those of the forces.
+    drive: base acceleration [m s-2]; accel: (n,) modal accelerations due to interface forces.
     """
     n = omega.size
     for i in range(n):
@@ -146,7 +151,7 @@ def accelerations(state, omega, damp, damping, base, drive, accel, out):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def safe_point(low, high, guess):
-    """The point `guess` if it lies inside (low, high), else their middle."""
+    """Return `guess` if it lies inside (low, high), else the midpoint."""
     if low < guess < high and np.isfinite(guess):
         return guess
     return 0.5 * (low + high)
@@ -154,12 +159,12 @@ def safe_point(low, high, guess):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def narrowed(low, high, here, miss, gain, late):
-    """Narrow the search for the root of a rising function by Newton's steps in a bracket: (low, high, next place).
+    """Take a bracketed Newton step towards the root of an increasing function.
 
-    miss: the function at `here`, gain: its slope or what stands for one; low, high: infinite where nothing is known
-    yet. The bracket closes on `here`; a step that leaves it is replaced by its middle. late: evaluations beyond those
-    that a search should take. From 1 on every other step is the middle, as kinks can throw steps to and fro, and the
-    steps grow where there is no bracket.
+    miss: the function at `here`; gain: its slope or an approximation of it; low, high: bracket, infinite where there is
+    no bound yet. An end of the bracket moves to `here`; a step that leaves the bracket is replaced by the midpoint.
+    late: number of evaluations beyond those that usually suffice. From 1 on every other step is a bisection, because
+    kinks can make the steps alternate, and without a bracket the steps grow. Returns low, high and the next point.
     """
     if miss > 0:
         high = here
@@ -177,10 +182,9 @@ def narrowed(low, high, here, miss, gain, late):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def sample(row, state, slide, output):
-    """Write slide, slide speed and output of the modes into a row after the modes themselves, its first 2 n + 2
-    entries.
+    """Write coordinates, rates, slide and slide speed into the first 2 n + 2 entries of row.
 
-    Returns (slide, its speed, output).
+    Returns slide [m], slide speed [m/s] and output [m].
     """
     n = slide.size
     q = 0.0
@@ -199,9 +203,9 @@ def sample(row, state, slide, output):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def note(row, force, energy, slip, out, travel, total, ledger):
-    """Write force, slip and the interface's energy into a row, and the peak of all energy into the ledger.
+    """Write force, slip and interface energy into a row, and the peak energy into the ledger.
 
-    Returns 0, or 1 beyond the travel and 3 for a motion that is not finite.
+    Returns 0; 1 where the output exceeds the travel; 3 where the motion is not finite.
     """
     n = row.size - 4
     row[n] = force
@@ -216,7 +220,10 @@ def note(row, force, energy, slip, out, travel, total, ledger):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def tell(count, work, ledger):
-    """Add the iterations of a step (below 0: it failed) and its friction work [J]."""
+    """Add the iterations of a step and its friction work [J] to the ledger.
+
+    count: iterations, negative if the step failed.
+    """
     ledger[5] += abs(count)
     ledger[6] = max(ledger[6], abs(count))
     ledger[7] += 1.0 if count < 0 else 0.0
@@ -225,7 +232,10 @@ def tell(count, work, ledger):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def ended(state, free, push, dense, table, at, accel, out):
-    """Coordinates and rates at the end of a step under `accel` (n,), into out (2, n); nothing is moved or booked."""
+    """Write coordinates and rates at the end of a step under `accel` (n,) into out (2, n).
+
+    The state and the ledger do not change.
+    """
     n = state.shape[1]
     for i in range(n):
         z = table[at, i]

@@ -1,25 +1,25 @@
-"""When a motion under a periodic drive has become periodic.
+"""Test whether a motion under a periodic drive has become periodic.
 
-From there on the remaining cycles equal the last one.
+The remaining cycles are then equal to the last one.
 
-The motion is looked at after APART cycles, then after twice as many each time. Its changes between
-three looks bound what it would still change by: the changes decrease by a constant factor, as of a
-motion that dies out, or stay equal, as of one that creeps. A period of two cycles shows in the
-last cycle alone.
+The motion is checked after APART cycles, then after twice as many each time. The changes between
+three checks bound the change in the remaining cycles: the changes either decrease by a constant
+factor, as in a decaying transient, or stay equal, as in a creeping motion. A period of two cycles
+shows only in the change over the last cycle.
 """
 
 import numpy as np
 
-APART = 4  # cycles after which a motion is first looked at
+APART = 4  # cycles after which a motion is first checked
 
 
 def looked_at(number: int) -> bool:
-    """Return whether a motion is looked at after this number of cycles."""
+    """Return whether a motion is checked after this number of cycles."""
     return number >= APART and number & (number - 1) == 0
 
 
 def until_look(number: int) -> int:
-    """Return the cycles from the end of cycle `number` to the next look, or one before it."""
+    """Return the cycles from the end of cycle `number` to one cycle before the next check."""
     at = APART
     while at <= number:
         at *= 2
@@ -27,15 +27,15 @@ def until_look(number: int) -> int:
 
 
 def ahead(change: float, before: float, left: int, far: int) -> float:
-    """Return what a motion would still change by in `left` cycles.
+    """Return a bound of the change of a motion in the remaining `left` cycles.
 
     Parameters
     ----------
     change, before : float
-        Relative changes between the last two looks, and between the two before.
+        Relative changes between the last two checks, and between the two before.
     left : int
     far : int
-        Cycles after which the last look was.
+        Number of cycles at the last check.
 
     Returns
     -------
@@ -45,5 +45,5 @@ def ahead(change: float, before: float, left: int, far: int) -> float:
         return change * max(1.0, 2 * left / far)
     fell = (
         np.sqrt(1 + 4 * change / before) - 1
-    ) / 2  # a + a^2 = change/before of what dies out by a
+    ) / 2  # a + a^2 = change/before for a decay by the factor a
     return change * max(1.0, min(fell**2 / (1 - fell**2) if fell < 1 else np.inf, 2 * left / far))

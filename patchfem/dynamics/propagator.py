@@ -1,9 +1,9 @@
-"""Exact one-step propagation of damped modes under any drive and interface forces that are constant over the step.
+"""Exact step of damped modes under any drive and interface forces constant over the step.
 
-Everything comes from the exponentials of the modes, of all of them at once where damping couples them. So resonance
-without damping, rigid modes and overdamped modes need no special case (report, eqs 3.5-3.10, with i w_i where 3.7 and
-3.9 print i w). What the drive adds in a step and the energies of the step are sums over Gauss points of the step, exact
-to round-off for a drive that is smooth inside it; those of modes that are stiff beside the step, by `doubling`.
+The step is computed from the matrix exponential of each mode, or of all modes together where damping couples them, so
+resonance without damping, rigid modes and overdamped modes need no special case (report, eqs 3.5-3.10, with i w_i where
+3.7 and 3.9 print i w). The effect of the drive and the energies of a step are sums over its Gauss points, exact to
+round-off for a drive that is smooth in the step; where modes are much faster than the step, `doubling` computes it.
 """
 
 from dataclasses import dataclass, replace
@@ -14,14 +14,15 @@ import numpy as np
 from ..core import ModalBasis
 from . import doubling
 
-# Gauss points of a step
+# smallest and largest number of Gauss points of a step
 LEAST = 8
 MOST = 48
-# propagators that are kept, and coordinates of each at most: more take room
+# number of propagators that are cached, and largest number of coordinates of a cached one, to limit memory
 KEPT = 4
 FEW = 32
-STIFF = 20.0  # radians or decays of the fastest motion in a step, beyond which that many points do not see it
-SHORT = 4.0  # of them in the short step that is doubled then
+# fastest rate times step length, above which MOST Gauss points do not resolve the motion
+STIFF = 20.0
+SHORT = 4.0  # fastest rate times length of the short step that is then doubled
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -29,10 +30,11 @@ class Propagator:
     """Coefficients of a step of dt [s] for n coordinates and p ports.
 
     free (4, n): z and z' at the end per z and z' at the start (zz, zv, vz, vv); push (2, n): both per modal
-    acceleration that is constant over the step; dense (2 n, 3 n): the same for (z, z', acceleration) where damping
-    couples the coordinates, else (0, 0). reach (p, 2 n): what the free motion moves every port; beta (p, p) [m/N]: what
-    port forces take from it; rows (p, n): the ports. loss (6, n) or dense_loss (3 n, 3 n): viscous loss of a step as a
-    quadratic form of (z, z', acceleration). drive: see `tables`; steps: per period.
+    acceleration, constant over the step; dense (2 n, 3 n): the same for (z, z', acceleration) where damping
+    couples the coordinates, else (0, 0). reach (p, 2 n): displacement of every port in a free motion;
+    beta (p, p) [m/N]: displacement of the ports against unit port forces; rows (p, n): the ports. loss (6, n) or
+    dense_loss (3 n, 3 n): viscous loss of a step as a quadratic form of (z, z', acceleration). drive: see `tables`;
+    steps: number per period.
     """
 
     dt: float
@@ -49,17 +51,17 @@ class Propagator:
     parts: dict
 
     def tables(self, drive, first: int, count: int) -> np.ndarray:
-        """Rows (count, 8 n + 3 + p) of the steps from number `first` on.
+        """Return the rows (count, 8 n + 3 + p) of the steps from number `first` on.
 
-        In turn: what the drive adds to z and z' (n, n); linear forms in (z, z', acceleration) of the work of the drive
-        (3 n) and of the viscous loss (3 n) [J]; the rest of both [J]; the drive at the end of the step [m s-2]; what
-        the drive moves every port (p) [m].
+        Columns: contribution of the drive to z and z' (n, n); linear forms in (z, z', acceleration) of the work of the drive
+        (3 n) and of the viscous loss (3 n) [J]; constant terms of both [J]; the drive at the end of the step [m s-2];
+        displacement of every port due to the drive (p) [m].
         """
         start = (first + np.arange(count)) * self.dt
         a = drive.values((start[:, None] + self.nodes).ravel()).reshape(count, -1)
         p = self.parts
         moved = a @ p["z"]
-        # a quadratic form as a product and a sum: an einsum of three factors takes four times as long
+        # the quadratic form is a product and a sum, because an einsum of three factors takes four times as long
         rest = np.stack(
             [
                 ((a @ p["work"]) * a).sum(axis=1),
@@ -80,11 +82,11 @@ class Propagator:
 
 
 def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
-    """Coefficients of `steps_per_cycle` equal steps of the drive's period, exact for the modes.
+    """Return the Propagator of `steps_per_cycle` equal steps of the drive's period.
 
     rows: ports (p, n), slide per coordinate; None: the interfaces. Steps of large omega dt take up to 48 Gauss points;
-    where that is not enough, a step is made of short ones. Those of the last few modes and drives are kept: the runs
-    that show an error march the same ones again.
+    where that is not enough, a short step is doubled. The last few propagators are cached, because the runs that
+    estimate errors use the same ones again.
     """
     if rows is None and modes.omega.size <= FEW:
         return _of_interfaces(_Basis(modes), drive.period, steps_per_cycle)
@@ -97,7 +99,7 @@ def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Pro
 
 
 class _Basis:
-    """A ModalBasis that equals any other one with the same numbers."""
+    """ModalBasis that is compared and hashed by its numbers, as a key of the cache."""
 
     def __init__(self, modes: ModalBasis):
         self.modes = modes
@@ -133,7 +135,7 @@ def _made(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propa
     if fastest * dt > STIFF:
         (at_end, push, parts, quadratic), nodes = _stiff(modes, dt, fastest, 2 * np.pi / period)
     else:
-        # two points more for each radian of the fastest motion
+        # two more Gauss points for each radian of the fastest motion
         nodes, weight = _gauss(dt, int(np.clip(LEAST + 2 * np.ceil(fastest * dt), LEAST, MOST)))
         at_end = [part[0] for part in free_motion(modes, np.array([dt]))]
         inside = free_motion(modes, nodes)
@@ -171,22 +173,23 @@ def _made(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propa
 
 
 def fastest_rate(modes: ModalBasis) -> float:
-    """Largest rate [1/s] at which a mode turns or dies out."""
+    """Return an upper bound [1/s] of the rates at which modes oscillate or decay."""
     if modes.damping is None:
         return float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0))
     return max(float(modes.omega.max(initial=0.0)), float(np.linalg.norm(modes.damping, 2)))
 
 
 def _gauss(dt: float, count: int) -> tuple:
-    """Gauss points and weights of [0, dt]."""
+    """Return Gauss points and weights on [0, dt]."""
     x, w = np.polynomial.legendre.leggauss(count)
     return dt * (1 + x) / 2, dt * w / 2
 
 
 def _stiff(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tuple:
-    """((blocks at the end, push, parts, quadratic form of the loss), nodes) of a step that is long beside its modes.
+    """Compute a step that is long compared to the periods of the modes, by doubling.
 
-    fastest, slowest [1/s]: rates of the modes and of the drive.
+    fastest, slowest [1/s]: rates of the modes and of the drive. Returns (blocks at the end, push, parts, quadratic form
+    of the loss) and the nodes.
     """
     times = max(0, int(np.ceil(np.log2(fastest * dt / SHORT))))
     count = int(np.clip(LEAST + 2 * np.ceil(max(SHORT, slowest * dt)), LEAST, MOST))
@@ -224,13 +227,16 @@ def _stiff(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tupl
 
 
 def free_motion(modes: ModalBasis, times) -> tuple:
-    """Blocks zz, zv, vz, vv of the free motion after `times` (k,): (k, n) each, (k, n, n) where damping couples."""
+    """Return the blocks zz, zv, vz, vv of the free motion after `times` (k,).
+
+    Each has the shape (k, n), or (k, n, n) where damping couples the coordinates.
+    """
     times = np.asarray(times, float)
     if modes.damping is None:
         return _single(modes.omega, modes.zeta, times[:, None])
     n = modes.omega.size
     scale = max(float(modes.omega.max()), 1 / float(times.max()))
-    # rates over `scale`: all entries of like size
+    # rates are divided by `scale`, so that all entries of the matrix have a similar size
     a = np.block(
         [[np.zeros((n, n)), scale * np.eye(n)], [-np.diag(modes.omega**2) / scale, -modes.damping]]
     )
@@ -239,7 +245,10 @@ def free_motion(modes: ModalBasis, times) -> tuple:
 
 
 def _single(omega, zeta, t) -> tuple:
-    """Blocks zz, zv, vz, vv of single coordinates (n,) after times t (k, 1), in closed form for any damping."""
+    """Return the blocks zz, zv, vz, vv of uncoupled coordinates (n,) after times t (k, 1).
+
+    The closed form holds for any damping ratio.
+    """
     decay = zeta * omega
     root = omega * np.sqrt(np.abs(zeta**2 - 1))
     x = root * t
@@ -262,9 +271,9 @@ def _single(omega, zeta, t) -> tuple:
 
 
 def exponentials(a) -> np.ndarray:
-    """Matrix exponentials (k, m, m) of matrices a (k, m, m): Taylor's sum to order 13 of a scaled matrix, squared back.
+    """Return the matrix exponentials (k, m, m) of matrices a (k, m, m), by scaling and squaring.
 
-    A norm below 1/4 leaves (1/4)^14/14! = 4e-20.
+    The Taylor series of order 13 of a matrix with a norm below 1/4 has an error of (1/4)^14/14! = 4e-20.
     """
     norm = float(np.abs(a).sum(axis=2).max()) if a.size else 0.0
     halvings = max(0, int(np.ceil(np.log2(max(4 * norm, 1e-300)))))
@@ -279,9 +288,10 @@ def exponentials(a) -> np.ndarray:
 
 
 def _push(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
-    """Motion (z, z') after dt per constant modal acceleration: (n,) each, (n, n) where damping couples.
+    """Return the motion (z, z') after dt [s] per constant modal acceleration.
 
-    The first is the integral of zv: of a short step no difference of large numbers.
+    Each has the shape (n,), or (n, n) where damping couples the coordinates. The first one is the integral of zv, which
+    avoids cancellation in a short step.
     """
     return np.tensordot(weight, free_motion(modes, nodes)[1], 1), free_motion(
         modes, np.array([dt])
@@ -289,7 +299,10 @@ def _push(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
 
 
 def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
-    """Weights on the drive at the Gauss points of what `tables` returns, and the quadratic form of the viscous loss."""
+    """Return weights of the drive at the Gauss points, and the quadratic form of the viscous loss.
+
+    `tables` multiplies the weights by the drive.
+    """
     n = modes.omega.size
     base = modes.base
     mass = modes.mass
@@ -337,7 +350,7 @@ def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
 
 
 def _lagrange(nodes, at) -> np.ndarray:
-    """Lagrange polynomials (k, m) of the nodes (m,) at places (k,)."""
+    """Return the Lagrange polynomials (k, m) of the nodes (m,) at the points `at` (k,)."""
     gap = nodes[:, None] - nodes
     np.fill_diagonal(gap, 1.0)
     scale = 1 / np.prod(gap / np.ptp(nodes), axis=1)

@@ -1,13 +1,15 @@
-"""Coefficients of the Runge-Kutta step of order 8 with its estimates of order 5 and 3 and its extension of order 7.
+"""Coefficients of the Runge-Kutta method DOP853 of order 8, with error estimates.
 
-Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd edition, II.5 and II.6 (Prince and
-Dormand's method as they give it). The conditions of order are tested.
+The estimates have orders 5 and 3, and the dense output (extension) has order 7.
+
+Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd edition, II.5 and II.6 (the method
+of Dormand and Prince). The order conditions are tested.
 """
 
 import numpy as np
 
 STAGES = 16  # 12 of the step, the slope at its end, three more of the extension
-# places of the stages in the step
+# nodes c_i of the stages as fractions of the step
 PLACES = np.array(
     [
         0.0,
@@ -28,9 +30,9 @@ PLACES = np.array(
         0.7777777777777778,
     ]
 )
-# besides the first slope, those from this one on feed a stage
+# first column of each row of the Runge-Kutta matrix that is not 0, apart from column 0
 BEFORE = np.array([0, 1, 1, 2, 2, 3, 3, 3, 3, 3, 3, 3, 5, 6, 5, 5])
-# of the slopes before it in every stage; row 12 is the step itself
+# Runge-Kutta matrix a_ij; row 12 holds the weights b_j of the step
 SHARES = np.zeros((STAGES, STAGES))
 SHARES[1, 0] = 0.05260015195876773
 SHARES[2, [0, *range(1, 2)]] = [0.0197250569845379, 0.0591751709536137]
@@ -128,7 +130,7 @@ SHARES[15, [0, *range(5, 15)]] = [
     2.9475147891527724,
     -9.15095847217987,
 ]
-FIFTH = np.zeros(12)  # the step less that of order 5, over its length
+FIFTH = np.zeros(12)  # weights of the step of order 8 minus those of order 5
 FIFTH[[0, *range(5, 12)]] = [
     0.01312004499419488,
     -1.2251564463762044,
@@ -139,7 +141,7 @@ FIFTH[[0, *range(5, 12)]] = [
     0.08192320648511571,
     -0.022355307863886294,
 ]
-THIRD = np.zeros(12)  # the step less that of order 3, over its length
+THIRD = np.zeros(12)  # weights of the step of order 8 minus those of order 3
 THIRD[[0, *range(5, 12)]] = [
     -0.18980075407240762,
     4.450312892752409,
@@ -150,7 +152,7 @@ THIRD[[0, *range(5, 12)]] = [
     0.20136540080403034,
     0.02265179219836082,
 ]
-INSIDE = np.zeros((4, STAGES))  # the upper coefficients of the extension
+INSIDE = np.zeros((4, STAGES))  # coefficients of the four highest terms of the dense output
 INSIDE[0, [0, *range(5, STAGES)]] = [
     -8.428938276109013,
     0.5667149535193777,

@@ -61,7 +61,7 @@ class CondensedGrid:
     - ``inner_factor``: factors of the inner nodes of the grid, or of its right half if `is_mirrored`
     - ``kept_factors``: factors of the kept nodes: one, or one for even and one for odd motion
     - ``is_mirrored``: whether the grid is mirror-symmetric in x
-    - ``rounding``: relative error of the compliance by round-off. If it is not 0, solutions take
+    - ``rounding``: relative error of the compliance due to round-off. If it is not 0, solutions take
       one step of iterative refinement.
     """
 
@@ -255,7 +255,7 @@ def irregular_load(size: int) -> np.ndarray:
 
 
 def estimate_round_off(load, u, residual, solve: Callable) -> float:
-    """Estimate the relative error of a solution by round-off from one step of refinement.
+    """Estimate the relative round-off error of a solution from one step of refinement.
 
     The change by this step is the error of the compliance, too: a compliance refined in double
     precision differs by as much and is no better.

@@ -15,9 +15,9 @@ N_LANDMARKS = 4  # nodes whose distances serve as coordinates; four separate a g
 
 
 def graph_coordinates(graph) -> np.ndarray:
-    """Return coordinates of the nodes of a graph: numbers of steps from nodes far apart.
+    """Return coordinates of the nodes of a graph: graph distances to landmarks far apart.
 
-    Each of these landmarks is the node farthest from the earlier ones. The components of the graph
+    Each landmark is the node farthest from the earlier ones. The components of the graph
     have separate ranges of coordinates.
 
     Parameters
@@ -32,7 +32,7 @@ def graph_coordinates(graph) -> np.ndarray:
     component = connected_components(graph, directed=False)[1]
 
     def count_steps(node: int) -> np.ndarray:
-        """Return the numbers of steps (n,) from a node to all others."""
+        """Return the graph distances (n,) from a node to all others."""
         steps = dijkstra(graph, directed=False, indices=node, unweighted=True)
         is_unreachable = np.isinf(steps)
         return np.where(is_unreachable, steps[~is_unreachable].max() + 1 + component, steps)

@@ -98,7 +98,7 @@ class Piece:
 
     @property
     def round_off_error(self) -> float:
-        """Relative error of the compliance by round-off [1]; 0 before the piece is factorised."""
+        """Relative round-off error of the compliance [1]; 0 before the piece is factorised."""
         return self.computed["factor"].round_off_error if "factor" in self.computed else 0.0
 
     @property

@@ -22,7 +22,7 @@ from .lapack import cho_inverse
 
 UNKNOWNS_PER_NODE = 2  # unknowns of a node, which follow one another
 MIN_SLICED_NODES = 40  # updates of fewer nodes are added by one indexed assignment
-# An update whose nodes form shorter runs of successive numbers, on average, is added by columns.
+# mean length [nodes] of runs of consecutive node numbers, below which an update is added column by column
 MIN_MEAN_RUN = 24
 
 
@@ -176,7 +176,7 @@ def _describe_fault(block, diagonal, min_pivot: float) -> NotConverged:
 
 
 def _add_update(front, update, nodes, per_node: int) -> None:
-    """Add the lower half of an update to a front, in the way that is fastest for its nodes.
+    """Add the lower triangle of an update to a front, by the fastest method for its nodes.
 
     nodes: ascending positions of its nodes in the front. A small update is added by one indexed
     assignment, a large one in rectangles of successive nodes, or by columns if few nodes are
@@ -184,7 +184,7 @@ def _add_update(front, update, nodes, per_node: int) -> None:
     """
     unknowns = _list_unknowns(nodes, per_node)
     if nodes.size < MIN_SLICED_NODES:
-        front.T[unknowns[:, None], unknowns] += update.T  # the transposes lie in rows
+        front.T[unknowns[:, None], unknowns] += update.T  # transposed: both are stored by rows
         return
     cuts = np.flatnonzero(np.diff(nodes) > 1) + 1
     if (cuts.size + 1) * MIN_MEAN_RUN > nodes.size:

@@ -259,7 +259,11 @@ class Runs(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def _split_ring(shape: Shape, half: Half) -> Runs:
-    """Split the ring of nodes around a half into runs of successive numbers in the whole part."""
+    """Split the boundary nodes of one half of a part into runs consecutive in the whole part.
+
+    The nodes on the boundary of a half form its ring. They are split where their numbers in the whole part are not
+    successive, and where nodes that the part eliminates (its cut) meet nodes on the ring of the part.
+    """
     numbering = number_nodes(shape)
     n_own = len(numbering.own)
     ring = number_nodes(half.shape).ring

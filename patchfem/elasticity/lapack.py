@@ -63,7 +63,7 @@ def cho_factor(matrix) -> np.ndarray:
 
 
 def cho_solve(low, right) -> np.ndarray:
-    """Solve a symmetric system by its `cho_factor`, for right sides (n,) or (n, k)."""
+    """Solve a symmetric system from its `cho_factor`, for right-hand sides (n,) or (n, k)."""
     return dpotrs(low, right, lower=1)[0]
 
 

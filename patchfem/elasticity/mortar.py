@@ -70,7 +70,7 @@ class Grids(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Mortar:
-    """Two pieces that are joined on the m nodes of the pressure, per unit width.
+    """Mortar coupling of two pieces at the m nodes that carry the pressure, per unit width.
 
     - ``side``: "lower" or "upper" if `x` are the nodes of that piece ("lower" if they match), else
       "both"
@@ -330,7 +330,9 @@ def zigzag_compliance(x, compliance) -> np.ndarray:
 
 
 def interpolate_zigzag_compliance(x, compliance, positions) -> np.ndarray:
-    """Interpolate the `zigzag_compliance` of a piece linearly along its interface.
+    """Interpolate the compliance of a piece to balanced triples of forces along its interface.
+
+    `zigzag_compliance` defines these triples; it is interpolated linearly between the inner nodes.
 
     Parameters
     ----------

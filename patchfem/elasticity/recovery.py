@@ -394,7 +394,8 @@ def _compute_rectangle_norms(rectangles: Rectangles, u, stress, lam, mu) -> Ener
     a, b, c, d = (recovered.take(points, axis=1) for points in rectangles.recovery_points)
     displacement = np.ascontiguousarray(u.T)
     u_a, u_b, u_c, u_d = (displacement.take(nodes, axis=1) for nodes in rectangles.nodes)
-    # twice the terms of the displacements in xi eta, from which the linear stresses follow
+    # twice the coefficients of the term xi eta of the bilinear displacements, which give the part of the stresses that is
+    # linear in xi or eta
     along, inward = (u_a - u_b + u_c - u_d) / 2
     by_xi = np.stack([bulk * inward, -shear * inward, shear * along]) / height
     by_eta = np.stack([bulk * along, shear * along, shear * inward]) / width

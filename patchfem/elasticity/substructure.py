@@ -51,7 +51,7 @@ class Substructure:
 
     @property
     def round_off_error(self) -> float:
-        """Relative error of the compliance by round-off [1]; 0 before the piece is factorised."""
+        """Relative round-off error of the compliance [1]; 0 before the piece is factorised."""
         return self.computed.get("rounding", 0.0)
 
     def solve(self, load) -> np.ndarray:

@@ -65,7 +65,7 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
     n_columns = widths.size
     n_rows = heights.size
     stencil = np.zeros((n_columns + 1, n_rows, 9, 4))
-    # products of three terms are too small for several threads, which wait for each other
+    # these products of matrices with three columns are so small that several BLAS threads only wait for each other
     with one_thread():
         for a, b in np.ndindex(4, 4):
             column, row = CORNER_POSITIONS[a]

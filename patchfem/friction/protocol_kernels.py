@@ -11,7 +11,8 @@ IS_SET_VALUED = False  # whether the law keeps a relative displacement at rest w
 HAS_ZERO_KINK = False  # whether the rate equation has a kink at zero stretch
 # whether the stretch depends on the path alone and is given by `integrate_stretch`
 IS_RATE_INDEPENDENT = False
-HAS_SPEED_LAYER = False  # whether the force changes within a layer of small velocities
+# whether the force changes steeply over a narrow range of velocities around 0
+HAS_SPEED_LAYER = False
 
 
 class Reading(NamedTuple):

@@ -271,7 +271,7 @@ def _check_tags(mesh: TaggedMesh, source) -> None:
 
 
 def _check_numbers(mesh: TaggedMesh, source) -> None:
-    """Raise PatchfemError unless node numbers exist and the nodes lie in a plane."""
+    """Raise PatchfemError unless cells refer to existing nodes and the nodes lie in a plane."""
     n_points = len(mesh.points)
     for group in (mesh.triangles, mesh.quads, *(mesh.nodes[edge] for edge in EDGE_TAGS)):
         if group.size and (group.min() < 0 or group.max() >= n_points):
@@ -453,7 +453,7 @@ def _check_connections(mesh: PieceMesh, side: str, source) -> None:
 
 
 def _check_hanging_nodes(mesh: PieceMesh, border, side: str, source) -> None:
-    """Raise PatchfemError if a node of the border lies inside another edge (e, 2) of the border."""
+    """Raise PatchfemError if a boundary node lies inside a boundary edge (e, 2)."""
     nodes = np.unique(border)
     begin = mesh.points[border[:, 0]]
     along = mesh.points[border[:, 1]] - begin

@@ -69,7 +69,7 @@ def write_mesh(lower, path: Path, upper=None) -> None:
 
 
 def read_bodies(path: Path) -> tuple:
-    """Read a tagged mesh of any format as tensor grids, or as pieces of any cells.
+    """Read a tagged mesh of any format as two tensor grids, or else as two unstructured meshes.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def _read_with_meshio(path: Path):
 
 
 def _check_counts(path: Path) -> None:
-    """Raise PatchfemError if a section of .msh announces more entries than the file can contain."""
+    """Raise PatchfemError if a section of a .msh file declares more entries than fit in it."""
     content = path.read_bytes()
     _check_node_numbers(path, content)
     for section, min_bytes in MIN_ENTRY_BYTES.items():

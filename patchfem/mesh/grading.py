@@ -133,7 +133,7 @@ def divide_into_columns(layout: Layout, required_levels=()) -> np.ndarray:
 
 
 def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarray, int]:
-    """Divide a layout in depth into rows, two at least in the coating and three below it.
+    """Return the depths of the rows of cells, at least two in the coating and three below it.
 
     Parameters
     ----------

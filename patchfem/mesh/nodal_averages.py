@@ -34,7 +34,10 @@ class Patches:
         return np.add.reduceat(self.weights[:, None] * values[self.cells], self.starts[:-1])
 
     def group_by_size(self) -> "GroupedPatches":
-        """Return the same patches for values that have the cells on the last axis."""
+        """Return the patches grouped by their number of cells, so that groups are summed at once.
+
+        The result acts on values with the cells on the last axis.
+        """
         counts = np.diff(self.starts)
         groups = []
         for count in np.unique(counts[counts <= MAX_ORDERED_CELLS]):

@@ -11,7 +11,7 @@ from .tensor import TensorGrid
 
 # Fraction of the size of the piece; coordinates that differ by less lie on the same grid line.
 GRID_LINE_TOL = 1e-7
-# Successive edges of the border that turn by more than 30 degrees belong to different faces.
+# Successive boundary edges that turn by more than 30 degrees belong to different faces.
 MIN_FACE_COSINE = np.cos(np.radians(30.0))
 
 
@@ -135,11 +135,11 @@ def _border_edges(mesh: PieceMesh) -> np.ndarray:
 
 
 def _number_faces(mesh: PieceMesh, border, directions) -> np.ndarray:
-    """Return the number (b,) of the face to which each edge (b, 2) of the border belongs.
+    """Return the number (b,) of the face to which each boundary edge (b, 2) belongs.
 
     A face ends at corners and at the ends of the interface. directions: (b, 2) unit vectors.
     """
-    # the border is counterclockwise, so every edge ends where another one begins
+    # the boundary is counterclockwise, so every edge ends where another one begins
     by_begin = np.argsort(border[:, 0], kind="stable")
     position = np.searchsorted(border[by_begin, 0], border[:, 1])
     following = by_begin[np.minimum(position, len(border) - 1)]

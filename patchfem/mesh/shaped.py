@@ -98,7 +98,7 @@ def shaped_grid(
 
 
 def _move_columns(inner: TensorGrid, outer, length: float, end: End) -> ShapedGrid:
-    """Extend a grid beyond the interface and lower its columns to the face of the piece."""
+    """Extend a grid beyond the interface and move its nodes to the curved face of the piece."""
     beyond = inner.x[-1] + outer[1:]
     if beyond.size:
         beyond[-1] = length / 2

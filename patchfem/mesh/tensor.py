@@ -54,7 +54,7 @@ class TensorGrid:
 
     @property
     def base_grid(self) -> "TensorGrid":
-        """The tensor grid over the interface: this grid."""
+        """Tensor grid that spans the interface, which for this class is the grid itself."""
         return self
 
     def tributary_lengths(self) -> np.ndarray:
@@ -85,7 +85,7 @@ class TensorGrid:
         return self._with_rows(split_levels(self.x), split_levels)
 
     def _with_rows(self, x, change) -> "TensorGrid":
-        """Return the grid with columns `x`, and with `change` applied to the rows of each layer."""
+        """Return the grid with columns `x`; `change` maps the row depths of each layer to new ones."""
         coated = change(self.depth[: self.coating_rows + 1])
         under = change(self.depth[self.coating_rows :])
         depth = np.concatenate([coated, under[1:]])
@@ -243,6 +243,7 @@ def split_levels(levels) -> np.ndarray:
         ratio[-1] = cells[-1] / cells[-2]
     out = np.empty(2 * levels.size - 1)
     out[::2] = levels
-    # beyond a factor of four the ratio is a jump between two gradings, which halving must not spread
+    # a ratio beyond four is a jump of the cell size where two gradings meet; the limit keeps the halves of a cell beside
+    # the jump within a factor of two of each other
     out[1::2] = levels[:-1] + cells / (1 + np.sqrt(np.clip(ratio, 0.25, 4.0)))
     return out

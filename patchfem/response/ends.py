@@ -12,7 +12,7 @@ from .run_events import slips_and_slides
 
 
 def estimate_window_error(window: Response, period: float, offset: float) -> dict:
-    """Return the change of each measure, by name, if the window lies `offset` steps elsewhere.
+    """Return the change of each measure, by name, if the window is shifted by `offset` steps.
 
     An extreme value changes only if it lies at an end of the window.
 

@@ -63,7 +63,7 @@ def sort_events(rows, count: int | None = None, source: str = "") -> Events:
 
 
 def detect_events(time, slips, slides, period: float, held: float = 0.0, borders=()) -> Events:
-    """Return the events in samples: stops, releases and reversals, and the borders of the drive.
+    """Return the events in samples: stops, releases, reversals, and borders of drive segments.
 
     A stop or a release is where the slip speed passes 1e-2 of its peak in the cycle, a reversal
     where it changes sign without a stop between two samples.

@@ -97,9 +97,9 @@ def find_missing_secant(values) -> dict:
 
 
 def find_missing_steady(values, outcome: Outcome, drive) -> dict:
-    """Return the steady amplitude without a value, by name, if a transient hides its limit.
+    """Return the steady amplitude as a Measure without value, if a transient hides its limit.
 
-    Only under a periodic drive; {} otherwise.
+    The result is a dict by name; {} for a drive that is not periodic.
     """
     return (
         {

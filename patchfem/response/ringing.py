@@ -1,4 +1,4 @@
-"""Ringing of a rig while an interface sticks: a decaying sinusoid besides the forced motion.
+"""Free vibration of a rig while an interface sticks: a decaying sinusoid and forced motion.
 
 In: a signal during the sticks of a window. Out: `ring_frequency` and `ring_damping` with their
 errors. The model is a sum of decaying sinusoids, the forced sine and a constant. Frequency and
@@ -145,7 +145,7 @@ def make_ring(amplitude: float, own: float, damping: float, size: float) -> dict
 
 
 class HeldMode(NamedTuple):
-    """Mode that rings while every interface sticks.
+    """Free vibration of one mode while every interface sticks.
 
     - begin, end: time span of the stick [s].
     - frequency: frequency of the damped motion [Hz].
@@ -162,7 +162,9 @@ class HeldMode(NamedTuple):
 
 
 def held_modes(modes, stiffness, motion) -> list:
-    """Return the HeldModes of a motion without a forced sine while every interface sticks.
+    """Return the free vibration of each mode while every interface sticks, as HeldModes.
+
+    The motion must not contain a response to a sine.
 
     Each stuck interface is a spring, and the modes are eigenvectors of the rig with these springs.
     Two states that are h apart differ by c (exp(lambda h) - 1) in every mode, whatever the

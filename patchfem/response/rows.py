@@ -37,7 +37,7 @@ from .spectrum import MIN_HARMONIC, odd_harmonics, wave_measures
 
 NO_INTEGRATED_MEASURES = (
     IntegratedMeasures()
-)  # for an engine that integrates no measures besides its samples
+)  # for an engine that computes measures from samples only
 
 
 @dataclass(frozen=True, eq=False)

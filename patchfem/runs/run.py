@@ -240,7 +240,7 @@ def _complete_result(
 
 
 def _yielding_faces(result: Result) -> dict:
-    """Return notes by Strength on faces that yield even at the smallest peak within its error."""
+    """Return the notes on faces that yield even at the peak pressure minus its error."""
     peak, asked = result.measures.get("pressure_peak"), result.plan.model.patch
     if asked is None or result.patch is None or peak is None or peak.value is None:
         return {}

@@ -105,7 +105,7 @@ def foresee_tolerance(model: Model) -> Forecast:
 
 
 def _without(model: Model, **keys) -> Model:
-    """Return a model with other values of keys in [accuracy]."""
+    """Return a model with some values of its section [accuracy] replaced."""
     return replace(model, accuracy=model.accuracy.model_copy(update=keys))
 
 

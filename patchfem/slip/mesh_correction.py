@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-# error of a measure / its change when the elements are spread (tests/README.md)
+# factor from the change of a measure, when each element is spread over a range of yield displacements, to the error
+# of the measure (tests/README.md)
 SPREAD_FACTOR = 1.5
 N_ELEMENT_PARTS = 4  # number of parts into which each element but the first is divided
 # number of times that the range of the first element is halved, with N_ELEMENT_PARTS parts per halving; displacements

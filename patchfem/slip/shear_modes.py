@@ -46,8 +46,8 @@ GAUSS_COUNTS = (16, 32, 64)  # numbers of Gauss points that may represent the no
 # bond lengths by which a Newton step may move a node back; the law there is exp(2) times as steep as at rest
 MAX_BACKWARD_LENGTHS = 2.0
 N_DISPLACEMENTS = 24  # number of relative displacements at which backbones are compared
-# largest of these displacements in bond lengths, without the displacement of the pieces; the force there is within
-# exp(-6) of its limit
+# largest relative displacement of a compared backbone [bond lengths], to which twice the displacement of the pieces is
+# added; the force there is within exp(-6) of its limit
 MAX_BACKBONE_LENGTHS = 6
 N_ERROR_MODES = (
     64  # smallest number of modes with which the backbone error of a reduction is computed
@@ -232,7 +232,7 @@ class ShearModes:
 
 
 def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0) -> JenkinsSet:
-    """Return the parallel elements that are equivalent to nodes on a compliance that yield at fixed forces.
+    """Return the Jenkins elements equivalent to elastically coupled nodes with yield forces.
 
     Parameters
     ----------
@@ -366,7 +366,10 @@ def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray
 
 
 def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Sequence:
-    """Return the yields of nodes with the compliance c (n, n) [m/N] in a given order."""
+    """Return the yield displacements of nodes that yield in a given order.
+
+    c: (n, n) compliance [m/N]; force: (n,) yield forces [N].
+    """
     cholesky_factor = _factorise(c[np.ix_(order, order)])
     inverse_ones = dtrsm(1.0, cholesky_factor, np.ones((force.size, 1)), lower=1)[:, 0]
     factored_force = force[order] @ cholesky_factor
@@ -696,7 +699,7 @@ class GaussModes(NamedTuple):
 
 
 def fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> GaussModes:
-    """Return the modes on the smallest Gauss rule that meets a tolerance.
+    """Return the modes at the fewest Gauss points that meet a tolerance.
 
     All nodes are kept if the rule would need more than half as many points. Traction and slip of the nodes cannot be
     recovered from Gauss points.
@@ -724,7 +727,7 @@ def fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> G
 
 
 def modes_on_gauss(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
-    """Return the modes on the Gauss rule with `count` points whose weight function is the friction limit.
+    """Return the modes at `count` Gauss points of the rule weighted by the friction limit.
 
     Parameters
     ----------

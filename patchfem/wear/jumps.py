@@ -15,7 +15,7 @@ MIN_JUMP_FRACTION = 1e-9  # smallest length of a jump as a fraction of all cycle
 METHOD_ORDER = 2  # order of `depth.solve_jump`
 # divisor of the difference between a jump and its two halves, which gives the error of the halves
 RICHARDSON_DIVISOR = 2**METHOD_ORDER - 1
-MIN_ERROR_RATIO = 1e-9  # error / tolerance; the next jump does not grow further below it
+MIN_ERROR_RATIO = 1e-9  # smallest error / tolerance from which the next jump is computed
 MIN_DEPTH = 1e-300  # depth [m] that keeps quotients finite before anything is worn
 # wear of a jump / worn depth; a jump that wears less than this fraction hardly changes the depth, and the error of its
 # slip path is then compared with this fraction of the depth

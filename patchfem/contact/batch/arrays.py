@@ -6,7 +6,9 @@ import numpy as np
 
 
 class NestedStretches(NamedTuple):
-    """Compliance of m nodes, Cholesky factor from the current left end on, sums of stretches.
+    """Arrays from which contacts on runs of consecutive nodes (stretches) are solved.
+
+    A stretch begins at a left end, from which on the Cholesky factor is kept.
 
     - c (m, m) [m/N]; x (m,) [m].
     - upper (m, m): upper Cholesky factor U of the nodes from the left end on.

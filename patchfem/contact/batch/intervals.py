@@ -19,7 +19,7 @@ from .arrays import Cases, NestedStretches, make_cases
 
 kernels = compiled.load("contact.batch.interval_kernels")
 N_TRIES = 12  # left ends that are tried if the stretch is known; beyond them all others are tried
-MIN_COARSE_NODES = 40  # nodes above which the stretches are first found on fewer nodes
+MIN_COARSE_NODES = 40  # nodes above which the contacts are first located on a coarser interface
 COARSENING = 4  # the coarse interface has every fourth node
 BATCH_SIZE = 256  # cases that are solved together, so that their forces stay in the cache
 MIN_PARABOLA_NODES = 3  # nodes in contact from which a stiffness is interpolated between sets
@@ -158,7 +158,7 @@ class Intervals:
         return first, stop
 
     def fill_sums(self, first: np.ndarray) -> None:
-        """Fill `sums` for stretches that begin at the nodes `first` (q,) or beside them."""
+        """Fill `sums` for stretches that begin at the nodes `first` (q,) or next to them."""
         none = np.zeros(0, int)
         cases = make_cases(none, none, np.zeros((0, self.x.size)), np.zeros((0, 3)))
         self._solve_all(cases, int(first.min()) - 1, int(first.max()) + 1, 1, is_free=False)
@@ -213,7 +213,7 @@ class Intervals:
         )
         force = _substitute(lower, y, is_backward=True)
         is_solved = (stop > 0) & (force[:, 0] > 0)
-        # without an end before its limit, a contact is searched once more up to the end of the interface
+        # a case without a contact end before its limit is solved again with the limit at the last node
         is_cut = (stop == 0) & (limits < m)
         cases.end_limit[indices[is_cut]] = m
         if is_solved.any():

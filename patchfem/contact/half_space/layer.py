@@ -15,7 +15,8 @@ import numpy as np
 
 from ...elasticity.elasticity import Layers, Piece, lame
 
-# wave number times thickness above which a wave does not reach the other side of a layer: exp(-40) is rounding
+# wave number times thickness above which a wave does not reach the other side of a
+# layer: its relative amplitude exp(-40) there is below round-off
 MAX_WAVE_DEPTH = 40.0
 
 
@@ -72,7 +73,7 @@ def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
             # the foot of the last layer does not move
             matrix[:, first_row : first_row + 2, columns] = foot[:, :2]
             break
-        # displacements and tractions are continuous across the border of two layers
+        # displacements and tractions are continuous across the interface of two layers
         rows = slice(first_row, first_row + 4)
         matrix[:, rows, columns] = foot
         below = _layer_states(k, 0.0, depths[n + 1], moduli[n + 1], scale)

@@ -17,10 +17,10 @@ from ..edges import ContactEdge, compute_edge_fraction, parabola_change
 # ratio of a compliance of the free ends to the largest one below which its function is left out
 MIN_RELATIVE_COMPLIANCE = 1e-9
 EQUATION_TOL = 1e-10  # relative residual of the equations on the active points
-# offset of an edge over the length of a cell (see `edges.edge_offset`), measured for Hertz contact on
-# 24 rows of points to 0.001
+# offset of an edge over the length of a cell (see `edges.edge_offset`), measured to 0.001 for Hertz contact
+# on 24 rows of points
 EDGE_OFFSET_FRACTION = 0.189
-# length in points above which contacts are not compared in the choice of the longest one
+# points up to which a contact is measured in the choice of the longest one; longer contacts are equivalent
 MAX_REFERENCE_POINTS = 64
 
 

@@ -36,7 +36,8 @@ def drive_phase(segment, cycle, offset, period):
         if segment[SEGMENT.turns] != 0.0:
             extra = cycles * segment[SEGMENT.turns]
             theta += 2 * pi * (extra - floor(extra) + cycles * segment[SEGMENT.turns_remainder])
-        return theta - 2 * pi * floor(theta / (2 * pi))  # a tenth of the time of %
+        # takes a tenth of the time of the operator %
+        return theta - 2 * pi * floor(theta / (2 * pi))
     if segment[SEGMENT.kind] == KIND.line:
         return 2 * pi * offset / period
     time = time_since_start(segment, cycle, offset, period)

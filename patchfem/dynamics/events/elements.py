@@ -1,6 +1,6 @@
-"""Elements of an interface side by side: a rigid one (Coulomb) and elastic-plastic ones, and what they remember.
+"""Parallel elements of an interface, rigid (Coulomb) and elastic-plastic, and their memory.
 
-Every element feels the relative displacement of its interface. The elastic-plastic ones are sorted by yield slide, the
+All elements share the relative displacement of their interface. The elastic-plastic ones are sorted by yield slide, the
 stretch at which they slip.
 """
 
@@ -19,7 +19,7 @@ YIELD_TOL = 1e-14
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Elements:
-    """Elements of one interface: F = sum k_j e_j with stretches |e_j| <= y_j, and a rigid element before them.
+    """Elements of one interface: F = sum k_j e_j with stretches |e_j| <= y_j, and a rigid element.
 
     - stiffness: (t,) k_j [N/m]
     - yield_displacement: (t,) y_j [m], in increasing order
@@ -107,7 +107,7 @@ def coulomb(static: float, kinetic: float | None = None) -> Elements:
 
 
 def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elements:
-    """Return fewer elements, each of which has the stiffness and the limit of some of the given ones together.
+    """Return fewer elements, each of which has the total stiffness and limit of several given ones.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elemen
     begins = np.r_[0, np.arange(first, k.size - n_last, count), [k.size - 1] * n_last]
     begins = np.unique(begins).astype(int)
     stiffness = np.add.reduceat(k, begins)
-    # each yield slide lies between those of its parts, so they are in increasing order
+    # each yield slide lies between those of the merged elements, so they are in increasing order
     yield_slide = np.add.reduceat(k * elements.yield_displacement, begins) / stiffness
     return Elements(
         frozen_array(stiffness),
@@ -158,7 +158,7 @@ def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
 
 
 class ElementTable(NamedTuple):
-    """Elements of all interfaces (i) as the kernels take them; t is the length of the longest list.
+    """Elements of all interfaces (i), padded to the longest list (t), as arrays for the kernels.
 
     - n_elements: (i,) number of elements
     - yield_slide: (i, t + 1) [m], infinite after the last element
@@ -197,7 +197,7 @@ def make_table(groups) -> ElementTable:
 
 
 class Memory(NamedTuple):
-    """What the elements of all interfaces (i) remember.
+    """Memory of the elements of all interfaces (i).
 
     - slide: (i,) relative displacement [m]
     - n_slipping, direction: (i,) number of elements that slip, the first ones of the list, and the sign of their slip
@@ -255,7 +255,7 @@ def reset_work(memory: Memory) -> Memory:
 
 
 def element_stretches(group: Elements, memory: Memory, interface: int) -> np.ndarray:
-    """Return the stretch (a,) [m] of every element in the order in which `make_elements` got them.
+    """Return the stretch (a,) [m] of every element in the order given to `make_elements`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""List of the events of a run: kind, interface, time and place of each."""
+"""List of the events of a run: kind, interface, time and relative displacement of each."""
 
 from dataclasses import dataclass
 

@@ -266,7 +266,8 @@ def simulate(
         )
     run = start_run(modes, drive, groups, cycles, window, travel, start, memory)
     done = run.run(frames, progress, even=even)
-    # the travel ends the run: the same again to there, for the last cycles before it
+    # the output exceeded the travel: the run is repeated up to that time, because only a run whose end is known
+    # keeps the samples of its last cycles
     if done is None:
         again = start_run(
             modes, drive, groups, run.now / drive.period, window, np.inf, start, memory
@@ -400,7 +401,7 @@ class _Run:
         still = self.kernels.stored_energy(
             np.zeros_like(self.motion), self.modal_system, self.table, self.memory
         )
-        # [J] before the books began
+        # energy [J] of the stretched elements minus their work and loss so far, before the energy balance of the run begins
         self.start_stretch_energy = still - float(np.sum(self.memory.work - self.memory.loss))
         self.rows = (
             np.empty((ROWS_PER_CALL, self.n_columns))
@@ -492,7 +493,7 @@ class _Run:
         """Keep the turning points and slips among rows from before the window."""
         self.is_marked = self._log_events(rows) | (rows[:, ROW.begin] == BEGIN.reversal)
         if not self.n_kept and len(rows):
-            self.is_marked[0] = True  # the start
+            self.is_marked[0] = True  # the first row is the start of the run
         if self.n_kept < MAX_TURNING_ROWS:
             self.early_rows.append(rows[self.is_marked])
             self.n_kept += int(self.is_marked.sum())
@@ -531,7 +532,7 @@ class _Run:
         k = int(self.time_state.now[TIME.segment]) + 1
         if k < len(self.time_state.segments):
             end = min(end, int(self.time_state.segments[k, SEGMENT.cycle]))
-        end -= 1  # the last one is run: it crosses the border
+        end -= 1  # the last cycle is marched, because it crosses the border
         many = end - begin - 1
         if many < 1:
             return
@@ -579,7 +580,10 @@ class _Run:
         self.n_events += many * (self.n_events - count)
 
     def _log_events(self, rows) -> np.ndarray:
-        """Log stops, releases, reversals and borders of the drive; returns which rows (k,) begin with one."""
+        """Log stops, releases, reversals and borders of the drive.
+
+        Returns which rows (k,) begin with one.
+        """
         is_event = np.zeros(len(rows), bool)
         if not len(rows):
             return is_event
@@ -691,7 +695,7 @@ class _Run:
             row[self._column(0, column) :: N_COLUMNS] = values
         rows = np.concatenate([*late, row[None]])
         if self.has_rigid:
-            # an event at the start of the window, to the last digits, lies before it
+            # an event within round-off of the start of the window counts as before it
             is_long = rows[:, ROW.duration] > SAME_TIME_TOL * self.period
             rows = rows[min(int(np.argmax(is_long)), len(rows) - 2) :]
         return rows

@@ -47,9 +47,10 @@ from .slow_kernels import find_slow_rate, shorten_series
 from .stick_kernels import MAX_ORDER, choose_sticks, correct_held_slides, find_resting_slides
 from .sum_kernels import add_piece_sums
 
-# fraction of a piece: within it, what was at rest at a turning point still is, so no second reversal is found there
+# fraction of a piece within which an interface that was at rest at a turning point still rests, so that no second
+# reversal is found there
 MIN_MOVING_FRACTION = 1e-12
-# events in a row without progress in time; more are taken for an endless sequence
+# largest number of successive events without progress in time; more count as an endless sequence
 MAX_IDLE_EVENTS = 1000.0
 # a piece is longer by this factor than the predicted time to the next yield, which should lie in it
 YIELD_MARGIN = 1.3
@@ -308,7 +309,7 @@ def choose_initial_sticks(motion, modal_system, table, memory, time_state, works
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def estimate_time_to_yield(motion, modal_system, table, memory):
-    """Return an estimate of the time [s] to the next yield by the present speeds."""
+    """Estimate the time [s] to the next yield from the present speeds."""
     time = 1e300
     for f in range(len(modal_system.inverse_mass)):
         speed = 0.0
@@ -331,7 +332,7 @@ def output_displacement(motion, modal_system):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def apply_event(kind, interface, sign, modal_system, table, memory, time_state):
-    """Change the elements as an event asks, and note which interfaces are at rest."""
+    """Apply an event to the elements, and record which interfaces are at rest."""
     if kind != EVENT.none and kind != EVENT.output_reversal:
         time_state.now[TIME.n_quiet] = 0.0
     if kind == EVENT.yielding:
@@ -465,14 +466,14 @@ def cross_border(kind, remaining, stop, motion, modal_system, table, memory, pre
         forget_previous(previous)
     for f in range(
         len(modal_system.inverse_mass)
-    ):  # at every border, so that a run in parts is the run
+    ):  # cleared at every border, so that a run in parts gives the same result as a single run
         memory.force[f] = interface_force(f, table, memory)
     return drive_changes, repeats
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def clear_rests(u, time_state):
-    """Forget which interfaces were at rest at a turning point, after a motion up to u of a piece."""
+    """Clear the marks of interfaces that rested at a turning point, after a motion up to u."""
     if u > MIN_MOVING_FRACTION:
         time_state.is_at_turn[:] = 0.0
 
@@ -487,7 +488,10 @@ def is_before(now, stop):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def is_idle(progress, time_state, run_sums):
-    """Count the events without progress [s] in time; returns whether there are too many in a row."""
+    """Count the events without progress [s] in time.
+
+    Returns whether there are too many in a row.
+    """
     if progress < MIN_PROGRESS * time_state.period[0]:
         run_sums.limits[LIMIT.n_idle] += 1
     else:
@@ -556,7 +560,7 @@ def march(
     now[TIME.is_paused] = 0.0
     while is_before(now, stop):
         if used == rows.shape[0] and used > 0:
-            # the forces go on as they are
+            # the forces continue unchanged
             now[TIME.begin] = begin
             now[TIME.is_paused] = 1.0
             return STATUS.full, used
@@ -596,7 +600,7 @@ def march(
             move_state(
                 u, h, top, motion, modal_system, table, memory, time_state, run_sums, workspace
             )
-            # an event on the border, to the last digit
+            # an event within round-off of the border
             if is_to_border and (
                 u == 1.0 or now[TIME.offset] + u * h >= now[TIME.offset] + remaining
             ):

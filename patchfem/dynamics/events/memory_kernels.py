@@ -55,7 +55,10 @@ def next_yield_slide(interface, direction, table, memory):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def release_next_element(interface, direction, table, memory):
-    """Let the next element slip in a direction, or the whole innermost group that slipped this way before."""
+    """Let the next element slip in a direction.
+
+    If the innermost group slipped in this direction before, the whole group slips.
+    """
     group = memory.n_groups[interface] - 1
     if memory.group_sign[interface, group] == direction:
         memory.n_slipping[interface] = memory.group_end[interface, group]
@@ -101,7 +104,7 @@ def rigid_friction(interface, table, memory):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def interface_force(interface, table, memory):
-    """Return the friction force [N] of an interface, without the reaction of a rigid element that sticks."""
+    """Return the friction force [N] of an interface without the reaction of its rigid element."""
     return (
         rigid_friction(interface, table, memory)
         + find_force_and_energy(interface, table, memory)[0]
@@ -110,7 +113,7 @@ def interface_force(interface, table, memory):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_force_and_energy(interface, table, memory):
-    """Return force [N] and elastic energy [J] of the elastic-plastic elements, added group by group."""
+    """Sum force [N] and elastic energy [J] of the elastic-plastic elements, group by group."""
     first = memory.n_slipping[interface]
     slide = memory.slide[interface]
     force = memory.direction[interface] * table.limit_sum[interface, first]

@@ -20,7 +20,7 @@ series = kernels("dynamics.events.series_kernels")
 
 
 class ModalSystem(NamedTuple):
-    """The modes as the kernels take them.
+    """Modes as arrays for the kernels.
 
     The kernels take the number of modes from the length of `omega_squared`, and that of interfaces from `inverse_mass`.
     Of one mode behind one interface both are tuples: their length is then part of their type, and the same text is
@@ -224,7 +224,7 @@ def _record_segments(record) -> np.ndarray:
 
 
 def copy_into(old, new):
-    """Copy a tuple of arrays, or of such tuples, into the arrays of another one.
+    """Copy a nested tuple of arrays into the arrays of another one.
 
     Compiled code knows where the old arrays are, which takes most of the time of a short call.
 
@@ -381,7 +381,7 @@ def make_workspace(modal_system: ModalSystem) -> Workspace:
 
 
 def clear_workspace(workspace: Workspace) -> Workspace:
-    """Set a workspace to what it is before a run, and return it."""
+    """Reset a workspace to its state before a run, and return it."""
     for part in (*workspace[:-2], *workspace.constraint, *workspace.choice):
         part.fill(0.0)
     workspace.choice.orders.fill(-1.0)
@@ -389,7 +389,7 @@ def clear_workspace(workspace: Workspace) -> Workspace:
 
 
 class RunSums(NamedTuple):
-    """What a run sums up.
+    """Sums over a run.
 
     - ledger: (8,) energies and counts, see `LedgerPositions`
     - extremes: (c, 2) smallest and largest output [m] of every cycle

@@ -54,7 +54,7 @@ class Orbits:
         self._set_system(modes)
 
     def _set_system(self, modes: ModalBasis) -> None:
-        """Take modes."""
+        """Set the modes, and build the arrays that depend on them."""
         self.modes = modes
         self.held = {}
         self.gauge = (
@@ -62,7 +62,7 @@ class Orbits:
         )
 
     def replace_system(self, modes: ModalBasis, groups) -> bool:
-        """Take other modes and elements in the same workspace.
+        """Replace the modes and the elements, in the same workspace.
 
         Returns False where they do not fit.
         """

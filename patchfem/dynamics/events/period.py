@@ -40,16 +40,16 @@ class Point(NamedTuple):
 
     motion: np.ndarray
     memory: Memory
-    known: tuple | None = None  # turning places, where they are known
+    known: tuple | None = None  # turning points, where they have been computed
 
     @property
     def turning_places(self) -> tuple:
-        """Interfaces (d,) and groups (d,) of the turning places in the memory."""
+        """Interfaces (d,) and groups (d,) of the turning points in the memory."""
         return self.known or find_turning_places(self.memory)
 
     @property
     def numbers(self) -> np.ndarray:
-        """Motion and relative displacements of the turning places (2 n + d,)."""
+        """Motion and relative displacements of the turning points (2 n + d,)."""
         return np.concatenate([self.motion, self.memory.group_slide[self.turning_places]])
 
     def moved(self, numbers) -> "Point":
@@ -62,7 +62,7 @@ class Point(NamedTuple):
 
 
 def find_turning_places(memory: Memory) -> tuple:
-    """Return interfaces (d,) and groups (d,) of the turning places in a memory."""
+    """Return interfaces (d,) and groups (d,) of the turning points in a memory."""
     found = [
         row[:deep].nonzero()[0] for row, deep in zip(memory.group_sign, memory.n_groups.tolist())
     ]
@@ -126,7 +126,7 @@ class PeriodMap:
         self.seconds = 0.0
 
     def _set_system(self, modes: ModalBasis, groups) -> None:
-        """Take modes and elements."""
+        """Set the modes and the elements, and build the arrays that depend on them."""
         self.modes = modes
         self.groups = tuple(groups)
         self.modal_system = make_modal_system(modes)
@@ -136,7 +136,7 @@ class PeriodMap:
         self.still = unstretched_memory(self.table, np.zeros(len(self.groups)))
 
     def replace_system(self, modes: ModalBasis, groups) -> bool:
-        """Take other modes and elements.
+        """Replace the modes and the elements.
 
         Returns False where their numbers differ from the present ones.
         """
@@ -153,7 +153,7 @@ class PeriodMap:
         return Point(np.zeros(2 * self.n), copy_memory(self.still))
 
     def complete_memory(self, point: Point) -> Memory:
-        """Return the memory of a Point with displacement and slip as the motion gives them."""
+        """Return the memory of a Point with displacement and slip computed from its motion."""
         memory = copy_memory(point.memory)
         memory.slide[:] = self.faces @ point.motion[: self.n]
         for f, one in enumerate(self.groups):

@@ -22,13 +22,13 @@ from .series_kernels import (
 
 # fraction of the friction limit; where more of it slips, the interface slips
 SLIP_FRACTION = 0.5
-# fraction of a cycle: a shorter slip does not count as one, it is round-off of a stop
+# fraction of a cycle; a shorter slip is not counted, because it is round-off of a stop
 MIN_SLIP_DURATION = 1e-9
 # fraction of the largest rate of an interface, below which it is at rest
 REST_RATE_RATIO = 1e-9
-# fraction of the range of an interface: a piece with less motion is a rest
+# fraction of the range of an interface, below which its motion in a piece counts as rest
 MIN_MOTION_RATIO = 1e-13
-# fraction of a cycle after its border within which a turn still counts for it
+# fraction of a cycle after its border within which a reversal still counts as at the border
 MAX_TURN_DELAY = 0.003
 
 
@@ -163,7 +163,7 @@ def add_row_state(row, modal_system, run_values, interface_values):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def add_forces(rows, j, top, modal_system, workspace, interface_values):
-    """Widen the ranges of the forces by the piece of row j, and add the work by its ends."""
+    """Widen the ranges of the forces by the piece of row j, and add the work computed from its ends."""
     for f in range(len(modal_system.inverse_mass)):
         values = interface_values[f]
         at = force_column(f, modal_system)
@@ -189,7 +189,7 @@ def add_forces(rows, j, top, modal_system, workspace, interface_values):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def turning_force(rows, j, n_rows, interface, modal_system, min_motion):
-    """Return the force [N] of an interface at a turn where row j begins.
+    """Return the force [N] of an interface at a reversal where row j begins.
 
     It is the mean of the forces before and after the rest there, and NaN where the force jumps and
     one of both is unknown. min_motion: a piece with a smaller change of the relative displacement
@@ -233,7 +233,7 @@ def turning_force(rows, j, n_rows, interface, modal_system, min_motion):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_turn_near_border(rows, j, n_rows, forward, interface, modal_system, period, rest_rate):
-    """Return the row near a border of a cycle at which an interface turns, -1 if none."""
+    """Return the row near a border of a cycle at which an interface reverses, -1 if none."""
     k = j
     while (
         0 <= k <= n_rows and abs(rows[k, ROW.time] - rows[j, ROW.time]) <= MAX_TURN_DELAY * period

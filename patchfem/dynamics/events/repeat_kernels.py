@@ -18,7 +18,7 @@ from .positions_kernels import KIND, PREVIOUS, SEGMENT, TIME
 REPEAT_TOL = 1e-14
 # the same ratio, at which the count of the cycles of approach begins
 APPROACH_TOL = 1e-10
-# cycles of approach at most; what the motion would still change by is then below 1e-11 of its size
+# largest number of cycles of approach; the remaining change of the motion is then below 1e-11 of its size
 MAX_APPROACH_CYCLES = 9000.0
 
 
@@ -70,7 +70,7 @@ def measure_change(motion, modal_system, memory, time_state, previous):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def forget_previous(previous):
-    """Forget the state at the end of the cycle before."""
+    """Clear the state at the end of the previous cycle."""
     previous.status[PREVIOUS.segment] = -1.0
     previous.status[PREVIOUS.repeats] = 0.0
 

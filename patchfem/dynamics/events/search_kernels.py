@@ -12,11 +12,11 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .memory_kernels import is_held, next_yield_slide
 
-# what ends a piece
+# kinds of events that end a piece
 from .positions_kernels import EVENT
 from .series_kernels import EPS, NO_ROOT, SINGLE_INTEGRAL, find_first_root, refine_root
 
-# fraction of the sum of the terms of a speed: a smaller term is round-off and gives no direction
+# fraction of the sum of the terms of a speed: a smaller term is round-off, whose sign is not significant
 ACCELERATION_TOL = 1e-14
 
 
@@ -85,7 +85,7 @@ def find_crossing(poly, top, distance, limit, scratch):
         scratch[k + 1] = -direction * poly[k] * SINGLE_INTEGRAL[k + 1]
     start = limit * distance / end
     square = scratch[1] * scratch[1] - 4 * scratch[0] * scratch[2]
-    # the root of the first three terms
+    # Newton's method starts from the root of the first three terms
     if square > 0 and 2 * scratch[0] < limit * (sqrt(square) - scratch[1]):
         start = 2 * scratch[0] / (sqrt(square) - scratch[1])
     return refine_root(scratch, 0, top, 0.0, limit, start)

@@ -22,9 +22,9 @@ MAX_RATE_TIME = 2.0
 MAX_POWER = 28
 # unit round-off of doubles
 EPS = 2.0**-52
-# place of a root that lies after the end of the piece
+# position of a root that lies after the end of the piece
 NO_ROOT = 2.0
-# halvings of a piece in the search for a root; the last interval is as long as the round-off of its place
+# halvings of a piece in the search for a root; the last interval is as long as the round-off of its position
 MAX_HALVINGS = 52
 # columns for the Bernstein coefficients of an interval; the last one is 1 in a right half
 HULL_WIDTH = MAX_POWER + 5
@@ -111,7 +111,7 @@ def bound_fastest_rate(modal_system, springs):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bound_modal_rate(modal_system, workspace):
-    """Return the bound of `bound_fastest_rate` for workspace.stiffness, 0 where nothing can move."""
+    """Return the bound of `bound_fastest_rate` for workspace.stiffness; 0 without free motions."""
     if workspace.constraint.status[HOLD.is_immobile] == 1.0:
         return 0.0
     return bound_fastest_rate(modal_system, workspace.stiffness)
@@ -319,7 +319,7 @@ def evaluate_polynomial(poly, low, top, u):
 
     Even and odd powers are added apart, which halves the length of the dependency chain.
     """
-    # two chains of half the length
+    # two independent sums of half the length, which the processor computes at the same time
     square = u * u
     even = poly[top]
     odd = 0.0
@@ -399,7 +399,7 @@ def fill_bernstein(poly, low, top, hull):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_possible_root(poly, low, top, hull):
-    """Return a place near which the first root may lie; NO_ROOT where there is none.
+    """Return a position near which the first root may lie; NO_ROOT if there is none.
 
     The Bernstein coefficients of the first terms are compared with the sum of the magnitudes of
     the other terms.
@@ -487,7 +487,7 @@ def find_first_root(poly, low, top, hulls):
     float
         NO_ROOT if there is none.
     """
-    # as they are: the compiler then knows that no index is negative
+    # the indices are not wrapped, because the compiler then knows that none is negative
     remainder = 0.0
     low = low & 31
     top = top & 31
@@ -519,7 +519,7 @@ def find_first_root(poly, low, top, hulls):
             if k > 0 and (hull[k] < 0) != (hull[k - 1] < 0):
                 changes += 1
                 at = k
-        # free of roots: on with the part to the right, which an outer halving left
+        # the interval has no root, so the search goes on in the part to its right that an earlier halving left
         if lowest >= -noise:
             left += width
             depth, width = _take_right_half(hulls, depth, width, degree)
@@ -588,7 +588,8 @@ def find_largest_magnitude(poly, top, best, hulls):
                 turns += 1
                 at = k
         known = largest <= best * (1 + 1e-14) or depth == MAX_HALVINGS
-        if not known and turns < 2:  # Descartes: one turn at most; the ends have been looked at
+        # by Descartes' rule there is at most one extremum; the ends have been checked
+        if not known and turns < 2:
             if turns == 1:
                 sense = 1.0 if hull[1] > hull[0] else -1.0
                 before = hull[at - 1] - hull[at - 2]

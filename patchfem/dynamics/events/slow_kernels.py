@@ -17,9 +17,9 @@ from .memory_kernels import RIGID_STIFFNESS
 from .positions_kernels import TIME
 from .series_kernels import EPS, MAX_RATE_TIME, find_highest_power
 
-# free vibration over the motion, below which it is round-off
+# free vibration over the size of the motion, below which it is round-off
 RINGING_TOL = 64 * EPS
-# short pieces after which the march looks again whether the free vibration has decayed
+# number of short pieces after which the march checks again whether the free vibration has decayed
 MIN_SHORT_PIECES = 16.0
 
 
@@ -78,7 +78,7 @@ def solve_equilibrium(force, coordinates, springs, modal_system, imbalance, work
     n_interfaces = len(modal_system.inverse_mass)
     for i in range(n):
         coordinates[i] = 0.0
-    for _ in range(2):  # the second time for the round-off of the first
+    for _ in range(2):  # the second pass removes the round-off of the first
         find_imbalance(force, coordinates, springs, modal_system, imbalance)
         for f in range(n_interfaces):
             constraint.scratch[1, f] = 0.0

@@ -20,7 +20,7 @@ from .period import PeriodMap, PeriodMapping, Point, copy_memory
 
 # periods of the run that leads to the start of Newton's method
 N_APPROACH_PERIODS = 4
-# fraction of the friction limit that may stick, by round-off, where all interfaces slide
+# fraction of the friction limit that may stick due to round-off where all interfaces slide
 WHOLE_SLIP_TOL = 1e-12
 
 
@@ -163,7 +163,7 @@ class YieldShooting(Shooting):
         self.rows = np.maximum(np.abs(period_map.faces).sum(axis=1), 1e-300)
 
     def mapped(self, point: Point) -> Mapped:
-        """The map of a Point. NotConverged where events pile up."""
+        """Return the map of a Point; raise NotConverged where events accumulate."""
         found = self.period_map(self.drive, point, self.half)
         n = self.period_map.n
         omega = self.drive.segments[0].omega
@@ -190,7 +190,7 @@ class YieldShooting(Shooting):
         )
 
     def moved(self, mapped: Mapped, step) -> Point:
-        """The Point that lies a step from that of a map, with the elements of its end in every group."""
+        """Point of a map moved by a step, with the groups of elements of the end of the map."""
         return mapped.found.end.moved(mapped.point.numbers + step)
 
     def after(self, mapped: Mapped, periods: int) -> Point:
@@ -226,7 +226,7 @@ class YieldShooting(Shooting):
 
 
 def _have_same_numbers(point: Point, end: Point) -> bool:
-    """Return whether two Points have the same numbers: turning places of the same kind."""
+    """Return whether two Points have the same numbers: turning points of the same kind."""
     a = point.memory
     b = end.memory
     deep = a.n_groups.tolist()

@@ -33,11 +33,11 @@ MAX_ENUMERATED_FIRST = 4
 MAX_ENUMERATED = 8
 # exchanges per interface, after which a choice by exchange is given up
 MAX_EXCHANGES_PER_SLIDE = 8
-# sweeps of Jacobi rotations; a handful suffices
+# largest number of sweeps of Jacobi rotations; about five suffice
 MAX_SWEEPS = 40
 # length of an orthogonal row over the longest one, below which the row depends on the others
 DEPENDENT_TOL = 1e-10
-# what a projection leaves of a row over the row itself, below which the row is held too
+# remainder of a row after projection over the row, below which the interface is held too
 TIED_TOL = 1e-9
 
 
@@ -159,7 +159,7 @@ def constrain_slides(modal_system, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def remove_held_rates(rates, modal_system, workspace):
-    """Remove from rates (n,) what moves the held interfaces."""
+    """Remove from rates (n,) the part that moves the held interfaces."""
     constraint = workspace.constraint
     n_interfaces = len(modal_system.inverse_mass)
     n = len(modal_system.omega_squared)
@@ -292,7 +292,7 @@ def leading_margin_term(interface, side, noise, limit, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_violation(noise, motion, modal_system, table, memory, h, workspace):
-    """Return the first interface that breaks the law under the guess, and how.
+    """Return the first interface that violates the law under the guess, and the violation.
 
     Interfaces in choice.is_resting have no velocity. The memory, force and stiffness are left as
     they are under the guess, and choice.orders as the search for the next event needs them.
@@ -362,7 +362,7 @@ def find_violation(noise, motion, modal_system, table, memory, h, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def choose_by_exchange(noise, motion, modal_system, table, memory, h, workspace):
-    """Exchange the first interface that breaks the law, again and again.
+    """Exchange the first interface that violates the law, until none does.
 
     Returns whether a choice is found.
 

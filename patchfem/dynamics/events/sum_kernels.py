@@ -10,7 +10,7 @@ from .series_kernels import GAUSS_POINTS, GAUSS_WEIGHTS, count_gauss_points, eva
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def evaluate_at_four(poly, low, top, u):
-    """Return the values of a polynomial, as `evaluate_polynomial`, at four places."""
+    """Return the values of a polynomial at four points, as `evaluate_polynomial` does."""
     a = b = c = d = poly[top]
     for k in range(top - 1, low - 1, -1):
         part = poly[k]
@@ -23,7 +23,7 @@ def evaluate_at_four(poly, low, top, u):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def evaluate_rates_at_four(coefs, i, top, u):
-    """Return the rates over u of the coordinate i at four places."""
+    """Return the derivatives with respect to u of the coordinate i at four points."""
     a = b = c = d = top * coefs[top, i]
     for k in range(top - 1, 0, -1):
         part = k * coefs[k, i]

@@ -127,13 +127,13 @@ def with_shear_modes(
 
 
 class FlankModel:
-    """What `march.march` needs to know of a contact along the flanks of `grooves`.
+    """Description of a contact along the flanks of `grooves` for `march.march`.
 
     It is under a `load` [N] and has the coefficient of friction `static` [1].
     """
 
     __slots__ = ()
-    # nothing beside it, and the loop knows of a load that stays
+    # there are no other elements, and the compiled loop treats the load as constant
     joints = ()
     laws = ()
     loading = ""
@@ -153,7 +153,7 @@ class FlankModel:
         return False
 
     def shown(self, contact) -> dict:
-        """Nothing: all points share its stretch, if it has any."""
+        """Return an empty dict, because all points have the same stretch."""
         return {}
 
 

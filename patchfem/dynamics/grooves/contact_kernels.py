@@ -120,7 +120,7 @@ def write_resistance(pulled, gain, middle, dt, flank, at):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_mean_force(dq, q, dt, c):
-    """Write the mean force over dq [m] in dt [s], and what belongs to it, into c.climb."""
+    """Write the mean force over dq [m] in dt [s] and its derivative [N/m] into c.climb."""
     ds, flat, end = climb_flank(dq, q, dt, c.flank, c.climb)
     pulled, gain = points.solve_friction(ds, flat, end, dt, c)
     write_resistance(pulled, gain, q + 0.5 * dq, dt, c.flank, c.climb)

@@ -44,7 +44,7 @@ class GroovesModel(FlankModel):
 
     @property
     def length(self) -> float:
-        """Bond length [m], none."""
+        """Bond length [m]; 0, as the law has no bonds."""
         return 0.0
 
     @property
@@ -58,7 +58,7 @@ class GroovesModel(FlankModel):
         return SampledRun
 
     def build(self):
-        """Return a contact that nothing uses."""
+        """Return a contact without friction, which no kernel reads."""
         return coulomb_model(0.0, 0.0).build()
 
 
@@ -141,7 +141,7 @@ class SampledRun(GroovesRun):
         return np.array([y[-3], y[-2], own[COUNT.drive_power], y[n], own[COUNT.accepted], y[-1]])
 
     def fork(self, drive):
-        """Return a copy that goes on by itself, as a Run does."""
+        """Return an independent copy, as a Run does."""
         twin = super().fork(drive)
         twin.smooth_motion = self.smooth_motion.fork(drive)
         return twin

@@ -1,4 +1,6 @@
-"""Backbone of a mode with a contact: frequency and damping of the motion that a balancing negative damping keeps up.
+"""Backbone of a mode with a contact: frequency and damping ratio over amplitude.
+
+A negative damping that balances friction sustains the motion.
 
 z'' + (D - 2 zeta omega) z' + Omega^2 z + faces^T F/m = 0 has, for every amplitude of the mode's coordinate, one
 periodic motion with its own omega and zeta: zeta is the loss of a cycle over 8 pi times the mean kinetic energy, what

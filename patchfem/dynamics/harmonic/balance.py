@@ -38,7 +38,7 @@ __all__ = [
 ]
 
 
-# slip over the bond length, below which bonds count as stuck
+# slip over the bond length, below which bonds count as sticking
 STUCK_SLIDE_RATIO = 1e-3
 
 

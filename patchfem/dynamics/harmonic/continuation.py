@@ -210,7 +210,7 @@ def _find_tangent(system, x, p, last, size, width, forward) -> tuple:
 
 
 def _keeps_direction(new, x, p, t, size, width, step) -> bool:
-    """Return whether a step went where the tangent points, and not to another part of the curve."""
+    """Return whether a step follows the tangent, instead of jumping to another part of the curve."""
     move = np.append((new[0] - x) / size, (new[1] - p) / width)
     return float(move @ t) > 0.7 * float(np.linalg.norm(move))  # within 45 degrees of the tangent
 

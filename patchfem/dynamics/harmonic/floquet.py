@@ -1,4 +1,4 @@
-"""Floquet multipliers of a steady motion: what one cycle makes of a small disturbance.
+"""Floquet multipliers of a steady motion: growth of small disturbances over a cycle.
 
 The state is the motion of the modes and what the contacts remember. A law without memory gives a
 slope over the slide and over its rate. Elastic-plastic elements remember, for each turning point,

@@ -1,4 +1,6 @@
-"""Steady motion under a sine by harmonic balance: the linear part exact, only the interface rows unknown.
+"""Harmonic balance under a sine, with the interface rows as unknowns.
+
+The linear part is exact.
 
 With theta = omega t every quantity is x(theta) = Re sum_k X_k exp(i k theta), k = 0..H, and the modes are condensed to
 the rows that touch: q_k = q_k(drive) - G_k F_k, G_k = faces (Omega^2 - k^2 omega^2 + i k omega D)^-1 faces^T/m. The

@@ -283,7 +283,7 @@ class Flow(Law):
         n = track.samples
         own = np.ones(track.samples + len(cells), bool)
         own[cells + 1 + np.arange(len(cells))] = False
-        angle, q, speed = np.zeros((3, own.size))  # the slide rests at a turn
+        angle, q, speed = np.zeros((3, own.size))  # the velocity is 0 at a turning point
         angle[own] = np.arange(n) * (2 * np.pi / n)
         q[own] = track.q
         speed[own] = track.omega * track.rate
@@ -316,7 +316,8 @@ class Flow(Law):
                 stretch=stretch,
                 tangent=lambda: self._tangent(track, one),
             )
-        # at the end of a step dz/dq is its slope over the slide; at its start, over what it keeps of z, besides
+        # dz/dq at the end of a step is the slope of z over the slide; at its start this slope is also divided by the
+        # fraction of z that the step keeps
         before = np.roll(one.steps[1], 1)
         after = one.steps[1] / np.maximum(one.steps[0], 1e-300)
         hold = one.kept_from(np.flatnonzero(~own)) * (before - after)[~own, None]
@@ -365,7 +366,7 @@ class Nodes(NamedTuple):
     slopes: np.ndarray
 
     def kept_from(self, places) -> np.ndarray:
-        """Return what remains at every node of a disturbance of z at nodes `places`, (r, M).
+        """Return the remainder (r, M) at every node of a disturbance of z at the nodes `places`.
 
         It is 0 for a law that forgets nothing.
         """
@@ -379,7 +380,7 @@ class Nodes(NamedTuple):
         return np.exp(since) / forgets if forgets > 1e-12 else np.zeros_like(since)
 
     def by_cell(self) -> tuple:
-        """Return what every cell keeps of the stretch, and its slope over the slide, (N,)."""
+        """Return the fraction of the stretch kept by every cell, and its slope over the slide (N,)."""
         kept, by_slide, _ = self.steps
         first = np.flatnonzero(self.own)
         turns = ~self.own

@@ -15,7 +15,7 @@ from ..march.march import ends_of, mark_of
 FIRST_CYCLES = 6
 # cycles after an extrapolation in which the memory of the contact follows
 MEMORY_CYCLES = 2
-# cycles that are marched at most
+# largest number of cycles that are marched
 MAX_CYCLES = 600
 # change of the state after an extrapolation over that before; if it is larger, the next one waits twice as long
 MIN_GAIN = 0.1
@@ -23,7 +23,7 @@ MIN_GAIN = 0.1
 PERIODIC_TOL = 1e-8
 # motion over that of a free mass under the drive, below which nothing moves
 REST_RATIO = 1e-9
-# disturbance over the largest state, by which multipliers are measured
+# disturbance over the largest state, from which multipliers are estimated
 DISTURBANCE = 1e-6
 # cycles in which the contact takes up a disturbance
 SETTLING_CYCLES = 2
@@ -158,7 +158,7 @@ def _size(state) -> float:
 
 
 def _extrapolate(kept):
-    """Return the limit of successive states (k, 2 n), None where nothing is gained.
+    """Return the limit of successive states (k, 2 n), None where extrapolation does not help.
 
     It is the mean with the weights that make its change smallest.
     """

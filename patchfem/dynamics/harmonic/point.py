@@ -95,7 +95,7 @@ class Periodic:
         for at in (
             np.argmin(places),
             np.argmax(places),
-        ):  # the cycle begins there: its first sample is the turn
+        ):  # the cycle begins at the reversal, so its first sample is the reversal
             track = Track(
                 self.coefficients[0] * np.exp(1j * k * angles[at]), self.omega, self.samples
             )
@@ -111,9 +111,9 @@ class Periodic:
 
 
 def friction_force(laws: tuple, sampled: list) -> np.ndarray:
-    """Return the force (N,) [N] of the laws of a row at its samples, without that of an interlock beside friction.
+    """Return the force (N,) [N] of the laws of a row at its samples, without an interlock.
 
-    The interlock of [structure.bonded] is a spring beside the contact, so its force is no friction force.
+    The interlock of [structure.bonded] is a spring parallel to the contact, so its force is not friction.
     """
     friction = [one.force for law, one in zip(laws, sampled) if not isinstance(law, Interlock)]
     return sum(friction or [one.force for one in sampled])
@@ -140,7 +140,7 @@ def find_peak(y) -> float:
 
 
 def group_of(modes, group) -> Group:
-    """Return a Group of laws given as such, as a law, a model, or (row, law) pairs."""
+    """Return a Group from a Group, a law, a model or (row, law) pairs."""
     return group if isinstance(group, Group) else Group(modes, group)
 
 
@@ -462,7 +462,7 @@ def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> Pe
     level = drive.acceleration
     top = h * wider
     solve = solve_linear(here.jacobian)
-    probe = max(top, 2 * h)  # harmonics that tell what is left out
+    probe = max(top, 2 * h)  # additional harmonics that estimate the truncation error
     q = np.zeros((len(balance.rows), probe + 1), complex)
     if known is not None:
         q[:, : known.shape[1]] = known[:, : probe + 1]

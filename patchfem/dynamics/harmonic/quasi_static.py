@@ -19,7 +19,7 @@ from ...friction.laws.elastic_plastic import masing_loop
 from .forces import Group
 from .laws import Jenkins, Track
 
-# step over a slide, by which the slope of a tip is taken
+# step over a slide, for the finite difference of the force at the tip of a loop
 SLOPE_STEP = 1e-6
 # ratio of two rates of a cycle, by which a law is tested for a dependence on time
 RATE_RATIO = 2.0
@@ -178,7 +178,7 @@ def static_motions_from_loops(modes: ModalBasis, row, held: tuple, slides, found
 
 
 def _solve_equilibrium(modes, group, held: tuple, share: float, near, samples: int) -> np.ndarray:
-    """Return z/share and alpha/(omega^2 share) of the equilibrium at a share [m].
+    """Return z/share and alpha/(omega^2 share) at the equilibrium with amplitude `share` [m].
 
     held: frequency, shape and `of`.
     """

@@ -64,7 +64,7 @@ def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
 
 
 def _average_cells(values, share) -> np.ndarray:
-    """Return means per cell (..., N); share: weight of the value at its end."""
+    """Return means per cell (..., N); share: weight of the value at the end of a cell."""
     return (1 - share) * values + share * np.roll(values, -1, axis=-1)
 
 
@@ -92,14 +92,14 @@ def _weigh_samples(track, found):
 
 
 def _set_turning_cells(track, share):
-    """Return the weights (N,) with those of the cells of the turning points set by their places."""
+    """Return the weights (N,) with those of the cells of the turning points set from their positions."""
     cells = track.turning[2]
     share[cells] = 1 - _place_in_cell(track)
     return share
 
 
 def _place_in_cell(track) -> np.ndarray:
-    """Return the place [0, 1] of every turning point in its cell."""
+    """Return the position [0, 1] of every turning point in its cell."""
     return track.turning[0] * (track.samples / (2 * np.pi)) - track.turning[2]
 
 

@@ -37,7 +37,7 @@ class Sheared(NamedTuple):
     - y: (2, 1 + r) solution (dq, db) of the step, and of the pieces that spring back
     - last: (2, 1 + r) those of the two steps before
     - scale, workspace: (1 + r,), (3, 1 + r)
-    - hess, ready: (2, 1 + r, 1 + r), and (2,) 1 where it is a factor
+    - hess, ready: (2, 1 + r, 1 + r), and (2,): 1 where `hess` holds the factorised Hessian
     """
 
     weight: np.ndarray
@@ -227,7 +227,7 @@ class Stops(NamedTuple):
 
 
 class Faces(NamedTuple):
-    """Elements (e,) on ports (p,) beside a contact on port 0 or in its place.
+    """Elements (e,) on ports (p,), in addition to a contact on port 0 or in its place.
 
     Rows are named in `march.stops_kernels`.
 
@@ -317,7 +317,7 @@ def memory_rows(element, memory) -> list:
 
 
 def copied(parts):
-    """Return a copy of a tuple of arrays, or of such tuples."""
+    """Return a copy of a nested tuple of arrays."""
     return type(parts)(
         *(copied(part) if isinstance(part, tuple) else part.copy() for part in parts)
     )

@@ -35,7 +35,8 @@ def solve_element(free, beta, numbers, memory, q, eps, dt, guess, bound, goal):
     closed = law.solve_step(numbers, memory, free, beta)
     if closed.is_solved:
         return closed.increment, closed.mean_force, 1
-    reach = 1.001 * beta * bound  # a contact that slides all the way lies inside, not on the edge
+    # the margin keeps a contact in full slip inside the bracket, not on its edge
+    reach = 1.001 * beta * bound
     low = free - reach
     high = free + reach
     dq = min(max(guess, low), high)
@@ -46,9 +47,10 @@ def solve_element(free, beta, numbers, memory, q, eps, dt, guess, bound, goal):
         digit = 4e-16 * (abs(free) + abs(dq) + beta * abs(force))
         if abs(miss) <= goal * beta + digit:
             return dq, force, count
-        gain = max(1 + beta * slope, 0.1)  # a falling law must not turn the step around
+        # a force that decreases with the slide must not reverse the step
+        gain = max(1 + beta * slope, 0.1)
         low, high, dq = narrowed(low, high, dq, miss, gain, count - 40)
-        # the force jumps there where the last digit of the slide does not explain the miss
+        # the force jumps at this slide if round-off of the slide does not explain the residual
         if high - low <= digit:
             return dq, force, count if abs(miss) <= goal * beta + 8 * gain * digit else -count
     return dq, force, -200

@@ -12,9 +12,10 @@ from ...friction.bonds.list_rows_kernels import LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..modal_kernels import narrowed
 
-# increment over the bond length, below which its slope is the mean of those in both directions
+# increment over the bond length, below which the slope of the force is the mean of the slopes in both directions
 SLOPE_STEP = 1e-9
-# energy over that of a bond length at the friction limit, which a list of stretched bonds may owe
+# largest energy that a list may gain in short steps and repay by its next dissipation (see `commit`), over the
+# energy of one bond length at the friction limit
 MAX_OWED = 1e-4
 
 
@@ -110,7 +111,7 @@ def commit(dq, force, q, v0, v1, dt, c):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def book_energy(work, before, limit, c):
-    """Add the work [J] of a step that is not stored to the energies of the list c; returns it.
+    """Add the work [J] of a step that is not stored to the energies of the list; return it.
 
     Parameters
     ----------

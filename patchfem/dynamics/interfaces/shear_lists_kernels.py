@@ -15,11 +15,11 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .list_kernels import find_mean_and_slope
 from .shear_points_kernels import FORCE, LOAD, SLIDE, SLOPE
 
-# residual over the goal that is accepted where it decreases no further: sums over bonds jump by up to 1e-8
+# residual over the goal that is accepted where it does not decrease further, because sums over bonds jump by up to 1e-8
 GOAL_SLACK = 1e4
 # whether a force may decrease as its point slides on
 FORCE_MAY_FALL = True
-# damping of the change of a step over the stiffness of the modes, which forces that jump need
+# damping of a Newton step over the stiffness of the modes, needed because the forces jump
 STEP_DAMPING = 1 / 16
 # rows of `points`: speed at which bonds grow in the step, mean speed of the last step, slide and force of the last trial
 GROWTH_SPEED = 0
@@ -58,7 +58,7 @@ def store_list(j, c):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def interpolate_pressure(x, pattern):
-    """Return the relative pressure of the lower piece at x [m], 0 beyond its places."""
+    """Return the relative pressure of the lower piece at x [m], 0 outside its nodes."""
     last = pattern.shape[1] - 1
     if x < pattern[0, 0] or x > pattern[0, last]:
         return 0.0
@@ -111,9 +111,12 @@ def start_step(dt, c):
 
 @njit(
     error_model="numpy", forceinline=False, **NJIT_NO_REFCOUNT
-)  # else that of its caller goes on to all that it calls
+)  # without this option the caller's forced inlining would extend to all functions called here
 def write_forces(kind, ending, c):
-    """Write path-mean force [N] and slope [N/m] of every point at its slide; returns the friction force [N]."""
+    """Write path-mean force [N] and slope [N/m] of every point at its slide.
+
+    Returns the friction force [N].
+    """
     points = c.points
     dt = c.time[0]
     force = 0.0
@@ -127,7 +130,7 @@ def write_forces(kind, ending, c):
             continue
         load_list(j, c)
         f, s = find_mean_and_slope(xi, c, points[GROWTH_SPEED, j], dt)
-        # many bonds at one place: a mean that ends among them is steeper than s tells
+        # where many bonds have the same stretch, the mean force is steeper than its slope s, so the secant is used
         if xi != points[TRIAL_SLIDE, j]:
             steep = (f - points[TRIAL_FORCE, j]) / (xi - points[TRIAL_SLIDE, j])
             s = steep if steep > s else s

@@ -36,7 +36,7 @@ LAST_STEP_RATIO = 4e-6
 GOAL_SLACK = law.GOAL_SLACK
 FORCE_MAY_FALL = law.FORCE_MAY_FALL
 STEP_DAMPING = law.STEP_DAMPING
-# iterations; points that move to and fro about one place take up to 100
+# largest number of iterations; points that oscillate about one position take up to 100
 MAX_ITERATIONS = 1000 if FORCE_MAY_FALL else 200
 
 
@@ -121,7 +121,7 @@ def write_gradient(y, free, beta, kind, ending, c, out):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def write_hessian(beta, ending, c, hess):
-    """Write the lower half of the Hessian (1 + r, 1 + r) by the slopes of the points.
+    """Write the lower triangle of the Hessian (1 + r, 1 + r) from the slopes of the points.
 
     It overwrites their forces.
     """
@@ -233,7 +233,7 @@ def minimise(free, beta, kind, ending, c, goal):
         p[i] = 0.0
     for count in range(
         MAX_ITERATIONS
-    ):  # the first is the guess: one place of the gradient in the code, of two that run it
+    ):  # the first pass evaluates the guess, so that the code contains the gradient once
         if count > 0:
             if c.ready[which] == 0.0:
                 write_hessian(beta, ending, c, hess)

@@ -18,9 +18,9 @@ from ...friction.protocol_kernels import step_bond_length as step_bond_length
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_force(numbers, memory, q, dq, eps, dt):
-    """Path-mean force [N] of the springs from the slide q [m] over dq [m], and its slope over dq [N/m].
+    """Return the path-mean force [N] of the springs over dq [m], and its slope over dq [N/m].
 
-    (V(q + dq) - V(q))/dq, written without a difference of large numbers; memory, eps and dt are not used.
+    It is (V(q + dq) - V(q))/dq, written without cancellation; memory, eps and dt are not used.
     """
     b = q + dq
     cubic = 0.25 * numbers[1]
@@ -32,7 +32,8 @@ def mean_force(numbers, memory, q, dq, eps, dt):
     turn = 2 * pi / numbers[3]
     half = 0.5 * turn * dq
     centre = turn * (q + 0.5 * dq)
-    if abs(half) < 1e-4:  # the series is off by 1e-4^4/120 there, the quotients lose digits
+    # the error of the series is 1e-4^4/120 here, and the quotients would lose digits
+    if abs(half) < 1e-4:
         ratio = 1 - half * half / 6
         bend = -half / 3
     else:
@@ -44,7 +45,7 @@ def mean_force(numbers, memory, q, dq, eps, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_memory(numbers, memory, dq, force, v0, v1, dt, eps):
-    """Energy dissipated: 0 J, as springs give all of it back."""
+    """Return the dissipated energy, which is 0 J for springs."""
     return 0.0
 
 

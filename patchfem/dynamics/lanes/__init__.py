@@ -1,4 +1,4 @@
-"""Many cases of one mode, one interface and a sinusoidal drive, integrated side by side in the lanes of the processor.
+"""Many cases of one mode, one interface and a sine drive, integrated in vector lanes.
 
 Equation. With the angle of the drive as time, x the slide and f the friction over the mass,
 

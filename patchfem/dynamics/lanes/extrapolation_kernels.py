@@ -1,4 +1,4 @@
-"""Extrapolation of a motion that settles: the cycles up to the steady state are computed without marching them.
+"""Extrapolation of the transient: cycles up to the steady state are computed, not marched.
 
 Near a periodic motion the state at the ends of the cycles follows a linear map of two dimensions. By the theorem of Cayley
 and Hamilton the changes d_k of any number from one cycle to the next then follow
@@ -73,7 +73,7 @@ class Changes(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def last_changes(row, place, workspace, lane):
-    """Return the `Changes` of a row of the workspace that has this place in a cycle end."""
+    """Return the last `Changes` of a row of the workspace; place: its index in a cycle end."""
     last = workspace[(CYCLE_ENDS + place) * LANES + lane]
     second = workspace[(CYCLE_ENDS + CYCLE_END_SIZE + place) * LANES + lane]
     third = workspace[(CYCLE_ENDS + 2 * CYCLE_END_SIZE + place) * LANES + lane]
@@ -82,7 +82,7 @@ def last_changes(row, place, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def push_cycle_end(lane, workspace):
-    """Push the end of a cycle onto those of the cycles before."""
+    """Store the present cycle end in front of those of the cycles before."""
     for k in range(N_CYCLE_ENDS - 1, 0, -1):
         for n in range(LAW_PLACE + law.N_KEPT):
             workspace[(CYCLE_ENDS + k * CYCLE_END_SIZE + n) * LANES + lane] = workspace[
@@ -102,7 +102,7 @@ def push_cycle_end(lane, workspace):
 
 @njit(**NJIT_INLINE)
 def has_cut_extremes(lane, workspace, lowest, highest):
-    """Return whether an extreme of the last cycle is at its start or end and not at a reversal of the slide."""
+    """Return whether an extreme of the last cycle is at its start or end instead of a reversal."""
     x = workspace[SLIDE * LANES + lane]
     start = workspace[CYCLE_ENDS * LANES + lane]
     start_speed = workspace[(CYCLE_ENDS + 1) * LANES + lane]
@@ -246,7 +246,7 @@ def extrapolate_cycles(lane, workspace, history, n_done, until):
 
 @njit(**NJIT_INLINE)
 def predict_next_end(lane, workspace, change, next_change):
-    """Move the state by a change and write the end of the cycle after it in place of the latest cycle end.
+    """Move the state by a change, and replace the latest cycle end by the predicted next one.
 
     Parameters
     ----------
@@ -270,7 +270,7 @@ def predict_next_end(lane, workspace, change, next_change):
 
 @njit(**NJIT_INLINE)
 def confirms_extrapolation(lane, workspace):
-    """Return whether the cycle after an extrapolation ends where the map predicts."""
+    """Return whether the cycle after an extrapolation ends as the map predicts."""
     size = workspace[MAX_SLIDE * LANES + lane] - workspace[MIN_SLIDE * LANES + lane]
     confirms = True
     for m in range(len(STATE_ROWS) - 1):

@@ -84,7 +84,8 @@ N_LAW_STATE = 4
 N_KEPT = 2  # the friction and the mean square of the stretches follow the map of a cycle
 
 MAX_PARTS = 4  # a step has at most a reversal, and a kink on either side of it
-N_CORRECTIONS = 2  # Newton steps for the place of an event, which a cubic across a kink misses by the second order
+# Newton steps for the time of an event, because a cubic across a kink has an error of second order
+N_CORRECTIONS = 2
 MAX_LAYER_PARTS = 64  # number of parts of a step through a layer
 LAYER_EDGE = 5.0  # speed over that of the layer beyond which the force is taken as constant
 LAYER_STEP = (
@@ -128,7 +129,10 @@ class LayerPart(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def law_numbers(workspace, lane):
-    """Return the numbers of the law (7,), as its `rate_equation` takes them; the first is not used."""
+    """Return the numbers of the law (7,), as its `rate_equation` takes them.
+
+    The first number is not used.
+    """
     first = LAW_NUMBERS
     return (
         0.0,
@@ -203,19 +207,24 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def irreversible_slide(x, memory, workspace, lane):
-    """Return the irreversible part of a slide [m]; arguments as of `rigid_kernels.irreversible_slide`."""
+    """Return the irreversible part of a slide [m].
+
+    The arguments are those of `rigid_kernels.irreversible_slide`.
+    """
     return x - memory
 
 
 @njit(**NJIT_INLINE)
 def slip_increment(memory, event_memory, memory1, workspace, lane):
-    """Return the friction work of the last step over the mass [m^2], in place of a path of slip."""
+    """Return the friction work of the last step over the mass [m^2], which replaces the slip path."""
     return workspace[STEP_WORK * LANES + lane]
 
 
 @njit(**NJIT_INLINE)
 def stretch_after(numbers, stretch, slide, rise, slip_sign):
-    """Return the stretch after a slide that raises it by `rise`; a rate-independent law is integrated in closed form.
+    """Return the stretch after a slide that raises it by `rise`.
+
+    A rate-independent law is integrated in closed form.
 
     Parameters
     ----------
@@ -811,7 +820,10 @@ def stretch_at(start, end, numbers, angle, u):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sticks_at(start, end, numbers, angle, u):
-    """Return whether the interface sticks inside a segment of a step; arguments as of `stretch_at`."""
+    """Return whether the interface sticks inside a segment of a step.
+
+    The arguments are those of `stretch_at`.
+    """
     speed = hermite_cubic(
         start.state.speed, end.state.speed, angle * start.acceleration, angle * end.acceleration, u
     )
@@ -847,7 +859,10 @@ def find_stick_change(start, end, numbers, angle, low, high):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_zero_stretch(start, end, numbers, angle):
-    """Find by bisection where the stretch changes its sign in a segment of a step; arguments as of `stretch_at`."""
+    """Find by bisection where the stretch changes its sign in a segment of a step.
+
+    The arguments are those of `stretch_at`.
+    """
     low = 0.0
     high = 1.0
     for _ in range(N_HALVINGS):

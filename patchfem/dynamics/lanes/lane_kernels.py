@@ -1,4 +1,4 @@
-"""Motion of one lane: a step with or without an event, the change of cycles, and the exchange of cases.
+"""Motion of one lane: steps with or without events, ends of cycles, and exchange of cases.
 
 `law` is the module of the friction law; `rigid_kernels` lists the functions that it must have. A step is tried for all
 lanes as if no event lay inside it (`try_lane_step`), which a compiler does for several lanes at once. The few lanes that
@@ -136,7 +136,10 @@ def accept_step(workspace, lane, before, s1, c1, tried, extreme):
 
 @njit(**NJIT_INLINE)
 def try_lane_step(workspace, lane, s0, c0, s1, c1, angle):
-    """Move a lane over a step without an event; a lane that has one stays where it is and is marked."""
+    """Move a lane over a step without an event.
+
+    A lane with an event stays where it is and is marked.
+    """
     before = lane_state(workspace, lane)
     tried = law.try_step(workspace, lane, s0, c0, s1, c1, False)
     extreme = tried.slide
@@ -147,7 +150,10 @@ def try_lane_step(workspace, lane, s0, c0, s1, c1, angle):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def collect_marked_lanes(workspace, marked, n_busy):
-    """Write the numbers of the marked lanes among the first `n_busy` into marked (LANES + 1,); return how many."""
+    """Write the numbers of the marked lanes among the first `n_busy` into marked (LANES + 1,).
+
+    Returns the number of these lanes.
+    """
     count = 0
     for lane in range(n_busy):
         marked[count] = lane

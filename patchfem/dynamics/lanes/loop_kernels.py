@@ -1,4 +1,4 @@
-"""The march of many cases side by side: every step is taken by all lanes before the next one.
+"""March of many cases in lanes: all lanes take a step before the next one begins.
 
 `march` takes the cases to their steady state or to a given cycle, `observe` takes them over their last cycles and reads
 these. The law is a part of the text: `run.kernels` makes an instance of it per law. A step of a case costs 2 to 5 ns on a
@@ -34,7 +34,10 @@ from .rows_kernels import (
 
 @njit(**NJIT_INLINE)
 def march_cycle(workspace, marked, table, n_busy):
-    """March the first lanes, `n_busy` of them, over a cycle of the drive; arguments as of `march`."""
+    """March the first lanes, `n_busy` of them, over a cycle of the drive.
+
+    The arguments are those of `march`.
+    """
     angle = table[2, 0]
     width = (n_busy + (1 << GROUP_BITS) - 1) >> GROUP_BITS << GROUP_BITS
     for k in range(table.shape[1] - 1):

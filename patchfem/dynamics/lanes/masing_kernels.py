@@ -1,4 +1,6 @@
-"""A step behind sliders side by side, of one case: of the fourth order between reversals of the slide and closings of loops.
+"""Step of one case behind parallel sliders (Masing's rule).
+
+It has order 4 between reversals of the slide and closings of loops.
 
 The equation in the angle of the drive is x'' + D x' + W x = P sin - f. With the slide x_t and the friction f_t of the last
 reversal, and the direction s = +-1 since then, Masing's rule is
@@ -103,7 +105,8 @@ MAX_DROPPED_GAP = (
     LAW_STATE + 17
 )  # largest gap, over its size, of a loop that was dropped from a full stack
 N_REVERSALS = LAW_STATE + 18  # number of reversals on the stack
-STICK_FRACTION = LAW_STATE + 19  # fraction of the step before its event without a slip
+# fraction of the segment before the event in which the interface sticks
+STICK_FRACTION = LAW_STATE + 19
 INVERSE_LENGTH = LAW_STATE + 20  # DIRECTION over m YIELD_LENGTH
 FORCE_RATIO = LAW_STATE + 21  # SPRING YIELD_LENGTH over KINETIC
 REVERSALS = (
@@ -115,7 +118,7 @@ N_KEPT = MAX_KEPT
 FORM_ROWS = (DIRECTION, BRANCH_SCALE, KEEPS_FIRST_LOADING, ALL_SLIP, N_REVERSALS)
 N_LAW_STATE = CURVE_STATE - LAW_STATE + curve.N_CURVE_STATE
 
-MIN_PLACE = 1e-30  # smallest place on the curve, whose logarithm a power needs
+MIN_PLACE = 1e-30  # smallest abscissa on the curve, because a power needs its logarithm
 EVENT_TOL = 1e-9  # last Newton step, as a fraction of a step; the error left is its square
 N_NEWTON = 6
 MAX_EVENTS = 32  # number of events in a step
@@ -183,7 +186,7 @@ def place_on_curve(x, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def clamped_place(x, workspace, lane):
-    """Return the place of a slide on the curve, between MIN_PLACE and the slip of all sliders.
+    """Return the abscissa of a slide on the curve, limited to [MIN_PLACE, slip of all sliders].
 
     A branch whose sliders do not all slip yet goes on to 2, so that a step beyond 1 finds where its event is.
     """
@@ -315,7 +318,9 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def stick_fractions(start, end, workspace, lane, angle):
-    """Return the `StickReading` of a segment of a step; it sticks while less than half of the friction slips.
+    """Return the `StickReading` of a segment of a step.
+
+    The interface sticks while less than half of the friction slips.
 
     Parameters
     ----------
@@ -337,7 +342,10 @@ def stick_fractions(start, end, workspace, lane, angle):
 
 @njit(**NJIT_INLINE)
 def slip_increment(memory, event_memory, memory1, workspace, lane):
-    """Return the path of slip of the last step [m]; arguments as of `rigid_kernels.slip_increment`."""
+    """Return the path of slip of the last step [m].
+
+    The arguments are those of `rigid_kernels.slip_increment`.
+    """
     return workspace[STEP_SLIP * LANES + lane]
 
 
@@ -365,7 +373,10 @@ def branch_state(workspace, lane):
 
 @njit(**NJIT_INLINE)
 def prepare_step(workspace, s0, c0):
-    """Look up the curves of all lanes at the slides that a Taylor series predicts for the end of the next step."""
+    """Look up the curves of all lanes at the predicted slides at the end of the next step.
+
+    A Taylor series predicts the slides.
+    """
     if curve.LOOKS_AHEAD:
         for lane in range(LANES):
             t = workspace[STEP * LANES + lane]
@@ -543,7 +554,10 @@ def restore_reversal(k, workspace, lane):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def drop_smallest_loop(workspace, lane):
-    """Drop the loop from a full stack whose closing changes the least: the one beside a loop of nearly its size."""
+    """Drop the loop from a full stack whose loss changes the motion least.
+
+    It is the loop that is nearest in size to the next one.
+    """
     best = 1
     smallest_gap = BEYOND_ALL
     for k in range(1, MAX_REVERSALS - 2):

@@ -1,4 +1,4 @@
-"""Readings of the last cycles: peaks, loop, sticks and phasors, folded while the lanes march.
+"""Readings of the last cycles, accumulated in the march: peaks, loop, sticks and phasors.
 
 Between two instants that the march knows, the acceleration and the friction are cubics through their values and rates, so
 a peak between steps is found too. A step with an event is read in two segments, before and after the event.
@@ -76,7 +76,7 @@ class Instant(NamedTuple):
 
 
 class Peaks(NamedTuple):
-    """Largest absolute acceleration of the output [m s-2] and largest absolute friction [m] of a segment."""
+    """Largest absolute output acceleration [m s-2] and absolute friction [m] in a segment."""
 
     acceleration: float
     friction: float
@@ -169,7 +169,9 @@ def friction_rate_at(workspace, lane, instant, when):
 
 @njit(**NJIT_INLINE)
 def observe_step(workspace, lane, s0, c0, s1, c1, angle):
-    """Move a lane over a step without an event and add its readings; a lane that has an event is marked and stays.
+    """Move a lane over a step without an event and add its readings.
+
+    A lane that has an event is marked and stays.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The force of a first loading of Segalman's Iwan law, in closed form.
+"""Force of Segalman's Iwan law in its first loading, in closed form.
 
 With the force over the stiffness and YIELD_LENGTH, the slide over YIELD_LENGTH w, and the numbers chi and q of the law,
 

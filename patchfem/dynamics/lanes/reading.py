@@ -1,4 +1,4 @@
-"""Energies and readings of a march in lanes, in the form in which `dynamics.events` gives those of its runs.
+"""Energies and readings of a march in lanes, in the form of those of `dynamics.events`.
 
 Sums of a march are those of the trapezoidal rule; the formula of Euler and Maclaurin corrects them at their ends.
 """

@@ -1,4 +1,6 @@
-"""A step under Coulomb friction, of one case: exact between stops and releases, each of which is found inside its step.
+"""Step of one case under Coulomb friction, exact between stops and releases.
+
+Stops and releases are located inside their steps.
 
 The equation in the angle of the drive is x'' + D x' + W x = P sin - f. The friction f is +-KINETIC in a slip and at most
 STATIC in a stick. A reference is the engine `dynamics.events`.
@@ -201,7 +203,9 @@ def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
-    """Return the rate of the friction; 0 for a rigid contact, whose output does not move in a stick.
+    """Return the rate of the friction.
+
+    The result is 0 for a rigid contact, whose output does not move in a stick.
 
     Parameters
     ----------
@@ -234,7 +238,9 @@ def records_own_peaks():
 
 @njit(**NJIT_INLINE)
 def slide_at_reversal(x, v, x1, v1, angle):
-    """Return the slide at a reversal in a step without an event; there is none, so it is that of the end.
+    """Return the slide at a reversal in a step without an event.
+
+    Such a step has no reversal, so the result is the slide at its end.
 
     Parameters
     ----------
@@ -468,7 +474,10 @@ def resolve_step(workspace, lane, s0, c0, s1, c1, angle):
 
 @njit(**NJIT_INLINE)
 def release(workspace, lane, s0, c0, s1, c1, angle):
-    """Compute a step from a stick, in which the interface may start to slip; arguments as of `resolve_step`."""
+    """Compute a step from a stick, in which the interface may start to slip.
+
+    The arguments are those of `resolve_step`.
+    """
     x = workspace[SLIDE * LANES + lane]
     stiffness = workspace[STIFFNESS * LANES + lane]
     drive = workspace[DRIVE * LANES + lane]
@@ -495,7 +504,10 @@ def release(workspace, lane, s0, c0, s1, c1, angle):
 
 @njit(**NJIT_INLINE)
 def stop(workspace, lane, s0, c0, s1, c1, angle):
-    """Compute a step from a slip, which may stop and then stick or slip back; arguments as of `resolve_step`."""
+    """Compute a step from a slip, which may stop and then stick or slip back.
+
+    The arguments are those of `resolve_step`.
+    """
     x = workspace[SLIDE * LANES + lane]
     v = workspace[SPEED * LANES + lane]
     sign = workspace[SLIP_SIGN * LANES + lane]

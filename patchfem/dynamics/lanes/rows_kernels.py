@@ -132,10 +132,10 @@ SUM_ROWS = (SLIP_PATH, WORK_SUM, LOSS_SUM, POWER_SUM)
 MAX_KEPT = 38  # largest number of numbers of the state of a law in a cycle end
 CYCLE_END_SIZE = len(STATE_ROWS) + len(SUM_ROWS) + MAX_KEPT
 
-# The rows from here on are the state that a law has besides MEMORY. In a motion it follows the first N_STATE numbers.
+# The rows from here on are the state of a law in addition to MEMORY. In a motion it follows the first N_STATE numbers.
 LAW_STATE = CYCLE_ENDS + N_CYCLE_ENDS * CYCLE_END_SIZE
 # Masing's rule: HALF_SLIP is the slide over YIELD_LENGTH from which half of the friction slips; from CURVE_STATE on a
-# table has its own rows, of which the first is the place on the curve that is looked for.
+# table has its own rows, of which the first is the abscissa on the curve that is looked up.
 HALF_SLIP = LAW_NUMBERS + 2
 CURVE_STATE = LAW_STATE + 276
 CURVE_PLACE = CURVE_STATE

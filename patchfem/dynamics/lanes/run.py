@@ -11,7 +11,7 @@ from . import rows_kernels as rows
 HERE = "dynamics.lanes"
 MASING = ("masing", "table")  # laws of Masing's rule, named by the curve of their first loading
 N_TERMS = 24  # terms of a Taylor series over a step; the rest is below round-off for rates up to 2 per step
-NO_YIELD = 1e300  # place of the entries of a table after its last yield
+NO_YIELD = 1e300  # yield slide of the unused entries of a table after its last yield
 MAX_SLIDE = 1e100  # a larger slide [m] is that of a march that ran away with too long steps; its energies overflow
 N_PERIODIC = 3  # number of cycles that are read of a motion that repeats
 
@@ -70,7 +70,10 @@ class Marched(NamedTuple):
 
 
 def has_one_stretch(law: str) -> bool:
-    """Return whether a law is one of one stretch, which is named as its kernels: "friction.laws.tanh_kernels"."""
+    """Return whether the memory of a law is one stretch.
+
+    The law is then named by the module of its kernels, such as "friction.laws.tanh_kernels".
+    """
     return "." in law
 
 
@@ -91,7 +94,10 @@ def load_loop(law: str):
 
 
 def law_kernels(law: str):
-    """Return the kernels that name the rows of the state of a law; None if a law has no state of its own."""
+    """Return the kernels that name the rows of the state of a law.
+
+    The result is None if a law has no state of its own.
+    """
     if law in ("rigid", "yielding"):
         return None
     if law == "table":
@@ -235,7 +241,10 @@ def case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
 
 
 def step_coefficients(cases: Cases, spring, angle: float) -> np.ndarray:
-    """Return the coefficients (n, 10) of an exact step with a spring beside the mode; see `rows_kernels`."""
+    """Return the coefficients (n, 10) of an exact step with a spring parallel to the mode.
+
+    `rows_kernels` names the columns.
+    """
     quarters = np.arange(N_TERMS) * np.pi / 2
     sines = np.round(np.sin(quarters)).tolist()
     cosines = np.round(np.cos(quarters)).tolist()
@@ -302,7 +311,9 @@ def law_state(law: str, motion, name: str) -> np.ndarray:
 
 
 def continue_march(law: str, cases: Cases, motion, cycles: int, steps: int) -> tuple:
-    """March cases over more cycles, or until they repeat; the last cycle then stands for those that follow.
+    """March cases over more cycles, or until they repeat.
+
+    The last cycle then stands for those that follow.
 
     Parameters
     ----------
@@ -370,7 +381,7 @@ def output_accelerations(law: str, cases: Cases, motion, cycles: int, steps: int
 
 
 def make_workspace(numbers, motion) -> tuple:
-    """Return the workspace of the lanes for cases with such numbers and motions, and numbers of lanes."""
+    """Return the workspace of the lanes for cases, and an array for the numbers of lanes."""
     n_law_state = motion.shape[1] - rows.N_STATE
     table_size = numbers.shape[1] - rows.N_NUMBERS
     n_rows = rows.LAW_STATE + n_law_state + table_size

@@ -1,4 +1,4 @@
-"""The force of a first loading of parallel Jenkins elements, which is straight between their yields.
+"""Force of parallel Jenkins elements in their first loading, linear between yields.
 
 With the force over the stiffness and YIELD_LENGTH, and the slide over YIELD_LENGTH w,
 
@@ -37,7 +37,7 @@ PART_STARTS = N_COLUMNS * N_YIELDS
 FIRST_YIELD = PART_STARTS + N_PARTS
 PARTS_PER_SLIDE = PART_STARTS + N_PARTS + 1
 TABLE_SIZE = PART_STARTS + N_PARTS + 2
-TABLE_START = N_ROWS * LANES  # place of the first table in the workspace
+TABLE_START = N_ROWS * LANES  # index of the first table in the workspace
 N_CURVE_STATE = N_ROWS - CURVE_STATE  # number of rows that the curve has in the state of the law
 MAX_STEP = (
     0.25  # longest step, over YIELD_LENGTH; Newton's method finds the end of a longer one badly
@@ -51,7 +51,7 @@ AT_START = 2
 
 @njit(**NJIT_INLINE)
 def walk_to(first_guess, w, workspace, lane):
-    """Walk from a yield to the last one up to w, and note its number."""
+    """Search up or down from a yield for the last one not beyond w, and store its index."""
     n = first_guess
     table = TABLE_START + TABLE_SIZE * lane
     while w >= workspace[table + N_COLUMNS * (n + 1)]:
@@ -63,7 +63,10 @@ def walk_to(first_guess, w, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def find_yield(w, workspace, lane):
-    """Return the place in the workspace of the last yield up to w: the last one found, or by the part that holds w."""
+    """Return the workspace index of the last yield not beyond w.
+
+    The yield found last is tried first, then the first yield of the interval of the table that contains w.
+    """
     k = int(workspace[YIELD_INDEX * LANES + lane])
     table = TABLE_START + TABLE_SIZE * lane
     if w < workspace[table + N_COLUMNS * k] or w >= workspace[table + N_COLUMNS * (k + 1)]:

@@ -1,4 +1,6 @@
-"""A step behind one elastic-plastic element, of one case: exact between yields and stops, each found inside its step.
+"""Step of one case behind an elastic-plastic element, exact between yields and stops.
+
+Yields and stops are located inside their steps.
 
 The equation in the angle of the drive is x'' + D x' + W x = P sin - f. In a stick f = SPRING (x - memory), in a slip
 f = +-KINETIC; a slip starts at |x - memory| = YIELD_LENGTH. A reference is the engine `dynamics.events`.
@@ -79,8 +81,9 @@ __all__ = [
 STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = False
 PROOF_TOL = 1e-7
-MIN_SLIP = 1e-3  # path of slip over YIELD_LENGTH of a cycle that determines the memory anew
-N_NEWTON = 4  # Newton steps for the place of an event, which is then exact to round-off
+# slip path of a cycle over YIELD_LENGTH, above which earlier cycles do not affect the memory
+MIN_SLIP = 1e-3
+N_NEWTON = 4  # Newton steps for the time of an event, which is then exact to round-off
 AFTER_EVENT = 2  # instant of a step as in `observation_kernels`
 TINY = 1e-300  # keeps a divisor above 0
 
@@ -143,7 +146,9 @@ def friction_force(x, v, slip_sign, memory, sine, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_rate(v, acceleration, slip_sign, memory, workspace, lane, when):
-    """Return the rate of the friction; 0 after an event, because a stick that starts there moves with its slip.
+    """Return the rate of the friction.
+
+    The result is 0 after an event, because a stick that starts there moves with its slip.
 
     Parameters
     ----------
@@ -251,7 +256,7 @@ def try_step(workspace, lane, s0, c0, s1, c1, is_observed):
 
 @njit(**NJIT_INLINE)
 def slip_correction(angle, damping, stiffness, event):
-    """Return the `Motion` that is to be added an angle after an event, where the spring changes its action.
+    """Return the `Motion` to add at an angle after an event that engages or releases the spring.
 
     It solves d'' + damping d' + stiffness d = factor (speed t + rate t^2/2 + second_rate t^3/6) from rest, with the fields
     of the `CurveEvent`, by its Taylor series.
@@ -278,7 +283,9 @@ def slip_correction(angle, damping, stiffness, event):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_reversal_in_slip(event, spring, angle):
-    """Find the angle from a yield to the reversal of the slip by Newton's method; at most `angle`.
+    """Find the angle from a yield to the reversal of the slip by Newton's method.
+
+    The result is at most `angle`.
 
     The speed of the stick goes on as a parabola, and the slip adds the force that the spring lacks.
     """
@@ -322,7 +329,7 @@ def continue_in_stick(start, damping, stiffness, force, angle):
 
 @njit(**NJIT_INLINE)
 def slide_on(curve, u):
-    """Return the slide at a place of a `SpeedCurve`."""
+    """Return the slide at a fraction of the step of a `SpeedCurve`."""
     return curve.x + curve.angle * u * (
         curve.v + u * (curve.m0 / 2 + u * (curve.c2 / 3 + u * curve.c3 / 4))
     )
@@ -330,13 +337,16 @@ def slide_on(curve, u):
 
 @njit(**NJIT_INLINE)
 def speed_on(curve, u):
-    """Return the speed at a place of a `SpeedCurve`."""
+    """Return the speed at a fraction of the step of a `SpeedCurve`."""
     return curve.v + u * (curve.m0 + u * (curve.c2 + u * curve.c3))
 
 
 @njit(**NJIT_INLINE)
 def event_on(curve, u, speed, factor):
-    """Return the `CurveEvent` at a place of a `SpeedCurve`, with a speed that is known better than the curve gives it."""
+    """Return the `CurveEvent` at a fraction of the step of a `SpeedCurve`, with a given speed.
+
+    The speed is known more accurately than from the curve.
+    """
     rate = (curve.m0 + u * (2 * curve.c2 + 3 * curve.c3 * u)) / curve.angle
     second_rate = (2 * curve.c2 + 6 * curve.c3 * u) / (curve.angle * curve.angle)
     return CurveEvent(u, speed, rate, second_rate, factor)
@@ -344,7 +354,7 @@ def event_on(curve, u, speed, factor):
 
 @njit(**NJIT_INLINE)
 def find_yield(curve, memory, side, length, top, highest):
-    """Find the place on a `SpeedCurve` where the spring reaches its yield length.
+    """Find the fraction of the step of a `SpeedCurve` at which the spring reaches its yield length.
 
     Parameters
     ----------
@@ -367,7 +377,7 @@ def find_yield(curve, memory, side, length, top, highest):
     reserve = side * (curve.x - memory) - length
     u = top * min(max(-reserve / (highest - length - reserve), 0.0), 1.0)
     if top < 1.0:
-        # Beside a reversal the slide is a parabola, from which its secant is far.
+        # Near a reversal the slide is a parabola, which a secant does not approximate.
         bend = abs(curve.m0 + top * (2 * curve.c2 + 3 * curve.c3 * top))
         bow = curve.angle * max(bend, TINY)
         u = max(top - sqrt(2 * (highest - length) / bow), 0.0)
@@ -462,7 +472,10 @@ def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
 
 @njit(**NJIT_INLINE)
 def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
-    """Compute a step from a stick, in which the element may yield; arguments as of `resolve_slip`."""
+    """Compute a step from a stick, in which the element may yield.
+
+    The arguments are those of `resolve_slip`.
+    """
     memory = workspace[MEMORY * LANES + lane]
     spring = workspace[SPRING * LANES + lane]
     length = workspace[YIELD_LENGTH * LANES + lane]

@@ -17,7 +17,7 @@ CURE = 'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with o
 
 
 class Kept(NamedTuple):
-    """Copies of arrays of a run, to go back to.
+    """Copies of arrays of a run, from which a step is repeated.
 
     - `entries`: entries in use of every list of bonds.
     - `fields`: other arrays of the contact by name.
@@ -30,7 +30,10 @@ class Kept(NamedTuple):
 
 
 def copy_state(contact, *others) -> Kept | None:
-    """Return copies of a contact with a list of bonds and of other arrays; None for a contact without a list."""
+    """Return copies of a contact with a list of bonds and of other arrays.
+
+    The result is None for a contact without a list.
+    """
     if not hasattr(contact, "bondlist"):
         return None
     fields = {name: array.copy() for name, array in contact._asdict().items() if name != "bondlist"}
@@ -47,12 +50,15 @@ def _statuses(contact) -> np.ndarray:
 
 
 def is_full(contact) -> bool:
-    """Return whether a list of a contact is full; a single list is then the only thing that failed."""
+    """Return whether a list of bonds of a contact is full.
+
+    For a contact with a single list a full list is the only cause of a failed step.
+    """
     return hasattr(contact, "bondlist") and (not hasattr(contact, "flow") or contact.flow[0] == 1.0)
 
 
 def enlarge_list(contact, kept: Kept, place: str, *others):
-    """Return a contact as it was kept, with twice the capacity; the other arrays are set back in place.
+    """Restore a contact with twice the capacity of its list; other arrays are restored in place.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The arrays of what rubs in a march: of one contact, or of the elements beside it or in its place."""
+"""Arrays of the friction elements of a march, which act with a contact or in its place."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Several elements, and a contact, over a step: block descent on their forces.
+"""Solution of a contact and several elements over a step, by block descent on their forces.
 
 Port p is a row of slides. The contact, if there is one, acts on port 0, and every element on its own port. Over a step the
 path-mean forces F satisfy d = free - beta F together with every law. Each law is solved in turn under the forces of the
@@ -61,11 +61,12 @@ HAS_SLOPES = parts.HAS_SLOPES
 HAS_CONTACT = parts.HAS_CONTACT
 IS_COUPLED = parts.IS_COUPLED
 HAS_PLANES = parts.HAS_PLANES
-MAX_TURNS = 1000  # turns of all elements after which a step has failed
+MAX_TURNS = 1000  # sweeps over all elements after which a step has failed
 MAX_EVENT_TURNS = (
     60  # the same with stops and releases inside the step; the first half settles which they are
 )
-ROUND_OFF = 4e-15  # smallest residual that can be reached, as a fraction of a free slide over its give and of a force
+# smallest residual that can be reached, as a fraction of a free slide over its compliance, and of a force
+ROUND_OFF = 4e-15
 ELEMENT_COLUMNS = (
     5  # slide, speed, force, slip, and mean force of the step that follows, of an element in a row
 )
@@ -218,7 +219,7 @@ def prepare_step(motion, modal_system, table, at, dt, faces):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def slide_by_others(mine, port, faces):
-    """Return the slide [m] that the forces of all others take from a port.
+    """Return the reduction [m] of the slide of a port due to the forces of all other elements.
 
     Parameters
     ----------
@@ -439,7 +440,9 @@ def solve_coupled_forces(q, v, modal_system, interface, faces):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def speed_up_turns(turn, worst, last_worst, modal_system, faces):
-    """Take a step on the forces of all elements at once, if there is no contact; return the iterations.
+    """Take a Newton step on the forces of all elements at once; return the iterations.
+
+    This is done only without a contact.
 
     Laws with a slope are solved to the minimum of their potential; others take a Newton step if the turns are
     slow.
@@ -462,7 +465,7 @@ def speed_up_turns(turn, worst, last_worst, modal_system, faces):
     if HAS_CONTACT:
         return 0
     elif HAS_SLOPES:
-        if HAS_PLANES:  # its force has no potential
+        if HAS_PLANES:  # the force of an element in a plane has no potential
             pass
         elif faces.stops.names.size == 0 and modal_system.dense.size == 0:
             return abs(together.solve_smooth(faces, modal_system.dt))
@@ -489,7 +492,10 @@ def set_free_motion(faces):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def take_stop_forces(faces):
-    """Take the forces of the stops into faces.each; return their largest change over the tolerance."""
+    """Take the forces of the stops into faces.each.
+
+    Returns their largest change over the tolerance.
+    """
     stops = faces.stops
     worst = 0.0
     for i in range(stops.names.size):
@@ -628,7 +634,7 @@ def solve_with_events(q, v, motion, modal_system, table, at, interface, faces):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def is_all_set_valued(faces):
-    """Return whether all that rubs is set-valued, which is then solved at once."""
+    """Return whether all elements are set-valued, so that they are solved at once."""
     if HAS_CONTACT:
         return False
     else:
@@ -637,7 +643,10 @@ def is_all_set_valued(faces):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def newton_with_stops(faces, dt):
-    """Take a Newton step on the forces of all elements beside known stops, if there is no contact."""
+    """Take a Newton step on the forces of all elements whose stops are known.
+
+    This is done only without a contact.
+    """
     if HAS_SLOPES:
         if HAS_CONTACT:
             return
@@ -742,7 +751,9 @@ def friction_work(dq, row, faces):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def strike_modes(motion, mass, faces):
-    """Strike the modes by the blows of set-valued elements; return the energy that they take [J].
+    """Strike the modes by the blows of set-valued elements.
+
+    Returns the energy that they take [J].
 
     If no stops are known, the elements that do not slide are brought to rest.
 
@@ -875,7 +886,10 @@ def cap_forces(faces):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def slide_freely(used, faces):
-    """Let the only set-valued element slide through the step under a mean force; return its slide."""
+    """Let the only set-valued element slide through the step under a mean force.
+
+    Returns its slide.
+    """
     f = faces.stops.field
     faces.each[ELEMENT_FORCE, 0] = used
     faces.each[INCREMENT, 0] = faces.port[FREE_SLIDE, 0] - faces.gives[BETA, 0, 0] * used

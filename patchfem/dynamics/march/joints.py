@@ -1,4 +1,4 @@
-"""Several interfaces and springs that are not linear beside, or instead of, the patch: the march of many elements."""
+"""Interfaces and nonlinear springs in addition to the patch or in its place, in a march."""
 
 from dataclasses import dataclass, replace
 
@@ -59,7 +59,7 @@ def in_planes(joints, planes) -> list:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JointsModel:
-    """Elements beside a contact, or in its place.
+    """Elements in addition to a contact, or in its place.
 
     A patch with set-valued friction becomes the first of the joints, because all set-valued elements are
     solved together.
@@ -77,7 +77,7 @@ class JointsModel:
     rows: np.ndarray
     scale: float
     also: tuple = ()
-    loading = ""  # the loads stay
+    loading = ""  # the loads are constant
 
     def __post_init__(self):
         if self.patch is not None and self.patch.set_valued:
@@ -98,7 +98,10 @@ class JointsModel:
 
     @property
     def reduction(self):
-        """What the arrays of the patch were reduced from (`ContactModel.reduction`); None without a patch."""
+        """ShearModes from which the patch was reduced (`ContactModel.reduction`).
+
+        The result is None without patch.
+        """
         return self.patch.reduction if self.patch is not None else None
 
     @property
@@ -119,9 +122,9 @@ class JointsModel:
         return self.patch.kind if self.patch is not None else IDLE
 
     def shown(self, contact) -> dict:
-        """Return what a picture needs of the patch's memory (`ContactModel.shown`); empty without a patch."""
+        """Return the fields of the patch's memory for pictures (`ContactModel.shown`)."""
         return self.patch.shown(contact) if self.patch is not None else {}
 
     def build(self):
-        """Return the contact of the patch with arrays of its own; an idle point if there is none."""
+        """Return the contact of the patch with newly allocated arrays; an idle point without a patch."""
         return (self.patch or free_model()).build()

@@ -1,4 +1,4 @@
-"""Patches with bonds behind shear modes in lanes: numbers of cases, their march, and what it leaves."""
+"""March of patches with bonds behind shear modes in lanes: input, march and results."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -77,7 +77,7 @@ def _rig(kernels, modes: ModalBasis, prop) -> np.ndarray:
     ):
         out[first : first + len(rows), :n] = rows
     out[-1] = prop.beta[0, 0], modes.mass, prop.dt
-    # of forces [N] in place of accelerations
+    # these coefficients apply to forces [N] instead of accelerations
     for first, power in (
         (kernels.BY_Z, 1),
         (kernels.BY_V, 1),
@@ -113,7 +113,7 @@ def _table(kernels, modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
     for forms in (
         kernels.WORK_FORMS,
         kernels.LOSS_FORMS,
-    ):  # of forces [N] in place of accelerations
+    ):  # these apply to forces [N] instead of accelerations
         out[:, forms + 2 * kernels.N_RIG_MODES : forms + 3 * kernels.N_RIG_MODES] /= modes.mass
     out[:, kernels.REMAINDERS : kernels.REMAINDERS + 2] = found[:, 8 * n : 8 * n + 2]
     out[:, kernels.PORT_SLIDE] = found[:, 8 * n + 3]

@@ -1,4 +1,6 @@
-"""Patches with bonds behind shear modes marched side by side, one case in a lane: the steps of `passing_kernels`.
+"""March of patches with bonds behind shear modes, one case per lane.
+
+The steps are those of `passing_kernels`.
 
 The cases share the modes of their rig and the frequency of their drive, and have N_POINTS points behind N_PIECE_MODES modes
 of the pieces each. In every step all lanes take as many turns of Newton's method as the slowest of them needs. The workspace
@@ -74,7 +76,7 @@ N_UNSOLVED = WORK_IN + 14  # number of steps without a solution
 MAX_SLIDE = WORK_IN + 15  # largest slide of the run [m]
 N_NUMBERS = WORK_IN + 16
 
-# Rows of a mode of the rig: its step as `propagator.Propagator` has it, for forces in place of accelerations.
+# Rows of a mode of the rig: its step as `propagator.Propagator` has it, for forces instead of accelerations.
 ZZ = 0
 ZV = 1
 VZ = 2
@@ -87,7 +89,7 @@ LOSS = 8  # six coefficients of the quadratic form of the viscous loss
 SLIDE_SHAPE = 14  # slide per coordinate
 OUTPUT_SHAPE = 15  # output per coordinate
 OMEGA_SQUARE = 16  # square of the angular frequency
-N_RIG_ROWS = 17  # after them: give of the slide [m/N], mass [kg], length of a step [s]
+N_RIG_ROWS = 17  # after them: compliance of the slide [m/N], mass [kg], length of a step [s]
 # Columns of the table of a step, for a drive of 1 m s-2.
 BY_DRIVE = 0  # what it adds to coordinates and rates
 WORK_FORMS = 2 * N_RIG_MODES  # coefficients of its work
@@ -102,7 +104,7 @@ NEWTON_TOL = 4e-6  # last step of Newton's method, in bond lengths, as in `shear
 MAX_TURNS = 60  # turns of Newton's method
 BEND_TOL = 1e-9  # bend of the forces over the last step of Newton's method that is neglected, over the limit
 MAX_SERIES = 0.5  # slide, in bond lengths, up to which the series is used
-MAX_EXPONENT = 40.0  # slide, in bond lengths, after which nothing is left of a bond
+MAX_EXPONENT = 40.0  # slide, in bond lengths, beyond which exp(-x) of the bonds is below round-off
 
 
 @njit(**NJIT_INLINE)
@@ -164,7 +166,7 @@ def path_shapes(x, far):
 
 @njit(**NJIT_INLINE)
 def add_point(s, workspace, lane, j, y, over, far):
-    """Add a point to the residual and to the lower half of the Hessian, s (9,), at the increments y.
+    """Add a point to the residual and the lower triangle of the Hessian, s (9,), at increments y.
 
     Parameters
     ----------
@@ -212,7 +214,7 @@ def add_point(s, workspace, lane, j, y, over, far):
 
 @njit(**NJIT_INLINE)
 def take_newton_turn(workspace, lane, beta, far):
-    """Take a turn of Newton's method in a lane; if the last step went too far, half of it is taken back.
+    """Take a Newton step in a lane, or take back half of the last step if it went too far.
 
     Parameters
     ----------
@@ -248,7 +250,7 @@ def take_newton_turn(workspace, lane, beta, far):
         0.0,
         two,
     )
-    # one after the other: a loop over them is not taken in several lanes at once
+    # unrolled, because the compiler does not vectorise a loop over them across the lanes
     s = add_point(s, workspace, lane, 0, y, over, far)
     s = add_point(s, workspace, lane, 1, y, over, far)
     s = add_point(s, workspace, lane, 2, y, over, far)
@@ -271,7 +273,8 @@ def take_newton_turn(workspace, lane, beta, far):
     slopes = h00 - 1 / beta
     size = abs(n0) + one * abs(n1) + two * abs(n2)
     least = abs(y0) - one * abs(y1) - two * abs(y2)
-    # where no point turns over in this step, what the forces bend in it is told by their slopes, which a drag has not
+    # where no point reverses in this step, the curvature of the forces over it follows from their slopes, which are 0
+    # while all points slip
     near = size <= NEWTON_TOL * length or (
         least > size and slopes * size * size <= BEND_TOL * workspace[LIMIT * LANES + lane] * length
     )
@@ -383,7 +386,7 @@ def commit_step(workspace, lane, beta, far):
     workspace[CREATED * LANES + lane] -= gone if gone < -noise else 0.0
     workspace[FRICTION * LANES + lane] = force
     workspace[INTERFACE_ENERGY * LANES + lane] = energy
-    # the next guess, as the last three steps went on
+    # the next guess is a quadratic extrapolation of the last three steps
     for k in range(3):
         here = workspace[(INCREMENTS + k) * LANES + lane]
         last = workspace[(LAST_INCREMENTS + k) * LANES + lane]
@@ -451,7 +454,7 @@ def move_mode(workspace, lane, k, mode, push):
 
 @njit(**NJIT_INLINE)
 def start_sums(workspace, lane, work, lost, cosine, sine):
-    """Start the sums of a step over the modes with what the drive alone does.
+    """Start the sums over the modes in a step with the terms that depend on the drive alone.
 
     Parameters
     ----------
@@ -459,11 +462,11 @@ def start_sums(workspace, lane, work, lost, cosine, sine):
         Rows of the lanes, named at the top of the module.
     lane : int
     work : float
-        Constant part of its work [J].
+        Constant part of the work of the drive [J].
     lost : float
         Constant part of the viscous loss [J].
     cosine : float
-        Of the drive at the start of the step.
+        Cosine of the drive at the start of the step.
     sine : float
     """
     out = workspace[OUTPUT * LANES + lane]
@@ -545,7 +548,7 @@ def set_free_slide(workspace, lane, rig, row):
 
 @njit(**NJIT_INLINE)
 def count_long_slides(workspace, lengths):
-    """Return the number of lanes in which a point may slide further than so many bond lengths, or by nan."""
+    """Return the number of lanes in which a point may slide `lengths` bond lengths or more."""
     near = 0.0
     for lane in range(LANES):
         far = (

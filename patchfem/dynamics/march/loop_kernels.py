@@ -27,8 +27,8 @@ EXCEEDS_TRAVEL = 1
 MEMORY_FULL = 2
 NOT_FINITE = 3
 NO_CONTACT_SET = 4
-N_UNCONVERGED = 7  # place of the number of steps without convergence in the ledger
-DISSIPATED = 3  # place of the dissipated energy in the ledger
+N_UNCONVERGED = 7  # index of the number of steps without convergence in the ledger
+DISSIPATED = 3  # index of the dissipated energy in the ledger
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)

@@ -35,7 +35,7 @@ MAX_PIECE_STEPS = 8000  # number of steps of a piece of a march
 MAX_PIECE_CYCLES = 16  # number of cycles of a piece of a march
 PASSING = "dynamics.march.passing_kernels"
 PERIODIC_TOL = 1e-12  # change of a periodic motion in all cycles that are left, over its size
-SUMS = [0, 1, 2, 3, 5, 7, 8]  # places of the ledger that grow from cycle to cycle
+SUMS = [0, 1, 2, 3, 5, 7, 8]  # indices of the ledger that grow from cycle to cycle
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -132,7 +132,7 @@ def modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
 
 
 def _runner(model):
-    """Return the class that marches a model: `Run`, or its own."""
+    """Return the class that marches a model: `Run`, or the one that the model names."""
     return getattr(model, "runner", None) or Run
 
 
@@ -165,7 +165,7 @@ def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) 
         _WARM.update({kind} - {None})
 
 
-_WARM = set()  # kinds of patches that have marched: their code is there
+_WARM = set()  # kinds of patches that have marched, so that their compiled code is loaded
 
 
 def fresh(
@@ -322,7 +322,7 @@ class _Plan(NamedTuple):
 
 
 class _Recorder:
-    """What a march keeps of its cycles: all samples of the last ones, and before them those worth keeping.
+    """Recorder of a march: all samples of the last cycles, and selected earlier samples.
 
     - `samples`: the `checkpoint.Samples` that are kept.
     - `keeps_samples`, `keeps_extremes`: whether samples from before the last cycles are kept, and extremes and phasors
@@ -388,7 +388,9 @@ def _march_recorded(run, recorder: _Recorder, plan: _Plan, slot, progress) -> li
 
 
 def _keep_samples(samples: Samples, run, cycle, pick=None) -> int:
-    """Keep samples of a cycle (first step, rows, work) that is none of the last ones; return how many.
+    """Keep samples of a cycle (first step, rows, work) that is none of the last ones.
+
+    Returns how many.
 
     `pick` has their numbers if they are known.
     """
@@ -399,7 +401,9 @@ def _keep_samples(samples: Samples, run, cycle, pick=None) -> int:
 
 
 def _repeat_last_cycle(samples: Samples, run, count: int) -> int:
-    """Skip `count` cycles that are equal to the last one; return how many samples may still be kept.
+    """Skip `count` cycles that are equal to the last one.
+
+    Returns how many samples may still be kept.
 
     The samples of the last cycle are kept again for the skipped ones, with the sums that have grown since.
     """
@@ -487,8 +491,9 @@ class Run:
         self.outcome = None
         self.message = ""
         self.totals = np.zeros(3)
-        self.second = np.zeros(2)  # friction work off the samples, and what went to and fro [J]
-        self.ledger[0] = self.motion()  # what is released at the start counts as work in
+        # friction work from the samples, and energy exchanged in both directions [J]
+        self.second = np.zeros(2)
+        self.ledger[0] = self.motion()  # energy that is stored at the start counts as work input
         self.modal_system = modal_arrays(modes, self.prop)
         self.faces, self.load = (
             faces_of(model, self.prop, self.modal_system, modes.mass),
@@ -502,7 +507,7 @@ class Run:
         self.periodic = (
             self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
         )
-        # of `repeats`: states at the last look and one cycle before the next, their sizes; the books a cycle before
+        # used by `repeats`: states at the last check and one cycle before the next, their sizes, and energies a cycle before
         self.looks = np.zeros((3, sum(map(len, self._carried_state()))))
         self.books = np.zeros(14)
         self.change = np.inf
@@ -565,7 +570,8 @@ class Run:
         before = self.change
         self.change = change
         self.looks[0] = now
-        known = left > 0 and number >= 4 * APART  # two changes between looks
+        # changes over two intervals between checks are known
+        known = left > 0 and number >= 4 * APART
         return (
             known
             and max(change, last) <= PERIODIC_TOL
@@ -581,7 +587,10 @@ class Run:
         self.done += count * self.prop.steps
 
     def placed(self, place, rate) -> None:
-        """Move the march to coordinates and rates (n,) at the start of a cycle; the contact slides there slowly."""
+        """Move the march to coordinates and rates (n,) at the start of a cycle.
+
+        The contact slides there slowly.
+        """
         path = np.array([self.modes.slide @ self.state[0], self.modes.slide @ place])
         if path[0] != path[1]:
             self._slid(path)
@@ -641,7 +650,7 @@ class Run:
         rubs = (rubs == 1) & ~second
         push = -np.einsum("ke,en->kn", parts[:, :, 2], faces.rows[ports]) / modes.mass
         if self.model.patch is None:
-            # of the first element, counted already
+            # that of the first element is counted already
             push += np.outer(out.force, modes.slide) / modes.mass
         extra = out.extra | {"spring_forces": parts[:, ~(rubs | second), 2]}
         names = ("slides", "slide_rates", "forces", "slips")
@@ -661,7 +670,9 @@ class Run:
         )
 
     def passed(self, steps: int, tell=None) -> bool:
-        """March to a step in long pieces without keeping samples; return whether the march got there.
+        """March to a step in long pieces without keeping samples.
+
+        Returns whether the march got there.
 
         `tell` is called after each piece.
         """
@@ -823,7 +834,9 @@ class Run:
         return first, rows[0], works[0]
 
     def _march_rows(self, size: int, frames: int, snapshots: list) -> np.ndarray:
-        """Return the rows (steps + 1, width) of `size` steps as the loop writes them; arguments as of `cycles`.
+        """Return the rows (steps + 1, width) of `size` steps as the loop writes them.
+
+        The arguments are those of `cycles`.
 
         Parameters
         ----------
@@ -838,7 +851,7 @@ class Run:
         edges = np.linspace(0, size, max(min(frames, size), 1) + 1).round().astype(int)
         for piece in np.diff(edges) if size else [0]:
             rows = np.empty((piece + 1, self.width))
-            rows[-1] = 0.0  # what belongs to the step after the last one is nothing yet
+            rows[-1] = 0.0  # the entries of the step that follows the last one are not known yet
             kept = copy_state(self.contact, *self._changing_arrays())
             begin = self._before_a_fling()
             did, status = self._steps(int(piece), rows)
@@ -893,7 +906,10 @@ class Run:
             return abs(float(self.modes.output @ row[: self.modes.omega.size]))
 
     def _steps(self, count: int, rows) -> tuple:
-        """March `count` steps into rows (count + 1, width); return the number of steps done and the status."""
+        """March `count` steps into rows (count + 1, width).
+
+        Returns the number of steps done and the status.
+        """
         table, row = self.table(count)
         return self.loops.march(
             self.model,
@@ -943,7 +959,7 @@ class Run:
         if lost.min(initial=0.0) == 0.0:
             parts[1] = lost
             return parts
-        # of the step solve, and of the slide's last digit
+        # error of the work due to the tolerance of the step solution and to round-off of the slide
         noise = self.model.limit * (
             1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n])
         )
@@ -976,7 +992,7 @@ class Run:
         return out if smooth else out + blows
 
     def _changing_arrays(self) -> tuple:
-        """Return the arrays that a step changes besides those of the contact."""
+        """Return the arrays that a step changes, without those of the contact."""
         faces = self.faces
         return self.state, self.ledger, *faces[:-1], *(faces.stops if self.model.joints else ())
 
@@ -1054,7 +1070,8 @@ class Run:
             for one, part in zip(self.model.joints, self._elements(rows)[0])
             if one.potential is not None
         ]
-        normal = rows[0, -3] if self.model.loading else 0.0  # of the preloaded contact
+        # normal energy of the preloaded contact
+        normal = rows[0, -3] if self.model.loading else 0.0
         return float(rows[0, n + 5] + normal + sum(springs))
 
     def book(self) -> dict:

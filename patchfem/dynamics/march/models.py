@@ -18,16 +18,16 @@ from ..interfaces.dispatch import COULOMB
 
 HERE = "dynamics.interfaces"
 ELEMENTS = f"{HERE}.element_kernels"
-MOST_AT_FIRST = (
-    256  # entries of the list of a point before it is enlarged, besides those of one step
-)
-WIDE = 1e-6  # bond lengths over which the first bonds of a point lie: one may rest where their force turns
+MOST_AT_FIRST = 256  # initial entries of the list of a point, in addition to those of one step
+# width [bond lengths] over which the initial bonds of a point are distributed, so that their force has no jump
+WIDE = 1e-6
 LANES = 16  # number of points that compiled loops take at once; points are filled up to a multiple of it
-IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"  # kind of a contact that nothing asks
+# kind of a contact that is never evaluated
+IDLE = ELEMENTS, "friction.laws.elastic_plastic_kernels"
 
 
 def load_kernels(say=None):
-    """Load the module `instances`; `say` is told if its loops have to be compiled first."""
+    """Load the module `instances`; `say` is called if its loops have to be compiled first."""
     return load("dynamics.march.instances", say)
 
 
@@ -50,7 +50,7 @@ class Joint:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactModel:
-    """What the loop needs to know of an interface; `build` makes fresh arrays, so a model can be run many times.
+    """Description of an interface for the loop; every `build` allocates new arrays.
 
     - `contact`: module of the compiled contact.
     - `limit`: friction limit [N].
@@ -70,7 +70,7 @@ class ContactModel:
     element: Element | None = None
     tuple_of: type = arrays.Element
 
-    loading = ""  # the load stays
+    loading = ""  # the load is constant
 
     @property
     def kind(self) -> tuple:
@@ -102,7 +102,7 @@ class ContactModel:
         if not hasattr(contact, "psi"):
             return {}
         if hasattr(contact, "bondlist"):
-            # as if all bonds of a point were stretched alike
+            # all bonds of a point count as equally stretched
             load = contact.points[4]
             share = contact.statuses[:, STATUS.force]
             here = load * point_pressures(contact)
@@ -125,7 +125,7 @@ class ContactModel:
         }
 
     def build(self):
-        """Return the contact with arrays of its own."""
+        """Return the contact with newly allocated arrays."""
         made = {k: np.array(v, dtype=np.float64, order="C") for k, v in self.fields.items()}
         return self.tuple_of(**made)
 

@@ -1,9 +1,9 @@
-"""The flags of the loop of a rig; here those of one contact under a constant load. `instances` writes others.
+"""Flags of the loop for one contact under a constant load; `instances` writes others.
 
 Numba leaves out the branches of a flag that is False, so nothing is compiled that a rig does not have.
 """
 
-HAS_ELEMENTS = False  # elements beside the contact, or in place of it
+HAS_ELEMENTS = False  # there are elements, with the contact or in its place
 HAS_STOPS = False  # some elements are set-valued
 HAS_SLOPES = False  # some elements have a slope
 HAS_CONTACT = True  # there is a contact; elements may take its place

@@ -1,4 +1,6 @@
-"""Cycles of bonds behind shear modes of which no sample is stored: extremes, phasors and energies are folded as they pass.
+"""March of bonds behind shear modes without stored samples.
+
+Extremes, phasors and energies of the cycles are accumulated in the march.
 
 The steps are those of `loop_kernels.march` with the contact `interfaces.shear_kernels`; a test compares both. While all
 points slip one way the friction is constant, and the modes of the pieces alternate about their mean from one step to the
@@ -104,9 +106,12 @@ def keep_largest(row, number, totals, sums, far, far_at):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def swing_pieces(interface, did, slides):
-    """Move the modes of the pieces by steps of a drag, in which they alternate.
+    """Advance the shear modes of the pieces over steps in which all points slip in one direction.
 
-    The next guess of an increment is the one that `shear_solve_kernels` makes of the last three steps.
+    The forces of the points are then constant. Each mode coordinate jumps in every step to the mirror image about its
+    equilibrium, so its increments are equal with alternating sign. `interface.last` gets the increments of the last two
+    steps, `interface.y` the guess of the next ones that `shear_solve_kernels` extrapolates from three steps, and
+    `interface.ready` marks the factorised Hessian as out of date.
 
     Parameters
     ----------
@@ -284,7 +289,7 @@ def march_drag(
         dq = after - q
         if way * dq <= least:
             break
-        # forth, then back
+        # the modes of the pieces move forward in one step and back in the next one
         did = s + 1
         swings = 1.0 if s % 2 == 0 else -1.0
         odd = 0.5 * (1.0 + swings)

@@ -1,4 +1,4 @@
-"""A load that varies: the normal force and the moment of the contact on the modes, or a load prescribed in time.
+"""Varying load: normal force and moment of the contact, or a load prescribed in time.
 
 Heave h (positive away) and pitch t (positive if it opens +x) move the upper holder, so the approach d = -h closes it. Over
 a step the modes move exactly under constant forces. Those of the normal contact are the path mean of its forces along the
@@ -52,7 +52,7 @@ PRESS_START = 17  # heave, pitch, energy and forces at the start of the step (5,
 
 
 class Secant(NamedTuple):
-    """Bracket of the force on which friction and normal contact agree, and the last guess with its miss [N]."""
+    """Bracket of the force on which friction and normal contact agree; last guess and residual [N]."""
 
     low: float
     high: float
@@ -233,7 +233,9 @@ def sample_load(i, last, motion, mass, interface, faces, press, row):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def set_loads(before, after, interface, faces, press):
-    """Give the loads at both ends of a step to what rubs; those of points at the later end are in press.now.
+    """Set the loads of friction at both ends of a step.
+
+    The loads of points at the end of the step are in press.now.
 
     Parameters
     ----------
@@ -341,7 +343,7 @@ def solve_friction_step(
             force[0], force[1], modal_system.mass, press, faces.modal[OTHER_ACCELERATION]
         )
         faces.port[FREE_SLIDE, 0] = free
-        if press.beta[0, 0] == 0.0:  # nothing slides
+        if press.beta[0, 0] == 0.0:  # no interface slides
             return coupling.slide_freely(0.0, faces), 0.0, 1
         faces.port[FREE_SPEED, 0] = (
             free_rate(motion, modal_system.slide, modal_system.free, modal_system.dense, table, at)
@@ -421,7 +423,10 @@ def is_closed(secant):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def next_guess(secant, guess, used, turn):
-    """Take a secant step inside the bracket; every eighth step is a bisection, as jumps can throw secants to and fro.
+    """Take a secant step inside the bracket.
+
+    Every eighth step is a bisection, because jumps can make the secant steps alternate.
+
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Stops and releases of set-valued faces inside a step: which rest, slide or carry, and the forces that this needs.
+"""Stops and releases of set-valued faces inside a step, and the forces on the faces.
 
 A march moves the modes under mean forces, so a stop or a release inside the step would be off by up to a step, and a slide
 that is held would keep a speed. Here the forces h(x) that would hold all faces change linearly over the step, 0 <= x <= 1,
@@ -32,7 +32,7 @@ SET_VALUED = 0
 PORT = 0
 IS_FRICTION = 1
 MATE = 2
-# `modal`: give of the coordinates [m/N], accelerations by other forces [m s-2], and the first row of scratch space.
+# `modal`: compliance of the coordinates [m/N], accelerations by other forces [m s-2], and the first row of scratch space.
 COORDINATE_GIVE = 0
 OTHER_ACCELERATION = 1
 MODAL_SCRATCH = 2
@@ -55,7 +55,7 @@ MAX_FORCE = 6
 FORCE_TOL = 7
 LAST_INCREMENT = 8
 INCREMENT_BEFORE = 9
-# `gives`: what constant forces take from the slides [m/N] and speeds [m/(s N)] in a step, and from accelerations [1/kg].
+# `gives`: reduction of slides [m/N], speeds [m/(s N)] and accelerations [1/kg] in a step per constant force.
 BETA = 0
 GAMMA = 1
 ACCELERANCE = 2
@@ -79,7 +79,7 @@ SLIP_STATE = (
     11  # 0: it rests; +-1: it slides; +-2: it carries its static friction while others hold it
 )
 SLIDES_ON = 12  # 1 if it slides in one direction through the whole step
-RIGHT_SIDE = 13  # right side of the equations that are solved
+RIGHT_SIDE = 13  # right-hand side of the equations that are solved
 SOLUTION = 14  # solution of these equations
 RESIDUAL = 15  # their residual, also scratch space
 FACE_INCREMENT = 16  # increment of slide of the step [m]
@@ -89,7 +89,8 @@ N_FIELDS = 18
 DIAGONAL_SHIFT = (
     1e-10  # relative shift of the diagonal that makes equations of dependent faces regular
 )
-DEPENDENT_TOL = 1e-7  # remaining fraction of a face's own give below which the other faces hold it
+# compliance of a face while the others are held, over its compliance; below it the others hold the face
+DEPENDENT_TOL = 1e-7
 OVERLOAD_TOL = 1e-9  # fraction by which a force may exceed the static friction
 SAME_TIME_TOL = 1e-12  # fraction of a speed below which equal faces stop at once
 ZERO_SLIDE_TOL = 1e-14  # fraction of its terms below which an increment of slide is zero
@@ -98,7 +99,7 @@ TINY = 1e-300  # keeps a divisor above 0
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def friction_bound(which, e, x, stops):
-    """Return the static or kinetic friction [N] of a face at a place of the step.
+    """Return the static or kinetic friction [N] of a face at a fraction of the step.
 
     Parameters
     ----------
@@ -155,7 +156,8 @@ def solve_shared_forces(which, count, stops):
         x[i] = 0.0
     if not factor(a):
         return False
-    for _ in range(2):  # the second takes the trace out of what depends on no other
+    # the second pass removes the effect of the diagonal shift from independent faces
+    for _ in range(2):
         for i in range(count):
             r[i] = b[i]
             for k in range(count):
@@ -179,7 +181,10 @@ def list_resting(stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_forces(x, stops):
-    """Write the forces of all faces and their slopes into stops.field; return whether they exist."""
+    """Write the forces of all faces and their slopes into stops.field.
+
+    Returns whether they exist.
+    """
     f = stops.field
     count = list_resting(stops)
     for e in range(stops.names.size):
@@ -224,7 +229,7 @@ def release_face(e, way, stops):
     stops : interfaces.arrays.Stops
     """
     f = stops.field
-    # no more among those that rest
+    # the face no longer belongs to the resting ones
     f[SLIP_STATE, e] = way
     f[SLIDES_ON, e] = 0.0
     count = list_resting(stops)
@@ -241,7 +246,10 @@ def release_face(e, way, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def choose_states(x, stops):
-    """Choose which faces rest, slide or carry at a place of the step; return whether it succeeds."""
+    """Choose which faces rest, slide or carry at a fraction of the step.
+
+    Returns whether it succeeds.
+    """
     f = stops.field
     for e in range(stops.names.size):
         if abs(f[SLIP_STATE, e]) == 2.0:
@@ -316,14 +324,14 @@ def speed_rates(e, x, dt, stops):
         rise = f[HOLDING_END, k] - f[HOLDING_START, k]
         start += g * (f[HOLDING_START, k] + rise * x - f[FORCE_NOW, k])
         bend += 0.5 * g * (rise - f[FORCE_SLOPE, k])
-    if f[SPEED, e] == 0.0:  # just let go: forward but for round-off
+    if f[SPEED, e] == 0.0:  # a face that was just released slides forward, up to round-off
         start = f[SLIP_STATE, e] * max(f[SLIP_STATE, e] * start, 0.0)
     return start, bend
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_next_event(x, dt, stops):
-    """Find the next stop or release after a place of the step.
+    """Find the next stop or release after a fraction of the step.
 
     Parameters
     ----------
@@ -374,7 +382,7 @@ def find_next_event(x, dt, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def advance_faces(x, y, who, dt, stops):
-    """Move all faces on from a place of the step up to an event.
+    """Move all faces on from a fraction of the step up to an event.
 
     Parameters
     ----------
@@ -399,7 +407,8 @@ def advance_faces(x, y, who, dt, stops):
         if abs(f[SLIP_STATE, e]) == 1.0:
             last = abs(f[SPEED, e])
             f[SPEED, e] = f[RESIDUAL, e]
-            least = SAME_TIME_TOL * last if last > 0.0 else -1.0  # alike faces stop at once
+            # equal faces stop at the same time
+            least = SAME_TIME_TOL * last if last > 0.0 else -1.0
             if (
                 e == who
                 or (who < 0 and f[SLIP_STATE, e] * f[SPEED, e] <= 0)
@@ -429,7 +438,10 @@ def follow_events(dt, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def check_all_slide(stops):
-    """Return whether all faces slide on to the end of the step; stops.field then has their speeds."""
+    """Return whether all faces slide on to the end of the step.
+
+    If so, stops.field gets their speeds.
+    """
     f = stops.field
     count = stops.names.size
     for e in range(count):
@@ -452,7 +464,9 @@ def check_all_slide(stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_holding_forces(dt, stops):
-    """Find the forces that would hold the faces at both ends of the step; return whether they exist.
+    """Find the forces that would hold the faces at both ends of the step.
+
+    Returns whether they exist.
 
     They are found for all faces at once, and then for the resting ones as the step itself asks of them beside
     those that slide: accelerations are known to the first order of the step only, which would place a release
@@ -533,7 +547,10 @@ def follow_step(dt, stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def match_mean_forces(stops):
-    """Find mean forces of all faces that give the slides of stops.field; return whether they exist."""
+    """Find mean forces of all faces that cause the slides in stops.field.
+
+    Returns whether they exist.
+    """
     f = stops.field
     count = 0
     for e in range(stops.names.size):
@@ -571,7 +588,7 @@ def match_mean_forces(stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_blows(stops):
-    """Find the blows that give the faces their speeds; return the work of all friction [J]."""
+    """Find the impulses that cause the speeds of the faces; return the friction work [J]."""
     f = stops.field
     count = 0
     work = 0.0

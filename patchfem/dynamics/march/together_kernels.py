@@ -1,4 +1,4 @@
-"""Newton's method on all elements of a step at once, for where one element after the other converges slowly.
+"""Newton's method on all elements of a step, for slow convergence of the block descent.
 
 With y_i what the forces take from coordinate i over the step, the slides are d = free - R y, and y minimises
 sum y_i^2/(2 S_i) + sum Psi_e(d_e), where Psi_e' is the path-mean force of element e and S_i the give of a coordinate [m/N].
@@ -148,7 +148,10 @@ def newton_equations(y, step, faces, dt, hess):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_smooth(faces, dt):
-    """Solve the forces of a step by Newton's method; return the iterations, negative if it fails."""
+    """Solve the forces of a step by Newton's method.
+
+    Returns the iterations, negative if it fails.
+    """
     y = faces.modal[MODAL_SCRATCH]
     step = faces.modal[MODAL_SCRATCH + 1]
     trial = faces.modal[MODAL_SCRATCH + 2]
@@ -299,7 +302,7 @@ def newton_step(faces, dt, known):
     count = faces.of.shape[1]
     miss = faces.each[ELEMENT_RESIDUAL]
     force_equations(faces, dt, known)
-    # pivots in place: 1 + slope beta leads its row for laws that resist
+    # no row exchanges are needed: 1 + slope beta dominates its row for laws that resist the slide
     if not eliminate(faces.system, miss):
         return False
     for e in range(count):

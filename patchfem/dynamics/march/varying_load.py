@@ -1,4 +1,4 @@
-"""Modes under the normal force, the moment and the friction of a contact, each under the present load.
+"""March of modes under normal force, moment and friction of a contact with varying load.
 
 The upper holder moves from its solved preload by the heave h = normal . z and the pitch th = pitch . z. The nodal forces are
 those of the unilateral contact at approach delta0 - h and rotation theta0 + th (`contact.contact_sets`). The modes are
@@ -34,7 +34,7 @@ PLASTIC = 1
 POINTS = 2
 LISTS = 3
 RATE = 4
-LIST_TOL_FACTOR = 1e4  # residual that sums over bonds keep, over that of other laws
+LIST_TOL_FACTOR = 1e4  # residual that sums over bonds can reach, over the tolerance of other laws
 FLOOR = 1.0  # smallest pressure of a node in the weights of the shear modes, over the mean of the preload
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
@@ -75,7 +75,10 @@ def plastic(static: float, length: float) -> Rubbing:
 
 
 def bonds(law) -> Rubbing:
-    """Return the stretch reading of bonds with order 1 at every point; PatchfemError for other bonds."""
+    """Return the stretch reading of bonds with order 1 at every point.
+
+    PatchfemError is raised for other bonds.
+    """
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
         raise PatchfemError(
             describe_unsupported(
@@ -95,7 +98,9 @@ def bonds(law) -> Rubbing:
 
 
 def lists(law, reach: float, merge: float) -> Rubbing:
-    """Return the printed reading of bonds, a list of bonds at every point; PatchfemError for the stretch reading.
+    """Return the printed reading of bonds, a list of bonds at every point.
+
+    PatchfemError is raised for the stretch reading.
 
     Bonds keep the pressure under which they formed. In the stretch reading bonds are released as the load
     falls.
@@ -196,7 +201,7 @@ def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class VaryingLoadModel:
-    """What `march.march` needs to know of a load that varies.
+    """Description of a varying load for `march.march`.
 
     - `law`: what rubs.
     - `sets`: contact sets.
@@ -267,7 +272,7 @@ class VaryingLoadModel:
 
     @property
     def kind(self) -> tuple:
-        """Contact and law of what rubs beside the joints, by which `instances` makes an instance of the loop."""
+        """Contact and law without the joints, for which `instances` makes a loop."""
         if self.law.kind == LISTS:
             return SHEARED_LISTS, ""
         if self.pointed:
@@ -275,7 +280,7 @@ class VaryingLoadModel:
         return IDLE if self.set_valued else (IDLE[0], "friction.laws.tanh_kernels")
 
     def build(self):
-        """Return the contact with arrays of its own, under the preload."""
+        """Return the contact with newly allocated arrays, under the preload."""
         law = self.law
         if self.pointed:
             return self.points(
@@ -331,7 +336,7 @@ def shear_of(
     ShearModes
     """
     limit = law.static * (force + FLOOR * force.sum() * weight / weight.sum())
-    # a patch that could jump by itself is refused, under its preload as where the load stays
+    # a patch that could jump without a change of the drive is refused, by its preload as under a constant load
     if law.growth[0] >= 0:
         shear_modes(
             giving,
@@ -468,7 +473,7 @@ class VaryingLoadRun(Run):
         nodal = self.load.now.copy()
         found = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
         c = self.contact
-        if self.model.law.kind == LISTS:  # as if all bonds of a point were stretched alike
+        if self.model.law.kind == LISTS:  # all bonds of a point count as equally stretched
             force = self.model.law.static * c.points[4] * c.statuses[:, STATUS.force]
             law = self.model.law
             found = {

@@ -155,9 +155,9 @@ COUNT = CounterPositions()
 TURN = TurnPositions()
 END = StepEnds()
 STATUS = CallStatus()
-# places of a part of a step at which its samples are taken
+# points of a part of a step at which its samples are taken
 N_NODES = 9
-# these places as fractions of the part, Chebyshev points of the second kind
+# these points as fractions of the part, which are Chebyshev points of the second kind
 NODE_PLACES = (1 - np.cos(np.pi * np.arange(N_NODES) / (N_NODES - 1))) / 2
 
 

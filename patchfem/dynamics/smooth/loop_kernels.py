@@ -31,7 +31,7 @@ MAX_TRIES = 50_000
 MIN_PROGRESS = 1e-3
 # fraction of a period within which two events are at the same time
 INSTANT_FRACTION = 1e-13
-# fraction of a period that a step in stick may take, as nothing else tells when it ends
+# fraction of a period that a step in stick may take, because no other criterion limits it
 MAX_STUCK_STEP = 0.02
 # a motion that has not moved on since a stop: it is at the stop, or was found to go in the other direction
 AT_STOP = 1
@@ -63,7 +63,7 @@ def distance_to_end(motion, what, y, slopes, travel):
         side = 1.0 if motion.turn[TURN.is_above_knee] > 0 else -1.0
         floor = motion.turn[TURN.knee_velocity]
         return side * (way * v - floor), side * way * gain, 1e-12 * floor
-    # a law that holds writes what is left of its hold and of the load behind its loss
+    # a set-valued law writes the remaining margin of its hold and of its load after its loss
     if what >= END.release:
         return slopes[2 * n + what - END.release + 1], 0.0, 0.0
     x, w = watch.find_output(motion, y)
@@ -72,7 +72,7 @@ def distance_to_end(motion, what, y, slopes, travel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def can_end(motion, what, travel):
-    """Return whether a motion can meet such an end at all."""
+    """Return whether this event can occur in the motion."""
     if what == END.kink:
         return motion.turn[TURN.kink_path] < np.inf
     if what == END.knee:
@@ -84,11 +84,11 @@ def can_end(motion, what, travel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_first_end(motion, h, travel, skip):
-    """Return what ends a step of h [s] first, and a guess of its fraction.
+    """Return the first event inside a step of h [s], and a guess of its fraction of the step.
 
     Cubics through both ends of the step give the guess.
 
-    skip: an end that is left out. Without an end they are END.none and 1.
+    skip: an event that is ignored. Without an event END.none and 1 are returned.
     """
     found = END.none
     where = 1.0
@@ -163,7 +163,7 @@ def locate_end(motion, h, what, share, travel):
         else:
             high = at
         new = at - value / rate if rate < 0 else 0.5 * (low + high)
-        # what leaves its rest is within round-off of it too, but does not end there: it would stand for ever
+        # a motion that leaves rest is within round-off of it too; it must not end there, or it would rest for ever
         there = abs(value) <= noise and rate < 0
         if there or abs(new - at) <= 2e-16 * (motion.now[NOW.time] + at) or high - low <= 1e-15 * h:
             break
@@ -434,7 +434,7 @@ def pass_end(motion, record, what):
             record.counters[COUNT.n_turns] += 1
     elif what == END.stop:
         if n == 1:
-            motion.state[1] = 0.0  # to the last digit
+            motion.state[1] = 0.0  # removes the round-off of the velocity
         end_direction(motion, record)
         if reverse_or_continue(motion, record.counters[COUNT.period]):
             watch.write_sample(
@@ -560,13 +560,14 @@ def advance(motion, record, until, edge, tolerance, travel):
             and fresh > 0
             and share * h < INSTANT_FRACTION * record.counters[COUNT.period]
         ):
-            if fresh == FLIPPED:  # neither way: no motion of a law that is smooth does so
+            if fresh == FLIPPED:  # the motion stops in both directions, which a smooth law excludes
                 return STATUS.no_step
             start_direction(motion, -motion.turn[TURN.direction])
             fresh = FLIPPED
             continue
         taken, what = locate_first_end(motion, taken, what, share, travel)
-        # the stages of the step that was tried may have passed by what bends beside its end
+        # the stages of the longer tried step may have missed strong curvature near the event, so the error of the
+        # shortened step is checked as well
         if what != END.none:
             error = steps.estimate_error(motion, taken, tolerance)
             if error > 1:

@@ -92,11 +92,11 @@ class StepParts:
         self.length = np.diff(self.time[:, [0, -1]])[:, 0]
 
     def values(self, name: str) -> np.ndarray:
-        """Return a number of the response at the places of every part (k, N_NODES)."""
+        """Return a quantity of the response at the nodes of every part (k, N_NODES)."""
         return getattr(self.response, name).reshape(-1, N_NODES)
 
     def find_maximum(self, values) -> tuple:
-        """Return the maximum of values (k, N_NODES) between the places, and its error.
+        """Return the maximum between the nodes of values (k, N_NODES), and its error.
 
         The error is the size of the last two Chebyshev coefficients.
         """
@@ -140,7 +140,7 @@ class StepParts:
 
     def mean(self, name: str, begin: float, end: float) -> float:
         """Return the time mean of a number from `begin` to `end` [s]."""
-        length = np.maximum(self.length, 1e-300)  # of a step at an event, 0
+        length = np.maximum(self.length, 1e-300)  # a step at an event has the length 0
         low, high = (np.clip((edge - self.begin) / length, 0.0, 1.0) for edge in (begin, end))
         part = np.flatnonzero(high > low)
         total = 0.0

@@ -36,7 +36,7 @@ LAST_TOLERANCE_RATIO = 0.01
 N_PHASOR_WINDOWS = 8
 # length of the first step over the shortest time of modes and drive
 FIRST_STEP_RATIO = 1e-3
-# change that a motion that repeats may still make, in tolerances of a step
+# largest change per cycle of a motion that counts as periodic, over the tolerance of a step
 MAX_REPEAT_CHANGE = 10.0
 # change of the extremes between two cycles over MAX_REPEAT_CHANGE, as their steps lie at other times
 MAX_CYCLE_RATIO = 10.0
@@ -57,7 +57,7 @@ def load_loop(law: str, say=None):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SmoothResult(MarchResult):
-    """Result of the smooth engine: that of a march, and what the integrator knows besides.
+    """Result of the smooth engine: that of a march, and statistics of the integrator.
 
     - fine: measures of the last cycles, integrated over their steps
     - unsure: errors of peaks [unit of the measure] by measure
@@ -217,7 +217,7 @@ class Motion:
         self.begun = float(self.record.counters[COUNT.max_stored])
 
     def fork(self, drive):
-        """Return a copy of the motion that goes on by itself, under another drive."""
+        """Return an independent copy of the motion, under another drive."""
         twin = copy(self)
         twin.progress = None
         twin.arrays = type(self.arrays)(*(array.copy() for array in self.arrays))
@@ -274,7 +274,7 @@ class Motion:
                 self.arrays, self.record, float(time), end, self.tolerance, float(self.travel)
             )
             self._collect(status)
-            # here alone, for a step cut for its sake would change the motion
+            # only here, because a step that is shortened for a sample would change the motion
             if self.progress is not None:
                 self.progress(min(self.time / (self.cycles * self.drive.period), 1.0))
             if status == STATUS.finished and self.time >= time:
@@ -298,7 +298,8 @@ class Motion:
         self.run_to((first + APART) * period)
         last = self.arrays.state.copy()
         while self.outcome is None and (first + far) * period < time:
-            self.record.cycles[2:, first + far - 1] = 0.0  # its phasor is asked for
+            # 0 marks the cycle as one whose phasor is requested
+            self.record.cycles[2:, first + far - 1] = 0.0
             self.run_to((first + far - far // 4) * period)
             books = self._read_sums()
             self.run_to((first + far) * period)
@@ -573,7 +574,7 @@ def simulate(
     rows, (fine, unsure) = run.run_last_cycles(
         end, window * period, [float(min(t, end)) for t in at], shots
     )
-    # its last cycles were not known before: once more to where it ended
+    # the last cycles were not known in advance, so the run is repeated up to its end
     if run.outcome is not None and run.time > 0:
         done = simulate(
             modes,

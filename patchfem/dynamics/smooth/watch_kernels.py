@@ -144,7 +144,7 @@ def widen_extremes(cycles, period, time, x, y):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def add_phasor(cycles, period, t, h, begin, end):
-    """Add a step of h [s] from a time t [s] to the phasors of the cycles that are wanted.
+    """Add a step of h [s] from a time t [s] to the phasors of the cycles that request one.
 
     It integrates 2/T x exp(-i omega t) of the quintic through output, rate and acceleration at
     both ends, whose error is h^6/46080 of the sixth derivative.

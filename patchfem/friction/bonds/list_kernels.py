@@ -73,7 +73,7 @@ MAX_PANEL_LENGTH = 0.5  # longest first panel of five Gauss points, in bond leng
 MAX_EXPONENT = 300.0  # exponent beyond which the scaled numbers are rescaled; exp(709) is the largest floating-point number
 # path in bond lengths; below it, the moments of new bonds are computed by power series
 MAX_SERIES_PATH = 1e-2
-# number of strips by which a list must grow, besides a fifth of its length, before it is merged again
+# number of strips, in addition to a fifth of the list, by which a list grows before it is merged again
 MIN_STRIPS_BETWEEN_MERGES = 12
 
 

@@ -18,7 +18,7 @@ MAX_DAMAGE = 745.0  # damage beyond which exp(-damage) is zero
 MAX_STRIPS_PER_LENGTH = 4  # largest number of strips of an increment per bond length
 N_JACOBI_POINTS = 4  # Gauss-Jacobi points of the form POWER
 N_LAW_NUMBERS = 24  # numbers of a law, with the points and weights of two powers
-N_WORK_STRIPS = 64  # additional strips for work space, besides those of an increment
+N_WORK_STRIPS = 64  # strips of workspace in addition to those of an increment
 UNMERGED_CAPACITY = 20_000  # initial capacity of a list whose strips are not merged
 
 
@@ -82,7 +82,7 @@ def _jacobi_rule(power: float) -> np.ndarray:
 
 
 def make_status(capacity: int, count: int | None = None) -> np.ndarray:
-    """Return the status of an empty list with room for `capacity` strips.
+    """Return the status of an empty list that can hold `capacity` strips.
 
     Parameters
     ----------

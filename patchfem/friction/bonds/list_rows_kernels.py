@@ -57,9 +57,9 @@ class ReportRows(NamedTuple):
 
 
 class GrowingRows(NamedTuple):
-    """Rows of a strip in the form FORM_REPORT_GROWING.
+    """Rows that a strip has besides the common ones, where the bond length grows (report reading).
 
-    They are the scaled starting lengths [m] of the bonds at both Gauss points.
+    They hold the scaled starting lengths [m] of the bonds at both Gauss points; `FORM_REPORT_GROWING` is this form.
     """
 
     length_1: int = 5

@@ -35,7 +35,8 @@ from .strips import PathState, Strip, Strips, strip_weights, surviving_density
 N_POINTS = 5  # number of Gauss points of a panel of a step
 # ends of the panels of a step in bond lengths; the force changes most in the first bond length
 PANEL_ENDS = (0, 1, 2, 4, 8, 16, 32)
-# number of strips that the cut-off must remove at least, besides half of all strips; copying fewer does not pay
+# smallest number of strips, in addition to half of all, that the cut-off removes; removing fewer costs more than it
+# saves
 MIN_DROPPED = 64
 
 

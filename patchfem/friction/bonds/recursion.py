@@ -259,7 +259,9 @@ def refuse_directions(law: Bonds, directions: int) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Recursion:
-    """Law for reading="stretch" and p = 1; the pressure may vary in the increment and in time.
+    """Bonds of order p = 1 in the stretch reading, advanced from increment to increment.
+
+    The pressure may vary within an increment and from one increment to the next.
 
     Along a line increments are numbers and tractions (m,) [Pa]; in a plane they are (2,) and (2, m), positive against
     slip. If the rates of growth of `law` are arrays (m,), every point has a bond length of its own.

@@ -1,4 +1,4 @@
-"""Growth of bonds on a warm surface (eq. 2.13), and the temperature rise by friction.
+"""Growth of bonds on a warm surface (eq. 2.13), and its frictional heating.
 
 The report states a_s = a_0 exp(-T_a/T_s) and l_k = l_0 exp(T_l/T_s). Here both are referred to a temperature T_ref at
 which a_s and l_k are known, so that a surface at this temperature changes nothing:

@@ -1,1 +1,1 @@
-"""Laws of friction, one per file; the compiled form of a law stands beside it as *_kernels."""
+"""Friction laws, one per file; *_kernels modules hold their compiled forms."""

@@ -151,7 +151,7 @@ def _unload(y, x, n, unloading):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _follow_path(y, x, n, s):
-    """Return y after a path x >= 0, in lengths eps, and the integral of y over x."""
+    """Return y after a path x >= 0 in units of eps, and the integral of y over x."""
     area = 0.0
     if y < 0:
         y, x, area = _unload(y, x, n, 1 - 2 * s)

@@ -167,7 +167,7 @@ class Convolution:
     lower_pressure: np.ndarray | None = None
     cache: dict = field(default_factory=dict)
     can_change_load: ClassVar[bool] = True  # the law has no stretch
-    has_force_at_rest: ClassVar[bool] = True  # the last traction stays at rest
+    has_force_at_rest: ClassVar[bool] = True  # the traction persists while the interface rests
 
     def start(self, sigma) -> ConvolutionState:
         """Return the state before any motion: no traction, under a pressure sigma (m,) [Pa]."""

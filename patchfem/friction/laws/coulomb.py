@@ -18,7 +18,7 @@ class Coulomb(LastTraction):
 
     kinetic: float
     static: float | None = None
-    has_force_at_rest: ClassVar[bool] = True  # the last traction stays at rest
+    has_force_at_rest: ClassVar[bool] = True  # the traction persists while the interface rests
 
     @property
     def _breakaway(self) -> float:

@@ -54,6 +54,7 @@ class _Pattern(NamedTuple):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _view_points(numbers, memory):
+    """Return views of the points in the numbers and the memory of the law."""
     m = int(numbers[1])
     return _Points(
         numbers[FIRST_POINT_INDEX : FIRST_POINT_INDEX + m],
@@ -68,6 +69,7 @@ def _view_points(numbers, memory):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _view_pattern(numbers):
+    """Return views of the lower piece's pressure pattern, which follows the points in `numbers`."""
     m = int(numbers[1])
     p = int(numbers[FIRST_POINT_INDEX + 2 * m])
     first = FIRST_POINT_INDEX + 2 * m + 1

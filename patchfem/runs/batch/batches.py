@@ -59,7 +59,9 @@ def _batch(
     columns: bool = False,
     together: int = 1,
 ) -> Batch:
-    """Return the batch of the module of this name, which is imported for its first model.
+    """Return the Batch of a module of this folder, which is imported when first needed.
+
+    name: name of the module.
 
     kind: kind of the models that it takes; the other parameters are fields of `Batch`.
     """

@@ -379,7 +379,7 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
 
 
 def _beside(model: Model, done: lanes.Marched) -> np.ndarray:
-    """Return whether modes other than the first carry part of the slide (n,)."""
+    """Return whether modes other than the first contribute to the slide (n,)."""
     return np.array(
         [
             model.rig.first_mode.fraction_of_other_modes(done.z[:, :, k]) > MAX_OTHER_MODES_FRACTION

@@ -91,7 +91,7 @@ def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> Ca
     """
     out = CaseResults.blank(len(models))
     for first in range(0, len(models), together):
-        # several threads wait for each other longer than such small systems take
+        # for these small systems several BLAS threads wait longer for each other than the solution takes
         with one_thread():
             part = solved_together(models[first : first + together])
             out.place(range(first, first + len(part)), solve(part))

@@ -62,7 +62,7 @@ class Pair:
 
     @property
     def rounding(self) -> float:
-        """Relative error of the compliance by round-off [1]; 0 if it is negligible."""
+        """Relative round-off error of the compliance [1]; 0 if it is negligible."""
         return max(self.piece.round_off_error, self.upper.round_off_error)
 
     def forces(self, nodal) -> tuple:

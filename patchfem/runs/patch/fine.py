@@ -42,7 +42,7 @@ MAX_ITERATIONS = 4000  # iterations of one contact
 CORNER_SPAN = 1e-3  # length of a corner over that of the interface
 # pressure at a corner over the largest; above it the largest pressure may be at the corner
 CORNER_PRESSURE = 0.2
-MAX_OVERLAP = 1e-6  # largest overlap of a solved contact, over the displacement by the pressure
+MAX_OVERLAP = 1e-6  # largest overlap of a solved contact over the displacement due to the pressure
 
 
 class PointSolution(NamedTuple):
@@ -138,7 +138,7 @@ def _first(asked) -> int:
 
 
 def _dear(last: PointLevel) -> bool:
-    """Return whether twice the points of a level are too many, or take too many iterations."""
+    """Return whether doubling the points of a level exceeds the limit of points or iterations."""
     return 2 * last.force.size > MAX_POINTS or 3 * last.work * last.force.size > MAX_WORK
 
 

@@ -16,8 +16,8 @@ from .grids import MAX_SECONDS, MIN_LEVELS, base_grids, seconds_of
 from .measures import is_within_tolerance, measures
 from .press import press_patch, solve
 
-# Down to this tolerance, a patch that slips may take the seconds of a moving mesh; at a tenth of
-# it, 3.2 times as many.
+# tolerance [1] down to which a patch that slips may take as many CPU seconds as a moving mesh; at a tenth of this
+# tolerance it may take 3.2 times as many
 TOL_OF_SECONDS = 1e-3
 MAX_DECADES = 6  # decades of the tolerance that are searched for one that needs a finer mesh
 

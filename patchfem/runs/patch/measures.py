@@ -309,7 +309,7 @@ def max_error_ratio(found: dict, tolerance: float) -> float:
 
 
 def _remove_unbounded(why: str, found: dict) -> dict:
-    """Return the measures, with those that no mesh bounds replaced by the reason `why`.
+    """Return the measures, with `why` in place of values that diverge under mesh refinement.
 
     These are the peak pressure next to a loaded step or at a free corner, and the loaded fraction;
     "" changes nothing.
@@ -423,7 +423,7 @@ def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
     longest = cells.max(axis=1)
     spread = gap_range + np.abs(force @ pieces.normal).max(axis=1)
     corner = 0.0
-    if pieces is pair.compliance:  # a skin smooths the pressure
+    if pieces is pair.compliance:  # a compliant layer of asperities (skin) bounds the pressure
         corner = corner_layer(
             pair, (force / interface.weight)[:, [0, -1]], np.diff(interface.x)[[0, -1]]
         )

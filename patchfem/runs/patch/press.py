@@ -387,7 +387,7 @@ def _solve_under_load(asked, pieces: Compliance, gap, added=None, warm_start=Non
 
 
 def with_linear_skin(asperities, pieces: Compliance) -> Compliance:
-    """Return the pieces with the diagonal compliance of a linear skin in series.
+    """Return the pieces in series with the diagonal compliance of a linear asperity layer.
 
     A skin without a tangential ratio is rigid in shear.
     """

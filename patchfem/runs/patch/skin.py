@@ -1,4 +1,4 @@
-"""Smooth skins of asperities between the pieces of a patch: law, solution and linearisation.
+"""Asperity layer (skin) with a smooth law between the pieces of a patch: law and solution.
 
 In: a `PatchModel` with a skin. Out: the skin law, the pressure through it, the compliance
 linearised at the operating point, and a note on the stiffness of peaks from a profile.
@@ -19,7 +19,7 @@ from ...surface.roughness import peaks
 
 
 def skin_law(asked):
-    """Return the smooth law of the asperities of a patch: ExponentialSkin or HertzSkin."""
+    """Return the smooth pressure law of the asperity layer of a patch."""
     part = asked.interface.skin
     if part.law == "exponential":
         pressure = (
@@ -35,7 +35,7 @@ def skin_law(asked):
 
 
 def mean_stiffness(asked, pressure: float) -> float:
-    """Return the normal stiffness [Pa/m] of the skin under a uniform `pressure` [Pa].
+    """Return the normal stiffness [Pa/m] of the asperity layer under a uniform `pressure` [Pa].
 
     It is 0 for a smooth skin without pressure.
     """
@@ -92,7 +92,7 @@ def _half(asked, coarse, pressure: float) -> str:
 
 
 def cut_off_pressure(pressure) -> np.ndarray:
-    """Return the pressure (..., m) [Pa] of a smooth skin, with 0 below MIN_RELATIVE_PRESSURE.
+    """Return the pressure (..., m) [Pa] of a smooth layer, with 0 below MIN_RELATIVE_PRESSURE.
 
     The law never reaches 0, but the pressure that is cut off is below the residual of the load
     balance, and underflows farther out. The limit is relative to the largest pressure.
@@ -103,7 +103,7 @@ def cut_off_pressure(pressure) -> np.ndarray:
 def press_through_asperities(
     asked, pieces: Compliance, gap, angle: float, moment, spring: float
 ) -> tuple:
-    """Solve the contact of a pair through a smooth skin.
+    """Solve the contact of a pair through an asperity layer with a smooth law.
 
     The gap of the ContactState is the separation of the mean planes, which is negative if the skin
     is crushed.

@@ -1,7 +1,7 @@
 """Static measures of many patches on shared condensed pieces, equal to those of `measures`.
 
 In: `PatchModel`s with shared meshes. Out: measures with errors, (q,) for q patches. This module
-treats bare pieces, or pieces with a linear skin, under a load, whose contact is a single
+treats bare pieces, or pieces with a linear asperity layer, under a load, whose contact is a single
 interval (`contact.batch`). Other patches are left to single runs.
 """
 
@@ -167,12 +167,12 @@ def _not_of_one_stretch(asked) -> str:
 
 
 def pressing_kind(asked) -> tuple:
-    """Return the properties besides the pieces that patches solved together have in common."""
+    """Return the properties that patches solved together share, apart from their pieces."""
     return asked.mesh.shared.name, *_kind(asked)
 
 
 def _kind(asked) -> tuple:
-    """Return the numbers of the linear skin, and whether the rotation is fixed."""
+    """Return the numbers of the linear asperity layer, and whether the rotation is fixed."""
     skin = asked.interface.skin
     numbers = None if skin is None else (skin.normal_stiffness, skin.tangential_ratio)
     return numbers, asked.loading.moment is None
@@ -357,7 +357,7 @@ def _patch_of(asked, pair: Pair, level: Level, k: int):
 
 
 def _with_asperities(asked, pair: Pair):
-    """Return the Compliance of a pair, in series with a linear skin if the model has one."""
+    """Return the Compliance of a pair, in series with a linear asperity layer if there is one."""
     skin = asked.interface.skin
     return pair.compliance if skin is None else with_linear_skin(skin, pair.compliance)
 

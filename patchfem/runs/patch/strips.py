@@ -80,7 +80,7 @@ def press_strips_of_patch(
 
 
 def skin_of(asked):
-    """Return the skin between the strips; None if they are bare."""
+    """Return the asperity layer between the strips; None if they are bare."""
     if asked.interface.skin is None:
         return None
     if asked.interface.skin.law == "linear":
@@ -90,7 +90,7 @@ def skin_of(asked):
 
 
 def rotational_stiffness(state, c, x, weight) -> float:
-    """Return the rotational stiffness -dM/d(rotation) [N m/rad] of strips with a smooth skin.
+    """Return the rotational stiffness [N m/rad] of strips with a smooth asperity layer.
 
     The approach is fixed.
 
@@ -136,7 +136,7 @@ def strip_values(patch) -> dict:
 
 
 def _behind_skin(patch, weight) -> dict:
-    """Return the extent of contact and the stiffnesses of strips with a smooth skin, by name."""
+    """Return extent of contact and stiffnesses, by name, of strips with a smooth asperity layer."""
     state, pieces, count = patch.strips, patch.pair.compliance, len(patch.strips.offsets)
     ratio = patch.tangential_ratio if patch.tangential_ratio is not None else np.inf
     x, bears = patch.x, state.pressure > MIN_RELATIVE_PRESSURE * state.pressure.max()

@@ -91,7 +91,7 @@ def _border_pressures(x, sigma) -> np.ndarray:
     The curve is a parabola through three loaded nodes, or a line through two.
     """
     peaks = sigma[:, 0].copy()
-    # number of loaded nodes from the border to the first open one
+    # number of loaded nodes from the end of the interface to the first open one
     loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)
     counts = np.minimum(loaded, min(3, x.size - 1))
     for count in (2, 3):
@@ -262,7 +262,7 @@ def unresolved_rounding(patch: Patch) -> float:
     pair, x, sigma = patch.pair, patch.x, patch.pressure.sigma_n
     rounded = _rounded_bodies(pair)
     loaded = np.flatnonzero(patch.active)
-    # a skin smooths the pressure
+    # a compliant layer of asperities (skin) bounds the pressure
     if not rounded or not loaded.size or patch.pieces is not pair.compliance:
         return 0.0
     flat, radius = (

@@ -230,7 +230,7 @@ def without_folders_of(path: Path) -> Callable[[Iterable[str]], list]:
     ]
 
     def told(texts) -> list:
-        """Return the remarks with short file names and readable numbers."""
+        """Return the remarks with shortened file names and rounded numbers."""
         out = []
         for text in texts:
             for folder in folders:

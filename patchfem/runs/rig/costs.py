@@ -104,7 +104,7 @@ MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 
 
 def steps_wanted(model: Model) -> int:
-    """Return the steps per cycle that the tolerance requires of a march, without upper bound."""
+    """Return the steps per cycle that a march needs for the tolerance, without upper bound."""
     accuracy, rig = model.accuracy, model.rig
     quickest = max(
         find_max_frequency_ratio(rig.drive.signal),
@@ -195,7 +195,7 @@ def ringing_and_events(model: Model) -> tuple:
 
 
 def _jumps(model: Model) -> float:
-    """Return how many slips per cycle of a slow drive end early, at most.
+    """Return an upper bound of the slips per cycle that end early under a slow drive.
 
     They end because static friction falls to kinetic friction.
     """
@@ -229,7 +229,7 @@ def _size_seconds(model: Model) -> float:
 
 
 def expected_seconds(model: Model) -> float:
-    """Return the expected CPU seconds of a run from event to event, for a plan.
+    """Estimate the CPU seconds of an event-driven run before it starts.
 
     The pieces of ringing during stick count for the fraction of the time of stick.
     """

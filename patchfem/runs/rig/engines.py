@@ -280,7 +280,7 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 def _numerics_of_meshes(model: Model, numerics) -> list:
-    """Return Numerics in which one patch of the interfaces after the other has a coarser mesh."""
+    """Return one Numerics per interface patch, in which only this patch has a coarser mesh."""
     if not model.rig.friction.has_partial_slip:
         return []
     return [replace(numerics, meshed=one) for one in faces.interfaces_with_coarse_mesh(model)]

@@ -202,9 +202,10 @@ def is_held_without_stiffness(model: Model) -> bool:
 
 
 def lists_grow(model: Model) -> bool:
-    """Return whether a list grows with every step because a law without stiffness holds a block.
+    """Return whether the list of bonds gains an entry in almost every step of the run.
 
-    It is enough that this happens at some time of the run. Pieces with shear compliance have a
+    It does if, at some time of the run, the friction of a law without stiffness at rest (see `held_by_bonds`) holds the
+    sliding block. Pieces with shear compliance have a
     stiffness, and the lists of their points are merged.
     """
     if model.partial_slip:

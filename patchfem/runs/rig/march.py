@@ -66,7 +66,7 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
     progress = ListGuard(progress) if has_list(model, numerics) else progress
     folds = (
         model.patch is not None and model.patch.mesh.can_gather_points
-    )  # nobody reads the histories of such a run
+    )  # the histories of this run are not used
     done = engine.march(
         rig.modes,
         rig.drive.signal,

@@ -132,7 +132,7 @@ def nearest_sweep_end(frequency: float, *ends: float) -> float | None:
 
 
 def _beside(modes: list, at: float, upper: bool) -> list:
-    """Return words, in a list, on the mode with the nearest resonance beside a frequency.
+    """Return a list with a phrase on the mode whose resonance is nearest to a frequency.
 
     Parameters
     ----------

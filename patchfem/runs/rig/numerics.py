@@ -146,7 +146,7 @@ def local_of(tolerance: float) -> float:
 
 
 def ending(steps: int, cycles: float) -> int:
-    """Return the steps per cycle, at least `steps`, with which a run ends closest to its end.
+    """Return the steps per cycle >= `steps` with which a run ends nearest to the requested time.
 
     They are a multiple of 4, because runs with a half and a quarter of them show the order. A run
     ends at a sample, and the last of its `cycles` may be incomplete. An end that is wrong by half a

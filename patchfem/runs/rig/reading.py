@@ -238,7 +238,10 @@ class Reader:
 
 
 def _between_reversals(histories, parity: int):
-    """Return histories with every second sample of this parity, and all ends and reversals."""
+    """Return histories thinned to samples of one parity, with both ends and all reversals kept.
+
+    parity: 0 or 1, remainder of the index of the samples that are kept on division by 2.
+    """
     step = np.diff(histories.slide)
     kept = np.arange(histories.time.size) % 2 == parity
     kept[1:-1] |= step[1:] * step[:-1] < 0

@@ -155,7 +155,7 @@ class Evidence:
             return None
         size = self.number("drive", "acceleration")
         force = self.number("drive", "force")
-        # the drive is of another kind, such as a displacement of the base
+        # the drive has another kind, for example a displacement of the base
         if size is None and force is None:
             return None
         drive = force / modes.mass if size is None else size

@@ -34,9 +34,9 @@ MOST = 1500  # most jumps that are counted
 
 
 def jumps_about(model) -> int:
-    """Return the approximate number of jumps, of a prescribed number or of automatic ones.
+    """Return the number of wear jumps: the prescribed one, or an estimate for automatic jumps.
 
-    It was within a factor of 1.5 in 54 of 56 cases, and of 2 in all. Automatic jumps are those of a
+    The estimate was within a factor of 1.5 in 54 of 56 cases, and of 2 in all. Automatic jumps are those of a
     row of springs as stiff as the pieces, with the path of the slide, or of a mass that moves
     freely with the drive; multiplied by 0.6 tolerance^-0.18, because the edges of a contact of
     pieces need more (193 nodes, tilts and crowns, 1e4 to 1e8 cycles, tolerances of 1e-2 and 1e-3).

@@ -25,7 +25,8 @@ EXACT = 1024  # samples per cycle for a law without memory, whose steps are chos
 LEAD = 30  # cycles after which a lifted mass counts as staying in its grooves
 READ = 1e-9  # relative error of the end of a step
 LOOSE = 1e-6  # largest change from cycle to cycle, over the amplitude, of a periodic motion
-# error of the multipliers by the steps of a march; only a larger excess over 1 is unstable
+# error of the Floquet multipliers due to the step length of a march; a motion is unstable only if a multiplier exceeds
+# 1 by more
 ROUGH = 1e-2
 
 
@@ -184,7 +185,7 @@ class MarchFinder(Followed):
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
     def shown(self, drive, near=None) -> CurvePoint:
-        """Return a point of a curve; if the search from `near` fails, from rest."""
+        """Return a point of a curve, found from the state `near` or, if that fails, from rest."""
         try:
             return curve_point(drive, *self.point(drive, near))
         except NotConverged:
