@@ -65,7 +65,9 @@ def row(rung: str, reading: str, values, frequency: float) -> dict:
     """{"rung", "frequency", "onset" [g], "runaway" [g], "slip_phase" [degrees]} of a rung with fitted values."""
     question = RUNGS[rung].question(reading)
     asked = question.asked([(frequency, 5 * G_N)])
-    scene = asked.base.override([one.format_assignment(value) for one, value in zip(asked.wanted, values)])
+    scene = asked.base.override(
+        [one.format_assignment(value) for one, value in zip(asked.wanted, values)]
+    )
     place = bisect_left(
         ONSETS,
         True,
