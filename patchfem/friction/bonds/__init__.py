@@ -7,4 +7,9 @@ reading over the `strips` of a path. These are NumPy, along a line and in a plan
 Compiled, along a line: `point_kernels` has the recursion, `list_kernels` the sum as one list of strips. `engines`
 chooses between them by error and cost. `list_numbers` makes the arrays of a list, whose positions `list_rows_kernels`
 names; `list_sum_kernels` has its sums, `list_merge_kernels` joins its strips.
+
+Which code runs: reading="stretch" with p = 1, the default, is summed by the recursion. Every other sum
+along a line is the compiled list, which `engines` truncates and merges to the tolerance. The NumPy
+`Quadrature` sums the bonds of a bench that is evaluated sample by sample (`runs.bench.law`). A strip is
+here a piece of the path along which the bonds of a point formed, not a strip of the patch.
 """

@@ -110,7 +110,7 @@ def choose_engine(
 
     Returns
     -------
-    Choice
+    EngineChoice
 
     Raises
     ------
