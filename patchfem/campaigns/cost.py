@@ -450,7 +450,7 @@ def cheapest(runs: list, tolerance: float) -> dict:
 
 
 def _confirmed(runs: list, good) -> list:
-    """Return the runs for which good(run) holds, and holds for every finer run with an error.
+    """Return the runs that fulfil a condition, as do all finer runs whose error is known.
 
     What the tolerance chooses is judged on its own.
     """

@@ -40,7 +40,7 @@ def compute_coating_traction(cells: Cells, rules: list, u) -> CoatingTraction | 
 
     Returns
     -------
-    Bond or None
+    CoatingTraction or None
         None without a coating.
     """
     edges = _find_bonded_edges(cells)

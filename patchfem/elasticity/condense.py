@@ -178,7 +178,7 @@ def condense(stencil, is_mirrored: bool) -> CondensedGrid:
 
     Returns
     -------
-    Condensed
+    CondensedGrid
 
     Raises
     ------

@@ -176,7 +176,7 @@ def run_away_of(result: Result) -> dict:
 
 
 def loop_of(result: Result) -> dict:
-    """Return slide amplitude [m] and loss factor of a bench whose slide repeats; else {}.
+    """Return the slide amplitude [m] and the loss factor of a bench; {} if the slide does not repeat.
 
     It is {"loop": {"slide_amplitude", "loss_factor", "error"}}. The loss factor is the work of a
     cycle over 2 pi times the largest elastic energy, W/(pi k A^2) with the equivalent stiffness k.

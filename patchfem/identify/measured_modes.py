@@ -322,7 +322,7 @@ def list_shape_modes(shapes: MeasuredModes, places: dict) -> ListedModes:
 
     Parameters
     ----------
-    shapes : Shapes
+    shapes : MeasuredModes
     places : dict
         Text of a place such as ``"12:+x"`` for some of `SHAPE_QUANTITIES`; `slide` is needed unless there is only
         one place.

@@ -65,7 +65,7 @@ def make_space(low, high, log=None) -> SearchSpace:
 
     Returns
     -------
-    Space
+    SearchSpace
 
     Raises
     ------
@@ -100,7 +100,7 @@ class CubeResidual:
     ----------
     residual : callable
         Function of values (n,) that returns a residual (r,).
-    space : Space
+    space : SearchSpace
     quick : bool
         Whether evaluations are expensive, so that derivatives are one-sided and of first order, and ends
         of profiles are accurate to 1 %.

@@ -29,8 +29,8 @@ SURFACE_KEYS = (
     "profile",
     "mesh",
 )
-# fraction of the range of the gap; the gaps of one patch on two meshes differ by less
-MAX_GAP_DIFFERENCE = 1e-2
+# largest difference between the gaps of one patch on two meshes, over the range of the gap
+GAP_DIFFERENCE_FRACTION = 1e-2
 MIN_GAP_DIFFERENCE = 1e-12  # m; a smaller difference between gaps is round-off
 MAX_LENGTH_DIFFERENCE = 1e-6  # relative; the lengths of one interface on two meshes differ by less
 # errors of h5py, json and tomllib for a file of another kind
@@ -84,7 +84,7 @@ class EarlierWear:
         self._require_same_length(x)
         change = np.interp(x, self.x, self.gap) - gap
         change = float(np.abs(change - np.polyval(np.polyfit(x, change, 1), x)).max())
-        if change > MAX_GAP_DIFFERENCE * float(np.ptp(gap)) + MIN_GAP_DIFFERENCE:
+        if change > GAP_DIFFERENCE_FRACTION * float(np.ptp(gap)) + MIN_GAP_DIFFERENCE:
             raise PatchfemError(
                 f"{self.path}: the unworn surfaces of that run differ from those of this scene by "
                 f"{format_length(change, 3)}; choose a run of the same pieces, and elements of the same length if "

@@ -257,9 +257,9 @@ class LastCycles:
 
 
 def lateral_work(window, number: int) -> float:
-    """Return the friction work [J] of an interface in its second direction over a window.
+    """Return the friction work [J] that an interface does across the drive during a window.
 
-    By the trapezoidal rule; 0 without a second direction.
+    The trapezoidal rule is used; the work is 0 if the interface slides along a line.
     """
     force, slide = (lateral_history(window, name, number) for name in ("forces", "slides"))
     return 0.0 if force is None or slide is None else float(np.trapezoid(force, slide))

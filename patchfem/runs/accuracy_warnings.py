@@ -20,9 +20,8 @@ from .results import notes, patch_rows
 from .rig import costs, engines
 
 MAX_EXCESS = 1e9  # error over the allowed error; a larger ratio belongs to a value that is zero
-# ratio of a proposed tolerance to that of the scene, which gives at least one more halving of the
-# mesh
-TIGHTER = 0.1
+# proposed tolerance over that of the scene; a tenth gives at least one more halving of the mesh
+PROPOSED_TOLERANCE_RATIO = 0.1
 # halvings of the steps up to which an order that was observed over two halvings is used
 MAX_HALVINGS = 4
 # fraction of the allowed error that is left for the steps if other causes use up all of it
@@ -253,7 +252,7 @@ def _refining_tolerance(found: Finding, coarse) -> float | None:
         if ladder.next_seconds(found.patch) > ladder.most_seconds(asked):
             return None
     if not any(coarse) or asked.mesh.shared is not None:
-        return TIGHTER * tolerance
+        return PROPOSED_TOLERANCE_RATIO * tolerance
     return ladder.tolerance_of_next_mesh(
         asked, found.climbed or [found.patch, *coarse], asked.mesh.tolerance or tolerance
     )
@@ -291,7 +290,8 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
         ]
         if pinned:
             return f"leave out {' and leave out '.join(pinned)}"
-        return f"set accuracy.tolerance = {TIGHTER * model.accuracy.tolerance:.3g} to refine the sum over bonds"
+        proposed = PROPOSED_TOLERANCE_RATIO * model.accuracy.tolerance
+        return f"set accuracy.tolerance = {proposed:.3g} to refine the sum over bonds"
     if name == STEADY:  # the transient decays in a longer run
         return "more drive cycles make this value more accurate; raise drive.cycles"
     if extra.get("harmonics") is None or name.startswith(SAMPLED):

@@ -78,7 +78,7 @@ def run(
         If False, there are no coarse runs and the errors are None.
     fresh : bool
         Whether the pieces are condensed again.
-    kept : KeptState, optional
+    kept : StateFile, optional
         File in which the state of a run with [wear] or of a long march is saved.
 
     Returns

@@ -87,7 +87,7 @@ def make_levels(
 
     Returns
     -------
-    Piecewise
+    PiecewiseDrive
     """
     period = 2 * np.pi / omega
     segments = []

@@ -381,7 +381,7 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
 
     Returns
     -------
-    Shapes
+    MeasuredModes
 
     Raises
     ------

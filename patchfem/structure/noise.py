@@ -53,7 +53,7 @@ def draw_random_record(
 
     Returns
     -------
-    Random
+    RandomRecord
 
     Raises
     ------

@@ -88,7 +88,7 @@ def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: 
 
     Parameters
     ----------
-    shapes : Shapes
+    shapes : MeasuredModes
     mass : float
         Modal mass [kg] to which the modes are scaled; their coordinates are motions like those of a
         block of this mass.

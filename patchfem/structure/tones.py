@@ -47,7 +47,7 @@ def make_tones(frequencies, accelerations, phases, duration: float) -> TonesReco
 
     Returns
     -------
-    Tones
+    TonesRecord
     """
     max_frequency = max(frequencies)
     step = 1 / (ROWS_PER_PERIOD * max_frequency)

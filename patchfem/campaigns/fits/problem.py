@@ -153,7 +153,7 @@ def model_without_joint(base: BaseScene, sets: Iterable) -> Model:
 
     Parameters
     ----------
-    base : Base
+    base : BaseScene
         The scene whose keys are changed.
     sets : iterable of str
         ``table.key=value`` strings.

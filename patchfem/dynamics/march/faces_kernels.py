@@ -643,9 +643,9 @@ def is_all_set_valued(faces):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def newton_with_stops(faces, dt):
-    """Take a Newton step on the forces of all elements whose stops are known.
+    """Take a step of Newton's method on the forces of the elements, which keep their stops.
 
-    This is done only without a contact.
+    It does nothing if the rig has a contact that can open.
     """
     if HAS_SLOPES:
         if HAS_CONTACT:

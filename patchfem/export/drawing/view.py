@@ -1,4 +1,4 @@
-"""The pressed pieces in a window or a picture: von Mises stress, motion, interface stress.
+"""Draw the pressed pieces in a window or a picture: von Mises stress, motion, interface stress.
 
 Pictures are drawn by matplotlib (`flat`), the window by pyvista, which no other module uses. A
 child process checks whether OpenGL can draw the window, because VTK 9.7 crashes without a working

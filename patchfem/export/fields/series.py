@@ -70,7 +70,7 @@ class Frame(Block):
         ]
 
     def interface(self) -> np.ndarray:
-        """Return the numbers of the points of the interface (m,), in order of x."""
+        """Return the indices (m,) of the points of the interface, in order of x."""
         nodes = np.unique(np.concatenate([block.ravel() for block in self.cells(2)]))
         return nodes[np.argsort(self.points[nodes, 0], kind="stable")]
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import Missing, PatchfemError, frozen_array
 from ...formatting import format_length
-from ...model.earlier_wear import LOADING_KEYS, MAX_GAP_DIFFERENCE
+from ...model.earlier_wear import GAP_DIFFERENCE_FRACTION, LOADING_KEYS
 from ...surface.compare import ratios
 from ...surface.compare.compare import AMPLITUDE, SLOPE
 from ...surface.profile import Profile, level
@@ -243,7 +243,7 @@ def _require_same_patch(first: PatchRun, second: PatchRun) -> None:
     if unlike:
         raise PatchfemError(f"{both}: {', '.join(unlike)} differ")
     difference = float(np.abs(unworn[0] - unworn[1]).max())
-    if difference > MAX_GAP_DIFFERENCE * float(np.ptp(unworn[1])) + MIN_ROUGHNESS:
+    if difference > GAP_DIFFERENCE_FRACTION * float(np.ptp(unworn[1])) + MIN_ROUGHNESS:
         raise PatchfemError(
             f"{both}: their unworn surfaces differ by {format_length(difference, 3)}"
         )

@@ -575,7 +575,7 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
     ----------
     displacement, path : float
         Relative displacement and path [m] now.
-    mature : Mature
+    mature : MatureBonds
         Length of mature bonds, and factor that undoes the scale of the starting lengths.
     bonds, strips : array, Range
         Array of strips, and those that are summed.

@@ -174,7 +174,7 @@ class Convolution:
         return ConvolutionState(np.zeros_like(sigma), 0.0, 0.0)
 
     def limit_fraction(self, dq, dt):
-        """Return the fraction of the limit that is carried in increments dq [m], 0 at rest."""
+        """Return the friction force over its limit in increments dq [m]; 0 at rest."""
         return np.sign(dq)
 
     def limit(self, sigma, direction: float):

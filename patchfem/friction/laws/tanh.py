@@ -34,7 +34,7 @@ class TanhLaw(LastTraction):
         )
 
     def limit_fraction(self, dq, dt):
-        """Return the fraction of the limit that is carried in increments dq [m] over dt [s].
+        """Return the friction force over its limit in increments dq [m] during dt [s].
 
         For dt = 0 it is the sign of dq, because the velocity is infinite.
         """

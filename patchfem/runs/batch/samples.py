@@ -101,7 +101,7 @@ class Samples:
         return out | self.slips() | self.loops(first, stiffness)
 
     def harmonic(self, number: int) -> np.ndarray:
-        """Return the Fourier coefficients (m, n) [m] of the modes at a multiple of the frequency.
+        """Return the Fourier coefficients (m, n) [m] of the modes at a harmonic of the drive.
 
         They are those of cubics, as in `spectrum.motion_harmonic`.
         """

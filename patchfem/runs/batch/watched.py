@@ -32,7 +32,7 @@ UNBOUNDED = Outcome.GROWS, Outcome.NOT_CONVERGED, Outcome.EXCEEDS_TRAVEL, Outcom
 class ObservedMotion(NamedTuple):
     """Last cycles of a rig.
 
-    - window: histories; None if the Watcher does not need them.
+    - window: histories; None if the MotionObserver does not need them.
     - acceleration: largest absolute acceleration as a run measures it [m s-2].
     - displacement: displacement amplitude as a run measures it [m].
     - near: initial guess for a motion nearby, or None.
@@ -50,7 +50,7 @@ class ObservedMotion(NamedTuple):
 class MotionObserver:
     """Model of kind rig or linear that is evaluated at one drive after the other.
 
-    A call with a drive (core.SineDrive), and with the `near` of another result, returns Watched;
+    A call with a drive (core.SineDrive), and with the `near` of another result, returns ObservedMotion;
     None if no bounded motion is found. Without a start, the result is that of `runs.run.run` to
     round-off.
 
@@ -63,8 +63,8 @@ class MotionObserver:
         Callback for a line of text.
     windowed : bool
         Whether histories are needed if the engine can do without them.
-    before : Watcher, optional
-        Watcher of another model that is no longer used, whose workspace is reused if it fits.
+    before : MotionObserver, optional
+        MotionObserver of another model that is no longer used, whose workspace is reused if it fits.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class MotionObserver:
         )
 
     def _orbits(self):
-        """Return the map of yields, in the workspace of an earlier Watcher if it fits."""
+        """Return the map of yields, in the workspace of an earlier MotionObserver if it fits."""
         modes, groups = (
             self.model.rig.modes,
             pieces.YieldingElements(self.model, self.numerics, self.patch).groups,
@@ -214,7 +214,7 @@ def _last_cycles(raw) -> ObservedMotion | None:
 
 
 def _observe(window: Response, values: dict) -> ObservedMotion:
-    """Return the Watched of a window and its measures."""
+    """Return the last cycles of a window with its peak acceleration and its amplitude."""
     return ObservedMotion(
         window, values["absolute_acceleration_peak"], values["relative_displacement_amplitude"]
     )

@@ -82,7 +82,7 @@ def run(
         Number of frames of the fields.
     path : tuple, optional
         Path in the form of `SlidePath.samples` that replaces that of the model.
-    watch : Watch
+    watch : PassOptions
         Options and callbacks of the pass.
 
     Returns
@@ -110,7 +110,7 @@ def run(
 
 
 def _slid(model, patch, path: tuple, frames: int, engine: BenchEngine, watch: PassOptions) -> tuple:
-    """Return the Slid of a pass along (time, slide), and histories of the lateral direction."""
+    """Return the SlideHistories of a pass along (time, slide), and histories of the lateral direction."""
     if model.slide.across is not None:
         return stepping.run_plane(model, patch, *path, frames, watch)
     if model.partial_slip:

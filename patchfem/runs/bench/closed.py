@@ -24,11 +24,11 @@ def closed_form(model, patch, path: tuple, frames: int, watch: PassOptions) -> S
         time (k,) [s] and slide (k,) [m].
     frames : int
         Number of frames of the tractions.
-    watch : Watch
+    watch : PassOptions
 
     Returns
     -------
-    Slid
+    SlideHistories
     """
     if model.grooves is not None:
         return closed_form_on_grooves(model, patch, path, frames, watch)

@@ -60,7 +60,7 @@ def follow_path(
         [s], [m].
     frames : int
         Number of copies of its state that are kept.
-    watch : Watch
+    watch : PassOptions
     paced : bool
         Whether the law depends on the speed.
 

@@ -39,11 +39,11 @@ def rigid(
     frames : int
         Number of frames of the tractions.
     engine : BenchEngine
-    watch : Watch
+    watch : PassOptions
 
     Returns
     -------
-    Slid
+    SlideHistories
     """
     (time, slide), f = path, model.friction
     sigma, weight = pressure_of(model, patch)

@@ -35,7 +35,7 @@ def with_shear(
         [s], [m].
     frames : int
         Number of frames of the tractions.
-    watch : Watch
+    watch : PassOptions
     engine : BenchEngine, optional
         Needed for bonds.
 

@@ -40,11 +40,11 @@ def slide_step_by_step(
         [s], [m].
     frames : int
         Number of frames of the tractions.
-    watch : Watch
+    watch : PassOptions
 
     Returns
     -------
-    Slid
+    SlideHistories
 
     Raises
     ------
@@ -90,12 +90,12 @@ def run_plane(model, patch, time, slide, frames: int, watch: PassOptions) -> tup
         [s], [m].
     frames : int
         Number of frames of the tractions.
-    watch : Watch
+    watch : PassOptions
 
     Returns
     -------
     tuple
-        Slid along x, and histories of the lateral direction by name; `pairs` are (slide, force) in
+        SlideHistories along x, and histories of the lateral direction by name; `pairs` are (slide, force) in
         this direction.
     """
     law = law_for(model)
@@ -164,7 +164,7 @@ def _evaluate_law(
         Samples of the frames.
     peaks : dict
         Sign of the motion that starts, by the sample at the end of a rest.
-    watch : Watch
+    watch : PassOptions
     """
     (law, move), (time, slide), (weight, pressure) = laws, path, points
     size, width = slide.shape

@@ -122,7 +122,7 @@ def refuse_opening(asked, pieces: Compliance) -> None:
     flat = np.zeros(pieces.interface.x.size)
 
     def closing(offset: float) -> float:
-        """Return the approach [m] of flat pieces under 1 N on a load line at `offset` [m]."""
+        """Return the approach [m] of flat pieces that a load of 1 N presses at `offset` [m]."""
         return press(
             pieces, flat, 1.0, float(offset), spring=asked.loading.rotational_stiffness
         ).approach

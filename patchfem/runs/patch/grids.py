@@ -25,8 +25,8 @@ from .values import contact_ends
 SEARCH_CELLS = 96  # columns of the first search for the contact
 # most columns of the coarsest grid; a layout with more is made coarser everywhere
 MAX_COLUMNS = 120
-# The dicts have one value for a static patch (True) and one for a patch with motion, which takes
-# longer with more nodes.
+# Each dict has a value for a patch at rest (True) and a value for a patch that moves (False), which
+# gets fewer nodes because every time step takes longer with more of them.
 SLOPE = {True: 0.5, False: 0.9}  # growth of the cells of the coarsest grid per distance [1]
 EDGE_CELLS = {True: 20, False: 10}  # length of a contact over the coarsest cells at its edges
 # shortest cell of the coarsest grid over the length: some tens of picometres, near round-off

@@ -288,7 +288,7 @@ def pressed_together(
 
     Parameters
     ----------
-    asked : Asked
+    asked : PatchLoads
     tolerance : float
         Relative error above which values are extrapolated.
     pieces : list of Pair, optional
@@ -377,7 +377,7 @@ def solve_on_pair(asked: PatchLoads, pair: Pair, coarse: Level | None = None) ->
 
     Parameters
     ----------
-    asked : Asked
+    asked : PatchLoads
     pair : Pair
     coarse : Level, optional
         The same patches on coarser cells, near whose ends of contact the search starts.

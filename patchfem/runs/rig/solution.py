@@ -138,7 +138,7 @@ def last_cycles(model, patch, window, extremes, book: dict, **more) -> LastCycle
     book : dict
         Energies by name [J].
     more
-        Other fields of Seen, with `drive` if it is not that of the model.
+        Other fields of LastCycles, with `drive` if it is not that of the model.
     """
     drive = more.pop("drive", model.rig.drive.signal)
     return LastCycles(

@@ -163,7 +163,7 @@ def describe_error(place: KeyDefinition, error: Any, value: Any) -> str:
 
     Parameters
     ----------
-    place : KeyPlace
+    place : KeyDefinition
     error : dict
         One of `ValidationError.errors()`.
     value

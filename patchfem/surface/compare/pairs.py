@@ -57,7 +57,7 @@ class TableLine(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Properties that all pairs of a mean share.
+    """Properties that are equal for all pairs over which a mean is taken.
 
     label: cell of the column group; direction: "x", "y" or ""; kind: key of `KINDS`. Depths that count
     from a place, from flanks, or over an area are different quantities, and so are computed ones.

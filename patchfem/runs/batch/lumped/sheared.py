@@ -157,7 +157,7 @@ def move_cases(models, held: list, say) -> tuple:
     Parameters
     ----------
     models : sequence of Model
-    held : list of Pressed
+    held : list of PressedCase
     say : callable or None
         Callback for a line of text.
     """
@@ -197,7 +197,7 @@ def add_patch_results(
     found : CaseResults
     case : int
     model : Model
-    one : Pressed
+    one : PressedCase
     reach : float
         Largest output [m].
     """

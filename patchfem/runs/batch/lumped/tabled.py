@@ -41,7 +41,7 @@ def move_cases(models, held: list, say) -> tuple:
     Parameters
     ----------
     models : sequence of Model
-    held : list of Pressed
+    held : list of PressedCase
     say : callable or None
         Callback for a line of text.
     """

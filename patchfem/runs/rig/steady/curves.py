@@ -148,9 +148,9 @@ def trace_curve(modes, drive, find) -> list:
     ----------
     modes
         Modal basis.
-    drive : Sweep
+    drive : SweepDrive
     find : callable
-        Function (sine, near) that returns a Shown; near: initial guess from the previous point, or
+        Function (sine, near) that returns a CurvePoint; near: initial guess from the previous point, or
         None.
     """
 
@@ -181,14 +181,14 @@ def starts_of(modes, drive) -> np.ndarray:
 
 
 def sweep_around_peak(drive, curve: dict, at: float):
-    """Return a Sweep over the neighbourhood of the largest amplitude of a curve.
+    """Return a sweep over the neighbourhood of the largest amplitude of a curve.
 
     The neighbourhood ends where the curve has fallen to FALLEN of the largest amplitude, plus a
     quarter of its width on both sides.
 
     Parameters
     ----------
-    drive : Sweep
+    drive : SweepDrive
     curve : dict
         Columns from `curve_columns`.
     at : float
@@ -196,7 +196,7 @@ def sweep_around_peak(drive, curve: dict, at: float):
 
     Returns
     -------
-    Sweep or None
+    SweepDrive or None
         None if another peak is nearly as high, or the neighbourhood is most of the curve.
     """
     order = np.argsort(curve["frequency"], kind="stable")

@@ -82,7 +82,7 @@ class Maps(Followed):
         self.groups = self.found.groups
 
     def repeating(self, drive, near) -> PeriodicMotion:
-        """Return the motion that repeats with a sine, as Repeating."""
+        """Return the motion that repeats with a sine, as PeriodicMotion."""
         raise NotImplementedError
 
     def point(self, drive, near=None) -> tuple:

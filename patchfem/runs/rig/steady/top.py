@@ -49,17 +49,17 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
 
     Parameters
     ----------
-    points : list of Shown
+    points : list of CurvePoint
         Points along the curve.
     finder
-        Has apart(Shown, Shown) -> distance along the curve, between(Shown, Shown, fraction) ->
-        Shown, and `leaves`: fractions of the tolerance that may remain as the error of the
+        Has apart(CurvePoint, CurvePoint) -> distance along the curve, between(CurvePoint, CurvePoint, fraction) ->
+        CurvePoint, and `leaves`: fractions of the tolerance that may remain as the error of the
         amplitude, and of its position over the width of the peak.
     tolerance : float
 
     Returns
     -------
-    Top
+    RefinedPeak
         At the latest after MOST points.
     """
     points = list(points)
