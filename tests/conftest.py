@@ -19,7 +19,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from patchfem import compiled
-from patchfem.compiled import UNKEPT, cache_folder
+from patchfem.compiled import UNCACHED_FUNCTIONS, cache_folder
 
 HERE = Path(__file__).parent
 
@@ -31,7 +31,7 @@ COMPILING = ("dynamics", "export", "model", "campaigns", "response", "runs", "co
 LATER = ("structure", "wear", "scene", "identify", "torture", "studies")
 
 # a test runs compiled code also where a short run would choose plain Python
-compiled.PATIENCE = -1.0
+compiled.MAX_PYTHON_SECONDS = -1.0
 
 if sys.dont_write_bytecode:
     # Hundreds of child processes would each translate all modules that they import.
@@ -148,8 +148,8 @@ def machine_code_is_kept():
     Each process that calls such a function would wait for numba and its compiler.
     """
     yield
-    uncached = sorted(UNKEPT)
-    UNKEPT.clear()
+    uncached = sorted(UNCACHED_FUNCTIONS)
+    UNCACHED_FUNCTIONS.clear()
     assert not uncached, (
         f"not kept as machine code: {', '.join(uncached)}; such a function allocates memory, or an argument is not a "
         "number, an array or a tuple of these"

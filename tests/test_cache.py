@@ -103,10 +103,10 @@ def test_always_another_takes_over_from_a_process_that_is_killed_while_it_compil
         f"""
 import pathlib, time
 from patchfem.compiled import machine
-def make(*arguments):
+def compile_and_store(*arguments):
     pathlib.Path({str(mark)!r}).touch()
     time.sleep(600)
-machine.make = make
+machine.compile_and_store = compile_and_store
 """,
     )
     end = time.monotonic() + 120
@@ -176,7 +176,7 @@ def smallest(place: Path):
 def test_exact_code_that_came_with_the_package_serves_the_first_run(tmp_path, answers):
     """Nothing is compiled, nothing is said; kernels with another text leave it alone."""
     home = copied(tmp_path / "home")
-    hook.made(home / "patchfem" / "compiled" / "generic", smallest)
+    hook.build_machine_code(home / "patchfem" / "compiled" / "generic", smallest)
     first, native = slid(home, tmp_path / "cache"), answers[0]
     assert (
         not first["numba"]
@@ -189,7 +189,7 @@ def test_exact_code_that_came_with_the_package_serves_the_first_run(tmp_path, an
     )
     for law in (home / "patchfem" / "friction" / "laws").glob("*kernels.py"):
         law.write_text(law.read_text("utf-8") + "# edited\n", "utf-8")
-    asked = "from patchfem import compiled; print(compiled.prebuilt.folder(compiled.sources), compiled.__file__)"
+    asked = "from patchfem import compiled; print(compiled.prebuilt.find_folder(compiled.hash_sources), compiled.__file__)"
     said = subprocess.run(
         [sys.executable, "-c", asked],
         cwd=home,
@@ -202,16 +202,16 @@ def test_exact_code_that_came_with_the_package_serves_the_first_run(tmp_path, an
 
 
 def test_exact_code_that_came_with_the_package_is_of_this_machine(tmp_path, monkeypatch):
-    monkeypatch.setattr(prebuilt, "HERE", tmp_path)
+    monkeypatch.setattr(prebuilt, "COMPILED_FOLDER", tmp_path)
     (tmp_path / "machine.py").touch()
 
     def found():
-        return prebuilt.folder.__wrapped__(compiled.sources)
+        return prebuilt.find_folder.__wrapped__(compiled.hash_sources)
 
     assert found() is None
-    own = tmp_path / "generic" / prebuilt.key(compiled.sources)
+    own = tmp_path / "generic" / prebuilt.compute_key(compiled.hash_sources)
     own.mkdir(parents=True)
-    can = dict.fromkeys(prebuilt.CPUS["x86_64"].needs, True)
+    can = dict.fromkeys(prebuilt.COMMON_CPUS["x86_64"].instruction_sets, True)
     monkeypatch.setattr("llvmlite.binding.get_host_cpu_features", lambda: can)
     assert found() == own
     with monkeypatch.context() as more:
@@ -223,7 +223,9 @@ def test_exact_code_that_came_with_the_package_is_of_this_machine(tmp_path, monk
                 "llvmlite.binding.get_host_cpu_features", lambda lacking=lacking: can | lacking
             )
             more.setattr("platform.machine", lambda name=name: name)
-            (tmp_path / "generic" / prebuilt.key(compiled.sources)).mkdir(exist_ok=True)
+            (tmp_path / "generic" / prebuilt.compute_key(compiled.hash_sources)).mkdir(
+                exist_ok=True
+            )
             assert found() is None
     with monkeypatch.context() as more:
         more.setattr(prebuilt, "find_package_version", lambda name: "0.0")
@@ -238,7 +240,7 @@ def test_exact_a_wheel_has_no_machine_code_unless_it_is_asked_for(monkeypatch):
         "hatchling.builders.hooks.plugin.interface",
         SimpleNamespace(BuildHookInterface=object),
     )
-    monkeypatch.setattr(hook, "made", lambda place: (place / "KEY").mkdir())
+    monkeypatch.setattr(hook, "build_machine_code", lambda place: (place / "KEY").mkdir())
     for asked, version, has in (
         ("", "standard", False),
         ("0", "standard", False),
@@ -314,15 +316,15 @@ import json, pathlib
 from patchfem import compiled
 package = pathlib.Path(compiled.__file__).parents[1]
 kernels = sorted(package.rglob("*kernels.py"))
-keys = [compiled.kernel_key()]
+keys = [compiled.compute_kernel_key()]
 with open(package / "core.py", "a", encoding="utf-8") as file:
     file.write("# edited")
-keys.append(compiled.kernel_key())
-for path in (*kernels, *(package / name for name in compiled.TUPLES)):
+keys.append(compiled.compute_kernel_key())
+for path in (*kernels, *(package / name for name in compiled.TUPLE_MODULES)):
     path.write_text(path.read_text("utf-8") + "# edited\\n", "utf-8")
-    keys.append(compiled.kernel_key())
+    keys.append(compiled.compute_kernel_key())
 (package / "mesh" / "new_kernels.py").write_text("", "utf-8")
-keys.append(compiled.kernel_key())
+keys.append(compiled.compute_kernel_key())
 print(json.dumps(keys))
 """
 
@@ -343,9 +345,9 @@ def test_exact_key_follows_the_kernels_only(tmp_path):
         return json.loads(done.stdout)
 
     own, after_core, *others = keys_of_copy()
-    assert own == after_core == compiled.kernel_key()
+    assert own == after_core == compiled.compute_kernel_key()
     n_kernels = len(list((home / "patchfem").rglob("*kernels.py")))
-    assert len(others) == n_kernels + len(compiled.TUPLES) > 40
+    assert len(others) == n_kernels + len(compiled.TUPLE_MODULES) > 40
     assert len({own, *others}) == 1 + len(others)
     metadata = home / "numba-0.0.dist-info" / "METADATA"
     metadata.parent.mkdir()
@@ -354,16 +356,16 @@ def test_exact_key_follows_the_kernels_only(tmp_path):
 
 
 def test_exact_key_follows_the_machine(monkeypatch):
-    own = compiled.kernel_key()
+    own = compiled.compute_kernel_key()
     monkeypatch.setattr(platform, "machine", lambda: "riscv64")
-    assert compiled.kernel_key() != own
+    assert compiled.compute_kernel_key() != own
 
 
 def test_exact_cache_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path / "mine"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "theirs"))
     found = compiled.cache_folder()
-    assert found == tmp_path / "mine" / "patchfem" / compiled.kernel_key()
+    assert found == tmp_path / "mine" / "patchfem" / compiled.compute_kernel_key()
     assert found.is_dir() and not list(found.iterdir())
     monkeypatch.delenv("PATCHFEM_CACHE")
     assert compiled.cache_folder().is_relative_to(tmp_path / "theirs")
@@ -384,7 +386,7 @@ def test_exact_a_later_process_knows_which_kinds_of_runs_came_to_their_end(tmp_p
 
     question = "print(compiled.has_run('march'), compiled.has_run('other march'))"
     assert python(question) == "False False"
-    python("compiled.ran('march')")
+    python("compiled.record_run('march')")
     assert python(question) == "True False"
 
 
@@ -418,8 +420,11 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
     monkeypatch.setenv("PATCHFEM_CACHE", str(base))
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "session"))
     found = compiled.cache_folder()
-    assert found == tmp_path / "session" / "patchfem" / compiled.kernel_key() and found.is_dir()
-    assert str(base) in compiled.why_elsewhere()
+    assert (
+        found == tmp_path / "session" / "patchfem" / compiled.compute_kernel_key()
+        and found.is_dir()
+    )
+    assert str(base) in compiled.explain_cache_folder()
     monkeypatch.delenv("XDG_RUNTIME_DIR")
     user_cache.make_process_folder.cache_clear()
     try:
@@ -458,7 +463,7 @@ def test_exact_a_folder_is_made_the_user_s_own(tmp_path, monkeypatch):
 def code_folder(tmp_path, monkeypatch):
     """The folder in which this process keeps its compiled code."""
     folder = tmp_path / "code"
-    monkeypatch.setattr(compiled, "_folder", lambda: folder)
+    monkeypatch.setattr(compiled, "_set_cache_folder", lambda: folder)
     return folder
 
 
@@ -469,7 +474,7 @@ def toy(code_folder: Path):
     if not source.exists():
         source.write_text("def toy(x):\n    return 2 * x + 1\n", "utf-8")
     exec(compile(source.read_text("utf-8"), str(source), "exec"), space)
-    return cache_files.kept_on_disk(numba.njit(space["toy"]))
+    return cache_files.store_on_disk(numba.njit(space["toy"]))
 
 
 def missed(found) -> tuple:
@@ -511,16 +516,16 @@ def test_always_a_cache_that_cannot_be_written_is_no_fault(code_folder, obstacle
 def test_always_a_made_module_lives_without_a_file_and_a_damaged_file_is_made_again(code_folder):
     text = "WIDE = 3\nfrom . import jit as part\n\n\ndef wide(x):\n    return WIDE * x\n"
     with limited(0):
-        found = compiled.written("compiled.without_file", text)
-        assert found.WIDE == 3 and found.module().wide(2) == 6
-        assert found.module().part.__name__ == "patchfem.compiled.jit"
+        found = compiled.write_kernel_module("compiled.without_file", text)
+        assert found.WIDE == 3 and found.load_module().wide(2) == 6
+        assert found.load_module().part.__name__ == "patchfem.compiled.jit"
     assert not [path for path in code_folder.rglob("*") if path.is_file()]
     source = code_folder / "instances" / "compiled.with_file.py"
     for harm in ("", text[:20], "mine = 1"):
         source.parent.mkdir(parents=True, exist_ok=True)
         source.write_text(harm)
         sys.modules.pop("patchfem.compiled.with_file", None)
-        assert compiled.written("compiled.with_file", text).module().wide(2) == 6
+        assert compiled.write_kernel_module("compiled.with_file", text).load_module().wide(2) == 6
         assert source.read_text() == text
     for name in ("with", "without"):
         sys.modules.pop(f"patchfem.compiled.{name}_file")
@@ -530,9 +535,9 @@ def test_always_a_made_module_lives_without_a_file_and_a_damaged_file_is_made_ag
 def test_exact_what_is_said_of_a_cache_without_room():
     said = []
     with limited(1000):
-        compiled._told.__wrapped__(said.append)
-    compiled._told.__wrapped__(said.append)
-    if compiled.PLAIN:
+        compiled._report_once.__wrapped__(said.append)
+    compiled._report_once.__wrapped__(said.append)
+    if compiled.IS_JIT_DISABLED:
         assert not said
     else:
         assert (

@@ -35,13 +35,13 @@ def own(base: Path) -> Path:
 def test_exact_the_longest_unused_go_and_those_of_the_last_hour_stay(tmp_path):
     ages = [30, 2, 50, 0.5, 3, 0.1, 40, 0.9]
     made, mine = states(tmp_path, ages), own(tmp_path)
-    cache_limit.make_room(mine, 4)
+    cache_limit.remove_old_folders(mine, 4)
     # the last four are of 0.1, 0.5, 0.9 and 2 hours
     assert {one.name for one in tmp_path.iterdir()} == {
         mine.name,
         *(made[k].name for k in (5, 3, 7, 1)),
     }
-    cache_limit.make_room(mine, 0)
+    cache_limit.remove_old_folders(mine, 0)
     assert {one.name for one in tmp_path.iterdir()} == {
         mine.name,
         *(made[k].name for k in (5, 3, 7)),
@@ -51,7 +51,7 @@ def test_exact_the_longest_unused_go_and_those_of_the_last_hour_stay(tmp_path):
 def test_exact_code_put_into_a_folder_counts_as_its_use(tmp_path):
     (old,), mine = states(tmp_path, [30]), own(tmp_path)
     os.utime(old / "code")
-    cache_limit.make_room(mine, 0)
+    cache_limit.remove_old_folders(mine, 0)
     assert (old / "code" / "a.code").is_file()
 
 
@@ -68,7 +68,7 @@ def test_exact_nothing_else_is_touched(tmp_path):
     (half / "code").mkdir(parents=True)
     for one in tmp_path.iterdir():
         os.utime(one, (time() - 99 * HOUR,) * 2, follow_symlinks=False)
-    cache_limit.make_room(mine, 0)
+    cache_limit.remove_old_folders(mine, 0)
     assert not half.exists() and target.is_dir()
     assert len(list(tmp_path.iterdir())) == 7
 
@@ -83,7 +83,7 @@ def test_exact_room_is_made_where_a_folder_is_new_and_uses_are_marked(tmp_path):
     (mine / "code").mkdir()
     old = states(tmp_path / "more", [99])[0]
     cache_limit.mark_used(old)  # there is code in it: it is marked, and nobody is looked at
-    assert time() - cache_limit.last_use(old) < 60
+    assert time() - cache_limit.find_last_use(old) < 60
     os.utime(mine, (time() - HOUR,) * 2)
     cache_limit.mark_used(mine)
     assert time() - mine.stat().st_mtime < 60
@@ -99,7 +99,7 @@ def test_always_a_folder_marked_while_it_goes_is_put_back(tmp_path, monkeypatch)
         rename(source, target)
 
     monkeypatch.setattr(os, "rename", marked)
-    cache_limit.make_room(mine, 0)
+    cache_limit.remove_old_folders(mine, 0)
     assert (old / "code" / "a.code").is_file() and len(list(tmp_path.iterdir())) == 2
 
 
@@ -110,7 +110,7 @@ def test_always_what_cannot_be_removed_is_no_fault(tmp_path, monkeypatch):
         raise PermissionError
 
     monkeypatch.setattr(os, "rename", refused)
-    cache_limit.make_room(mine, 0)
+    cache_limit.remove_old_folders(mine, 0)
     monkeypatch.setattr(os, "utime", refused)
     cache_limit.mark_used(mine)
     cache_limit.mark_used(tmp_path / "nowhere")
@@ -121,7 +121,7 @@ def test_always_what_cannot_be_removed_is_no_fault(tmp_path, monkeypatch):
 def test_always_processes_that_make_room_at_once_leave_what_is_young(tmp_path, rounds):
     code = (
         "import sys; from pathlib import Path; from patchfem.compiled import cache_limit\n"
-        "sys.stdin.readline(); cache_limit.make_room(Path(sys.argv[1]), 2)"
+        "sys.stdin.readline(); cache_limit.remove_old_folders(Path(sys.argv[1]), 2)"
     )
     base = tmp_path / "base"
     made, mine = states(base, [0.1, 0.2, 0.3, *range(2, 40)]), own(base)

@@ -11,7 +11,7 @@ import pytest
 from numba.core.registry import CPUDispatcher
 
 from patchfem.compiled import jit
-from patchfem.compiled.jit import Inner, njit
+from patchfem.compiled.jit import InlinedDispatcher, njit
 
 KERNELS = """\
 import numpy as np
@@ -41,10 +41,10 @@ def bring():
     spec.loader.exec_module(module)
     return module
 
-kernels = compiled.Kernels("some_kernels", path, bring)
+kernels = compiled.KernelModule("some_kernels", path, bring)
 print(kernels.doubled(3.0), "numba" in sys.modules)
-assert not compiled.UNKEPT
-print(kernels.lengthened(3), *compiled.UNKEPT)
+assert not compiled.UNCACHED_FUNCTIONS
+print(kernels.lengthened(3), *compiled.UNCACHED_FUNCTIONS)
 """
 ALIKE = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp"}}
 
@@ -80,9 +80,9 @@ def test_exact_a_caller_takes_the_code_in_and_answers_as_python():
     asked = called.overloads[next(iter(called.overloads))]
     # no machine code of its own
     assert asked.library.get_pointer_to_function(asked.fndesc.llvm_func_name) == 0
-    assert not called._alone.overloads and len(total._alone.overloads) == 1
+    assert not called._standalone.overloads and len(total._standalone.overloads) == 1
     assert called(values, 0.1) == nearest(values, 0.1)  # compiled inside another one before
-    assert len(called._alone.overloads) == 1
+    assert len(called._standalone.overloads) == 1
     # nothing of an inner one to keep
     assert total(values.astype("f4"), places) == pytest.approx(truth, rel=1e-5)
 
@@ -90,11 +90,11 @@ def test_exact_a_caller_takes_the_code_in_and_answers_as_python():
 def test_always_this_numba_has_what_inner_functions_need():
     """Else all of them are compiled for themselves and inside all others: the same answers at three times the wait."""
     called, total = made(njit())
-    assert isinstance(called, Inner) and isinstance(total, Inner)
+    assert isinstance(called, InlinedDispatcher) and isinstance(total, InlinedDispatcher)
 
 
 def test_exact_without_its_hooks_it_is_numba_s(monkeypatch):
-    monkeypatch.setattr("patchfem.compiled.jit.HOOKS", ("something_else",))
+    monkeypatch.setattr("patchfem.compiled.jit.LIBRARY_METHODS", ("something_else",))
     called, total = made(njit(**ALIKE))
     assert type(called) is type(total) is CPUDispatcher
     assert total(np.arange(3.0), np.array([0.5, 1.75])) == 0 + 0.5 / 1.5 + 2 + 0.25 / 2.75

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from patchfem.compiled import Kernels, jit, load, machine
+from patchfem.compiled import KernelModule, jit, load, machine
 
 
 class Inner(NamedTuple):
@@ -69,12 +69,12 @@ def kept(path, function, *arguments):
     """(what numba answers, the function read back from its file or None)."""
     made = njit(error_model="numpy", _nrt=function is lengthened)(function)
     answer = made(*arguments)
-    return answer, machine.found(path) if machine.keep(path, made, arguments) else None
+    return answer, machine.load_file(path) if machine.store_code(path, made, arguments) else None
 
 
 def words_of(*arguments) -> bytes:
-    words = machine.Words()
-    return b"".join(words.of(one)[1] for one in arguments)
+    words = machine.ArgumentConverter()
+    return b"".join(words.convert(one)[1] for one in arguments)
 
 
 @pytest.fixture(scope="module")
@@ -82,8 +82,8 @@ def weighing(tmp_path_factory):
     path, given = tmp_path_factory.mktemp("code") / "weighed.code", some_arguments()
     made = njit(error_model="numpy", _nrt=False)(weighed)
     answer = made(*given)
-    assert machine.keep(path, made, given)
-    return path, given, answer, machine.found(path), made
+    assert machine.store_code(path, made, given)
+    return path, given, answer, machine.load_file(path), made
 
 
 def test_exact_the_same_bits_from_the_file(weighing):
@@ -112,8 +112,8 @@ def test_exact_tuples_are_taken_by_their_address(weighing, tmp_path):
         return within(first, outer, step, out)
 
     for function in (within, called):
-        code = machine.make(
-            tmp_path / "a.code", function, (first, outer, step, np.zeros(5)), jit.optimised
+        code = machine.compile_and_store(
+            tmp_path / "a.code", function, (first, outer, step, np.zeros(5)), jit.compile_optimised
         )
         mine = np.zeros(5)
         assert code(words_of(first, outer, step, mine)) == (8, (mine[-1], 7))
@@ -125,7 +125,7 @@ def test_exact_tuples_are_taken_by_their_address(weighing, tmp_path):
         assert code(words_of(-1, other, 2.0, mine))[0] == made(-1, other, 2.0, theirs)[0] == 1
         assert mine[:2] == pytest.approx(theirs[:2], rel=1e-14)
     [taken] = within.overloads.values()  # for `called`
-    assert taken.signature.args[1].whole.fields == Outer._fields
+    assert taken.signature.args[1].tuple_type.fields == Outer._fields
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,8 @@ def test_refuses_a_damaged_file(weighing, tmp_path, damage):
     assert json.loads(text.partition(b"\n")[0])["calls"] == ["tan"]
     (tmp_path / "a.code").write_bytes(damage(text))
     assert (
-        machine.found(tmp_path / "a.code") is None and machine.found(tmp_path / "none.code") is None
+        machine.load_file(tmp_path / "a.code") is None
+        and machine.load_file(tmp_path / "none.code") is None
     )
 
 
@@ -174,22 +175,22 @@ def test_exact_yes_and_no(tmp_path):
 def test_refuses_what_numba_alone_can_run(tmp_path):
     assert kept(tmp_path / "a.code", lengthened, 3) == (3, None)  # it allocates
     for unfit in (True, "text", 1j, [1.0], None, np.float32(1), (1.0, None)):
-        with pytest.raises(machine.Unfit):
-            machine.Words().of(unfit)
+        with pytest.raises(machine.UnsupportedError):
+            machine.ArgumentConverter().convert(unfit)
     made = njit(refusing)
     made(1.0)
     # nowhere to write to
-    assert not machine.keep(tmp_path / "none" / "folder" / "a.code", made, (1.0,))
-    assert not machine.keep(tmp_path / "a.code", made, (1,))  # never compiled for these
+    assert not machine.store_code(tmp_path / "none" / "folder" / "a.code", made, (1.0,))
+    assert not machine.store_code(tmp_path / "a.code", made, (1,))  # never compiled for these
     assert not list(tmp_path.iterdir())
 
 
 def test_always_kinds_tell_types_apart():
-    words, grid = machine.Words(), np.zeros((4, 4))
+    words, grid = machine.ArgumentConverter(), np.zeros((4, 4))
     still = np.zeros(4)
     still.flags.writeable = False
     kinds = [
-        words.of(one)[0]
+        words.convert(one)[0]
         for one in (
             1.0,
             1,
@@ -206,18 +207,20 @@ def test_always_kinds_tell_types_apart():
         )
     ]
     assert kinds[3] == "<f82C"[:-1] + "F" and len(set(kinds)) == len(kinds)
-    assert words.of(np.float64(1.0)) == words.of(1.0) and words.of(np.int64(7)) == words.of(7)
+    assert words.convert(np.float64(1.0)) == words.convert(1.0) and words.convert(
+        np.int64(7)
+    ) == words.convert(7)
 
 
 def test_always_a_tuple_is_remembered_as_itself(weighing):
     """Tuples come and go at the same addresses; one that is remembered is kept alive, so none is taken for another."""
     _, (first, outer, step, _), _, code, made = weighing
-    words, mine = machine.Words(), np.zeros(5)
+    words, mine = machine.ArgumentConverter(), np.zeros(5)
     for k in range(20):
         other = outer._replace(inner=Inner(outer.inner.places * k, 0.1 * k))
-        row = b"".join(words.of(one)[1] for one in (first, other, step, mine))
+        row = b"".join(words.convert(one)[1] for one in (first, other, step, mine))
         assert code(row) == made(first, other, step, np.zeros(5))
-    assert len(words.known) <= machine.PARTS
+    assert len(words.known_tuples) <= machine.MAX_CACHED_TUPLES
 
 
 def test_exact_constants_are_read_without_the_module(tmp_path):
@@ -229,7 +232,7 @@ def test_exact_constants_are_read_without_the_module(tmp_path):
         "OTHER = len(NAME)\nWORSE = [missing.remove() for missing in NAME]\n"
     )
     brought = []
-    module = Kernels("patchfem.some_kernels", path, lambda: brought.append(1))
+    module = KernelModule("patchfem.some_kernels", path, lambda: brought.append(1))
     assert (module.STILL, module.MOVES, module.NAME, module.FAR, module.WIDE) == (
         0,
         1,
@@ -249,7 +252,7 @@ MOTIONS = """
 import json, sys
 import patchfem as pf
 from patchfem import compiled
-compiled.PATIENCE = -1.0
+compiled.MAX_PYTHON_SECONDS = -1.0
 rig = '[normal]\\nload = "40 N"\\n[friction]\\nlaw = "LAW"\\nstatic = 0.3\\nMORE\\n' \\
     '[structure]\\nmoving_mass = "1 kg"\\n' \\
     '[[structure.mode]]\\nname = "a"\\nfrequency = "100 Hz"\\ndamping = 0.01\\nslide = 1.0\\n' \\
@@ -275,7 +278,7 @@ def test_always_threads_that_call_first_at_once_bring_code_once(monkeypatch):
         sleep(0.05)
         return lambda words: 7.0
 
-    monkeypatch.setattr(machine, "found", slow)
+    monkeypatch.setattr(machine, "load_file", slow)
 
     def call(_):
         at_once.wait()
@@ -286,10 +289,10 @@ def test_always_threads_that_call_first_at_once_bring_code_once(monkeypatch):
     assert len(brought) == 1
 
 
-def kernels_of_its_own(module: str) -> Kernels:
-    """The Kernels of a module of which nothing has been called yet."""
+def kernels_of_its_own(module: str) -> KernelModule:
+    """The kernel module of which nothing has been called yet."""
     known = load(module)
-    return Kernels(known.__name__, known._text, known._bring)
+    return KernelModule(known.__name__, known._source, known._importer)
 
 
 def test_exact_without_compiled_code_the_same_motions(monkeypatch):

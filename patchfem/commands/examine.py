@@ -80,7 +80,7 @@ def _version(name: str) -> str:
 
 def _cache() -> Finding:
     """Check the cache of compiled code; without it every command compiles again."""
-    folder, why = compiled.cache_folder(), compiled.why_elsewhere()
+    folder, why = compiled.cache_folder(), compiled.explain_cache_folder()
     sizes = [one.stat().st_size for one in folder.rglob("*") if one.is_file()]
     return Finding(
         "compiled code",

@@ -1,18 +1,18 @@
 """Compiled kernels and the cache of their machine code, one folder per state of the sources.
 
-`load` returns a kernel module by name as a `Kernels` object, and `instance` returns a variant of it in which some
+`load` returns a kernel module by name as a `KernelModule`, and `instantiate` returns a variant of it in which some
 imports are replaced. The module, and with it numba, is imported only if a function is called whose machine code is not
 stored. `jit` contains the decorator `njit` of all kernels, `machine` stores and loads machine code, `no_jit` runs
 kernels as Python, `prebuilt` finds the machine code of a wheel, `cache_files` and `cache_limit` manage the cache. Read
-`load`, `instance` and `Entry` first.
+`load`, `instantiate` and `KernelFunction` first.
 
 The cache of numba detects a change of the file of a function, but not of the modules whose functions it calls, and it
 stores no function that takes another function as an argument. So the folder is named by a hash of all kernel sources,
-and a loop for any friction law is written out once per law by `instance`, with the import of the law replaced.
+and a loop for any friction law is written out once per law by `instantiate`, with the import of the law replaced.
 
 NUMBA_DISABLE_JIT=1 runs every kernel as Python for debuggers and coverage tools. NUMBA_BOUNDSCHECK=1 compiles all
-kernels again with checks of every index. If the caller of a function predicts its cost as Python (`Entry.expect`), the
-function runs as Python as long as this is cheaper than compiling it.
+kernels again with checks of every index. If the caller of a function predicts its cost as Python
+(`KernelFunction.add_python_cost`), the function runs as Python as long as this is cheaper than compiling it.
 
 The optimisation level is 3, the default of numba. Levels 2 and 1 save no compile time: the rig and five laws took 64
 and 61 CPU seconds instead of 63, most of it in the Python code of numba. At level 2 the loop of Iwan's law takes 10.1
@@ -42,11 +42,11 @@ from ..disk import user_cache
 from ..disk.atomic_write import describe_space_shortage
 from ..disk.installed import find_package_version
 from . import cache_limit, machine, prebuilt
-from .no_jit import plain
+from .no_jit import load_uncompiled
 
-HERE = Path(__file__).parents[1]  # folder of the package
+PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
 # Modules of tuples that kernels take. They belong to the hash because the machine code depends on the field order.
-TUPLES = (
+TUPLE_MODULES = (
     "contact/batch/arrays.py",
     "contact/set_arrays.py",
     "dynamics/interfaces/arrays.py",
@@ -55,25 +55,23 @@ TUPLES = (
     "dynamics/events/elements.py",
 )
 # Numba's environment variable that disables compilation; all kernels then run as Python.
-PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in (
-    "",
-    "0",
-)
-LEAST = 1 << 21  # bytes; the machine code of a run needs this disk space
+IS_JIT_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+MIN_FREE_BYTES = 1 << 21  # the machine code of a run needs this disk space
 # CPU seconds; a function that would take longer as Python in this process is compiled. This is about a tenth of the
 # compile time (10 to 30 s), because later processes reuse the machine code.
-PATIENCE = 2.0
-# Maximum time [s] to wait for another process that compiles, ten times the longest compilation; interval [s] of checks.
-WAIT, LOOK = (
-    300.0,
-    0.05,
+MAX_PYTHON_SECONDS = 2.0
+MAX_LOCK_WAIT = (
+    300.0  # s to wait for another process that compiles: ten times the longest compilation
+)
+LOCK_CHECK_INTERVAL = (
+    0.05  # s between two attempts to take the lock; short compared with a compilation
 )
 # Functions called by this process whose machine code cannot be stored, so every process imports numba for them.
-UNKEPT = set()
+UNCACHED_FUNCTIONS = set()
 # One thread at a time loads code, because loading a function twice at the same time crashes the process.
-LOADING = RLock()
-_LISTENERS = []  # callbacks that receive a message when a function is compiled
-ARITHMETIC = {
+LOADING_LOCK = RLock()
+_MESSAGE_CALLBACKS = []  # callbacks that receive a message when a function is compiled
+ARITHMETIC_OPERATORS = {
     ast.Add: add,
     ast.Sub: sub,
     ast.Mult: mul,
@@ -84,39 +82,39 @@ ARITHMETIC = {
 }
 
 
-def sources():
+def hash_sources():
     """Return the hash object of all kernels, of the tuples that they take and of their compiler."""
     digest = hashlib.sha256()
     for source in (
-        *(HERE / "compiled" / name for name in ("jit.py", "pass_by_reference.py")),
-        *sorted(HERE.rglob("*kernels.py")),
-        *(HERE / name for name in TUPLES),
+        *(PACKAGE_FOLDER / "compiled" / name for name in ("jit.py", "pass_by_reference.py")),
+        *sorted(PACKAGE_FOLDER.rglob("*kernels.py")),
+        *(PACKAGE_FOLDER / name for name in TUPLE_MODULES),
     ):
-        digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
+        digest.update(
+            str(source.relative_to(PACKAGE_FOLDER)).encode() + b"\0" + source.read_bytes()
+        )
     return digest
 
 
-def kernel_key() -> str:
+def compute_kernel_key() -> str:
     """Return a hash of the kernels, the versions of numba and llvmlite, and the CPU."""
-    digest = sources()
+    digest = hash_sources()
     checked = os.environ.get("NUMBA_BOUNDSCHECK", "")
-    made_by = f"{find_package_version('numba')} {find_package_version('llvmlite')} {sys.version_info[:2]} {checked}"
-    digest.update(f"{made_by} {platform.machine()} {_cpu()}".encode())
+    versions = f"{find_package_version('numba')} {find_package_version('llvmlite')} {sys.version_info[:2]} {checked}"
+    digest.update(f"{versions} {platform.machine()} {_describe_cpu()}".encode())
     return digest.hexdigest()[:16]
 
 
-def _cpu() -> str:
+def _describe_cpu() -> str:
+    """Return the model of the CPU and its instruction sets."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return platform.processor()
     # the flags are needed because a virtual machine may hide some instruction sets of a CPU model
-    found = [
-        line
-        for line in dict.fromkeys(lines)
-        if line.startswith(("model name", "flags", "Features"))
-    ]
-    return " ".join(found) or platform.processor()
+    names = ("model name", "flags", "Features")
+    descriptions = [line for line in dict.fromkeys(lines) if line.startswith(names)]
+    return " ".join(descriptions) or platform.processor()
 
 
 def cache_folder() -> Path:
@@ -125,93 +123,109 @@ def cache_folder() -> Path:
     It lies in the user's cache. If that belongs to another user or cannot be written, it lies in the folder of the
     session (XDG_RUNTIME_DIR), or else in a folder of this process alone.
     """
-    return _place()[0]
+    return _choose_folder()[0]
 
 
-def why_elsewhere() -> str:
+def explain_cache_folder() -> str:
     """Return the reason why `cache_folder` is not in the user's cache; "" if it is."""
-    return _place()[1]
+    return _choose_folder()[1]
 
 
 @cache
-def _placed() -> tuple[Path, str]:
-    """Return the folder for this process, and the reason why it is not in the user's cache."""
-    return _place()
+def _choose_folder_once() -> tuple[Path, str]:
+    """Return what `_choose_folder` returned at the first call in this process."""
+    return _choose_folder()
 
 
-def _place() -> tuple[Path, str]:
-    session, name = os.environ.get("XDG_RUNTIME_DIR"), Path("patchfem") / kernel_key()
-    first = user_cache.prepare_folder(user_cache.find_cache_base() / name)
-    if not first:
-        return user_cache.find_cache_base() / name, ""
+def _choose_folder() -> tuple[Path, str]:
+    """Return the cache folder, and the reason why it is not in the user's cache; "" if it is."""
+    session = os.environ.get("XDG_RUNTIME_DIR")
+    name = Path("patchfem") / compute_kernel_key()
+    user_folder = user_cache.find_cache_base() / name
+    reason = user_cache.prepare_folder(user_folder)
+    if not reason:
+        return user_folder, ""
     if session and not user_cache.prepare_folder(Path(session) / name):
-        return Path(session) / name, first
-    user_cache.prepare_folder(user_cache.make_process_folder() / name)  # makes it if possible
-    return user_cache.make_process_folder() / name, first
+        return Path(session) / name, reason
+    process_folder = user_cache.make_process_folder() / name
+    user_cache.prepare_folder(process_folder)  # makes it if possible
+    return process_folder, reason
 
 
-class Kernels:
+class KernelModule:
     """Kernel module that is imported when it is needed.
 
-    Its attributes are compiled functions (`Entry`) and constants, which are read from the source without an import. Any
-    other attribute imports the module.
+    Its attributes are compiled functions (`KernelFunction`) and constants, which are read from the source without an
+    import. Any other attribute imports the module.
+
+    Parameters
+    ----------
+    name : str
+        Full name of the module.
+    source : Path or str
+        Its file, or its text if it has no file.
+    importer : callable
+        Function without arguments that imports the module and returns it.
     """
 
-    def __init__(self, name: str, text: Path | str, bring):
-        self.__name__, self._text, self._bring, self._entries = name, text, bring, {}
+    def __init__(self, name: str, source: Path | str, importer):
+        self.__name__ = name
+        self._source = source
+        self._importer = importer
+        self._functions = {}
 
     def __getattr__(self, name: str):
         if name.startswith("__"):
             raise AttributeError(f"{self.__name__} has no {name}")
-        if name not in self._entries:
-            constants, functions = _names(self._text)
+        if name not in self._functions:
+            constants, functions = _read_names(self._source)
             if name in constants:
                 return constants[name]
             if name not in functions:
-                return getattr(self.module(), name)
-            self._entries[name] = Entry(
-                self, name, f"{self.__name__.removeprefix('patchfem.')}.{name}-"
-            )
-        return self._entries[name]
+                return getattr(self.load_module(), name)
+            file_prefix = f"{self.__name__.removeprefix('patchfem.')}.{name}-"
+            self._functions[name] = KernelFunction(self, name, file_prefix)
+        return self._functions[name]
 
-    def module(self):
+    def load_module(self):
         """Import the module and return it."""
-        _prepared()
-        return self._bring()
+        _prepare_cache()
+        return self._importer()
 
 
-SPENT = [0.0]  # s; time in which this process compiled code or waited for another process that did
+# s; time in which this process compiled code or waited for another process that did
+COMPILE_SECONDS = [0.0]
 
 
 @contextmanager
-def spending():
-    """Add the time of the block to `SPENT`."""
+def measure_compile_time():
+    """Add the time of the block to `COMPILE_SECONDS`."""
     begin = monotonic()
     try:
         yield
     finally:
-        SPENT[0] += monotonic() - begin
+        COMPILE_SECONDS[0] += monotonic() - begin
 
 
 @contextmanager
-def tidied_later():
+def pause_garbage_collection():
     """Pause the garbage collection in the block; it takes a seventh of the compile time."""
-    was = gc.isenabled()
+    was_enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        if was:
+        if was_enabled:
             gc.enable()
 
 
 @contextmanager
-def alone(path: Path):
+def lock_exclusively(path: Path):
     """Let one process at a time run the block, by a lock on a file.
 
-    The operating system releases the lock if the process is killed.
-    Other processes wait for at most `WAIT` seconds, because the lock of a machine that has disappeared may remain on a
-    network file system. On a file system without locks no process waits.
+    The operating system releases the lock if the process is killed. Other processes wait for at most `MAX_LOCK_WAIT`
+    seconds, because the lock of a machine that has disappeared may remain on a network file system. On a file system
+    without locks no process waits.
     """
     try:
         import fcntl
@@ -222,13 +236,13 @@ def alone(path: Path):
         yield
         return
     try:
-        end = monotonic() + WAIT
+        end = monotonic() + MAX_LOCK_WAIT
         while monotonic() < end:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 break
             except BlockingIOError:
-                sleep(LOOK)
+                sleep(LOCK_CHECK_INTERVAL)
             except OSError:
                 break
         yield
@@ -236,32 +250,45 @@ def alone(path: Path):
         os.close(file)
 
 
-class Entry:
+class KernelFunction:
     """Function of a kernel module.
 
     A call runs its stored machine code. If there is none, numba compiles the function, or it runs as Python if its
     predicted cost is small.
+
+    Parameters
+    ----------
+    module : KernelModule
+    name : str
+        Name of the function in the module.
+    file_prefix : str
+        Start of the names of its files of machine code; a hash of the argument types follows.
     """
 
-    def __init__(self, home: Kernels, name: str, kept: str):
-        self.home, self.name, self.kept = home, name, kept
-        self.words, self.codes, self.as_python = machine.Words(), {}, inf
+    def __init__(self, module: KernelModule, name: str, file_prefix: str):
+        self.module = module
+        self.name = name
+        self.file_prefix = file_prefix
+        self.converter = machine.ArgumentConverter()
+        # loaded function for each tuple of type codes; False if numba runs the function itself
+        self.loaded_functions = {}
+        self.python_seconds = inf  # predicted cost of all calls as Python [CPU s]
 
-    def expect(self, seconds: float) -> None:
+    def add_python_cost(self, seconds: float) -> None:
         """Add the predicted cost of calls as Python [CPU s].
 
         The estimate must be the same in every process, so that all of them choose the same form of the function.
         """
-        self.as_python = seconds + (self.as_python if self.as_python < inf else 0.0)
+        known = self.python_seconds if self.python_seconds < inf else 0.0
+        self.python_seconds = known + seconds
 
-    def is_kept(self, *arguments) -> bool:
+    def is_stored(self, *arguments) -> bool:
         """Return whether machine code for arguments of these types is stored."""
-        kinds = ",".join(self.words.of(argument)[0] for argument in arguments)
-        return any(
-            (folder / "code" / f"{self.kept}{digest(kinds)}.code").is_file() for folder in _kept()
-        )
+        type_codes = [self.converter.convert(argument)[0] for argument in arguments]
+        file_name = self._make_file_name(type_codes)
+        return any((folder / "code" / file_name).is_file() for folder in _list_code_folders())
 
-    def held(self, *arguments) -> tuple:
+    def bind_arguments(self, *arguments) -> tuple:
         """Convert the last arguments of many calls once, for `call_with_bound_args`.
 
         They must be the same objects in every call, but the content of their arrays may change.
@@ -271,105 +298,119 @@ class Entry:
         tuple
             Type codes, words and the arguments themselves. The type codes are None if there are no words.
         """
-        if PLAIN:
+        if IS_JIT_DISABLED:
             return None, b"", arguments
         try:
-            kinds, words = zip(*map(self.words.of, arguments))
-        except machine.Unfit:
+            type_codes, words = zip(*map(self.converter.convert, arguments))
+        except machine.UnsupportedError:
             return None, b"", arguments
-        return kinds, b"".join(words), arguments
+        return type_codes, b"".join(words), arguments
 
-    def call_with_bound_args(self, held: tuple, *first):
-        """Call the function with first arguments and the last arguments that `held` has converted."""
-        kinds, words, last = held
-        if kinds is None:
+    def call_with_bound_args(self, bound: tuple, *first):
+        """Call the function with first arguments and the last arguments of `bind_arguments`."""
+        last_codes, last_words, last = bound
+        if last_codes is None:
             return self(*first, *last)
-        own, mine = zip(*map(self.words.of, first))
-        code = self.codes.get(own + kinds)
-        return code(b"".join(mine) + words) if code else self(*first, *last)
+        first_codes, first_words = zip(*map(self.converter.convert, first))
+        function = self.loaded_functions.get(first_codes + last_codes)
+        return function(b"".join(first_words) + last_words) if function else self(*first, *last)
 
     def __call__(self, *arguments):
-        if PLAIN:
-            return self.function()(*arguments)
+        if IS_JIT_DISABLED:
+            return self.get_dispatcher()(*arguments)
         try:
-            kinds, words = zip(*map(self.words.of, arguments))
-        except machine.Unfit:
-            UNKEPT.add(self.kept[:-1])
-            return self.function()(*arguments)
-        code = self.codes.get(kinds)
-        if code is None:
-            with LOADING:
-                code = self.codes.get(kinds)  # another thread may have loaded it in the meantime
-                if code is None:
-                    return self._first(kinds, words, arguments)
-        return code(b"".join(words)) if code else self.function()(*arguments)
+            type_codes, words = zip(*map(self.converter.convert, arguments))
+        except machine.UnsupportedError:
+            UNCACHED_FUNCTIONS.add(self.file_prefix[:-1])
+            return self.get_dispatcher()(*arguments)
+        function = self.loaded_functions.get(type_codes)
+        if function is None:
+            with LOADING_LOCK:
+                # another thread may have loaded it in the meantime
+                function = self.loaded_functions.get(type_codes)
+                if function is None:
+                    return self._call_first_time(type_codes, words, arguments)
+        return function(b"".join(words)) if function else self.get_dispatcher()(*arguments)
 
-    def _first(self, kinds: tuple, words: tuple, arguments: tuple):
+    def _make_file_name(self, type_codes) -> str:
+        return f"{self.file_prefix}{hash_text(','.join(type_codes))}.code"
+
+    def _call_first_time(self, type_codes: tuple, words: tuple, arguments: tuple):
         """Load or compile the code for arguments of these types, and return the result of the call."""
-        path = _prepared() / "code" / f"{self.kept}{digest(','.join(kinds))}.code"
-        code = machine.found(path) or _generic(path)
-        if code is None and self.as_python <= PATIENCE:
+        path = _prepare_cache() / "code" / self._make_file_name(type_codes)
+        function = machine.load_file(path) or _load_prebuilt(path)
+        if function is None and self.python_seconds <= MAX_PYTHON_SECONDS:
             with np.errstate(all="ignore"):
-                return getattr(plain(self.home.__name__), self.name)(*arguments)
-        if code is None:
-            with spending():
-                code = self._made(path, arguments)
-        if code is None:
-            with spending(), tidied_later():
-                answer = self.function()(*arguments)
-                if not machine.keep(path, self.function(), arguments):
-                    UNKEPT.add(self.kept[:-1])
-            self.codes[kinds] = False
-            return answer
-        self.codes[kinds] = code
-        return code(b"".join(words))
+                return getattr(load_uncompiled(self.module.__name__), self.name)(*arguments)
+        if function is None:
+            with measure_compile_time():
+                function = self._build_machine_code(path, arguments)
+        if function is None:
+            with measure_compile_time(), pause_garbage_collection():
+                result = self.get_dispatcher()(*arguments)
+                if not machine.store_code(path, self.get_dispatcher(), arguments):
+                    UNCACHED_FUNCTIONS.add(self.file_prefix[:-1])
+            self.loaded_functions[type_codes] = False
+            return result
+        self.loaded_functions[type_codes] = function
+        return function(b"".join(words))
 
-    def _made(self, path: Path, arguments: tuple):
+    def _build_machine_code(self, path: Path, arguments: tuple):
         """Compile code for arguments of these types, or load it if another process has compiled it.
 
         Returns None if the function cannot be compiled in this way.
         """
-        with alone(path.with_suffix(".lock")):
-            code = machine.found(path)
-            if code is None:
-                _tell()
-                with tidied_later():
-                    optimised = import_module(f"{__name__}.jit").optimised  # imports numba
-                    code = machine.make(path, self.function(), arguments, optimised)
-        return code
+        with lock_exclusively(path.with_suffix(".lock")):
+            function = machine.load_file(path)
+            if function is None:
+                _report_compilation()
+                with pause_garbage_collection():
+                    compiler = import_module(f"{__name__}.jit").compile_optimised  # imports numba
+                    dispatcher = self.get_dispatcher()
+                    function = machine.compile_and_store(path, dispatcher, arguments, compiler)
+        return function
 
-    def function(self):
+    def get_dispatcher(self):
         """Return the dispatcher of the function, which numba compiles or loads from its cache."""
-        function = getattr(self.home.module(), self.name)
-        return function.alone() if hasattr(function, "alone") else function
+        function = getattr(self.module.load_module(), self.name)
+        return function.get_standalone() if hasattr(function, "get_standalone") else function
 
     def __getattr__(self, name: str):
         if name.startswith("__"):
             raise AttributeError(name)
-        return getattr(self.function(), name)
+        return getattr(self.get_dispatcher(), name)
 
 
 @cache
-def _names(text: Path | str) -> tuple:
+def _read_names(source: Path | str) -> tuple[dict, set]:
     """Read the constants and the names of the compiled functions of a module from its source."""
-    out, functions = {}, set()
-    for line in ast.parse(text.read_text("utf-8") if isinstance(text, Path) else text).body:
-        if isinstance(line, ast.FunctionDef) and any(
-            "njit" in ast.unparse(one) for one in line.decorator_list
+    constants = {}
+    functions = set()
+    text = source.read_text("utf-8") if isinstance(source, Path) else source
+    for statement in ast.parse(text).body:
+        if isinstance(statement, ast.FunctionDef) and "njit" in "".join(
+            map(ast.unparse, statement.decorator_list)
         ):
-            functions.add(line.name)
-        if isinstance(line, ast.Assign) and len(line.targets) == 1:
+            functions.add(statement.name)
+        if isinstance(statement, ast.Assign) and len(statement.targets) == 1:
             try:
-                value, target = _value(line.value, out), line.targets[0]
+                value = _evaluate(statement.value, constants)
             except KeyError:
                 continue
-            names = target.elts if isinstance(target, ast.Tuple) else [target]
-            values = value if isinstance(target, ast.Tuple) else [value]
-            out |= {name.id: one for name, one in zip(names, values) if isinstance(name, ast.Name)}
-    return out, functions
+            _add_constants(constants, statement.targets[0], value)
+    return constants, functions
 
 
-def _value(node: ast.expr, names: dict):
+def _add_constants(constants: dict, target: ast.expr, value) -> None:
+    """Add what an assignment of a value to a name, or to a tuple of names, defines."""
+    is_tuple = isinstance(target, ast.Tuple)
+    names = target.elts if is_tuple else [target]
+    for name, element in zip(names, value if is_tuple else [value]):
+        if isinstance(name, ast.Name):
+            constants[name.id] = element
+
+
+def _evaluate(node: ast.expr, names: dict):
     """Evaluate an expression of constants, known names, arithmetic and ranges.
 
     Raises KeyError for any other expression.
@@ -380,36 +421,52 @@ def _value(node: ast.expr, names: dict):
         case ast.Name():
             return names[node.id]
         case ast.Tuple():
-            return tuple(_value(one, names) for one in node.elts)
-        case ast.Call(ast.Name("range"), given, []):
-            return tuple(range(*(_value(one, names) for one in given)))
+            return tuple(_evaluate(element, names) for element in node.elts)
+        case ast.Call(ast.Name("range"), arguments, []):
+            return tuple(range(*(_evaluate(argument, names) for argument in arguments)))
         case ast.UnaryOp():
-            return ARITHMETIC[type(node.op)](_value(node.operand, names))
+            return ARITHMETIC_OPERATORS[type(node.op)](_evaluate(node.operand, names))
         case ast.BinOp():
-            return ARITHMETIC[type(node.op)](_value(node.left, names), _value(node.right, names))
+            return ARITHMETIC_OPERATORS[type(node.op)](
+                _evaluate(node.left, names), _evaluate(node.right, names)
+            )
     raise KeyError(ast.unparse(node))
 
 
-def load(module: str, say=None):
+def load(module: str, report=None):
     """Load a module of the package, whose compiled code is cached on disk.
 
-    `module` is its name without that of the package, such as "dynamics.modal_kernels". A module named *kernels is
-    returned as `Kernels`. The callback `say` receives a message if the cache is empty, so the code must be compiled.
+    Parameters
+    ----------
+    module : str
+        Name of the module without that of the package, such as "dynamics.modal_kernels".
+    report : callable or None
+        Callback that receives a message if the cache is empty, so the code must be compiled.
+
+    Returns
+    -------
+    KernelModule or module
+        A `KernelModule` if the name ends with "kernels".
     """
-    _prepared(say)
-    return kernels(module) if module.endswith("kernels") else import_module(f"patchfem.{module}")
+    _prepare_cache(report)
+    if module.endswith("kernels"):
+        return get_kernel_module(module)
+    return import_module(f"patchfem.{module}")
 
 
 @cache
-def kernels(module: str) -> Kernels:
+def get_kernel_module(module: str) -> KernelModule:
     """Return the kernel module of this name without importing it."""
     name = f"patchfem.{module}"
-    return Kernels(
-        name, HERE.joinpath(*module.split(".")).with_suffix(".py"), lambda: import_module(name)
-    )
+    return KernelModule(name, _find_source(module), lambda: import_module(name))
 
 
-def instance(module: str, parts: dict, say=None):
+def _find_source(module: str) -> Path:
+    """Return the file of a module of the package."""
+    return PACKAGE_FOLDER.joinpath(*module.split(".")).with_suffix(".py")
+
+
+def instantiate(module: str, replacements: dict, report=None) -> KernelModule:
     """Write a kernel module in which other modules replace some of its imports.
 
     The source differs from the file in these imports only, so the line numbers of tracebacks are those of the file. It is
@@ -420,122 +477,130 @@ def instance(module: str, parts: dict, say=None):
     ----------
     module : str
         Name as in `load`.
-    parts : dict
+    replacements : dict
         Name under which the module imports another one (`from . import other as name`) -> the module that replaces it,
         or its name as in `load`. It must have the same functions.
-    say : callable or None
+    report : callable or None
         Callback as in `load`.
 
     Returns
     -------
-    Kernels
+    KernelModule
 
     Raises
     ------
     ValueError
-        If the module does not import a part exactly once under this name.
+        If the module does not import another one exactly once under one of these names.
     """
-    text = HERE.joinpath(*module.split(".")).with_suffix(".py").read_text("utf-8")
-    for part, other in parts.items():
-        name = other.__name__ if hasattr(other, "__name__") else f"patchfem.{other}"
+    text = _find_source(module).read_text("utf-8")
+    for alias, replacement in replacements.items():
+        has_name = hasattr(replacement, "__name__")
+        name = replacement.__name__ if has_name else f"patchfem.{replacement}"
         text, count = re.subn(
-            rf"(?m)^from \.[\w.]* import \w+ as {part}$", f"import {name} as {part}", text
+            rf"(?m)^from \.[\w.]* import \w+ as {alias}$", f"import {name} as {alias}", text
         )
         if count != 1:
-            raise ValueError(f"patchfem.{module} imports its part {part} {count} times, not once")
-    return written(
-        f"{module}_{digest(text)}",
-        text,
-        say,
-        [one for one in parts.values() if isinstance(one, Kernels)],
-    )
+            raise ValueError(f"patchfem.{module} imports its part {alias} {count} times, not once")
+    imported = [other for other in replacements.values() if isinstance(other, KernelModule)]
+    return write_kernel_module(f"{module}_{hash_text(text)}", text, report, imported)
 
 
-def digest(text: str) -> str:
+def hash_text(text: str) -> str:
     """Return a short hash of a string."""
     return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def written(module: str, text: str, say=None, parts=()):
-    """Write the source of a kernel module into the cache folder, and return it as `Kernels`.
+def write_kernel_module(module: str, text: str, report=None, imported=()) -> KernelModule:
+    """Write the source of a kernel module into the cache folder, and return the module.
 
     Parameters
     ----------
     module : str
         Name as in `load`.
     text : str
-    say : callable or None
+        Source.
+    report : callable or None
         Callback as in `load`.
-    parts : sequence of Kernels
+    imported : sequence of KernelModule
         Modules that the source imports; they are imported before it.
 
     Returns
     -------
-    Kernels
+    KernelModule
     """
     name = f"patchfem.{module}"
-    path, data = _prepared(say) / "instances" / f"{module}.py", text.encode()
-    kept = _bytes_of(path) == data or user_cache.write_cache_file(path, data)
+    path = _prepare_cache(report) / "instances" / f"{module}.py"
+    data = text.encode()
+    is_stored = _read_bytes(path) == data or user_cache.write_cache_file(path, data)
 
-    def bring():
-        if name not in sys.modules:
-            for part in parts:
-                part.module()
-            spec = spec_from_file_location(name, path) if kept else spec_from_loader(name, None)
-            sys.modules[name] = module_from_spec(spec)
-            if kept:
-                spec.loader.exec_module(sys.modules[name])
-            else:  # without a file, the module exists only in this process
-                exec(compile(text, str(path), "exec"), sys.modules[name].__dict__)
+    def import_written_module():
+        """Import the module from its file, or execute its text if the file cannot be written."""
+        if name in sys.modules:
+            return sys.modules[name]
+        for kernel_module in imported:
+            kernel_module.load_module()
+        spec = spec_from_file_location(name, path) if is_stored else spec_from_loader(name, None)
+        sys.modules[name] = module_from_spec(spec)
+        if is_stored:
+            spec.loader.exec_module(sys.modules[name])
+        else:
+            exec(compile(text, str(path), "exec"), sys.modules[name].__dict__)
         return sys.modules[name]
 
-    return Kernels(name, path if kept else text, bring)
+    return KernelModule(name, path if is_stored else text, import_written_module)
 
 
-def ran(kind: str) -> None:
+def record_run(kind: str) -> None:
     """Record that a run of this kind was completed, so its compiled code is stored."""
-    if not PLAIN:
-        user_cache.write_cache_file(_folder() / "kinds" / digest(kind), kind.encode())
+    if not IS_JIT_DISABLED:
+        path = _set_cache_folder() / "kinds" / hash_text(kind)
+        user_cache.write_cache_file(path, kind.encode())
 
 
 def has_run(kind: str) -> bool:
     """Return whether a run of this kind needs no compilation, since one was completed before."""
-    return PLAIN or any((one / "kinds" / digest(kind)).is_file() for one in _kept())
+    file_name = hash_text(kind)
+    return IS_JIT_DISABLED or any(
+        (folder / "kinds" / file_name).is_file() for folder in _list_code_folders()
+    )
 
 
-def _kept(own_code: Path | None = None) -> list:
+def _list_code_folders(machine_folder: Path | None = None) -> list:
     """List the folders of compiled code: that of this machine and, if any, that of the wheel."""
-    return [own_code or _placed()[0], *filter(None, [prebuilt.folder(sources)])]
+    wheel_folder = prebuilt.find_folder(hash_sources)
+    return [machine_folder or _choose_folder_once()[0], *filter(None, [wheel_folder])]
 
 
-def _generic(path: Path) -> machine.Code | None:
+def _load_prebuilt(path: Path) -> machine.LoadedFunction | None:
     """Load the code from the file of this name in the wheel; return None if there is none."""
-    found = prebuilt.folder(sources)
-    return found and machine.found(found / "code" / path.name)
+    folder = prebuilt.find_folder(hash_sources)
+    return folder and machine.load_file(folder / "code" / path.name)
 
 
-def _bytes_of(path: Path) -> bytes | None:
+def _read_bytes(path: Path) -> bytes | None:
+    """Return the content of a file; None if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError:
         return None
 
 
-def _prepared(say=None) -> Path:
+def _prepare_cache(report=None) -> Path:
     """Set the cache folder for numba too, and return it.
 
-    The callback `say` receives a message, once per process, if the folder is empty.
+    The callback `report` receives a message, once per process, if the folder is empty.
     """
-    folder = _folder()
-    if say is not None:
-        _told(say)
+    folder = _set_cache_folder()
+    if report is not None:
+        _report_once(report)
     return folder
 
 
 @cache
-def _folder() -> Path:
-    folder, elsewhere = _placed()
-    if elsewhere:
+def _set_cache_folder() -> Path:
+    """Return the cache folder, and make numba and child processes use it."""
+    folder, reason = _choose_folder_once()
+    if reason:
         os.environ["PATCHFEM_CACHE"] = str(folder.parents[1])  # for child processes
     else:
         cache_limit.mark_used(folder)
@@ -545,29 +610,34 @@ def _folder() -> Path:
     return folder
 
 
-def when_compiling(say) -> None:
-    """Register a callback that receives the message of `load` when a function is compiled."""
-    if say is not None:
-        _LISTENERS[:] = [say]
+def set_compile_callback(report) -> None:
+    """Set the callback that receives the message of `load` when a function is compiled."""
+    if report is not None:
+        _MESSAGE_CALLBACKS[:] = [report]
 
 
-def _tell() -> None:
-    for say in _LISTENERS:
-        _told(say)
+def _report_compilation() -> None:
+    for report in _MESSAGE_CALLBACKS:
+        _report_once(report)
 
 
 @cache
-def _told(say) -> None:
-    if not PLAIN and not any(
-        any(one.rglob(f"*.{ending}")) for one in _kept(_folder()) for ending in ("code", "nbi")
-    ):
-        why = _placed()[1] or describe_space_shortage(_folder() / "code", LEAST)
-        say(
-            "compiling the code of the simulation for this machine, "
-            + (
-                f"which takes 10 to 30 s at every command because the compiled code cannot be kept: {why}; set "
-                "PATCHFEM_CACHE to another folder"
-                if why
-                else "which takes 10 to 30 s and is needed only once"
-            )
+def _report_once(report) -> None:
+    """Report, once per callback, that code is compiled because the cache folder is empty."""
+    if IS_JIT_DISABLED or _has_code_files():
+        return
+    reason = _choose_folder_once()[1]
+    reason = reason or describe_space_shortage(_set_cache_folder() / "code", MIN_FREE_BYTES)
+    duration = "which takes 10 to 30 s and is needed only once"
+    if reason:
+        duration = (
+            f"which takes 10 to 30 s at every command because the compiled code cannot be kept: {reason}; set "
+            "PATCHFEM_CACHE to another folder"
         )
+    report(f"compiling the code of the simulation for this machine, {duration}")
+
+
+def _has_code_files() -> bool:
+    """Return whether a folder of compiled code contains a file of this package or of numba."""
+    folders = _list_code_folders(_set_cache_folder())
+    return any(any(folder.rglob(f"*.{end}")) for folder in folders for end in ("code", "nbi"))

@@ -10,85 +10,90 @@ from contextlib import suppress
 
 from numba.core import caching
 
-SEAL = 32  # bytes of the SHA-256 hash at the start of a file
+CHECKSUM_SIZE = 32  # bytes of the SHA-256 hash at the start of a file
 # The class is private in numba 0.61.
-LOCATOR = getattr(caching, "UserProvidedCacheLocator", None) or caching._UserProvidedCacheLocator
-# Private attributes of IndexDataCacheFile that Sealed uses; another version of numba may lack them.
-PARTS = ("_index_path", "_version", "_source_stamp")
+NUMBA_LOCATOR = (
+    getattr(caching, "UserProvidedCacheLocator", None) or caching._UserProvidedCacheLocator
+)
+# Private attributes of IndexDataCacheFile that ChecksummedFiles uses; another version of numba may lack them.
+NUMBA_ATTRIBUTES = ("_index_path", "_version", "_source_stamp")
 
 
-class Damaged(Exception):
+class DamagedFileError(Exception):
     """Cache file whose content does not match its checksum."""
 
 
-def kept_on_disk(function):
+def store_on_disk(function):
     """Make a numba dispatcher store its machine code in the cache folder, and return it."""
-    with suppress(Exception):  # source that is no file, which every process compiles
-        function._cache = Kept(function.py_func)
+    with suppress(Exception):  # a function without a source file is compiled by every process
+        function._cache = FaultTolerantCache(function.py_func)
     return function
 
 
-class Place(LOCATOR):
+class PackageLocator(NUMBA_LOCATOR):
     """Locator that stores numba's files in the cache folder of this package."""
 
     @classmethod
     def from_function(cls, py_func, py_file):
         """Return the locator of the cache files of a function."""
-        from . import _folder
+        from . import _set_cache_folder
 
-        here = cls(py_func, py_file)
-        here._cache_path = os.path.join(_folder(), cls.get_suitable_cache_subpath(py_file))
-        return here
-
-
-class Placed(caching.CompileResultCacheImpl):
-    """Description of what numba stores of a function, with `Place` as its only locator."""
-
-    _locator_classes = (Place,)
+        locator = cls(py_func, py_file)
+        subfolder = cls.get_suitable_cache_subpath(py_file)
+        locator._cache_path = os.path.join(_set_cache_folder(), subfolder)
+        return locator
 
 
-class Sealed(caching.IndexDataCacheFile):
+class PackageCacheImpl(caching.CompileResultCacheImpl):
+    """Description of what numba stores of a function, with `PackageLocator` as its only locator."""
+
+    _locator_classes = (PackageLocator,)
+
+
+class ChecksummedFiles(caching.IndexDataCacheFile):
     """Index and data files of numba that start with a hash of their content."""
 
     def _load_index(self) -> dict:
         try:
-            version, stamp, overloads = pickle.loads(_opened(self._index_path))
+            version, stamp, overloads = pickle.loads(_read_checked(self._index_path))
         except FileNotFoundError:
             return {}
         return overloads if (version, stamp) == (self._version, self._source_stamp) else {}
 
     def _save_index(self, overloads: dict) -> None:
-        self._seal(self._index_path, (self._version, self._source_stamp, overloads))
+        self._write_with_checksum(self._index_path, (self._version, self._source_stamp, overloads))
 
     def _load_data(self, name: str):
-        return pickle.loads(_opened(self._data_path(name)))
+        return pickle.loads(_read_checked(self._data_path(name)))
 
     def _save_data(self, name: str, data) -> None:
-        self._seal(self._data_path(name), data)
+        self._write_with_checksum(self._data_path(name), data)
 
-    def _seal(self, path: str, content) -> None:
+    def _write_with_checksum(self, path: str, content) -> None:
         data = self._dump(content)
         with self._open_for_write(path) as file:
             file.write(hashlib.sha256(data).digest() + data)
 
 
-def _opened(path: str) -> bytes:
+def _read_checked(path: str) -> bytes:
+    """Return the content of a file without its checksum; raise DamagedFileError if it does not match."""
     with open(path, "rb") as file:
-        seal, data = file.read(SEAL), file.read()
-    if seal != hashlib.sha256(data).digest():
-        raise Damaged(path)
+        checksum = file.read(CHECKSUM_SIZE)
+        data = file.read()
+    if checksum != hashlib.sha256(data).digest():
+        raise DamagedFileError(path)
     return data
 
 
-class Kept(caching.FunctionCache):
+class FaultTolerantCache(caching.FunctionCache):
     """Numba's cache of a function, whose errors never stop a run."""
 
-    _impl_class = Placed
+    _impl_class = PackageCacheImpl
 
     def __init__(self, py_func):
         super().__init__(py_func)
-        if all(hasattr(self._cache_file, name) for name in PARTS):
-            self._cache_file.__class__ = Sealed
+        if all(hasattr(self._cache_file, name) for name in NUMBA_ATTRIBUTES):
+            self._cache_file.__class__ = ChecksummedFiles
 
     def load_overload(self, sig, target_context):
         """Load the code for these types; return None if there is none or its file is damaged.

@@ -29,10 +29,10 @@ def mark_used(folder: Path) -> None:
         if is_new or time() - folder.stat().st_mtime > MARK_INTERVAL:
             os.utime(folder)
         if is_new:
-            make_room(folder)
+            remove_old_folders(folder)
 
 
-def make_room(folder: Path, max_others: int = MAX_OTHER_FOLDERS) -> None:
+def remove_old_folders(folder: Path, max_others: int = MAX_OTHER_FOLDERS) -> None:
     """Remove the least recently used folders of compiled code beside this one.
 
     The `max_others` most recently used ones and those used in the last hour stay. Several processes may do this at
@@ -47,13 +47,13 @@ def make_room(folder: Path, max_others: int = MAX_OTHER_FOLDERS) -> None:
             and entry.name != folder.name
             and entry.is_dir(follow_symlinks=False)
         ):
-            others[Path(entry.path)] = last_use(Path(entry.path))
+            others[Path(entry.path)] = find_last_use(Path(entry.path))
     for other in sorted(others, key=others.get, reverse=True)[max_others:]:
         if time() - others[other] > MIN_UNUSED_TIME:
             _remove(other)
 
 
-def last_use(folder: Path) -> float:
+def find_last_use(folder: Path) -> float:
     """Return the time [s] of the last mark of a folder or change in it; 0 if it does not exist."""
     times = [0.0]
     with suppress(OSError):
@@ -67,7 +67,7 @@ def _remove(folder: Path) -> None:
     removed = folder.with_name(f".{folder.name}.{os.getpid()}.gone")
     with suppress(OSError):  # another process removed it first
         os.rename(folder, removed)
-        if time() - last_use(removed) < MIN_UNUSED_TIME and not folder.exists():
+        if time() - find_last_use(removed) < MIN_UNUSED_TIME and not folder.exists():
             os.rename(removed, folder)
             return
         shutil.rmtree(removed, ignore_errors=True)

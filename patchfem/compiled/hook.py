@@ -17,18 +17,19 @@ from shutil import copytree, ignore_patterns
 from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[2]
-ABOUT = """import platform, numba
-from patchfem.compiled import prebuilt, sources
-if not prebuilt.runs_here():
-    raise SystemExit('this CPU lacks what the machine code asks for')
-print(prebuilt.CPUS[platform.machine()].name, prebuilt.key(sources))"""
-# command that compiles every kernel that it calls, even if running it as Python would cost less
-RUN = """import sys
+# program that prints the name of the common CPU in LLVM and the folder name KEY
+CPU_AND_KEY_PROGRAM = """import platform, numba
+from patchfem.compiled import hash_sources, prebuilt
+if not prebuilt.is_cpu_sufficient():
+    raise SystemExit('this CPU lacks instruction sets of the machine code')
+print(prebuilt.COMMON_CPUS[platform.machine()].name, prebuilt.compute_key(hash_sources))"""
+# program that compiles every kernel that it calls, even if running it as Python would cost less
+COMPILE_PROGRAM = """import sys
 from patchfem import compiled
 from patchfem.__main__ import main
-compiled.PATIENCE = -1.0
+compiled.MAX_PYTHON_SECONDS = -1.0
 main(sys.argv[1:])"""
-RIG = """
+RIG_TEXT = """
 [normal]
 load = "26 lbf"
 [structure]
@@ -39,8 +40,10 @@ frequency = "143 Hz"
 damping = 0.003
 slide = 1.0
 """
-SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "990 Hz"\ndamping = 0.01\nslide = 0.1\n'
-DRIVEN = """[drive]
+SECOND_MODE_TEXT = (
+    '[[structure.mode]]\nname = "second"\nfrequency = "990 Hz"\ndamping = 0.01\nslide = 0.1\n'
+)
+DRIVE_TEXT = """[drive]
 kind = "base"
 frequency = "143 Hz"
 acceleration = "5 g"
@@ -48,7 +51,7 @@ cycles = 20
 [friction]
 static = 0.3
 law = """
-LAWS = (
+LAW_TEXTS = (
     '"coulomb"',
     '"elastic-plastic"\nbond_length = "1 um"',
     '"nonlocal"\nbond_length = "1 um"',
@@ -59,28 +62,28 @@ LAWS = (
 )
 
 
-def usual(place: Path):
+def list_usual_commands(folder: Path):
     """Yield the arguments of commands that call the usual kernels.
 
     These are runs of the rig in `studies`, runs of rigs with each friction law, and two sweeps. Their scenes are written
-    into the folder `place`.
+    into this folder.
     """
     yield "run", ROOT / "studies" / "rig" / "rig.toml"
-    for at, (modes, law) in enumerate(product(("", SECOND), LAWS)):
-        scene = place / f"{at}.toml"
-        scene.write_text(f"{RIG}{modes}{DRIVEN}{law}\n", "utf-8")
+    for number, (modes, law) in enumerate(product(("", SECOND_MODE_TEXT), LAW_TEXTS)):
+        scene = folder / f"{number}.toml"
+        scene.write_text(f"{RIG_TEXT}{modes}{DRIVE_TEXT}{law}\n", "utf-8")
         yield "run", scene
-    for at in range(2):  # laws for which a sweep integrates many cases at once
-        yield "sweep", place / f"{at}.toml", "--over", "drive.acceleration=3 g..6 g:64"
+    for number in range(2):  # laws for which a sweep integrates many cases at once
+        yield "sweep", folder / f"{number}.toml", "--over", "drive.acceleration=3 g..6 g:64"
 
 
-def made(place: Path, commands=usual) -> None:
-    """Compile the kernels that some commands call for a common CPU, into the folder `place`/KEY.
+def build_machine_code(target: Path, commands=list_usual_commands) -> None:
+    """Compile the kernels that some commands call for a common CPU, into the folder `target`/KEY.
 
     Parameters
     ----------
-    place : Path
-        Folder; KEY is the hash `prebuilt.key`.
+    target : Path
+        Folder; KEY is the hash `prebuilt.compute_key`.
     commands : callable
         Generator of the arguments of the commands, which takes a folder for their scenes.
 
@@ -89,6 +92,7 @@ def made(place: Path, commands=usual) -> None:
     CalledProcessError
         If a command fails.
     """
+    python = [sys.executable, "-P", "-c"]
     with TemporaryDirectory() as work:
         cache = Path(work) / "cache"
         environment = os.environ | {
@@ -97,23 +101,23 @@ def made(place: Path, commands=usual) -> None:
             "PYTHONPATH": str(ROOT),
         }
         cpu, key = subprocess.run(
-            [sys.executable, "-P", "-c", ABOUT],
+            [*python, CPU_AND_KEY_PROGRAM],
             env=environment,
             cwd=work,
             check=True,
             stdout=subprocess.PIPE,
             text=True,
         ).stdout.split()
-        for at, words in enumerate(commands(Path(work))):
+        for number, arguments in enumerate(commands(Path(work))):
             subprocess.run(
-                [sys.executable, "-P", "-c", RUN, *map(str, words), "-q", "-o", f"{work}/{at}"],
+                [*python, COMPILE_PROGRAM, *map(str, arguments), "-q", "-o", f"{work}/{number}"],
                 env=environment | {"NUMBA_CPU_NAME": cpu},
                 cwd=work,
                 check=True,
             )
-        [found] = (cache / "patchfem").iterdir()
-        for part in ("code", "kinds"):
-            copytree(found / part, place / key / part, ignore=ignore_patterns("*.lock"))
+        [compiled_folder] = (cache / "patchfem").iterdir()
+        for name in ("code", "kinds"):
+            copytree(compiled_folder / name, target / key / name, ignore=ignore_patterns("*.lock"))
 
 
 def get_build_hook():
@@ -131,7 +135,7 @@ def get_build_hook():
             if version == "editable" or os.environ.get("PATCHFEM_MACHINE_CODE", "0") in ("", "0"):
                 return
             self.work = TemporaryDirectory()
-            made(Path(self.work.name))
+            build_machine_code(Path(self.work.name))
             build_data["force_include"][self.work.name] = "patchfem/compiled/generic"
             build_data["pure_python"] = False
             machine = sysconfig.get_platform().replace("-", "_").replace(".", "_")

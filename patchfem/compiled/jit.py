@@ -18,21 +18,22 @@ from numba.core.options import DefaultOptions
 from numba.core.registry import CPUDispatcher
 from numba.core.types.functions import BaseFunction
 
-from .cache_files import kept_on_disk
-from .pass_by_reference import held
+from .cache_files import store_on_disk
+from .pass_by_reference import get_argument_type
 
-# options of numba that omit the wrappers through which C and Python call a function
-NO_C, NO_PYTHON = (
-    {flag: True} if hasattr(DefaultOptions, flag) else {}
-    for flag in ("no_cfunc_wrapper", "no_cpython_wrapper")
+# Option of numba that omits the wrapper through which C calls a function.
+NO_C_WRAPPER = {"no_cfunc_wrapper": True} if hasattr(DefaultOptions, "no_cfunc_wrapper") else {}
+# Option of numba that omits the wrapper through which Python calls a function.
+NO_PYTHON_WRAPPER = (
+    {"no_cpython_wrapper": True} if hasattr(DefaultOptions, "no_cpython_wrapper") else {}
 )
 # Functions that allocate nothing need no reference counting, which took 1.3 of the 1.6 us of a time step.
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 # Functions that only compiled code calls need no wrappers, which take most of their compile time.
-NJIT_INTERNAL = NJIT_NO_REFCOUNT | NO_C | NO_PYTHON
+NJIT_INTERNAL = NJIT_NO_REFCOUNT | NO_C_WRAPPER | NO_PYTHON_WRAPPER
 # Numba's passes that the kernels need. The omitted ones handle closures, generators, `with`, lists, raise and array
 # expressions, which no kernel contains; they took a seventh of the compile time of a loop.
-PASSES = [
+NUMBA_PASSES = [
     getattr(home, name, None)
     for home, names in (
         (
@@ -60,7 +61,8 @@ PASSES = [
     )
     for name in names
 ]
-HOOKS = (
+# private methods of numba's JITCodeLibrary that the libraries below replace or call
+LIBRARY_METHODS = (
     "_optimize_final_module",
     "_finalize_final_module",
     "_finalize_dynamic_globals",
@@ -75,58 +77,58 @@ def njit(cache: bool = False, **options):
     ----------
     cache : bool
         Whether the machine code is stored on disk, as by `numba.njit`. Other functions are compiled only within their
-        callers; if this version of numba lacks the methods `HOOKS`, `numba.njit` compiles them.
+        callers; if this version of numba lacks the methods `LIBRARY_METHODS`, `numba.njit` compiles them.
     **options
         Options of `numba.njit`.
     """
     if numba.config.DISABLE_JIT:
         return lambda function: function
-    if cache or not all(hasattr(JITCodeLibrary, name) for name in HOOKS):
-        made = numba.njit(**NO_C, **options)
-        return (lambda function: kept_on_disk(made(function))) if cache else made
-    return lambda function: Inner(
-        function, {}, {"nopython": True, "boundscheck": None, **options}, Inside
-    )
+    if cache or not all(hasattr(JITCodeLibrary, name) for name in LIBRARY_METHODS):
+        decorate = numba.njit(**NO_C_WRAPPER, **options)
+        return (lambda function: store_on_disk(decorate(function))) if cache else decorate
+    options = {"nopython": True, "boundscheck": None, **options}
+    return lambda function: InlinedDispatcher(function, {}, options, UnoptimisedCompiler)
 
 
-def _remembered(ask):
+def _memoize_call_types(method):
     """Memoize the method `get_call_type`, by which numba resolves a call of a built-in function.
 
     Numba tries all overloads of the function, some dozens for a sum of two numbers, at each of the 4000 calls of a
     loop, which took a seventh of its compile time. A signature that depends on more than the types of the arguments is
     not stored: that of an overload written in Python, which numba compiles with the flags of the caller.
     """
-    known = {}
+    signatures = {}
 
-    @wraps(ask)
-    def meant(self, context, args, kws):
+    @wraps(method)
+    def get_call_type(self, context, args, kws):
         key = self, tuple(args)
-        if not kws and key in known:
-            signature = known[key]
+        if not kws and key in signatures:
+            signature = signatures[key]
             self._impl_keys[signature.args] = self.typing_key
             return signature
-        signature = ask(self, context, args, kws)
+        signature = method(self, context, args, kws)
         if (
             not kws
             and signature is not None
             and self._impl_keys.get(signature.args) is self.typing_key
         ):
-            known[key] = signature
+            signatures[key] = signature
         return signature
 
-    return meant
+    return get_call_type
 
 
 if all(hasattr(BaseFunction, name) for name in ("get_call_type", "get_impl_key")):
-    BaseFunction.get_call_type = _remembered(BaseFunction.get_call_type)
+    BaseFunction.get_call_type = _memoize_call_types(BaseFunction.get_call_type)
 
 
-class Inner(CPUDispatcher):
+class InlinedDispatcher(CPUDispatcher):
     """Dispatcher of a function that is compiled only within the compiled functions that call it."""
 
     def __init__(self, function, names, options, compiler):
-        super().__init__(function, names, options | NO_C | NO_PYTHON, compiler)
-        self._alone, self._kept = CPUDispatcher(function, names, options | NO_C), False
+        super().__init__(function, names, options | NO_C_WRAPPER | NO_PYTHON_WRAPPER, compiler)
+        self._standalone = CPUDispatcher(function, names, options | NO_C_WRAPPER)
+        self._is_stored_on_disk = False
 
     def get_call_template(self, args, kws):
         """Resolve a call by the types of its arguments, not by the values of constants.
@@ -138,21 +140,21 @@ class Inner(CPUDispatcher):
         return super().get_call_template(args, kws)
 
     def __call__(self, *arguments):
-        return self._alone(*arguments)
+        return self._standalone(*arguments)
 
     def enable_caching(self):
         """Store the machine code for calls from Python on disk."""
-        if not self._kept:
-            kept_on_disk(self._alone)
-            self._kept = True
+        if not self._is_stored_on_disk:
+            store_on_disk(self._standalone)
+            self._is_stored_on_disk = True
 
-    def alone(self) -> CPUDispatcher:
+    def get_standalone(self) -> CPUDispatcher:
         """Return the dispatcher for calls from Python, whose machine code is stored on disk."""
         self.enable_caching()
-        return self._alone
+        return self._standalone
 
 
-def optimised(function, arguments: tuple) -> tuple:
+def compile_optimised(function, arguments: tuple) -> tuple:
     """Compile a function to optimised LLVM code, but not to machine code.
 
     This saves a tenth of the compile time.
@@ -171,43 +173,46 @@ def optimised(function, arguments: tuple) -> tuple:
     Raises
     ------
     NotImplementedError
-        If this version of numba lacks the methods `HOOKS`.
+        If this version of numba lacks the methods `LIBRARY_METHODS`.
     """
-    if not all(hasattr(JITCodeLibrary, name) for name in HOOKS):
+    if not all(hasattr(JITCodeLibrary, name) for name in LIBRARY_METHODS):
         raise NotImplementedError
-    bare = CPUDispatcher(
-        function.py_func, function.locals, function.targetoptions | NO_C | NO_PYTHON, Whole
+    options = function.targetoptions | NO_C_WRAPPER | NO_PYTHON_WRAPPER
+    dispatcher = CPUDispatcher(function.py_func, function.locals, options, OptimisedCompiler)
+    argument_types = tuple(
+        get_argument_type(dispatcher.typeof_pyval(argument)) for argument in arguments
     )
-    kinds = tuple(held(bare.typeof_pyval(one)) for one in arguments)
-    bare.compile(kinds)
-    return bare.targetctx, bare.overloads[kinds]
+    dispatcher.compile(argument_types)
+    return dispatcher.targetctx, dispatcher.overloads[argument_types]
 
 
-class Inside(Compiler):
+class UnoptimisedCompiler(Compiler):
     """Compiler that stops at LLVM code without optimisation, which callers link in."""
 
-    part = property(lambda self: Part)  # class of the library that holds the LLVM code
+    # class of the library that contains the LLVM code
+    library_class = property(lambda self: UnoptimisedLibrary)
 
     def define_pipelines(self):
-        self.state.library = self.part(
+        """Return the passes of numba that the kernels need, which write into this library."""
+        self.state.library = self.library_class(
             self.state.targetctx.codegen(), self.state.func_id.func_qualname
         )
-        if not all(PASSES):
+        if not all(NUMBA_PASSES):
             return super().define_pipelines()
         passes = PassManager("nopython")
-        for one in PASSES:
-            passes.add_pass(one, one.__name__)
+        for numba_pass in NUMBA_PASSES:
+            passes.add_pass(numba_pass, numba_pass.__name__)
         passes.finalize()
         return [passes]
 
 
-class Whole(Inside):
+class OptimisedCompiler(UnoptimisedCompiler):
     """Compiler that stops at optimised LLVM code of a function and all that it calls."""
 
-    part = property(lambda self: Optimised)
+    library_class = property(lambda self: OptimisedLibrary)
 
 
-class Part(JITCodeLibrary):
+class UnoptimisedLibrary(JITCodeLibrary):
     """LLVM code of a function before optimisation, which is linked into its callers."""
 
     # Without machine code, no environment of Python objects has to be registered.
@@ -216,10 +221,10 @@ class Part(JITCodeLibrary):
     def _optimize_functions(self, module):
         """Run the LLVM passes for single functions on every function that has a body."""
         module.data_layout = self._codegen._data_layout
-        for one in module.functions:
-            if not one.is_declaration:
+        for function in module.functions:
+            if not function.is_declaration:
                 passes, builder = self._codegen._function_pass_manager()
-                passes.run(one, builder)
+                passes.run(function, builder)
 
     def _optimize_final_module(self):
         pass
@@ -229,11 +234,12 @@ class Part(JITCodeLibrary):
         self._finalized = True
 
     def get_pointer_to_function(self, name):
+        """Return 0 for the address of any function, because there is no machine code."""
         self._ensure_finalized()
         return 0
 
 
-class Optimised(Part):
+class OptimisedLibrary(UnoptimisedLibrary):
     """LLVM code of a function and of all that it calls; it is optimised but has no address."""
 
     def _optimize_final_module(self):

@@ -2,10 +2,10 @@
 
 Numba takes half a second before it can load a function from its cache, because it imports its whole compiler. So the
 machine code of a function is stored a second time, together with an entry function that reads the arguments from a
-buffer of 8-byte words (status, results, then arguments as numba flattens them). `found` loads this file by llvmlite.
+buffer of 8-byte words (status, results, then arguments as numba flattens them). `load_file` loads this file by llvmlite.
 
 This is possible for functions of floats, integers, arrays and tuples of these that call only the C library. For other
-functions `keep` writes nothing, and numba loads them from its cache. A file consists of one line of JSON and an object
+functions `store_code` writes nothing, and numba loads them from its cache. A file consists of one line of JSON and an object
 file.
 """
 
@@ -15,136 +15,182 @@ import json
 import os
 import struct
 import threading
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from ..disk import user_cache
 
-FINE = (0, -2)  # status codes of numba for success: the function returned a value, or None
-NUMBERS = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
-_KINDS = {}  # (dtype, dimensions, flags) of an array -> (type code, packer of words, is C-contiguous and writeable)
-PARTS = 12  # number of tuples whose words are cached, because a run passes the same tuples in many calls
+SUCCESS_CODES = (0, -2)  # status codes of numba for success: a function returned a value, or None
+# type code of `struct` for each type of number that a function takes
+NUMBER_CODES = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
+_ARRAY_FORMATS = {}  # (dtype, dimensions, flags) of an array -> its `ArrayFormat`
+MAX_CACHED_TUPLES = 12  # tuples whose words are cached; a run passes the same few in many calls
 
 
-class Unfit(Exception):
+class UnsupportedError(Exception):
     """Function or argument that this module does not support."""
 
 
-class Words:
+class ArgumentConverter:
     """Conversion of arguments to words, with a cache of tuples, whose fields never change."""
 
     def __init__(self):
-        self.known, self.lock = {}, threading.Lock()
+        self.known_tuples = {}
+        self.lock = threading.Lock()
 
-    def of(self, value) -> tuple:
-        """Return the type code and the words (bytes) of an argument; raise Unfit for other types.
+    def convert(self, value) -> tuple:
+        """Return the type code and the words (bytes) of an argument; raise UnsupportedError for other types.
 
         A tuple that contains only numbers is not cached.
         """
-        kind = NUMBERS.get(type(value))
-        if kind is not None:
-            return kind, struct.pack(kind, value)
+        code = NUMBER_CODES.get(type(value))
+        if code is not None:
+            return code, struct.pack(code, value)
         if isinstance(value, np.ndarray):
-            return _of_array(value)
+            return _convert_array(value)
         if not isinstance(value, tuple):
-            raise Unfit
-        held = self.known.get(id(value))
-        if held is None:
-            kinds, words = zip(*(self.of(one) for one in value)) if value else ((), ())
-            held = value, f"{type(value).__name__}({','.join(kinds)})", b"".join(words)
+            raise UnsupportedError
+        known = self.known_tuples.get(id(value))
+        if known is None:
+            codes, words = zip(*map(self.convert, value)) if value else ((), ())
+            # the tuple itself is cached too, so that no other object gets its `id`
+            known = value, f"{type(value).__name__}({','.join(codes)})", b"".join(words)
             # a tuple of numbers is made for a single call and would displace others from the cache
-            if all(map(NUMBERS.__contains__, map(type, value))):
-                return held[1:]
+            if all(map(NUMBER_CODES.__contains__, map(type, value))):
+                return known[1:]
             with self.lock:
-                self.known[id(value)] = held
-                while len(self.known) > PARTS:
-                    del self.known[next(iter(self.known))]
-        return held[1:]
+                self.known_tuples[id(value)] = known
+                while len(self.known_tuples) > MAX_CACHED_TUPLES:
+                    del self.known_tuples[next(iter(self.known_tuples))]
+        return known[1:]
 
 
-def _of_array(value) -> tuple:
-    flags, count = value.flags, value.ndim
-    held = _KINDS.get((value.dtype, count, flags.num))
-    if held is None:
-        order = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
-        kind = f"{value.dtype.str}{count}{order}{'' if flags.writeable else 'r'}{'' if flags.aligned else 'u'}"
-        held = kind, struct.Struct(f"{5 + 2 * count}q").pack, order == "C" and flags.writeable
-        _KINDS[value.dtype, count, flags.num] = held
-    kind, pack, plain = held
+class ArrayFormat(NamedTuple):
+    """Conversion of arrays of one type to words.
+
+    - type_code: dtype, number of dimensions, memory order, and "r" for read-only or "u" for unaligned arrays
+    - pack: function that packs the words
+    - is_buffer: whether the array is C-contiguous and writeable, so `ctypes` can take its address
+    """
+
+    type_code: str
+    pack: Callable
+    is_buffer: bool
+
+
+def _convert_array(array) -> tuple:
+    """Return the type code and the words (bytes) of an array."""
+    key = array.dtype, array.ndim, array.flags.num
+    known = _ARRAY_FORMATS.get(key)
+    if known is None:
+        known = _ARRAY_FORMATS[key] = _make_array_format(array)
     # `__array_interface__` takes 3 us, which matters in a short call
-    there = (
-        ctypes.addressof(ctypes.c_char.from_buffer(value))
-        if plain and value.size
-        else value.__array_interface__["data"][0]
-    )
-    return kind, pack(0, 0, value.size, value.itemsize, there, *value.shape, *value.strides)
+    if known.is_buffer and array.size:
+        address = ctypes.addressof(ctypes.c_char.from_buffer(array))
+    else:
+        address = array.__array_interface__["data"][0]
+    words = known.pack(0, 0, array.size, array.itemsize, address, *array.shape, *array.strides)
+    return known.type_code, words
 
 
-class Code:
-    """Loaded machine code of a function; a call takes the words of its arguments as bytes."""
+def _make_array_format(array) -> ArrayFormat:
+    flags = array.flags
+    order = "A"
+    if flags.c_contiguous:
+        order = "C"
+    elif flags.f_contiguous:
+        order = "F"
+    restrictions = ("" if flags.writeable else "r") + ("" if flags.aligned else "u")
+    type_code = f"{array.dtype.str}{array.ndim}{order}{restrictions}"
+    pack = struct.Struct(f"{5 + 2 * array.ndim}q").pack
+    return ArrayFormat(type_code, pack, order == "C" and flags.writeable)
 
-    def __init__(self, address: int, results, nogil: bool = False):
+
+class LoadedFunction:
+    """Loaded machine code of a function; a call takes the words of its arguments as bytes.
+
+    Parameters
+    ----------
+    address : int
+    result_format : str or list
+        Format of the result (`_describe_result`).
+    nogil : bool
+        Whether the function releases the global interpreter lock.
+    """
+
+    def __init__(self, address: int, result_format, *, nogil: bool = False):
         # CFUNCTYPE releases the global interpreter lock during the call, PYFUNCTYPE keeps it
-        kind = ctypes.CFUNCTYPE if nogil else ctypes.PYFUNCTYPE
-        self.call = kind(None, ctypes.c_void_p)(address)
-        self.results, self.leaves = results, _leaves(results)
-        self.front = bytes(8 * (1 + max(len(self.leaves), 1)))
+        prototype = ctypes.CFUNCTYPE if nogil else ctypes.PYFUNCTYPE
+        self.call = prototype(None, ctypes.c_void_p)(address)
+        self.result_format = result_format
+        self.flat_format = _flatten_format(result_format)
+        # words of the status and of the results, which precede the arguments
+        self.header = bytes(8 * (1 + max(len(self.flat_format), 1)))
 
     def __call__(self, words: bytes):
         """Call the function and return its result; raise RuntimeError if it raised an exception."""
-        row = bytearray(self.front + words)
-        self.call(ctypes.addressof(ctypes.c_char.from_buffer(row)))
-        status = struct.unpack_from("q", row)[0]
-        if status not in FINE:
+        buffer = bytearray(self.header + words)
+        self.call(ctypes.addressof(ctypes.c_char.from_buffer(buffer)))
+        status = struct.unpack_from("q", buffer)[0]
+        if status not in SUCCESS_CODES:
             raise RuntimeError(f"compiled code ended with status {status}")
-        return _shaped(self.results, iter(struct.unpack_from(self.leaves, row, 8)))
+        values = struct.unpack_from(self.flat_format, buffer, 8)
+        return _build_result(self.result_format, iter(values))
 
 
-def _leaves(results) -> str:
-    return results if isinstance(results, str) else "".join(map(_leaves, results))
+def _flatten_format(result_format) -> str:
+    """Return the format of the numbers of a result in their order in memory."""
+    if isinstance(result_format, str):
+        return result_format
+    return "".join(map(_flatten_format, result_format))
 
 
-def _shaped(results, values):
-    if results == "":
+def _build_result(result_format, values):
+    """Return a result of this format from an iterator over its numbers."""
+    if result_format == "":
         return None
-    return (
-        next(values) if isinstance(results, str) else tuple(_shaped(one, values) for one in results)
-    )
+    if isinstance(result_format, str):
+        return next(values)
+    return tuple(_build_result(element, values) for element in result_format)
 
 
-def found(path: Path) -> Code | None:
+def load_file(path: Path) -> LoadedFunction | None:
     """Load the function of a file; return None if there is no usable file.
 
     The file may be missing or damaged, or contain code that this machine cannot run.
     """
     try:
-        return loaded(path.read_bytes())
+        return load_code(path.read_bytes())
     except OSError:
         return None
 
 
-def loaded(content: bytes) -> Code | None:
+def load_code(content: bytes) -> LoadedFunction | None:
     """Load a function from the content of its file; return None if this machine cannot use it."""
     try:
         line, _, code = content.partition(b"\n")
-        about = json.loads(line)
-        whole = about["sha256"] == hashlib.sha256(code).hexdigest()
-        if not (whole and os.name == "posix" and all(map(_in_c_library, about["calls"]))):
+        header = json.loads(line)
+        is_intact = header["sha256"] == hashlib.sha256(code).hexdigest()
+        if not (is_intact and os.name == "posix" and all(map(_is_in_c_library, header["calls"]))):
             return None
-        engine, binding = _engine()
+        engine, binding = _create_engine()
         engine.add_object_file(binding.ObjectFileRef.from_data(code))
         engine.finalize_object()
-        return Code(
-            engine.get_function_address(about["name"]), about["results"], about.get("nogil", False)
+        return LoadedFunction(
+            engine.get_function_address(header["name"]),
+            header["results"],
+            nogil=header.get("nogil", False),
         )
     except (ValueError, KeyError, ImportError, RuntimeError):
         return None
 
 
 @cache
-def _engine() -> tuple:
+def _create_engine() -> tuple:
     """Return the engine that owns loaded code and the binding module of llvmlite.
 
     Both are kept until the process ends, because loaded functions need them.
@@ -157,23 +203,26 @@ def _engine() -> tuple:
     return binding.create_mcjit_compiler(binding.parse_assembly(""), machine), binding
 
 
-def _in_c_library(name: str) -> bool:
+def _is_in_c_library(name: str) -> bool:
     """Return whether a function is in the C library and does not belong to Python or numba.
 
     Functions of Python and numba need more than a call: the interpreter or the run-time library of numba.
     """
-    return not name.lstrip("_").startswith(("Py", "NRT", "numba")) and hasattr(_process(), name)
+    return not name.lstrip("_").startswith(("Py", "NRT", "numba")) and hasattr(
+        _load_c_library(), name
+    )
 
 
 @cache
-def _process():
+def _load_c_library():
+    """Return the symbols of this process, which include those of the C library; none on Windows."""
     try:
         return ctypes.CDLL(None)
     except (OSError, TypeError):
         return object()
 
 
-def keep(path: Path, function, arguments: tuple) -> bool:
+def store_code(path: Path, function, arguments: tuple) -> bool:
     """Write the machine code of a compiled function to a file; return False on failure.
 
     Parameters
@@ -190,15 +239,14 @@ def keep(path: Path, function, arguments: tuple) -> bool:
         False if the file cannot be written or the code needs numba to run.
     """
     try:
-        made = function.overloads[tuple(map(function.typeof_pyval, arguments))]
-        return user_cache.write_cache_file(
-            path, _content(path.name, function.targetctx, made, function.targetoptions)
-        )
+        result = function.overloads[tuple(map(function.typeof_pyval, arguments))]
+        content = _make_file_content(path.name, function.targetctx, result, function.targetoptions)
+        return user_cache.write_cache_file(path, content)
     except Exception:  # numba and llvmlite may raise any; the run already has its function
         return False
 
 
-def make(path: Path, function, arguments: tuple, optimised) -> Code | None:
+def compile_and_store(path: Path, function, arguments: tuple, compiler) -> LoadedFunction | None:
     """Compile a function for such a file, write the file if possible, and load the code.
 
     Parameters
@@ -207,86 +255,91 @@ def make(path: Path, function, arguments: tuple, optimised) -> Code | None:
     function : numba dispatcher
     arguments : tuple
         Arguments whose types select the version to compile.
-    optimised : callable
-        `jit.optimised`; a parameter because importing `jit` imports numba.
+    compiler : callable
+        `jit.compile_optimised`; a parameter because importing `jit` imports numba.
 
     Returns
     -------
-    Code or None
+    LoadedFunction or None
         None if the function cannot be compiled in this way.
     """
     if os.name != "posix":
         return None
     try:
-        content = _content(path.name, *optimised(function, arguments), function.targetoptions)
+        target, result = compiler(function, arguments)
+        content = _make_file_content(path.name, target, result, function.targetoptions)
     except Exception:  # numba reports an error of the function at the call
         return None
     user_cache.write_cache_file(path, content)
-    return loaded(content)
+    return load_code(content)
 
 
-def _content(name: str, target, made, options: dict) -> bytes:
+def _make_file_content(file_name: str, target, result, options: dict) -> bytes:
     """Return the content of the file of this name for a function that numba compiled.
 
     Parameters
     ----------
-    name : str
-        File name, from which the name of the entry function is made.
+    file_name : str
+        The name of the entry function is made from it.
     target : numba target context
-    made : numba CompileResult
+    result : numba CompileResult
     options : dict
         Options of the function.
 
     Raises
     ------
-    Unfit
+    UnsupportedError
         If the function calls others than those of the C library.
     """
-    name = "patchfem_" + hashlib.sha256(name.encode()).hexdigest()[:16]
-    results = _results(made.signature.return_type)
-    code, calls = _code(target, made, name, max(len(_leaves(results)), 1))
-    if not all(map(_in_c_library, calls)):
-        raise Unfit
-    about = {
+    name = "patchfem_" + hashlib.sha256(file_name.encode()).hexdigest()[:16]
+    result_format = _describe_result(result.signature.return_type)
+    n_result_words = max(len(_flatten_format(result_format)), 1)
+    code, calls = _emit_object_code(target, result, name, n_result_words)
+    if not all(map(_is_in_c_library, calls)):
+        raise UnsupportedError
+    header = {
         "name": name,
-        "results": results,
+        "results": result_format,
         "calls": calls,
         "sha256": hashlib.sha256(code).hexdigest(),
         "nogil": bool(options.get("nogil")),
     }
-    return json.dumps(about).encode() + b"\n" + code
+    return json.dumps(header).encode() + b"\n" + code
 
 
-def _results(kind, inside: bool = False):
-    """Return the format of the result of a function; raise Unfit for other types.
+def _describe_result(kind):
+    """Return the format of the result of a function; raise UnsupportedError for other types.
 
     It is "d" for a float, "q" for an integer, "" for None, "?" for a boolean, and a list of formats for a tuple.
     """
     from numba.core import types
 
-    if kind == types.boolean and not inside:
+    if kind == types.boolean:
         return "?"
     if isinstance(kind, types.NoneType):
         return ""
     if isinstance(kind, types.BaseTuple):
-        return [_results(one, True) for one in kind]
-    if kind == types.float64 or (
-        isinstance(kind, types.Integer) and kind.bitwidth == 64 and kind.signed
-    ):
-        return "d" if kind == types.float64 else "q"
-    raise Unfit
+        # a boolean in a tuple takes one byte, not a word of eight
+        if types.boolean in kind.types:
+            raise UnsupportedError
+        return [_describe_result(element) for element in kind]
+    if kind == types.float64:
+        return "d"
+    if isinstance(kind, types.Integer) and kind.bitwidth == 64 and kind.signed:
+        return "q"
+    raise UnsupportedError
 
 
-def _code(target, made, name: str, results: int) -> tuple:
+def _emit_object_code(target, result, name: str, n_result_words: int) -> tuple:
     """Emit the object code of a function with an entry function, and list its external calls.
 
     Parameters
     ----------
     target : numba target context
-    made : numba CompileResult
+    result : numba CompileResult
     name : str
         Name of the entry function.
-    results : int
+    n_result_words : int
         Number of words of the results.
 
     Returns
@@ -296,52 +349,77 @@ def _code(target, made, name: str, results: int) -> tuple:
     calls : list of str
         Names of the external functions and variables that the code needs.
     """
-    from llvmlite import binding, ir
+    from llvmlite import binding
 
-    from .pass_by_reference import Held, words
-
-    whole = made.library._get_module_for_linking().clone()
-    inner, word = (
-        target.call_conv.get_function_type(made.signature.return_type, made.signature.args),
-        ir.IntType(64),
-    )
-    module = ir.Module()
-    module.triple, module.data_layout = whole.triple, whole.data_layout
-    called = ir.Function(module, inner, made.fndesc.llvm_func_name)
-    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [word.as_pointer()]), name)
-    build = ir.IRBuilder(entry.append_basic_block())
-    row, given, at, flat = entry.args[0], [], 1 + results, iter(inner.args[2:])
-    for taken in made.signature.args:
-        count = words(taken)
-        if isinstance(taken, Held):
-            given.append(build.bitcast(build.gep(row, [word(at)]), next(flat)))
-        else:
-            for k in range(count):
-                kind = next(flat)
-                if not isinstance(kind, (ir.PointerType, ir.DoubleType)) and kind != word:
-                    raise Unfit
-                given.append(
-                    build.load(build.bitcast(build.gep(row, [word(at + k)]), kind.as_pointer()))
-                )
-        at += count
-    answer = build.bitcast(build.gep(row, [word(1)]), inner.args[0])
-    fault = build.bitcast(build.alloca(ir.IntType(8).as_pointer()), inner.args[1])
-    build.store(build.sext(build.call(called, [answer, fault, *given]), word), row)
-    build.ret_void()
-
-    whole.link_in(binding.parse_assembly(str(module)))
-    for part in (*whole.functions, *whole.global_variables):
-        if not part.is_declaration and part.name != name:
-            part.linkage = "internal"
-    machine = target.codegen()._tm
+    linked = result.library._get_module_for_linking().clone()
+    entry_text = _write_entry_function(target, result, name, n_result_words, linked)
+    linked.link_in(binding.parse_assembly(entry_text))
+    for symbol in (*linked.functions, *linked.global_variables):
+        if not symbol.is_declaration and symbol.name != name:
+            symbol.linkage = "internal"
+    target_machine = target.codegen()._tm
     passes = binding.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()  # removes the wrapper for Python
-    passes.run(
-        whole, binding.create_pass_builder(machine, binding.create_pipeline_tuning_options())
-    )
+    options = binding.create_pipeline_tuning_options()
+    passes.run(linked, binding.create_pass_builder(target_machine, options))
     calls = [
-        part.name
-        for part in (*whole.functions, *whole.global_variables)
-        if part.is_declaration and not part.name.startswith("llvm.")
+        symbol.name
+        for symbol in (*linked.functions, *linked.global_variables)
+        if symbol.is_declaration and not symbol.name.startswith("llvm.")
     ]
-    return machine.emit_object(whole), calls
+    return target_machine.emit_object(linked), calls
+
+
+def _write_entry_function(target, result, name: str, n_result_words: int, linked) -> str:
+    """Return the LLVM code of the function that reads the arguments from the buffer of words.
+
+    Parameters
+    ----------
+    target, result, name, n_result_words
+        As in `_emit_object_code`.
+    linked : llvmlite module
+        Module with the code of the function, whose triple and data layout the entry function gets.
+
+    Raises
+    ------
+    UnsupportedError
+        If an argument is neither a pointer, a float nor a 64-bit integer.
+    """
+    from llvmlite import ir
+
+    from .pass_by_reference import ReferencedTuple, count_words
+
+    signature = result.signature
+    function_type = target.call_conv.get_function_type(signature.return_type, signature.args)
+    word = ir.IntType(64)
+    module = ir.Module()
+    module.triple = linked.triple
+    module.data_layout = linked.data_layout
+    function = ir.Function(module, function_type, result.fndesc.llvm_func_name)
+    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [word.as_pointer()]), name)
+    builder = ir.IRBuilder(entry.append_basic_block())
+    buffer = entry.args[0]
+    arguments = []
+    offset = 1 + n_result_words
+    # the first two arguments of a function of numba are the addresses of the result and of the exception
+    result_type, exception_type, *llvm_types = function_type.args
+    remaining_types = iter(llvm_types)
+    for argument_type in signature.args:
+        n_words = count_words(argument_type)
+        if isinstance(argument_type, ReferencedTuple):
+            address = builder.gep(buffer, [word(offset)])
+            arguments.append(builder.bitcast(address, next(remaining_types)))
+        else:
+            for k in range(n_words):
+                kind = next(remaining_types)
+                if not isinstance(kind, (ir.PointerType, ir.DoubleType)) and kind != word:
+                    raise UnsupportedError
+                address = builder.gep(buffer, [word(offset + k)])
+                arguments.append(builder.load(builder.bitcast(address, kind.as_pointer())))
+        offset += n_words
+    returned = builder.bitcast(builder.gep(buffer, [word(1)]), result_type)
+    exception = builder.bitcast(builder.alloca(ir.IntType(8).as_pointer()), exception_type)
+    status = builder.call(function, [returned, exception, *arguments])
+    builder.store(builder.sext(status, word), buffer)
+    builder.ret_void()
+    return str(module)

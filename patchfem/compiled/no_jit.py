@@ -10,38 +10,38 @@ from importlib.util import resolve_name
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
-PACKAGE = __name__.partition(".")[0]
-ROOT = Path(__file__).parents[2]  # folder that contains the package
+PACKAGE_NAME = __name__.partition(".")[0]
+SOURCE_FOLDER = Path(__file__).parents[2]  # folder that contains the package
 
 
-def _untouched(function=None, **options):
+def _return_unchanged(function=None, **options):
     """Return the function unchanged; this replaces the decorator `jit.njit`."""
-    return function if function is not None else lambda one: one
+    return function if function is not None else lambda decorated: decorated
 
 
 # stands for the module `jit` in kernel modules that are not compiled
-NJIT_INTERNAL = SimpleNamespace(njit=_untouched, NJIT_NO_REFCOUNT={}, NJIT_INTERNAL={})
+JIT_REPLACEMENT = SimpleNamespace(njit=_return_unchanged, NJIT_NO_REFCOUNT={}, NJIT_INTERNAL={})
 
 
-PLAIN = {}  # uncompiled kernel modules by full name
+UNCOMPILED_MODULES = {}  # uncompiled kernel modules by full name
 
 
-def plain(name: str) -> ModuleType:
+def load_uncompiled(name: str) -> ModuleType:
     """Return a kernel module without compilation.
 
     `name` is its full name, such as "patchfem.dynamics.modal_kernels".
     """
-    return retold(name, NJIT_INTERNAL, PLAIN)
+    return execute_with_jit(name, JIT_REPLACEMENT, UNCOMPILED_MODULES)
 
 
-def retold(name: str, inner, known: dict[str, ModuleType]) -> ModuleType:
+def execute_with_jit(name: str, replacement, known: dict[str, ModuleType]) -> ModuleType:
     """Execute the source of a kernel module with another object in place of the module `jit`.
 
     Parameters
     ----------
     name : str
         Full name of the module.
-    inner : object
+    replacement : object
         Replacement of `jit`, with its attributes that kernels import.
     known : dict
         Modules executed with this replacement, by full name; receives this module and those that it imports.
@@ -51,24 +51,31 @@ def retold(name: str, inner, known: dict[str, ModuleType]) -> ModuleType:
     ModuleType
     """
     if name not in known:
-        path = ROOT.joinpath(*name.split(".")).with_suffix(".py")
+        path = SOURCE_FOLDER.joinpath(*name.split(".")).with_suffix(".py")
         module = known[name] = ModuleType(name)
-        module.__file__, module.__package__ = str(path), name.rpartition(".")[0]
-        module.__builtins__ = vars(builtins) | {"__import__": partial(_bring, inner, known)}
+        module.__file__ = str(path)
+        module.__package__ = name.rpartition(".")[0]
+        importer = partial(_import_for_kernels, replacement, known)
+        module.__builtins__ = vars(builtins) | {"__import__": importer}
         exec(compile(path.read_text("utf-8"), str(path), "exec"), vars(module))
     return known[name]
 
 
-def _bring(inner, known: dict, name: str, names=None, locals=None, parts=(), level: int = 0):
-    """Import a module for a kernel module that `retold` executes, in place of `__import__`.
+def _import_for_kernels(
+    replacement, known: dict, name: str, globals=None, locals=None, fromlist=(), level: int = 0
+):
+    """Import a module for a kernel module that `execute_with_jit` executes, in place of `__import__`.
 
-    Kernel modules are executed with the same replacement `inner` of `jit`; Python imports all other modules.
+    Kernel modules are executed with the same `replacement` of `jit`; Python imports all other modules.
     """
-    full = resolve_name("." * level + name, names["__package__"]) if level else name
-    if full == f"{PACKAGE}.compiled.jit":
-        return inner
-    if full.startswith(PACKAGE) and full.endswith("kernels"):
-        return retold(full, inner, known)
-    if parts and all(part.endswith("kernels") for part in parts):
-        return SimpleNamespace(**{part: retold(f"{full}.{part}", inner, known) for part in parts})
-    return builtins.__import__(name, names, locals, parts, level)
+    full = resolve_name("." * level + name, globals["__package__"]) if level else name
+    if full == f"{PACKAGE_NAME}.compiled.jit":
+        return replacement
+    if full.startswith(PACKAGE_NAME) and full.endswith("kernels"):
+        return execute_with_jit(full, replacement, known)
+    if fromlist and all(module.endswith("kernels") for module in fromlist):
+        modules = {
+            module: execute_with_jit(f"{full}.{module}", replacement, known) for module in fromlist
+        }
+        return SimpleNamespace(**modules)
+    return builtins.__import__(name, globals, locals, fromlist, level)

@@ -13,70 +13,68 @@ from numba.core.extending import register_model
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 
-WORD = 8  # bytes of a number in a tuple, and of each word that describes an array
+WORD_BYTES = 8  # bytes of a number in a tuple, and of each word that describes an array
 
 
-class Held(types.Type):
-    """Numba type of a named tuple passed by reference; `whole` is its type passed by value."""
+class ReferencedTuple(types.Type):
+    """Numba type of a named tuple passed by reference; `tuple_type` is its type passed by value."""
 
-    def __init__(self, whole):
-        self.whole = whole
-        super().__init__(f"Held[{whole.name}]")
-
-
-def held(kind):
-    """Return the type by which a function receives an argument: `Held` for a named tuple."""
-    return Held(kind) if isinstance(kind, types.BaseNamedTuple) else kind
+    def __init__(self, tuple_type):
+        self.tuple_type = tuple_type
+        super().__init__(f"ReferencedTuple[{tuple_type.name}]")
 
 
-def words(kind) -> int:
+def get_argument_type(kind):
+    """Return the type by which a function receives an argument: `ReferencedTuple` for a named tuple."""
+    return ReferencedTuple(kind) if isinstance(kind, types.BaseNamedTuple) else kind
+
+
+def count_words(kind) -> int:
     """Return the number of 8-byte words of a value of this type in memory."""
-    if isinstance(kind, Held):
-        return words(kind.whole)
+    if isinstance(kind, ReferencedTuple):
+        return count_words(kind.tuple_type)
     if isinstance(kind, types.BaseTuple):
-        return sum(map(words, kind.types))
+        return sum(map(count_words, kind.types))
     return 5 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
 
 
-@register_model(Held)
-class Address(models.PrimitiveModel):
-    """Data model of `Held`: the address of the tuple."""
+@register_model(ReferencedTuple)
+class ReferencedTupleModel(models.PrimitiveModel):
+    """Data model of `ReferencedTuple`: the address of the tuple."""
 
     def __init__(self, manager, kind):
         super().__init__(manager, kind, ir.IntType(8).as_pointer())
 
 
 @infer_getattr
-class Fields(AttributeTemplate):
-    """Typing of the attributes of `Held`."""
+class FieldTyping(AttributeTemplate):
+    """Typing of the attributes of `ReferencedTuple`."""
 
-    key = Held
+    key = ReferencedTuple
 
     def generic_resolve(self, kind, name):
         """Return the type of the field of this name; None if the tuple has no such field."""
-        return (
-            held(kind.whole.types[kind.whole.fields.index(name)])
-            if name in kind.whole.fields
-            else None
-        )
+        fields = kind.tuple_type.fields
+        if name not in fields:
+            return None
+        return get_argument_type(kind.tuple_type.types[fields.index(name)])
 
 
-@lower_getattr_generic(Held)
-def field(context, builder, kind, value, name):
+@lower_getattr_generic(ReferencedTuple)
+def load_field(context, builder, kind, value, name):
     """Generate the LLVM code that loads a field of a tuple passed by reference."""
-    at = kind.whole.fields.index(name)
-    place = builder.gep(
-        value, [ir.Constant(ir.IntType(64), WORD * sum(map(words, kind.whole.types[:at])))]
-    )
-    found = held(kind.whole.types[at])
-    if isinstance(found, Held):
-        return place
-    out = builder.load(
-        builder.bitcast(place, context.get_value_type(found).as_pointer()), align=WORD
-    )
+    field_types = kind.tuple_type.types
+    index = kind.tuple_type.fields.index(name)
+    offset = WORD_BYTES * sum(map(count_words, field_types[:index]))
+    address = builder.gep(value, [ir.Constant(ir.IntType(64), offset)])
+    field_type = get_argument_type(field_types[index])
+    if isinstance(field_type, ReferencedTuple):
+        return address
+    pointer_type = context.get_value_type(field_type).as_pointer()
+    loaded = builder.load(builder.bitcast(address, pointer_type), align=WORD_BYTES)
     module = builder.module
     family = module.add_metadata(["patchfem"])
     leaf = module.add_metadata(["field", family, ir.Constant(ir.IntType(64), 0)])
     zero, one = (ir.Constant(ir.IntType(64), n) for n in (0, 1))
-    out.set_metadata("tbaa", module.add_metadata([leaf, leaf, zero, one]))
-    return out
+    loaded.set_metadata("tbaa", module.add_metadata([leaf, leaf, zero, one]))
+    return loaded

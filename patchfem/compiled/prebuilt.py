@@ -18,17 +18,17 @@ from typing import NamedTuple
 
 from ..disk.installed import find_package_version
 
-HERE = Path(__file__).parent
+COMPILED_FOLDER = Path(__file__).parent
 
 
 class CommonCpu(NamedTuple):
     """Common CPU: its name in LLVM and the instruction sets that its code needs."""
 
     name: str
-    needs: tuple
+    instruction_sets: tuple
 
 
-CPUS = {  # common CPU for each value of `platform.machine()`
+COMMON_CPUS = {  # common CPU for each value of `platform.machine()`
     "x86_64": CommonCpu(
         "x86-64-v3", ("avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
     ),
@@ -37,13 +37,13 @@ CPUS = {  # common CPU for each value of `platform.machine()`
 }
 
 
-def key(sources) -> str:
+def compute_key(hash_sources) -> str:
     """Return the name KEY of the folder of code for this kind of machine.
 
-    `sources` is a function that returns the hash object of the kernels.
+    `hash_sources` is a function that returns the hash object of the kernels.
     """
-    digest = sources()
-    digest.update((HERE / "machine.py").read_bytes())
+    digest = hash_sources()
+    digest.update((COMPILED_FOLDER / "machine.py").read_bytes())
     digest.update(
         f"{find_package_version('numba')} {find_package_version('llvmlite')} {sys.platform} {platform.machine()}".encode()
     )
@@ -51,15 +51,15 @@ def key(sources) -> str:
 
 
 @cache
-def folder(sources) -> Path | None:
+def find_folder(hash_sources) -> Path | None:
     """Return the folder of code in the wheel; None if there is none that this CPU can run."""
-    if not (HERE / "generic").is_dir() or os.environ.get("NUMBA_BOUNDSCHECK"):
+    if not (COMPILED_FOLDER / "generic").is_dir() or os.environ.get("NUMBA_BOUNDSCHECK"):
         return None
-    found = HERE / "generic" / key(sources)
-    return found if found.is_dir() and runs_here() else None
+    folder = COMPILED_FOLDER / "generic" / compute_key(hash_sources)
+    return folder if folder.is_dir() and is_cpu_sufficient() else None
 
 
-def runs_here() -> bool:
+def is_cpu_sufficient() -> bool:
     """Return whether this CPU has the instruction sets of the common CPU of its kind."""
     from llvmlite import binding
 
@@ -67,6 +67,6 @@ def runs_here() -> bool:
         features = binding.get_host_cpu_features()
     except RuntimeError:  # LLVM does not know this CPU
         return False
-    return platform.machine() in CPUS and all(
-        features.get(name) for name in CPUS[platform.machine()].needs
+    return platform.machine() in COMMON_CPUS and all(
+        features.get(name) for name in COMMON_CPUS[platform.machine()].instruction_sets
     )

@@ -310,8 +310,8 @@ def _fit_poles(time, value, forced, poles, *ends) -> tuple:
     """
     room = _fit_workspace(forced.shape[1] + poles.size, poles.size, time.size)
     room[0][0, : forced.shape[1]] = forced.T
-    fit = compiled.kernels(KERNELS_MODULE).fit_sinusoids
-    fit.expect(
+    fit = compiled.get_kernel_module(KERNELS_MODULE).fit_sinusoids
+    fit.add_python_cost(
         EVALUATIONS_PER_FIT * SECONDS_PER_TERM * time.size * (forced.shape[1] + poles.size) ** 2
     )
     ends = np.array([*ends, MAX_STEPS] if ends else [0.0] * 4)

@@ -194,7 +194,7 @@ def _run(
         if model.wear is not None:
             result = measures.add_wear_measures(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
-        compiled.ran(compiled_kind(model, what.engine, what.unknowns))
+        compiled.record_run(compiled_kind(model, what.engine, what.unknowns))
     return _complete_result(with_self_checks(result), notes, begin, coarse, climbed, still)
 
 

@@ -43,7 +43,7 @@ class Law(NamedTuple):
 def load_kernels():
     """Return the compiled loops, from the folder of compiled code."""
     text = KERNELS.read_text("utf-8")
-    return compiled.written(f"report_methods_{compiled.digest(text)}", text)
+    return compiled.write_kernel_module(f"report_methods_{compiled.hash_text(text)}", text)
 
 
 def coulomb(limit: float, stick_speed: float = 0.0) -> Law:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scene_texts import KILOGRAM
 
 from patchfem import load
-from patchfem.compiled.no_jit import plain
+from patchfem.compiled.no_jit import load_uncompiled
 from patchfem.response.ringing import fit_ring, measure_ringing
 from patchfem.runs.run import run
 
@@ -65,7 +65,7 @@ def signal(t, omega, own, zeta, size=1.0, phase=0.3):
 
 def test_exact_the_basis_of_nearly_equal_sinusoids_is_orthonormal():
     """Poles that differ by 1e-5 of their frequency have columns that are parallel to 5 digits."""
-    kernels = plain("patchfem.response.ringing_kernels")
+    kernels = load_uncompiled("patchfem.response.ringing_kernels")
     columns, basis, corner = np.zeros((6, 200)), np.zeros((6, 200)), np.zeros((6, 6))
     poles = 50.0 * np.array([1, 0.02, 1 + 1e-5, 0.02, 1 + 2e-5, 0.02])
     kernels.fill_sinusoids(np.linspace(0, 1, 200), poles, columns, 0)

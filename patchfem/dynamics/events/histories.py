@@ -5,7 +5,7 @@ from math import ceil
 
 import numpy as np
 
-from ...compiled import kernels, load, when_compiling
+from ...compiled import get_kernel_module, load, set_compile_callback
 from ...core import (
     InitialState,
     ModalBasis,
@@ -128,7 +128,7 @@ def load_kernels(say=None) -> tuple:
 
     say: is called before they are compiled.
     """
-    when_compiling(say)
+    set_compile_callback(say)
     return tuple(load(f"{HERE}.{name}_kernels") for name in ("march", "dense", "read"))
 
 
@@ -154,10 +154,10 @@ def announce_runs(
     stiff = max((float(one.stiffness.sum()) for one in groups), default=0.0)
     shown = min(cycles, window)
     each = python_seconds(modes, drive, stiff, sum(one.stiffness.size for one in groups))
-    march.march.expect(runs * cycles * each)
-    march.stored_energy.expect(runs * each)
-    dense.evaluate_rows.expect(runs * shown * SAMPLES_PER_CYCLE * sample_seconds(modes))
-    read.read_rows.expect(PYTHON_READ_TIME_RATIO * runs * shown * each)
+    march.march.add_python_cost(runs * cycles * each)
+    march.stored_energy.add_python_cost(runs * each)
+    dense.evaluate_rows.add_python_cost(runs * shown * SAMPLES_PER_CYCLE * sample_seconds(modes))
+    read.read_rows.add_python_cost(PYTHON_READ_TIME_RATIO * runs * shown * each)
 
 
 def is_loop_kept(modes: ModalBasis, drive) -> bool:
@@ -171,8 +171,8 @@ def is_loop_kept(modes: ModalBasis, drive) -> bool:
     motion = np.zeros((2, modes.omega.size))
     rows = np.zeros((1, 1))
     memory = unstretched_memory(table, np.zeros(len(modal_system.interfaces)))
-    march = kernels(f"{HERE}.march_kernels").march
-    return march.is_kept(
+    march = get_kernel_module(f"{HERE}.march_kernels").march
+    return march.is_stored(
         (0.0, 0.0),
         motion,
         modal_system,

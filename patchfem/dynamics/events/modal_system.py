@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import kernels
+from ...compiled import get_kernel_module
 from ...core import ModalBasis, PatchfemError
 from .elements import ElementTable, Memory, unstretched_memory
 from .positions_kernels import HOLD, KIND, LEDGER, LIMIT, PREVIOUS, SEGMENT, TIME
@@ -16,7 +16,7 @@ WHOLE_TOL = 4e-15
 # positions of the first part of the revolutions per cycle, so that its product with a number of cycles is exact [bits]
 TURN_BITS = 24
 
-series = kernels("dynamics.events.series_kernels")
+series = get_kernel_module("dynamics.events.series_kernels")
 
 
 class ModalSystem(NamedTuple):

@@ -77,7 +77,7 @@ class Orbits:
             period_map, drive, near if self._is_compatible(near) else None
         )[0].point
         used, swing = self._march_half_period(drive, point, period_map.modal_system)
-        self.peak.expect(PYTHON_READ_TIME_RATIO * period_map.seconds / 2)
+        self.peak.add_python_cost(PYTHON_READ_TIME_RATIO * period_map.seconds / 2)
         high = self.peak.call_with_bound_args(
             self._bound_arguments("peak", period_map.modal_system, float(drive.moving)),
             self.rows[:used],
@@ -120,7 +120,7 @@ class Orbits:
         stop = (0.0, drive.period / 2)
         while True:
             period_map.start_period(drive, point)
-            self.march.expect(period_map.seconds / 2)
+            self.march.add_python_cost(period_map.seconds / 2)
             run_sums.ledger[:] = 0.0
             run_sums.phasors[:] = 0.0
             run_sums.limits[LIMIT.n_idle] = 0.0
@@ -144,11 +144,11 @@ class Orbits:
         key = (name, id(modal_system), moving)
         if key not in self.held:
             self.held[key] = (
-                self.peak.held(
+                self.peak.bind_arguments(
                     modal_system, period_map.time_state, moving, period_map.workspace, self.forces
                 )
                 if name == "peak"
-                else self.march.held(
+                else self.march.bind_arguments(
                     period_map.motion,
                     modal_system,
                     period_map.table,

@@ -245,9 +245,11 @@ class PeriodMap:
             marks[face, group, np.arange(2 * n, size)] = 1.0
         seen[0] = memory.n_slipping
         seen[1] = memory.n_groups
-        self.follow.expect(self.seconds * (SLOPE_COST_FACTOR if slopes else 1.0) / (1 + half))
+        self.follow.add_python_cost(
+            self.seconds * (SLOPE_COST_FACTOR if slopes else 1.0) / (1 + half)
+        )
         if size not in self.held:
-            self.held[size] = self.follow.held(
+            self.held[size] = self.follow.bind_arguments(
                 self.motion,
                 slope,
                 marks,

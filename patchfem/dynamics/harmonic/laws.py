@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import instance, load
+from ...compiled import instantiate, load
 from ...core import PatchfemError, frozen_array
 from ...friction.protocol import Element
 
@@ -30,13 +30,13 @@ def load_cycle_kernels():
 @cache
 def load_speed_kernels(law: str):
     """Return the loop over the samples for a compiled law without memory."""
-    return instance("dynamics.harmonic.speed_kernels", {"law": load(law)})
+    return instantiate("dynamics.harmonic.speed_kernels", {"law": load(law)})
 
 
 @cache
 def load_flow_kernels(law: str):
     """Return the loop over the samples for a compiled law with one number of memory."""
-    return instance("dynamics.harmonic.flow_kernels", {"law": load(law)})
+    return instantiate("dynamics.harmonic.flow_kernels", {"law": load(law)})
 
 
 class SampledForce(NamedTuple):

@@ -63,4 +63,6 @@ def law_of(laws: tuple):
         )
         + text
     )
-    return compiled.written(f"dynamics.interfaces.laws_{compiled.digest(text)}", text)
+    return compiled.write_kernel_module(
+        f"dynamics.interfaces.laws_{compiled.hash_text(text)}", text
+    )

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...compiled import instance, load
+from ...compiled import instantiate, load
 from . import rows_kernels as rows
 
 HERE = "dynamics.lanes"
@@ -85,12 +85,13 @@ def load_loop(law: str):
         return load(loop)
     kernels = f"{HERE}.yielding_kernels" if law == "yielding" else law_kernels(law)
     if has_one_stretch(law):
-        kernels = instance(f"{HERE}.flowing_kernels", {"friction": law})
-    parts = {"law": kernels, "lanes": instance(f"{HERE}.lane_kernels", {"law": kernels})}
+        kernels = instantiate(f"{HERE}.flowing_kernels", {"friction": law})
+    parts = {"law": kernels, "lanes": instantiate(f"{HERE}.lane_kernels", {"law": kernels})}
     others = {
-        name: instance(f"{HERE}.{name}_kernels", parts) for name in ("extrapolation", "observation")
+        name: instantiate(f"{HERE}.{name}_kernels", parts)
+        for name in ("extrapolation", "observation")
     }
-    return instance(loop, parts | others)
+    return instantiate(loop, parts | others)
 
 
 def law_kernels(law: str):
@@ -101,7 +102,7 @@ def law_kernels(law: str):
     if law in ("rigid", "yielding"):
         return None
     if law == "table":
-        return instance(f"{HERE}.masing_kernels", {"curve": f"{HERE}.table_curve_kernels"})
+        return instantiate(f"{HERE}.masing_kernels", {"curve": f"{HERE}.table_curve_kernels"})
     return load(f"{HERE}.{'flowing' if has_one_stretch(law) else law}_kernels")
 
 

@@ -1,7 +1,7 @@
 """The compiled loops: one instance of the text per contact, set of laws and load.
 
 `loop_kernels` runs with any contact, `interfaces.element_kernels` and its solver with any law. A law passed to a compiled
-function as an argument is never found on disk again, so `compiled.instance` writes the loop once per law instead.
+function as an argument is never found on disk again, so `compiled.instantiate` writes the loop once per law instead.
 """
 
 from functools import cache
@@ -22,10 +22,10 @@ def load_contact(kind: tuple):
     """Return the compiled contact of a ContactModel's kind (contact, law)."""
     contact, law = kind
     if contact == SHEARED_LISTS:
-        return compiled.instance(
+        return compiled.instantiate(
             contact,
             {
-                "solver": compiled.instance(
+                "solver": compiled.instantiate(
                     "dynamics.interfaces.shear_solve_kernels",
                     {"law": compiled.load("dynamics.interfaces.shear_lists_kernels")},
                 )
@@ -34,8 +34,8 @@ def load_contact(kind: tuple):
     if not law:
         return compiled.load(contact)
     law = compiled.load(law)
-    solver = compiled.instance("dynamics.interfaces.element_solve_kernels", {"law": law})
-    return compiled.instance(contact, {"law": law, "solver": solver})
+    solver = compiled.instantiate("dynamics.interfaces.element_solve_kernels", {"law": law})
+    return compiled.instantiate(contact, {"law": law, "solver": solver})
 
 
 @cache
@@ -66,7 +66,7 @@ def load_loop(
 
     Returns
     -------
-    Kernels
+    KernelModule
     """
     contact = load_contact(kind)
     named = {}
@@ -84,28 +84,30 @@ def load_loop(
     text = '"""Parts of a loop, written by patchfem.dynamics.march.instances."""\n\n' + "".join(
         f"{name} = {value}\n" for name, value in flags.items()
     )
-    parts = compiled.written(f"{FOLDER}.parts_{compiled.digest(text)}_kernels", text)
+    parts = compiled.write_kernel_module(f"{FOLDER}.parts_{compiled.hash_text(text)}_kernels", text)
     if laws:
         law = law_of(laws)
-        named["coupling"] = compiled.instance(
+        named["coupling"] = compiled.instantiate(
             f"{FOLDER}.faces_kernels",
             {
                 "law": law,
                 "contact": contact,
                 "parts": parts,
-                "solver": compiled.instance(
+                "solver": compiled.instantiate(
                     "dynamics.interfaces.element_solve_kernels", {"law": law}
                 ),
-                "together": compiled.instance(
+                "together": compiled.instantiate(
                     f"{FOLDER}.together_kernels", {"law": law, "parts": parts}
                 ),
             },
         )
     if load != STEADY:
-        named["pressing"] = compiled.instance(
+        named["pressing"] = compiled.instantiate(
             f"{FOLDER}.pressing_kernels", {"contact": contact, "parts": parts} | named
         )
-    return compiled.instance(f"{FOLDER}.loop_kernels", {"contact": contact, "parts": parts} | named)
+    return compiled.instantiate(
+        f"{FOLDER}.loop_kernels", {"contact": contact, "parts": parts} | named
+    )
 
 
 def march(model, *arguments) -> tuple:

@@ -723,7 +723,7 @@ class Run:
             )
             if rows is not table:
                 table = rows
-                held = kernels.march_folded_cycles.held(
+                held = kernels.march_folded_cycles.bind_arguments(
                     self.state,
                     self.modal_system,
                     rows,

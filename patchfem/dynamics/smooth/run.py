@@ -50,9 +50,11 @@ def load_loop(law: str, say=None):
     say: is called before it is compiled.
     """
     law = compiled.load(law, say)
-    steps = compiled.instance(f"{HERE}.step_kernels", {"law": law})
-    watch = compiled.instance(f"{HERE}.watch_kernels", {"law": law, "steps": steps})
-    return compiled.instance(f"{HERE}.loop_kernels", {"law": law, "steps": steps, "watch": watch})
+    steps = compiled.instantiate(f"{HERE}.step_kernels", {"law": law})
+    watch = compiled.instantiate(f"{HERE}.watch_kernels", {"law": law, "steps": steps})
+    return compiled.instantiate(
+        f"{HERE}.loop_kernels", {"law": law, "steps": steps, "watch": watch}
+    )
 
 
 @dataclass(frozen=True, eq=False, slots=True)

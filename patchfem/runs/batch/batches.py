@@ -251,7 +251,7 @@ def _solve_cases(
         try:
             out = batch.solve(models, say)
             if batch.compile and batch_compile_seconds(batch, models[0]):
-                compiled.ran(_kind(batch, models[0]))
+                compiled.record_run(_kind(batch, models[0]))
             return out
         except Exception as error:  # each case is run again by itself, which names the one at fault
             if say is not None:

@@ -316,7 +316,7 @@ def exact_cost(model: Model, numerics, points: int) -> Cost:
         "histories": cost_model.KEPT_EVENT_SAMPLE_SECONDS * kept_samples(numerics),
     }
     code = EVENT_CODE if model.rig.friction.interfaces else LINEAR_CODE
-    if _python_seconds(model) <= compiled.PATIENCE:
+    if _python_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
         # such a run takes 86 MB without machine code, and 152 MB with it, because it loads the LLVM
         # library
         loading = replace(

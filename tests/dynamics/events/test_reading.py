@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.compiled.no_jit import plain
+from patchfem.compiled.no_jit import load_uncompiled
 from patchfem.core import ModalBasis, SineDrive
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.elements import make_elements
@@ -11,7 +11,7 @@ from patchfem.dynamics.events.positions_kernels import INTERFACE, RUN
 from patchfem.response.loops import find_reversals, mean_half_range, secant_stiffness
 from patchfem.response.run_events import measure_rings
 
-read = plain("patchfem.dynamics.events.read_kernels")
+read = load_uncompiled("patchfem.dynamics.events.read_kernels")
 PLACE, WEIGHT = np.polynomial.legendre.leggauss(16)
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from patchfem.compiled.no_jit import plain
+from patchfem.compiled.no_jit import load_uncompiled
 
-series = plain("patchfem.dynamics.events.series_kernels")
+series = load_uncompiled("patchfem.dynamics.events.series_kernels")
 
 
 def test_exact_first_root_of_a_long_series_is_the_first_of_several():
