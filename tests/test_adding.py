@@ -95,6 +95,16 @@ def test_always_a_ripple_touches_at_its_crests(folder):
     )
 
 
+def test_refuses_a_shape_whose_table_has_no_key_for_its_piece(tmp_path):
+    """The table of a shape that somebody adds without `on` is not ignored: the scene has a mistake in its line."""
+    on = '    on: key(Piece, "the piece that carries the shape") = "upper"\n'
+    assert on in PAGE
+    adding.copied(tmp_path, PAGE.replace(on, ""))
+    (tmp_path / "waved.toml").write_text(WAVED, "utf-8")
+    with pytest.raises(AssertionError, match=r"waved.toml:7: contact.ripple: .* has no key `on`"):
+        adding.run(tmp_path, ["check waved.toml"])
+
+
 def test_always_a_drive_has_its_waveform_and_its_sweep(folder):
     """The base accelerates by 5 g for one second and then rests, and the sweep has each of its cases."""
     run = xarray.load_dataset(folder / "hold" / "result.nc")

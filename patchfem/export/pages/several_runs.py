@@ -35,7 +35,7 @@ CHARTS = (
     (
         "Levels",
         ("level_drive", "level"),
-        ("relative_displacement_amplitude", "displacement amplitude"),
+        ("level_relative_displacement_amplitude", "displacement amplitude"),
     ),
     (
         "Steady motions",
@@ -103,11 +103,10 @@ def _arrays(path: Path) -> dict:
 def page(runs: list) -> str:
     """Return the HTML page of several `FinishedRun`s; differences are relative to the first."""
     names = distinct([run.name for run in runs])
-    charts = [
-        one
-        for one in (_chart(number, *chart, runs, names) for number, chart in enumerate(CHARTS))
-        if one
-    ]
+    charts = []
+    for title, x, y in CHARTS:
+        for units, lines in _lines_by_units(x[0], y[0], runs, names).items():
+            charts.append(_chart(len(charts), title, (x, y), units, lines))
     outcomes = "; ".join(
         f"{escape(name)}: {escape(run.summary['outcome'])}" for name, run in zip(names, runs)
     )
@@ -148,40 +147,66 @@ def distinct(names: list) -> list:
     ]
 
 
-def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list) -> dict | None:
-    """Return the figure of all runs that have both variables; None if no run has them.
+class Line(NamedTuple):
+    """A line of a figure: the name of its run and its coordinates [SI]."""
+
+    name: str
+    x: np.ndarray
+    y: np.ndarray
+
+
+def _lines_by_units(x: str, y: str, runs: list, names: list) -> dict:
+    """Return the lines of all runs that have two variables, by the pair of their units.
+
+    The units of runs can differ: the levels of a drive are forces in one run and accelerations in
+    another one. Such lines cannot share an axis.
+
+    Parameters
+    ----------
+    x, y : str
+        Names of the variables.
+    runs : list of FinishedRun
+    names : list of str
+        Names of the runs on the page.
+
+    Returns
+    -------
+    dict
+        (unit of x, unit of y) -> list of Line, in the order of the runs.
+    """
+    lines = {}
+    for run, name in zip(runs, names):
+        if x not in run.arrays or y not in run.arrays:
+            continue
+        (a, unit_a), (b, unit_b) = run.arrays[x], run.arrays[y]
+        if a.shape != b.shape or not a.size:
+            continue
+        if "time" in run.arrays and run.arrays["time"][0].shape == a.shape:
+            late = _late(run)
+            a, b = a[late], b[late]
+            a = a - a[-1] if x == "time" else a
+        step = -(-a.size // POINTS)
+        lines.setdefault((unit_a, unit_b), []).append(Line(name, a[::step], b[::step]))
+    return lines
+
+
+def _chart(number: int, title: str, axes: tuple, units: tuple, lines: list) -> dict:
+    """Return a figure.
 
     Parameters
     ----------
     number : int
         Number of the figure.
     title : str
-    x, y : tuple
-        (variable, label).
-    runs : list of FinishedRun
-    names : list of str
+    axes : tuple
+        (variable, label) of x and of y.
+    units : tuple
+        Units of x and y that all lines have.
+    lines : list of Line
     """
-    lines = []
-    for run, name in zip(runs, names):
-        if x[0] not in run.arrays or y[0] not in run.arrays:
-            continue
-        (a, unit_a), (b, unit_b) = run.arrays[x[0]], run.arrays[y[0]]
-        if a.shape != b.shape or not a.size:
-            continue
-        if "time" in run.arrays and run.arrays["time"][0].shape == a.shape:
-            late = _late(run)
-            a, b = a[late], b[late]
-            a = a - a[-1] if x[0] == "time" else a
-        step = -(-a.size // POINTS)
-        lines.append((name, a[::step], b[::step]))
-    if not lines:
-        return None
-    (unit_a, scale_a), (unit_b, scale_b) = (
-        choose_axis_unit(np.concatenate([line[k] for line in lines]), unit)
-        if unit in UNIT_LADDERS
-        else (unit, 1.0)
-        for k, unit in ((1, unit_a), (2, unit_b))
-    )
+    x, y = axes
+    unit_a, scale_a = _axis_unit([line.x for line in lines], units[0])
+    unit_b, scale_b = _axis_unit([line.y for line in lines], units[1])
     peaks = ", ".join(
         f"{name} from {np.nanmin(b) * scale_b:.4g} to {np.nanmax(b) * scale_b:.4g}"
         for name, _, b in lines
@@ -204,6 +229,13 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
             for colour, (name, a, b) in zip(COLOURS * len(lines), lines)
         ],
     }
+
+
+def _axis_unit(arrays: list, unit: str) -> tuple:
+    """Return the unit (name, scale) of an axis that shows some arrays [SI]."""
+    if unit in UNIT_LADDERS:
+        return choose_axis_unit(np.concatenate(arrays), unit)
+    return unit, 1.0
 
 
 def period_of(run: FinishedRun) -> float | None:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
+from ...effects import GAP_SHAPES
 from ..keys.contact import Contact, outermost_strip_distance
 from .outlines import PIECE_NAMES, check_outlines, find_flat_length
 from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
@@ -191,6 +192,7 @@ def check_patches(draft: SceneDraft) -> None:
         facts = PatchFacts(draft, at, contact)
         check_outlines(facts)
         apply_rules(draft, PATCH_RULES, facts)
+        _check_shapes_have_a_piece(draft, at, contact)
         _check_coatings(facts)
         if contact.asperities is not None:
             check_selector(
@@ -200,6 +202,20 @@ def check_patches(draft: SceneDraft) -> None:
             _check_peaks(facts)
         if contact.load_line is not None:
             apply_rules(draft, LOAD_LINE_RULES, facts)
+
+
+def _check_shapes_have_a_piece(draft: SceneDraft, at: str, contact: Contact) -> None:
+    """Report gap shapes whose table lacks the key `on`, which `Contact.shapes` would leave out.
+
+    Only a shape that somebody adds to the package can lack this key.
+    """
+    for name in GAP_SHAPES:
+        if getattr(contact, name, None) is not None and name not in contact.shapes:
+            draft.add_mistake(
+                f"{at}.{name}",
+                f"[contact.{name}] is a gap shape, but its table has no key `on`, which names the piece with the "
+                "shape; add the key to the class of the table in scene/keys/contact.py",
+            )
 
 
 def _check_coatings(patch: PatchFacts) -> None:

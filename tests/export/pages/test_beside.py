@@ -4,8 +4,9 @@ import re
 
 import numpy as np
 import pytest
-from page_data import charts_of
+from page_data import charts_of, data_of
 
+import patchfem as pf
 from patchfem.core import Measure, PatchfemError
 from patchfem.export.netcdf import of_run, write
 from patchfem.export.pages.several_runs import page, read
@@ -18,6 +19,25 @@ frequency = "100 Hz"
 [[structure.mode]]
 name = "axial"
 frequency = "143 Hz"
+"""
+LEVELS = """[normal]
+load = "100 N"
+[friction]
+law = "coulomb"
+static = 0.3
+[structure]
+moving_mass = "10 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.01
+slide = 1
+[drive]
+kind = "{kind}"
+waveform = "levels"
+levels = ["{first} {unit}", "{last} {unit}"]
+frequency = "143 Hz"
+cycles = 10
 """
 
 
@@ -115,6 +135,26 @@ def test_always_runs_of_the_same_name_are_told_apart(tmp_path):
     (tmp_path / "y").mkdir()
     text = page([read(made(tmp_path / name / "out", 10.0, 2e-6, 1e-9)) for name in "xy"])
     assert "out (1)" in text and "out (2)" in text
+
+
+def test_always_levels_in_different_units_have_different_figures(tmp_path):
+    """A base of 5 and 10 m/s^2 acts like forces of 50 and 100 N on 10 kg; an axis shows one unit."""
+    drives = (("base", 5, 10, "m/s^2"), ("force", 50, 100, "N"), ("force", 40, 80, "N"))
+    runs = []
+    for number, (kind, first, last, unit) in enumerate(drives):
+        scene = LEVELS.format(kind=kind, first=first, last=last, unit=unit)
+        pf.run(scene).save(tmp_path / f"run{number}")
+        runs.append(read(tmp_path / f"run{number}"))
+    charts = data_of(page(runs))["charts"]
+    assert len({one["anchor"] for one in charts}) == len(charts)
+    levels = [one for one in charts if one["title"] == "Levels"]
+    assert [one["x"]["unit"] for one in levels] == ["g", "N"]
+    accelerations, forces = levels
+    assert [one["name"] for one in accelerations["marks"]] == ["run0"]
+    assert [one["name"] for one in forces["marks"]] == ["run1", "run2"]
+    assert accelerations["marks"][0]["x"] == pytest.approx([5 / 9.80665, 10 / 9.80665])
+    assert forces["marks"][0]["x"] == [50, 100] and forces["marks"][1]["x"] == [40, 80]
+    np.testing.assert_allclose(accelerations["marks"][0]["y"], forces["marks"][0]["y"], rtol=1e-6)
 
 
 def test_refuses_a_folder_without_results(tmp_path):
