@@ -1,9 +1,12 @@
-"""The commands as Python functions. `new` gives a scene to start from. `load` and `build` read one. `plan`, `run`,
-`sweep` and `cost` compute, and `run` returns a `Result`. `compare` compares two measured surfaces.
+"""The commands of the command line as Python functions.
 
     import patchfem as pf
     result = pf.run("scene.toml", **{"contact.tilt.angle": "1 mrad"})
     result.measures["loop_area"].value
+
+`new` returns a scene to start from, `load` and `build` read one. `plan`, `run`, `sweep`, `backbone`, `cost` and `fit`
+compute. `profile` and `compare` evaluate measured surfaces. `report`, `view`, `export`, `import_` and `mesh` read and
+write files. `run` returns a `Result`. The examples of the docstrings are run by a test.
 """
 
 from __future__ import annotations
@@ -106,99 +109,179 @@ __all__ = [
     "sweep",
     "view",
 ]
-TEXT, TABLES = "<text>", "<dict>"  # names of a scene that was given as a string, and as a dict
+TEXT_NAME = "<text>"  # name of a scene that was given as a string
+DICT_NAME = "<dict>"  # name of a scene that was given as a dict
 # start of messages that locates a mistake in --set or a dict; a Python program has neither
-PLACES = re.compile(rf"^(--set: |{TABLES}(:\d+)?: )", re.MULTILINE)
+LOCATION_PATTERN = re.compile(rf"^(--set: |{DICT_NAME}(:\d+)?: )", re.MULTILINE)
 
 
-def _by_key(function: Callable) -> Callable:
+def _name_keys_only(function: Callable) -> Callable:
     """Decorate a function so that its errors on a dict name only the key, not a file and line."""
 
+    def remove_location(text: Any) -> Any:
+        return LOCATION_PATTERN.sub("", text) if isinstance(text, str) else text
+
     @wraps(function)
-    def called(*args: Any, **more: Any) -> Any:
+    def call(*args: Any, **keywords: Any) -> Any:
         try:
-            return function(*args, **more)
+            return function(*args, **keywords)
         except PatchfemError as error:
-            error.args = tuple(
-                PLACES.sub("", one) if isinstance(one, str) else one for one in error.args
-            )
+            error.args = tuple(map(remove_location, error.args))
             if isinstance(error, SceneError):
-                error.mistakes = [PLACES.sub("", one) for one in error.mistakes]
+                error.mistakes = list(map(remove_location, error.mistakes))
             raise
 
-    return called
+    return call
 
 
-def _refuse_removed(function: Callable) -> Callable:
-    """Make a function refuse the arguments that were removed, in one sentence."""
+def _refuse_removed_options(function: Callable) -> Callable:
+    """Decorate a function so that it refuses removed arguments, in one sentence."""
 
     @wraps(function)
-    def called(*args: Any, **named: Any) -> Any:
+    def call(*args: Any, **keywords: Any) -> Any:
         verb = function.__name__
-        for name in named:
+        for name in keywords:
             if sentence := removed.describe_removed_option(verb, f"--{name}", f"{verb}: {name}"):
                 raise PatchfemError(sentence)
-        return function(*args, **named)
+        return function(*args, **keywords)
 
-    return called
+    return call
 
 
-@_by_key
+@_name_keys_only
 def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene:
     """Read a scene from a file, a text or a dict of its tables.
 
-    A Path, or a str without newline and bracket, is the name of a file; any other str is the text of a scene. A Scene
-    is returned with the sets applied. sets: keys with new values, passed as ``**{"contact.load": "26 lbf"}``. A value
-    is a text as in the scene, a number in SI, or a list of these. A plain number for a length is refused if it exceeds
-    the length of the patch or 1 m, because it was probably meant in millimetres; texts and radii are not checked in
-    this way. Raises SceneError, which lists every mistake.
+    Parameters
+    ----------
+    scene : path, str, dict or Scene
+        A Path, or a str without newline and bracket, is the name of a file. Any other str is the text of a scene. A Scene
+        is returned with the sets applied.
+    **sets
+        Keys with new values, passed as ``**{"contact.load": "26 lbf"}``. A value is a text as in the scene, a number in
+        SI, or a list of these. A plain number for a length is refused if it exceeds the length of the patch or 1 m, because
+        it was probably meant in millimetres; texts and radii are not checked in this way.
+
+    Returns
+    -------
+    Scene
+        The scene with checked values in SI.
+
+    Raises
+    ------
+    SceneError
+        If the scene has mistakes; it lists every mistake.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> scene = pf.load(pf.new("bench"), **{"normal.load": "26 lbf"})
+    >>> scene.kind, round(scene.normal.load, 2)
+    ('bench', 115.65)
     """
-    added = format_assignments(sets)
+    assignments = format_assignments(sets)
     if isinstance(scene, Mapping):
-        return require_units(
-            require_files(loads(format_scene(dict(scene)), TABLES, added)), {**scene, **sets}
-        )
+        loaded = require_files(loads(format_scene(dict(scene)), DICT_NAME, assignments))
+        return require_units(loaded, {**scene, **sets})
     if isinstance(scene, Scene):
-        return scene if not added else require_units(base_of(scene).override(added), sets)
-    if isinstance(scene, str) and ("\n" in scene or "[" in scene):
-        return require_units(require_files(loads(scene, TEXT, added)), sets)
-    return require_units(load_file(_path(scene, "a scene"), added), sets)
+        if not assignments:
+            return scene
+        return require_units(get_base_scene(scene).override(assignments), sets)
+    if _is_scene_text(scene):
+        return require_units(require_files(loads(scene, TEXT_NAME, assignments)), sets)
+    return require_units(load_file(_require_path(scene, "a scene"), assignments), sets)
 
 
-def base_of(scene: Scene) -> BaseScene:
+def _is_scene_text(scene: Any) -> bool:
+    """Return whether a scene was given as its text instead of the name of its file."""
+    return isinstance(scene, str) and ("\n" in scene or "[" in scene)
+
+
+def get_base_scene(scene: Scene) -> BaseScene:
     """Return the `BaseScene` of a scene, from which scenes with a few other keys are made.
 
     It is cached for the last scene.
     """
-    found = next((one for one in _bases if one.scene is scene), None) or BaseScene(scene)
-    _bases[:] = [found]
-    return found
+    for base in _last_bases:
+        if base.scene is scene:
+            return base
+    _last_bases[:] = [BaseScene(scene)]
+    return _last_bases[0]
 
 
-_bases: list[BaseScene] = []
+_last_bases: list[BaseScene] = []  # at most one
 
 
-@_by_key
+@_name_keys_only
 def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
-    """Build the model of a scene without solving anything. `scene` and sets are those of `load`.
+    """Build the model of a scene without solving anything.
 
-    Raises PatchfemError for sets with a Model, which cannot be changed.
+    Parameters
+    ----------
+    scene : path, str, dict, Scene or Model
+        As for `load`. A Model is returned unchanged.
+    **sets
+        Keys with new values, as for `load`.
+
+    Returns
+    -------
+    Model
+        What the scene means; `run_many` takes a list of them.
+
+    Raises
+    ------
+    SceneError
+        If the scene has mistakes.
+    PatchfemError
+        If a file of the scene cannot be used, or if sets are given with a Model.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> model = pf.build(pf.new("patch"))
+    >>> model.kind, round(model.nominal_load, 2)
+    ('patch', 115.65)
     """
     if isinstance(scene, Model):
-        _without(sets, "Model")
+        _refuse_sets(sets, "Model")
         return scene
     return build_model(load(scene, **sets))
 
 
-@_by_key
+@_name_keys_only
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
-    """Plan a scene: what a run would compute, its size, its cost, its stiffnesses and dimensionless groups. No result
-    is computed.
+    """Plan the run of a scene: its engine, size, predicted cost and stiffnesses. Nothing is solved.
+
+    Parameters
+    ----------
+    scene : path, str, dict, Scene or Model
+        As for `build`.
+    **sets
+        Keys with new values, as for `load`.
+
+    Returns
+    -------
+    Plan
+        Printing it shows what `patchfem plan` prints; `run` takes it.
+
+    Raises
+    ------
+    SceneError
+        If the scene has mistakes.
+    PatchfemError
+        If the scene cannot be run.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> plan = pf.plan(pf.new("rig"))
+    >>> plan.kind, plan.seconds < 10
+    ('rig', True)
     """
     return plan_model(build(scene, **sets))
 
 
-@_by_key
+@_name_keys_only
 def run(
     scene: str | Path | Scene | Model | Plan,
     /,
@@ -207,25 +290,69 @@ def run(
     progress: Callable[[float], None] | None = None,
     **sets: Any,
 ) -> Result:
-    """Run a scene and estimate the errors of its measures. `scene` and sets are those of `load`.
+    """Run a scene and estimate the errors of its measures.
 
-    say: function that takes one line of text, called before steps that take long, such as compiling; default: print to
-    stderr. progress: function that takes the completed share of the run, from 0 to 1. Raises SceneError for mistakes in
-    the scene, and PatchfemError (also NotConverged and Missing) if the scene cannot be run.
+    Parameters
+    ----------
+    scene : path, str, dict, Scene, Model or Plan
+        As for `load`, or the result of `build` or `plan`.
+    say : callable, optional
+        Function that takes one line of text, called before steps that take long, such as compiling. Default: print to
+        stderr.
+    progress : callable, optional
+        Function that takes the completed fraction of the run, from 0 to 1.
+    **sets
+        Keys with new values, as for `load`.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    SceneError
+        If the scene has mistakes.
+    PatchfemError
+        If the scene cannot be run. `NotConverged` and `Missing` are kinds of it.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> result = pf.run(pf.new("bench"))
+    >>> result.outcome.value, round(result.measures["friction_force_peak"].value, 3)
+    ('done', 34.5)
     """
     if isinstance(scene, Plan):
-        _without(sets, "Plan")
-    what = scene if isinstance(scene, Plan) else plan(scene, **sets)
-    done = run_plan(what, _on_stderr if say is None else say, progress)
-    return Result(
-        **{one.name: getattr(done, one.name) for one in fields(done)}
-        | {"measures": Measures(done.measures)}
-    )
+        _refuse_sets(sets, "Plan")
+    scene_plan = scene if isinstance(scene, Plan) else plan(scene, **sets)
+    result = run_plan(scene_plan, _print_to_stderr if say is None else say, progress)
+    values = {field.name: getattr(result, field.name) for field in fields(result)}
+    return Result(**values | {"measures": Measures(result.measures)})
 
 
 def demo(**sets: Any) -> Result:
-    """Run the scene that comes with the program: the rig of the 1985 report at 143 Hz and 5 g. sets are those of
-    `load`.
+    """Run the scene that comes with the program: the rig of the 1985 report at 143 Hz and 5 g.
+
+    Parameters
+    ----------
+    **sets
+        Keys with new values, as for `load`.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    SceneError
+        If a key or a value does not exist.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> result = pf.demo(**{"accuracy.tolerance": 0.05})
+    >>> print(result.outcome)
+    steady
     """
     return run(starting.find_shipped_scene(), **sets)
 
@@ -233,10 +360,27 @@ def demo(**sets: Any) -> Result:
 def new(kind: str, /) -> str:
     """Return the text of a scene to start from, for `load` and `run`.
 
-    kind: patch, joint, bench, rig, beam, damper, shroud, linear, misalignment or wear. Raises PatchfemError for any
-    other kind.
+    Parameters
+    ----------
+    kind : str
+        "patch", "joint", "bench", "rig", "beam", "damper", "shroud", "linear", "misalignment" or "wear".
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    PatchfemError
+        If there is no such kind.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> pf.new("bench").splitlines()[0]
+    'title = "A friction loop of one contact point"'
     """
-    return starting.read_template(_word(kind, "new"))
+    return starting.read_template(_require_text(kind, "new"))
 
 
 def cost(
@@ -248,29 +392,53 @@ def cost(
     say: Callable[[str], None] | None = None,
     **sets: Any,
 ) -> dict[str, Any]:
-    """Measure error against CPU seconds of a scene for several tolerances: the dict of `patchfem cost --json`.
+    """Measure error against CPU seconds of a scene for several tolerances.
 
-    scene and sets are those of `load`. over: one setting (element_size, steps_per_cycle, shear_modes, jumps) instead of
-    the tolerance. out: folder for cost.csv and the picture. say: function that takes one line of text per run; default:
-    print to stderr.
+    Parameters
+    ----------
+    scene : path, str, dict, Scene or Model
+        As for `build`.
+    over : str, optional
+        One setting instead of the tolerance: "element_size", "steps_per_cycle", "shear_modes" or "jumps".
+    out : path, optional
+        Folder for cost.csv and the picture.
+    say : callable, optional
+        Function that takes one line of text per run. Default: print to stderr.
+    **sets
+        Keys with new values, as for `load`.
 
-    The dict has the entry "tolerance", or that of the setting, with `runs`. Each run has its `label`, `tolerance`, CPU
-    `seconds`, `wall_seconds`, the `worst` measure with its error (relative to what a tolerance of 1 would allow),
-    `meets_tolerance`, the `remedies` of its warnings, and by measure its `values` and its stated `errors` in SI. Runs
-    with a setting that was tried because a tolerance was missed have the same `tolerance`. For one setting there are
-    also `distances` from the best run, `cheapest` and `sentence`, and settings that gave bit-identical runs are listed
-    as one. Raises PatchfemError for a setting that the scene does not have.
+    Returns
+    -------
+    dict
+        The dict of `patchfem cost --json`: an entry "tolerance", or that of the setting, with the list `runs`. Each run has
+        its `label`, `tolerance`, CPU `seconds`, `wall_seconds`, the `worst` measure with its error (relative to what a
+        tolerance of 1 would allow), `meets_tolerance`, the `remedies` of its warnings, and by measure its `values` and its
+        stated `errors` in SI. Runs with a setting that was tried because a tolerance was missed have the same `tolerance`.
+        For one setting there are also `distances` from the best run, `cheapest` and `sentence`, and settings that gave
+        bit-identical runs are listed as one.
+
+    Raises
+    ------
+    SceneError
+        If the scene has mistakes.
+    PatchfemError
+        If the scene does not have the setting.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> curve = pf.cost(pf.new("bench"), over="steps_per_cycle", say=lambda line: None)
+    >>> [run["meets_tolerance"] for run in curve["steps_per_cycle"]["runs"]][-1]
+    True
     """
-    model, runs = build(scene, **sets), {}
-    for knob in [over] if _word(over, "cost: over") else [cost_curves.TOLERANCE]:
-        runs[knob] = cost_curves.curve(model, knob, _on_stderr if say is None else say)
-        if out is not None:
-            cost_files.write(Path(out), runs)
-            cost_files.write_picture(Path(out), knob, runs[knob], model.accuracy.tolerance)
-    return {
-        knob: cost_files.answer_of(knob, each, model.accuracy.tolerance)
-        for knob, each in runs.items()
-    }
+    model = build(scene, **sets)
+    tolerance = model.accuracy.tolerance
+    setting = _require_text(over, "cost: over") or cost_curves.TOLERANCE
+    curve = cost_curves.curve(model, setting, _print_to_stderr if say is None else say)
+    if out is not None:
+        cost_files.write(Path(out), {setting: curve})
+        cost_files.write_picture(Path(out), setting, curve, tolerance)
+    return {setting: cost_files.answer_of(setting, curve, tolerance)}
 
 
 def backbone(
@@ -282,30 +450,60 @@ def backbone(
     method: str = "all",
     **sets: Any,
 ) -> Dataset:
-    """Compute frequency and damping ratio of a mode against its amplitude at the output, with errors: an
-    xarray.Dataset.
+    """Compute frequency and damping ratio of a mode against its amplitude at the output, with errors.
 
-    scene and sets are those of `load`. mode: name of the mode, or its number for a rig of masses; default: the first.
-    amplitudes: one or more in m, or a text such as "1 um..1 mm:25"; default: around the amplitude at which the contact
-    slips. method: "balance", "decay", "quasi-static" or "all". Each method has its own variables and amplitudes in the
-    Dataset. Attributes are `free_frequency` and `stuck_frequency` [Hz], the exponents of the energy dissipated per
-    cycle `exponent_micro` and `exponent_gross`, and `flutter_amplitude` [m], where they are known. `missing` says why a
-    method gave no curve. Raises PatchfemError for a scene without rig or friction, an unknown mode and amplitudes that
-    are not positive lengths.
+    Parameters
+    ----------
+    scene : path, str, dict, Scene or Model
+        As for `build`.
+    mode : str, optional
+        Name of the mode, or its number for a rig of masses. Default: the first mode.
+    amplitudes : float, str or list, optional
+        One or more amplitudes [m], or a text such as "1 um..1 mm:25". Default: around the amplitude at which the contact
+        slips.
+    method : str
+        "balance", "decay", "quasi-static" or "all".
+    **sets
+        Keys with new values, as for `load`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Each method has its own variables and amplitudes. Attributes are `free_frequency` and `stuck_frequency` [Hz], the
+        exponents of the energy dissipated per cycle `exponent_micro` and `exponent_gross`, and `flutter_amplitude` [m],
+        where they are known. `missing` says why a method gave no curve.
+
+    Raises
+    ------
+    SceneError
+        If the scene has mistakes.
+    PatchfemError
+        If the scene has no rig or no friction, if the mode is unknown, or if the amplitudes are not positive lengths.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> law = {"friction.law": "elastic-plastic", "friction.bond_length": "1 um"}
+    >>> found = pf.backbone(pf.new("rig"), amplitudes="0.1 um..10 um:5", method="quasi-static", **law)
+    >>> found["quasi_static_frequency"].size
+    5
     """
     model = joint.without_joint(build(scene, **sets))
-    ways = backbones.METHODS if _word(method, "backbone: method") == "all" else (method,)
-    if unknown := set(ways) - set(backbones.METHODS):
+    is_all = _require_text(method, "backbone: method") == "all"
+    methods = backbones.METHODS if is_all else (method,)
+    if unknown := set(methods) - set(backbones.METHODS):
         raise PatchfemError(
             f"backbone: method {unknown.pop()!r} does not exist; use one of "
             f"{', '.join(backbones.METHODS)}, or 'all'"
         )
-    wanted = None if amplitudes is None else axes.read_lengths(_lengths(amplitudes), "amplitudes")
-    found = backbones.backbone(model, _word(mode, "backbone: mode"), wanted, ways)
-    return backbone_files.contents(found, model.source.title).to_xarray()
+    values = None
+    if amplitudes is not None:
+        values = axes.read_lengths(_format_lengths(amplitudes), "amplitudes")
+    curves = backbones.backbone(model, _require_text(mode, "backbone: mode"), values, methods)
+    return backbone_files.contents(curves, model.source.title).to_xarray()
 
 
-@_by_key
+@_name_keys_only
 def sweep(
     scene: str | Path | Scene,
     over: Mapping[str, Any] | None = None,
@@ -320,47 +518,88 @@ def sweep(
     executor: str = "",
     resume: bool = False,
 ) -> Dataset:
-    """Run a scene for all combinations of the values of some keys: the Dataset of sweep.nc.
+    """Run a scene for all combinations of the values of some keys.
 
-    `scene` is that of `load`. over: dict of key -> list of values (texts as in a scene, or numbers in SI) or a range
-    such as "1e-6 rad..1e-2 rad:9"; default: the table [sweep] of the scene. draw: number of cases to draw between the
-    ends of ranges such as "1e-6 rad..1e-2 rad", instead of all combinations. The draw is random, with the seed `seed`,
-    or follows Sobol's sequence if `sobol` is true. Drawn cases are rows of one dimension `case`. out: folder to write,
-    as `patchfem sweep -o` does; `resume` continues it. of: the measure that the printed answer states, such as
-    "equivalent_damping". jobs: number of processes. executor: "dask" or "dask:ADDRESS".
+    Parameters
+    ----------
+    scene : path, str, dict or Scene
+        As for `load`.
+    over : dict, optional
+        Key -> list of values (texts as in a scene, or numbers in SI) or a range such as "1e-6 rad..1e-2 rad:9". Default:
+        the table [sweep] of the scene.
+    out : path, optional
+        Folder to write, as `patchfem sweep -o` does.
+    draw : int
+        Number of cases to draw between the ends of ranges such as "1e-6 rad..1e-2 rad", instead of all combinations. Drawn
+        cases are rows of one dimension `case`.
+    seed : int
+        Seed of the draw.
+    sobol : bool
+        Draw by Sobol's sequence instead of at random.
+    of : str
+        Measure that the printed answer states, such as "equivalent_damping".
+    jobs : int
+        Number of processes.
+    executor : str
+        "dask" or "dask:ADDRESS".
+    resume : bool
+        Continue the sweep in the folder `out`.
 
-    The attribute `answer` states the main result in one sentence. A case that is refused or fails has the outcome
-    "failed" and its message. Raises SceneError if no case is valid.
+    Returns
+    -------
+    xarray.Dataset
+        The Dataset of sweep.nc. The attribute `answer` states the main result in one sentence. A case that is refused or
+        fails has the outcome "failed" and its message.
+
+    Raises
+    ------
+    SceneError
+        If no case is valid.
+    PatchfemError
+        If an option cannot be used.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> found = pf.sweep(pf.new("bench"), {"friction.static": [0.1, 0.2, 0.3]})
+    >>> found["friction_force_peak"].values.round(1).tolist()
+    [11.5, 23.0, 34.5]
     """
     if over is not None and not isinstance(over, Mapping):
         raise PatchfemError(
             f"sweep: `over` must be a dict of keys and their values, not {over!r:.60}"
         )
-    if wrong := find_oversized_lengths(over or {}):
-        raise SceneError(wrong)
-    if empty := [
-        key for key, one in (over or {}).items() if hasattr(one, "__len__") and not len(one)
-    ]:
+    values_by_key = over or {}
+    if mistakes := find_oversized_lengths(values_by_key):
+        raise SceneError(mistakes)
+    if empty := [key for key, values in values_by_key.items() if _is_empty(values)]:
         raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
-    asked = case_models.Asked(*_text_of(scene), of=of)
-    lines = [
-        one if isinstance(one, str) else ",".join(format_values(key, one))
-        for key, one in (over or {}).items()
-    ]
-    request = parse_request.Request(
-        [f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed, of
-    )
-    cases, by = parse_request.cases_of(asked, request), executors.of(executor, jobs)
-    place = None if out is None else sweep_run.Place(Path(out), resume)
-    found = (
-        sweep_run.swept(asked, cases, by, _on_stderr)
-        if out is None
-        else sweep_run.sweep_into(asked, cases, place, by, _on_stderr)
-    )
-    named = [] if out is None or place.kept(len(cases)) == "none" else cases.names(asked)
-    keys = [folder.key_of(name) for name in named]
-    answer = headline.lead_of(page.table_of(asked, cases, found, (), Path(out or ""))).answer()
-    return tables.contents(asked, cases, found, keys, answer).to_xarray()
+    asked = case_models.Asked(*_read_scene_text(scene), of=of)
+    ranges = [f"{key}={_format_range(key, values)}" for key, values in values_by_key.items()]
+    request = parse_request.Request(ranges, None, draw, sobol, seed, of)
+    cases = parse_request.cases_of(asked, request)
+    pool = executors.of(executor, jobs)
+    if out is None:
+        results = sweep_run.swept(asked, cases, pool, _print_to_stderr)
+        names = []
+    else:
+        place = sweep_run.Place(Path(out), resume)
+        results = sweep_run.sweep_into(asked, cases, place, pool, _print_to_stderr)
+        names = [] if place.kept(len(cases)) == "none" else cases.names(asked)
+    keys = [folder.key_of(name) for name in names]
+    table = page.table_of(asked, cases, results, (), Path(out or ""))
+    answer = headline.lead_of(table).answer()
+    return tables.contents(asked, cases, results, keys, answer).to_xarray()
+
+
+def _is_empty(values: Any) -> bool:
+    """Return whether the values of a key are a list or a text without content."""
+    return hasattr(values, "__len__") and not len(values)
+
+
+def _format_range(key: str, values: Any) -> str:
+    """Return the values of a key as the string that `patchfem sweep --over` reads."""
+    return values if isinstance(values, str) else ",".join(format_values(key, values))
 
 
 class SweepPlots:
@@ -370,9 +609,31 @@ class SweepPlots:
     def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
         """Plot a measure of a sweep, with its numerical errors, against the key that has most values.
 
-        Hollow points miss the tolerance. An axis is logarithmic if its values span more than two decades. ax: Axes to
-        draw on. Raises PatchfemError for a Dataset that does not come from a sweep, and for a measure that the Dataset
-        does not contain.
+        Hollow points miss the tolerance. An axis is logarithmic if its values span more than two decades.
+
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Result of `pf.sweep`.
+        measure : str
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw on. Default: a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        PatchfemError
+            If the Dataset does not come from a sweep or does not contain the measure.
+
+        Examples
+        --------
+        >>> import patchfem as pf
+        >>> found = pf.sweep(pf.new("bench"), {"friction.static": [0.1, 0.2, 0.3]})
+        >>> axes = pf.plot.sweep(found, "loop_area")
+        >>> axes.figure.savefig("loop_area.png")
         """
         if not hasattr(dataset, "coords") or not any(
             str(name).endswith("_error") for name in dataset
@@ -387,27 +648,43 @@ class SweepPlots:
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
         """Plot the frequency of a mode against its amplitude for each method, with errors, and its damping ratio.
 
-        With `ax`, the damping ratio is left out. dataset: the result of `pf.backbone`. Raises PatchfemError for any
-        other Dataset, and for one without a curve.
+        Parameters
+        ----------
+        dataset : xarray.Dataset
+            Result of `pf.backbone`.
+        ax : matplotlib.axes.Axes, optional
+            Axes to draw on; the damping ratio is left out. Default: a new figure.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+
+        Raises
+        ------
+        PatchfemError
+            If the Dataset does not come from a backbone or has no curve.
+
+        Examples
+        --------
+        >>> import patchfem as pf
+        >>> law = {"friction.law": "elastic-plastic", "friction.bond_length": "1 um"}
+        >>> found = pf.backbone(pf.new("rig"), amplitudes="0.1 um..10 um:5", method="quasi-static", **law)
+        >>> pf.plot.backbone(found).figure.savefig("backbone.png")
         """
-        known = getattr(dataset, "coords", ())
-        ways = [way for way in backbones.METHODS if f"{way.replace('-', '_')}_amplitude" in known]
-        if not ways:
+        coordinates = getattr(dataset, "coords", ())
+        curves = {}
+        for method in backbones.METHODS:
+            prefix = method.replace("-", "_")
+            if f"{prefix}_amplitude" in coordinates:
+                names = backbone_files.COLUMNS
+                columns = {name: dataset[f"{prefix}_{name}"].values for name in names}
+                curves[method] = SimpleNamespace(**columns)
+        if not curves:
+            reason = getattr(dataset, "attrs", {}).get("missing")
             raise PatchfemError(
                 "plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
-                + "".join(
-                    f"; {why}" for why in [getattr(dataset, "attrs", {}).get("missing")] if why
-                )
+                + (f"; {reason}" if reason else "")
             )
-        curves = {
-            way: SimpleNamespace(
-                **{
-                    name: dataset[f"{way.replace('-', '_')}_{name}"].values
-                    for name in backbone_files.COLUMNS
-                }
-            )
-            for way in ways
-        }
         figure = pictures.draw.figure(backbone_files.drawn(curves), onto=ax)
         return figure.axes[0] if ax is None else ax
 
@@ -418,17 +695,41 @@ plot = SweepPlots()
 def run_many(
     models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None
 ) -> CaseResults:
-    """Run many models, or scenes as for `load`: the result has a column per measure and a row per model.
+    """Run many models or scenes, and return a column per measure and a row per model.
 
-    Models that share work are computed together, with the same results as single runs. Patches of equal geometry share
-    one mesh, as in a sweep. A model that cannot be run has the outcome "failed" and its message. A single scene or
-    model counts as a list of one. Raises SceneError for a mistake in a scene.
+    Models that share work are computed together, with the same results as single runs. Patches of equal geometry share one
+    mesh, as in a sweep.
+
+    Parameters
+    ----------
+    models : list of path, str, dict, Scene or Model
+        As for `build`. A single scene or model counts as a list of one.
+    say : callable, optional
+        Function that takes one line of text, called before steps that take long. Default: print to stderr.
+
+    Returns
+    -------
+    CaseResults
+        `values` and `errors` by measure, and `outcome` of each model. A model that cannot be run has the outcome "failed"
+        and its message.
+
+    Raises
+    ------
+    SceneError
+        If a scene has a mistake.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> scenes = [pf.load(pf.new("bench"), **{"friction.static": value}) for value in (0.1, 0.2)]
+    >>> pf.run_many(scenes).values["friction_force_peak"].round(1).tolist()
+    [11.5, 23.0]
     """
     if isinstance(models, str | Path | Scene | Model | Mapping) or not isinstance(models, Iterable):
         models = [models]
     return batches.solve_models(
-        meshes.with_shared_meshes([build(one) for one in models]),
-        say=_on_stderr if say is None else say,
+        meshes.with_shared_meshes([build(model) for model in models]),
+        say=_print_to_stderr if say is None else say,
     )
 
 
@@ -453,49 +754,101 @@ def fit(
     say: Callable[[str], None] | None = None,
     **sets: Any,
 ) -> dict[str, Any]:
-    """Find values of keys of a scene from measurements, with intervals: the dict of fit.json, in SI.
+    r"""Find values of keys of a scene from measurements, with intervals.
 
-    scene and sets are those of `load`. to: file of the measurements, which are a friction loop for a bench; rows of
-    responses, or frequency and damping against amplitude, for a rig; or a worn depth for a scene with [wear]. free:
-    dict of key -> (low, high) or a text such as "0.1..0.6". hold: rows to predict without fitting them, such as
-    "frequency=135 Hz,150 Hz". leave_out: a column; each of its values is left out in turn. unstable: "bound", "out" or
-    "read", the treatment of rows with the flag U (unstable). placebo: values such as
-    "structure.mode.yaw.frequency=110 Hz,138 Hz", for each of which the whole fit is repeated. starts, seed: number
-    of starting points and their seed. offset, warm_up: options for a loop. out: folder to write, as `patchfem fit -o`
-    does; `resume` continues it. say: function that takes a line of text before steps that take long.
+    Parameters
+    ----------
+    scene : path, str, dict or Scene
+        As for `load`.
+    to : path
+        File of the measurements: a friction loop for a bench; rows of responses, or frequency and damping against
+        amplitude, for a rig; a worn depth for a scene with [wear].
+    free : dict
+        Key -> (low, high) or a text such as "0.1..0.6".
+    from_patch : bool
+        Instead of `to` and `free`, replace the patch of the scene by laws of a single point, fitted to the patch's own
+        loops.
+    amplitudes : str or list, optional
+        Amplitudes of the slide for `from_patch`, in m or as a text such as "0.1 um..10 um:25".
+    hold : list of str
+        Rows to predict without fitting them, such as "frequency=135 Hz,150 Hz".
+    offset : list of str
+        For a loop: offsets to fit as well, "force" (a constant force over the whole record) or "displacement" (distance
+        of the first row from the stress-free position).
+    warm_up : bool
+        For a loop: compute the whole cycles of the record once, as a run-in, before the fitted cycles.
+    leave_out : str
+        A column; each of its values is left out in turn.
+    starts : int, optional
+        Number of random starting points inside the ranges; the best result is used. Default: 8, or 6 for a
+        curve of frequency and damping against amplitude.
+    seed : int
+        Seed of the starting points.
+    unstable : str
+        Treatment of rows with the flag U (unstable): "bound", "out" or "read".
+    placebo : list of str
+        Values such as "structure.mode.yaw.frequency=110 Hz,138 Hz", for each of which the whole fit is repeated.
+    resume : bool
+        Continue the fit in the folder `out`.
+    out : path, optional
+        Folder to write, as `patchfem fit -o` does.
+    say : callable, optional
+        Function that takes a line of text before steps that take long. Default: print to stderr.
+    **sets
+        Keys with new values, as for `load`.
 
-    from_patch: instead of `to` and `free`, replace the patch of the scene by laws of a single point, fitted to the
-    patch's own loops. amplitudes: amplitudes of the slide for from_patch, in m or as a text such as "0.1 um..10 um:25".
+    Returns
+    -------
+    dict
+        The dict of fit.json, in SI. `values` has for each key its `value` and the interval `low`, `high`.
 
-    Raises SceneError or PatchfemError in the same cases as `patchfem fit`.
+    Raises
+    ------
+    SceneError
+        If the scene has mistakes or lacks a key of `free`.
+    PatchfemError
+        If the measurements cannot be read or do not suit the scene.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import patchfem as pf
+    >>> run = pf.run(pf.new("bench")).response
+    >>> rows = zip(run.time.tolist(), run.slide.tolist(), run.force.tolist())
+    >>> lines = ["time [s],displacement [m],force [N]", *(f"{t},{x},{f}" for t, x, f in rows)]
+    >>> _ = Path("loop.csv").write_text("\n".join(lines))
+    >>> found = pf.fit(pf.new("bench"), to="loop.csv", free={"friction.static": (0.1, 0.6)})
+    >>> round(found["values"]["friction.static"]["value"], 6)
+    0.3
     """
-    found, tell = load(scene, **sets), _on_stderr if say is None else say
+    loaded = load(scene, **sets)
     if not isinstance(free, Mapping | None):
         raise PatchfemError(
             f"fit: `free` must be a dict of keys and their ranges (low, high), not {free!r:.60}"
         )
-    asked = [f"{key}={_ends_of(key, ends)}" for key, ends in (free or {}).items()]
-    slides = "" if amplitudes is None else _lengths(amplitudes)
+    ranges = [f"{key}={_format_ends(key, ends)}" for key, ends in (free or {}).items()]
+    slides = "" if amplitudes is None else _format_lengths(amplitudes)
     options = fits.Options(
-        _words(hold, "fit: hold"),
-        _words(offset, "fit: offset"),
+        _require_texts(hold, "fit: hold"),
+        _require_texts(offset, "fit: offset"),
         warm_up,
         leave_out,
         starts,
         seed,
         unstable,
-        _words(placebo, "fit: placebo"),
+        _require_texts(placebo, "fit: placebo"),
         resume,
         from_patch,
         slides,
     )
-    measured = "" if isinstance(to, str) and not to else str(_path(to, "fit: to"))
-    with TemporaryDirectory() as room:
-        target = Path(room) / "fit" if out is None else Path(out)
-        return fits.fit_into(found, measured, asked, options, target, fits.Listener(tell)).answer
+    measured = "" if isinstance(to, str) and not to else str(_require_path(to, "fit: to"))
+    with TemporaryDirectory() as temporary_folder:
+        target = Path(temporary_folder) / "fit" if out is None else Path(out)
+        listener = fits.Listener(_print_to_stderr if say is None else say)
+        return fits.fit_into(loaded, measured, ranges, options, target, listener).answer
 
 
-def _ends_of(key: str, ends: Any) -> str:
+def _format_ends(key: str, ends: Any) -> str:
     """Return the string "low..high" of two values or of a range given as a string.
 
     Raises PatchfemError for anything else.
@@ -508,62 +861,104 @@ def _ends_of(key: str, ends: Any) -> str:
     return "..".join(pair)
 
 
-def _lengths(given: float | str | Iterable) -> str:
+def _format_lengths(lengths: float | str | Iterable) -> str:
     """Return lengths [m] as the string that a command-line option reads."""
-    return given if isinstance(given, str) else ",".join(format_values(axes.LENGTH_KEY, given))
+    if isinstance(lengths, str):
+        return lengths
+    return ",".join(format_values(axes.LENGTH_KEY, lengths))
 
 
-def _words(given: str | Iterable[str], what: str) -> tuple:
-    listed = given if isinstance(given, Iterable) and not isinstance(given, str) else [given]
-    return tuple(_word(one, what) for one in listed)
-
-
-@_refuse_removed
+@_refuse_removed_options
 def profile(
     *files: str | Path,
     cutoff: float | str | None = None,
     window: Iterable | None = None,
     units: tuple[str, str] | None = None,
 ) -> dict[str, Any]:
-    """Compute the roughness of measured traces or areal scans: the dict of `patchfem profile --json`, in SI.
+    """Compute the roughness of measured traces or areal scans.
 
-    cutoff: wavelength that separates roughness from waviness. window: first and last position; for a scan those in x
-    first. Each is in m or a text such as "0.25 mm". units: units of x and z for files that give none. The dict has
-    `profiles` with an entry per file and `means` over all files. Raises PatchfemError for a file that cannot be read
-    and for invalid lengths.
+    Parameters
+    ----------
+    *files : path
+    cutoff : float or str, optional
+        Wavelength that separates roughness from waviness, in m or as a text such as "0.25 mm".
+    window : list, optional
+        First and last position, in m or as texts; for a scan those in x first.
+    units : tuple of str, optional
+        Units of x and z for files that give none, such as ("mm", "um").
+
+    Returns
+    -------
+    dict
+        The dict of `patchfem profile --json`, in SI: `profiles` with an entry per file, and `means` over all files.
+
+    Raises
+    ------
+    PatchfemError
+        If a file cannot be read or a length is invalid.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import patchfem as pf
+    >>> x = np.arange(0.0, 8.0, 0.001)
+    >>> z = np.random.default_rng(1).normal(size=x.size)
+    >>> np.savetxt("trace.csv", np.c_[x, z], delimiter=",", header="x [mm],z [um]", comments="")
+    >>> found = pf.profile("trace.csv", cutoff="0.8 mm")
+    >>> len(found["profiles"])
+    1
     """
-    asked = {"cutoff": _metres(cutoff, "profile: cutoff"), "window": None}
+    length = _parse_length(cutoff, "profile: cutoff")
+    ends = None
     if window is not None:
-        listed = (
-            window.split(",")
-            if isinstance(window, str)
-            else window
-            if isinstance(window, Iterable)
-            else [window]
-        )
-        asked["window"] = tuple(_metres(one, "profile: window") for one in listed)
-    length = asked["cutoff"]
+        values = [window]
+        if isinstance(window, str):
+            values = window.split(",")
+        elif isinstance(window, Iterable):
+            values = window
+        ends = tuple(_parse_length(value, "profile: window") for value in values)
     if length is not None and not 0 < length < float("inf"):
         raise PatchfemError(f"profile: cutoff: a length above zero is needed, not {length:g} m")
-    reports = [
-        roughness_report.make_report(surfaces.read_surface(_path(one, "profile"), units), **asked)
-        for one in files
-    ]
+    reports = []
+    for file in files:
+        surface = surfaces.read_surface(_require_path(file, "profile"), units)
+        reports.append(roughness_report.make_report(surface, cutoff=length, window=ends))
     return {
-        "profiles": [roughness.data_of(one) for one in reports],
+        "profiles": [roughness.data_of(trace_report) for trace_report in reports],
         "means": roughness.means_data(reports),
     }
 
 
-@_refuse_removed
+@_refuse_removed_options
 def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None = None) -> Path:
-    """Put the results folders of a list side by side on one page and return the path of the page. For a single sweep,
-    rebuild the page of the sweep.
+    """Put results folders side by side on one page, or rebuild the page of a single sweep.
 
-    out: the page, default report.html. Raises PatchfemError for an empty list and for folders that cannot be compared.
+    Parameters
+    ----------
+    folders : path or list of path
+    out : path, optional
+        The page. Default: report.html.
+
+    Returns
+    -------
+    Path
+        The page.
+
+    Raises
+    ------
+    PatchfemError
+        If the list is empty or the folders cannot be compared.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> soft = pf.run(pf.new("bench")).save("soft")
+    >>> stiff = pf.run(pf.new("bench"), **{"friction.bond_length": "0.1 um"}).save("stiff")
+    >>> pf.report([soft, stiff], "both.html").name
+    'both.html'
     """
-    target = None if out is None else _path(out, "report: out")
-    return Path(page_of_several.report_of(_paths(folders, "report"), target))
+    target = None if out is None else _require_path(out, "report: out")
+    return Path(page_of_several.report_of(_require_paths(folders, "report"), target))
 
 
 def export(
@@ -575,25 +970,51 @@ def export(
     histories: bool = False,
     of: str = "",
 ) -> Path:
-    """Write a results folder, or the structure of a scene (.toml), in another format, and return the path.
+    """Write a results folder, or the structure of a scene (.toml), in another format.
 
-    The ending of `out` gives the format. Fields: .pvd, .vtu, .vtkhdf or .csv (the interface). Histories and loops:
-    .uff, .mat, or .csv with `histories` or if the folder has no fields. A script that plays the last cycle in ParaView:
-    .py. Matrices and friction elements of a scene: .mat for NLvib, .npz for TMDSimPy and pyHarm. frame: number of the
-    frame of a .vtu or .csv, default the last. of: the stress that a script shows, such as "sigma_yy". Raises
-    PatchfemError in the same cases as `patchfem export`.
+    Parameters
+    ----------
+    folder : path
+        Results folder, or a scene file.
+    out : path
+        File whose extension gives the format. Fields: .pvd, .vtu, .vtkhdf or .csv (the interface). Histories and loops:
+        .uff, .mat, or .csv with `histories` or if the folder has no fields. A script that plays the last cycle in
+        ParaView: .py. Matrices and friction elements of a scene: .mat for NLvib, .npz for TMDSimPy and pyHarm.
+    frame : int, optional
+        Number of the frame of a .vtu or .csv. Default: the last.
+    histories : bool
+        Write histories to a .csv, even if the folder has fields.
+    of : str
+        Stress that a script shows, such as "sigma_yy".
+
+    Returns
+    -------
+    Path
+        The file that was written.
+
+    Raises
+    ------
+    PatchfemError
+        In the same cases as `patchfem export`, such as a format that the folder has no data for.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> folder = pf.run(pf.new("bench")).save("bench")
+    >>> pf.export(folder, "histories.csv").read_text().startswith("time")
+    True
     """
-    folder, out = _path(folder, "export"), _path(out, "export: out")
+    folder = _require_path(folder, "export")
+    out = _require_path(out, "export: out")
     if folder.suffix != ".toml":
         convert.export(folder, out, frame, histories, of)
     elif frame is not None or histories or of:
         raise PatchfemError(
             "the options `frame`, `histories` and `of` can be used only with a results folder; from a "
-            "scene only the "
-            "structure is exported"
+            "scene only the structure is exported"
         )
     else:
-        from .export.lab import structures  # its folder holds more than words
+        from .export.lab import structures
 
         structures.export(build_without_sweep(load(folder)), out)
     return out
@@ -607,13 +1028,32 @@ def view(
     frame: int | None = None,
     magnify: float | None = None,
 ) -> None:
-    """Show the pieces of a results folder in a window, or draw them into the file `out`.
+    """Show the pieces of a results folder in a window, or draw them into a file.
 
-    `out` is a picture, or the last cycle as .gif, .mp4 or .html. The arguments are those of `patchfem view`.
+    Parameters
+    ----------
+    folder : path
+        Results folder of a scene with [contact].
+    out : path, optional
+        A picture (.png), or the last cycle as .gif, .mp4 or .html. Default: a window.
+    frame : int, optional
+        Number of the frame. Default: the last.
+    magnify : float, optional
+        Factor of the drawn displacements.
+
+    Raises
+    ------
+    PatchfemError
+        If the folder has no fields, or if the option does not suit the format.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> folder = pf.run(pf.new("patch"), **{"accuracy.tolerance": 0.05}).save("patch")
+    >>> pf.view(folder, "patch.html")
     """
-    convert.view(
-        _path(folder, "view"), None if out is None else _path(out, "view: out"), frame, magnify
-    )
+    target = None if out is None else _require_path(out, "view: out")
+    convert.view(_require_path(folder, "view"), target, frame, magnify)
 
 
 def import_(
@@ -626,40 +1066,91 @@ def import_(
     decay: bool = False,
     **how: str,
 ) -> dict[str, Any]:
-    """Convert laboratory records (.uff, .mat, .csv): the dict of `patchfem import --json`, in SI.
+    r"""Convert laboratory records (.uff, .mat, .csv) to a file that scenes and fits read.
 
-    The ending of `out` gives the result: a table that scenes and fits read (.csv), modes for a scene (.toml) or a
-    frequency response (.uff). map: the quantity of each channel, such as "force=Load cell [lbf]". zero: subtract the
-    first row from time and displacement. decay: the record is a free decay. how: the options segment, window, band and
-    begin as texts, such as segment="2 s". Raises PatchfemError in the same cases as `patchfem import`.
+    Parameters
+    ----------
+    file : path
+    out : path
+        File whose extension gives the result: a table (.csv), modes for a scene (.toml) or a frequency response (.uff).
+    map : str or list of str
+        Quantity of each channel, such as "force=Load cell [lbf]".
+    zero : bool
+        Subtract the first row from time and displacement.
+    decay : bool
+        The record is a free decay.
+    **how
+        Options `segment`, `window`, `band` and `begin` as texts, such as segment="2 s".
+
+    Returns
+    -------
+    dict
+        The dict of `patchfem import --json`, in SI.
+
+    Raises
+    ------
+    PatchfemError
+        In the same cases as `patchfem import`, such as a channel without a known quantity.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import patchfem as pf
+    >>> _ = Path("shaker.csv").write_text("time [ms],force [lbf]\n0,1\n1,2\n2,-1\n")
+    >>> pf.import_("shaker.csv", "record.csv", zero=True)["rows"]
+    3
     """
     from .export.lab import imported
 
-    file, out, given = _path(file, "import_"), _path(out, "import_: out"), imported.Estimate._fields
-    if unknown := set(how) - set(given):
+    file = _require_path(file, "import_")
+    out = _require_path(out, "import_: out")
+    names = imported.Estimate._fields
+    if unknown := set(how) - set(names):
         raise PatchfemError(
-            f"import_: {unknown.pop()}: unknown setting; use map, zero, {', '.join(sorted(given))}"
+            f"import_: {unknown.pop()}: unknown setting; use map, zero, {', '.join(sorted(names))}"
         )
-    words = {name: _word(one, f"import_: {name}") for name, one in how.items()}
-    return {
-        "file": str(out),
-        **imported.imported(
-            file, out, _words(map, "import_: map"), zero, imported.Estimate(decay=decay, **words)
-        ),
-    }
+    texts = {name: _require_text(value, f"import_: {name}") for name, value in how.items()}
+    estimate = imported.Estimate(decay=decay, **texts)
+    channels = _require_texts(map, "import_: map")
+    return {"file": str(out), **imported.imported(file, out, channels, zero, estimate)}
 
 
 def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> Path:
-    """Write the tagged mesh of the pieces of a scene as .msh or .vtu and return its path.
+    """Write the tagged mesh of the pieces of a scene.
 
-    Raises PatchfemError without [contact].
+    Parameters
+    ----------
+    scene : path, str, dict, Scene or Model
+        As for `build`.
+    out : path
+        File with the extension .msh or .vtu.
+    **sets
+        Keys with new values, as for `load`.
+
+    Returns
+    -------
+    Path
+        The file that was written.
+
+    Raises
+    ------
+    SceneError
+        If the scene has mistakes.
+    PatchfemError
+        If the scene has no [contact].
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> pf.mesh(pf.new("patch"), "pieces.vtu", **{"contact.element_size": "1 mm"}).name
+    'pieces.vtu'
     """
     model = build(scene, **sets)
     if model.patch is None:
         raise PatchfemError("only a scene with [contact] has a mesh", "contact")
-    out = _path(out, "mesh")
-    low, high = patch_result.bodies(model)
-    mesh_files.write_mesh(low, out, high)
+    out = _require_path(out, "mesh")
+    lower, upper = patch_result.bodies(model)
+    mesh_files.write_mesh(lower, out, upper)
     return out
 
 
@@ -672,117 +1163,138 @@ def compare(
     pairs: str | Path | None = None,
     datum: str = "",
 ) -> dict[str, Any]:
-    """Compare a measured surface before and after wear: the dict of compare.json, in SI.
+    """Compare a measured surface before and after wear.
 
-    files: the surface before and the surface after wear, as two traces or two areal scans; optionally a second pair of
-    traces in the other direction. direction: "x" or "y", along which the first two traces run. units: units of x and z
-    for files that give none, such as ("mm", "um"). shift: known shift of the second trace [m], 0.0 if both start at the
-    same mark. keep_spikes: do not remove spikes, dropouts and dust. datum: "straight" if the datum of the instrument is
-    known to be straight, so that no bow is subtracted from traces. pairs: a table of pairs instead of files, with the
-    columns before and after.
+    Parameters
+    ----------
+    *files : path
+        The surface before and the surface after wear, as two traces or two areal scans; optionally a second pair of traces
+        in the other direction. Or the results folders of two runs, the second with [wear].
+    direction : str
+        "x" or "y", along which the first two traces run.
+    units : tuple of str, optional
+        Units of x and z for files that give none, such as ("mm", "um").
+    shift : float or str, optional
+        Known shift of the second trace [m]; 0.0 if both start at the same mark.
+    keep_spikes : bool
+        Do not remove spikes, dropouts and dust.
+    pairs : path, optional
+        Table of pairs instead of files, with the columns before and after.
+    datum : str
+        "straight" if the datum of the instrument is known to be straight, so that no bow is subtracted from traces.
 
-    In the dict, `verdict` and `sentences` are texts. `shift`, `worn_depth_mean`, `amplitude_ratio` and others have
-    `value`, `low`, `high`, `unit`, and a `reason` if the value is None. Two scans also have `worn_volume`,
-    `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With `pairs` the dict has `pairs`, an
-    entry per pair, and `means` with mean, interval and scatter; a pair that fails has its reason as `message`. For the
-    results folders of two runs, the second with [wear], the dict has the wear between the two runs over the whole
-    patch, and the measures of both runs under `runs`. Raises PatchfemError for files that do not fit together.
+    Returns
+    -------
+    dict
+        The dict of compare.json, in SI. `verdict` and `sentences` are texts. `shift`, `worn_depth_mean`, `amplitude_ratio`
+        and others have `value`, `low`, `high`, `unit`, and a `reason` if the value is None. Two scans also have
+        `worn_volume`, `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With `pairs` the dict has
+        `pairs`, an entry per pair, and `means` with mean, interval and scatter; a pair that fails has its reason as
+        `message`. For two results folders it has the wear between the two runs over the whole patch, and the measures of
+        both runs under `runs`.
+
+    Raises
+    ------
+    PatchfemError
+        If the files do not fit together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import patchfem as pf
+    >>> x = np.arange(0.0, 8.0, 0.002)
+    >>> before = np.convolve(np.random.default_rng(1).normal(size=x.size + 20), np.ones(21) / 21, "valid")
+    >>> for name, z in (("before.csv", before), ("after.csv", np.minimum(before, 0.2))):
+    ...     np.savetxt(name, np.c_[x, z], delimiter=",", header="x [mm],z [um]", comments="")
+    >>> found = pf.compare("before.csv", "after.csv", shift=0.0)
+    >>> found["amplitude_ratio"]["value"] < 1
+    True
     """
-    how = {
+    settings = {
         "units": units,
-        "shift": _metres(shift, "compare: shift"),
+        "shift": _parse_length(shift, "compare: shift"),
         "keep_spikes": keep_spikes,
         "datum": datum,
     }
-    files = [_path(one, "compare") for one in files]
-    _word(direction, "compare: direction")
-    _word(datum, "compare: datum")
-    if pairs is None and len(files) > 1 and any(Path(one).is_dir() for one in files):
-        if (
-            len(files) > 2
-            or direction
-            or units is not None
-            or shift is not None
-            or keep_spikes
-            or datum
-        ):
+    files = [_require_path(file, "compare") for file in files]
+    _require_text(direction, "compare: direction")
+    _require_text(datum, "compare: datum")
+    if pairs is None and len(files) > 1 and any(file.is_dir() for file in files):
+        has_setting = units is not None or shift is not None or keep_spikes or datum or direction
+        if len(files) > 2 or has_setting:
             raise PatchfemError(
                 "compare: give two results folders alone, without other files or settings of traces"
             )
-        lost = worn_runs.compare_runs(*map(Path, files))
-        return worn.data_of(lost, worn.verdict(lost))
+        wear = worn_runs.compare_runs(*files)
+        return worn.data_of(wear, worn.verdict(wear))
     if pairs is None:
-        return compared_data.data_of(*verdict.judge_files(files, direction, **how))
+        return compared_data.data_of(*verdict.judge_files(files, direction, **settings))
     if files:
         raise PatchfemError("compare: give either files or a table of pairs, not both")
-    return pairs_data.data_of(
-        pairs_data.answers(
-            pairs_tables.read_pairs(_path(pairs, "compare: pairs")), direction, **how
-        )
-    )
+    table = pairs_tables.read_pairs(_require_path(pairs, "compare: pairs"))
+    return pairs_data.data_of(pairs_data.answers(table, direction, **settings))
 
 
-def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
+def _read_scene_text(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
     """Return path, text and --set strings of a scene that `load` takes, valid or not."""
     if isinstance(scene, Mapping):
-        return Path(TABLES), format_scene(dict(scene)), ()
+        return Path(DICT_NAME), format_scene(dict(scene)), ()
     if isinstance(scene, Scene):
         return scene.path, scene.text, scene.sets
-    if isinstance(scene, str) and ("\n" in scene or "[" in scene):
-        return Path(TEXT), scene, ()
-    return _path(scene, "a scene"), read_text(scene), ()
+    if _is_scene_text(scene):
+        return Path(TEXT_NAME), scene, ()
+    return _require_path(scene, "a scene"), read_text(scene), ()
 
 
-def _path(given: Any, what: str) -> Path:
+def _require_path(value: Any, name: str) -> Path:
     """Return a file or folder as a Path; raise PatchfemError for anything else."""
-    if not isinstance(given, str | Path):
-        needed = "a path, a text, a dict of tables or a Scene" if what == "a scene" else "a path"
-        raise PatchfemError(f"{what}: {needed} is needed, not {given!r:.60}")
-    return Path(given)
+    if not isinstance(value, str | Path):
+        needed = "a path, a text, a dict of tables or a Scene" if name == "a scene" else "a path"
+        raise PatchfemError(f"{name}: {needed} is needed, not {value!r:.60}")
+    return Path(value)
 
 
-def _paths(given: Any, what: str) -> list:
+def _require_paths(value: Any, name: str) -> list:
     """Return the paths of a list, or a single path as a list."""
-    listed = given if isinstance(given, Iterable) and not isinstance(given, str) else [given]
-    return [_path(one, what) for one in listed]
+    is_list = isinstance(value, Iterable) and not isinstance(value, str)
+    return [_require_path(path, name) for path in (value if is_list else [value])]
 
 
-def _metres(given: Any, what: str) -> float | None:
-    """Return a length [m] from a number or a string with a unit, or None if it is None.
+def _parse_length(value: Any, name: str) -> float | None:
+    """Return a length [m] from a number or a string with a unit; None if it is None.
 
     Raises PatchfemError for anything else.
     """
+    if value is None:
+        return None
     try:
-        return (
-            parse_quantity(given, "length")
-            if isinstance(given, str)
-            else given
-            if given is None
-            else float(given)
-        )
+        return parse_quantity(value, "length") if isinstance(value, str) else float(value)
     except (TypeError, ValueError) as error:
-        raise PatchfemError(
-            f"{what}: "
-            + (
-                str(error)
-                if isinstance(given, str)
-                else f"a length in m or a text such as '0.25 mm' is needed, not {given!r:.60}"
-            )
-        ) from None
+        reason = f"a length in m or a text such as '0.25 mm' is needed, not {value!r:.60}"
+        if isinstance(value, str):
+            reason = str(error)
+        raise PatchfemError(f"{name}: {reason}") from None
 
 
-def _word(given: Any, what: str) -> str:
+def _require_text(value: Any, name: str) -> str:
     """Return a value that must be a string; raise PatchfemError for anything else."""
-    if not isinstance(given, str):
-        raise PatchfemError(f"{what}: a text is needed, not {given!r:.60}")
-    return given
+    if not isinstance(value, str):
+        raise PatchfemError(f"{name}: a text is needed, not {value!r:.60}")
+    return value
 
 
-def _on_stderr(text: str) -> None:
+def _require_texts(value: str | Iterable[str], name: str) -> tuple:
+    """Return a text or texts as a tuple; raise PatchfemError for anything else."""
+    is_list = isinstance(value, Iterable) and not isinstance(value, str)
+    return tuple(_require_text(text, name) for text in (value if is_list else [value]))
+
+
+def _print_to_stderr(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def _without(sets: dict, kind: str) -> None:
+def _refuse_sets(sets: dict, kind: str) -> None:
+    """Raise PatchfemError if there are sets, because an object of this kind cannot be changed."""
     if sets:
         raise PatchfemError(
             f"{', '.join(sets)} cannot be set in a {kind}; set the value in the scene"
@@ -790,7 +1302,15 @@ def _without(sets: dict, kind: str) -> None:
 
 
 class Measures(Mapping):
-    """The measures of a run by name or as attributes, read-only. A notebook shows them as a table."""
+    """The measures of a run by name or as attributes, read-only. A notebook shows them as a table.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> measures = pf.run(pf.new("bench")).measures
+    >>> measures.friction_force_peak.unit, "loop_area" in measures
+    ('N', True)
+    """
 
     def __init__(self, measures: dict[str, Measure]):
         self._measures = dict(measures)
@@ -827,96 +1347,113 @@ class Measures(Mapping):
     def __repr__(self) -> str:
         return "\n".join(
             sentences.table_of(
-                {name: summaries.measure_object(one) for name, one in self._measures.items()}
+                {
+                    name: summaries.measure_object(measure)
+                    for name, measure in self._measures.items()
+                }
             )
         )
 
 
 class Plots:
-    """The pictures of a run, each as matplotlib Axes: ``result.plot.loop().figure.savefig("loop.png")``.
+    """The pictures of a run, each as matplotlib Axes.
 
-    ax: Axes to draw on. Without it each method makes a new figure, which may have more Axes than the method returns.
-    Raises PatchfemError if the run does not have what the picture needs.
+    Every method takes `ax`, the Axes to draw on. Without it the method makes a new figure, which may have more Axes than
+    the method returns. It raises PatchfemError if the run does not have what the picture needs.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> result = pf.run(pf.new("bench"))
+    >>> result.plot.loop().figure.savefig("loop.png")
     """
 
     def __init__(self, result: Result):
         self._result = result
 
     def pressure(self, ax: Axes | None = None) -> Axes:
-        """Normal stress along the interface, and the shear stress if there is any; if interfaces have patches of their
-        own, the normal stress on each. With `ax`, only the first of these charts is drawn.
+        """Plot the normal stress along the interface, and the shear stress if there is any.
+
+        If interfaces have patches of their own, the normal stress on each is drawn. With `ax`, only the first of these
+        charts is drawn.
         """
-        bare = self._result.patch is None and not self._result.extra.get("faces")
-        return self._drawn(
-            ax,
-            ("pressure", "faces"),
-            "the scene has no [contact]" if bare else "the pieces do not touch",
-        )
+        has_patch = self._result.patch is not None or self._result.extra.get("faces")
+        reason = "the pieces do not touch" if has_patch else "the scene has no [contact]"
+        return self._draw(ax, ("pressure", "faces"), reason)
 
     def loop(self, ax: Axes | None = None) -> Axes:
-        """Friction force against the slide of the interface."""
-        return self._drawn(ax, ("loop",), self._still() or "no friction acted, or nothing slid")
+        """Plot the friction force against the slide of the interface."""
+        reason = self._explain_missing_motion() or "no friction acted, or nothing slid"
+        return self._draw(ax, ("loop",), reason)
 
     def history(self, ax: Axes | None = None) -> Axes:
-        """Displacement over the whole run, and the last cycles or the friction force. With `ax`, only the
-        displacement is drawn.
+        """Plot the displacement over the whole run, and the last cycles or the friction force.
+
+        With `ax`, only the displacement is drawn.
         """
-        return self._drawn(ax, ("history",), self._still())
+        return self._draw(ax, ("history",), self._explain_missing_motion())
 
     def levels(self, ax: Axes | None = None) -> Axes:
-        """Amplitude at each level, or along the curve of steady states against level or frequency."""
-        return self._drawn(
-            ax,
-            ("levels", "curve"),
-            self._still()
-            or "the drive has no levels; use drive.waveform = "
-            '"levels", or a sweep with accuracy.method = "harmonic"',
+        """Plot the amplitude at each level, or of the steady states against level or frequency."""
+        no_levels = (
+            'the drive has no levels; use drive.waveform = "levels", or a sweep with '
+            'accuracy.method = "harmonic"'
         )
+        return self._draw(ax, ("levels", "curve"), self._explain_missing_motion() or no_levels)
 
     def stress(self, ax: Axes | None = None) -> Axes:
-        """Von Mises stress in both pieces under load, and an enlarged view of the contact. With `ax`, only the
-        pieces are drawn.
+        """Plot the von Mises stress in both pieces under load, and an enlarged view of the contact.
+
+        With `ax`, only the pieces are drawn.
         """
         if self._result.patch is None:
             raise PatchfemError("plot.stress: nothing to draw: the scene has no [contact]")
         from .export.fields import bodies
 
-        with TemporaryDirectory() as room:
-            made = bodies.write_fields(self._result, Path(room) / "fields.vtkhdf")
-        return self._drawn(
-            ax, ("bodies",), "the pieces do not touch, or their mesh is not a grid", made
-        )
+        with TemporaryDirectory() as temporary_folder:
+            path = Path(temporary_folder) / "fields.vtkhdf"
+            fields_of_bodies = bodies.write_fields(self._result, path)
+        reason = "the pieces do not touch, or their mesh is not a grid"
+        return self._draw(ax, ("bodies",), reason, fields_of_bodies)
 
-    def _still(self) -> str:
+    def _explain_missing_motion(self) -> str:
+        """Return the reason why a run has no motion; "" if it has one."""
         if self._result.response is not None:
             return ""
-        return (
-            "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]"
-            if self._result.plan.kind == "patch"
-            else "no motion was computed"
-        )
+        if self._result.plan.kind == "patch":
+            return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]"
+        return "no motion was computed"
 
-    def _drawn(self, ax: Axes | None, names: tuple, lack: str, bodies: dict | None = None) -> Axes:
+    def _draw(self, ax: Axes | None, names: tuple, reason: str, bodies: dict | None = None) -> Axes:
+        """Return the Axes of the first of these charts that the run has; refuse with `reason` if none."""
         if ax is not None and not hasattr(ax, "errorbar"):
             raise PatchfemError(
                 f"plot.{names[0]}: matplotlib Axes are needed as ax, not {ax!r:.60}"
             )
-        found = run_page.axes(self._result, names, ax, bodies)
-        if found is not None:
-            return found
-        raise PatchfemError(f"plot.{names[0]}: nothing to draw: {lack}")
+        drawn = run_page.axes(self._result, names, ax, bodies)
+        if drawn is None:
+            raise PatchfemError(f"plot.{names[0]}: nothing to draw: {reason}")
+        return drawn
 
 
 class Result(run_result.Result):
-    """A finished run: `outcome`, `measures`, `warnings`, `notes`, `seconds`, and the stored histories in `response`.
+    """A finished run: `outcome`, `measures`, `warnings`, `notes`, `seconds`, and the histories in `response`.
 
     `outcome.sentence` says how the run ended. `measures[name]` has `value`, `error`, `unit` and `text`, in SI.
+
+    Examples
+    --------
+    >>> import patchfem as pf
+    >>> result = pf.run(pf.new("bench"))
+    >>> measure = result.measures["loop_area"]
+    >>> measure.unit, measure.error < 1e-3 * measure.value
+    ('J', True)
     """
 
     measures: Measures
 
     def _repr_html_(self) -> str:
-        """The answer as a notebook shows it: outcome, headline, every measure in its group, warnings."""
+        """Return the answer for a notebook: outcome, headline, measures in their groups, warnings."""
         summary = summaries.summary_of(self)
         return sentences.fragment(
             summary, sentences.verdict(summary), summaries.cycles_of(self), released.released(self)
@@ -933,13 +1470,21 @@ class Result(run_result.Result):
         return Plots(self)
 
     def table(self) -> Any:
-        """The measures as rows of name, value, error and unit in SI.
+        """Return the measures as rows of name, value, error and unit in SI.
 
-        It is a pandas.DataFrame if pandas is installed, otherwise a list of dicts.
+        Returns
+        -------
+        pandas.DataFrame or list of dict
+            A DataFrame if pandas is installed.
         """
         rows = [
-            {"measure": name, "value": one.value, "error": one.error, "unit": one.unit}
-            for name, one in self.measures.items()
+            {
+                "measure": name,
+                "value": measure.value,
+                "error": measure.error,
+                "unit": measure.unit,
+            }
+            for name, measure in self.measures.items()
         ]
         try:
             from pandas import DataFrame
@@ -948,15 +1493,33 @@ class Result(run_result.Result):
         return DataFrame(rows).set_index("measure")
 
     def to_xarray(self) -> Dataset:
-        """The Dataset of result.nc: histories and fields with units, and the scene."""
+        """Return the Dataset of result.nc: histories and fields with units, and the scene."""
         return histories.contents(self).to_xarray()
 
     def save(self, folder: str | Path) -> Path:
-        """Write the results folder, as `patchfem run -o` does, and return its path. An older results folder is
-        replaced.
+        """Write the results folder, as `patchfem run -o` does. An older results folder is replaced.
 
-        Raises PatchfemError for a folder that holds other files.
+        Parameters
+        ----------
+        folder : path
+
+        Returns
+        -------
+        Path
+            The folder.
+
+        Raises
+        ------
+        PatchfemError
+            If the folder contains other files.
+
+        Examples
+        --------
+        >>> import patchfem as pf
+        >>> folder = pf.run(pf.new("bench")).save("bench")
+        >>> (folder / "summary.json").is_file()
+        True
         """
-        folder = _path(folder, "save")
+        folder = _require_path(folder, "save")
         results_folder.save(self, folder)
         return folder

@@ -24,7 +24,14 @@ project, author, copyright = (
     "The patchfem founders, MIT licence",
 )
 version = release = patchfem.__version__
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx_copybutton", "equations"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "equations",
+]
+napoleon_google_docstring = False
 root_doc = "studies/site/index"
 include_patterns = [
     "README.md",

@@ -12,7 +12,7 @@ from campaigns import Row, strip_number
 from scene_texts import MODE
 
 import patchfem as pf
-from patchfem.api import base_of
+from patchfem.api import get_base_scene
 from patchfem.response.rows import TABLE as MOTION
 from patchfem.runs.batch import meshes, one_by_one
 from patchfem.runs.batch.lumped import lanes
@@ -83,7 +83,11 @@ N_SINGLES = 30  # cases that are computed by single runs too
 
 def draw_points(law: str, seed: int, count: int) -> list:
     """Draw models of a law that lanes take: from sliding all the time to sticking, near resonance and away."""
-    r, base, out = np.random.default_rng(seed), base_of(pf.load(SCENE.format(law=LAWS[law]))), []
+    r, base, out = (
+        np.random.default_rng(seed),
+        get_base_scene(pf.load(SCENE.format(law=LAWS[law]))),
+        [],
+    )
     while len(out) < count:
         push = 10 ** r.uniform(0.3, 2)
         sets = {
@@ -103,7 +107,7 @@ def draw_points(law: str, seed: int, count: int) -> list:
 
 def draw_patches(family: str, seed: int, count: int) -> list:
     """Draw models of a family of rigs with a patch."""
-    r, base = np.random.default_rng(seed), base_of(pf.load(PATCH))
+    r, base = np.random.default_rng(seed), get_base_scene(pf.load(PATCH))
     sets = [{key: float(draw(r)) for key, draw in FAMILIES[family].items()} for _ in range(count)]
     return [pf.build(base.override(format_assignments(one))) for one in sets]
 

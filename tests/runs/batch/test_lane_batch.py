@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from lane_cases import LAWS, SCENE, draw_points, rows
 
-from patchfem.api import base_of, build, load, run_many
+from patchfem.api import build, get_base_scene, load, run_many
 from patchfem.runs.batch import batches, one_by_one
 from patchfem.runs.batch.case_results import CaseResults
 from patchfem.runs.batch.lumped import lanes, lumped
@@ -141,7 +141,7 @@ def test_always_only_the_case_that_is_contradicted_is_exact(monkeypatch):
 @pytest.mark.parametrize("law", EXACT[:3])
 def test_exact_lanes_answer_stuck_cases(law):
     """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""
-    base = base_of(load(SCENE.format(law=LAWS[law])))
+    base = get_base_scene(load(SCENE.format(law=LAWS[law])))
     cases = [
         build(base.override([f"normal.load={load} N", f"structure.mode.axial.damping={damping}"]))
         for load in (300, 1000, 3000)
@@ -159,7 +159,7 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
     """It slips in the last of its 30 cycles, and sticks once it has settled. An extrapolation of the cycles in which it
     slips was off by 4 of its bars."""
     law = 'law = "elastic-plastic"\nstatic = 0.3\nstiffness = "176715.00010433397 N/m"'
-    base = base_of(load(SCENE.format(law=law)))
+    base = get_base_scene(load(SCENE.format(law=law)))
     sets = {
         "normal.load": 100.0,
         "structure.moving_mass": 1.0,

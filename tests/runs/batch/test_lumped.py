@@ -5,7 +5,7 @@ import pytest
 from batch_beside import held_against
 from scene_texts import MODE
 
-from patchfem.api import base_of, build, load
+from patchfem.api import build, get_base_scene, load
 from patchfem.runs.batch import one_by_one
 from patchfem.runs.batch.case_results import CaseResults
 from patchfem.runs.batch.lumped import lumped
@@ -47,7 +47,7 @@ def models(law: str, seed: int, count: int) -> list:
         if law == "elastic-plastic":
             sets["friction.bond_length"] = 10 ** r.uniform(-7, -4)
         scene = load(SCENE.format(law=LAWS[law], kind=kind, kind_size=SIZES[kind]))
-        out.append(build(base_of(scene).override(format_assignments(sets))))
+        out.append(build(get_base_scene(scene).override(format_assignments(sets))))
     return out
 
 
@@ -73,7 +73,9 @@ def test_exact_batch_is_the_single_runs(law, count):
 def test_always_errors_of_few_cells_hold_the_result_of_many():
     """Cells of a density that a tolerance asks for: the answers of a far smaller tolerance lie within the errors, where
     small cycles slip too, for which the first cells are too few."""
-    base = base_of(load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"])))
+    base = get_base_scene(
+        load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"]))
+    )
     for push in ("20 m/s^2", "2 m/s^2", "0.3 m/s^2"):
         few, many = (
             build(base.override([f"drive.acceleration={push}", f"accuracy.tolerance={tolerance}"]))

@@ -8,7 +8,7 @@ import pytest
 from lane_cases import PATCH, draw_patches, rows
 
 import patchfem as pf
-from patchfem.api import base_of
+from patchfem.api import get_base_scene
 from patchfem.runs.batch import batches, meshes
 from patchfem.runs.batch.lumped import sheared, tabled
 from patchfem.scene.sets import format_assignments
@@ -44,7 +44,7 @@ def test_always_a_set_beyond_the_table_is_exact(monkeypatch):
 
 def test_always_a_patch_that_sticks_is_answered_in_lanes():
     """Its loop is a small difference, which changes by more than itself with the steps; the amplitude does not."""
-    base = base_of(pf.load(PATCH))
+    base = get_base_scene(pf.load(PATCH))
     sets = [
         {
             "drive.acceleration": "50 m/s^2",
