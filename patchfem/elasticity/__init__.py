@@ -4,12 +4,14 @@ In: tagged meshes and materials. Out: compliance matrices of the interface nodes
 tangential, coupled), and displacements and stresses inside for given forces on the interface.
 
 The equations are those of plane linear elasticity, in strain or stress: div sigma = 0 with
-sigma = lam tr(eps) I + 2 mu eps, and u = 0 on the far face. `plane_form` contains their weak form,
-which scikit-fem evaluates for every mesh. With the stiffness split into inside i and interface s,
-the compliance of the interface is the inverse of the Schur complement
-S = K_ss - K_si K_ii^-1 K_is.
+sigma = lam tr(eps) I + 2 mu eps, and u = 0 on the far face. `plane_form` contains their weak form.
+scikit-fem evaluates it, and the shape functions of the stresses, for every mesh. With the stiffness
+split into inside i and interface s, the compliance of the interface is the inverse of the Schur
+complement S = K_ss - K_si K_ii^-1 K_is.
 
 - Read `elasticity` first: materials, pieces, compliance and displacement.
+- `reference_cells` returns the values of scikit-fem's elements on reference cells, from the disk
+  cache if they are there.
 - A piece on a tensor grid is assembled in `tensor_stiffness` from the matrices of three reference
   cells. `condense` computes S, and `grid_fronts` eliminates the inside and predicts the cost.
 - A piece on an unstructured mesh (from a file, or with round ends) is assembled cell by cell in

@@ -1,11 +1,12 @@
 """Traction between a coating and its substrate, from nodal forces along their common line."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..mesh.grading import LENGTH_TOL
-from .recovery import Cells, quadrature_stress
+from .elasticity import hooke
+from .recovery import Cells, make_points
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -26,7 +27,7 @@ class CoatingTraction:
     normal: np.ndarray
 
 
-def compute_coating_traction(cells: Cells, rules: list, u) -> CoatingTraction | None:
+def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
     """Compute the forces of the coating on its substrate.
 
     They are the nodal forces of the stress in the coating, so they balance the load on its face.
@@ -34,7 +35,6 @@ def compute_coating_traction(cells: Cells, rules: list, u) -> CoatingTraction | 
     Parameters
     ----------
     cells : Cells
-    rules : list of Quadrature
     u : (frames, N, 2) ndarray
         Displacements [m].
 
@@ -61,8 +61,9 @@ def compute_coating_traction(cells: Cells, rules: list, u) -> CoatingTraction | 
         np.add.at(length, ends, edge_lengths / 2)
     across /= np.hypot(*across.T)[:, None]
     along = across[:, ::-1] * [1.0, -1.0]
-    coating, coating_rules = _select_coating(cells, rules, nodes)
-    force = np.stack([-_nodal_forces(coating, coating_rules, motion)[nodes] for motion in u])
+    coating = _select_coating(cells, nodes)
+    gauss_points = make_points(coating, "gauss")
+    force = np.stack([-_nodal_forces(coating, gauss_points, motion)[nodes] for motion in u])
     shear = (force * along).sum(axis=2) / length
     normal = (force * across).sum(axis=2) / length
     return CoatingTraction(nodes, length, force, shear, normal)
@@ -76,7 +77,7 @@ def _find_bonded_edges(cells: Cells) -> np.ndarray:
             for block in cells.blocks
         ]
     )
-    is_coating = cells.is_coating[cells.owner()]
+    is_coating = cells.is_coating[cells.cell_of_corner()]
     in_coating = np.zeros(len(cells.points), bool)
     in_coating[edges[is_coating]] = True
     in_substrate = np.zeros(len(cells.points), bool)
@@ -88,39 +89,34 @@ def _find_bonded_edges(cells: Cells) -> np.ndarray:
     return edges[is_coating & np.isin(key, key[~is_coating])]
 
 
-def _select_coating(cells: Cells, rules: list, nodes) -> tuple[Cells, list]:
-    """Return the coating cells that touch given nodes, and the Gauss points of these cells.
+def _select_coating(cells: Cells, nodes) -> Cells:
+    """Return the coating cells that touch given nodes.
 
     No other cell exerts a force of the coating on these nodes.
     """
     is_touched = np.zeros(len(cells.points), bool)
     is_touched[nodes] = True
-    selected = []
+    blocks = []
     first = 0
-    for rule in rules:
-        chosen = cells.is_coating[first : first + len(rule.block)]
-        chosen = chosen & is_touched[rule.block].any(axis=1)
-        first += len(rule.block)
-        selected.append(
-            replace(
-                rule,
-                block=rule.block[chosen],
-                gradient=rule.gradient[chosen],
-                weight=rule.weight[chosen],
-            )
-        )
-    blocks = tuple(rule.block for rule in selected)
+    for block in cells.blocks:
+        is_coating = cells.is_coating[first : first + len(block)]
+        first += len(block)
+        blocks.append(block[is_coating & is_touched[block].any(axis=1)])
     is_coating = np.ones(sum(map(len, blocks)), bool)
-    return Cells(cells.points, blocks, is_coating, cells.layers), selected
+    return Cells(cells.points, tuple(blocks), is_coating, cells.layers)
 
 
-def _nodal_forces(cells: Cells, rules: list, u) -> np.ndarray:
-    """Return the nodal forces (N, 2) [N/m] in equilibrium with the stress of the cells."""
-    out = np.zeros((len(cells.points), 2))
-    for rule, stress in zip(rules, quadrature_stress(cells, rules, u)):
-        tensor = stress[..., [[0, 2], [2, 1]]] * rule.weight[..., None, None]
-        force = np.einsum("cgij,cgnj->cni", tensor, rule.gradient, optimize=True)
-        np.add.at(out, rule.block, force)
+def _nodal_forces(coating: Cells, gauss_points: list, u) -> np.ndarray:
+    """Return the nodal forces (N, 2) [N/m] in equilibrium with the stress of coating cells."""
+    out = np.zeros((len(coating.points), 2))
+    for points in gauss_points:
+        is_coating = np.ones(points.weight.shape[1], bool)
+        xx, yy, _, xy = np.moveaxis(hooke(points.strain(u), is_coating, coating.layers), -1, 0)
+        tensor = np.array([[xx, xy], [xy, yy]]) * points.weight
+        # stress tensor with its second axis along the local coordinates
+        local = np.einsum("ijgc,jkgc->gkic", tensor, points.inverse_jacobian)
+        force = np.tensordot(points.element.gradient, local, axes=([0, 1], [0, 1]))
+        np.add.at(out, points.corners, force.swapaxes(1, 2))
     return out
 
 

@@ -150,8 +150,8 @@ def candidate_grids(lower: PieceInterface, upper: PieceInterface) -> Grids:
             f"contact.mesh: the pieces share {end - begin:.6g} m of the interface, which is less than "
             "two cells; shift or refine the pieces"
         )
-    softness_lower = interpolate_zigzag_compliance(lower.x, lower.compliance.nn, x_lower)
-    softness_upper = interpolate_zigzag_compliance(upper.x, upper.compliance.nn, x_upper)
+    softness_lower = interpolate_force_triple_compliance(lower.x, lower.compliance.nn, x_lower)
+    softness_upper = interpolate_force_triple_compliance(upper.x, upper.compliance.nn, x_upper)
     return Grids(x_lower, x_upper, common_grid(x_lower, x_upper, softness_lower, softness_upper))
 
 
@@ -267,7 +267,7 @@ def common_grid(x_lower, x_upper, softness_lower, softness_upper) -> np.ndarray:
     x_lower, x_upper : (n,) ndarray
         Ascending nodes [m].
     softness_lower, softness_upper : (n,) ndarray
-        zigzag compliance of each piece at its nodes [m2/N].
+        `force_triple_compliance` of each piece at its nodes [m2/N].
 
     Returns
     -------
@@ -294,15 +294,15 @@ def common_grid(x_lower, x_upper, softness_lower, softness_upper) -> np.ndarray:
     return np.array(grid)
 
 
-def _zigzag_forces(x) -> tuple[np.ndarray, np.ndarray]:
-    """Return the outer forces (m - 2,) that balance a force of 1 at each inner node."""
+def _outer_triple_forces(x) -> tuple[np.ndarray, np.ndarray]:
+    """Return the forces (m - 2,) at both neighbours that balance a force of 1 at each inner node."""
     cells = np.diff(x)
     left = cells[:-1]
     right = cells[1:]
     return -right / (left + right), -left / (left + right)
 
 
-def zigzag_compliance(x, compliance) -> np.ndarray:
+def force_triple_compliance(x, compliance) -> np.ndarray:
     """Return the compliance of a body to balanced triples of forces at adjacent nodes.
 
     It does not depend on the size of the body.
@@ -320,7 +320,7 @@ def zigzag_compliance(x, compliance) -> np.ndarray:
     (m - 2,) ndarray
         At the inner nodes [m2/N].
     """
-    left, right = _zigzag_forces(x)
+    left, right = _outer_triple_forces(x)
     i = np.arange(1, x.size - 1)
     middle = compliance[i, i]
     outer = left**2 * compliance[i - 1, i - 1] + right**2 * compliance[i + 1, i + 1]
@@ -329,10 +329,10 @@ def zigzag_compliance(x, compliance) -> np.ndarray:
     return middle + outer + 2 * mutual
 
 
-def interpolate_zigzag_compliance(x, compliance, positions) -> np.ndarray:
+def interpolate_force_triple_compliance(x, compliance, positions) -> np.ndarray:
     """Interpolate the compliance of a piece to balanced triples of forces along its interface.
 
-    `zigzag_compliance` defines these triples; it is interpolated linearly between the inner nodes.
+    `force_triple_compliance` defines these triples; it is interpolated linearly between the inner nodes.
 
     Parameters
     ----------
@@ -345,7 +345,7 @@ def interpolate_zigzag_compliance(x, compliance, positions) -> np.ndarray:
     -------
     (k,) ndarray [m2/N]
     """
-    return np.interp(positions, x[1:-1], zigzag_compliance(x, compliance))
+    return np.interp(positions, x[1:-1], force_triple_compliance(x, compliance))
 
 
 def estimate_ripples(x, nn, pieces) -> np.ndarray:
@@ -353,8 +353,8 @@ def estimate_ripples(x, nn, pieces) -> np.ndarray:
 
     It holds for a smooth contact whose half width is `N_REFERENCE_CELLS` cells of the coarser side,
     and falls with the square of this width. A piece that is deformed to a parabola reaches the grid
-    with the kinks of its own nodes, d = T (x_s)^2 - x^2. Zigzag forces against the joint compliance
-    balance the non-smooth component of d. For Hertz contact the measured ripple was 0.4 to 1.3
+    with the kinks of its own nodes, d = T (x_s)^2 - x^2. Balanced triples of forces on the joint
+    compliance balance the non-smooth component of d. For Hertz contact the measured ripple was 0.4 to 1.3
     times this one, for cells of 1:1.5 to 1:10 and moduli of 1:1 to 1:100.
 
     Parameters
@@ -370,7 +370,7 @@ def estimate_ripples(x, nn, pieces) -> np.ndarray:
     -------
     (m - 2,) ndarray [1]
     """
-    left, right = _zigzag_forces(x)
+    left, right = _outer_triple_forces(x)
     inner = x[1:-1]
     forced = np.zeros(inner.size)
     coarser_cell = np.zeros(inner.size)
@@ -380,11 +380,13 @@ def estimate_ripples(x, nn, pieces) -> np.ndarray:
         offset = (piece_x[entries.col] - x[entries.row]) ** 2
         kink = np.bincount(entries.row, entries.data * offset, x.size)
         roughness = np.abs(kink[1:-1] + left * kink[:-2] + right * kink[2:])
-        forced += roughness * interpolate_zigzag_compliance(piece_x, piece.compliance.nn, inner)
+        forced += roughness * interpolate_force_triple_compliance(
+            piece_x, piece.compliance.nn, inner
+        )
         cell = np.interp(inner, (piece_x[1:] + piece_x[:-1]) / 2, np.diff(piece_x))
         coarser_cell = np.maximum(coarser_cell, cell)
     half_width = N_REFERENCE_CELLS * coarser_cell
-    return forced / (zigzag_compliance(x, nn) * tributary_lengths(x)[1:-1] * half_width)
+    return forced / (force_triple_compliance(x, nn) * tributary_lengths(x)[1:-1] * half_width)
 
 
 def join_on_grid(grids: Grids, side: str, lower: PieceInterface, upper: PieceInterface) -> Mortar:

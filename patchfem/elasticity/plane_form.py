@@ -1,7 +1,8 @@
-"""Bilinear form of plane linear elasticity, evaluated by scikit-fem on every mesh."""
+"""Plane linear elasticity in scikit-fem: the bilinear form and the elements on reference cells."""
 
 import numpy as np
-from skfem import Basis, BilinearForm, ElementQuad1, ElementVector, MeshQuad
+from skfem import Basis, BilinearForm, ElementQuad1, ElementTriP1, ElementVector, MeshQuad
+from skfem.quadrature import get_quadrature
 
 
 @BilinearForm
@@ -17,7 +18,23 @@ def plane_elasticity(u, v, w):
     return volumetric + w.mu * deviatoric
 
 
-def rectangle_terms(corners) -> np.ndarray:
+def evaluate_reference_cells() -> dict[str, np.ndarray]:
+    """Evaluate the elements on their reference cells; `reference_cells` describes the arrays."""
+    arrays = {"rectangle_terms": rectangle_terms()}
+    for name, element in (("triangle", ElementTriP1()), ("quadrilateral", ElementQuad1())):
+        gauss_points, weights = get_quadrature(element.refdom, 2)
+        centre = element.doflocs.mean(axis=0)[:, None]
+        rules = (("gauss", gauss_points, weights), ("centre", centre, weights.sum(keepdims=True)))
+        for kind, points, weight in rules:
+            values = [element.lbasis(points, corner) for corner in range(len(element.doflocs))]
+            arrays[f"{name}_{kind}_shape"] = np.stack([shape for shape, _ in values], axis=-1)
+            gradients = np.stack([gradient for _, gradient in values], axis=-1)
+            arrays[f"{name}_{kind}_gradient"] = gradients.swapaxes(0, 1)
+            arrays[f"{name}_{kind}_weight"] = weight
+    return arrays
+
+
+def rectangle_terms() -> np.ndarray:
     """Return the matrices from which the stiffness of every bilinear rectangle follows.
 
     The stiffness of a rectangle per unit width depends on its height / width r and on its Lame
@@ -28,11 +45,6 @@ def rectangle_terms(corners) -> np.ndarray:
     over a square. They are rounded to these multiples: a very thin and stiff coating amplifies
     the round-off of the quadrature.
 
-    Parameters
-    ----------
-    corners : (4, 2) array_like
-        Corners of the unit square, counterclockwise from the origin.
-
     Returns
     -------
     (2, 3, 4, 4, 2, 2) ndarray
@@ -41,7 +53,7 @@ def rectangle_terms(corners) -> np.ndarray:
     """
     ratios = np.array([0.5, 1.0, 2.0])
     sizes = np.stack([np.ones(3), ratios], axis=1)
-    points = np.array(corners) * sizes[:, None] + [[[0, 0]], [[2, 0]], [[4, 0]]]
+    points = ElementQuad1.doflocs * sizes[:, None] + [[[0, 0]], [[2, 0]], [[4, 0]]]
     mesh = MeshQuad(points.reshape(-1, 2).T.copy(), np.arange(12).reshape(3, 4).T.copy())
     basis = Basis(mesh, ElementVector(ElementQuad1()), intorder=2)
     powers = np.stack([ratios, np.ones(3), 1 / ratios], axis=1)

@@ -7,19 +7,17 @@ error (Zienkiewicz and Zhu 1987).
 """
 
 from dataclasses import dataclass
-from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from ..core import frozen_array
-from ..mesh.nodal_averages import GroupedPatches, Patches, collect_patches
+from ..mesh.nodal_averages import Patches, collect_patches
 from .elasticity import Layers, Piece, hooke
+from .lapack import one_thread
+from .reference_cells import ElementValues, element_values
 
 # A patch whose correlations of (1, x, y) have a smaller determinant takes in the cells around it.
 MIN_PLANE_DETERMINANT = 0.1
-GAUSS_COORDINATE = 1 / np.sqrt(3)  # local coordinate of the points of 2 x 2 Gauss quadrature
-CORNER_COORDINATES = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -37,7 +35,7 @@ class Cells:
     is_coating: np.ndarray
     layers: Layers
 
-    def owner(self) -> np.ndarray:
+    def cell_of_corner(self) -> np.ndarray:
         """Return the cell number of every corner, block after block."""
         sizes = np.concatenate([np.full(len(block), block.shape[1]) for block in self.blocks])
         return np.repeat(np.arange(sizes.size), sizes)
@@ -60,6 +58,76 @@ def get_cells(piece) -> Cells:
     return Cells(mesh.points, blocks, mesh.is_coating, piece.layers)
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class CellPoints:
+    """Points in the cells of one block, at which scikit-fem's shape functions are known.
+
+    - ``corners``: (n, c) nodes of the cells
+    - ``element``: values of the element at the points of its reference cell
+    - ``inverse_jacobian``: (2, 2, g, c) derivative of local coordinate j along axis i at [i, j]
+      [1/m]
+    - ``weight``: (g, c) weights for integrals over the cells [m2]
+    """
+
+    corners: np.ndarray
+    element: ElementValues
+    inverse_jacobian: np.ndarray
+    weight: np.ndarray
+
+    def strain(self, u) -> np.ndarray:
+        """Return the plane strains exx, eyy, exy (3, g, c) [1] of displacements u (N, 2) [m]."""
+        local_slopes = _local_slopes(self.element, self.corners, u)
+        slopes = np.einsum("glkc,ilgc->kigc", local_slopes, self.inverse_jacobian)
+        return np.stack([slopes[0, 0], slopes[1, 1], (slopes[0, 1] + slopes[1, 0]) / 2])
+
+    def interpolate(self, values) -> np.ndarray:
+        """Interpolate values (n, ..., c) at the corners; returns (g, ..., c) at the points."""
+        return _combine_corners(self.element.shape, values)
+
+
+def _local_slopes(element: ElementValues, corners, values) -> np.ndarray:
+    """Return the derivatives (g, 2, 2, c) of nodal values (N, 2) by the local coordinates.
+
+    The second axis is the local coordinate, the third the component of the values.
+    """
+    by_component = np.ascontiguousarray(np.transpose(values))
+    corner_values = np.stack([by_component.take(nodes, axis=1) for nodes in corners])
+    return _combine_corners(element.gradient, corner_values)
+
+
+def _combine_corners(factors, values) -> np.ndarray:
+    """Return the products (..., c) of factors (..., n) with values (n, ..., c) at the corners."""
+    # several BLAS threads only wait for each other in products with so few rows
+    with one_thread():
+        return np.tensordot(factors, values, axes=1)
+
+
+def make_points(cells: Cells, kind: str) -> list[CellPoints]:
+    """Return the Gauss points or the centres of the cells of each block.
+
+    Parameters
+    ----------
+    cells : Cells
+    kind : {"gauss", "centre"}
+        Gauss points, with which the stiffness is integrated, or the centres.
+
+    Returns
+    -------
+    list of CellPoints
+    """
+    points = []
+    for block in cells.blocks:
+        corners = np.ascontiguousarray(block.T)
+        element = element_values(len(corners), kind)
+        jacobian = _local_slopes(element, corners, cells.points)
+        (x_by_first, y_by_first), (x_by_second, y_by_second) = np.moveaxis(jacobian, 0, 2)
+        determinant = x_by_first * y_by_second - y_by_first * x_by_second
+        adjugate = np.array([[y_by_second, -y_by_first], [-x_by_second, x_by_first]])
+        weight = element.weight[:, None] * determinant
+        points.append(CellPoints(corners, element, adjugate / determinant, weight))
+    return points
+
+
 def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
     """Compute the stress at the centres of cells, the superconvergent points of bilinear quads.
 
@@ -75,31 +143,12 @@ def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
         xx, yy, zz, xy [Pa], positive in tension. y is the inward axis, so xy changes its sign for
         a piece that is drawn at y < 0.
     """
-    strains = []
-    for block in cells.blocks:
-        first, second = _axis_changes(cells.points, block)
-        u_first, u_second = _axis_changes(u, block)
-        area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-        exx = (u_first[..., 0] * second[:, 1] - u_second[..., 0] * first[:, 1]) / area
-        eyy = (u_second[..., 1] * first[:, 0] - u_first[..., 1] * second[:, 0]) / area
-        along_by_depth = u_second[..., 0] * first[:, 0] - u_first[..., 0] * second[:, 0]
-        inward_by_x = u_first[..., 1] * second[:, 1] - u_second[..., 1] * first[:, 1]
-        strains.append((exx, eyy, (along_by_depth + inward_by_x) / (2 * area)))
-    strain = [np.concatenate(parts, axis=1) for parts in zip(*strains)]
-    return hooke(strain, cells.is_coating, cells.layers)
-
-
-def _axis_changes(values, block) -> tuple[np.ndarray, np.ndarray]:
-    """Return the changes (..., c, k) of nodal values (..., N, k) along both local axes of cells.
-
-    For a quad these are twice the differences between the midpoints of opposite sides.
-    """
-    corners = [values.take(nodes, axis=-2) for nodes in block.T]
-    if len(corners) == 3:
-        return corners[1] - corners[0], corners[2] - corners[0]
-    diagonal = corners[2] - corners[0]
-    other_diagonal = corners[1] - corners[3]
-    return diagonal + other_diagonal, diagonal - other_diagonal
+    centres = make_points(cells, "centre")
+    out = np.empty((len(u), cells.is_coating.size, 4))
+    for frame, motion in zip(out, u):
+        strains = [points.strain(motion)[:, 0] for points in centres]
+        frame[:] = hooke(np.concatenate(strains, axis=1), cells.is_coating, cells.layers)
+    return out
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -137,12 +186,12 @@ def fit_recovery(cells: Cells) -> Recovery:
     A patch that is too thin for a plane, as at edges and corners, takes in the cells around it. If
     it stays thin, as in a coating of one row, the fit has no slope across it.
     """
-    owner = cells.owner()
+    cell_of_corner = cells.cell_of_corner()
     key, recovery_point = np.unique(
-        2 * cells.corners() + cells.is_coating[owner], return_inverse=True
+        2 * cells.corners() + cells.is_coating[cell_of_corner], return_inverse=True
     )
     node = key // 2
-    near = collect_patches(recovery_point, owner)
+    near = collect_patches(recovery_point, cell_of_corner)
     centres = cells.centres()
     fit, is_thin = _fit_planes(near, cells.points[node], centres)
     if is_thin.any():
@@ -195,79 +244,6 @@ def _fit_planes(near: Patches, points, centres) -> tuple[Patches, np.ndarray]:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Quadrature:
-    """Gauss points of one block of cells.
-
-    - ``block``: (c, n) nodes of the cells
-    - ``shape``: (g, n) shape functions at the points
-    - ``gradient``: (c, g, n, 2) their derivatives [1/m]
-    - ``weight``: (c, g) [m2]
-    """
-
-    block: np.ndarray
-    shape: np.ndarray
-    gradient: np.ndarray
-    weight: np.ndarray
-
-    def strain(self, u) -> np.ndarray:
-        """Return the plane strains exx, eyy, exy (3, c, g) [1] of displacements u (N, 2) [m]."""
-        slope = np.einsum("cgnj,cni->ijcg", self.gradient, u[self.block], optimize=True)
-        return np.stack([slope[0, 0], slope[1, 1], (slope[0, 1] + slope[1, 0]) / 2])
-
-
-def make_quadratures(cells: Cells) -> list[Quadrature]:
-    """Return the Gauss points of each block with which the stiffness is integrated.
-
-    These are 2 x 2 points in quadrilaterals and 3 points in triangles.
-    """
-    rules = []
-    for block in cells.blocks:
-        if block.shape[1] == 3:
-            at = np.array([[4, 1], [1, 4], [1, 1]]) / 6
-            shape = np.column_stack([1 - at.sum(axis=1), at])
-            local_gradient = np.broadcast_to(np.array([[-1, -1], [1, 0], [0, 1]]), (3, 3, 2))
-            local_weight = 1 / 6
-        else:
-            at = GAUSS_COORDINATE * CORNER_COORDINATES
-            factors = 1 + at[:, None] * CORNER_COORDINATES
-            shape = factors.prod(axis=2) / 4
-            local_gradient = CORNER_COORDINATES * factors[..., ::-1] / 4
-            local_weight = 1.0
-        jacobian = np.einsum("gni,cnj->cgij", local_gradient, cells.points[block], optimize=True)
-        inverse = np.linalg.inv(jacobian)
-        gradient = np.einsum("gni,cgji->cgnj", local_gradient, inverse, optimize=True)
-        weight = local_weight * np.linalg.det(jacobian)
-        rules.append(Quadrature(block, shape, gradient, weight))
-    return rules
-
-
-def quadrature_stress(cells: Cells, rules: list, u) -> list[np.ndarray]:
-    """Compute the plane stresses at the Gauss points of each block.
-
-    Parameters
-    ----------
-    cells : Cells
-    rules : list of Quadrature
-    u : (N, 2) ndarray
-        Displacements [m] along x and inward.
-
-    Returns
-    -------
-    list of (c, g, 3) ndarray
-        xx, yy, xy [Pa], positive in tension.
-    """
-    out = []
-    first = 0
-    for rule in rules:
-        is_coating = cells.is_coating[first : first + len(rule.block)]
-        first += len(rule.block)
-        strain = np.swapaxes(rule.strain(u), 1, 2)  # the materials belong to the last axis
-        stress = hooke(strain, is_coating, cells.layers)
-        out.append(np.swapaxes(stress, 0, 1)[..., [0, 1, 3]])
-    return out
-
-
-@dataclass(frozen=True, eq=False, slots=True)
 class StressError:
     """Estimated error of the stress in the energy norm.
 
@@ -278,7 +254,7 @@ class StressError:
     error: np.ndarray
     energy: np.ndarray
 
-    def relative(self, *others: "StressError") -> tuple[np.ndarray, np.ndarray]:
+    def relative_error(self, *others: "StressError") -> tuple[np.ndarray, np.ndarray]:
         """Return the errors relative to the energy norm of the stress in all pieces.
 
         Parameters
@@ -300,18 +276,14 @@ class StressError:
         return np.sqrt(self.error / norm[:, None]), np.sqrt(total / norm)
 
 
-class EnergyNorms(NamedTuple):
-    """Squared energy norms of the error of each cell (t,) and of the whole stress [J/m]."""
-
-    error: np.ndarray
-    energy: float
-
-
-def estimate_error(recovery: Recovery, u, stress, rules: list) -> StressError:
+def estimate_error(recovery: Recovery, u, stress, gauss_points: list) -> StressError:
     """Estimate the error of the stress by the method of Zienkiewicz and Zhu.
 
     ||sigma* - sigma||^2 = integral of (sigma* - sigma) : C^-1 : (sigma* - sigma) per metre of
-    width. sigma* is the recovered stress, interpolated by the shape functions.
+    width. sigma* is the recovered stress, interpolated by the shape functions. The integrals are
+    sums over the Gauss points. The components (xx + yy) / (2 sqrt(lam + mu)),
+    (xx - yy) / (2 sqrt(mu)) and xy / sqrt(mu) of a stress have squares that add up to the
+    integrand.
 
     Parameters
     ----------
@@ -320,136 +292,48 @@ def estimate_error(recovery: Recovery, u, stress, rules: list) -> StressError:
         Displacements [m].
     stress : (frames, t, 4) ndarray
         Stress at the cell centres [Pa] (`centre_stress`).
-    rules : list of Quadrature
+    gauss_points : list of CellPoints
 
     Returns
     -------
     StressError
     """
-    cells = recovery.cells
-    lam, mu = cells.layers.lame(cells.is_coating)
-    sides = _rectangle_sides(cells)
-    if sides is None:
-        frame_norms = partial(_compute_quadrature_norms, recovery, rules)
-    else:
-        rectangles = Rectangles(
-            recovery.fit.group_by_size(),
-            np.ascontiguousarray(recovery.recovery_point.reshape(-1, 4).T),
-            np.ascontiguousarray(cells.blocks[0].T),
-            sides,
-        )
-        frame_norms = partial(_compute_rectangle_norms, rectangles)
-    norms = [
-        frame_norms(motion, centre[:, [0, 1, 3]], lam, mu) for motion, centre in zip(u, stress)
-    ]
-    return StressError(
-        frozen_array([norm.error for norm in norms]), frozen_array([norm.energy for norm in norms])
-    )
-
-
-def _rectangle_sides(cells: Cells) -> np.ndarray | None:
-    """Return the lengths (2, t) [m] of rectangles along x and inward; None for other cells.
-
-    The first corner of each has the least coordinates, as on a tensor grid.
-    """
-    if len(cells.blocks) != 1 or cells.blocks[0].shape[1] != 4:
-        return None
-    first, second, third, fourth = np.moveaxis(cells.points[cells.blocks[0]], 1, 0)
-    sides = (third - first).T
-    corners = np.stack([third[:, 0], first[:, 1]]), np.stack([first[:, 0], third[:, 1]])
-    deviation = max(np.abs(second.T - corners[0]).max(), np.abs(fourth.T - corners[1]).max())
-    return sides if 1e9 * deviation < sides.min() else None
-
-
-class Rectangles(NamedTuple):
-    """Recovery on cells that are rectangles.
-
-    - ``fit``: weights of the recovery
-    - ``recovery_points``, ``nodes``: (4, t) recovery points and nodes of the corners
-    - ``sides``: (2, t) lengths [m] along x and inward
-    """
-
-    fit: GroupedPatches
-    recovery_points: np.ndarray
-    nodes: np.ndarray
-    sides: np.ndarray
-
-
-def _compute_rectangle_norms(rectangles: Rectangles, u, stress, lam, mu) -> EnergyNorms:
-    """Compute the `EnergyNorms` of the stress at one instant on rectangles, in closed form.
-
-    Both fields are split into 1, xi, eta and xi eta, which are orthogonal with the mean squares 1,
-    1/3, 1/3 and 1/9, and into (xx + yy) / (2 sqrt(lam + mu)), (xx - yy) / (2 sqrt(mu)) and
-    xy / sqrt(mu), whose squares add up to the complementary energy. Arrays have the three
-    components first, because NumPy is slow along an axis of three.
-
-    u: (N, 2) [m]; stress: xx, yy, xy (t, 3) [Pa] at the cell centres.
-    """
-    width, height = rectangles.sides
+    lam, mu = recovery.cells.layers.lame(recovery.cells.is_coating)
     bulk = np.sqrt(lam + mu)
     shear = np.sqrt(mu)
-    xx, yy, xy = stress.T
-    constant = np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear])
-    recovered = rectangles.fit(constant)
-    a, b, c, d = (recovered.take(points, axis=1) for points in rectangles.recovery_points)
-    displacement = np.ascontiguousarray(u.T)
-    u_a, u_b, u_c, u_d = (displacement.take(nodes, axis=1) for nodes in rectangles.nodes)
-    # twice the coefficients of the term xi eta of the bilinear displacements, which give the part of the stresses that is
-    # linear in xi or eta
-    along, inward = (u_a - u_b + u_c - u_d) / 2
-    by_xi = np.stack([bulk * inward, -shear * inward, shear * along]) / height
-    by_eta = np.stack([bulk * along, shear * along, shear * inward]) / width
-    upper_sum = a + b
-    lower_sum = c + d
-    upper_difference = b - a
-    lower_difference = c - d
-    error = sum(
-        np.einsum("kt,kt->t", part, part) * mean_square
-        for part, mean_square in (
-            ((upper_sum + lower_sum) / 4 - constant, 1),
-            ((upper_difference + lower_difference) / 4 - by_xi, 1 / 3),
-            ((lower_sum - upper_sum) / 4 - by_eta, 1 / 3),
-            ((lower_difference - upper_difference) / 4, 1 / 9),
-        )
-    )
-    energy = sum(
-        np.einsum("kt,kt->t", part, part) * mean_square
-        for part, mean_square in ((constant, 1), (by_xi, 1 / 3), (by_eta, 1 / 3))
-    )
-    area = width * height
-    return EnergyNorms(area * error, float(area @ energy))
+    recover = recovery.fit.group_by_size()
+    error = np.zeros((len(u), mu.size))
+    energy = np.zeros(len(u))
+    for frame, motion in enumerate(u):
+        xx, yy, _, xy = stress[frame].T
+        recovered = recover(np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear]))
+        first_cell = 0
+        first_corner = 0
+        for points in gauss_points:
+            n_corners, n_cells = points.corners.shape
+            cells = slice(first_cell, first_cell + n_cells)
+            corners = slice(first_corner, first_corner + n_cells * n_corners)
+            nodes = recovery.recovery_point[corners].reshape(n_cells, n_corners).T
+            at_corners = np.stack([recovered.take(node, axis=1) for node in nodes])
+            at_points = points.interpolate(at_corners)
+            exx, eyy, exy = points.strain(motion)
+            computed = (
+                bulk[cells] * (exx + eyy),
+                shear[cells] * (exx - eyy),
+                shear[cells] * (2 * exy),
+            )
+            for k, component in enumerate(computed):
+                energy[frame] += (points.weight * component**2).sum()
+                difference = at_points[:, k] - component
+                error[frame, cells] += np.einsum("gc,gc->c", points.weight, difference**2)
+            first_cell = cells.stop
+            first_corner = corners.stop
+    return StressError(frozen_array(error), frozen_array(energy))
 
 
-def _compute_quadrature_norms(recovery: Recovery, rules: list, u, stress, lam, mu) -> EnergyNorms:
-    """Compute the `EnergyNorms` of the stress at one instant by quadrature, on cells of any shape."""
-    at_corners = recovery(stress)[recovery.recovery_point]
-    errors = []
-    energy = 0.0
-    first_corner = 0
-    first_cell = 0
-    for rule, computed in zip(rules, quadrature_stress(recovery.cells, rules, u)):
-        n_cells, n_corners = rule.block.shape
-        cells = slice(first_cell, first_cell + n_cells)
-        corners = slice(first_corner, first_corner + n_cells * n_corners)
-        nodal = at_corners[corners].reshape(n_cells, n_corners, 3)
-        recovered = np.einsum("gn,cnk->cgk", rule.shape, nodal)
-        density = _complementary_energy(recovered - computed, lam[cells], mu[cells])
-        errors.append((rule.weight * density).sum(axis=1))
-        energy += (rule.weight * _complementary_energy(computed, lam[cells], mu[cells])).sum()
-        first_corner = corners.stop
-        first_cell = cells.stop
-    return EnergyNorms(np.concatenate(errors), energy)
-
-
-def _complementary_energy(stress, lam, mu) -> np.ndarray:
-    """Return the density s : C^-1 : s (c, g) [Pa] of plane stresses (c, g, 3); lam, mu: (c,)."""
-    xx, yy, xy = np.moveaxis(stress, -1, 0)
-    lam = lam[:, None]
-    mu = mu[:, None]
-    return (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy) ** 2) / (2 * mu)
-
-
-def choose_rounding_step(recovery: Recovery, error: StressError, rules: list, fraction: float):
+def choose_rounding_step(
+    recovery: Recovery, error: StressError, gauss_points: list, fraction: float
+) -> float:
     """Choose a rounding step for stresses that is small compared with their estimated error.
 
     Rounding to multiples of q changes xx, yy and xy by q / sqrt(12) in the root mean square, whose
@@ -459,7 +343,7 @@ def choose_rounding_step(recovery: Recovery, error: StressError, rules: list, fr
     ----------
     recovery : Recovery
     error : StressError
-    rules : list of Quadrature
+    gauss_points : list of CellPoints
     fraction : float
         Change by rounding over the estimated error of any loaded frame, in the energy norm [1].
 
@@ -471,7 +355,7 @@ def choose_rounding_step(recovery: Recovery, error: StressError, rules: list, fr
     total = error.error.sum(axis=1)
     if not total.any():
         return 0.0
-    area = np.concatenate([rule.weight.sum(axis=1) for rule in rules])
+    area = np.concatenate([points.weight.sum(axis=0) for points in gauss_points])
     _, mu = recovery.cells.layers.lame(recovery.cells.is_coating)
     smallest = total[total > 0].min()
     return float(fraction * np.sqrt(6 * smallest / (area / mu).sum()))

@@ -10,34 +10,13 @@ A stencil (nx, rows, 3, 3, 2, 2) [N/m per m] contains at [c, r, 1 + dc, 1 + dr] 
 not exist. rows: the free ones; the last row of nodes is fixed.
 """
 
-from functools import cache
-
 import numpy as np
 
-from . import cache as disk_cache
 from .lapack import one_thread
+from .reference_cells import rectangle_terms
 
-# Corners (column, row) of a cell.
+# Corners (column, row) of a cell, in the order of scikit-fem.
 CORNER_POSITIONS = ((0, 0), (1, 0), (1, 1), (0, 1))
-# Shape of `plane_form.rectangle_terms`: Lame constant, term A, B or C, two corners, two directions.
-RECTANGLE_TERMS_SHAPE = (2, 3, 4, 4, 2, 2)
-
-
-@cache
-def _rectangle_terms() -> np.ndarray:
-    """Return `plane_form.rectangle_terms`, from the disk cache if it is there.
-
-    Only the first run on a machine imports scikit-fem, which takes as long as a small patch.
-    """
-    key = disk_cache.reference_cell_key()
-    kept = disk_cache.load_arrays(key, {"terms": RECTANGLE_TERMS_SHAPE})
-    if kept is not None:
-        return kept["terms"]
-    from .plane_form import rectangle_terms
-
-    terms = rectangle_terms(CORNER_POSITIONS)
-    disk_cache.store_arrays(key, {"terms": terms})
-    return terms
 
 
 def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
@@ -59,7 +38,7 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
     # the terms r A, B and C / r of a cell are products of a factor of its column and one of its row
     column_factors = np.stack([1 / widths, np.ones_like(widths), widths], axis=1)
     materials = np.array([lam, mu], float)
-    row_terms = np.einsum("lr,ltabij->trabij", materials, _rectangle_terms())
+    row_terms = np.einsum("lr,ltabij->trabij", materials, rectangle_terms())
     row_terms[0] *= heights[:, None, None, None, None]
     row_terms[2] /= heights[:, None, None, None, None]
     n_columns = widths.size

@@ -6,7 +6,7 @@ is given. No traction remains without pressure, and at rest no traction exceeds 
 - `start(sigma)`: state before any motion, under a pressure sigma (m,) [Pa]
 - `step(state, increment, s0, s1, dt)`: `Step` for an increment [m] in dt [s] under pressures from s0 to s1
 - `press(state, s0, s1)`: `Step` at rest while the pressure changes from s0 to s1
-- `traction(state)`, `stored(state)`: traction [Pa] and elastic energy per area [J/m2] of a state
+- `traction(state)`, `stored_energy(state)`: traction [Pa] and elastic energy per area [J/m2] of a state
 - `element(load)`: `Element` of a whole contact
 
 Laws of constant load (Iwan, Bouc-Wen, LuGre) have only `element`. Its kernels are a module of compiled functions, which
@@ -74,7 +74,7 @@ class LastTraction:
         """Return the traction (m,) [Pa] at the end of the last step, positive against slip to +x."""
         return state
 
-    def stored(self, state):
+    def stored_energy(self, state):
         """Return the elastic energy per area (m,) [J/m2], which is 0."""
         return np.zeros_like(state)
 

@@ -12,7 +12,7 @@ import ladder_cycles as ladder
 import today
 
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.protocol import Step
 
@@ -70,7 +70,7 @@ def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0), shares=SHARES) -> dict:
         for b in shares:
             law = ladder.bonds(order=p, breakaway=b, initial=float(p > 0), **more)
             out[f"stretch p = {p:g}, b = {b:g}{tail}"] = (
-                Recursion(law) if p == 1 else Quadrature(law, 1e-9)
+                FirstOrderBonds(law) if p == 1 else Quadrature(law, 1e-9)
             )
     for p in (0.0, 1.0):
         law = ladder.bonds(order=p, reading="report", initial=p, **more)

@@ -17,7 +17,7 @@ from force_control import OutOfReach, drift
 from friction_forms import dither_drift, stretch_loop
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 
 HERE = Path(__file__).parent
 COLOURS = (BLUE, "#4f9bd9", "#e0975f", ORANGE)
@@ -26,7 +26,7 @@ MARCHED = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 
 def growing(share: float, swing: float) -> float:
     """Drift per cycle [bond lengths] at .5 +- swing with growth; nan where the block slides away."""
-    engine = Recursion(ladder.bonds(breakaway=share, **ladder.GROWTH))
+    engine = FirstOrderBonds(ladder.bonds(breakaway=share, **ladder.GROWTH))
     try:
         return (
             drift(engine, (0.5 + swing, 0.5 - swing), (1.0, 1.0), 4, period=PERIOD, length=LENGTH)

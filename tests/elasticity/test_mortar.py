@@ -18,7 +18,7 @@ from patchfem.elasticity.mortar import (
     PieceInterface,
     clip_nodes,
     common_grid,
-    interpolate_zigzag_compliance,
+    interpolate_force_triple_compliance,
     transfer_matrix,
 )
 from patchfem.mesh.anymesh import PieceMesh
@@ -126,8 +126,8 @@ def test_exact_patch_test_on_held_blocks_without_poisson_effect(one, other, stif
         column(x_high, 0.7 * HEIGHT, stiff * YOUNG, 0.0, plane),
     )
     soft = (
-        interpolate_zigzag_compliance(x_low, low[0], x_low),
-        interpolate_zigzag_compliance(x_high, high[0], x_high),
+        interpolate_force_triple_compliance(x_low, low[0], x_low),
+        interpolate_force_triple_compliance(x_high, high[0], x_high),
     )
     for x, limit in ((common_grid(x_low, x_high, *soft), 1e-12), (x_low, None), (x_high, None)):
         nn = forced(low, x_low, high, x_high, x)

@@ -10,7 +10,7 @@ from scene_texts import NONLOCAL, POINT, SMALL_PATCH, TRIANGLE
 from patchfem import build, plan
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 from patchfem.runs.bench import bench as law_bench
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.run import run
@@ -77,7 +77,7 @@ def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
     corners = 1e-3 * np.array([0, 2, 6, 8])
     ways = 1e-6 * np.array([[0, 10, 10, 4], [0, 0, 20, 24]])
     path = np.stack([np.interp(time, corners, way) for way in ways], axis=1)
-    law = Recursion(Bonds(0.3, 2e-6))
+    law = FirstOrderBonds(Bonds(0.3, 2e-6))
     state, tractions = law.start(flat, 2), [np.zeros((2, flat.size))]
     for move, span in zip(np.diff(path, axis=0), np.diff(time)):
         state = law.step(state, move, flat, flat, span).state

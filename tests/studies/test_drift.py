@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from study_module import study
 
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +68,7 @@ def test_exact_creep_and_the_way_of_bouc_wen(table):
 def test_always_growth_asks_for_a_longer_elastic_range(table):
     def last(share, case):
         law = table.ladder.bonds(breakaway=share, **table.ladder.GROWTH)
-        return table.row("", Recursion(law), case, 4).last
+        return table.row("", FirstOrderBonds(law), case, 4).last
 
     assert last(0.1, "force .5+-.1") == pytest.approx(0.0014, abs=1e-4)
     assert last(0.3, "force .3+-.3") == pytest.approx(0.033, abs=1e-3)
@@ -112,7 +112,7 @@ def test_exact_an_elastic_range_narrows_the_loop(table):
 
 @pytest.mark.parametrize("share", [0.0, 0.1])
 def test_exact_the_elastic_range_in_the_virgin_curve(table, share):
-    law, one = Recursion(table.ladder.bonds(breakaway=share)), np.ones(1)
+    law, one = FirstOrderBonds(table.ladder.bonds(breakaway=share)), np.ones(1)
     force = law.traction(law.step(law.start(one), 0.8 * table.LENGTH, one, one, 1.0).state)[0]
     assert force == pytest.approx(1 - (1 - share) * np.exp(share - 0.8), abs=1e-14)
 

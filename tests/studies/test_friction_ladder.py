@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from study_module import study
 
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +81,7 @@ def test_exact_lugre_is_the_law_that_grows_at_once(ladder):
 
 def test_exact_bouc_wen_of_the_first_power_is_the_constant_length(ladder, today):
     path = np.random.default_rng(1).normal(0, 0.7, 200).cumsum()
-    law, one = Recursion(ladder.bonds()), np.ones(1)
+    law, one = FirstOrderBonds(ladder.bonds()), np.ones(1)
     state, force = law.start(one), [0.0]
     for dq in np.diff(path):
         state = law.step(state, dq * ladder.LENGTH, one, one, 1.0).state

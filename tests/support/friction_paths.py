@@ -57,7 +57,7 @@ def walk(law, path, pressure, dt=1.0):
     for k, dq in enumerate(np.diff(path)):
         step = law.step(state, float(dq), pressure(path[k]), pressure(path[k + 1]), float(times[k]))
         state = step.state
-        rows.append((step.mean, law.traction(state), step.dissipated, law.stored(state)))
+        rows.append((step.mean, law.traction(state), step.dissipated, law.stored_energy(state)))
     return Walk(*(np.array(part) for part in zip(*rows)), state)
 
 

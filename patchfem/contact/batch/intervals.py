@@ -114,7 +114,7 @@ class Intervals:
         if brackets is None:
             brackets = everywhere
             if m > MIN_COARSE_NODES:
-                brackets = self._bracket_on_coarse(gap, loads, is_free=is_free)
+                brackets = self._bracket_on_coarse_grid(gap, loads, is_free=is_free)
         first, stop = np.clip(brackets, [[0], [1]], [[m - 1], [m]])
         first_try = np.broadcast_to(first, n_cases).astype(int)
         is_known = first_try.any()
@@ -145,7 +145,7 @@ class Intervals:
                 values[missed] = new_values
         return contacts
 
-    def _bracket_on_coarse(self, gap, loads, *, is_free: bool) -> tuple:
+    def _bracket_on_coarse_grid(self, gap, loads, *, is_free: bool) -> tuple:
         """Bracket the contacts: first node and end (q,) of stretches that contain them.
 
         The brackets follow from the contacts on a coarse interface.

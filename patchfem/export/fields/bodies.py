@@ -18,7 +18,7 @@ from ...elasticity.recovery import (
     estimate_error,
     fit_recovery,
     get_cells,
-    make_quadratures,
+    make_points,
 )
 from ...runs.results.result import surface_of
 from .blocks import blocks_of
@@ -71,7 +71,7 @@ def write_fields(result, path: Path) -> dict:
     x = surface_of(patch, fields).x
     low, high = (_body(patch, fields, x, *of) for of in zip(("lower", "upper"), insides, motions))
     for one, other in ((low, high), (high, low)):
-        one["stress_error"] = one["error"].relative(other["error"])[0]
+        one["stress_error"] = one["error"].relative_error(other["error"])[0]
     notes = result.extra.setdefault("notes", [])
     inside = beyond_yield(result.plan.model.patch, {"lower": low, "upper": high})
     faces = result.extra.get("yielding_faces", {})
@@ -149,7 +149,7 @@ class _Inside:
     stress : callable
         Displacements -> stresses of cells.
     cells, rules, found
-        Cells, quadratures and recovery for the error of the stress.
+        Cells, Gauss points and recovery for the error of the stress.
     """
 
     points: np.ndarray
@@ -178,7 +178,7 @@ def _inside(piece, grid) -> _Inside:
         interface,
         partial(centre_stress, cells),
         cells,
-        make_quadratures(cells),
+        make_points(cells, "gauss"),
         fit_recovery(cells),
     )
 
@@ -225,7 +225,7 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
         *(np.concatenate([getattr(one, name) for one in errors]) for name in ("error", "energy"))
     )
     bond = coating_traction.interpolate_coating_traction(
-        cells, coating_traction.compute_coating_traction(cells, inside.rules, u), x
+        cells, coating_traction.compute_coating_traction(cells, u), x
     )
     bond = {name: rows[:1] + rows[1:] for name, rows in bond.items()}
     if bond:

@@ -145,8 +145,8 @@ class Quadrature:
         """
         dq = np.atleast_1d(np.asarray(dq, float))
         after = self.advance(state, dq, s0, s1, dt)
-        stored = self.stored(state)
-        gain = self.stored(after) - stored
+        stored = self.stored_energy(state)
+        gain = self.stored_energy(after) - stored
         if not dq.any():
             return Step(self.traction(after), -gain, after)
         if self._has_moments:
@@ -159,7 +159,7 @@ class Quadrature:
                 # bonds that are lost at the end of the step still act during the step
                 positive = np.maximum(s1, np.finfo(float).tiny)
                 before_loss = self.advance(state, dq, s0, positive, dt, forming=(s0 + s1) / 2)
-                gain_before_loss = self.stored(before_loss) - stored
+                gain_before_loss = self.stored_energy(before_loss) - stored
             mean = self._mean_from_energy(state, gain_before_loss, dq, s0, s1, dt)
         return Step(_drop_single_axis(mean), dq @ mean - gain, after)
 
@@ -240,7 +240,9 @@ class Quadrature:
             cohort = Strip(now, np.zeros_like(now.displacement), 0.0, now.mature_length, 0.0, 0.0)
             pressure = np.vstack([state.pressure * kept, np.where(s1 > 0, formed, 0.0)])
             after = replace(after, strips=state.strips.append(cohort), pressure=pressure)
-        return Step(self.traction(after), self.stored(state) - self.stored(after), after)
+        return Step(
+            self.traction(after), self.stored_energy(state) - self.stored_energy(after), after
+        )
 
     def _release_by_moments(self, state: Strips, s0, s1) -> _Release:
         """Return a release after which the bonds have the moments of `recursion.press_bonds`.
@@ -374,7 +376,7 @@ class Quadrature:
         """Return the traction [Pa], positive against slip: (m,) along a line, (2, m) in a plane."""
         return self.law.static * _drop_single_axis(self._sums(state)[:-1])
 
-    def stored(self, state: Strips) -> np.ndarray:
+    def stored_energy(self, state: Strips) -> np.ndarray:
         """Return the elastic energy per area (m,) [J/m2] at the present damage."""
         return self.law.static * self._sums(state)[-1]
 

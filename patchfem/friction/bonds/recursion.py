@@ -258,7 +258,7 @@ def refuse_directions(law: Bonds, directions: int) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Recursion:
+class FirstOrderBonds:
     """Bonds of order p = 1 in the stretch reading, advanced from increment to increment.
 
     The pressure may vary within an increment and from one increment to the next.
@@ -339,6 +339,6 @@ class Recursion:
         z = state.bonds[1] if len(state.bonds) == 3 else state.bonds[1:-1]
         return self.law.static / self.law.length * z
 
-    def stored(self, state: BondState):
+    def stored_energy(self, state: BondState):
         """Return the elastic energy per area mu_s s2/(2 eps_0) (m,) [J/m2]."""
         return self.law.static / (2 * self.law.length) * state.bonds[-1]

@@ -367,7 +367,9 @@ def _divide_strips(strips: Strip, now: PathState, law: Bonds) -> _Pieces:
             singular_points.append(zero)
         if np.isfinite(origin):
             singular_points.append(complex(-origin - parts.start[k], 0.0))
-        cuts = _grade_cuts(parts.length[k], MAX_PIECE_LENGTH * eps[k], singular_points)
+        cuts = _subdivide_near_singularities(
+            parts.length[k], MAX_PIECE_LENGTH * eps[k], singular_points
+        )
         steep = np.zeros(cuts.size - 1, int)
         if starts_steep[k] or origin + parts.start[k] == 0:
             steep[0] = 1
@@ -452,11 +454,13 @@ def _rules_of_pieces(steep_end, order: float) -> _GaussRule:
     return _GaussRule(points, np.where(steep_end != 0, jacobi.weights, legendre.weights))
 
 
-def _grade_cuts(length: float, max_length: float, singular_points: list[complex]) -> np.ndarray:
-    """Cut [0, length] into pieces not longer than their distance from the singular points.
+def _subdivide_near_singularities(
+    length: float, max_length: float, singular_points: list[complex]
+) -> np.ndarray:
+    """Divide [0, length] into pieces not longer than their distance from the singular points.
 
-    The points are complex: position along the interval, and distance from its line. A piece is halved until it is also
-    not longer than `max_length`. Returns the cuts (k,), with both ends.
+    The points are complex: position along the interval, and distance from its line. No piece is longer than
+    `max_length`. Returns the ends (k,) of the pieces in increasing order.
     """
     inside = [point.real for point in singular_points if 0 < point.real < length]
     intervals = list(pairwise(sorted({0.0, length, *inside})))[::-1]

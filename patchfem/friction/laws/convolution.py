@@ -257,6 +257,6 @@ class Convolution:
         """Return the traction (m,) [Pa] at the end of the last step, positive against slip to +x."""
         return state.traction
 
-    def stored(self, state: ConvolutionState):
+    def stored_energy(self, state: ConvolutionState):
         """Return the elastic energy per area (m,) [J/m2], which is 0."""
         return np.zeros_like(state.traction)

@@ -65,7 +65,7 @@ class ElasticPlastic:
         decay = np.exp(-(1 - elastic) * abs(dq) / self.length)
         springs = remaining + (springs - remaining) * decay
         after = np.where(s1 > 0, np.stack([y1, springs]), 0.0)
-        gain = self.stored(after) - self.stored(state)
+        gain = self.stored_energy(after) - self.stored_energy(state)
         return Step(self.static * mean, self.static * mean * dq - gain, after)
 
     def press(self, state, s0, s1) -> Step:
@@ -83,7 +83,9 @@ class ElasticPlastic:
             Its mean is the traction after the change.
         """
         after = np.stack(self._limit_traction(state, s1))
-        return Step(self.traction(after), self.stored(state) - self.stored(after), after)
+        return Step(
+            self.traction(after), self.stored_energy(state) - self.stored_energy(after), after
+        )
 
     def _limit_traction(self, state, sigma):
         """Return traction/mu and density of springs under a changed pressure, 0 without pressure."""
@@ -94,7 +96,7 @@ class ElasticPlastic:
         """Return the traction (m,) [Pa] of a state, positive against slip to +x."""
         return self.static * state[0]
 
-    def stored(self, state):
+    def stored_energy(self, state):
         """Return the elastic energy mu eps y^2/(2 density) (m,) [J/m2] of a state, y = traction/mu."""
         y, springs = state
         energy = np.divide(y**2, 2 * springs, out=np.zeros_like(y), where=springs > 0)

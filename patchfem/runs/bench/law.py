@@ -23,7 +23,7 @@ def law_for(model, patch=None):
     law = model.bonds
     engine = model.accuracy.quadrature
     if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):
-        return recursion.Recursion(law)
+        return recursion.FirstOrderBonds(law)
 
     return quadrature.Quadrature(law, tail_of(model))
 

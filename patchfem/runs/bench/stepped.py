@@ -188,7 +188,7 @@ def _evaluate_law(
         here = np.atleast_2d(
             law.breakaway_traction(s0, peaks[k]) if k in peaks else law.traction(state)
         )
-        force[k], load[k], stored[k] = here @ weight, weight @ s0, weight @ law.stored(state)
+        force[k], load[k], stored[k] = here @ weight, weight @ s0, weight @ law.stored_energy(state)
         if k in pick:
             tau.append(here)
         if k % BLOCK == 0 or k == size - 1:

@@ -13,7 +13,7 @@ from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import element_model, points_model
 from patchfem.dynamics.march.varying_load import bonds, plastic
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 from patchfem.friction.grooves import Grooves
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.response.measures import energy_balance
@@ -27,7 +27,10 @@ LAWS = {
         lambda length: plastic(MU, length),
         lambda length: ElasticPlastic(MU, length),
     ),
-    "bonds": (lambda length: bonds(Bonds(MU, length)), lambda length: Recursion(Bonds(MU, length))),
+    "bonds": (
+        lambda length: bonds(Bonds(MU, length)),
+        lambda length: FirstOrderBonds(Bonds(MU, length)),
+    ),
 }
 
 

@@ -11,7 +11,7 @@ from patchfem.dynamics.march.march import fresh, march
 from patchfem.dynamics.march.models import jenkins_model, list_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion, advance_bonds
+from patchfem.friction.bonds.recursion import FirstOrderBonds, advance_bonds
 from patchfem.slip.shear_modes import shear_modes
 from patchfem.structure import drives
 
@@ -34,7 +34,7 @@ def test_exact_prescribed_path_of_points_is_the_recursion(growth):
     area, sigma = np.array([0.5, 1.0, 0.25]), np.array([2.0, 1.0, 3.0])
     path = random_walk(2, 80, 0.6)
     forces, energies, bad, _ = follow(points_model(law, area, sigma), path)
-    run = walk(Recursion(law), path, upper_pressure(sigma), 0.3)
+    run = walk(FirstOrderBonds(law), path, upper_pressure(sigma), 0.3)
     assert bad == 0
     assert forces[1:, 0] == pytest.approx(run.traction @ area, abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean @ area, abs=1e-12)
@@ -249,7 +249,9 @@ def test_exact_march_with_a_pressure_on_the_lower_piece_replayed():
         window=2,
     )
     path = got.window.slide
-    run = walk(Recursion(law), path, lambda q: np.interp(x + q, x, sigma, left=0.0, right=0.0))
+    run = walk(
+        FirstOrderBonds(law), path, lambda q: np.interp(x + q, x, sigma, left=0.0, right=0.0)
+    )
     assert np.ptp(path) > 5e-6 and (run.traction == 0).any()
     assert got.window.force[1:] == pytest.approx(run.traction @ area, abs=1e-9 * limit)
 

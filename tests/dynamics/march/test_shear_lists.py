@@ -195,7 +195,7 @@ def test_order_points_under_the_pressure_of_the_lower_piece_are_the_numpy_sum(re
         state = twin.advance(state, after - here, before, now, 1e-3)
         before = now
         found.append(weight * twin.traction(state).sum())
-        stored.append(weight * twin.stored(state).sum())
+        stored.append(weight * twin.stored_energy(state).sum())
     away = np.abs(path) > 1e-8  # of the place of the first bonds, which have a width behind shear
     assert (
         bad == 0

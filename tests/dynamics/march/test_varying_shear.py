@@ -13,11 +13,11 @@ from patchfem.dynamics.march import march as plain
 from patchfem.dynamics.march import models, varying_load
 from patchfem.dynamics.propagator import propagator
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import Recursion, advance_bonds
+from patchfem.friction.bonds.recursion import FirstOrderBonds, advance_bonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.slip.shear_modes import jenkins_set, shear_modes
 
-SOFT = {"plastic": ElasticPlastic(0.3, 1e-6), "bonds": Recursion(Bonds(0.3, 1e-6))}
+SOFT = {"plastic": ElasticPlastic(0.3, 1e-6), "bonds": FirstOrderBonds(Bonds(0.3, 1e-6))}
 
 
 def giving(x, depth: float = 3e-8) -> np.ndarray:
@@ -49,7 +49,7 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
     )
     z = v = 0.0
     u, state, slides, forces = np.zeros(sets.x.size), law.start(loads[0]), [0.0], [0.0]
-    bonds = isinstance(law, Recursion)
+    bonds = isinstance(law, FirstOrderBonds)
 
     def moved(state, xi, load):
         """(mean tractions, state) after the slides xi (m,)."""

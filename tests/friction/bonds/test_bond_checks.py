@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from patchfem.friction.bonds.parameters import Bonds, grow, growth_exponents
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 
 ONE = upper_pressure([1.0])
 UNEVEN = np.array([0.0, 0.02, 0.5, 0.7, 1.0, 1.9, 2.0, 3.3, 4.0])
@@ -25,7 +25,7 @@ def bonds(order=1.0, reading="stretch", initial=1.0, **more):
 def laws(order, reading, initial):
     law = bonds(order, reading, initial)
     both = [Quadrature(law, tail=0.0)]
-    return [*both, Recursion(law)] if reading == "stretch" and order == 1 else both
+    return [*both, FirstOrderBonds(law)] if reading == "stretch" and order == 1 else both
 
 
 def last_cycle_work(law, path, per_cycle):
@@ -72,7 +72,7 @@ def test_exact_virgin_force(order, reading, initial, want):
 def test_exact_stretch_loop_with_any_number_of_steps(ratio, area):
     for per_stroke in (2, 14):
         path = triangle(ratio, int(np.ceil(9 / ratio)) + 1, per_stroke)
-        work, end, _ = last_cycle_work(Recursion(bonds()), path, 2 * per_stroke)
+        work, end, _ = last_cycle_work(FirstOrderBonds(bonds()), path, 2 * per_stroke)
         want, force = stretch_loop(ratio, 1.0)
         assert work == pytest.approx(area, rel=4e-7) and work == pytest.approx(want, rel=1e-11)
         assert -end == pytest.approx(force, rel=1e-12)

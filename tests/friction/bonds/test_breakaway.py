@@ -8,7 +8,7 @@ from friction_paths import random_walk, slides, triangle, upper_pressure, walk
 from patchfem.dynamics.march.models import load_kernels, points_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 
 ONE = upper_pressure([1.0])
@@ -24,7 +24,7 @@ def bonds(share, order=1.0, **more):
 @pytest.mark.parametrize("amplitude", [0.1, 0.9, 1.5, 8.0])
 def test_exact_loop_with_breakaway(share, amplitude):
     path = triangle(amplitude, 80, 7)
-    run = walk(Recursion(bonds(share)), path, ONE)
+    run = walk(FirstOrderBonds(bonds(share)), path, ONE)
     work = run.mean[-14:, 0] @ np.diff(path)[-14:]
     area, end = friction_forms.stretch_loop(amplitude, 1.0, 1.0, share)
     if amplitude > share:  # below it the loop is a line about the first stroke's mean
@@ -33,7 +33,7 @@ def test_exact_loop_with_breakaway(share, amplitude):
         assert work == pytest.approx(0.0, abs=1e-14)
 
 
-@pytest.mark.parametrize("engine", [Recursion, lambda law: Quadrature(law, 0.0)])
+@pytest.mark.parametrize("engine", [FirstOrderBonds, lambda law: Quadrature(law, 0.0)])
 def test_exact_breakaway_of_the_whole_length_is_elastic_plastic(engine):
     path = random_walk(3, 60, 0.6)
     soft = walk(engine(bonds(1 - 1e-13)), path, ONE)
@@ -50,7 +50,7 @@ def test_exact_recursion_with_breakaway_is_the_sum_over_bonds(share, growth):
     path = random_walk(5, 150, 0.5)
     a, b = (
         walk(engine, path, upper_pressure([1.0, 0.3]))
-        for engine in (Recursion(law), Quadrature(law, 0.0))
+        for engine in (FirstOrderBonds(law), Quadrature(law, 0.0))
     )
     for name in ("mean", "traction", "stored", "dissipated"):
         assert getattr(a, name) == pytest.approx(getattr(b, name), abs=1e-11), name
@@ -64,7 +64,7 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
     contact = model.build()
     energies, forces = np.zeros((path.size, 2)), np.zeros((path.size, 3))
     assert load_kernels().follow_path(path, 1.0, model.kind, contact, 1e-12, energies, forces) == 0
-    run = walk(Recursion(law), path, ONE)
+    run = walk(FirstOrderBonds(law), path, ONE)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)
     assert energies[:-1, 0] == pytest.approx(run.dissipated[:, 0], abs=1e-12)
@@ -86,7 +86,7 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
 )
 def test_exact_drift_per_cycle_under_a_force_dither(share, low, high):
     """0 from the second cycle on where the dither stays within the elastic range, the closed form elsewhere."""
-    ends = slides(Recursion(bonds(share)), (high, low), (1.0, 1.0), 8)
+    ends = slides(FirstOrderBonds(bonds(share)), (high, low), (1.0, 1.0), 8)
     wanted = friction_forms.dither_drift(low, high, share)
     assert np.diff(ends) == pytest.approx(wanted, abs=1e-9)
     assert (wanted == 0) == (high - low <= 2 * share + 1e-15 or low == -high)
@@ -105,7 +105,7 @@ def worst_loss(seed, points, count):
         if rng.random() < 0.7
         else {}
     )
-    law = Recursion(
+    law = FirstOrderBonds(
         Bonds(
             0.4,
             1.0,
@@ -125,9 +125,13 @@ def worst_loss(seed, points, count):
         dq = float(rng.normal() * 10 ** rng.uniform(-4, 2))
         ahead = rng.uniform(0, 2, points) if rng.random() < 0.5 else after
         step = law.step(press.state, dq, after, ahead, 10 ** rng.uniform(-3, 2))
-        size = np.abs(step.mean * dq) + law.stored(state) + 1e-12
+        size = np.abs(step.mean * dq) + law.stored_energy(state) + 1e-12
         worst = min(worst, (press.dissipated / size).min(), (step.dissipated / size).min())
-        gain = step.mean * dq - (law.stored(step.state) - law.stored(press.state)) - step.dissipated
+        gain = (
+            step.mean * dq
+            - (law.stored_energy(step.state) - law.stored_energy(press.state))
+            - step.dissipated
+        )
         assert np.abs(gain / size).max() <= 1e-11
         state, sigma = step.state, ahead
     return worst

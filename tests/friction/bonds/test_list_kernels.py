@@ -9,7 +9,7 @@ from scipy.special import gammainc
 from patchfem.friction.bonds.engines import choose_engine
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 
 ONE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
@@ -56,7 +56,7 @@ def test_exact_direct_of_stretch_order_one_is_the_recursion(growth):
     path = np.concatenate(
         [random_walk(5, 80, 0.5), random_walk(5, 80, 0.5)[-1] + np.array([0, 1e-5, 20.0, 1e3])]
     )
-    got, run = follow_list(law, path, 0.4), walk(Recursion(law), path, ONE, 0.4)
+    got, run = follow_list(law, path, 0.4), walk(FirstOrderBonds(law), path, ONE, 0.4)
     assert got.after == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert got.mean == pytest.approx(run.mean[:, 0], abs=1e-12)
     assert got.stored == pytest.approx(run.stored[:, 0], abs=1e-11)

@@ -22,7 +22,7 @@ from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
 from patchfem.friction.bonds.parameters import Bonds, grow
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff_age
-from patchfem.friction.bonds.recursion import BondState, Recursion
+from patchfem.friction.bonds.recursion import BondState, FirstOrderBonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
@@ -74,7 +74,9 @@ def test_exact_c2_growth_factor(a, p, want):
 @pytest.mark.parametrize("hold", [0.05, 0.2, 1.0])
 def test_exact_c8_dwell_of_the_stretch_in_closed_form(hold):
     """From z = eps_k = 0.5, m = 1: eps = 1 - e^-10t/2, force unmoved, then z = eps + (0.5 - eps) e^-x/eps; 1e-12."""
-    law = Recursion(Bonds(1.0, 1.0, ratio=0.5, rest_growth=10.0, slip_growth=1e30, rest_speed=1.0))
+    law = FirstOrderBonds(
+        Bonds(1.0, 1.0, ratio=0.5, rest_growth=10.0, slip_growth=1e30, rest_speed=1.0)
+    )
     state, one = BondState(np.array([[1.0], [0.5], [0.5]]), 0.5), np.ones(1)
     held = law.step(state, 0.0, one, one, hold)
     eps = 1 - 0.5 * np.exp(-10 * hold)
@@ -114,7 +116,7 @@ def test_exact_c9_resultant_of_a_pad_that_bonds_enter_at_its_edge(order, engine,
     """Pressure on the lower piece: shear P(p + 1, x) from the leading edge; resultant P(s, X) - (s/X) P(s + 1, X)."""
     reading = "report" if engine == "printed" else "stretch"
     law = Bonds(1.0, 1.0, order, reading)
-    law = Recursion(law) if engine == "state" else Quadrature(law, tail=0.0)
+    law = FirstOrderBonds(law) if engine == "state" else Quadrature(law, tail=0.0)
     y, w = np.polynomial.legendre.leggauss(24 if width < 50 else 70)
     depth = width * (1 + y) / 2
     tau = over_a_pad(law, depth, width)
@@ -136,7 +138,7 @@ def test_exact_c9_behind_the_pad_old_bonds_hold_under_a_trace_of_pressure_only(o
         assert truth == pytest.approx(number, abs=1e-6)
         laws = [Quadrature(Bonds(1.0, 1.0, order, "report"), tail=0.0)]
         laws += (
-            [Recursion(Bonds(1.0, 1.0)), Quadrature(Bonds(1.0, 1.0), tail=0.0)]
+            [FirstOrderBonds(Bonds(1.0, 1.0)), Quadrature(Bonds(1.0, 1.0), tail=0.0)]
             if order == 1
             else []
         )
@@ -162,7 +164,7 @@ def test_exact_c10_pressure_wave_is_smoothed_and_delayed(order, eps, size, lag):
 
     def response(count):
         law = Bonds(1.0, eps, order, "report" if order == 0 else "stretch", initial=0.0)
-        law = Recursion(law) if order == 1 else Quadrature(law, tail=0.0)
+        law = FirstOrderBonds(law) if order == 1 else Quadrature(law, tail=0.0)
         path = np.linspace(0, 30 * eps, count + 1)
         pressure = lower_pressure(x, 80.0, 2.0)
         tau = pulled(law, path, pressure).traction[-1]
@@ -208,7 +210,7 @@ def test_exact_c16_breakaway_peak_its_place_and_the_force_far_on(slip_growth, pe
     top = brentq(lambda s: 1 - run.sol(s)[0] / (0.5 + 0.5 * np.exp(-s / slip_growth)), 0.3, 20)
     assert (run.sol(top)[0], run.y[0, -1]) == pytest.approx((peak, late), abs=1e-6)
     assert top == pytest.approx(place, abs=1e-3)
-    law = Recursion(
+    law = FirstOrderBonds(
         Bonds(1.0, 1.0, ratio=0.5, rest_growth=1e-30, slip_growth=slip_growth, rest_speed=1e-3)
     )
     path = np.concatenate(
@@ -324,7 +326,7 @@ def test_exact_bond_lengths_of_a_nanometre_and_a_metre_are_one_law(reading, orde
     length = 1e-9
     rng = np.random.default_rng(5)
     path = np.concatenate([[0], np.cumsum(rng.normal(0, 1.5, 24))])
-    laws = [Quadrature, Recursion] if (reading, order) == ("stretch", 1.0) else [Quadrature]
+    laws = [Quadrature, FirstOrderBonds] if (reading, order) == ("stretch", 1.0) else [Quadrature]
     for growth in ({}, GROWTH):
         scaled = {key: value * (1.0 if key == "ratio" else length) for key, value in growth.items()}
         for maker in laws:
@@ -362,7 +364,7 @@ def test_exact_speeds_of_nothing_are_a_dwell(speed, growth):
     for order, reading in ((1.0, "stretch"), (2.0, "stretch"), (0.0, "report"), (1.0, "report")):
         law = Bonds(0.4, 1.0, order, reading, **growth)
         for maker in (
-            (Quadrature, Recursion) if (order, reading) == (1.0, "stretch") else (Quadrature,)
+            (Quadrature, FirstOrderBonds) if (order, reading) == (1.0, "stretch") else (Quadrature,)
         ):
             engine, one = maker(law), np.ones(1)
             state = engine.start(one)
@@ -397,7 +399,7 @@ def test_exact_speeds_of_nothing_are_a_dwell(speed, growth):
 def test_exact_static_equal_to_kinetic_never_changes_the_length(reading, order):
     path = np.concatenate([[0], np.cumsum(np.random.default_rng(6).normal(0, 1, 60))])
     same = {**GROWTH, "ratio": 1.0}
-    for maker in (Quadrature, Recursion) if order == 1 else (Quadrature,):
+    for maker in (Quadrature, FirstOrderBonds) if order == 1 else (Quadrature,):
         grown = walk(maker(Bonds(0.4, 1.0, order, reading, **same)), path, ONE, 0.2)
         plain = walk(maker(Bonds(0.4, 1.0, order, reading)), path, ONE, 0.2)
         assert grown.traction == pytest.approx(plain.traction, abs=1e-13)
@@ -443,7 +445,12 @@ def test_exact_march_with_bonds_of_a_metre_is_a_linear_spring():
 @pytest.mark.parametrize(
     "law, forces, loads, drift_per_cycle",
     [
-        (Recursion(Bonds(1.0, 1.0)), (0.8, 0.2), (1.0, 1.0), np.log(0.8 / 0.2) - np.log(1.8 / 1.2)),
+        (
+            FirstOrderBonds(Bonds(1.0, 1.0)),
+            (0.8, 0.2),
+            (1.0, 1.0),
+            np.log(0.8 / 0.2) - np.log(1.8 / 1.2),
+        ),
         (
             Quadrature(Bonds(1.0, 1.0, 1.0, "stretch"), tail=0.0),
             (0.8, 0.2),
@@ -451,7 +458,7 @@ def test_exact_march_with_bonds_of_a_metre_is_a_linear_spring():
             0.980829253,
         ),
         (ElasticPlastic(1.0, 1.0), (0.999, -0.999), (1.0, 1.0), 0.0),
-        (Recursion(Bonds(1.0, 1.0)), (0.5, 0.5), (0.9, 1.1), 0.0),
+        (FirstOrderBonds(Bonds(1.0, 1.0)), (0.5, 0.5), (0.9, 1.1), 0.0),
     ],
 )
 def test_exact_drift_under_a_dither(law, forces, loads, drift_per_cycle):

@@ -16,7 +16,7 @@ from scipy.special import gamma
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 
 ONE = np.ones(1)
 GROWING = Bonds(0.7, 1.0, 1.0, "stretch", 0.6, 2.0, 0.3, 1e-3, 0.8)
@@ -29,7 +29,7 @@ def along(law, path, sigma=ONE, dt=1.0, pressures=None):
         s0, s1 = (sigma, sigma) if pressures is None else pressures[k : k + 2]
         step = law.step(state, dq, s0, s1, dt)
         state = step.state
-        rows.append((step.mean, law.traction(state), step.dissipated, law.stored(state)))
+        rows.append((step.mean, law.traction(state), step.dissipated, law.stored_energy(state)))
     return *(np.array(part) for part in zip(*rows)), state
 
 
@@ -54,7 +54,9 @@ def against_tangent(traction, path, radius):
 )
 def test_exact_c14_circle(radius, size, lag):
     path = circle(radius, 18, 3000)
-    found = against_tangent(along(Recursion(Bonds(1.0, 1.0)), path)[1][-1, :, 0], path, radius)
+    found = against_tangent(
+        along(FirstOrderBonds(Bonds(1.0, 1.0)), path)[1][-1, :, 0], path, radius
+    )
     assert (
         abs(found)
         == pytest.approx(size, abs=1e-5)
@@ -74,8 +76,8 @@ def test_always_one_direction_is_the_scalar_state(steps, axis, dt):
     knots, sigma = np.cumsum([0.0, *steps]), np.array([1.0, 0.3])
     path = np.zeros((len(knots), 2))
     path[:, axis] = knots
-    one = walk(Recursion(GROWING), knots, lambda q: sigma, dt)
-    found = along(Recursion(GROWING), path, sigma, dt)
+    one = walk(FirstOrderBonds(GROWING), knots, lambda q: sigma, dt)
+    found = along(FirstOrderBonds(GROWING), path, sigma, dt)
     assert found[0][:, axis] == pytest.approx(one.mean, rel=1e-14, abs=1e-14)
     assert found[1][:, axis] == pytest.approx(one.traction, rel=1e-14, abs=1e-14)
     assert found[2] == pytest.approx(one.dissipated, rel=1e-13, abs=1e-14)
@@ -133,7 +135,7 @@ def turned(seed: int, angle: float) -> None:
         random_path(rng, 8),
         np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]),
     )
-    for law in (Recursion(GROWING), Quadrature(GROWING)):
+    for law in (FirstOrderBonds(GROWING), Quadrature(GROWING)):
         one, other = along(law, path, dt=0.3), along(law, path @ turn.T, dt=0.3)
         assert other[1] == pytest.approx(np.einsum("ij,kjm->kim", turn, one[1]), abs=1e-13)
         assert other[2] == pytest.approx(one[2], abs=1e-12)
@@ -145,7 +147,7 @@ def test_exact_the_sum_is_the_state_on_random_polygons():
     for _ in range(3):
         path = random_path(rng, 30)
         pressures = rng.uniform(0, 2, (31, 3)) * (rng.uniform(size=(31, 3)) > 0.15)
-        one = along(Recursion(GROWING), path, dt=0.4, pressures=pressures)
+        one = along(FirstOrderBonds(GROWING), path, dt=0.4, pressures=pressures)
         other = along(Quadrature(GROWING, 0.0), path, dt=0.4, pressures=pressures)
         for a, b in zip(one[:4], other[:4]):
             assert a == pytest.approx(b, abs=1e-10)
@@ -226,7 +228,7 @@ def worst_gain(seed, paths, legs=24):
     """Least of (work so far, dissipation, miss of the ledger) over random closed-in paths, all over the work done."""
     rng, worst = np.random.default_rng(seed), [np.inf, np.inf, 0.0]
     for _ in range(paths):
-        law = Recursion(
+        law = FirstOrderBonds(
             Bonds(
                 1.0,
                 1.0,
@@ -284,14 +286,14 @@ def test_exact_work_and_loss_of_a_leg_are_those_of_its_parts(law):
     assert (two[2] >= -1e-13).all() and (one[2] >= -1e-13).all()
 
 
-@pytest.mark.parametrize("law", [Recursion, Quadrature])
+@pytest.mark.parametrize("law", [FirstOrderBonds, Quadrature])
 def test_refuses_breakaway(law):
     with pytest.raises(PatchfemError, match=r"breakaway in two directions is not supported yet"):
         law(Bonds(1.0, 1.0, breakaway=0.1)).start(ONE, 2)
 
 
 def test_exact_at_rest_only_the_bond_length_changes():
-    law = Recursion(GROWING)
+    law = FirstOrderBonds(GROWING)
     state = along(law, circle(0.5, 3, 40))[4]
     still = law.step(state, np.zeros(2), ONE, ONE, 2.0)
     assert (law.traction(still.state) == law.traction(state)).all() and not still.dissipated.any()

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion, advance_bonds
+from patchfem.friction.bonds.recursion import FirstOrderBonds, advance_bonds
 
 GROWTH = [{}, {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e-2}]
 X = np.linspace(-3, 3, 7)
@@ -45,7 +45,7 @@ def test_exact_recursion_is_the_sum_over_bonds(piece, growth, seed):
     steps[rng.integers(0, 120, 10)] = 0.0
     path, times = np.concatenate([[0], np.cumsum(steps)]), rng.uniform(0.01, 1, 120)
     law = Bonds(0.4, 1.0, initial=0.8, **growth)
-    fast = walk(Recursion(law), path, pressures(piece), times)
+    fast = walk(FirstOrderBonds(law), path, pressures(piece), times)
     slow = walk(Quadrature(law, tail=0.0), path, pressures(piece), times)
     if piece == "lower with bare places":
         lost = np.diff((np.array([pressures(piece)(q) for q in path]) <= 0).astype(int), axis=0)
@@ -60,7 +60,7 @@ def test_exact_step_mean_is_the_average_along_the_step():
     """Means of whole steps against Gauss points on partial steps whose bonds are summed by hand."""
     law = Bonds(1.0, 1.0)
     path = np.array([0.0, 0.8, -0.5, 0.1, 2.0])
-    run = walk(Recursion(law), path, pressures("upper"), 0.5)
+    run = walk(FirstOrderBonds(law), path, pressures("upper"), 0.5)
     y, w = np.polynomial.legendre.leggauss(10)
     for k in range(1, 5):
         dq = path[k] - path[k - 1]
@@ -123,7 +123,7 @@ def test_always_other_orders_of_the_stretch_give_no_energy_on_a_closed_path(orde
 @pytest.mark.parametrize("growth", GROWTH)
 def test_exact_huge_steps_end_in_steady_sliding(growth):
     law = Bonds(0.3, 1.0, **growth)
-    for maker in (Recursion, Quadrature):
+    for maker in (FirstOrderBonds, Quadrature):
         run = walk(
             maker(law), np.array([0.0, 1e6, -1e6, -1e6, -1e6 + 1e-9]), pressures("upper"), 1.0
         )
@@ -140,7 +140,7 @@ def test_exact_huge_steps_end_in_steady_sliding(growth):
 
 def test_exact_steps_of_no_length_and_no_time_change_nothing():
     law = Bonds(0.3, 1.0, **GROWTH[1])
-    for maker in (Recursion, Quadrature):
+    for maker in (FirstOrderBonds, Quadrature):
         path, times = np.array([0, 0.4, 0.4, 0.4, 0.9]), np.array([0.5, 0.0, 0.0, 0.5])
         run = walk(maker(law), path, pressures("upper"), times)
         short = walk(maker(law), path[[0, 1, 4]], pressures("upper"), times[[0, 3]])
@@ -152,7 +152,7 @@ def test_exact_steps_of_no_length_and_no_time_change_nothing():
 
 def test_exact_pressure_changes_leave_old_bonds_as_they_were():
     """Loading and unloading at rest move no force; only a bare place loses it."""
-    law = Recursion(Bonds(0.3, 1.0))
+    law = FirstOrderBonds(Bonds(0.3, 1.0))
     state = law.step(law.start(np.ones(1)), 0.5, np.ones(1), np.ones(1), 1.0).state
     for s0, s1 in ((1.0, 3.0), (3.0, 0.2)):
         step = law.step(state, 0.0, np.array([s0]), np.array([s1]), 1.0)
@@ -162,5 +162,5 @@ def test_exact_pressure_changes_leave_old_bonds_as_they_were():
         )
     lost = law.step(state, 0.0, np.array([0.2]), np.zeros(1), 1.0)
     assert law.traction(lost.state)[0] == 0 and lost.dissipated[0] == pytest.approx(
-        law.stored(state)[0]
+        law.stored_energy(state)[0]
     )

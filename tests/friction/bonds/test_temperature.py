@@ -14,7 +14,7 @@ from scipy.special import erfc
 from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 from patchfem.friction.bonds.temperature import growth_at_temperature, surface_temperature_rise
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
@@ -97,9 +97,9 @@ def test_exact_points_of_their_own_temperature_are_separate_runs(breakaway):
     rest, slip = growth_at_temperature(
         law.rest_growth, law.slip_growth, hot, 293.15, 2500.0, 1500.0
     )
-    engine = Recursion(replace(law, rest_growth=rest, slip_growth=slip))
+    engine = FirstOrderBonds(replace(law, rest_growth=rest, slip_growth=slip))
     alone = [
-        Recursion(
+        FirstOrderBonds(
             Bonds(
                 0.6,
                 2e-6,

@@ -11,7 +11,7 @@ from patchfem import build, plan
 from patchfem.core import Missing
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import TanhLaw
@@ -26,7 +26,7 @@ def test_exact_the_sum_over_bonds_lets_go_what_the_recursion_does():
     rng = np.random.default_rng(4)
     for growth, share in (({}, 0.0), (GROWTH, 0.0), (GROWTH, 0.4)):
         law = Bonds(0.4, 1.0, initial=0.6, breakaway=share, **growth)
-        sum_, state_law = Quadrature(law, 0.0), Recursion(law)
+        sum_, state_law = Quadrature(law, 0.0), FirstOrderBonds(law)
         sigma = rng.uniform(0, 2, 4)
         a, b = sum_.start(sigma), state_law.start(sigma)
         for dq in np.diff(random_walk(2, 60, 0.8)):
@@ -60,7 +60,7 @@ LAWS = [
     Coulomb(0.3),
     TanhLaw(0.3, 1.0),
     ElasticPlastic(0.3, 1.0),
-    Recursion(Bonds(0.3, 1.0)),
+    FirstOrderBonds(Bonds(0.3, 1.0)),
     Quadrature(Bonds(0.3, 1.0), 0.0),
     Quadrature(Bonds(0.3, 1.0, 2.0), 0.0),
     Quadrature(Bonds(0.3, 1.0, 0.0), 0.0),
@@ -75,9 +75,9 @@ def test_exact_lost_contact_takes_force_and_memory(law):
     one, state = np.ones(1), law.start(np.ones(1))
     for dq in (0.7, 0.4, -0.2):
         state = law.step(state, dq, one, one, 1.0).state
-    held = law.stored(state)[0]
+    held = law.stored_energy(state)[0]
     off = law.press(state, one, 0 * one)
-    assert law.traction(off.state)[0] == law.stored(off.state)[0] == off.mean[0] == 0.0
+    assert law.traction(off.state)[0] == law.stored_energy(off.state)[0] == off.mean[0] == 0.0
     assert off.dissipated[0] == pytest.approx(held, abs=1e-15)
     state, new = law.press(off.state, 0 * one, one).state, law.start(one)
     report = isinstance(law, Quadrature) and law.law.reading == "report"

@@ -15,7 +15,7 @@ from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion
+from patchfem.friction.bonds.recursion import FirstOrderBonds
 from patchfem.friction.laws.convolution import Convolution, average_pressure, sliding_limits
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.runs.bench import bench
@@ -110,7 +110,7 @@ def lower(nodes, sigma):
 
 @pytest.mark.share(0, 3, 5)
 @pytest.mark.parametrize(
-    "law, order", [(Recursion, 1), (Quadrature, 1), (Quadrature, 0), (Quadrature, 2)]
+    "law, order", [(FirstOrderBonds, 1), (Quadrature, 1), (Quadrature, 0), (Quadrature, 2)]
 )
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_exact_a_long_slide_over_a_pressure_below_settles_to_the_average(law, order, way):

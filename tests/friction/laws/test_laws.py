@@ -44,7 +44,9 @@ def test_always_elastic_plastic_creates_no_energy(rows, length):
         ) / 2 * (1 + 1e-12)
         work, spent = work + step.mean[0] * dq, spent + step.dissipated[0]
         total += abs(step.mean[0] * dq)
-    assert work - spent - law.stored(state)[0] == pytest.approx(0, abs=1e-12 * max(total, 1e-3))
+    assert work - spent - law.stored_energy(state)[0] == pytest.approx(
+        0, abs=1e-12 * max(total, 1e-3)
+    )
 
 
 def test_exact_falling_pressure_takes_energy_at_rest():
@@ -53,7 +55,7 @@ def test_exact_falling_pressure_takes_energy_at_rest():
     state = law.step(law.start(one), 0.8, one, one, 1.0).state
     for step in (law.step(state, 0.0, one / 2, one / 2, 1.0), law.press(state, one, one / 2)):
         assert law.traction(step.state)[0] == pytest.approx(0.5)
-        assert step.dissipated[0] == pytest.approx(0.32 - 0.125) and law.stored(step.state)[
+        assert step.dissipated[0] == pytest.approx(0.32 - 0.125) and law.stored_energy(step.state)[
             0
         ] == pytest.approx(0.125)
     light = law.press(state, one, 0.9 * one)
@@ -64,15 +66,17 @@ def test_exact_rising_pressure_brings_unstressed_springs_and_slip_breaks_those_i
     law, one = ElasticPlastic(1.0, 1.0), np.ones(1)
     state = law.step(law.start(one), 0.8, one, one, 1.0).state
     state = law.press(state, one, 2 * one).state
-    assert law.traction(state)[0] == 0.8 and law.stored(state)[0] == pytest.approx(0.8**2 / 4)
+    assert law.traction(state)[0] == 0.8 and law.stored_energy(state)[0] == pytest.approx(
+        0.8**2 / 4
+    )
     # stiffness 2
     assert law.step(state, 0.1, 2 * one, 2 * one, 1.0).mean[0] == pytest.approx(0.8 + 0.1)
     state = law.press(state, 2 * one, one).state
     # 0.1 up to the limit, then three lengths of slip
     slip_path = law.step(state, 0.1 + 3.0, one, one, 1.0)
-    assert law.stored(slip_path.state)[0] == pytest.approx(1 / (2 * (1 + np.exp(-3.0))))
+    assert law.stored_energy(slip_path.state)[0] == pytest.approx(1 / (2 * (1 + np.exp(-3.0))))
     assert slip_path.dissipated[0] == pytest.approx(
-        3.0 + 0.09 + 0.8**2 / 4 - law.stored(slip_path.state)[0]
+        3.0 + 0.09 + 0.8**2 / 4 - law.stored_energy(slip_path.state)[0]
     )
 
 
@@ -93,7 +97,7 @@ def test_always_coulomb_dissipates_its_whole_work(rows):
         step = law.step(state, dq, np.array([s0]), np.array([s1]), 1.0)
         state = step.state
         assert step.dissipated[0] == pytest.approx(0.3 * (s0 + s1) / 2 * abs(dq), abs=1e-15)
-        assert law.stored(state)[0] == 0
+        assert law.stored_energy(state)[0] == 0
         if dq:
             assert step.mean[0] == pytest.approx(0.3 * (s0 + s1) / 2 * np.sign(dq))
             assert law.traction(state)[0] == pytest.approx(0.3 * s1 * np.sign(dq))
