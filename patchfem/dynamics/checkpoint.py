@@ -1,8 +1,8 @@
 """Checkpoints of a long march on disk, from which it continues with bitwise equal results.
 
-`keeping` sets the files of all marches in its context, one per march in the order in which they begin. A march that
-ends within SECONDS writes nothing. A checkpoint holds the arrays and numbers of the Run, which are copied into a new
-Run, and the samples so far.
+`store_checkpoints` sets the files of all marches in its context, one per march in the order in
+which they begin. A march that ends within MIN_WRITE_INTERVAL writes nothing. A checkpoint holds the
+arrays and numbers of the `march.Run`, which are copied into a new Run, and the samples so far.
 """
 
 import hashlib
@@ -19,250 +19,305 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_atomically
 
-SECONDS = 20.0  # smallest time [s] between two checkpoints
-SHARE = 0.02  # largest fraction of the computing time that writing checkpoints may take
-# arrays that are not stored, as a new Run computes them or a step overwrites them
-CONSTANT = "periodic", "workspace"
-UNSET = ("sets",)  # arrays that a new Run has not filled yet, so they do not identify it
-WITHOUT = "run without --resume"
-_KEEPER = ContextVar("keeper", default=None)
+# smallest elapsed time [s] between two checkpoints; less is soon computed again
+MIN_WRITE_INTERVAL = 20.0
+# largest fraction of the elapsed time that writing checkpoints may take
+MAX_WRITE_FRACTION = 0.02
+# largest number of samples that are kept from before the last cycles, which bounds the file
+MAX_EARLY_SAMPLES = 400_000
+# attributes of a Run that are not stored, because a new Run computes them or a step overwrites them
+UNSTORED_ATTRIBUTES = "periodic", "workspace"
+# attributes that a new Run has not filled yet, so that they do not identify a march
+UNFILLED_ATTRIBUTES = ("sets",)
+RETRY_ADVICE = "run without --resume"
+_FILES = ContextVar("checkpoint_files", default=None)
 
 
-class Keeper:
+class CheckpointFiles:
     """Files in which the marches of a run store their checkpoints.
 
-    path: function from the number of a march to its file; key: identifies the scene and numerics; resume: whether
-    existing files are read.
+    Parameters
+    ----------
+    path_of_march : callable
+        path_of_march(number) -> Path of the file of a march.
+    key : str
+        Identifies the scene and its numerical settings.
+    is_resumed : bool
+        Whether existing files are read.
     """
 
-    def __init__(self, path, key: str, resume: bool):
-        self.path = path
+    def __init__(self, path_of_march, key: str, is_resumed: bool):
+        self.path_of_march = path_of_march
         self.key = key
-        self.resume = resume
-        self.begun = 0
+        self.is_resumed = is_resumed
+        self.n_begun = 0
 
 
 @contextmanager
-def keeping(keeper: Keeper | None) -> Iterator[None]:
-    """Let the marches in this context store checkpoints by `keeper`; None: they store nothing."""
-    token = _KEEPER.set(keeper)
+def store_checkpoints(files: CheckpointFiles | None) -> Iterator[None]:
+    """Let the marches in this context store checkpoints in files, or store nothing for None."""
+    token = _FILES.set(files)
     try:
         yield
     finally:
-        _KEEPER.reset(token)
+        _FILES.reset(token)
 
 
-MOST_KEPT = 400_000  # largest number of samples that are kept from before the last cycles
-
-
-class Samples:
+class MarchSamples:
     """Samples that a march has collected so far, which are stored with its checkpoint.
 
-    - last: the last cycles (first step, rows, work)
-    - kept, kept_at: blocks of samples from before the last cycles, and their step numbers
-    - extremes, phasors: smallest and largest output, and phasor, of every cycle
-    - again: whether the march was started a second time, cycle by cycle
-    - marks: for each mark passed, the march at that time, the cycles before it and their extremes
+    - last: the last cycles, each of them (number of the first step, rows, work [J])
+    - early_rows, early_numbers: blocks of samples from before the last cycles, and the numbers of
+      their steps
+    - extremes: smallest and largest output [m] of every cycle
+    - phasors: phasor [m] of every cycle
+    - is_restarted: whether the march was started a second time, cycle by cycle
+    - marks: for each mark that was passed the march at that time, the cycles before it and their
+      extremes
     """
 
     def __init__(self, last):
         self.last = last
-        self.kept = []
-        self.kept_at = []
+        self.early_rows = []
+        self.early_numbers = []
         self.extremes = []
         self.phasors = []
-        self.again = False
+        self.is_restarted = False
         self.marks = []
 
     @property
     def capacity(self) -> int:
         """Number of samples from before the last cycles that may still be kept."""
-        return MOST_KEPT - sum(map(len, self.kept_at))
+        return MAX_EARLY_SAMPLES - sum(map(len, self.early_numbers))
 
-    def early(self, rows, numbers) -> None:
-        """Keep samples from before the last cycles, with their step numbers."""
-        self.kept.append(rows)
-        self.kept_at.append(numbers)
+    def keep_early(self, rows, numbers) -> None:
+        """Keep samples from before the last cycles, and the numbers of their steps."""
+        self.early_rows.append(rows)
+        self.early_numbers.append(numbers)
 
-    def arrays(self) -> dict:
+    def to_arrays(self) -> dict:
         """Return all samples as arrays by name."""
-        out = _of_cycles("last", self.last, self.extremes)
-        if self.kept:
-            out |= {"kept": np.concatenate(self.kept), "kept_at": np.concatenate(self.kept_at)}
+        out = _cycles_to_arrays("last", self.last, self.extremes)
+        if self.early_rows:
+            out |= {
+                "kept": np.concatenate(self.early_rows),
+                "kept_at": np.concatenate(self.early_numbers),
+            }
         for k, (run, cycles, extremes) in enumerate(self.marks):
-            out |= _of_run(f"mark{k}.run", run) | _of_cycles(f"mark{k}", cycles, extremes)
-        return out | {"phasors": np.array(self.phasors, complex), "again": np.array(self.again)}
+            out |= _run_to_arrays(f"mark{k}.run", run) | _cycles_to_arrays(
+                f"mark{k}", cycles, extremes
+            )
+        return out | {
+            "phasors": np.array(self.phasors, complex),
+            "again": np.array(self.is_restarted),
+        }
 
-    def take(self, found: dict, fresh) -> None:
-        """Restore the samples from their `arrays`; fresh() returns a march at its start."""
-        cycles, self.extremes = _cycles("last", found)
+    def restore(self, arrays: dict, start_march) -> None:
+        """Restore the samples from what `to_arrays` returned; start_march() returns a new march."""
+        cycles, self.extremes = _cycles_from_arrays("last", arrays)
         self.last.extend(cycles)
-        if "kept" in found:
-            self.kept = [found["kept"]]
-            self.kept_at = [found["kept_at"]]
-        self.phasors = found["phasors"].tolist()
-        self.again = bool(found["again"])
-        while f"mark{len(self.marks)}.first" in found:
+        if "kept" in arrays:
+            self.early_rows = [arrays["kept"]]
+            self.early_numbers = [arrays["kept_at"]]
+        self.phasors = arrays["phasors"].tolist()
+        self.is_restarted = bool(arrays["again"])
+        while f"mark{len(self.marks)}.first" in arrays:
             name = f"mark{len(self.marks)}"
-            run = fresh()
-            _into(run, f"{name}.run", found)
-            self.marks.append((run.fork(run.drive), *_cycles(name, found)))
+            run = start_march()
+            _restore_run(run, f"{name}.run", arrays)
+            self.marks.append((run.fork(run.drive), *_cycles_from_arrays(name, arrays)))
 
 
-def _of_cycles(name: str, cycles, extremes) -> dict:
+def _cycles_to_arrays(name: str, cycles, extremes) -> dict:
     """Return cycles (first step, rows, work) and their extremes as arrays by name."""
     return {f"{name}.{k}": rows for k, (_, rows, _) in enumerate(cycles)} | {
-        f"{name}.first": np.array([one[0] for one in cycles], np.int64),
-        f"{name}.work": np.array([one[2] for one in cycles], float),
+        f"{name}.first": np.array([first for first, _, _ in cycles], np.int64),
+        f"{name}.work": np.array([work for _, _, work in cycles], float),
         f"{name}.extremes": np.array(extremes, float).reshape(-1, 2),
     }
 
 
-def _cycles(name: str, found: dict) -> tuple:
-    """Return the cycles and extremes that `_of_cycles` stored."""
-    firsts = found[f"{name}.first"].tolist()
-    works = found[f"{name}.work"].tolist()
-    return [
-        (first, found[f"{name}.{k}"], work) for k, (first, work) in enumerate(zip(firsts, works))
-    ], [tuple(one) for one in found[f"{name}.extremes"].tolist()]
+def _cycles_from_arrays(name: str, arrays: dict) -> tuple:
+    """Return the cycles and extremes that `_cycles_to_arrays` stored."""
+    firsts = arrays[f"{name}.first"].tolist()
+    works = arrays[f"{name}.work"].tolist()
+    cycles = [
+        (first, arrays[f"{name}.{k}"], work) for k, (first, work) in enumerate(zip(firsts, works))
+    ]
+    return cycles, [tuple(pair) for pair in arrays[f"{name}.extremes"].tolist()]
 
 
-class Slot:
+class MarchCheckpoint:
     """Checkpoint file of one march; without a path nothing is stored."""
 
     def __init__(self, path: Path | None, key: str):
         self.path = path
         self.key = key
-        self.next = perf_counter() + SECONDS
+        self.next_write = perf_counter() + MIN_WRITE_INTERVAL
 
-    def offer(self, run, samples: Samples) -> None:
+    def write_if_due(self, run, samples: MarchSamples) -> None:
         """Write a checkpoint between two cycles if it is due; a full disk ends the checkpoints."""
-        if self.path is None or perf_counter() < self.next or run.outcome is not None:
+        if self.path is None or perf_counter() < self.next_write or run.outcome is not None:
             return
         begin = perf_counter()
         try:
-            save(self.path, self.key, run, samples)
+            save_checkpoint(self.path, self.key, run, samples)
         except Missing:
             with suppress(OSError):
                 self.path.unlink(missing_ok=True)
             self.path = None
         end = perf_counter()
-        self.next = end + max(SECONDS, (end - begin) / SHARE)
+        self.next_write = end + max(MIN_WRITE_INTERVAL, (end - begin) / MAX_WRITE_FRACTION)
 
 
-def slot_of(run, asked: tuple, samples: Samples, fresh) -> Slot:
-    """Return the Slot of a march that begins; an existing checkpoint is loaded into the march.
+def open_checkpoint(run, request: tuple, samples: MarchSamples, start_march) -> MarchCheckpoint:
+    """Open the checkpoint of a march that begins; a file that exists is loaded into the march.
 
-    run: fresh, as fresh() makes another; asked: numbers that say what is marched. PatchfemError for the state of
-    another march.
+    Parameters
+    ----------
+    run : march.Run
+        The march at its start.
+    request : tuple
+        Numbers that identify what is marched; the first one is the number of steps.
+    samples : MarchSamples
+    start_march : callable
+        start_march() -> another march at its start.
+
+    Returns
+    -------
+    MarchCheckpoint
+
+    Raises
+    ------
+    PatchfemError
+        If the file belongs to another march.
     """
-    keeper = _KEEPER.get()
-    if keeper is None:
-        return Slot(None, "")
-    keeper.begun += 1
-    path = keeper.path(keeper.begun)
-    key = _key_of(keeper.key, run, asked)
-    if keeper.resume and path.is_file():
-        load(path, key, run, samples, fresh)
-    return Slot(path, key)
+    files = _FILES.get()
+    if files is None:
+        return MarchCheckpoint(None, "")
+    files.n_begun += 1
+    path = files.path_of_march(files.n_begun)
+    key = _make_key(files.key, run, request)
+    if files.is_resumed and path.is_file():
+        load_checkpoint(path, key, run, samples, start_march)
+    return MarchCheckpoint(path, key)
 
 
-def _key_of(key: str, run, asked: tuple) -> str:
+def _make_key(key: str, run, request: tuple) -> str:
     """Return a digest of the new Run, its drive and its request, which identifies a checkpoint."""
-    digest = hashlib.sha256(f"{key} {type(run).__name__} {asked}".encode())
-    for name, array in _arrays(run, UNSET).items():
+    digest = hashlib.sha256(f"{key} {type(run).__name__} {request}".encode())
+    for name, array in _collect_arrays(run, UNFILLED_ATTRIBUTES).items():
         digest.update(f"{name} {array.shape} ".encode() + array.tobytes())
-    time = np.linspace(0, asked[0] * run.prop.dt, 1000)
+    time = np.linspace(0, request[0] * run.prop.dt, 1000)
     digest.update(np.asarray(run.drive.values(time)).tobytes())
     return digest.hexdigest()
 
 
-def _arrays(run, besides=()) -> dict:
-    """Return the arrays of a Run and of its tuples by name, without the attributes `besides`."""
+def _collect_arrays(run, omitted=()) -> dict:
+    """Return the arrays of a Run and of its tuples by name, without the attributes `omitted`."""
     out = {}
 
-    def walk(name: str, value) -> None:
+    def collect(name: str, value) -> None:
         if isinstance(value, np.ndarray):
             out[name] = value
         elif isinstance(value, tuple):
-            for k, one in enumerate(value):
-                walk(f"{name}.{k}", one)
+            for k, part in enumerate(value):
+                collect(f"{name}.{k}", part)
 
     for name, value in vars(run).items():
-        if name not in CONSTANT and name not in besides:
-            walk(name, value)
+        if name not in UNSTORED_ATTRIBUTES and name not in omitted:
+            collect(name, value)
     return out
 
 
-def _of_run(name: str, run) -> dict:
+def _run_to_arrays(prefix: str, run) -> dict:
     """Return the arrays and numbers of a Run by name."""
     numbers = {
-        each: value for each, value in vars(run).items() if type(value) in (int, float, bool, str)
+        name: value for name, value in vars(run).items() if type(value) in (int, float, bool, str)
     }
-    return {f"{name}.{each}": array for each, array in _arrays(run).items()} | {
-        f"{name}:": np.array(json.dumps(numbers))
-    }
+    arrays = {f"{prefix}.{name}": array for name, array in _collect_arrays(run).items()}
+    return arrays | {f"{prefix}:": np.array(json.dumps(numbers))}
 
 
-def _into(run, name: str, found: dict) -> None:
-    """Copy the arrays and numbers of `_of_run` into a new Run."""
-    numbers = json.loads(str(found[f"{name}:"]))
-    for each in vars(run):
-        if each not in CONSTANT:
-            setattr(
-                run, each, _taken(getattr(run, each), f"{name}.{each}", found, numbers.get(each))
-            )
+def _restore_run(run, prefix: str, arrays: dict) -> None:
+    """Copy the arrays and numbers of `_run_to_arrays` into a new Run."""
+    numbers = json.loads(str(arrays[f"{prefix}:"]))
+    for name, value in list(vars(run).items()):
+        if name not in UNSTORED_ATTRIBUTES:
+            restored = _restore_value(value, f"{prefix}.{name}", arrays, numbers.get(name))
+            setattr(run, name, restored)
 
 
-def save(path: Path, key: str, run, samples: Samples) -> None:
-    """Write the checkpoint of a march atomically; raise Missing if it cannot be written.
+def save_checkpoint(path: Path, key: str, run, samples: MarchSamples) -> None:
+    """Write the checkpoint of a march atomically.
 
-    key: identifies its scene and numerics.
+    Parameters
+    ----------
+    path : Path
+    key : str
+        Identifies the scene and its numerical settings.
+    run : march.Run
+    samples : MarchSamples
+
+    Raises
+    ------
+    Missing
+        If the file cannot be written.
     """
-    arrays = _of_run("run", run) | samples.arrays()
-    need = sum(one.nbytes for one in arrays.values())
-    with write_atomically(path, need) as partial, open(partial, "wb") as file:
+    arrays = _run_to_arrays("run", run) | samples.to_arrays()
+    n_bytes = sum(array.nbytes for array in arrays.values())
+    with write_atomically(path, n_bytes) as partial, open(partial, "wb") as file:
         np.savez(file, key=np.array(key), **arrays)
         file.flush()
         os.fsync(file.fileno())
 
 
-def load(path: Path, key: str, run, samples: Samples, fresh) -> None:
-    """Load a checkpoint into a new Run and its Samples.
+def load_checkpoint(path: Path, key: str, run, samples: MarchSamples, start_march) -> None:
+    """Load a checkpoint into a new march and its samples.
 
-    PatchfemError is raised if the file belongs to another march or cannot be read.
+    Parameters
+    ----------
+    path, key, run, samples
+        As of `save_checkpoint`; `run` and `samples` are overwritten.
+    start_march : callable
+        start_march() -> another march at its start.
+
+    Raises
+    ------
+    PatchfemError
+        If the file belongs to another march or cannot be read.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
-            found = {name: file[name] for name in file.files}
-        if str(found["key"]) != key:
+            arrays = {name: file[name] for name in file.files}
+        if str(arrays["key"]) != key:
             raise PatchfemError(
                 f"{path.parent.name}: the state saved there belongs to another scene or to another "
-                f"version of patchfem; {WITHOUT}"
+                f"version of patchfem; {RETRY_ADVICE}"
             )
-        _into(run, "run", found)
-        samples.take(found, fresh)
+        _restore_run(run, "run", arrays)
+        samples.restore(arrays, start_march)
     except PatchfemError:
         raise
-    except Exception as error:  # a damaged archive has many ways to fail
+    except Exception as error:  # a damaged archive can raise errors of many classes
         raise PatchfemError(
-            f"{path.parent.name}: the state saved there cannot be read ({error}); {WITHOUT}"
+            f"{path.parent.name}: the state saved there cannot be read ({error}); {RETRY_ADVICE}"
         ) from None
 
 
-def _taken(value, name: str, found: dict, number):
+def _restore_value(value, name: str, arrays: dict, number):
     """Return the stored value of an attribute; an array of equal shape is overwritten in place.
 
-    Other objects may refer to the array of the new Run.
+    Other objects may refer to the array of the new march.
     """
     if isinstance(value, np.ndarray):
-        new = found[name]
-        if new.shape != value.shape or new.dtype != value.dtype:
-            return new
+        stored = arrays[name]
+        if stored.shape != value.shape or stored.dtype != value.dtype:
+            return stored
         if value.flags.writeable:
-            value[...] = new
+            value[...] = stored
         return value
     if isinstance(value, tuple):
-        parts = [_taken(one, f"{name}.{k}", found, None) for k, one in enumerate(value)]
+        parts = [_restore_value(part, f"{name}.{k}", arrays, None) for k, part in enumerate(value)]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
     return value if number is None or type(value) is not type(number) else number

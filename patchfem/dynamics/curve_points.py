@@ -1,96 +1,99 @@
 """Adaptive points of a curve, denser where its curvature is larger.
 
-If the point b of three points a, b, c deviates by e from the line from a to c, a parabola through
+If the middle point b of three points a, b, c deviates by e from the line from a to c, a parabola through
 them deviates by e h_ab^2/(4 h_ab h_bc) from its chord in the middle of ab. An interval is halved
 while this exceeds three quarters of the permitted error of the largest of the three values, because
-a curve may bend more on one side of b than on the other. Any peak is found whose flanks show at the
+a curve may bend more on one side of b than on the other. A peak is found if its flanks show at the
 first points.
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-# value over the largest one, below which errors are relative to this fraction, because a curve may start from 0
+# errors of values below this fraction of the largest one are relative to this fraction, because a
+# curve may start from 0
 MIN_VALUE_RATIO = 1e-3
 # smallest interval over its abscissa; at a jump of the curve the refinement ends there
 MIN_INTERVAL_RATIO = 1e-6
 
 
-def adapted(find: Callable, places, share: float = 0.01, most: int = 2000) -> tuple:
+class CurvePoints(NamedTuple):
+    """Abscissas (k,) of a curve in order, and what was computed at each of them."""
+
+    abscissas: np.ndarray
+    results: list
+
+
+def sample_adaptively(
+    compute: Callable, abscissas, tolerance: float = 0.01, max_points: int = 2000
+) -> CurvePoints:
     """Compute a curve at adaptive points.
 
     Parameters
     ----------
-    find : callable
-        find(place, near) -> (value, anything); near: what it returned at the point before, None at
-        the first.
-    places : sequence of float
-        First points in increasing or decreasing order; all are kept.
-    share : float, optional
-        Largest error of a straight line over the larger value at hand, or over MIN_VALUE_RATIO of
-        the largest value.
-    most : int, optional
-        Points.
+    compute : callable
+        compute(abscissa, previous) -> (value, ...), where `previous` is what it returned at the
+        neighbouring point, None at the first point.
+    abscissas : sequence of float
+        First points in increasing or decreasing order; all of them are kept.
+    tolerance : float, optional
+        Largest error of a straight line between two points over the larger of their values, or over
+        MIN_VALUE_RATIO of the largest value.
+    max_points : int, optional
+        Largest number of points.
 
     Returns
     -------
-    places : ndarray
-        (k,).
-    found : list
-        What `find` returned at each. Next to a value that is not finite no point is added.
+    CurvePoints
+        No point is added next to a value that is not finite.
     """
-    places = [float(place) for place in places]
-    found = []
-    for place in places:
-        found.append(find(place, found[-1] if found else None))
+    abscissas = [float(abscissa) for abscissa in abscissas]
+    results = []
+    for abscissa in abscissas:
+        results.append(compute(abscissa, results[-1] if results else None))
     while True:
-        wide = coarse(np.array(places), np.array([one[0] for one in found], float), share)
-        if not wide.size or len(places) >= most:
-            return np.array(places), found
-        for k in wide[::-1][
-            : most - len(places)
-        ]:  # from the end, so that the indices before it stay valid
-            middle = 0.5 * (places[k] + places[k + 1])
-            places.insert(k + 1, middle)
-            found.insert(k + 1, find(middle, found[k]))
+        values = np.array([result[0] for result in results], float)
+        intervals = find_coarse_intervals(np.array(abscissas), values, tolerance)
+        if not intervals.size or len(abscissas) >= max_points:
+            return CurvePoints(np.array(abscissas), results)
+        # from the last interval to the first, so that the indices before it stay valid
+        for k in intervals[::-1][: max_points - len(abscissas)]:
+            middle = 0.5 * (abscissas[k] + abscissas[k + 1])
+            abscissas.insert(k + 1, middle)
+            results.insert(k + 1, compute(middle, results[k]))
 
 
-def coarse(places, values, share: float) -> np.ndarray:
-    """Return the numbers k of the intervals from point k to k + 1 that are to be halved.
+def find_coarse_intervals(abscissas, values, tolerance: float) -> np.ndarray:
+    """Return the indices k of the intervals from point k to k + 1 that must be halved.
 
     Parameters
     ----------
-    places, values : ndarray
+    abscissas, values : ndarray
         (n,); values may be nan.
-    share : float
-        As of `adapted`.
+    tolerance : float
+        As of `sample_adaptively`.
 
     Returns
     -------
     ndarray
     """
-    if places.size < 3:
+    if abscissas.size < 3:
         return np.zeros(0, int)
-    h = np.abs(np.diff(places))
+    h = np.abs(np.diff(abscissas))
     with np.errstate(invalid="ignore"):
         line = (values[:-2] * h[1:] + values[2:] * h[:-1]) / (h[:-1] + h[1:])
-        bend = np.abs(values[1:-1] - line) / (4 * h[:-1] * h[1:])
-        # 0.75, because on the worst flank of a peak the error of a straight line is 1.25 times the estimate
-        scale = np.maximum(np.maximum(values[:-2], values[1:-1]), values[2:])
-        scale = (
-            0.75
-            * share
-            * np.maximum(
-                scale, MIN_VALUE_RATIO * np.max(values, initial=0.0, where=np.isfinite(values))
-            )
-        )
+        curvature = np.abs(values[1:-1] - line) / (4 * h[:-1] * h[1:])
+        largest = np.maximum(np.maximum(values[:-2], values[1:-1]), values[2:])
+        floor = MIN_VALUE_RATIO * np.max(values, initial=0.0, where=np.isfinite(values))
+        # 0.75, because on the worst flank of a peak the error of a straight line is 1.25 times the
+        # estimate
+        max_error = 0.75 * tolerance * np.maximum(largest, floor)
         # a comparison with nan is false, so no point is added there
-        bent = [
-            bend * h[:-1] ** 2 > scale,
-            bend * h[1:] ** 2 > scale,
-        ]
-    wide = np.zeros(h.size, bool)
-    wide[:-1] |= bent[0]
-    wide[1:] |= bent[1]
-    return np.flatnonzero(wide & (h > MIN_INTERVAL_RATIO * np.abs(places[1:])))
+        is_left_coarse = curvature * h[:-1] ** 2 > max_error
+        is_right_coarse = curvature * h[1:] ** 2 > max_error
+    is_coarse = np.zeros(h.size, bool)
+    is_coarse[:-1] |= is_left_coarse
+    is_coarse[1:] |= is_right_coarse
+    return np.flatnonzero(is_coarse & (h > MIN_INTERVAL_RATIO * np.abs(abscissas[1:])))

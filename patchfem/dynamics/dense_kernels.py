@@ -7,7 +7,7 @@ from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def factor(a):
+def factorise(a):
     """Compute the Cholesky factor of a (n, n) in its lower triangle; False if not positive.
 
     Returns False if it is not positive definite.
@@ -32,8 +32,8 @@ def factor(a):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def solve(a, b):
-    """Solve (l l^T) x = b in place of b (n,), with a as `factor` left it; returns b . x >= 0.
+def solve_factorised(a, b):
+    """Solve (l l^T) x = b in place of b (n,), with a as `factorise` left it; returns b . x >= 0.
 
     By columns, so that the unknowns below one do not wait for each other.
     """
@@ -54,7 +54,7 @@ def solve(a, b):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def eliminate(a, b):
+def solve_by_elimination(a, b):
     """Solve a x = b in place of b (n,) by elimination without row exchanges.
 
     Returns False where one is below 1e-12.

@@ -12,7 +12,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Step:
+class StepMap:
     """Linear map and energies of a step as functions of y = (z, z', f, a).
 
     The entries of y are coordinates, rates and constant accelerations (n,), and the drive (m,) at nodes.
@@ -29,7 +29,7 @@ class Step:
     lost: np.ndarray
 
 
-def short_step(square, damping, push, parts: dict, quadratic) -> Step:
+def make_short_step(square, damping, push, parts: dict, quadratic) -> StepMap:
     """Return the Step of a short step, from the numbers of `propagator`.
 
     Parameters
@@ -39,7 +39,7 @@ def short_step(square, damping, push, parts: dict, quadratic) -> Step:
     push : tuple
         Two (n, n): z and z' per constant acceleration.
     parts, quadratic
-        As `propagator._parts` gives them where damping couples the modes.
+        As `propagator._drive_weights` gives them where damping couples the modes.
 
     Returns
     -------
@@ -59,12 +59,12 @@ def short_step(square, damping, push, parts: dict, quadratic) -> Step:
         form[: 3 * n, 3 * n :] = form[3 * n :, : 3 * n].T
         form[3 * n :, 3 * n :] = (parts[own] + parts[own].T) / 2
     lost[: 3 * n, : 3 * n] = (quadratic + quadratic.T) / 2
-    return Step(
+    return StepMap(
         change, np.concatenate(push), np.concatenate([parts["z"].T, parts["v"].T]), work, lost
     )
 
 
-def doubled(step: Step, halves) -> Step:
+def double_step(step: StepMap, halves) -> StepMap:
     """Return the Step of twice the length.
 
     halves: two (m, m), the drive at the nodes of each half from that at those of the whole.
@@ -81,7 +81,7 @@ def doubled(step: Step, halves) -> Step:
     two[:size, :size] += step.change
     two[:size, size : size + n] = step.push
     two[:size, size + n :] = begun
-    return Step(
+    return StepMap(
         2 * step.change + step.change @ step.change,
         2 * step.push + step.change @ step.push,
         begun + step.change @ begun + step.drive @ second,
@@ -89,8 +89,8 @@ def doubled(step: Step, halves) -> Step:
     )
 
 
-def as_parts(step: Step) -> tuple:
-    """Return parts and quadratic form of a Step, as `propagator._parts` for coupled modes."""
+def split_step(step: StepMap) -> tuple:
+    """Return parts and quadratic form of a Step, as `propagator._drive_weights` for coupled modes."""
     n = step.push.shape[1]
     cut = 3 * n
     parts = {

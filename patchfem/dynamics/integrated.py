@@ -13,7 +13,7 @@ from ..core import ModalBasis, Outcome, Response
 MIN_ALIGNMENT = 0.95
 
 
-def start_phase(count, cosine, sine):
+def mean_slip_phase(count, cosine, sine):
     """Return the mean phase [rad] modulo pi of the starts of slip, of one run or of (n,) runs.
 
     It is NaN without a start, and where the starts differ by more than MIN_ALIGNMENT allows: the
@@ -33,7 +33,7 @@ def start_phase(count, cosine, sine):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Run:
+class EngineResult:
     """A run of an engine.
 
     - response, window: histories of the run and of its last cycles
@@ -53,7 +53,7 @@ class Run:
     snapshots: list = field(default_factory=list)
 
 
-def accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
+def find_accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
     """Return the modal accelerations (k, n) [m s-2] relative to the base, eq. 3.4.
 
     Parameters
@@ -76,7 +76,9 @@ def accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
     return -np.outer(push, modes.base) - damped - z * modes.omega**2 - pull / modes.mass
 
 
-def histories(modes: ModalBasis, drive, time, motion: tuple, face: tuple, extra: dict) -> Response:
+def make_histories(
+    modes: ModalBasis, drive, time, motion: tuple, face: tuple, extra: dict
+) -> Response:
     """Return the histories of a motion and of the first interface.
 
     Parameters
@@ -99,7 +101,7 @@ def histories(modes: ModalBasis, drive, time, motion: tuple, face: tuple, extra:
     slide, speed, force, slip = face
     push = drive.values(time)
     base = push if drive.moving else np.zeros_like(push)
-    accel = accelerations(modes, push, z, rate, np.outer(force, modes.slide))
+    accel = find_accelerations(modes, push, z, rate, np.outer(force, modes.slide))
     return Response(
         time,
         z,

@@ -6,8 +6,8 @@ omega A^2. Where both are equal a motion repeats: one mode under Coulomb frictio
 amplitudes friction no longer holds the motion: flutter. Below it the motion decays, to rest or to
 a smaller limit cycle that lasts.
 
-`of_relay` is exact for rigid friction, which is a relay of the sliding velocity (Tsypkin 1984, ch.
-6); `of_balance` serves every law of harmonic balance: it is the motion of `harmonic.backbone`
+`find_relay_cycles` is exact for rigid friction, which is a relay of the sliding velocity (Tsypkin 1984, ch.
+6); `find_balance_cycles` serves every law of harmonic balance: it is the motion of `harmonic.backbone`
 whose damping is 0.
 """
 
@@ -24,29 +24,31 @@ from .harmonic.forces import Group
 from .harmonic.harmonic import pack
 from .harmonic.point import balance_of
 
-SAMPLES = 4096  # samples of a cycle from which its largest motion is found
-PLACES = 48  # number of amplitudes at which the damping of a free motion is evaluated
+N_SAMPLES = 4096  # samples of a cycle from which its largest motion is found
+N_AMPLITUDES = 48  # number of amplitudes at which the damping of a free motion is evaluated
 # the smallest and the largest of these amplitudes over 4 F/(pi |c| omega)
-LOW = 1e-6
-HIGH = 4.0
+MIN_AMPLITUDE_RATIO = 1e-6
+MAX_AMPLITUDE_RATIO = 4.0
 # smallest amplitude (same unit) and number of amplitudes where smaller motions cannot be followed
-SLIDING = 0.02
-FEWER = 16
-LOST = (
+MIN_SLIDING_RATIO = 0.02
+N_SLIDING_AMPLITUDES = 16
+NOT_FOLLOWED_MESSAGE = (
     "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
     "amplitude at which friction dissipates what the mode gains"
 )
 # relative error of an amplitude that round-off and the tolerances of the solvers leave
-ROUND = 1e-9
+AMPLITUDE_TOL = 1e-9
 # fraction of the range by which a slide that counts as resting may move in a half period
-SHUT = 1e-8
-SECANTS = 12  # largest number of secant steps to the damping that balances an amplitude
+REST_TOL = 1e-8
+MAX_SECANT_STEPS = 12  # largest number of secant steps to the damping that balances an amplitude
 MAX_FIRST_RATIO = 2.0  # damping ratio of friction by den Hartog's balance; where it is larger, friction is 3 times
 # the elastic force at the reversal or more, and the interface sticks there
-FEW = 9  # harmonics of the first solution; a second one with twice as many estimates its error
+N_HARMONICS = (
+    9  # harmonics of the first solution; a second one with twice as many estimates its error
+)
 
 
-class Cycle(NamedTuple):
+class LimitCycle(NamedTuple):
     """A limit cycle.
 
     - amplitude, error: half the range at the output and its error [m]
@@ -60,12 +62,12 @@ class Cycle(NamedTuple):
     lasts: bool
 
 
-def unstable_modes(modes: ModalBasis) -> np.ndarray:
+def find_unstable_modes(modes: ModalBasis) -> np.ndarray:
     """Return the numbers (k,) of the coordinates with negative damping."""
     return np.flatnonzero(np.diagonal(modes.damping_matrix) < 0)
 
 
-def balanced_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float:
+def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float:
     """Return the amplitude 4 F s/(pi |d| omega m) [m] of a coordinate by den Hartog's balance.
 
     Parameters
@@ -86,7 +88,7 @@ def balanced_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
     return 4 * limit * abs(row[mode]) / (np.pi * gives)
 
 
-def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
+def find_relay_cycles(modes: ModalBasis, row, slides: float, holds: float) -> list:
     """Find the limit cycles under rigid friction on an interface that never sticks.
 
     From a turn on the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
@@ -108,34 +110,36 @@ def of_relay(modes: ModalBasis, row, slides: float, holds: float) -> list:
         In increasing amplitude.
     """
     return sorted(
-        one for mode in unstable_modes(modes) for one in _turning(modes, row, (slides, holds), mode)
+        one
+        for mode in find_unstable_modes(modes)
+        for one in _find_mode_relay_cycles(modes, row, (slides, holds), mode)
     )
 
 
-def _turning(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
-    """Return the cycles of `of_relay` with a frequency near that of a coordinate.
+def _find_mode_relay_cycles(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
+    """Return the cycles of `find_relay_cycles` with a frequency near that of a coordinate.
 
     forces: (2,) as there [N].
     """
     out = []
     half = np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
-    rest = _speeds(modes, row, forces[0], half)
+    rest = _reversal_speed_ratios(modes, row, forces[0], half)
     for k in np.flatnonzero(rest[:-1] * rest[1:] <= 0):
         t = brentq(
-            lambda t: _turn(modes, row, forces[0], t)[1],
+            lambda t: _find_reversal(modes, row, forces[0], t)[1],
             half[k],
             half[k + 1],
             xtol=1e-16,
             rtol=1e-14,
         )
         # this does not hold where a mode without damping is in resonance
-        shut = abs(_turn(modes, row, forces[0], t)[1]) < SHUT
-        if shut and (found := _slides_through(modes, row, forces, t)) is not None:
+        shut = abs(_find_reversal(modes, row, forces[0], t)[1]) < REST_TOL
+        if shut and (found := _make_relay_cycle(modes, row, forces, t)) is not None:
             out.append(found)
     return out
 
 
-def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int) -> list:
+def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int) -> list:
     """Find the free motions at given amplitudes under rigid friction, with their damping.
 
     A damping -g of every coordinate keeps the motion of `mode` up (extended periodic motion: Krack
@@ -146,7 +150,7 @@ def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int)
     modes : ModalBasis
     row : ndarray
     forces : tuple
-        Friction in slip and in stick [N], as of `of_relay`.
+        Friction in slip and in stick [N], as of `find_relay_cycles`.
     amplitudes : array_like
         (k,) [m].
     mode : int
@@ -162,7 +166,9 @@ def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int)
             modes,
             damping=modes.damping_matrix - (own + np.exp(log_more)) * np.eye(modes.omega.size),
         )
-        found = [one for one in _turning(lifted, row, forces, mode) if one.amplitude > 0]
+        found = [
+            one for one in _find_mode_relay_cycles(lifted, row, forces, mode) if one.amplitude > 0
+        ]
         return min(found, key=lambda one: abs(one.omega - modes.omega[mode]), default=None)
 
     own = float(modes.damping_matrix[mode, mode])
@@ -175,30 +181,30 @@ def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int)
     rates = first / np.asarray(amplitudes, float)
     max_rate = 2 * MAX_FIRST_RATIO * modes.omega[mode]
     return [
-        _balanced_at(cycle, float(a), own, float(rate)) if 0 < rate <= max_rate else None
+        _solve_damping_at(cycle, float(a), own, float(rate)) if 0 < rate <= max_rate else None
         for a, rate in zip(amplitudes, rates)
     ]
 
 
-def _balanced_at(cycle, amplitude: float, own: float, more: float) -> tuple | None:
+def _solve_damping_at(cycle, amplitude: float, own: float, more: float) -> tuple | None:
     """Return Cycle and damping ratio at an amplitude [m], by secants of logarithms.
 
     own: rate of the mode [1/s]; more: guess of what friction takes [1/s].
     """
     g = np.log([more, 1.01 * more])
     found = [cycle(one) for one in g]
-    for _ in range(SECANTS):
+    for _ in range(MAX_SECANT_STEPS):
         if None in found:
             return None
         off = [np.log(one.amplitude / amplitude) for one in found]
-        if abs(off[1]) < ROUND or off[0] == off[1]:
+        if abs(off[1]) < AMPLITUDE_TOL or off[0] == off[1]:
             return found[1], float((own + np.exp(g[1])) / (2 * found[1].omega))
         g = np.array([g[1], g[1] - off[1] * (g[1] - g[0]) / (off[1] - off[0])])
         found = [found[1], cycle(g[1])]
     return None
 
 
-def _flow(modes: ModalBasis, t) -> np.ndarray:
+def _free_motion_matrices(modes: ModalBasis, t) -> np.ndarray:
     """Return the free motion (k, 2n, 2n) of (z, z') over times (k,)."""
     blocks = propagator.free_motion(modes, t)
     if modes.damping is None:
@@ -206,20 +212,20 @@ def _flow(modes: ModalBasis, t) -> np.ndarray:
     return np.block([[blocks[0], blocks[1]], [blocks[2], blocks[3]]])
 
 
-def _speeds(modes: ModalBasis, row, force: float, half) -> np.ndarray:
+def _reversal_speed_ratios(modes: ModalBasis, row, force: float, half) -> np.ndarray:
     """Return velocity at the reversal times half period over the swing (k,), for half periods.
 
-    See `_turn`.
+    See `_find_reversal`.
     """
     n = modes.omega.size
     eye = np.eye(2 * modes.omega.size)
     rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
-    flow = _flow(modes, half)
+    flow = _free_motion_matrices(modes, half)
     y = np.einsum("kab,kb->ka", np.linalg.pinv(flow + eye, rcond=1e-14), (flow - eye) @ rest)
     return y[:, n:] @ row * half / np.maximum(np.abs(y[:, :n]) @ np.abs(row), 1e-300)
 
 
-def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:
+def _find_reversal(modes: ModalBasis, row, force: float, t: float) -> tuple:
     """Return the state at the reversal, its velocity times t over the swing, and the rest state.
 
     t: half period [s].
@@ -227,18 +233,18 @@ def _turn(modes: ModalBasis, row, force: float, t: float) -> tuple:
     n = modes.omega.size
     eye = np.eye(2 * modes.omega.size)
     rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
-    flow = _flow(modes, [t])[0]
+    flow = _free_motion_matrices(modes, [t])[0]
     y = np.linalg.lstsq(flow + eye, (flow - eye) @ rest, rcond=None)[0]
     return y, float(row @ y[n:]) * t / max(float(np.abs(row) @ np.abs(y[:n])), 1e-300), rest
 
 
-def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | None:
+def _make_relay_cycle(modes: ModalBasis, row, forces: tuple, t: float) -> LimitCycle | None:
     """Return the Cycle of half period t [s], None where the interface reverses or sticks."""
     slides, holds = forces
     n = modes.omega.size
-    y, _, rest = _turn(modes, row, slides, t)
-    times = np.linspace(0, t, SAMPLES // 2 + 1)
-    path = rest + _flow(modes, times) @ (y - rest)
+    y, _, rest = _find_reversal(modes, row, slides, t)
+    times = np.linspace(0, t, N_SAMPLES // 2 + 1)
+    path = rest + _free_motion_matrices(modes, times) @ (y - rest)
     rate = path[:, n:] @ row
     swing = float(np.abs(row) @ np.abs(y[:n]))
     pull = -modes.mass * (modes.omega**2 * y[:n] + modes.damping_matrix @ y[n:]) @ row / (row @ row)
@@ -246,23 +252,25 @@ def _slides_through(modes: ModalBasis, row, forces: tuple, t: float) -> Cycle | 
         return None
     motion = path[:, :n] @ modes.output
     cycle = np.concatenate([motion, -motion[1:]])
-    found = _highest(cycle)
-    coarse = _highest(cycle[::2])
+    found = _find_maximum(cycle)
+    coarse = _find_maximum(cycle[::2])
     # a shift of the reversal in time absorbs part of the deviation, so the map goes from reversal to reversal
-    speed = np.concatenate([path[-1, n:], _rates(modes, path[-1], row, slides)])
+    speed = np.concatenate([path[-1, n:], _find_accelerations(modes, path[-1], row, slides)])
     face = np.concatenate([np.zeros(n), row])
-    turned = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ _flow(modes, [t])[0]
+    turned = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ _free_motion_matrices(
+        modes, [t]
+    )[0]
     lasts = bool(np.abs(np.linalg.eigvals(turned)).max() < 1)
-    return Cycle(found, abs(found - coarse) + ROUND * found, np.pi / t, lasts)
+    return LimitCycle(found, abs(found - coarse) + AMPLITUDE_TOL * found, np.pi / t, lasts)
 
 
-def _rates(modes: ModalBasis, y, row, force: float) -> np.ndarray:
+def _find_accelerations(modes: ModalBasis, y, row, force: float) -> np.ndarray:
     """Return the accelerations (n,) in a state (2n,) under a force [N] along `row`."""
     n = modes.omega.size
     return row * force / modes.mass - modes.omega**2 * y[:n] - modes.damping_matrix @ y[n:]
 
 
-def _highest(samples) -> float:
+def _find_maximum(samples) -> float:
     """Return the maximum of a motion sampled at (k,), between samples by a parabola.
 
     The motion changes sign after half a period.
@@ -275,7 +283,7 @@ def _highest(samples) -> float:
     return float(b - (c - a) ** 2 / (8 * bend)) if bend < 0 else float(samples.max())
 
 
-def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
+def find_balance_cycles(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
     """Find the limit cycles of the laws of a Group on one interface, by harmonic balance.
 
     Each is found with harmonics and samples twice as many. A law that weakens may have no free
@@ -303,50 +311,56 @@ def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
     """
     out = []
     least = 0.0
-    for mode in unstable_modes(modes):
+    for mode in find_unstable_modes(modes):
         if limit * abs(row[mode]) > 0:
-            found, low = _of_mode(
-                modes, group, int(mode), balanced_amplitude(modes, row, limit, mode)
+            found, low = _find_mode_cycles(
+                modes, group, int(mode), estimate_amplitude(modes, row, limit, mode)
             )
             out = out + found
             least = max(least, low * abs(modes.output[mode]))
     return sorted(out), least
 
 
-def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> tuple:
+def _find_mode_cycles(modes: ModalBasis, group: Group, mode: int, size: float) -> tuple:
     """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
     shape = np.eye(modes.omega.size)[mode]
     paths = (
         (
-            size * np.geomspace(LOW, HIGH, PLACES),
+            size * np.geomspace(MIN_AMPLITUDE_RATIO, MAX_AMPLITUDE_RATIO, N_AMPLITUDES),
             modes.stuck_mode(group.rows, group.stiffness(), mode),
             0.0,
         ),
-        (size * np.geomspace(SLIDING, HIGH, FEWER), (modes.omega[mode], shape), SLIDING * size),
+        (
+            size * np.geomspace(MIN_SLIDING_RATIO, MAX_AMPLITUDE_RATIO, N_SLIDING_AMPLITUDES),
+            (modes.omega[mode], shape),
+            MIN_SLIDING_RATIO * size,
+        ),
     )
     for amplitudes, start, least in paths:
         try:
             few, many = (
-                _crossings(modes, group, mode, (amplitudes, start), harmonics)
-                for harmonics in (FEW, 2 * FEW + 1)
+                _find_undamped_motions(modes, group, mode, (amplitudes, start), harmonics)
+                for harmonics in (N_HARMONICS, 2 * N_HARMONICS + 1)
             )
         except NotConverged:
             continue
         if len(few) != len(many):
             raise NotConverged(
-                f"{len(few)} limit cycles were found with {FEW} harmonics but {len(many)} limit cycles "
-                f"with {2 * FEW + 1} harmonics"
+                f"{len(few)} limit cycles were found with {N_HARMONICS} harmonics but {len(many)} limit cycles "
+                f"with {2 * N_HARMONICS + 1} harmonics"
             )
         return [
             better._replace(
-                error=2 * abs(one.amplitude - better.amplitude) + ROUND * better.amplitude
+                error=2 * abs(one.amplitude - better.amplitude) + AMPLITUDE_TOL * better.amplitude
             )
             for one, better in zip(few, many)
         ], least
-    raise NotConverged(LOST)
+    raise NotConverged(NOT_FOLLOWED_MESSAGE)
 
 
-def _crossings(modes: ModalBasis, group: Group, mode: int, path: tuple, harmonics: int) -> list:
+def _find_undamped_motions(
+    modes: ModalBasis, group: Group, mode: int, path: tuple, harmonics: int
+) -> list:
     """Return the cycles along the free motions of a mode, where their damping changes sign.
 
     path: amplitudes (k,) [m], and frequency [rad/s] and shape (n,) of the first motion.
@@ -359,30 +373,32 @@ def _crossings(modes: ModalBasis, group: Group, mode: int, path: tuple, harmonic
     zeta = np.array([one.zeta for one in path])
     out = []
     for k in np.flatnonzero(np.sign(zeta[:-1]) * np.sign(zeta[1:]) < 0):
-        found = _between(equations, path[k], path[k + 1])
+        found = _solve_undamped_between(equations, path[k], path[k + 1])
         wave = np.exp(
-            1j * np.outer(np.linspace(0, 2 * np.pi, SAMPLES + 1), np.arange(len(found.modal)))
+            1j * np.outer(np.linspace(0, 2 * np.pi, N_SAMPLES + 1), np.arange(len(found.modal)))
         )
         motion = (wave @ (found.modal @ modes.output)).real
-        half = (_highest(motion) + _highest(-motion)) / 2
-        out.append(Cycle(half, 0.0, found.omega, bool(zeta[k + 1] > 0)))
+        half = (_find_maximum(motion) + _find_maximum(-motion)) / 2
+        out.append(LimitCycle(half, 0.0, found.omega, bool(zeta[k + 1] > 0)))
     return out
 
 
-def _unknowns(equations: FreeBalance, one: FreeMotion) -> np.ndarray:
+def _pack_unknowns(equations: FreeBalance, one: FreeMotion) -> np.ndarray:
     """Return the unknowns of `FreeBalance.solve` at a free motion."""
     y = equations.balance.lift.T @ one.slides[:, : equations.h + 1]
     return np.append(pack(y) / one.amplitude, [one.omega / equations.scale, one.zeta])
 
 
-def _between(equations: FreeBalance, low: FreeMotion, high: FreeMotion) -> FreeMotion:
+def _solve_undamped_between(
+    equations: FreeBalance, low: FreeMotion, high: FreeMotion
+) -> FreeMotion:
     """Return the free motion without damping between two of opposite sign (Illinois method)."""
     ends = [(np.log(one.amplitude), one.zeta, one) for one in (low, high)]
     last = 0
     for _ in range(60):
         (a, below, start), (b, above, _) = ends
         at = (a * above - b * below) / (above - below)
-        _, found = equations.solve(_unknowns(equations, start), float(np.exp(at)))
+        _, found = equations.solve(_pack_unknowns(equations, start), float(np.exp(at)))
         if abs(found.zeta) < 1e-13 or abs(b - a) < 1e-13:
             return found
         side = int(np.sign(found.zeta) == np.sign(above))

@@ -1,152 +1,193 @@
 """Compiled motion of the modes over a step of the march, and the energies of the step.
 
-state (2, n): coordinates and rates; table[at]: a row of `propagator.Propagator.tables`; accel (n,): modal accelerations
-due to interface forces, which are constant over the step.
+Parameters that the functions share:
+
+- motion: (2, n) coordinates and rates of the modes
+- modal_system: `interfaces.arrays.ModalArrays`
+- table, i: table[i] is the row of `propagator.Propagator.tables` of the step
+- accel: (n,) modal accelerations [m s-2] due to interface forces, which are constant over the step
+- ledger: sums over a march, see `ledger.LedgerPositions`
 """
 
 import numpy as np
 
 from ..compiled.jit import njit
 from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from .ledger import LEDGER
+
+# values that `write_interface` returns
+WITHIN_TRAVEL = 0
+EXCEEDS_TRAVEL = 1
+NOT_FINITE = 3
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def free_slide(state, reach, port, table, at):
+def free_increment(motion, modal_system, port, table, i):
     """Return the increment [m] of the slide of a port in a step without interface forces."""
-    n = state.shape[1]
-    out = table[at, 8 * n + 3 + port]
-    for i in range(n):
-        out += reach[port, i] * state[0, i] + reach[port, n + i] * state[1, i]
-    return out
+    n = motion.shape[1]
+    reach = modal_system.reach
+    increment = table[i, 8 * n + 3 + port]
+    for k in range(n):
+        increment += reach[port, k] * motion[0, k] + reach[port, n + k] * motion[1, k]
+    return increment
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def free_rate(state, row, free, dense, table, at):
-    """Return the rate [m/s] of the slide `row` (n,) after a step without interface forces."""
-    n = row.size
-    out = 0.0
-    for i in range(n):
-        end = table[at, n + i]
+def free_rate(motion, slide_row, modal_system, table, i):
+    """Return the rate [m/s] of a slide at the end of a step without interface forces.
+
+    Parameters
+    ----------
+    slide_row : ndarray
+        (n,) slide per coordinate.
+    motion, modal_system, table, i
+        See the top of the module.
+
+    Returns
+    -------
+    float
+    """
+    n = slide_row.size
+    free = modal_system.free
+    dense = modal_system.dense
+    rate = 0.0
+    for j in range(n):
+        modal_rate = table[i, n + j]
         if dense.size == 0:
-            end += free[2, i] * state[0, i] + free[3, i] * state[1, i]
+            modal_rate += free[2, j] * motion[0, j] + free[3, j] * motion[1, j]
         else:
             for k in range(n):
-                end += dense[n + i, k] * state[0, k] + dense[n + i, n + k] * state[1, k]
-        out += row[i] * end
-    return out
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def struck(state, row, speed, now, mass):
-    """Change the rate of a slide from `now` to `speed` [m/s] by an impulse along it, in place.
-
-    row: (n,) slide per coordinate. Returns the energy [J] that the modes lose.
-    """
-    share = 0.0
-    for i in range(row.size):
-        share += row[i] * row[i]
-    for i in range(row.size):
-        state[1, i] -= row[i] * (now - speed) / share
-    return 0.5 * mass * (now * now - speed * speed) / share
+                modal_rate += dense[n + j, k] * motion[0, k] + dense[n + j, n + k] * motion[1, k]
+        rate += slide_row[j] * modal_rate
+    return rate
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def push_back(force, row, mass, accel):
-    """Write the modal accelerations (n,) of a force [N] that resists the slide `row` (n,)."""
-    for i in range(accel.size):
-        accel[i] = -row[i] * force / mass
+def write_friction_accelerations(force, slide_row, mass, accel):
+    """Write the modal accelerations of a force that resists a slide.
+
+    Parameters
+    ----------
+    force : float
+        [N].
+    slide_row : ndarray
+        (n,) slide per coordinate.
+    mass : float
+        Modal mass [kg].
+    accel : ndarray
+        (n,) accelerations [m s-2], which are written.
+    """
+    for k in range(accel.size):
+        accel[k] = -slide_row[k] * force / mass
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def move(state, free, push, loss, dense, dense_loss, table, at, accel, scratch, ledger):
-    """Advance the modes in place by one step, and add its energies to the ledger.
+def move_modes(motion, modal_system, table, i, accel, scratch, ledger):
+    """Move the modes by one step, and add its energies to the ledger.
 
-    ledger[0]: work of the drive, ledger[1]: viscous loss, ledger[2]: sum of the absolute works [J]. scratch: (2, n)
-    workspace. The arrays of a step are passed separately, because the reference counts of a tuple of them would be
-    updated in every step.
+    Parameters
+    ----------
+    motion, modal_system, table, i, accel, ledger
+        See the top of the module; motion and ledger are changed.
+    scratch : ndarray
+        (2, n) workspace.
     """
-    n = state.shape[1]
-    work = table[at, 8 * n]
-    lost = table[at, 8 * n + 1]
-    for i in range(n):
-        z = state[0, i]
-        v = state[1, i]
-        f = accel[i]
-        work += table[at, 2 * n + i] * z + table[at, 3 * n + i] * v + table[at, 4 * n + i] * f
-        lost += table[at, 5 * n + i] * z + table[at, 6 * n + i] * v + table[at, 7 * n + i] * f
-    if dense.size == 0:
-        for i in range(n):
-            z = state[0, i]
-            v = state[1, i]
-            f = accel[i]
+    n = motion.shape[1]
+    free = modal_system.free
+    push = modal_system.push
+    loss = modal_system.loss
+    work = table[i, 8 * n]
+    lost = table[i, 8 * n + 1]
+    for k in range(n):
+        z = motion[0, k]
+        v = motion[1, k]
+        f = accel[k]
+        work += table[i, 2 * n + k] * z + table[i, 3 * n + k] * v + table[i, 4 * n + k] * f
+        lost += table[i, 5 * n + k] * z + table[i, 6 * n + k] * v + table[i, 7 * n + k] * f
+    if modal_system.dense.size == 0:
+        for k in range(n):
+            z = motion[0, k]
+            v = motion[1, k]
+            f = accel[k]
             lost += (
-                (loss[0, i] * z + loss[1, i] * v + loss[3, i] * f) * z
-                + (loss[2, i] * v + loss[4, i] * f) * v
-                + loss[5, i] * f * f
+                (loss[0, k] * z + loss[1, k] * v + loss[3, k] * f) * z
+                + (loss[2, k] * v + loss[4, k] * f) * v
+                + loss[5, k] * f * f
             )
-            state[0, i] = free[0, i] * z + free[1, i] * v + push[0, i] * f + table[at, i]
-            state[1, i] = free[2, i] * z + free[3, i] * v + push[1, i] * f + table[at, n + i]
+            motion[0, k] = free[0, k] * z + free[1, k] * v + push[0, k] * f + table[i, k]
+            motion[1, k] = free[2, k] * z + free[3, k] * v + push[1, k] * f + table[i, n + k]
     else:
-        lost += _move_coupled(state, dense, dense_loss, table, at, accel, scratch)
-    ledger[0] += work
-    ledger[1] += lost
-    ledger[2] += abs(work)
+        lost += _move_coupled_modes(motion, modal_system, table, i, accel, scratch)
+    ledger[LEDGER.drive_work] += work
+    ledger[LEDGER.viscous_loss] += lost
+    ledger[LEDGER.drive_power] += abs(work)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def _move_coupled(state, dense, loss, table, at, accel, scratch):
-    """Advance modes whose damping couples the coordinates, as `move` does.
+def _move_coupled_modes(motion, modal_system, table, row_index, accel, scratch):
+    """Move modes whose damping couples the coordinates, as `move_modes` does.
 
     Returns the quadratic part of the viscous loss [J].
     """
-    n = state.shape[1]
+    n = motion.shape[1]
+    dense = modal_system.dense
+    loss = modal_system.dense_loss
     lost = 0.0
     for i in range(3 * n):
-        x = accel[i - 2 * n] if i >= 2 * n else state[i // n, i % n]
+        x = accel[i - 2 * n] if i >= 2 * n else motion[i // n, i % n]
         part = 0.0
         for j in range(2):
             for k in range(n):
-                part += loss[i, j * n + k] * state[j, k]
+                part += loss[i, j * n + k] * motion[j, k]
         for k in range(n):
             part += loss[i, 2 * n + k] * accel[k]
         lost += x * part
     for i in range(2 * n):
-        part = table[at, i]
+        part = table[row_index, i]
         for j in range(2):
             for k in range(n):
-                part += dense[i, j * n + k] * state[j, k]
+                part += dense[i, j * n + k] * motion[j, k]
         for k in range(n):
             part += dense[i, 2 * n + k] * accel[k]
         scratch[i // n, i % n] = part
     for i in range(n):
-        state[0, i] = scratch[0, i]
-        state[1, i] = scratch[1, i]
+        motion[0, i] = scratch[0, i]
+        motion[1, i] = scratch[1, i]
     return lost
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def stored(state, omega, mass):
+def modal_energy(motion, modal_system):
     """Return the kinetic and elastic energy [J] of the modes."""
-    out = 0.0
-    for i in range(omega.size):
-        out += state[1, i] * state[1, i] + omega[i] * omega[i] * state[0, i] * state[0, i]
-    return 0.5 * mass * out
+    omega = modal_system.omega
+    energy = 0.0
+    for k in range(omega.size):
+        energy += motion[1, k] * motion[1, k] + omega[k] * omega[k] * motion[0, k] * motion[0, k]
+    return 0.5 * modal_system.mass * energy
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def accelerations(state, omega, damp, damping, base, drive, accel, out):
-    """Write the modal accelerations (n,) [m s-2] at an instant, relative to the base.
+def write_accelerations(motion, modal_system, drive, accel, out):
+    """Write the modal accelerations at an instant, relative to the base, into out[0].
 
-    drive: base acceleration [m s-2]; accel: (n,) modal accelerations due to interface forces.
+    Parameters
+    ----------
+    motion, modal_system, accel
+        See the top of the module.
+    drive : float
+        Acceleration of the base [m s-2].
+    out : ndarray
+        (1, n) or larger.
     """
-    n = omega.size
-    for i in range(n):
-        out[0, i] = accel[i] - base[i] * drive - omega[i] ** 2 * state[0, i]
+    omega = modal_system.omega
+    damping = modal_system.damping
+    for i in range(omega.size):
+        out[0, i] = accel[i] - modal_system.base[i] * drive - omega[i] ** 2 * motion[0, i]
         if damping.size == 0:
-            out[0, i] -= damp[i] * state[1, i]
+            out[0, i] -= modal_system.damp[i] * motion[1, i]
         else:
-            for k in range(n):
-                out[0, i] -= damping[i, k] * state[1, k]
+            for k in range(omega.size):
+                out[0, i] -= damping[i, k] * motion[1, k]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -158,102 +199,146 @@ def safe_point(low, high, guess):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def narrowed(low, high, here, miss, gain, late):
+def narrow_bracket(low, high, here, residual, slope, n_late):
     """Take a bracketed Newton step towards the root of an increasing function.
 
-    miss: the function at `here`; gain: its slope or an approximation of it; low, high: bracket, infinite where there is
-    no bound yet. An end of the bracket moves to `here`; a step that leaves the bracket is replaced by the midpoint.
-    late: number of evaluations beyond those that usually suffice. From 1 on every other step is a bisection, because
-    kinks can make the steps alternate, and without a bracket the steps grow. Returns low, high and the next point.
+    Parameters
+    ----------
+    low, high : float
+        Bracket, infinite where there is no bound yet.
+    here : float
+        The point at which the function was evaluated.
+    residual, slope : float
+        Value of the function there, and its slope or an approximation of it.
+    n_late : int
+        Number of evaluations beyond those that usually suffice. From 1 on every other step is a
+        bisection, because kinks can make the steps alternate; without a bracket the steps grow.
+
+    Returns
+    -------
+    low, high : float
+        The bracket with one end moved to `here`.
+    new : float
+        The next point; a step that leaves the bracket is replaced by the midpoint.
     """
-    if miss > 0:
+    if residual > 0:
         high = here
     else:
         low = here
-    new = here - miss / gain
+    new = here - residual / slope
     if low > -np.inf and high < np.inf:
         new = safe_point(low, high, new)
-        if late > 0 and late % 2:
+        if n_late > 0 and n_late % 2:
             new = 0.5 * (low + high)
-    elif late > 0:
-        new = here - miss * 2.0 ** min(late, 60)
+    elif n_late > 0:
+        new = here - residual * 2.0 ** min(n_late, 60)
     return low, high, new
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def sample(row, state, slide, output):
-    """Write coordinates, rates, slide and slide speed into the first 2 n + 2 entries of row.
+def write_modes(row, motion, modal_system):
+    """Write coordinates, rates, slide and slide speed into the first 2 n + 2 entries of a row.
 
-    Returns slide [m], slide speed [m/s] and output [m].
+    Returns
+    -------
+    slide, speed : float
+        Of the first interface [m], [m/s].
+    output : float
+        [m].
     """
-    n = slide.size
-    q = 0.0
-    v = 0.0
-    out = 0.0
+    n = motion.shape[1]
+    slide_row = modal_system.slide
+    slide = 0.0
+    speed = 0.0
+    output = 0.0
     for k in range(n):
-        row[k] = state[0, k]
-        row[n + k] = state[1, k]
-        q += slide[k] * state[0, k]
-        v += slide[k] * state[1, k]
-        out += output[k] * state[0, k]
-    row[2 * n] = q
-    row[2 * n + 1] = v
-    return q, v, out
+        row[k] = motion[0, k]
+        row[n + k] = motion[1, k]
+        slide += slide_row[k] * motion[0, k]
+        speed += slide_row[k] * motion[1, k]
+        output += modal_system.output[k] * motion[0, k]
+    row[2 * n] = slide
+    row[2 * n + 1] = speed
+    return slide, speed, output
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def note(row, force, energy, slip, out, travel, total, ledger):
-    """Write force, slip and interface energy into a row, and the peak energy into the ledger.
+def write_interface(row, force, energy, slip, output, travel, stored, ledger):
+    """Write force, slip and energy of the interface into a row, and the stored energy into the ledger.
 
-    Returns 0; 1 where the output exceeds the travel; 3 where the motion is not finite.
+    Parameters
+    ----------
+    row : ndarray
+        (2 n + 6,) row of `loop_kernels.march`.
+    force, energy, slip : float
+        Of the interface [N], [J], [m].
+    output, travel : float
+        Displacement of the output, and its largest permitted magnitude [m].
+    stored : float
+        Stored energy of modes and interfaces [J].
+    ledger : ndarray
+
+    Returns
+    -------
+    int
+        WITHIN_TRAVEL, EXCEEDS_TRAVEL or NOT_FINITE.
     """
     n = row.size - 4
     row[n] = force
     row[n + 1] = slip
     row[n + 2] = force
     row[n + 3] = energy
-    ledger[4] = max(ledger[4], total)
+    ledger[LEDGER.max_stored] = max(ledger[LEDGER.max_stored], stored)
     if not np.isfinite(row[n - 2] + row[n - 1] + force):
-        return 3
-    return 1 if abs(out) > travel else 0
+        return NOT_FINITE
+    return EXCEEDS_TRAVEL if abs(output) > travel else WITHIN_TRAVEL
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def tell(count, work, ledger):
-    """Add the iterations of a step and its friction work [J] to the ledger.
-
-    count: iterations, negative if the step failed.
-    """
-    ledger[5] += abs(count)
-    ledger[6] = max(ledger[6], abs(count))
-    ledger[7] += 1.0 if count < 0 else 0.0
-    ledger[8] += work
+def count_iterations(n_iterations, work, ledger):
+    """Add the iterations of a step, negative if it failed, and its friction work [J] to the ledger."""
+    ledger[LEDGER.n_iterations] += abs(n_iterations)
+    ledger[LEDGER.max_iterations] = max(ledger[LEDGER.max_iterations], abs(n_iterations))
+    ledger[LEDGER.n_unconverged] += 1.0 if n_iterations < 0 else 0.0
+    ledger[LEDGER.friction_work] += work
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def ended(state, free, push, dense, table, at, accel, out):
-    """Write coordinates and rates at the end of a step under `accel` (n,) into out (2, n).
+def write_end_state(motion, modal_system, table, row_index, accel, end):
+    """Write coordinates and rates at the end of a step into end (2, n).
 
-    The state and the ledger do not change.
+    The motion and the ledger do not change.
+
+    Parameters
+    ----------
+    motion, modal_system, table, accel
+        See the top of the module.
+    row_index : int
+        Row of the table for the step.
+    end : ndarray
+        (2, n), which is written.
     """
-    n = state.shape[1]
+    n = motion.shape[1]
+    free = modal_system.free
+    push = modal_system.push
+    dense = modal_system.dense
     for i in range(n):
-        z = table[at, i]
-        v = table[at, n + i]
+        z = table[row_index, i]
+        v = table[row_index, n + i]
         if dense.size == 0:
-            z += free[0, i] * state[0, i] + free[1, i] * state[1, i] + push[0, i] * accel[i]
-            v += free[2, i] * state[0, i] + free[3, i] * state[1, i] + push[1, i] * accel[i]
+            z += free[0, i] * motion[0, i] + free[1, i] * motion[1, i] + push[0, i] * accel[i]
+            v += free[2, i] * motion[0, i] + free[3, i] * motion[1, i] + push[1, i] * accel[i]
         else:
             for k in range(n):
                 z += (
-                    dense[i, k] * state[0, k]
-                    + dense[i, n + k] * state[1, k]
+                    dense[i, k] * motion[0, k]
+                    + dense[i, n + k] * motion[1, k]
                     + dense[i, 2 * n + k] * accel[k]
                 )
                 v += (
-                    dense[n + i, k] * state[0, k]
-                    + dense[n + i, n + k] * state[1, k]
+                    dense[n + i, k] * motion[0, k]
+                    + dense[n + i, n + k] * motion[1, k]
                     + dense[n + i, 2 * n + k] * accel[k]
                 )
-        out[0, i] = z
-        out[1, i] = v
+        end[0, i] = z
+        end[1, i] = v

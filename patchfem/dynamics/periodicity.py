@@ -1,49 +1,54 @@
-"""Test whether a motion under a periodic drive has become periodic.
+"""Check whether a motion under a periodic drive has become periodic.
 
-The remaining cycles are then equal to the last one.
+If it has, the remaining cycles equal the last one and need not be computed.
 
-The motion is checked after APART cycles, then after twice as many each time. The changes between
-three checks bound the change in the remaining cycles: the changes either decrease by a constant
-factor, as in a decaying transient, or stay equal, as in a creeping motion. A period of two cycles
+The motion is checked after FIRST_CHECK cycles, then after twice as many each time. The changes between
+three checks bound the change in the remaining cycles: either the changes decrease by a constant
+factor, as in a decaying transient, or they stay equal, as in a creeping motion. A period of two cycles
 shows only in the change over the last cycle.
 """
 
 import numpy as np
 
-APART = 4  # cycles after which a motion is first checked
+# cycles after which a motion is first checked; the later checks are at 8, 16, 32, ... cycles
+FIRST_CHECK = 4
 
 
-def looked_at(number: int) -> bool:
+def is_checked_after(n_cycles: int) -> bool:
     """Return whether a motion is checked after this number of cycles."""
-    return number >= APART and number & (number - 1) == 0
+    return n_cycles >= FIRST_CHECK and n_cycles & (n_cycles - 1) == 0
 
 
-def until_look(number: int) -> int:
-    """Return the cycles from the end of cycle `number` to one cycle before the next check."""
-    at = APART
-    while at <= number:
-        at *= 2
-    return max(at - 1 - number, 1)
+def cycles_to_next_check(n_cycles: int) -> int:
+    """Return the cycles from the end of cycle `n_cycles` to one cycle before the next check."""
+    check = FIRST_CHECK
+    while check <= n_cycles:
+        check *= 2
+    return max(check - 1 - n_cycles, 1)
 
 
-def ahead(change: float, before: float, left: int, far: int) -> float:
-    """Return a bound of the change of a motion in the remaining `left` cycles.
+def bound_remaining_change(
+    change: float, previous_change: float, n_remaining: int, n_checked: int
+) -> float:
+    """Return a bound of the relative change of a motion in the remaining cycles.
 
     Parameters
     ----------
-    change, before : float
-        Relative changes between the last two checks, and between the two before.
-    left : int
-    far : int
+    change, previous_change : float
+        Relative changes between the last two checks, and between the two checks before.
+    n_remaining : int
+        Number of remaining cycles.
+    n_checked : int
         Number of cycles at the last check.
 
     Returns
     -------
     float
     """
-    if before == 0.0:
-        return change * max(1.0, 2 * left / far)
-    fell = (
-        np.sqrt(1 + 4 * change / before) - 1
-    ) / 2  # a + a^2 = change/before for a decay by the factor a
-    return change * max(1.0, min(fell**2 / (1 - fell**2) if fell < 1 else np.inf, 2 * left / far))
+    creep = 2 * n_remaining / n_checked
+    if previous_change == 0.0:
+        return change * max(1.0, creep)
+    # a decay by the factor a per half of the interval gives a + a^2 = change/previous_change
+    factor = (np.sqrt(1 + 4 * change / previous_change) - 1) / 2
+    decay = factor**2 / (1 - factor**2) if factor < 1 else np.inf
+    return change * max(1.0, min(decay, creep))

@@ -15,14 +15,14 @@ from ..core import ModalBasis
 from . import doubling
 
 # smallest and largest number of Gauss points of a step
-LEAST = 8
-MOST = 48
+MIN_GAUSS_POINTS = 8
+MAX_GAUSS_POINTS = 48
 # number of propagators that are cached, and largest number of coordinates of a cached one, to limit memory
-KEPT = 4
-FEW = 32
+MAX_CACHED = 4
+MAX_CACHED_COORDINATES = 32
 # fastest rate times step length, above which MOST Gauss points do not resolve the motion
-STIFF = 20.0
-SHORT = 4.0  # fastest rate times length of the short step that is then doubled
+MAX_RATE_TIME = 20.0
+SHORT_STEP_RATE_TIME = 4.0  # fastest rate times length of the short step that is then doubled
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -81,16 +81,16 @@ class Propagator:
         )
 
 
-def propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
+def make_propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
     """Return the Propagator of `steps_per_cycle` equal steps of the drive's period.
 
     rows: ports (p, n), slide per coordinate; None: the interfaces. Steps of large omega dt take up to 48 Gauss points;
     where that is not enough, a short step is doubled. The last few propagators are cached, because the runs that
     estimate errors use the same ones again.
     """
-    if rows is None and modes.omega.size <= FEW:
-        return _of_interfaces(_Basis(modes), drive.period, steps_per_cycle)
-    return _made(
+    if rows is None and modes.omega.size <= MAX_CACHED_COORDINATES:
+        return _make_for_interfaces(_Basis(modes), drive.period, steps_per_cycle)
+    return _make(
         modes,
         drive.period,
         steps_per_cycle,
@@ -122,25 +122,34 @@ class _Basis:
         return hash(self.key)
 
 
-@lru_cache(maxsize=KEPT)
-def _of_interfaces(basis: _Basis, period: float, steps_per_cycle: int) -> Propagator:
-    return _made(basis.modes, period, steps_per_cycle, np.array(basis.modes.interfaces, float))
+@lru_cache(maxsize=MAX_CACHED)
+def _make_for_interfaces(basis: _Basis, period: float, steps_per_cycle: int) -> Propagator:
+    return _make(basis.modes, period, steps_per_cycle, np.array(basis.modes.interfaces, float))
 
 
-def _made(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propagator:
+def _make(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propagator:
     dt = period / steps_per_cycle
-    fastest = max(fastest_rate(modes), 2 * np.pi / period)
+    fastest = max(bound_fastest_rate(modes), 2 * np.pi / period)
     n = modes.omega.size
     coupled = modes.damping is not None
-    if fastest * dt > STIFF:
-        (at_end, push, parts, quadratic), nodes = _stiff(modes, dt, fastest, 2 * np.pi / period)
+    if fastest * dt > MAX_RATE_TIME:
+        (at_end, push, parts, quadratic), nodes = _integrate_by_doubling(
+            modes, dt, fastest, 2 * np.pi / period
+        )
     else:
         # two more Gauss points for each radian of the fastest motion
-        nodes, weight = _gauss(dt, int(np.clip(LEAST + 2 * np.ceil(fastest * dt), LEAST, MOST)))
+        nodes, weight = _gauss_rule(
+            dt,
+            int(
+                np.clip(
+                    MIN_GAUSS_POINTS + 2 * np.ceil(fastest * dt), MIN_GAUSS_POINTS, MAX_GAUSS_POINTS
+                )
+            ),
+        )
         at_end = [part[0] for part in free_motion(modes, np.array([dt]))]
         inside = free_motion(modes, nodes)
-        push = _push(modes, dt, nodes, weight)
-        parts, quadratic = _parts(modes, dt, nodes, weight, inside)
+        push = _motion_per_acceleration(modes, dt, nodes, weight)
+        parts, quadratic = _drive_weights(modes, dt, nodes, weight, inside)
     if coupled:
         block = np.block([[at_end[0], at_end[1]], [at_end[2], at_end[3]]])
         dense = np.concatenate([block, np.concatenate(push)], axis=1)
@@ -172,44 +181,50 @@ def _made(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propa
     )
 
 
-def fastest_rate(modes: ModalBasis) -> float:
+def bound_fastest_rate(modes: ModalBasis) -> float:
     """Return an upper bound [1/s] of the rates at which modes oscillate or decay."""
     if modes.damping is None:
         return float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0))
     return max(float(modes.omega.max(initial=0.0)), float(np.linalg.norm(modes.damping, 2)))
 
 
-def _gauss(dt: float, count: int) -> tuple:
+def _gauss_rule(dt: float, count: int) -> tuple:
     """Return Gauss points and weights on [0, dt]."""
     x, w = np.polynomial.legendre.leggauss(count)
     return dt * (1 + x) / 2, dt * w / 2
 
 
-def _stiff(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tuple:
+def _integrate_by_doubling(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tuple:
     """Compute a step that is long compared to the periods of the modes, by doubling.
 
     fastest, slowest [1/s]: rates of the modes and of the drive. Returns (blocks at the end, push, parts, quadratic form
     of the loss) and the nodes.
     """
-    times = max(0, int(np.ceil(np.log2(fastest * dt / SHORT))))
-    count = int(np.clip(LEAST + 2 * np.ceil(max(SHORT, slowest * dt)), LEAST, MOST))
+    times = max(0, int(np.ceil(np.log2(fastest * dt / SHORT_STEP_RATE_TIME))))
+    count = int(
+        np.clip(
+            MIN_GAUSS_POINTS + 2 * np.ceil(max(SHORT_STEP_RATE_TIME, slowest * dt)),
+            MIN_GAUSS_POINTS,
+            MAX_GAUSS_POINTS,
+        )
+    )
     whole = replace(modes, damping=modes.damping_matrix)
     n = modes.omega.size
-    nodes, weight = _gauss(dt, count)
+    nodes, weight = _gauss_rule(dt, count)
     h = dt / 2**times
     shrink = 1 / 2**times
     near = nodes * shrink
     light = weight * shrink
-    step = doubling.short_step(
+    step = doubling.make_short_step(
         np.diag(modes.omega**2),
         modes.damping_matrix,
-        _push(whole, h, near, light),
-        *_parts(whole, h, near, light, free_motion(whole, near)),
+        _motion_per_acceleration(whole, h, near, light),
+        *_drive_weights(whole, h, near, light, free_motion(whole, near)),
     )
-    halves = _lagrange(nodes, nodes / 2), _lagrange(nodes, (dt + nodes) / 2)
+    halves = _lagrange_polynomials(nodes, nodes / 2), _lagrange_polynomials(nodes, (dt + nodes) / 2)
     for _ in range(times):
-        step = doubling.doubled(step, halves)
-    parts, quadratic = doubling.as_parts(step)
+        step = doubling.double_step(step, halves)
+    parts, quadratic = doubling.split_step(step)
     flow = step.change + np.eye(2 * n)
     blocks = [flow[:n, :n], flow[:n, n:], flow[n:, :n], flow[n:, n:]]
     push = (step.push[:n], step.push[n:])
@@ -233,18 +248,18 @@ def free_motion(modes: ModalBasis, times) -> tuple:
     """
     times = np.asarray(times, float)
     if modes.damping is None:
-        return _single(modes.omega, modes.zeta, times[:, None])
+        return _free_motion_uncoupled(modes.omega, modes.zeta, times[:, None])
     n = modes.omega.size
     scale = max(float(modes.omega.max()), 1 / float(times.max()))
     # rates are divided by `scale`, so that all entries of the matrix have a similar size
     a = np.block(
         [[np.zeros((n, n)), scale * np.eye(n)], [-np.diag(modes.omega**2) / scale, -modes.damping]]
     )
-    e = exponentials(a * times[:, None, None])
+    e = matrix_exponentials(a * times[:, None, None])
     return e[:, :n, :n], e[:, :n, n:] / scale, e[:, n:, :n] * scale, e[:, n:, n:]
 
 
-def _single(omega, zeta, t) -> tuple:
+def _free_motion_uncoupled(omega, zeta, t) -> tuple:
     """Return the blocks zz, zv, vz, vv of uncoupled coordinates (n,) after times t (k, 1).
 
     The closed form holds for any damping ratio.
@@ -270,7 +285,7 @@ def _single(omega, zeta, t) -> tuple:
     return c + decay * zv, zv, -(omega**2) * zv, c - decay * zv
 
 
-def exponentials(a) -> np.ndarray:
+def matrix_exponentials(a) -> np.ndarray:
     """Return the matrix exponentials (k, m, m) of matrices a (k, m, m), by scaling and squaring.
 
     The Taylor series of order 13 of a matrix with a norm below 1/4 has an error of (1/4)^14/14! = 4e-20.
@@ -287,7 +302,7 @@ def exponentials(a) -> np.ndarray:
     return out
 
 
-def _push(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
+def _motion_per_acceleration(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
     """Return the motion (z, z') after dt [s] per constant modal acceleration.
 
     Each has the shape (n,), or (n, n) where damping couples the coordinates. The first one is the integral of zv, which
@@ -298,7 +313,7 @@ def _push(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
     )[1][0]
 
 
-def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
+def _drive_weights(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
     """Return weights of the drive at the Gauss points, and the quadratic form of the viscous loss.
 
     `tables` multiplies the weights by the drive.
@@ -322,7 +337,7 @@ def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
     share = (1 + np.polynomial.legendre.leggauss(m)[0]) / 2
     for k, tau in enumerate(nodes):
         reply = times_base(free_motion(modes, tau * (1 - share))[3])
-        spread = _lagrange(nodes, tau * share) * (weight * tau / dt)[:, None]
+        spread = _lagrange_polynomials(nodes, tau * share) * (weight * tau / dt)[:, None]
         inner[k] = -spread.T @ reply
     if coupled:
         d = (modes.damping + modes.damping.T) / 2
@@ -349,7 +364,7 @@ def _parts(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
     return parts, np.stack([mass * d * (weight @ pair) for pair in pairs])
 
 
-def _lagrange(nodes, at) -> np.ndarray:
+def _lagrange_polynomials(nodes, at) -> np.ndarray:
     """Return the Lagrange polynomials (k, m) of the nodes (m,) at the points `at` (k,)."""
     gap = nodes[:, None] - nodes
     np.fill_diagonal(gap, 1.0)

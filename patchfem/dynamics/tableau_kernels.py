@@ -8,9 +8,9 @@ of Dormand and Prince). The order conditions are tested.
 
 import numpy as np
 
-STAGES = 16  # 12 of the step, the slope at its end, three more of the extension
+N_STAGES = 16  # 12 of the step, the slope at its end, three more of the extension
 # nodes c_i of the stages as fractions of the step
-PLACES = np.array(
+STAGE_NODES = np.array(
     [
         0.0,
         0.05260015195876773,
@@ -31,23 +31,36 @@ PLACES = np.array(
     ]
 )
 # first column of each row of the Runge-Kutta matrix that is not 0, apart from column 0
-BEFORE = np.array([0, 1, 1, 2, 2, 3, 3, 3, 3, 3, 3, 3, 5, 6, 5, 5])
+FIRST_COLUMNS = np.array([0, 1, 1, 2, 2, 3, 3, 3, 3, 3, 3, 3, 5, 6, 5, 5])
 # Runge-Kutta matrix a_ij; row 12 holds the weights b_j of the step
-SHARES = np.zeros((STAGES, STAGES))
-SHARES[1, 0] = 0.05260015195876773
-SHARES[2, [0, *range(1, 2)]] = [0.0197250569845379, 0.0591751709536137]
-SHARES[3, [0, *range(2, 3)]] = [0.02958758547680685, 0.08876275643042054]
-SHARES[4, [0, *range(2, 4)]] = [0.2413651341592667, -0.8845494793282861, 0.924834003261792]
-SHARES[5, [0, *range(3, 5)]] = [0.037037037037037035, 0.17082860872947386, 0.12546768756682242]
-SHARES[6, [0, *range(3, 6)]] = [0.037109375, 0.17025221101954405, 0.06021653898045596, -0.017578125]
-SHARES[7, [0, *range(3, 7)]] = [
+RUNGE_KUTTA_MATRIX = np.zeros((N_STAGES, N_STAGES))
+RUNGE_KUTTA_MATRIX[1, 0] = 0.05260015195876773
+RUNGE_KUTTA_MATRIX[2, [0, *range(1, 2)]] = [0.0197250569845379, 0.0591751709536137]
+RUNGE_KUTTA_MATRIX[3, [0, *range(2, 3)]] = [0.02958758547680685, 0.08876275643042054]
+RUNGE_KUTTA_MATRIX[4, [0, *range(2, 4)]] = [
+    0.2413651341592667,
+    -0.8845494793282861,
+    0.924834003261792,
+]
+RUNGE_KUTTA_MATRIX[5, [0, *range(3, 5)]] = [
+    0.037037037037037035,
+    0.17082860872947386,
+    0.12546768756682242,
+]
+RUNGE_KUTTA_MATRIX[6, [0, *range(3, 6)]] = [
+    0.037109375,
+    0.17025221101954405,
+    0.06021653898045596,
+    -0.017578125,
+]
+RUNGE_KUTTA_MATRIX[7, [0, *range(3, 7)]] = [
     0.03709200011850479,
     0.17038392571223998,
     0.10726203044637328,
     -0.015319437748624402,
     0.008273789163814023,
 ]
-SHARES[8, [0, *range(3, 8)]] = [
+RUNGE_KUTTA_MATRIX[8, [0, *range(3, 8)]] = [
     0.6241109587160757,
     -3.3608926294469414,
     -0.868219346841726,
@@ -55,7 +68,7 @@ SHARES[8, [0, *range(3, 8)]] = [
     20.154067550477894,
     -43.48988418106996,
 ]
-SHARES[9, [0, *range(3, 9)]] = [
+RUNGE_KUTTA_MATRIX[9, [0, *range(3, 9)]] = [
     0.47766253643826434,
     -2.4881146199716677,
     -0.590290826836843,
@@ -64,7 +77,7 @@ SHARES[9, [0, *range(3, 9)]] = [
     -33.28821096898486,
     -0.020331201708508627,
 ]
-SHARES[10, [0, *range(3, 10)]] = [
+RUNGE_KUTTA_MATRIX[10, [0, *range(3, 10)]] = [
     -0.9371424300859873,
     5.186372428844064,
     1.0914373489967295,
@@ -74,7 +87,7 @@ SHARES[10, [0, *range(3, 10)]] = [
     2.4936055526796523,
     -3.0467644718982196,
 ]
-SHARES[11, [0, *range(3, 11)]] = [
+RUNGE_KUTTA_MATRIX[11, [0, *range(3, 11)]] = [
     2.273310147516538,
     -10.53449546673725,
     -2.0008720582248625,
@@ -85,7 +98,7 @@ SHARES[11, [0, *range(3, 11)]] = [
     12.360567175794303,
     0.6433927460157636,
 ]
-SHARES[12, [0, *range(5, 12)]] = [
+RUNGE_KUTTA_MATRIX[12, [0, *range(5, 12)]] = [
     0.054293734116568765,
     4.450312892752409,
     1.8915178993145003,
@@ -95,7 +108,7 @@ SHARES[12, [0, *range(5, 12)]] = [
     0.20136540080403034,
     0.04471061572777259,
 ]
-SHARES[13, [0, *range(6, 13)]] = [
+RUNGE_KUTTA_MATRIX[13, [0, *range(6, 13)]] = [
     0.056167502283047954,
     0.25350021021662483,
     -0.2462390374708025,
@@ -105,7 +118,7 @@ SHARES[13, [0, *range(6, 13)]] = [
     0.007567897660545699,
     -0.008298,
 ]
-SHARES[14, [0, *range(5, 14)]] = [
+RUNGE_KUTTA_MATRIX[14, [0, *range(5, 14)]] = [
     0.03183464816350214,
     0.028300909672366776,
     0.053541988307438566,
@@ -117,7 +130,7 @@ SHARES[14, [0, *range(5, 14)]] = [
     -0.00034046500868740456,
     0.1413124436746325,
 ]
-SHARES[15, [0, *range(5, 15)]] = [
+RUNGE_KUTTA_MATRIX[15, [0, *range(5, 15)]] = [
     -0.42889630158379194,
     -4.697621415361164,
     7.683421196062599,
@@ -130,8 +143,8 @@ SHARES[15, [0, *range(5, 15)]] = [
     2.9475147891527724,
     -9.15095847217987,
 ]
-FIFTH = np.zeros(12)  # weights of the step of order 8 minus those of order 5
-FIFTH[[0, *range(5, 12)]] = [
+ORDER_5_WEIGHTS = np.zeros(12)  # weights of the step of order 8 minus those of order 5
+ORDER_5_WEIGHTS[[0, *range(5, 12)]] = [
     0.01312004499419488,
     -1.2251564463762044,
     -0.4957589496572502,
@@ -141,8 +154,8 @@ FIFTH[[0, *range(5, 12)]] = [
     0.08192320648511571,
     -0.022355307863886294,
 ]
-THIRD = np.zeros(12)  # weights of the step of order 8 minus those of order 3
-THIRD[[0, *range(5, 12)]] = [
+ORDER_3_WEIGHTS = np.zeros(12)  # weights of the step of order 8 minus those of order 3
+ORDER_3_WEIGHTS[[0, *range(5, 12)]] = [
     -0.18980075407240762,
     4.450312892752409,
     1.8915178993145003,
@@ -152,8 +165,10 @@ THIRD[[0, *range(5, 12)]] = [
     0.20136540080403034,
     0.02265179219836082,
 ]
-INSIDE = np.zeros((4, STAGES))  # coefficients of the four highest terms of the dense output
-INSIDE[0, [0, *range(5, STAGES)]] = [
+EXTENSION_WEIGHTS = np.zeros(
+    (4, N_STAGES)
+)  # coefficients of the four highest terms of the dense output
+EXTENSION_WEIGHTS[0, [0, *range(5, N_STAGES)]] = [
     -8.428938276109013,
     0.5667149535193777,
     -3.0689499459498917,
@@ -167,7 +182,7 @@ INSIDE[0, [0, *range(5, STAGES)]] = [
     -9.194632392478356,
     -4.436036387594894,
 ]
-INSIDE[1, [0, *range(5, STAGES)]] = [
+EXTENSION_WEIGHTS[1, [0, *range(5, N_STAGES)]] = [
     10.427508642579134,
     242.28349177525817,
     165.20045171727028,
@@ -181,7 +196,7 @@ INSIDE[1, [0, *range(5, STAGES)]] = [
     -9.35292435884448,
     35.81684148639408,
 ]
-INSIDE[2, [0, *range(5, STAGES)]] = [
+EXTENSION_WEIGHTS[2, [0, *range(5, N_STAGES)]] = [
     19.985053242002433,
     -387.0373087493518,
     -189.17813819516758,
@@ -195,7 +210,7 @@ INSIDE[2, [0, *range(5, STAGES)]] = [
     84.32040550667716,
     11.99229113618279,
 ]
-INSIDE[3, [0, *range(5, STAGES)]] = [
+EXTENSION_WEIGHTS[3, [0, *range(5, N_STAGES)]] = [
     -25.69393346270375,
     -154.18974869023643,
     -231.5293791760455,

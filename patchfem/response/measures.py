@@ -215,7 +215,9 @@ def slip_start_measure(phases) -> dict:
 
     Empty if the starts have no phase in common.
     """
-    found = integrated.start_phase(len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum())
+    found = integrated.mean_slip_phase(
+        len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum()
+    )
     return {} if np.isnan(found) else {"slip_start_phase": float(found)}
 
 

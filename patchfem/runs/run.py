@@ -259,14 +259,16 @@ def _saving_context(kept: StateFile | None, what: Plan, patch):
     if kept is None or not marches(what):
         return nullcontext()
 
-    def path(number: int) -> Path:
+    def path_of_march(number: int) -> Path:
         """Return the file of the state of a march."""
         return kept.path.parent / f"march_{number}.npz"
 
-    if kept.resume and model.wear is None and not path(1).is_file():
+    if kept.resume and model.wear is None and not path_of_march(1).is_file():
         raise evolve.nothing_kept(kept.path)
-    return checkpoint.keeping(
-        checkpoint.Keeper(path, state_key(model, patch, kept.version), kept.resume)
+    return checkpoint.store_checkpoints(
+        checkpoint.CheckpointFiles(
+            path_of_march, state_key(model, patch, kept.version), kept.resume
+        )
     )
 
 

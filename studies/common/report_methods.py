@@ -25,7 +25,7 @@ from scipy.linalg import expm
 
 from patchfem import compiled
 from patchfem.core import InitialState, ModalBasis
-from patchfem.dynamics.integrated import accelerations
+from patchfem.dynamics.integrated import find_accelerations
 
 KERNELS = Path(__file__).with_name("report_methods_kernels.py")
 CRITERIA = ("displacement", "velocity", "force")
@@ -80,7 +80,7 @@ class Motion:
     def accelerations(self, modes: ModalBasis) -> np.ndarray:
         """Return the modal accelerations (k, n) [m s-2] relative to the base."""
         friction = np.outer(self.force, modes.slide)
-        return accelerations(modes, self.drive, self.z, self.v, friction)
+        return find_accelerations(modes, self.drive, self.z, self.v, friction)
 
 
 class Problem(NamedTuple):
@@ -116,7 +116,7 @@ def set_up(modes: ModalBasis, drive, law: Law, steps: tuple, start: InitialState
     rig = (*(np.array(array, float, order="C") for array in arrays), float(modes.mass))
     push = np.array(drive.values(step * np.arange(count)), float)
     # the force that holds the interface at the start
-    free = accelerations(modes, push[:1], z[:1], v[:1], np.zeros((1, n)))[0]
+    free = find_accelerations(modes, push[:1], z[:1], v[:1], np.zeros((1, n)))[0]
     hold = free @ modes.slide * modes.mass / (modes.slide @ modes.slide)
     force[0] = load_kernels().law_force(
         tuple(law), float(modes.slide @ v[0]), 0.0, 0.0, float(hold)

@@ -29,7 +29,7 @@ from report_methods import solve_euler
 from told import told
 
 import patchfem as pf
-from patchfem.dynamics.cycles import hermite_extremes
+from patchfem.dynamics.cycles import find_hermite_extremes
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.model.model import build
 from patchfem.scene.scene import load as load_scene
@@ -96,7 +96,9 @@ def _by_euler(steps: int, period: float) -> Motion:
     )
     last = slice(-steps - 1, None)
     displacement = motion.z[last] @ rig.modes.output
-    low, high = hermite_extremes(displacement, motion.v[last] @ rig.modes.output, period / steps)
+    low, high = find_hermite_extremes(
+        displacement, motion.v[last] @ rig.modes.output, period / steps
+    )
     frame = motion.z[last] @ rig.modes.slide - displacement
     return Motion(
         motion.time[last] - 7 * period,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.dynamics.curve_points import adapted
+from patchfem.dynamics.curve_points import sample_adaptively
 
 
 def mode(f, zeta):
@@ -16,7 +16,9 @@ def mode(f, zeta):
 @pytest.mark.parametrize("ends", [(60.0, 210.0), (211.0, 61.0)])
 def test_always_straight_lines_miss_a_peak_by_the_share(zeta, ends):
     """Neither end nor spacing knows the mode: at a damping of .003 its half power width is .86 Hz, the spacing 1.25."""
-    places, found = adapted(lambda f, near: (mode(f, zeta), f), np.linspace(*ends, 121), 0.01)
+    places, found = sample_adaptively(
+        lambda f, near: (mode(f, zeta), f), np.linspace(*ends, 121), 0.01
+    )
     assert (
         np.all(np.diff(places) * np.sign(ends[1] - ends[0]) > 0)
         and np.isin(np.linspace(*ends, 121), places).all()
@@ -33,7 +35,9 @@ def test_always_straight_lines_miss_a_peak_by_the_share(zeta, ends):
 @pytest.mark.parametrize("share", [1e-3, 1e-4])
 def test_always_a_smaller_share_is_kept_too(share):
     """With no more points than three times those of the best places, int sqrt(|y''|/(8 share y)) df."""
-    places, found = adapted(lambda f, near: (mode(f, 3e-3),), np.linspace(120, 170, 6), share)
+    places, found = sample_adaptively(
+        lambda f, near: (mode(f, 3e-3),), np.linspace(120, 170, 6), share
+    )
     fine = np.linspace(120, 170, 200001)
     true = mode(fine, 3e-3)
     assert np.abs(np.interp(fine, places, [one[0] for one in found]) / true - 1).max() < share
@@ -43,7 +47,7 @@ def test_always_a_smaller_share_is_kept_too(share):
 
 def test_always_a_jump_and_a_hole_end():
     """Neither is a bend: a jump is followed to a millionth of its place, nan (no motion is bounded) not at all."""
-    places = adapted(
+    places = sample_adaptively(
         lambda f, near: (1.0 if f < 101.3 else np.nan if f > 150 else 5.0,),
         np.linspace(60, 210, 31),
     )[0]

@@ -30,11 +30,11 @@ def rates(modes: ModalBasis, y, force: float):
 def test_a_block_on_rigid_friction_has_its_closed_form(zeta):
     """Every half swing loses 2 F/k and gains by exp(pi |zeta|/sqrt(1 - zeta^2)); to the first order 4 F/(pi |c| w)."""
     modes, force = modes_of([750.0], [zeta], [1.0], [2.0]), 9.0
-    [found] = limit_cycles.of_relay(modes, modes.slide, force, force)
+    [found] = limit_cycles.find_relay_cycles(modes, modes.slide, force, force)
     gain, half = np.exp(np.pi * abs(zeta) / np.sqrt(1 - zeta**2)), force / (0.5 * 750.0**2)
     assert found.amplitude == pytest.approx(2 * half * (gain + 1) / (gain - 1), rel=1e-9)
     assert not found.lasts and found.omega == pytest.approx(750.0 * np.sqrt(1 - zeta**2), rel=1e-10)
-    assert 2 * limit_cycles.balanced_amplitude(modes, modes.slide, force, 0) == pytest.approx(
+    assert 2 * limit_cycles.estimate_amplitude(modes, modes.slide, force, 0) == pytest.approx(
         found.amplitude, rel=(np.pi * zeta) ** 2
     )
 
@@ -60,7 +60,7 @@ def turning_state(modes: ModalBasis, force: float, half: float) -> np.ndarray:
 def test_a_second_mode_rings_with_the_cycle():
     """The motion from the turn of the found cycle comes back with its sign turned, by DOP853 to its stop."""
     modes = modes_of([750.0, 2600.0], [-0.01, 0.02], [1.0, 0.7], [1.0, -0.4])
-    [found] = limit_cycles.of_relay(modes, modes.slide, 9.0, 10.0)
+    [found] = limit_cycles.find_relay_cycles(modes, modes.slide, 9.0, 10.0)
     start = turning_state(modes, 9.0, np.pi / found.omega)
 
     def stops(t, y):
@@ -87,8 +87,10 @@ def test_resonances_of_a_mode_without_damping_are_no_cycles(ratio):
     """The equation of the half period changes its sign where an odd harmonic meets such a mode, and has no zero there:
     one cycle is found, near that of the first mode alone, or none where the second one would hold the slide."""
     modes = modes_of([750.0, 750.0 * ratio], [-0.01, 0.0], [1.0, 0.02], [1.0, 0.0])
-    alone = limit_cycles.of_relay(modes_of([750.0], [-0.01], [1.0], [1.0]), np.ones(1), 9.0, 9.0)[0]
-    for one in limit_cycles.of_relay(modes, modes.slide, 9.0, 9.0):
+    alone = limit_cycles.find_relay_cycles(
+        modes_of([750.0], [-0.01], [1.0], [1.0]), np.ones(1), 9.0, 9.0
+    )[0]
+    for one in limit_cycles.find_relay_cycles(modes, modes.slide, 9.0, 9.0):
         half = np.pi / one.omega
         state = turning_state(modes, 9.0, half)
         largest_speed = np.abs(modes.slide) @ np.abs(state[:2]) / half
@@ -98,14 +100,14 @@ def test_resonances_of_a_mode_without_damping_are_no_cycles(ratio):
 
 def test_a_cycle_that_would_hold_on_the_way_is_none():
     modes = modes_of([750.0], [-0.3], [1.0], [1.0])
-    assert limit_cycles.of_relay(modes, modes.slide, 9.0, 30.0) == []
+    assert limit_cycles.find_relay_cycles(modes, modes.slide, 9.0, 30.0) == []
 
 
 def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not():
     """A cycle of DOP853 from both amplitudes repeats; around them the swing is drawn to one and away from the other."""
     stiffness, yields = np.array([2e4, 1e4, 3e4]), np.array([1e-4, 2e-4, 4e-4])
     modes, limit = modes_of([750.0], [-0.01], [1.0], [1.0]), float(stiffness @ yields)
-    (low, high), least = limit_cycles.of_balance(
+    (low, high), least = limit_cycles.find_balance_cycles(
         modes, Group(modes, Jenkins(stiffness, yields)), modes.slide, limit
     )
     assert least == 0.0
@@ -160,15 +162,15 @@ def test_exact_the_backbone_of_rigid_friction_has_its_closed_form():
     gain = np.log((places + h) / (places - h))
     net = gain / np.hypot(np.pi, gain)
     omega = 750.0 * np.sqrt(1 - net**2)
-    found = limit_cycles.relay_backbone(modes, modes.slide, (force, force), 2 * places, 0)
+    found = limit_cycles.trace_relay_backbone(modes, modes.slide, (force, force), 2 * places, 0)
     assert [one.omega for one, _ in found] == pytest.approx(omega, rel=1e-8)
     assert [ratio for _, ratio in found] == pytest.approx((net + zeta) * 750.0 / omega, rel=1e-7)
     # it holds
-    assert limit_cycles.relay_backbone(modes, modes.slide, (force, 4 * force), [2.4 * h], 0) == [
-        None
-    ]
+    assert limit_cycles.trace_relay_backbone(
+        modes, modes.slide, (force, 4 * force), [2.4 * h], 0
+    ) == [None]
     with np.errstate(all="raise"):  # a mode that friction does not act on
-        assert limit_cycles.relay_backbone(
+        assert limit_cycles.trace_relay_backbone(
             modes, 0 * modes.slide, (force, force), [h, 2 * h], 0
         ) == [None, None]
 
@@ -176,7 +178,7 @@ def test_exact_the_backbone_of_rigid_friction_has_its_closed_form():
 def test_the_backbone_of_two_modes_is_the_cycle_of_its_damping():
     """Lifted by the found ratio, the rig has a limit cycle of the amplitude that was asked for."""
     modes = modes_of([750.0, 2600.0], [0.003, 0.02], [1.0, 0.7], [1.0, -0.4])
-    [(cycle, ratio)] = limit_cycles.relay_backbone(modes, modes.slide, (9.0, 9.0), [4e-4], 0)
+    [(cycle, ratio)] = limit_cycles.trace_relay_backbone(modes, modes.slide, (9.0, 9.0), [4e-4], 0)
     lifted = replace(modes, damping=modes.damping_matrix - 2 * ratio * cycle.omega * np.eye(2))
-    again = limit_cycles.of_relay(lifted, modes.slide, 9.0, 9.0)
+    again = limit_cycles.find_relay_cycles(lifted, modes.slide, 9.0, 9.0)
     assert min(abs(one.amplitude / 4e-4 - 1) for one in again) < 1e-8

@@ -65,7 +65,7 @@ RIGS = {
 def often(monkeypatch):
     """Marches keep their state after every second cycle; the list has a number per state."""
     monkeypatch.setattr(march, "MAX_PIECE_CYCLES", 2)
-    saved, save = [], checkpoint.save
+    saved, save = [], checkpoint.save_checkpoint
 
     def counted(*of):
         saved.append(1)
@@ -73,9 +73,9 @@ def often(monkeypatch):
         if len(saved) == often.stop:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
-    monkeypatch.setattr(checkpoint, "SHARE", np.inf)
-    monkeypatch.setattr(checkpoint, "save", counted)
+    monkeypatch.setattr(checkpoint, "MIN_WRITE_INTERVAL", 0.0)
+    monkeypatch.setattr(checkpoint, "MAX_WRITE_FRACTION", np.inf)
+    monkeypatch.setattr(checkpoint, "save_checkpoint", counted)
     often = type("Often", (), {"saved": saved, "stop": 0})()
     return often
 
@@ -189,7 +189,7 @@ def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
     code = (
-        "from patchfem.dynamics import checkpoint as c; c.SECONDS = 0.05; c.SHARE = 1.0; "
+        "from patchfem.dynamics import checkpoint as c; c.MIN_WRITE_INTERVAL = 0.05; c.MAX_WRITE_FRACTION = 1.0; "
         "from patchfem.dynamics.march import march; march.PERIODIC_TOL = -1.0; "
         "from patchfem.__main__ import main; main()"
     )

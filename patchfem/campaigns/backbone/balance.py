@@ -291,7 +291,7 @@ def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
     if friction.kinetic is not None:
         kinetic = static * friction.kinetic / friction.static
     row = modes.interfaces[0]
-    found = limit_cycles.relay_backbone(modes, row, (kinetic, static), amplitudes, joint.mode)
+    found = limit_cycles.trace_relay_backbone(modes, row, (kinetic, static), amplitudes, joint.mode)
     known = np.array([motion is not None for motion in found])
     if not known.any():
         raise NotConverged(

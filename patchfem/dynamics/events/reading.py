@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import InterfaceLoop
-from ..integrated import start_phase
+from ..integrated import mean_slip_phase
 from .positions_kernels import INTERFACE, RUN
 
 # [rad] angle by which a free vibration must turn in a stick to be measured: a vibration is reported from 1.5 periods on,
@@ -53,8 +53,8 @@ class Reading:
 
     @property
     def start(self):
-        """Mean phase [rad] modulo pi of the releases of the first interface, see `start_phase`."""
-        return start_phase(
+        """Mean phase [rad] modulo pi of the releases of the first interface, see `mean_slip_phase`."""
+        return mean_slip_phase(
             *(self.run[..., place] for place in (RUN.n_releases, RUN.release_cos, RUN.release_sin))
         )
 

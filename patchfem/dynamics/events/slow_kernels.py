@@ -11,7 +11,7 @@ from math import sqrt
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..dense_kernels import factor, solve
+from ..dense_kernels import factorise, solve_factorised
 from .drive_kernels import expand_drive, fastest_drive_rate
 from .memory_kernels import RIGID_STIFFNESS
 from .positions_kernels import TIME
@@ -49,7 +49,7 @@ def factor_compliance(springs, modal_system, workspace):
                 )
             constraint.matrix[f, g] = part / modal_system.mass
         constraint.matrix[f, f] = constraint.matrix[f, f] + 1 / springs[f] if size > 0.0 else 1.0
-    factor(constraint.matrix)
+    factorise(constraint.matrix)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -87,7 +87,7 @@ def solve_equilibrium(force, coordinates, springs, modal_system, imbalance, work
                 constraint.scratch[1, f] += constraint.basis[f, i] * (
                     imbalance[i] / modal_system.omega_squared[i] + off
                 )
-        solve(constraint.matrix, constraint.scratch[1])
+        solve_factorised(constraint.matrix, constraint.scratch[1])
         for i in range(n):
             for f in range(n_interfaces):
                 imbalance[i] -= (

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import InitialState, ModalBasis, frozen_array
-from ..periodic import Mapped, Shooting, bound
+from ..periodic import MappedPoint, PeriodicPoint, Shooting, bound_error
 from .elements import Memory
 from .period import PeriodMap, PeriodMapping, Point, copy_memory
 
@@ -50,8 +50,8 @@ class SteadyState:
 
     @property
     def error(self) -> float:
-        """Relative error that the residual leaves in the motion, see `periodic.bound`."""
-        return bound(self.residual, self.multipliers)
+        """Relative error that the residual leaves in the motion, see `periodic.bound_error`."""
+        return bound_error(self.residual, self.multipliers)
 
     @property
     def regime(self) -> str:
@@ -81,7 +81,7 @@ def solve_steady(modes: ModalBasis, drive, groups, near: Point | None = None) ->
     Raises
     ------
     NotConverged
-        As `periodic.Shooting.repeating`.
+        As `periodic.Shooting.find_periodic_point`.
     PatchfemError
         If the drive does not repeat.
     """
@@ -116,13 +116,13 @@ def find_steady_state_from(
     period_map = PeriodMap(modes, groups)
     shooting = YieldShooting(period_map, drive, False)
     point = Point(np.concatenate([start.z, start.v]), memory)
-    return _make_steady(period_map, *shooting.repeating(point), False)
+    return _make_steady(period_map, *shooting.find_periodic_point(point), False)
 
 
-def find_antisymmetric_motion(period_map: PeriodMap, drive, near: Point | None = None) -> tuple:
+def find_antisymmetric_motion(
+    period_map: PeriodMap, drive, near: Point | None = None
+) -> PeriodicPoint:
     """Find the motion that changes sign after half a period.
-
-    Returns its map and the Newton steps.
 
     Parameters
     ----------
@@ -133,10 +133,10 @@ def find_antisymmetric_motion(period_map: PeriodMap, drive, near: Point | None =
 
     Returns
     -------
-    MappedPoint, int
+    PeriodicPoint
     """
     shooting = YieldShooting(period_map, drive, True)
-    return shooting.repeating(
+    return shooting.find_periodic_point(
         near or shooting.run(period_map.make_rest_point(), N_APPROACH_PERIODS)
     )
 
@@ -162,7 +162,7 @@ class YieldShooting(Shooting):
         self.moved_by = max(moved, 1e-300)
         self.rows = np.maximum(np.abs(period_map.faces).sum(axis=1), 1e-300)
 
-    def mapped(self, point: Point) -> Mapped:
+    def map_point(self, point: Point) -> MappedPoint:
         """Return the map of a Point; raise NotConverged where events accumulate."""
         found = self.period_map(self.drive, point, self.half)
         n = self.period_map.n
@@ -177,7 +177,7 @@ class YieldShooting(Shooting):
             scale = np.concatenate([scale, width * self.rows[point.turning_places[0]]])
             a = point.numbers
             b = found.end.numbers
-        return Mapped(
+        return MappedPoint(
             point,
             found,
             found.slope,
@@ -189,17 +189,17 @@ class YieldShooting(Shooting):
             found.kept,
         )
 
-    def moved(self, mapped: Mapped, step) -> Point:
-        """Point of a map moved by a step, with the groups of elements of the end of the map."""
-        return mapped.found.end.moved(mapped.point.numbers + step)
+    def step_from(self, mapped_point: MappedPoint, step) -> Point:
+        """Return the Point a step away, with the groups of elements at the end of the map."""
+        return mapped_point.image.end.moved(mapped_point.point.numbers + step)
 
-    def after(self, mapped: Mapped, periods: int) -> Point:
-        """The Point after some periods of the run from the end of a map."""
-        return self.run(self._next(mapped.found), periods)
+    def run_from(self, mapped_point: MappedPoint, n_periods: int) -> Point:
+        """Return the Point that a run from the end of a map reaches after some periods."""
+        return self.run(self._next(mapped_point.image), n_periods)
 
-    def run(self, point: Point, periods: int) -> Point:
+    def run(self, point: Point, n_periods: int) -> Point:
         """Return the Point after some periods."""
-        for _ in range(2 * periods if self.half else periods):
+        for _ in range(2 * n_periods if self.half else n_periods):
             point = self._next(self.period_map(self.drive, point, self.half, False))
         return point
 
@@ -249,10 +249,12 @@ def _have_same_elements(point: Point, end: Point) -> bool:
     )
 
 
-def _make_steady(period_map: PeriodMap, mapped: Mapped, used: int, half: bool) -> SteadyState:
-    point = mapped.point
-    found = mapped.found
-    values = mapped.multipliers()
+def _make_steady(
+    period_map: PeriodMap, mapped_point: MappedPoint, used: int, half: bool
+) -> SteadyState:
+    point = mapped_point.point
+    found = mapped_point.image
+    values = mapped_point.multipliers()
     low, high = found.extremes
     limit = period_map.table.limit_sum
     n = period_map.n
@@ -264,7 +266,7 @@ def _make_steady(period_map: PeriodMap, mapped: Mapped, used: int, half: bool) -
         point,
         start,
         period_map.complete_memory(point),
-        mapped.miss,
+        mapped_point.max_residual,
         frozen_array(values**2 if half else values, complex),
         float(max(high, -low) if half else (high - low) / 2),
         float(share),

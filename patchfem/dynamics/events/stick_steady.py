@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import InitialState, ModalBasis, PatchfemError, frozen_array
-from ..periodic import Grows, Mapped, Shooting
+from ..periodic import MappedPoint, MotionGrows, Shooting
 from . import histories
 from .positions_kernels import BEGIN, COLUMN, N_COLUMNS, ROW
 
@@ -289,7 +289,7 @@ def solve_steady(
     Raises
     ------
     NotConverged
-        As `periodic.Shooting.repeating`.
+        As `periodic.Shooting.find_periodic_point`.
     PatchfemError
         If the drive does not repeat.
     """
@@ -302,12 +302,12 @@ def solve_steady(
     begin = np.zeros(2 * n) if start is None else np.concatenate([start.z, start.v])
     shooting = CoulombShooting(modes, drive, groups, periods)
     try:
-        mapped, used = shooting.repeating(
+        periodic_point = shooting.find_periodic_point(
             shooting.run(begin, cycles), (2 * cycles, MAX_APPROACH_PERIODS)
         )
-    except Grows as found:
-        return _make_steady(found.mapped, n, "unbounded", found.steps)
-    return _make_steady(mapped, n, None, used)
+    except MotionGrows as error:
+        return _make_steady(error.mapped_point, n, "unbounded", error.n_steps)
+    return _make_steady(periodic_point.mapped_point, n, None, periodic_point.n_steps)
 
 
 class CoulombShooting(Shooting):
@@ -323,10 +323,10 @@ class CoulombShooting(Shooting):
             abs(part.amplitude) / part.omega**2 * float(np.abs(modes.base).max()), 1e-300
         )
 
-    def mapped(self, point) -> Mapped:
-        """The map of a state (2n,)."""
+    def map_point(self, point) -> MappedPoint:
+        """Return the map of a state (2n,)."""
         found = map_period(self.modes, self.drive, self.groups, point, self.periods)
-        return Mapped(
+        return MappedPoint(
             point,
             found,
             found.slope,
@@ -335,30 +335,30 @@ class CoulombShooting(Shooting):
             found.sizes[0] / self.moved_by,
         )
 
-    def moved(self, mapped: Mapped, step):
-        """The state a step away, whose held slides stay at rest."""
+    def step_from(self, mapped_point: MappedPoint, step):
+        """Return the state a step away, in which the sticking interfaces stay at rest."""
         n = self.modes.omega.size
-        out = mapped.point + step
-        out[n:] = mapped.found.first @ out[n:]
+        out = mapped_point.point + step
+        out[n:] = mapped_point.image.first @ out[n:]
         return out
 
-    def after(self, mapped: Mapped, periods: int):
-        """The state after some periods of the run from that of a map."""
-        return self.run(mapped.point, periods)
+    def run_from(self, mapped_point: MappedPoint, n_periods: int):
+        """Return the state that a run from that of a map reaches after some periods."""
+        return self.run(mapped_point.point, n_periods)
 
-    def run(self, state, periods: int):
+    def run(self, state, n_periods: int):
         """Return the state after some periods."""
         n = self.modes.omega.size
         run = histories.start_run(
-            self.modes, self.drive, self.groups, periods, start=InitialState(state[:n], state[n:])
+            self.modes, self.drive, self.groups, n_periods, start=InitialState(state[:n], state[n:])
         )
-        run.run_to(periods)
+        run.run_to(n_periods)
         return run.motion.ravel().copy()
 
 
-def _make_steady(mapped: Mapped, n: int, regime, used: int) -> SteadyState:
-    one = mapped.found
-    state = mapped.point
+def _make_steady(mapped_point: MappedPoint, n: int, regime, used: int) -> SteadyState:
+    one = mapped_point.image
+    state = mapped_point.point
     stops = tuple(
         int(k) for k in np.count_nonzero((one.signs[:-1] != 0) & (one.signs[1:] == 0), axis=0)
     )
@@ -375,8 +375,8 @@ def _make_steady(mapped: Mapped, n: int, regime, used: int) -> SteadyState:
             regime = f"{most} stop{'s' if most != 1 else ''}"
     return SteadyState(
         InitialState(frozen_array(state[:n]), frozen_array(state[n:])),
-        mapped.miss,
-        frozen_array(mapped.multipliers(), complex),
+        mapped_point.max_residual,
+        frozen_array(mapped_point.multipliers(), complex),
         one.swing,
         regime,
         stops,

@@ -1,10 +1,10 @@
-"""Named positions in the arrays of a contact that climbs flanks, `interfaces.arrays.Climbing`."""
+"""Named positions in the arrays of a contact that climbs flanks, `interfaces.arrays.ClimbingPoints`."""
 
 from typing import NamedTuple
 
 
 class FlankNumbers(NamedTuple):
-    """Positions in `Climbing.flank`.
+    """Positions in `ClimbingPoints.flank`.
 
     - load: on the patch [N]
     - wave_number, amplitude, phase: of the grooves [rad/m], [m], [rad]
@@ -21,7 +21,7 @@ class FlankNumbers(NamedTuple):
 
 
 class ClimbPositions(NamedTuple):
-    """Positions in `Climbing.climb`.
+    """Positions in `ClimbingPoints.climb`.
 
     Of the state:
 

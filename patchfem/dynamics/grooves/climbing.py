@@ -8,8 +8,9 @@ from ...contact.stiffness import tangential_stiffness
 from ...core import Outcome, PatchfemError, Response
 from ...friction.grooves import Grooves
 from ...slip.shear_modes import N_SHEAR_MODES, enough_modes, shear_modes
-from ..integrated import accelerations
-from ..interfaces.arrays import Climbing
+from ..integrated import find_accelerations
+from ..interfaces.arrays import ClimbingPoints
+from ..ledger import LEDGER
 from ..march.march import Run
 from ..march.varying_load import PLASTIC, Rubbing, plastic, rub_of
 from .arrays import CLIMB
@@ -195,7 +196,7 @@ class ClimbingModel(FlankModel):
         """Class that marches this contact."""
         return ClimbingRun
 
-    def build(self) -> Climbing:
+    def build(self) -> ClimbingPoints:
         """Return the arrays of the contact at rest at the relative displacement 0."""
         g = self.grooves
         share = np.array(self.share, float)
@@ -209,7 +210,7 @@ class ClimbingModel(FlankModel):
             normal,
             normal,
         )
-        return Climbing(
+        return ClimbingPoints(
             flank, climb, share, *rub_of(self.law, normal * share, self.shear, self.limit)
         )
 
@@ -253,7 +254,7 @@ class GroovesRun(Run):
         if not g.lifted_mass:
             return out
         along = (
-            accelerations(
+            find_accelerations(
                 modes,
                 self.drive.values(out.time),
                 out.modal,
@@ -287,7 +288,7 @@ class ClimbingRun(GroovesRun):
         contact.memory[:] *= normal / climb[CLIMB.end_normal]
         contact.pressed[:] *= normal / climb[CLIMB.end_normal]
         climb[[CLIMB.rise_speed, CLIMB.start_normal, CLIMB.end_normal]] = slope * v, normal, normal
-        self.ledger[0] += self.strained()
+        self.ledger[LEDGER.drive_work] += self.strained()
 
     def placed(self, place, rate) -> None:
         """Set the state as a Run does; the lifted mass has the velocity of the flank there."""

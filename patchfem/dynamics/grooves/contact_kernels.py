@@ -16,7 +16,7 @@ import numpy as np
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
-from ..modal_kernels import narrowed
+from ..modal_kernels import narrow_bracket
 from . import points_kernels as points
 from .arrays import CLIMB, FLANK
 
@@ -127,8 +127,8 @@ def write_mean_force(dq, q, dt, c):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve(free, beta, q, v, dt, c, goal):
-    """Solve a step with dq = free - beta force, as `interfaces.element_kernels.solve`.
+def solve_step(free, beta, q, v, dt, c, goal):
+    """Solve a step with dq = free - beta force, as `interfaces.element_kernels.solve_step`.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def solve(free, beta, q, v, dt, c, goal):
             return dq, at[CLIMB.mean_force], count
         gain = max(1 + beta * at[CLIMB.stiffness], 0.1)
         here = dq
-        low, high, dq = narrowed(low, high, dq, miss, gain, count - MAX_NEWTON_STEPS)
+        low, high, dq = narrow_bracket(low, high, dq, miss, gain, count - MAX_NEWTON_STEPS)
         if high - low <= digit:
             return (
                 here,
@@ -164,7 +164,7 @@ def solve(free, beta, q, v, dt, c, goal):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def given(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, c, goal):
     """Return the mean force [N] over a prescribed dq [m] in dt [s], and True."""
     t = find_slope(c.flank, q)
     points.start_step(c, v * sqrt(1 + t * t), dt)
@@ -173,7 +173,7 @@ def given(dq, q, v, dt, c, goal):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, c):
     """Keep a solved step of mean force [N].
 
     Returns
@@ -188,7 +188,7 @@ def commit(dq, force, q, v0, v1, dt, c):
     v0 = v0 * sqrt(1 + t0 * t0)
     v1 = v1 * sqrt(1 + t1 * t1)
     along = (force - at[CLIMB.trial_vertical] * at[CLIMB.mean_slope]) / at[CLIMB.path_ratio]
-    lost, fine = points.commit(at[CLIMB.path_ratio] * dq, along, v0, v1, dt, c)
+    lost, fine = points.commit_friction(at[CLIMB.path_ratio] * dq, along, v0, v1, dt, c)
     if c.flank[FLANK.lifted_mass] > 0.0:
         at[CLIMB.rise_speed] = 2 * at[CLIMB.mean_slope] * dq / dt - at[CLIMB.rise_speed]
         at[CLIMB.has_lifted] = max(
@@ -198,12 +198,12 @@ def commit(dq, force, q, v0, v1, dt, c):
     at[CLIMB.earlier_slide] = at[CLIMB.last_slide]
     at[CLIMB.last_slide] = dq
     at[CLIMB.start_normal] = at[CLIMB.end_normal]
-    at[CLIMB.start_force] = points.state(c, 0.0)[0]
+    at[CLIMB.start_force] = points.read_friction(c, 0.0)[0]
     return lost, fine
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(c, q, v):
+def read_state(c, q, v):
     """Return the state of the contact at q [m] and v [m/s].
 
     Returns
@@ -219,7 +219,7 @@ def state(c, q, v):
     t = find_slope(c.flank, q)
     length = sqrt(1 + t * t)
     half = sin(0.5 * (c.flank[FLANK.wave_number] * q - c.flank[FLANK.phase]))
-    along, energy, kept = points.state(c, q)
+    along, energy, kept = points.read_friction(c, q)
     energy += (
         2 * c.flank[FLANK.load] * c.flank[FLANK.amplitude] * half * half
         + 0.5 * c.flank[FLANK.lifted_mass] * at[CLIMB.rise_speed] * at[CLIMB.rise_speed]

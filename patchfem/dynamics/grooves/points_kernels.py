@@ -6,14 +6,13 @@ behind shear modes as in `interfaces.shear_solve_kernels`.
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
-from ..dense_kernels import factor
-from ..dense_kernels import solve as solve_factored
+from ..dense_kernels import factorise, solve_factorised
 from ..interfaces.pressed_points_kernels import (
+    commit_points,
+    find_friction_force,
     press_points,
-    rub_commit,
-    rub_force,
-    rub_state,
-    spring_back,
+    read_points,
+    relax_pieces,
 )
 from ..interfaces.shear_points_kernels import SLOPE
 from ..interfaces.shear_solve_kernels import (
@@ -75,7 +74,7 @@ def solve_friction(ds, flat, end, dt, c):
                 ds, 0.0, kind, False, c, SHEAR_GOAL * c.force[0] * c.flank[FLANK.load]
             )[0]
         else:
-            force, gain = rub_force(ds, kind, c)
+            force, gain = find_friction_force(ds, kind, c)
         bound = c.force[0] * before
         after = min(max(2 * force - at[CLIMB.start_force], -bound), bound)
         now = max(flat + after * end, 0.0)
@@ -115,24 +114,24 @@ def find_stiffness(c):
         total += c.points[SLOPE, j]
     if c.ready[0] == 0.0:
         write_hessian(0.0, False, c, hess)
-        if not factor(hess):
+        if not factorise(hess):
             return total
         c.ready[0] = 1.0
     project_onto_modes(SLOPE, c.psi, c.points, int(c.count[0]), p)
     p[0] = 0.0
-    return max(total - inverse_form(hess, p, c.workspace[GRADIENT]), 0.01 * total)
+    return max(total - find_inverse_form(hess, p, c.workspace[GRADIENT]), 0.01 * total)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def inverse_form(hess, p, workspace):
+def find_inverse_form(hess, p, workspace):
     """Return p . hess^-1 p for p (n,) and a factorised matrix."""
     for k in range(p.size):
         workspace[k] = p[k]
-    return solve_factored(hess, workspace)
+    return solve_factorised(hess, workspace)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(ds, along, v0, v1, dt, c):
+def commit_friction(ds, along, v0, v1, dt, c):
     """Keep a step over the path ds [m] under a mean force [N].
 
     v0, v1: velocities along the flank [m/s].
@@ -146,9 +145,9 @@ def commit(ds, along, v0, v1, dt, c):
     """
     kind = int(c.flank[FLANK.kind])
     fine = True
-    lost = rub_commit(ds, along, v0, v1, dt, kind, c)
+    lost = commit_points(ds, along, v0, v1, dt, kind, c)
     if c.kappa.size:
-        more, count = spring_back(kind, c, c.force[0] * c.flank[FLANK.load] * 1e-11)
+        more, count = relax_pieces(kind, c, c.force[0] * c.flank[FLANK.load] * 1e-11)
         lost = lost + more
         fine = count > 0
     for j in range(c.pressed.shape[1]):
@@ -157,6 +156,6 @@ def commit(ds, along, v0, v1, dt, c):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(c, q):
+def read_friction(c, q):
     """Return force along the flank [N], energy of the law [J] and slip [m] at q [m]."""
-    return rub_state(int(c.flank[FLANK.kind]), c, q)
+    return read_points(int(c.flank[FLANK.kind]), c, q)

@@ -13,6 +13,7 @@ from ...core import InitialState, Outcome
 from ...friction.grooves import Grooves
 from ...friction.path_work import sampled_work
 from ...friction.protocol import Element
+from ..ledger import LEDGER
 from ..march.models import coulomb_model
 from ..smooth import run as smooth
 from ..smooth.arrays import COUNT, NOW, WORK
@@ -23,6 +24,15 @@ TOLERANCE = 1e-11
 # motion over wavelength/(2 pi), below which the choice of the step takes it for rest
 REST_RATIO = 1e-6
 HERE = "dynamics.grooves.flank_kernels"
+# positions in the ledger of a march of the sums that `SampledRun._read_sums` returns
+LEDGER_SUMS = [
+    LEDGER.drive_work,
+    LEDGER.viscous_loss,
+    LEDGER.drive_power,
+    LEDGER.friction_loss,
+    LEDGER.n_iterations,
+    LEDGER.friction_work,
+]
 # status of a march by the outcome of the motion
 STATUS_OF_OUTCOME = {Outcome.LEAVES_GROOVES: 5, Outcome.NOT_CONVERGED: 3}
 
@@ -98,7 +108,7 @@ class SampledRun(GroovesRun):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
         self.width += 1
         self._begin()
-        self.ledger[0] += self.strained()
+        self.ledger[LEDGER.drive_work] += self.strained()
 
     def _begin(self) -> None:
         """Start the motion from the present state, at the start of the drive."""
@@ -194,8 +204,10 @@ class SampledRun(GroovesRun):
         part[:-1, 2 * n + 7] = work - np.diff(seen[:, 2 * n + 5])
         self.state[:] = motion.arrays.state[: 2 * n].reshape(2, n)
         sums = self._read_sums()
-        self.ledger[[0, 1, 2, 3, 5, 8]] += sums - self.booked
-        self.ledger[4] = max(self.ledger[4], motion.record.counters[COUNT.max_stored])
+        self.ledger[LEDGER_SUMS] += sums - self.booked
+        self.ledger[LEDGER.max_stored] = max(
+            self.ledger[LEDGER.max_stored], motion.record.counters[COUNT.max_stored]
+        )
         self.booked = sums
         return last, status
 
@@ -219,10 +231,10 @@ class SampledRun(GroovesRun):
 
     def check(self) -> None:
         """Set the outcome not_converged where steps did not meet their error."""
-        if self.ledger[7]:
+        if self.ledger[LEDGER.n_unconverged]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
-                f"{int(self.ledger[7])} of {self.done} time steps on the grooves did not converge; raise "
+                f"{int(self.ledger[LEDGER.n_unconverged])} of {self.done} time steps on the grooves did not converge; raise "
                 "accuracy.steps_per_cycle"
             )
 

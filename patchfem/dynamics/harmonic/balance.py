@@ -8,7 +8,7 @@ damping over amplitude.
 import numpy as np
 
 from ...core import Response
-from ..integrated import accelerations
+from ..integrated import find_accelerations
 from .branch import Backbone, Branch, backbone, branches, levels, response
 from .forces import Group
 from .laws import Flow, Interlock, Jenkins, SpeedLaw, Spring, Track, make_law, synthesis
@@ -131,7 +131,7 @@ def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> 
     z, rate = (synthesis((periodic.modal * f).T, inner) for f in (1.0, 1j * k * omega))
     forces = group.forces(periodic.coefficients, omega, inner)
     base = periodic.level * np.sin(2 * np.pi * np.arange(inner) / inner)
-    accel = accelerations(modes, base, z.T, rate.T, forces.T @ group.rows).T
+    accel = find_accelerations(modes, base, z.T, rate.T, forces.T @ group.rows).T
     track = Track(periodic.coefficients[0], omega, inner)
     found = [law.sample(track) for law in group.laws[0]]
     floor = base if drive.moving else 0 * base

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import ModalBasis
-from ..propagator import exponentials
+from ..propagator import matrix_exponentials
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -98,7 +98,7 @@ def monodromy(
         )
         a[:, k, n : 2 * n] = one.gain[first][:, None] * rows[one.row]
         a[:, k, k] = -one.loss[first]
-    steps = exponentials(a * width[:, None, None])
+    steps = matrix_exponentials(a * width[:, None, None])
     for k, mark in enumerate(marks, 2 * n):
         across = np.zeros(size)
         across[:n] = rows[mark.row]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..periodic import is_stable, multipliers
+from ..periodic import find_multipliers, is_stable
 from .floquet import Fading, TurningPoint, monodromy
 from .laws import Flow, Nodes
 
@@ -23,7 +23,7 @@ def with_stability(periodic, modes, cells: int = 0):
     -------
     Periodic
     """
-    found = multipliers(monodromy_of(periodic, modes, cells))
+    found = find_multipliers(monodromy_of(periodic, modes, cells))
     return replace(periodic, multipliers=found, stable=is_stable(found))
 
 

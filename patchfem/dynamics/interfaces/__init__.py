@@ -6,14 +6,14 @@ work is exact:
     dq = free - beta F(dq),
 
 with the increment dq of the relative displacement, its value `free` without friction, and the
-compliance beta of the modes. Every contact has the functions solve (this equation), given (F over
-a prescribed dq), commit (move the memory) and state (force, energy, slip).
+compliance beta of the modes. Every contact has the functions solve_step (this equation), apply_increment (F over
+a prescribed dq), commit_step (move the memory) and read_state (force, energy, slip).
 
 | contact | module | arrays |
 |---|---|---|
 | one law on one relative displacement; read it first | `element_kernels`, `element_solve_kernels` | `Element` |
-| points behind shear modes of the pieces | `shear_kernels`, `shear_points_kernels`, `shear_solve_kernels` | `Sheared` |
-| points under a load that changes | `pressed_points_kernels` | `Rub` |
+| points behind shear modes | `shear_kernels`, `shear_points_kernels`, `shear_solve_kernels` | `ShearedPoints` |
+| points under a load that changes | `pressed_points_kernels` | `PressedPoints` |
 | one list of bonds | `list_kernels` | `BondList` |
 | lists of bonds behind shear modes | `shear_list_kernels`, `shear_lists_kernels` | `ShearedLists` |
 | nonlinear springs, as a law | `spring_kernels` | |

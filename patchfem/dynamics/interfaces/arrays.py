@@ -22,7 +22,7 @@ class Element(NamedTuple):
     bound: np.ndarray
 
 
-class Sheared(NamedTuple):
+class ShearedPoints(NamedTuple):
     """Points (m,) of a law with memory behind r shear modes of the pieces.
 
     - weight: (m,) makes a traction of the law a force [N]: mu_s area/eps_0 of bonds under a load
@@ -58,8 +58,10 @@ class Sheared(NamedTuple):
     ready: np.ndarray
 
 
-def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1, load=None) -> dict:
-    """Return the fields of `Sheared` at rest.
+def make_sheared_fields(
+    weight, length: float, growth, psi, kappa, lanes: int = 1, load=None
+) -> dict:
+    """Return the fields of `ShearedPoints` at rest.
 
     Parameters
     ----------
@@ -113,7 +115,11 @@ def sheared(weight, length: float, growth, psi, kappa, lanes: int = 1, load=None
     }
 
 
-class Rub(namedtuple("Rub", ("force", "memory", "pressed", "modes", "under", *Sheared._fields))):
+class PressedPoints(
+    namedtuple(
+        "PressedPoints", ("force", "memory", "pressed", "modes", "under", *ShearedPoints._fields)
+    )
+):
     """Points of a law under a load that changes, see `pressed_points_kernels`.
 
     - force: (6,) positions named there
@@ -122,20 +128,22 @@ class Rub(namedtuple("Rub", ("force", "memory", "pressed", "modes", "under", *Sh
     - pressed: (2, m) nodal forces at both ends of the step [N]
     - modes: (r, m) shear modes at all points, none for pieces that are rigid in shear
     - under: (m,) numbers of the points under load, in the order in which they stand in the other
-      fields, which are those of `Sheared`; there they have the memory after half of the change of
+      fields, which are those of `ShearedPoints`; there they have the memory after half of the change of
       load, and the mean load
     """
 
     __slots__ = ()
 
 
-class Climbing(namedtuple("Climbing", ("flank", "climb", "share", *Rub._fields))):
+class ClimbingPoints(
+    namedtuple("ClimbingPoints", ("flank", "climb", "share", *PressedPoints._fields))
+):
     """A law with memory along flanks, see `dynamics.grooves`.
 
     - flank, climb: (6,), (14,) positions named in `grooves.arrays`
     - share: (m,) fractions of the normal force that the points carry
 
-    The other fields are those of `Rub`, with fractions of the normal force for the loads.
+    The other fields are those of `PressedPoints`, with fractions of the normal force for the loads.
     """
 
     __slots__ = ()
@@ -177,7 +185,7 @@ class ShearedLists(
             "pressed",
             "pattern",
             "places",
-            *Sheared._fields,
+            *ShearedPoints._fields,
         ),
     )
 ):
@@ -193,20 +201,20 @@ class ShearedLists(
       pressure moves with the upper one
     - places: (m,) of the points at rest [m]
 
-    The other fields are those of `Sheared`: weight (m,) has the friction limits [N], the first
+    The other fields are those of `ShearedPoints`: weight (m,) has the friction limits [N], the first
     four rows of points are named in `shear_lists_kernels`.
     """
 
     __slots__ = ()
 
 
-class Single(NamedTuple):
+class SingleContact(NamedTuple):
     """A contact on port 0 alone; goal: (1,) of its residual [N]."""
 
     goal: np.ndarray
 
 
-class Stops(NamedTuple):
+class SetValuedElements(NamedTuple):
     """The m set-valued interfaces of a march, see `march.stops_kernels`.
 
     - element, names: (m,) their numbers, and workspace for numbers
@@ -226,7 +234,7 @@ class Stops(NamedTuple):
     field: np.ndarray
 
 
-class Faces(NamedTuple):
+class PortElements(NamedTuple):
     """Elements (e,) on ports (p,), in addition to a contact on port 0 or in its place.
 
     Rows are named in `march.stops_kernels`.
@@ -256,10 +264,10 @@ class Faces(NamedTuple):
     modal: np.ndarray
     system: np.ndarray
     hess: np.ndarray
-    stops: Stops
+    stops: SetValuedElements
 
 
-class Pressing(NamedTuple):
+class VaryingLoad(NamedTuple):
     """A load that changes, see `march.pressing_kernels`.
 
     - sets: `contact.set_arrays.SetArrays`
@@ -287,39 +295,39 @@ class Pressing(NamedTuple):
     few: np.ndarray
 
 
-class Steady(NamedTuple):
+class ConstantLoad(NamedTuple):
     """A constant load; loads: (0,)."""
 
     loads: np.ndarray
 
 
-def carried(contact, element=None) -> list | None:
+def split_memory(contact, element=None) -> list | None:
     """Return what a contact carries from step to step, as rows of numbers of one kind each.
 
     It is None for a list of bonds, whose sums grow without end. element: the law of an `Element`.
     """
     if isinstance(contact, Element):
-        return memory_rows(element, contact.mem[0])
-    if isinstance(contact, Sheared):
+        return split_element_memory(element, contact.mem[0])
+    if isinstance(contact, ShearedPoints):
         return [contact.eps, contact.b, contact.flow[1:], *contact.points[:5]]
     return (
         [contact.eps, contact.b, contact.pressed[1], *contact.memory]
-        if isinstance(contact, Rub)
+        if isinstance(contact, PressedPoints)
         else None
     )
 
 
-def memory_rows(element, memory) -> list:
+def split_element_memory(element, memory) -> list:
     """Return the memory (l,) of an element as rows of numbers of one kind each."""
     head = {"parallel": 3, "points": 1, "places": 1}.get(element.form, memory.size)
     kinds = 5 if element.form in ("points", "places") else 1
     return [*memory[:head, None], *memory[head:].reshape(kinds, -1)]
 
 
-def copied(parts):
+def copy_arrays(parts):
     """Return a copy of a nested tuple of arrays."""
     return type(parts)(
-        *(copied(part) if isinstance(part, tuple) else part.copy() for part in parts)
+        *(copy_arrays(part) if isinstance(part, tuple) else part.copy() for part in parts)
     )
 
 

@@ -11,7 +11,7 @@ from . import element_solve_kernels as solver
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve(free, beta, q, v, dt, c, goal):
+def solve_step(free, beta, q, v, dt, c, goal):
     """Solve a step with dq = free - beta force; the memory stays as it is.
 
     Parameters
@@ -43,14 +43,14 @@ def solve(free, beta, q, v, dt, c, goal):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def given(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, c, goal):
     """Return the mean force [N] over a prescribed increment dq [m] in dt [s], and True."""
     c.eps[0] = law.step_bond_length(c.num[0], c.mem[0], v, dt)
     return law.mean_force(c.num[0], c.mem[0], q, dq, c.eps[0], dt)[0], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, c):
     """Move the memory by a solved step; returns the energy dissipated [J] and True.
 
     force: path mean over dq [N]; v0, v1: velocities at both ends of the step [m/s].
@@ -61,6 +61,6 @@ def commit(dq, force, q, v0, v1, dt, c):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(c, q, v):
+def read_state(c, q, v):
     """Return force [N], stored energy [J] and slip [m] at q [m] and v [m/s]."""
     return law.read_memory(c.num[0], c.mem[0], q, v)

@@ -3,7 +3,7 @@
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import elastic_plastic_kernels as law
-from ..modal_kernels import narrowed
+from ..modal_kernels import narrow_bracket
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -13,7 +13,7 @@ def solve_element(free, beta, numbers, memory, q, eps, dt, guess, bound, goal):
     Parameters
     ----------
     free, beta : float
-        As of `element_kernels.solve`.
+        As of `element_kernels.solve_step`.
     numbers, memory : ndarray
         Of the law.
     q, eps, dt : float
@@ -49,7 +49,7 @@ def solve_element(free, beta, numbers, memory, q, eps, dt, guess, bound, goal):
             return dq, force, count
         # a force that decreases with the slide must not reverse the step
         gain = max(1 + beta * slope, 0.1)
-        low, high, dq = narrowed(low, high, dq, miss, gain, count - 40)
+        low, high, dq = narrow_bracket(low, high, dq, miss, gain, count - 40)
         # the force jumps at this slide if round-off of the slide does not explain the residual
         if high - low <= digit:
             return dq, force, count if abs(miss) <= goal * beta + 8 * gain * digit else -count

@@ -10,13 +10,13 @@ from ...friction.bonds.list_forms_kernels import FORM_MOMENTS, FORM_POWER
 from ...friction.bonds.list_kernels import list_force, list_mean, list_slope, list_step
 from ...friction.bonds.list_rows_kernels import LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
-from ..modal_kernels import narrowed
+from ..modal_kernels import narrow_bracket
 
 # increment over the bond length, below which the slope of the force is the mean of the slopes in both directions
 SLOPE_STEP = 1e-9
-# largest energy that a list may gain in short steps and repay by its next dissipation (see `commit`), over the
+# largest energy that a list may gain in short steps and repay by its next dissipation (see `commit_step`), over the
 # energy of one bond length at the friction limit
-MAX_OWED = 1e-4
+MAX_OWED_RATIO = 1e-4
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -50,8 +50,8 @@ def find_force_and_slope(dq, c, v0, dt):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve(free, beta, q, v, dt, c, goal):
-    """Solve a step with dq = free - beta force by secants, as `element_kernels.solve`.
+def solve_step(free, beta, q, v, dt, c, goal):
+    """Solve a step with dq = free - beta force by secants, as `element_kernels.solve_step`.
 
     Returns
     -------
@@ -76,24 +76,24 @@ def solve(free, beta, q, v, dt, c, goal):
             gain = gain if gain > 0.1 else 1.0
         last = here
         last_miss = miss
-        low, high, here = narrowed(low, high, here, miss, gain, count - 8)
+        low, high, here = narrow_bracket(low, high, here, miss, gain, count - 8)
     return last, force, -300
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def given(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, c, goal):
     """Return the mean force [N] over a prescribed increment dq [m] in dt [s], and True."""
     return find_force_and_slope(dq, c, v, dt)[0], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, c):
     """Move the list by a solved step.
 
     The work that is not stored is dissipated where positive; the law as printed also creates
     energy, and both are summed separately. The stretch reading creates none: what its sums gain in
     a short step beyond the work, as strips change from one rule of integration to another, was
-    stored before. It is owed, up to MAX_OWED, and the next dissipation repays it.
+    stored before. It is owed, up to MAX_OWED_RATIO, and the next dissipation repays it.
 
     Returns
     -------
@@ -106,11 +106,11 @@ def commit(dq, force, q, v0, v1, dt, c):
     c.last[0] = dq
     before = c.status[STATUS.energy]
     ok = list_step(dq, c, v0, v1, dt)
-    return book_energy(force * dq, before, c.force[0], c), ok
+    return add_list_energies(force * dq, before, c.force[0], c), ok
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def book_energy(work, before, limit, c):
+def add_list_energies(work, before, limit, c):
     """Add the work [J] of a step that is not stored to the energies of the list; return it.
 
     Parameters
@@ -126,7 +126,7 @@ def book_energy(work, before, limit, c):
     net = work - limit * (c.status[STATUS.energy] - before)
     if c.law[LAW.form] <= FORM_POWER and limit > 0:
         owed = c.status[STATUS.owed] - net / limit
-        c.status[STATUS.owed] = min(max(owed, 0.0), MAX_OWED * c.law[LAW.length])
+        c.status[STATUS.owed] = min(max(owed, 0.0), MAX_OWED_RATIO * c.law[LAW.length])
         net = limit * (c.status[STATUS.owed] - owed)
     if net < 0:
         c.status[STATUS.created] -= net
@@ -136,7 +136,7 @@ def book_energy(work, before, limit, c):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(c, q, v):
+def read_state(c, q, v):
     """Return force [N], stored energy [J] and slip [m] of the list at q [m]."""
     force = c.force[0] * c.status[STATUS.force]
     return (

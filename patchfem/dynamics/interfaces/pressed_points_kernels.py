@@ -1,4 +1,4 @@
-"""A contact of points under a load that changes in time, `arrays.Rub` (compiled).
+"""A contact of points under a load that changes in time, `arrays.PressedPoints` (compiled).
 
 The points are elastic-plastic or bonds.
 
@@ -21,19 +21,19 @@ from .shear_points_kernels import (
     POINTS,
     SLIDE,
     SLOPE,
-    SQUARE,
+    SQUARED_STRETCH,
     STRETCH,
     write_forces,
 )
 from .shear_solve_kernels import accept_step, minimise, set_middle_length, set_slides
 
-# positions in `Rub.force`: coefficients of friction, bond length [m], initial density, kind of the law, goal [N]
-MU = 0
+# positions in `PressedPoints.force`: coefficients of friction, bond length [m], initial density, kind of the law, goal [N]
+MU_STATIC = 0
 MU_KINETIC = 1
-LENGTH = 2
-INITIAL = 3
-KIND = 4
-GOAL = 5
+BOND_LENGTH = 2
+INITIAL_DENSITY = 3
+LAW_KIND = 4
+RESIDUAL_GOAL = 5
 # residual over the goal, to which pieces that deform in shear are solved; their loss is a small difference
 GOAL_FRACTION = 0.01
 
@@ -71,17 +71,17 @@ def press_points(kind, contact):
                 memory[0, j], memory[1, j], points[LOAD, i]
             )
         else:
-            points[DENSITY, i], points[STRETCH, i], points[SQUARE, i] = press_point(
+            points[DENSITY, i], points[STRETCH, i], points[SQUARED_STRETCH, i] = press_point(
                 (memory[0, j], memory[1, j], memory[2, j]),
                 contact.pressed[0, j],
                 points[LOAD, i],
-                contact.force[INITIAL],
-                contact.force[LENGTH],
+                contact.force[INITIAL_DENSITY],
+                contact.force[BOND_LENGTH],
             )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rub_force(dq, kind, contact):
+def find_friction_force(dq, kind, contact):
     """Return the path-mean friction force [N] and its slope [N/m] for a rigid increment dq [m]."""
     set_slides(dq, contact.b, contact)
     force = write_forces(kind, False, contact)
@@ -92,7 +92,7 @@ def rub_force(dq, kind, contact):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve(free, beta, q, v, dt, c, goal):
+def solve_step(free, beta, q, v, dt, c, goal):
     """Solve a step with dq = free - beta force under the mean load; dq = free for beta = 0.
 
     Returns
@@ -102,7 +102,7 @@ def solve(free, beta, q, v, dt, c, goal):
     iterations : int
         Below 0 where it failed.
     """
-    kind = int(c.force[KIND])
+    kind = int(c.force[LAW_KIND])
     if kind == POINTS:
         set_middle_length(v, dt, c)
     press_points(kind, c)
@@ -113,14 +113,14 @@ def solve(free, beta, q, v, dt, c, goal):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def given(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, c, goal):
     """Return the mean force [N] over a prescribed increment dq [m], and whether it was found."""
-    _, force, count = solve(dq, 0.0, q, v, dt, c, goal)
+    _, force, count = solve_step(dq, 0.0, q, v, dt, c, goal)
     return force, count >= 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, c):
     """Move points and pieces by a solved step.
 
     Returns
@@ -130,27 +130,27 @@ def commit(dq, force, q, v0, v1, dt, c):
     is_solved : bool
         Whether the pieces came to balance.
     """
-    kind = int(c.force[KIND])
-    lost = rub_commit(dq, force, v0, v1, dt, kind, c)
+    kind = int(c.force[LAW_KIND])
+    lost = commit_points(dq, force, v0, v1, dt, kind, c)
     if c.b.size == 0:
         return lost, True
-    more, count = spring_back(kind, c, c.force[GOAL])
+    more, count = relax_pieces(kind, c, c.force[RESIDUAL_GOAL])
     return lost + more, count >= 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(c, q, v):
+def read_state(c, q, v):
     """Return friction force [N], stored energy [J] and slip [m] at q [m]."""
-    return rub_state(int(c.force[KIND]), c, q)
+    return read_points(int(c.force[LAW_KIND]), c, q)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rub_commit(dq, used, v0, v1, dt, kind, contact):
+def commit_points(dq, used, v0, v1, dt, kind, contact):
     """Move the memory by a solved step; returns the energy dissipated [J].
 
     It includes that of the changing load.
     """
-    length = contact.force[LENGTH]
+    length = contact.force[BOND_LENGTH]
     memory = contact.memory
     points = contact.points
     lost = used * dq + elastic_energy(kind, contact) if kind == PLASTIC else 0.0
@@ -162,11 +162,11 @@ def rub_commit(dq, used, v0, v1, dt, kind, contact):
             y, springs = spring_step(points[DENSITY, i], points[STRETCH, i], load, xi, length)
             memory[0, j], memory[1, j] = press_springs(y, springs, contact.pressed[1, j])
         else:
-            lost += 0.5 * contact.weight[i] * (memory[2, j] - points[SQUARE, i])
+            lost += 0.5 * contact.weight[i] * (memory[2, j] - points[SQUARED_STRETCH, i])
             m, z, s2, part = bond_step(
                 points[DENSITY, i],
                 points[STRETCH, i],
-                points[SQUARE, i],
+                points[SQUARED_STRETCH, i],
                 xi,
                 load,
                 contact.eps[1],
@@ -175,7 +175,7 @@ def rub_commit(dq, used, v0, v1, dt, kind, contact):
                 (m, z, s2),
                 load,
                 contact.pressed[1, j],
-                contact.force[INITIAL],
+                contact.force[INITIAL_DENSITY],
                 length,
             )
             lost += 0.5 * contact.weight[i] * (part + s2 - memory[2, j])
@@ -187,7 +187,7 @@ def rub_commit(dq, used, v0, v1, dt, kind, contact):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def spring_back(kind, contact, goal):
+def relax_pieces(kind, contact, goal):
     """Bring pieces and points to balance while the holder stands.
 
     The load is that at the end of the step.
@@ -214,7 +214,7 @@ def spring_back(kind, contact, goal):
         load = points[LOAD, i]
         xi = points[SLIDE, i]
         if kind == PLASTIC:
-            a, b = spring_step(memory[0, j], memory[1, j], load, xi, contact.force[LENGTH])
+            a, b = spring_step(memory[0, j], memory[1, j], load, xi, contact.force[BOND_LENGTH])
             memory[0, j], memory[1, j] = press_springs(a, b, load)
         else:
             memory[0, j], memory[1, j], memory[2, j], _ = bond_step(
@@ -229,8 +229,8 @@ def spring_back(kind, contact, goal):
 def elastic_energy(kind, contact):
     """Return the elastic energy of memory and pieces [J]."""
     out = 0.0
-    mu = contact.force[MU]
-    length = contact.force[LENGTH]
+    mu = contact.force[MU_STATIC]
+    length = contact.force[BOND_LENGTH]
     memory = contact.memory
     for k in range(contact.b.size):
         out += 0.5 * contact.kappa[k] * contact.b[k] * contact.b[k]
@@ -245,10 +245,10 @@ def elastic_energy(kind, contact):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def rub_state(kind, contact, q):
+def read_points(kind, contact, q):
     """Return friction force [N], stored energy [J] and slip [m]."""
-    mu = contact.force[MU]
-    length = contact.force[LENGTH]
+    mu = contact.force[MU_STATIC]
+    length = contact.force[BOND_LENGTH]
     memory = contact.memory
     points = contact.points
     force = 0.0

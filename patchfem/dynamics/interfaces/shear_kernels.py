@@ -1,10 +1,10 @@
-"""A contact of bond points behind shear modes, `arrays.Sheared` (compiled).
+"""A contact of bond points behind shear modes, `arrays.ShearedPoints` (compiled).
 
 The load is constant.
 
 For most of a cycle of gross slip all points drag: their bonds are those of a slide without end,
 and a further slide in the same direction has the force weight length load at every point, whatever
-its size. Such a step has a closed form in the modes alone (`drag_all`). The slide of a point is
+its size. Such a step has a closed form in the modes alone (`solve_dragging_step`). The slide of a point is
 that of the holder minus psi^T b at all times. `march.loop_kernels` calls the functions of every
 contact.
 """
@@ -12,23 +12,32 @@ contact.
 from ...compiled.jit import njit
 from ...friction.bonds.point_kernels import bond_step, elastic_bond_step, grow, short_bond_step
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .shear_points_kernels import DENSITY, LOAD, PLAY, POINTS, SLIDE, SQUARE, STRETCH, are_short
+from .shear_points_kernels import (
+    DENSITY,
+    LOAD,
+    PLAY,
+    POINTS,
+    SLIDE,
+    SQUARED_STRETCH,
+    STRETCH,
+    are_slides_short,
+)
 from .shear_solve_kernels import accept_step, minimise, set_middle_length
 
-# rows of `Sheared.drag`: force, largest slide of a point per coordinate, mean slide of the points
-PULL = 0
-REACH = 1
-MEAN = 2
-# positions in `Sheared.flow`: direction of the drag, and slide of the holder
-WAY = 0
-SLID = 1
+# rows of `ShearedPoints.drag`: force, largest slide of a point per coordinate, mean slide of the points
+DRAG_FORCE = 0
+MAX_MODE_SLIDE = 1
+MEAN_SLIDE = 2
+# positions in `ShearedPoints.flow`: direction of the drag, and slide of the holder
+DRAG_DIRECTION = 0
+TOTAL_SLIDE = 1
 # difference of the bonds of a point from those of a drag, over the latter; that of their energy is 100 times as large
 DRAG_TOL = 2e-15
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def solve(free, beta, q, v, dt, c, goal):
-    """Solve a step with dq = free - beta force, as `element_kernels.solve`.
+def solve_step(free, beta, q, v, dt, c, goal):
+    """Solve a step with dq = free - beta force, as `element_kernels.solve_step`.
 
     Returns
     -------
@@ -37,27 +46,27 @@ def solve(free, beta, q, v, dt, c, goal):
     iterations : int
         0 where all points drag, below 0 where it failed.
     """
-    if c.flow[WAY] != 0.0 and drag_all(free, beta, c):
-        return c.y[0, 0], c.flow[WAY] * c.drag[PULL, 0], 0
-    c.flow[WAY] = 0.0
+    if c.flow[DRAG_DIRECTION] != 0.0 and solve_dragging_step(free, beta, c):
+        return c.y[0, 0], c.flow[DRAG_DIRECTION] * c.drag[DRAG_FORCE, 0], 0
+    c.flow[DRAG_DIRECTION] = 0.0
     set_middle_length(v, dt, c)
     force, count = minimise(free, beta, POINTS, False, c, goal)
     return c.y[0, 0], force, count
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def drag_all(free, beta, c):
+def solve_dragging_step(free, beta, c):
     """Return whether all points drag on in this step; c.y[0] is then its solution.
 
     It solves kappa (b + db/2) = psi^T f.
     """
-    way = c.flow[WAY]
+    way = c.flow[DRAG_DIRECTION]
     y = c.y[0]
     least = 0.0
-    dq = free - beta * way * c.drag[PULL, 0]
+    dq = free - beta * way * c.drag[DRAG_FORCE, 0]
     for k in range(c.b.size):
-        y[k + 1] = 2 * (way * c.drag[PULL, k + 1] / c.kappa[k] - c.b[k])
-        least += c.drag[REACH, k + 1] * abs(y[k + 1])
+        y[k + 1] = 2 * (way * c.drag[DRAG_FORCE, k + 1] / c.kappa[k] - c.b[k])
+        least += c.drag[MAX_MODE_SLIDE, k + 1] * abs(y[k + 1])
     if way * dq <= least:
         return False
     y[0] = dq
@@ -65,9 +74,9 @@ def drag_all(free, beta, c):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def given(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, c, goal):
     """Return the mean force [N] over a prescribed increment, and whether it was found."""
-    c.flow[WAY] = 0.0
+    c.flow[DRAG_DIRECTION] = 0.0
     set_middle_length(v, dt, c)
     c.y[0, 0] = dq
     force, count = minimise(dq, 0.0, POINTS, False, c, goal)
@@ -75,27 +84,27 @@ def given(dq, q, v, dt, c, goal):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def commit(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, c):
     """Move points and pieces by a solved step; returns the energy dissipated [J] and True."""
-    way = c.flow[WAY]
+    way = c.flow[DRAG_DIRECTION]
     length = c.eps[1]
     lost = 0.0
-    c.flow[SLID] += dq
+    c.flow[TOTAL_SLIDE] += dq
     if way != 0.0:
         for k in range(c.y.shape[1]):
-            lost += way * c.drag[PULL, k] * c.y[0, k] * (1.0 if k == 0 else -1.0)
+            lost += way * c.drag[DRAG_FORCE, k] * c.y[0, k] * (1.0 if k == 0 else -1.0)
         accept_step(c)
         return lost, True
     loose = c.growth[5] * length
     lost = (
         move_points_short(c, length)
-        if loose == 0.0 and are_short(c, length)
+        if loose == 0.0 and are_slides_short(c, length)
         else move_points(c, loose, length)
     )
     accept_step(c)
     c.eps[0] = grow(c.eps[0], v0, v1, abs(dq), dt, c.growth)[0]
     if c.growth[0] < 0.0 and loose == 0.0:
-        c.flow[WAY] = find_drag_direction(1.0 if dq > 0.0 else -1.0, c)
+        c.flow[DRAG_DIRECTION] = find_drag_direction(1.0 if dq > 0.0 else -1.0, c)
     return lost / 2, True
 
 
@@ -109,7 +118,7 @@ def find_drag_direction(way, c):
         if not (
             abs(points[STRETCH, j] - way * length * load) <= DRAG_TOL * length * load
             and abs(points[DENSITY, j] - load) <= DRAG_TOL * load
-            and abs(points[SQUARE, j] - 2 * length * length * load)
+            and abs(points[SQUARED_STRETCH, j] - 2 * length * length * load)
             <= 100 * DRAG_TOL * length * length * load
         ):
             return 0.0
@@ -126,8 +135,13 @@ def move_points_short(c, length):
     lost = 0.0
     for j in range(c.weight.size):
         xi = points[SLIDE, j]
-        points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], part = short_bond_step(
-            points[DENSITY, j], points[STRETCH, j], points[SQUARE, j], xi, points[LOAD, j], length
+        points[DENSITY, j], points[STRETCH, j], points[SQUARED_STRETCH, j], part = short_bond_step(
+            points[DENSITY, j],
+            points[STRETCH, j],
+            points[SQUARED_STRETCH, j],
+            xi,
+            points[LOAD, j],
+            length,
         )
         lost += c.weight[j] * part
     return lost
@@ -144,7 +158,7 @@ def move_points(c, loose, length):
     for j in range(c.weight.size):
         m = points[DENSITY, j]
         z = points[STRETCH, j]
-        s2 = points[SQUARE, j]
+        s2 = points[SQUARED_STRETCH, j]
         xi = points[SLIDE, j]
         if loose > 0.0:
             (m, z, s2, part), points[PLAY, j] = elastic_bond_step(
@@ -154,22 +168,26 @@ def move_points(c, loose, length):
             m, z, s2, part = bond_step(m, z, s2, xi, points[LOAD, j], length)
         points[DENSITY, j] = m
         points[STRETCH, j] = z
-        points[SQUARE, j] = s2
+        points[SQUARED_STRETCH, j] = s2
         lost += c.weight[j] * part
     return lost
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def state(c, q, v):
+def read_state(c, q, v):
     """Return force [N], stored energy [J] and slip [m] of points and pieces."""
-    way = c.flow[WAY]
+    way = c.flow[DRAG_DIRECTION]
     energy = 0.0
-    slip = c.flow[SLID]
+    slip = c.flow[TOTAL_SLIDE]
     for k in range(c.b.size):
         energy += 0.5 * c.kappa[k] * c.b[k] ** 2
-        slip -= c.drag[MEAN, k + 1] * c.b[k]
+        slip -= c.drag[MEAN_SLIDE, k + 1] * c.b[k]
     if way != 0.0:
-        return way * c.drag[PULL, 0], energy + c.eps[0] * c.drag[PULL, 0], slip - way * c.eps[0]
+        return (
+            way * c.drag[DRAG_FORCE, 0],
+            energy + c.eps[0] * c.drag[DRAG_FORCE, 0],
+            slip - way * c.eps[0],
+        )
     force, stored, stretch, total = sum_bonds(c)
     return force, energy + stored, slip - stretch / total if total > 0 else q
 
@@ -190,7 +208,7 @@ def sum_bonds(c):
         z = points[STRETCH, j]
         share = c.weight[j] * points[LOAD, j]
         force += c.weight[j] * z
-        energy += 0.5 * c.weight[j] * points[SQUARE, j]
+        energy += 0.5 * c.weight[j] * points[SQUARED_STRETCH, j]
         stretch += share * (z / m) if m > 0.0 else 0.0
         total += share if m > 0.0 else 0.0
     return force, energy, stretch, total

@@ -10,8 +10,8 @@ from ...friction.bonds.list_kernels import list_step
 from ...friction.bonds.list_rows_kernels import CLOCK, LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from . import shear_solve_kernels as solver
-from .list_kernels import book_energy
-from .shear_kernels import MEAN, SLID
+from .list_kernels import add_list_energies
+from .shear_kernels import MEAN_SLIDE, TOTAL_SLIDE
 from .shear_lists_kernels import (
     GROWTH_SPEED,
     LAST_SPEED,
@@ -24,12 +24,12 @@ from .shear_lists_kernels import (
 from .shear_points_kernels import FORCE, SLIDE
 
 # position in `ShearedLists.flow`: 1 once a list is full
-FULL = 0
+IS_FULL = 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve(free, beta, q, v, dt, c, goal):
-    """Solve a step with dq = free - beta force, as `element_kernels.solve`.
+def solve_step(free, beta, q, v, dt, c, goal):
+    """Solve a step with dq = free - beta force, as `element_kernels.solve_step`.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def solve(free, beta, q, v, dt, c, goal):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def given(dq, q, v, dt, c, goal):
+def apply_increment(dq, q, v, dt, c, goal):
     """Return the mean force [N] over a prescribed increment, and whether it was found."""
     start_step(dt, c)
     c.y[0, 0] = dq
@@ -55,7 +55,7 @@ def given(dq, q, v, dt, c, goal):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def commit(dq, force, q, v0, v1, dt, c):
+def commit_step(dq, force, q, v0, v1, dt, c):
     """Move lists and pieces by a solved step; the lists sum up what they dissipate and create.
 
     Returns
@@ -69,7 +69,7 @@ def commit(dq, force, q, v0, v1, dt, c):
     before = stored_energy(c)
     fine = True
     changes = has_changing_pressure(c)
-    c.flow[SLID] += dq
+    c.flow[TOTAL_SLIDE] += dq
     for j in range(int(c.count[0])):
         load_list(j, c)
         xi = points[SLIDE, j]
@@ -80,12 +80,12 @@ def commit(dq, force, q, v0, v1, dt, c):
             c.nows[j, CLOCK.displacement] = c.now[CLOCK.displacement]
             if find_pressure(j, c) <= 0.0:
                 break_bonds(c.status)
-        book_energy(points[FORCE, j] * xi, energy, c.weight[j], c)
+        add_list_energies(points[FORCE, j] * xi, energy, c.weight[j], c)
         store_list(j, c)
         points[GROWTH_SPEED, j] = max(1.5 * speed - 0.5 * points[LAST_SPEED, j], 0.0)
         points[LAST_SPEED, j] = speed
     solver.accept_step(c)
-    c.flow[FULL] = 0.0 if fine else 1.0
+    c.flow[IS_FULL] = 0.0 if fine else 1.0
     return force * dq - (stored_energy(c) - before), fine
 
 
@@ -109,11 +109,11 @@ def stored_energy(c):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state(c, q, v):
+def read_state(c, q, v):
     """Return force [N], stored energy [J] and slip [m] of lists and pieces."""
     force = 0.0
     total = 0.0
-    slip = c.flow[SLID]
+    slip = c.flow[TOTAL_SLIDE]
     if has_changing_pressure(c):
         slip = 0.0
         for j in range(int(c.count[0])):
@@ -127,7 +127,7 @@ def state(c, q, v):
             (slip - c.law[LAW.length] * force) / total if total > 0 else q,
         )
     for k in range(c.b.size):
-        slip -= c.drag[MEAN, k + 1] * c.b[k]
+        slip -= c.drag[MEAN_SLIDE, k + 1] * c.b[k]
     for j in range(int(c.count[0])):
         force += c.weight[j] * c.statuses[j, STATUS.force]
         total += c.weight[j]

@@ -22,11 +22,11 @@ POINTS = 2
 GOAL_SLACK = 100.0
 FORCE_MAY_FALL = False
 STEP_DAMPING = 0.0
-# rows of `Sheared.points`: density, stretch and squared stretch of bonds, or traction/mu and springs; play, load; slide,
-# force and slope in the step
+# rows of `ShearedPoints.points`: density, stretch and squared stretch of bonds, or traction/mu and
+# springs of an elastic-plastic law; play and load; slide, force and slope in the step
 DENSITY = 0
 STRETCH = 1
-SQUARE = 2
+SQUARED_STRETCH = 2
 PLAY = 3
 LOAD = 4
 SLIDE = 5
@@ -35,7 +35,7 @@ SLOPE = 7
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def are_short(c, length):
+def are_slides_short(c, length):
     """Return whether no point slides farther than MAX_SHORT bond lengths; false for nan."""
     points = c.points
     near = 0.0
@@ -55,7 +55,7 @@ def write_forces(kind, ending, c):
     weight = c.weight
     length = c.eps[0 if ending else 1]
     force = 0.0
-    if kind == POINTS and not ending and c.growth[5] == 0.0 and are_short(c, length):
+    if kind == POINTS and not ending and c.growth[5] == 0.0 and are_slides_short(c, length):
         for j in range(int(c.count[0])):
             f, s = short_bond_mean(
                 points[DENSITY, j], points[STRETCH, j], points[SLIDE, j], points[LOAD, j], length

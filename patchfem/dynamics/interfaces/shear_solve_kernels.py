@@ -11,7 +11,7 @@ as a force grows with the slide.
 Both are minima of convex functions where no slope of a point is below 0; Newton's method with a
 line search finds them. The forces of some laws may decrease as their points slide, and then
 several minima exist: the one found lies downhill from where the last steps lead, to which pieces
-without mass would jump. c is an `arrays.Sheared`, or a tuple with its fields from `weight` on.
+without mass would jump. c is an `arrays.ShearedPoints`, or a tuple with its fields from `weight` on.
 `law` has the forces of the points; `march.instances` compiles this text for each.
 """
 
@@ -20,14 +20,14 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.bonds.point_kernels import grow
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from ..dense_kernels import factor, solve
+from ..dense_kernels import factorise, solve_factorised
 from ..modal_kernels import safe_point
 from . import shear_points_kernels as law
 
 FORCE = law.FORCE
 SLIDE = law.SLIDE
 SLOPE = law.SLOPE
-# rows of `Sheared.workspace`
+# rows of `ShearedPoints.workspace`
 GRADIENT = 0
 STEP = 1
 TRIAL = 2
@@ -205,7 +205,7 @@ def minimise(free, beta, kind, ending, c, goal):
         Of the law of the points.
     ending : bool
         Whether the pieces spring back while the holder stands.
-    c : arrays.Sheared
+    c : arrays.ShearedPoints
     goal : float
         Of the residual [N].
 
@@ -237,19 +237,19 @@ def minimise(free, beta, kind, ending, c, goal):
         if count > 0:
             if c.ready[which] == 0.0:
                 write_hessian(beta, ending, c, hess)
-                if not factor(hess):
+                if not factorise(hess):
                     if not FORCE_MAY_FALL:
                         return force, -count
                     for j in range(int(c.count[0])):
                         c.points[SLOPE, j] = max(c.points[SLOPE, j], 0.0)
                     write_hessian(beta, ending, c, hess)
-                    if not factor(hess):
+                    if not factorise(hess):
                         return force, -count
                 c.ready[which] = 1.0
                 stale = False
             for i in range(y.size):
                 p[i] = -g[i]
-            fall = -solve(hess, p)
+            fall = -solve_factorised(hess, p)
             if not stale and not ending and beta > 0.0 and is_last_step(p, c):
                 for i in range(y.size):
                     y[i] += p[i]

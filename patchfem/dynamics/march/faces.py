@@ -3,13 +3,13 @@
 import numpy as np
 
 from ..interfaces import arrays
-from ..interfaces.dispatch import COULOMB, number_of
+from ..interfaces.dispatch import COULOMB_LAW, number_laws
 
 GOAL = 1e-11  # residual of the step solve over the friction limit
 
 
 def faces_of(model, prop, modal_system, mass: float):
-    """Return the arrays of the elements of a march at its start; `arrays.Single` for a model without elements.
+    """Return the arrays of the elements of a march at its start; `arrays.SingleContact` for a model without elements.
 
     Parameters
     ----------
@@ -21,14 +21,14 @@ def faces_of(model, prop, modal_system, mass: float):
 
     Returns
     -------
-    interfaces.arrays.Faces or Single
+    interfaces.arrays.PortElements or SingleContact
     """
     if not model.joints:
-        return arrays.Single(np.array([GOAL * model.limit]))
+        return arrays.SingleContact(np.array([GOAL * model.limit]))
     elements, (p, n), numbers = (
         [one.element for one in model.joints],
         prop.rows.shape,
-        number_of(model.laws),
+        number_laws(model.laws),
     )
     e = len(elements)
     num, mem = (
@@ -38,20 +38,21 @@ def faces_of(model, prop, modal_system, mass: float):
     for k, one in enumerate(elements):
         num[k, : one.numbers.size] = one.numbers
         mem[k, : one.memory.size] = one.memory
-        num[k, 0] = numbers[one.kernels or COULOMB]
+        num[k, 0] = numbers[one.kernels or COULOMB_LAW]
     there = getattr(model, "patch", None) is not None
     scale = getattr(model, "scale", 0.0)
     ports = np.array([one.port for one in model.joints], np.int64)
     mates = [k + one.mate for k, one in enumerate(model.joints)]
     holds = np.array(
-        [k for k, one in enumerate(elements) if (one.kernels or COULOMB) == COULOMB], np.int64
+        [k for k, one in enumerate(elements) if (one.kernels or COULOMB_LAW) == COULOMB_LAW],
+        np.int64,
     )
     quick = prop.rows * prop.push[1] if not prop.dense.size else prop.rows @ prop.dense[n:, 2 * n :]
     gamma = quick @ prop.rows.T / mass
     m = holds.size
     at = ports[holds]
     gives = [give[np.ix_(at, at)] for give in (prop.beta, gamma, prop.rows @ prop.rows.T / mass)]
-    stops = arrays.Stops(
+    stops = arrays.SetValuedElements(
         holds,
         np.zeros(m, np.int64),
         np.tile(num[holds, 1:3].T, (2, 1)),
@@ -65,7 +66,7 @@ def faces_of(model, prop, modal_system, mass: float):
     each[7] = [GOAL * (one.limit or max(scale, 1e-300)) for one in elements]
     modal = np.zeros((5, n))
     modal[0] = modal_system.push[0] / mass
-    return arrays.Faces(
+    return arrays.PortElements(
         np.ascontiguousarray(prop.rows, float),
         np.array([prop.beta, gamma]),
         np.array([ports, [one.potential is None for one in model.joints], mates], np.int64),

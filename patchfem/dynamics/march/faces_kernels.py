@@ -16,7 +16,7 @@ from ...friction.laws import plane_kernels as plane
 from ...friction.laws.coulomb_kernels import solve_coulomb_step
 from ..interfaces import element_kernels as contact
 from ..interfaces import element_solve_kernels as solver
-from ..modal_kernels import ended, free_rate, free_slide
+from ..modal_kernels import free_increment, free_rate, write_end_state
 from . import parts_kernels as parts
 from . import stops_kernels as stop_kernels
 from . import together_kernels as together
@@ -88,7 +88,7 @@ def sample_elements(q, v, motion, row, interface, faces):
         Row of samples of `loop_kernels.march`; it is written.
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -123,7 +123,7 @@ def sample_elements(q, v, motion, row, interface, faces):
             first = force
             slip = moved
     if HAS_CONTACT:
-        first, stock, slip = contact.state(interface, q, v)
+        first, stock, slip = contact.read_state(interface, q, v)
         energy += stock
         faces.own[CONTACT_SAMPLE] = first
     return first, energy, slip, springs
@@ -146,7 +146,7 @@ def sample_set_valued(motion, modal_system, drive, force, row, faces):
         Force of the contact [N].
     row : (k,) array
         Row of samples of `loop_kernels.march`; it is written.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -203,14 +203,12 @@ def prepare_step(motion, modal_system, table, at, dt, faces):
         Row of the table for this step.
     dt : float
         Length of the step [s].
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
     """
     for p in range(faces.port.shape[1]):
-        faces.port[FREE_SLIDE, p] = free_slide(motion, modal_system.reach, p, table, at)
+        faces.port[FREE_SLIDE, p] = free_increment(motion, modal_system, p, table, at)
         if HAS_STOPS:
-            faces.port[FREE_SPEED, p] = free_rate(
-                motion, faces.rows[p], modal_system.free, modal_system.dense, table, at
-            )
+            faces.port[FREE_SPEED, p] = free_rate(motion, faces.rows[p], modal_system, table, at)
     for e in range(faces.of.shape[1]):
         faces.each[BOND_LENGTH, e] = law.step_bond_length(
             faces.num[e], faces.mem[e], faces.each[ELEMENT_SPEED, e], dt
@@ -226,7 +224,7 @@ def slide_by_others(mine, port, faces):
     mine : int
         Number of the element, -1 for the contact.
     port : int
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -251,7 +249,7 @@ def solve_one_element(e, turn, faces, dt):
         Number of the element.
     turn : int
         Number of the turn, from 0.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
     dt : float
         Length of the step [s].
 
@@ -311,7 +309,7 @@ def solve_plane_element(e, turn, faces):
         Number of the element.
     turn : int
         Number of the turn, from 0.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -366,7 +364,7 @@ def solve_contact(q, v, dt, interface, faces):
         Length of the step [s].
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -379,7 +377,7 @@ def solve_contact(q, v, dt, interface, faces):
     """
     free = faces.port[FREE_SLIDE, 0] - slide_by_others(-1, 0, faces)
     beta = faces.gives[BETA, 0, 0]
-    dq, _, tries = contact.solve(free, beta, q, v, dt, interface, faces.own[CONTACT_TOL])
+    dq, _, tries = contact.solve_step(free, beta, q, v, dt, interface, faces.own[CONTACT_TOL])
     used = (free - dq) / beta
     change = abs(used - faces.own[CONTACT_FORCE]) / (
         faces.own[CONTACT_TOL] + ROUND_OFF * (abs(faces.port[FREE_SLIDE, 0]) / beta + abs(used))
@@ -404,7 +402,7 @@ def solve_coupled_forces(q, v, modal_system, interface, faces):
     modal_system : interfaces.arrays.ModalArrays
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -456,7 +454,7 @@ def speed_up_turns(turn, worst, last_worst, modal_system, faces):
     last_worst : float
         The same of the turn before.
     modal_system : interfaces.arrays.ModalArrays
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -524,7 +522,7 @@ def rests_in_step(motion, modal_system, table, at, faces):
         Table of `propagator.Propagator`.
     at : int
         Row of the table for this step.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -543,7 +541,7 @@ def rests_in_step(motion, modal_system, table, at, faces):
                 * (faces.stops.field[MEAN_FORCE, i] - faces.each[ELEMENT_FORCE, e])
                 / modal_system.mass
             )
-    ended(motion, modal_system.free, modal_system.push, modal_system.dense, table, at, accel, end)
+    write_end_state(motion, modal_system, table, at, accel, end)
     for i in range(faces.stops.names.size):
         e = faces.stops.element[i]
         for k in range(accel.size):
@@ -584,7 +582,7 @@ def solve_with_events(q, v, motion, modal_system, table, at, interface, faces):
         Row of the table for this step.
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -675,7 +673,7 @@ def solve_step(q, v, motion, modal_system, table, at, interface, faces):
         Row of the table for this step.
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -705,7 +703,7 @@ def set_accelerations(modal_system, faces, accel):
     Parameters
     ----------
     modal_system : interfaces.arrays.ModalArrays
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
     accel : (n,) array
         Modal accelerations of the forces [m s-2].
     """
@@ -731,7 +729,7 @@ def friction_work(dq, row, faces):
         Increment of the slide of the contact [m].
     row : (k,) array
         Row of samples of `loop_kernels.march`; it is written.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -763,7 +761,7 @@ def strike_modes(motion, mass, faces):
         Coordinates and rates of the modes.
     mass : float
         [kg]
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -794,7 +792,7 @@ def commit_step(q, v, dq, motion, modal_system, interface, faces):
     modal_system : interfaces.arrays.ModalArrays
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -809,7 +807,7 @@ def commit_step(q, v, dq, motion, modal_system, interface, faces):
         speed = 0.0
         for k in range(modal_system.slide.size):
             speed += modal_system.slide[k] * motion[1, k]
-        lost, ok = contact.commit(
+        lost, ok = contact.commit_step(
             dq, faces.own[CONTACT_FORCE], q, v, speed, modal_system.dt, interface
         )
         faces.own[CONTACT_INCREMENT] = dq
@@ -864,7 +862,7 @@ def set_limits(load0, load1, mu, faces):
         Load at its end [N].
     mu : (2,) array
         Static and kinetic coefficient.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
     """
     stops = faces.stops
     load1 = max(load1, 0.0)

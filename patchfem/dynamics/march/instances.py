@@ -7,7 +7,7 @@ function as an argument is never found on disk again, so `compiled.instantiate` 
 from functools import cache
 
 from ... import compiled
-from ..interfaces.dispatch import COULOMB, law_of
+from ..interfaces.dispatch import COULOMB_LAW, load_law
 
 FOLDER = "dynamics.march"
 SHEARED_LISTS = "dynamics.interfaces.shear_list_kernels"  # lists of bonds behind shear modes
@@ -72,8 +72,8 @@ def load_loop(
     named = {}
     flags = {
         "HAS_ELEMENTS": bool(laws),
-        "HAS_STOPS": COULOMB in laws,
-        "HAS_SLOPES": {*laws} > {COULOMB} or COULOMB not in laws,
+        "HAS_STOPS": COULOMB_LAW in laws,
+        "HAS_SLOPES": {*laws} > {COULOMB_LAW} or COULOMB_LAW not in laws,
         "HAS_CONTACT": there,
         "IS_COUPLED": several,
         "HAS_PLANES": plane,
@@ -86,7 +86,7 @@ def load_loop(
     )
     parts = compiled.write_kernel_module(f"{FOLDER}.parts_{compiled.hash_text(text)}_kernels", text)
     if laws:
-        law = law_of(laws)
+        law = load_law(laws)
         named["coupling"] = compiled.instantiate(
             f"{FOLDER}.faces_kernels",
             {

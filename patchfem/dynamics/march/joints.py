@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...friction.protocol import Element
-from ..interfaces.dispatch import COULOMB
+from ..interfaces.dispatch import COULOMB_LAW
 from .models import IDLE, ContactModel, Joint, free_model
 
 
@@ -114,7 +114,9 @@ class JointsModel:
     @property
     def laws(self) -> tuple:
         """Modules of the compiled laws, each once."""
-        return tuple(sorted({*self.also, *(one.element.kernels or COULOMB for one in self.joints)}))
+        return tuple(
+            sorted({*self.also, *(one.element.kernels or COULOMB_LAW for one in self.joints)})
+        )
 
     @property
     def kind(self) -> tuple:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...compiled import load
 from ...core import ModalBasis, SineDrive
-from ..propagator import propagator
+from ..propagator import make_propagator
 
 KERNELS = "dynamics.march.lanes_kernels"
 
@@ -167,7 +167,7 @@ def march(
     Marched
     """
     kernels = load(KERNELS)
-    prop = propagator(modes, drive, steps)
+    prop = make_propagator(modes, drive, steps)
     rig = _rig(kernels, modes, prop)
     table = _table(kernels, modes, drive, steps, prop)
     n = len(cases)

@@ -3,15 +3,24 @@
 Over a step the modes move exactly under the path means of the friction forces along the straight increments of slide,
 which do exactly the work of the laws: the sum of all energies never grows by itself. What rubs is one contact, or elements
 beside it or in its place (`faces_kernels`); the load is constant or varies (`pressing_kernels`). A contact is a module with
-`solve`, `given`, `commit` and `state`, as `interfaces.element_kernels` has them. `instances` makes an instance of this text
-per contact and set of parts, and what a rig does not have is not compiled.
+`solve_step`, `apply_increment`, `commit_step` and `read_state`, as `interfaces.element_kernels` has them. `instances` makes
+an instance of this text per contact and set of parts, and what a rig does not have is not compiled.
 """
 
 from ...compiled.jit import njit
 from ...contact.set_arrays import REFERENCE_LOAD
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..interfaces import element_kernels as contact
-from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
+from ..ledger import LEDGER
+from ..modal_kernels import (
+    count_iterations,
+    free_increment,
+    modal_energy,
+    move_modes,
+    write_friction_accelerations,
+    write_interface,
+    write_modes,
+)
 from . import faces_kernels as coupling
 from . import parts_kernels as parts
 from . import pressing_kernels as pressing
@@ -21,14 +30,10 @@ HAS_ELEMENTS = parts.HAS_ELEMENTS
 HAS_STOPS = parts.HAS_STOPS
 LOAD_VARIES = parts.LOAD_VARIES
 HAS_LISTS = parts.HAS_LISTS
-# Status of a march.
+# Status of a march, beside EXCEEDS_TRAVEL and NOT_FINITE of `modal_kernels.write_interface`.
 FINISHED = 0
-EXCEEDS_TRAVEL = 1
 MEMORY_FULL = 2
-NOT_FINITE = 3
 NO_CONTACT_SET = 4
-N_UNCONVERGED = 7  # index of the number of steps without convergence in the ledger
-DISSIPATED = 3  # index of the dissipated energy in the ledger
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -50,15 +55,15 @@ def sample_interface(i, last, drive, motion, modal_system, row, interface, faces
         Row of samples of `loop_kernels.march`; it is written.
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
-    press : interfaces.arrays.Pressing or Steady
+    faces : interfaces.arrays.PortElements
+    press : interfaces.arrays.VaryingLoad or ConstantLoad
 
     Returns
     -------
     tuple
         Slide [m], its speed [m/s] and output [m]; force [N], energy [J] and slip [m] of the interface; energy beside it [J].
     """
-    q, v, out = sample(row, motion, modal_system.slide, modal_system.output)
+    q, v, out = write_modes(row, motion, modal_system)
     force = 0.0
     energy = 0.0
     slip = 0.0
@@ -76,7 +81,7 @@ def sample_interface(i, last, drive, motion, modal_system, row, interface, faces
             if i > 0:
                 force = coupling.sample_set_valued(motion, modal_system, drive, force, row, faces)
     else:
-        force, energy, slip = contact.state(interface, q, v)
+        force, energy, slip = contact.read_state(interface, q, v)
     return q, v, out, force, energy, slip, beside
 
 
@@ -131,14 +136,14 @@ def march(first, steps, motion, modal_system, table, interface, faces, press, tr
         if LOAD_VARIES:
             if press.slot[0] < 0:
                 return i, NO_CONTACT_SET
-        status = note(
+        status = write_interface(
             rows[i, : size + 6],
             force,
             energy,
             slip,
             out,
             travel,
-            energy + (beside + stored(motion, modal_system.omega, modal_system.mass)),
+            energy + (beside + modal_energy(motion, modal_system)),
             ledger,
         )
         if status:
@@ -156,36 +161,24 @@ def march(first, steps, motion, modal_system, table, interface, faces, press, tr
             coupling.prepare_step(motion, modal_system, table, at, dt, faces)
             dq, count = coupling.solve_step(q, v, motion, modal_system, table, at, interface, faces)
         else:
-            free = free_slide(motion, modal_system.reach, 0, table, at)
-            dq, _, count = contact.solve(free, beta, q, v, dt, interface, faces.goal[0])
+            free = free_increment(motion, modal_system, 0, table, at)
+            dq, _, count = contact.solve_step(free, beta, q, v, dt, interface, faces.goal[0])
             used = (free - dq) / beta
         if HAS_ELEMENTS:
             coupling.set_accelerations(modal_system, faces, accel)
             work = coupling.friction_work(dq, rows[i], faces)
         else:
-            push_back(used, slide, modal_system.mass, accel)
+            write_friction_accelerations(used, slide, modal_system.mass, accel)
             rows[i, size + 4] = used
             work = used * dq
             if LOAD_VARIES:
                 pressing.add_press_accelerations(press, modal_system.mass, accel)
-        move(
-            motion,
-            modal_system.free,
-            modal_system.push,
-            modal_system.loss,
-            modal_system.dense,
-            modal_system.dense_loss,
-            table,
-            at,
-            accel,
-            scratch,
-            ledger,
-        )
+        move_modes(motion, modal_system, table, at, accel, scratch, ledger)
         if HAS_STOPS:
             blow = coupling.strike_modes(motion, modal_system.mass, faces)
             work += blow
-            ledger[DISSIPATED] += blow
-        tell(count, work, ledger)
+            ledger[LEDGER.friction_loss] += blow
+        count_iterations(count, work, ledger)
         rows[i, size + 6] = work
         if HAS_ELEMENTS:
             lost, ok = coupling.commit_step(q, v, dq, motion, modal_system, interface, faces)
@@ -193,11 +186,11 @@ def march(first, steps, motion, modal_system, table, interface, faces, press, tr
             after = 0.0
             for k in range(slide.size):
                 after += slide[k] * motion[1, k]
-            lost, ok = contact.commit(dq, used, q, v, after, dt, interface)
-        ledger[DISSIPATED] += lost
+            lost, ok = contact.commit_step(dq, used, q, v, after, dt, interface)
+        ledger[LEDGER.friction_loss] += lost
         if not ok:
             if LOAD_VARIES and not HAS_LISTS:
-                ledger[N_UNCONVERGED] += 1.0
+                ledger[LEDGER.n_unconverged] += 1.0
             else:
                 return i, MEMORY_FULL
     return steps, FINISHED
@@ -232,15 +225,15 @@ def follow(path, dt, interface, goal, lost, forces):
     for i in range(path.size):
         dq = path[i + 1] - path[i] if i < path.size - 1 else before * dt
         v = dq / dt if dt > 0 else 0.0
-        force, energy, slip = contact.state(interface, path[i], 0.5 * (before + v) if i else v)
+        force, energy, slip = contact.read_state(interface, path[i], 0.5 * (before + v) if i else v)
         forces[i, 0] = force
         forces[i, 2] = slip
         lost[i, 1] = energy
         if i == path.size - 1:
             break
-        mean, good = contact.given(dq, path[i], v, dt, interface, goal)
+        mean, good = contact.apply_increment(dq, path[i], v, dt, interface, goal)
         forces[i, 1] = mean
-        lost[i, 0], ok = contact.commit(dq, mean, path[i], v, v, dt, interface)
+        lost[i, 0], ok = contact.commit_step(dq, mean, path[i], v, v, dt, interface)
         bad += not (good and ok)
         before = v
     return bad

@@ -15,13 +15,19 @@ from ...formatting import format_length
 from ...friction.bonds.list_rows_kernels import STATUS
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import choose_samples_per_cycle
-from ..checkpoint import Samples, slot_of
-from ..cycles import extremes_of, phasors_of, thinned
-from ..integrated import histories
+from ..checkpoint import MarchSamples, open_checkpoint
+from ..cycles import find_cycle_extremes, find_cycle_phasors, select_cycle_samples
+from ..integrated import make_histories
 from ..interfaces import arrays
 from ..interfaces.arrays import ModalArrays
-from ..periodicity import APART, ahead, looked_at, until_look
-from ..propagator import propagator
+from ..ledger import LEDGER
+from ..periodicity import (
+    FIRST_CHECK,
+    bound_remaining_change,
+    cycles_to_next_check,
+    is_checked_after,
+)
+from ..propagator import make_propagator
 from .capacity import copy_state, enlarge_list
 from .faces import GOAL, faces_of
 from .models import ContactModel, free_model, load_kernels
@@ -35,7 +41,16 @@ MAX_PIECE_STEPS = 8000  # number of steps of a piece of a march
 MAX_PIECE_CYCLES = 16  # number of cycles of a piece of a march
 PASSING = "dynamics.march.passing_kernels"
 PERIODIC_TOL = 1e-12  # change of a periodic motion in all cycles that are left, over its size
-SUMS = [0, 1, 2, 3, 5, 7, 8]  # indices of the ledger that grow from cycle to cycle
+# Positions in the ledger that grow from cycle to cycle.
+SUMS = [
+    LEDGER.drive_work,
+    LEDGER.viscous_loss,
+    LEDGER.drive_power,
+    LEDGER.friction_loss,
+    LEDGER.n_iterations,
+    LEDGER.n_unconverged,
+    LEDGER.friction_work,
+]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -99,7 +114,7 @@ def _response(rows, number, dt, modes, drive) -> Response:
         Acceleration of the base [m s-2].
     """
     n = modes.omega.size
-    return histories(
+    return make_histories(
         modes,
         drive,
         number * dt,
@@ -255,12 +270,12 @@ def march(
     n_last = max(window, 2)
     mark_steps = sorted({round(mark * steps_per_cycle) for mark in marks})
     plan = _Plan(round(cycles * steps_per_cycle), steps_per_cycle, window, frames, mark_steps)
-    samples = Samples(deque(maxlen=n_last))
+    samples = MarchSamples(deque(maxlen=n_last))
 
     def restart():
         return fresh(modes, drive, model, steps_per_cycle, travel, start)
 
-    slot = slot_of(
+    checkpoint = open_checkpoint(
         run, (plan.n_steps, steps_per_cycle, window, frames, whole, *mark_steps), samples, restart
     )
     before_last = plan.n_steps - n_last * steps_per_cycle
@@ -270,13 +285,13 @@ def march(
         if not run.folded(before_last, samples):
             # The march ends before its last cycles, so it is repeated cycle by cycle with all samples.
             run = restart()
-            samples = Samples(samples.last)
+            samples = MarchSamples(samples.last)
             keeps_folded = False
             keeps_samples = True
-    elif not keeps_samples and not samples.again:
-        if not run.passed(before_last, lambda: slot.offer(run, samples)):
+    elif not keeps_samples and not samples.is_restarted:
+        if not run.passed(before_last, lambda: checkpoint.write_if_due(run, samples)):
             run = restart()
-            samples.again = True
+            samples.is_restarted = True
     n_even = choose_samples_per_cycle(drive, cycles, wanted=even)
     recorder = _Recorder(
         samples,
@@ -284,15 +299,15 @@ def march(
         keeps_samples=keeps_samples,
         keeps_extremes=keeps_samples or keeps_folded,
     )
-    snapshots = _march_recorded(run, recorder, plan, slot, progress)
+    snapshots = _march_recorded(run, recorder, plan, checkpoint, progress)
     run.check()
     extremes = samples.extremes if recorder.keeps_extremes else ends_of(samples.last, run)
     phasors = samples.phasors if recorder.keeps_extremes else []
     end = mark_of(run, list(samples.last)[-window:], extremes)
     rows, first = _join_cycles(list(samples.last))
-    number = np.concatenate([*samples.kept_at, first + np.arange(len(rows))])
+    number = np.concatenate([*samples.early_numbers, first + np.arange(len(rows))])
     return MarchResult(
-        response=run.response(np.concatenate([*samples.kept, rows]), number),
+        response=run.response(np.concatenate([*samples.early_rows, rows]), number),
         window=end.window,
         step_force=end.step_force,
         amplitudes=end.amplitudes,
@@ -324,13 +339,15 @@ class _Plan(NamedTuple):
 class _Recorder:
     """Recorder of a march: all samples of the last cycles, and selected earlier samples.
 
-    - `samples`: the `checkpoint.Samples` that are kept.
+    - `samples`: the `checkpoint.MarchSamples` that are kept.
     - `keeps_samples`, `keeps_extremes`: whether samples from before the last cycles are kept, and extremes and phasors
       of all cycles.
     - `capacity`: number of samples from before the last cycles that may still be kept.
     """
 
-    def __init__(self, samples: Samples, n_even: int, *, keeps_samples: bool, keeps_extremes: bool):
+    def __init__(
+        self, samples: MarchSamples, n_even: int, *, keeps_samples: bool, keeps_extremes: bool
+    ):
         self.samples = samples
         self.keeps_samples = keeps_samples
         self.keeps_extremes = keeps_extremes
@@ -343,7 +360,7 @@ class _Recorder:
         last = self.samples.last
         picks = [None] * len(works)
         if self.keeps_samples and self.capacity > 0 and rows.shape[1] > 1:
-            picks = thinned(rows, run, self._n_even)
+            picks = select_cycle_samples(rows, run, self._n_even)
         for k, work in enumerate(works):
             if self.keeps_samples and len(last) == last.maxlen and self.capacity > 0:
                 pick = self._picks.pop(last[0][0], None)
@@ -351,15 +368,15 @@ class _Recorder:
             last.append((first + k * run.prop.steps, rows[k], work))
             self._picks[last[-1][0]] = picks[k]
         if self.keeps_extremes:
-            self.samples.extremes += extremes_of(rows, run.modes, run.prop.dt)
-            self.samples.phasors += phasors_of(rows, run.modes, first, run.prop.steps)
+            self.samples.extremes += find_cycle_extremes(rows, run.modes, run.prop.dt)
+            self.samples.phasors += find_cycle_phasors(rows, run.modes, first, run.prop.steps)
 
     def repeat_last(self, run, count: int) -> None:
         """Skip cycles that are equal to the last one."""
         self.capacity = _repeat_last_cycle(self.samples, run, count)
 
 
-def _march_recorded(run, recorder: _Recorder, plan: _Plan, slot, progress) -> list:
+def _march_recorded(run, recorder: _Recorder, plan: _Plan, checkpoint, progress) -> list:
     """March to the end of a plan and record the cycles; return the snapshots of the last cycle.
 
     A motion that has become periodic is not marched on; see `Run.repeats`.
@@ -381,13 +398,13 @@ def _march_recorded(run, recorder: _Recorder, plan: _Plan, slot, progress) -> li
         if recorder.keeps_samples and run.repeats(n_left):
             recorder.repeat_last(run, n_left)
         if run.done < plan.n_steps:
-            slot.offer(run, samples)
+            checkpoint.write_if_due(run, samples)
         if progress is not None:
             progress(run.done / plan.n_steps)
     return snapshots
 
 
-def _keep_samples(samples: Samples, run, cycle, pick=None) -> int:
+def _keep_samples(samples: MarchSamples, run, cycle, pick=None) -> int:
     """Keep samples of a cycle (first step, rows, work) that is none of the last ones.
 
     Returns how many.
@@ -395,12 +412,12 @@ def _keep_samples(samples: Samples, run, cycle, pick=None) -> int:
     `pick` has their numbers if they are known.
     """
     first, rows, _ = cycle
-    pick = thinned(rows[None], run)[0] if pick is None else pick
-    samples.early(rows[pick], first + pick)
+    pick = select_cycle_samples(rows[None], run)[0] if pick is None else pick
+    samples.keep_early(rows[pick], first + pick)
     return len(pick)
 
 
-def _repeat_last_cycle(samples: Samples, run, count: int) -> int:
+def _repeat_last_cycle(samples: MarchSamples, run, count: int) -> int:
     """Skip `count` cycles that are equal to the last one.
 
     Returns how many samples may still be kept.
@@ -414,21 +431,25 @@ def _repeat_last_cycle(samples: Samples, run, count: int) -> int:
     samples.last.clear()
     samples.extremes += [samples.extremes[-1]] * count
     samples.phasors += [samples.phasors[-1]] * count
-    pick = thinned(rows[None], run)[0]
+    pick = select_cycle_samples(rows[None], run)[0]
     begin = 2 * run.modes.omega.size + 6
     shown = np.arange(1, 1 + min(count, -(-max(0, samples.capacity) // len(pick))))[:, None]
     # friction work, and what is dissipated and created, since the start
     sums = slice(begin, begin + 3)
     later = np.tile(rows[pick], (len(shown), 1))
     later[:, sums] += np.repeat(shown * (rows[-1, sums] - rows[0, sums]), len(pick), axis=0)
-    samples.early(later, (first + pick + run.prop.steps * shown).ravel())
+    samples.keep_early(later, (first + pick + run.prop.steps * shown).ravel())
     run.leave_out(count)
     return samples.capacity
 
 
 def ends_of(cycles, run) -> list:
     """Return the smallest and largest output [m] of each of the cycles (first step, rows, work)."""
-    return [one for _, rows, _ in cycles for one in extremes_of(rows[None], run.modes, run.prop.dt)]
+    return [
+        one
+        for _, rows, _ in cycles
+        for one in find_cycle_extremes(rows[None], run.modes, run.prop.dt)
+    ]
 
 
 def mark_of(run, cycles, extremes, after=None) -> Mark:
@@ -481,7 +502,7 @@ class Run:
         self.model = model
         self.travel = travel
         self.loops = loops
-        self.prop = propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
+        self.prop = make_propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
         self.contact = model.build()
         self.state = np.zeros((2, modes.omega.size))
         if start is not None:
@@ -493,7 +514,9 @@ class Run:
         self.totals = np.zeros(3)
         # friction work from the samples, and energy exchanged in both directions [J]
         self.second = np.zeros(2)
-        self.ledger[0] = self.motion()  # energy that is stored at the start counts as work input
+        self.ledger[LEDGER.drive_work] = (
+            self.motion()
+        )  # energy that is stored at the start counts as work input
         self.modal_system = modal_arrays(modes, self.prop)
         self.faces, self.load = (
             faces_of(model, self.prop, self.modal_system, modes.mass),
@@ -503,7 +526,7 @@ class Run:
             2 * modes.omega.size + 7 + ELEMENT_COLUMNS * len(model.joints) + 5 * bool(model.loading)
         )
         if model.joints or model.loading:
-            self.ledger[0] += self.strained()
+            self.ledger[LEDGER.drive_work] += self.strained()
         self.periodic = (
             self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
         )
@@ -521,7 +544,7 @@ class Run:
             if isinstance(value, np.ndarray):
                 setattr(twin, name, value.copy())
         twin.contact, twin.faces, twin.load = map(
-            arrays.copied, (self.contact, self.faces, self.load)
+            arrays.copy_arrays, (self.contact, self.faces, self.load)
         )
         return twin
 
@@ -532,12 +555,14 @@ class Run:
         memories. The list is empty if no period brings the state back.
         """
         model = self.model
-        rubs = arrays.carried(self.contact, getattr(model, "element", None) or free_model().element)
+        rubs = arrays.split_memory(
+            self.contact, getattr(model, "element", None) or free_model().element
+        )
         if self.periodic is None or rubs is None or getattr(model, "load", None) is not None:
             return []
         beside = (
             [
-                arrays.memory_rows(one.element, row[: one.element.memory.size])
+                arrays.split_element_memory(one.element, row[: one.element.memory.size])
                 for one, row in zip(model.joints, self.faces.mem)
             ]
             if model.joints
@@ -552,15 +577,19 @@ class Run:
     def repeats(self, left: int) -> bool:
         """Return whether the motion has become periodic, so that `left` more cycles may be skipped.
 
-        It is to be called at the end of every cycle, or of those that `dynamics.periodicity.until_look` names.
+        It is to be called at the end of every cycle, or of those that `dynamics.periodicity.cycles_to_next_check` names.
         """
         number = self.done // self.prop.steps
         size = self.looks.shape[1]
-        if not size or self.periodic is None or not (looked_at(number) or looked_at(number + 1)):
+        if (
+            not size
+            or self.periodic is None
+            or not (is_checked_after(number) or is_checked_after(number + 1))
+        ):
             return False
         rows = self._carried_state()
         now = np.concatenate(rows)
-        if not looked_at(number):
+        if not is_checked_after(number):
             self.looks[1], self.books = now, self._sums_so_far()
             return False
         sizes = np.repeat([np.abs(row).max(initial=0.0) for row in rows], [*map(len, rows)])
@@ -571,11 +600,11 @@ class Run:
         self.change = change
         self.looks[0] = now
         # changes over two intervals between checks are known
-        known = left > 0 and number >= 4 * APART
+        known = left > 0 and number >= 4 * FIRST_CHECK
         return (
             known
             and max(change, last) <= PERIODIC_TOL
-            and ahead(change, before, left, number) <= PERIODIC_TOL
+            and bound_remaining_change(change, before, left, number) <= PERIODIC_TOL
         )
 
     def leave_out(self, count: int) -> None:
@@ -615,7 +644,7 @@ class Run:
         self.totals[:] = 0.0
         self.second[:] = 0.0
         self.done = 0
-        self.ledger[0] = self.motion() + self.strained()
+        self.ledger[LEDGER.drive_work] = self.motion() + self.strained()
 
     def mark(self, cycles: int, window: int) -> Mark:
         """March more cycles and return the `Mark` of the last `window` of them."""
@@ -678,7 +707,7 @@ class Run:
         """
         size = self.prop.steps
         while self.done < steps and self.outcome is None:
-            look = (until_look(self.done // size) + self.done // size) * size - self.done
+            look = (cycles_to_next_check(self.done // size) + self.done // size) * size - self.done
             rows = self._march_rows(
                 min(steps - self.done, MAX_PIECE_STEPS, MAX_PIECE_CYCLES * size, look), 0, []
             )
@@ -693,9 +722,13 @@ class Run:
     @property
     def folds(self) -> bool:
         """Whether `folded` can march it: bonds behind shear modes alone, under a constant load."""
-        return type(self) is Run and self.model.tuple_of is arrays.Sheared and not self.model.joints
+        return (
+            type(self) is Run
+            and self.model.tuple_of is arrays.ShearedPoints
+            and not self.model.joints
+        )
 
-    def folded(self, steps: int, samples: Samples) -> bool:
+    def folded(self, steps: int, samples: MarchSamples) -> bool:
         """March to a step as `passed` does, and keep extremes and phasors of all cycles and the largest slide.
 
         Return whether the march got there.
@@ -711,7 +744,7 @@ class Run:
         while self.done < steps and self.outcome is None:
             size = (steps - self.done) % around or around
             count = (
-                min((steps - self.done) // size, until_look(self.done // around))
+                min((steps - self.done) // size, cycles_to_next_check(self.done // around))
                 if size == around
                 else 1
             )
@@ -754,7 +787,7 @@ class Run:
                 samples.extremes += samples.extremes[-1:] * left
                 samples.phasors += samples.phasors[-1:] * left
         if number >= 0:
-            samples.early(far[None], np.array([number]))
+            samples.keep_early(far[None], np.array([number]))
         return self.outcome is None
 
     def cycles(self, size: int, stop: int, frames: int, snapshots: list) -> list:
@@ -788,7 +821,7 @@ class Run:
             MAX_PIECE_CYCLES,
             MAX_PIECE_STEPS // whole,
             (stop - first) // whole,
-            until_look(-(-first // whole)),
+            cycles_to_next_check(-(-first // whole)),
         )
         if frames and first + together * whole == stop:
             together -= 1
@@ -928,7 +961,7 @@ class Run:
 
     def _pressing(self):
         """Return the load at the start; here it is constant."""
-        return arrays.Steady(np.zeros(0))
+        return arrays.ConstantLoad(np.zeros(0))
 
     def _load(self, count: int):
         """Return the arrays of the load in the next steps."""
@@ -1024,10 +1057,10 @@ class Run:
 
     def check(self) -> None:
         """Set the outcome to not_converged if a step missed its residual; the samples are kept."""
-        if self.ledger[7]:
+        if self.ledger[LEDGER.n_unconverged]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
-                f"{int(self.ledger[7])} of {self.done} time steps have an error of the friction force "
+                f"{int(self.ledger[LEDGER.n_unconverged])} of {self.done} time steps have an error of the friction force "
                 f"above the permitted {GOAL:.0e} of the friction limit; raise accuracy.steps_per_cycle"
             )
 
@@ -1089,7 +1122,7 @@ class Run:
             "stored": self.motion() + self.strained()
         }
         book |= {
-            "booked": float(self.ledger[8]),
+            "booked": float(self.ledger[LEDGER.friction_work]),
             "sampled": float(self.second[0]),
             "passed": float(self.second[1]),
         }

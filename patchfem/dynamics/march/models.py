@@ -14,7 +14,7 @@ from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import growth_numbers, points_element, unpack_bonds
 from ...friction.protocol import Element
 from ..interfaces import arrays
-from ..interfaces.dispatch import COULOMB
+from ..interfaces.dispatch import COULOMB_LAW
 
 HERE = "dynamics.interfaces"
 ELEMENTS = f"{HERE}.element_kernels"
@@ -80,12 +80,12 @@ class ContactModel:
     @property
     def set_valued(self) -> bool:
         """Whether the contact holds without any stretch."""
-        return self.law == COULOMB
+        return self.law == COULOMB_LAW
 
     @property
     def laws(self) -> tuple:
         """Modules of the compiled laws of `joints`."""
-        return (COULOMB,) if self.set_valued else ()
+        return (COULOMB_LAW,) if self.set_valued else ()
 
     @property
     def joints(self) -> tuple:
@@ -145,7 +145,7 @@ def element_model(element: Element, reduction=None) -> ContactModel:
         element.limit,
         fields,
         element.length,
-        element.kernels or COULOMB,
+        element.kernels or COULOMB_LAW,
         reduction,
         element,
     )
@@ -202,7 +202,7 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
         return element_model(points_element(law, area, sigma, pattern))
     area = np.asarray(area, float)[shear.points]
     sigma = np.asarray(sigma, float)[shear.points]
-    fields = arrays.sheared(
+    fields = arrays.make_sheared_fields(
         law.static * area / law.length,
         law.length,
         growth_numbers(law),
@@ -214,7 +214,7 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     fields["points"][0, : area.size] = law.initial * sigma
     limit = law.static * float(area @ sigma)
     return ContactModel(
-        f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.Sheared
+        f"{HERE}.shear_kernels", limit, fields, law.length, "", shear, None, arrays.ShearedPoints
     )
 
 
@@ -254,7 +254,7 @@ def lists_model(
         numbers.list_capacity(law, reach, merge),
         MOST_AT_FIRST + numbers.MAX_STRIPS_PER_LENGTH * int(min(reach, numbers.MAX_DAMAGE)),
     )
-    fields = arrays.sheared(limit, law.length, growth_numbers(law), shape, stiffness)
+    fields = arrays.make_sheared_fields(limit, law.length, growth_numbers(law), shape, stiffness)
     fields["points"][4], fields["drag"][2, 1:] = sigma, shape.T @ limit / limit.sum()
     fields |= {
         "bondlist": np.zeros((N_ROWS, limit.size * capacity)),

@@ -12,8 +12,17 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..interfaces import shear_kernels as contact
-from ..interfaces.shear_kernels import PULL, REACH, SLID, WAY
-from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
+from ..interfaces.shear_kernels import DRAG_DIRECTION, DRAG_FORCE, MAX_MODE_SLIDE, TOTAL_SLIDE
+from ..ledger import LEDGER
+from ..modal_kernels import (
+    count_iterations,
+    free_increment,
+    modal_energy,
+    move_modes,
+    write_friction_accelerations,
+    write_interface,
+    write_modes,
+)
 
 # Places in `sums` [J].
 WORK_SUM = 0  # friction work
@@ -115,17 +124,17 @@ def swing_pieces(interface, did, slides):
 
     Parameters
     ----------
-    interface : interfaces.arrays.Sheared
+    interface : interfaces.arrays.ShearedPoints
     did : int
         Number of steps.
     slides : (did,) array
         Increments of the slide [m].
     """
-    way = interface.flow[WAY]
+    way = interface.flow[DRAG_DIRECTION]
     last = interface.last
     for k in range(interface.y.shape[1]):
         swing = (
-            2 * (way * interface.drag[PULL, k] / interface.kappa[k - 1] - interface.b[k - 1])
+            2 * (way * interface.drag[DRAG_FORCE, k] / interface.kappa[k - 1] - interface.b[k - 1])
             if k > 0
             else 0.0
         )
@@ -238,7 +247,7 @@ def march_drag(
     modal_system : interfaces.arrays.ModalArrays
     table : (s, k) array
         Table of `propagator.Propagator`.
-    interface : interfaces.arrays.Sheared
+    interface : interfaces.arrays.ShearedPoints
     travel : float
         Largest displacement of the output [m].
     limit : float
@@ -257,24 +266,24 @@ def march_drag(
     int
         Number of steps.
     """
-    way = interface.flow[WAY]
+    way = interface.flow[DRAG_DIRECTION]
     n = motion.shape[1]
     size = 2 * motion.shape[1]
     at = first % table.shape[0]
-    force = way * interface.drag[PULL, 0]
+    force = way * interface.drag[DRAG_FORCE, 0]
     accel = modal_system.workspace[0]
     begun = modal_system.workspace[1:]
     least = 0.0
     taken = 0.0
-    energy = interface.eps[0] * interface.drag[PULL, 0]
+    energy = interface.eps[0] * interface.drag[DRAG_FORCE, 0]
     swing = 0.0
     for k in range(interface.b.size):
-        y = 2 * (way * interface.drag[PULL, k + 1] / interface.kappa[k] - interface.b[k])
-        least += interface.drag[REACH, k + 1] * abs(y)
-        taken += way * interface.drag[PULL, k + 1] * y
+        y = 2 * (way * interface.drag[DRAG_FORCE, k + 1] / interface.kappa[k] - interface.b[k])
+        least += interface.drag[MAX_MODE_SLIDE, k + 1] * abs(y)
+        taken += way * interface.drag[DRAG_FORCE, k + 1] * y
         energy += 0.5 * interface.kappa[k] * interface.b[k] * interface.b[k]
         swing += interface.kappa[k] * y * (interface.b[k] + 0.5 * y)
-    push_back(force, modal_system.slide, modal_system.mass, accel)
+    write_friction_accelerations(force, modal_system.slide, modal_system.mass, accel)
     block = min(count, workspace.shape[1], table.shape[0] - at)
     for row in range(N_BLOCK_ROWS):
         for s in range(block):
@@ -295,19 +304,20 @@ def march_drag(
         odd = 0.5 * (1.0 + swings)
         power = workspace[DRIVE_WORK, s] + table[at + s, 4 * size]
         add_step(force * dq, swings * swing, q, after, force, limit, sums)
-        ledger[0] += power
-        ledger[1] += workspace[VISCOUS_LOSS, s] + table[at + s, 4 * size + 1]
-        ledger[2] += abs(power)
-        ledger[3] += force * dq - swings * taken
-        ledger[4] = max(
-            ledger[4], energy + odd * swing + 0.5 * modal_system.mass * workspace[ENERGY_ROW, s]
+        ledger[LEDGER.drive_work] += power
+        ledger[LEDGER.viscous_loss] += workspace[VISCOUS_LOSS, s] + table[at + s, 4 * size + 1]
+        ledger[LEDGER.drive_power] += abs(power)
+        ledger[LEDGER.friction_loss] += force * dq - swings * taken
+        ledger[LEDGER.max_stored] = max(
+            ledger[LEDGER.max_stored],
+            energy + odd * swing + 0.5 * modal_system.mass * workspace[ENERGY_ROW, s],
         )
-        ledger[8] += force * dq
+        ledger[LEDGER.friction_work] += force * dq
         trace[OUTPUT, i + did] = workspace[OUTPUT_ROW, s]
         trace[OUTPUT_RATE, i + did] = workspace[RATE_ROW, s]
         q = after
         workspace[SLIDE_ROW, s] = dq
-        interface.flow[SLID] += dq
+        interface.flow[TOTAL_SLIDE] += dq
         if not (
             abs(workspace[OUTPUT_ROW, s]) <= travel and np.isfinite(q + workspace[SPEED_ROW, s])
         ):
@@ -369,16 +379,16 @@ def march_folded_cycle(
     force0 = 0.0
     energy0 = 0.0
     while True:
-        q, v, out = sample(row, motion, modal_system.slide, modal_system.output)
-        force, energy, slip = contact.state(interface, q, v)
-        status = note(
+        q, v, out = write_modes(row, motion, modal_system)
+        force, energy, slip = contact.read_state(interface, q, v)
+        status = write_interface(
             row[: size + 6],
             force,
             energy,
             slip,
             out,
             travel,
-            energy + stored(motion, modal_system.omega, modal_system.mass),
+            energy + modal_energy(motion, modal_system),
             ledger,
         )
         if open_step:
@@ -391,7 +401,7 @@ def march_folded_cycle(
         keep_largest(row, first + i, totals, sums, far, far_at)
         if status or i == count:
             return i, status
-        if interface.flow[WAY] != 0.0 and modal_system.dense.size == 0:
+        if interface.flow[DRAG_DIRECTION] != 0.0 and modal_system.dense.size == 0:
             did = march_drag(
                 first + i,
                 count - i,
@@ -413,30 +423,18 @@ def march_folded_cycle(
                 open_step = False
                 continue
         at = (first + i) % around
-        free = free_slide(motion, modal_system.reach, 0, table, at)
-        dq, _, turns = contact.solve(free, modal_system.beta, q, v, dt, interface, goal)
+        free = free_increment(motion, modal_system, 0, table, at)
+        dq, _, turns = contact.solve_step(free, modal_system.beta, q, v, dt, interface, goal)
         used = (free - dq) / modal_system.beta
-        push_back(used, modal_system.slide, modal_system.mass, accel)
+        write_friction_accelerations(used, modal_system.slide, modal_system.mass, accel)
         work = used * dq
-        move(
-            motion,
-            modal_system.free,
-            modal_system.push,
-            modal_system.loss,
-            modal_system.dense,
-            modal_system.dense_loss,
-            table,
-            at,
-            accel,
-            scratch,
-            ledger,
-        )
-        tell(turns, work, ledger)
+        move_modes(motion, modal_system, table, at, accel, scratch, ledger)
+        count_iterations(turns, work, ledger)
         after = 0.0
         for k in range(n):
             after += modal_system.slide[k] * motion[1, k]
-        lost, _ = contact.commit(dq, used, q, v, after, dt, interface)
-        ledger[3] += lost
+        lost, _ = contact.commit_step(dq, used, q, v, after, dt, interface)
+        ledger[LEDGER.friction_loss] += lost
         q0 = q
         force0 = force
         energy0 = energy
@@ -448,7 +446,7 @@ def march_folded_cycle(
 def read_cycle(trace, dt, cycles):
     """Compute the extremes of the output between the samples of a cycle, and its phasor.
 
-    The output is a cubic through values and rates, as in `cycles.hermite_extremes`.
+    The output is a cubic through values and rates, as in `cycles.find_hermite_extremes`.
 
     Parameters
     ----------
@@ -531,7 +529,7 @@ def march_folded_cycles(
     modal_system : interfaces.arrays.ModalArrays
     table : (s, k) array
         Table of `propagator.Propagator`.
-    interface : interfaces.arrays.Sheared
+    interface : interfaces.arrays.ShearedPoints
     goal : float
         Tolerance of a step [N].
     limit : float

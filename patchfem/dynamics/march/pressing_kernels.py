@@ -18,7 +18,7 @@ from ...contact.press_path_kernels import path_mean
 from ...contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT, REFERENCE_STIFFNESS
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ..interfaces import element_kernels as contact
-from ..modal_kernels import free_rate, free_slide
+from ..modal_kernels import free_increment, free_rate
 from . import faces_kernels as coupling
 from . import parts_kernels as parts
 from .stops_kernels import (
@@ -43,7 +43,7 @@ MAX_GUESSES = (
 BISECT_EVERY = 8  # guesses after which the secant method takes the middle of its bracket
 BRACKET_TOL = 4e-16  # width of a bracket over its ends below which it is closed
 MAX_ITERATIONS = 100  # Newton steps for heave and pitch
-# Places in `few` of `interfaces.arrays.Pressing`.
+# Places in `few` of `interfaces.arrays.VaryingLoad`.
 LOAD = 0  # load now [N]
 MEAN_PRESS = 3  # mean forces of the step on heave [N] and pitch [N m]
 PRESS_GUESS = 6  # increments of heave and pitch of the step before, the guess of this one
@@ -92,7 +92,7 @@ def solve_press_step(press, k0, begin, f1, f2, turn, out):
 
     Parameters
     ----------
-    press : interfaces.arrays.Pressing
+    press : interfaces.arrays.VaryingLoad
     k0 : int
         Contact set at the start.
     begin : (5,) array
@@ -188,8 +188,8 @@ def sample_load(i, last, motion, mass, interface, faces, press, row):
         [kg]
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
-    press : interfaces.arrays.Pressing
+    faces : interfaces.arrays.PortElements
+    press : interfaces.arrays.VaryingLoad
     row : (k,) array
         Row of samples of `loop_kernels.march`; it is written.
 
@@ -245,8 +245,8 @@ def set_loads(before, after, interface, faces, press):
         Load at its end [N].
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
-    press : interfaces.arrays.Pressing
+    faces : interfaces.arrays.PortElements
+    press : interfaces.arrays.VaryingLoad
     """
     if HAS_POINTS:
         for i in range(press.now.size):
@@ -270,7 +270,7 @@ def set_press_accelerations(heave, pitch, mass, press, accel):
         Moment that resists the pitch [N m].
     mass : float
         [kg]
-    press : interfaces.arrays.Pressing
+    press : interfaces.arrays.VaryingLoad
     accel : (n,) array
         Modal accelerations of the forces [m s-2].
     """
@@ -284,7 +284,7 @@ def add_press_accelerations(press, mass, accel):
 
     Parameters
     ----------
-    press : interfaces.arrays.Pressing
+    press : interfaces.arrays.VaryingLoad
     mass : float
         [kg]
     accel : (n,) array
@@ -321,8 +321,8 @@ def solve_friction_step(
         Row of the table for this step.
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
-    press : interfaces.arrays.Pressing
+    faces : interfaces.arrays.PortElements
+    press : interfaces.arrays.VaryingLoad
 
     Returns
     -------
@@ -334,7 +334,7 @@ def solve_friction_step(
         Number of iterations, negative if the solution fails.
     """
     free = (
-        free_slide(motion, modal_system.reach, 0, table, at)
+        free_increment(motion, modal_system, 0, table, at)
         - press.beta[0, 1] * force[0]
         - press.beta[0, 2] * force[1]
     )
@@ -346,7 +346,7 @@ def solve_friction_step(
         if press.beta[0, 0] == 0.0:  # no interface slides
             return coupling.slide_freely(0.0, faces), 0.0, 1
         faces.port[FREE_SPEED, 0] = (
-            free_rate(motion, modal_system.slide, modal_system.free, modal_system.dense, table, at)
+            free_rate(motion, modal_system.slide, modal_system, table, at)
             - faces.gives[GAMMA, 0, 1] * force[0]
             - faces.gives[GAMMA, 0, 2] * force[1]
         )
@@ -357,7 +357,7 @@ def solve_friction_step(
             _, count = coupling.solve_step(q, v, motion, modal_system, table, at, interface, faces)
         return faces.each[INCREMENT, 0], faces.each[ELEMENT_FORCE, 0], count
     else:
-        return contact.solve(
+        return contact.solve_step(
             free,
             press.beta[0, 0],
             q,
@@ -378,7 +378,7 @@ def solve_press_part(heave, pitch, friction, press):
         Increments without interface forces [m], [rad].
     friction : float
         [N]
-    press : interfaces.arrays.Pressing
+    press : interfaces.arrays.VaryingLoad
 
     Returns
     -------
@@ -484,8 +484,8 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, interface, fa
         Row of the table for this step.
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
-    faces : interfaces.arrays.Faces
-    press : interfaces.arrays.Pressing
+    faces : interfaces.arrays.PortElements
+    press : interfaces.arrays.VaryingLoad
 
     Returns
     -------
@@ -502,8 +502,8 @@ def solve_coupled_forces(i, q, v, motion, modal_system, table, at, interface, fa
     is_given = press.loads.size > 0
     moves = not is_given and (beta[1, 1] != 0 or beta[2, 2] != 0)
     is_coupled = moves and (beta[0, 1] != 0 or beta[0, 2] != 0)
-    heave = free_slide(motion, modal_system.reach, 1, table, at)
-    pitch = free_slide(motion, modal_system.reach, 2, table, at)
+    heave = free_increment(motion, modal_system, 1, table, at)
+    pitch = free_increment(motion, modal_system, 2, table, at)
     after = load
     if is_given:
         after = press.loads[i + 1]

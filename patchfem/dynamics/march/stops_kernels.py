@@ -22,12 +22,12 @@ import numpy as np
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INTERNAL, NJIT_NO_REFCOUNT
-from ..dense_kernels import factor, solve
-from ..modal_kernels import accelerations
+from ..dense_kernels import factorise, solve_factorised
+from ..modal_kernels import write_accelerations
 
 # Number of the law in `num` of an element that holds without a stretch; it is set-valued.
 SET_VALUED = 0
-# Rows of `interfaces.arrays.Faces`. `of`: port of an element, whether it is friction, and the element of the other
+# Rows of `interfaces.arrays.PortElements`. `of`: port of an element, whether it is friction, and the element of the other
 # direction of a slide in a plane.
 PORT = 0
 IS_FRICTION = 1
@@ -154,7 +154,7 @@ def solve_shared_forces(which, count, stops):
             a[i, k] = stops.gives[which, names[i], names[k]]
         a[i, i] *= 1 + DIAGONAL_SHIFT
         x[i] = 0.0
-    if not factor(a):
+    if not factorise(a):
         return False
     # the second pass removes the effect of the diagonal shift from independent faces
     for _ in range(2):
@@ -162,7 +162,7 @@ def solve_shared_forces(which, count, stops):
             r[i] = b[i]
             for k in range(count):
                 r[i] -= stops.gives[which, names[i], names[k]] * x[k]
-        solve(a, r[:count])
+        solve_factorised(a, r[:count])
         for i in range(count):
             x[i] += r[i]
     return True
@@ -700,16 +700,7 @@ def find_reactions(motion, modal_system, drive, accel, scratch, stops):
     int
         Number of the forces, 0 if none are found.
     """
-    accelerations(
-        motion,
-        modal_system.omega,
-        modal_system.damp,
-        modal_system.damping,
-        modal_system.base,
-        drive,
-        accel,
-        scratch,
-    )
+    write_accelerations(motion, modal_system, drive, accel, scratch)
     count = list_resting(stops)
     for i in range(count):
         stops.field[RIGHT_SIDE, i] = 0.0

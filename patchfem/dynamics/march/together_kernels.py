@@ -13,7 +13,7 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws import plane_kernels as plane
-from ..dense_kernels import eliminate, factor, solve
+from ..dense_kernels import factorise, solve_by_elimination, solve_factorised
 from . import parts_kernels as parts
 from .stops_kernels import (
     BETA,
@@ -45,7 +45,7 @@ def element_slide(e, y, faces):
         Number of the element.
     y : (n,) array
         What the forces take from the coordinates.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
 
     Returns
     -------
@@ -71,7 +71,7 @@ def slope_along(t, y, step, trial, faces, dt):
     step : (n,) array
     trial : (n,) array
         Space for y + t step.
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
     dt : float
         Length of the step [s].
 
@@ -108,7 +108,7 @@ def newton_equations(y, step, faces, dt, hess):
     y : (n,) array
         What the forces take from the coordinates.
     step : (n,) array
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
     dt : float
         Length of the step [s].
     hess : (n, n) array
@@ -170,9 +170,9 @@ def solve_smooth(faces, dt):
         worst = newton_equations(y, step, faces, dt, hess)
         if turn > 1 and worst <= 0.1:
             return turn
-        if not factor(hess):
+        if not factorise(hess):
             return -turn
-        solve(hess, step)
+        solve_factorised(hess, step)
         begin = slope_along(0.0, y, step, trial, faces, dt)
         low = 0.0
         high = np.inf
@@ -200,7 +200,7 @@ def force_equations(faces, dt, known):
 
     Parameters
     ----------
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
     dt : float
         Length of the step [s].
     known : bool
@@ -261,7 +261,7 @@ def plane_equations(e, f, dx, faces):
         Number of the element of its second direction.
     dx : float
         Increment of the slide of e [m].
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
     """
     beta = faces.gives[BETA]
     p = faces.of[PORT, e]
@@ -289,7 +289,7 @@ def newton_step(faces, dt, known):
 
     Parameters
     ----------
-    faces : interfaces.arrays.Faces
+    faces : interfaces.arrays.PortElements
     dt : float
         Length of the step [s].
     known : bool
@@ -303,7 +303,7 @@ def newton_step(faces, dt, known):
     miss = faces.each[ELEMENT_RESIDUAL]
     force_equations(faces, dt, known)
     # no row exchanges are needed: 1 + slope beta dominates its row for laws that resist the slide
-    if not eliminate(faces.system, miss):
+    if not solve_by_elimination(faces.system, miss):
         return False
     for e in range(count):
         if not np.isfinite(miss[e]):

@@ -21,7 +21,7 @@ from ...friction.laws.stretch import growth_numbers
 from ...friction.laws.tanh import TanhLaw
 from ...slip.shear_modes import N_SHEAR_MODES, enough_modes, shear_modes
 from ..interfaces import arrays
-from ..interfaces.dispatch import COULOMB as COULOMB_LAW
+from ..interfaces.dispatch import COULOMB_LAW
 from .faces import GOAL
 from .instances import SHEARED_LISTS
 from .march import Run
@@ -45,7 +45,7 @@ class Rubbing:
 
     - `kind`: COULOMB, PLASTIC, POINTS, LISTS or RATE.
     - `static`: mu_s, which times the preload is the scale of the residuals.
-    - `force`: first numbers of `interfaces.arrays.Rub`, with v_0 of a rate law in place of mu_k.
+    - `force`: first numbers of `interfaces.arrays.PressedPoints`, with v_0 of a rate law in place of mu_k.
     - `growth`: numbers of the growth of bonds.
     - `length`: bond length [m].
     - `summed`: the Bonds of a list with its cut-off and its merge width, as `models.list_model` takes them.
@@ -167,7 +167,7 @@ def port_rows(modes: ModalBasis) -> np.ndarray:
 
 
 def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
-    """Return the fields of a fresh `interfaces.arrays.Rub` for points under nodal forces.
+    """Return the fields of a fresh `interfaces.arrays.PressedPoints` for points under nodal forces.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def rub_of(law: Rubbing, normal, shear, limit: float) -> tuple:
         np.stack([normal, normal]),
         np.array(psi.T, order="C"),
         np.arange(size),
-        *arrays.sheared(weight, law.length, law.growth, psi, kappa).values(),
+        *arrays.make_sheared_fields(weight, law.length, law.growth, psi, kappa).values(),
     )
 
 
@@ -294,7 +294,7 @@ class VaryingLoadModel:
         """Return fresh points under the nodal forces (m,) [N] of the preload."""
         law = self.law
         if law.kind != LISTS:
-            return arrays.Rub(*rub_of(law, force, self.shear, self.limit))
+            return arrays.PressedPoints(*rub_of(law, force, self.shear, self.limit))
         measure = force + FLOOR * force.mean()
         return lists_model(
             law.summed[0],
@@ -397,7 +397,7 @@ def model_of(
 class VaryingLoadRun(Run):
     """The arrays of a march under a load that varies, and how far it is."""
 
-    def _pressing(self) -> arrays.Pressing:
+    def _pressing(self) -> arrays.VaryingLoad:
         """Return the load at the start, and set what rubs under it.
 
         The contact sets are kept apart, because other runs may ask them.
@@ -419,7 +419,7 @@ class VaryingLoadRun(Run):
         if model.pointed:
             self.contact = model.points(now)
         goal = GOAL * model.limit * (LIST_TOL_FACTOR if model.law.kind == LISTS else 1.0)
-        return arrays.Pressing(
+        return arrays.VaryingLoad(
             (),
             np.ascontiguousarray(model.rows, float),
             self.prop.beta.copy(),
@@ -437,7 +437,7 @@ class VaryingLoadRun(Run):
         press = self.load
         return *super()._changing_arrays(), press.now, press.slot, press.mean, press.few
 
-    def _load(self, count: int) -> arrays.Pressing:
+    def _load(self, count: int) -> arrays.VaryingLoad:
         loads = self.load.loads
         if self.model.load is not None:
             loads = np.array(

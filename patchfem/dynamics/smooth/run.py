@@ -14,9 +14,9 @@ from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import choose_samples_per_cycle
 from ..events.modal_system import drive_segments
 from ..events.positions_kernels import KIND, SEGMENT
-from ..integrated import histories
+from ..integrated import make_histories
 from ..march.march import MarchResult
-from ..periodicity import APART, ahead
+from ..periodicity import FIRST_CHECK, bound_remaining_change
 from .arrays import COUNT, N_NODES, NOW, STATUS, WORK, MotionArrays, MotionRecord
 from .reader import measure_parts
 
@@ -171,7 +171,7 @@ def make_response(modes, drive, rows, stored: float) -> Response:
             np.cumsum(np.where(lost < -noise, -lost, 0.0)),
         ]
     )
-    return histories(
+    return make_histories(
         modes, drive, time, (z, rate), rows[:, 1 + 2 * n : 5 + 2 * n].T, {"ledger": ledger}
     )
 
@@ -291,13 +291,13 @@ class Motion:
         be as small. The last cycle must equal the one before it.
         """
         period = self.drive.period
-        far = 2 * APART
+        far = 2 * FIRST_CHECK
         before = None
         first = ceil(max(self.time, self._segment_starts()[-1]) / period - 1e-9)
         if not self._has_final_sine() or (first + far) * period >= time:
             self.run_to(time)
             return
-        self.run_to((first + APART) * period)
+        self.run_to((first + FIRST_CHECK) * period)
         last = self.arrays.state.copy()
         while self.outcome is None and (first + far) * period < time:
             # 0 marks the cycle as one whose phasor is requested
@@ -308,7 +308,7 @@ class Motion:
             change = self._measure_change(last)
             left = int(time / period + 1e-9) - first - far
             if before is not None and self.outcome is None and left > 0:
-                unlike = ahead(change, before, left, far)
+                unlike = bound_remaining_change(change, before, left, far)
                 if unlike <= MAX_REPEAT_CHANGE * self.tolerance and self._has_equal_cycles(
                     first + far
                 ):

@@ -14,7 +14,15 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_INTERNAL
 from ...friction.laws import stretch_kernels as law
 from ..events.drive_kernels import drive_value
-from ..tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD
+from ..tableau_kernels import (
+    EXTENSION_WEIGHTS,
+    FIRST_COLUMNS,
+    N_STAGES,
+    ORDER_3_WEIGHTS,
+    ORDER_5_WEIGHTS,
+    RUNGE_KUTTA_MATRIX,
+    STAGE_NODES,
+)
 from .arrays import MODE, NOW, TURN, WORK
 
 # smallest size of a number, by which the error of a state at rest is measured
@@ -132,11 +140,11 @@ def write_slopes(motion, t, y, out):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_INTERNAL)
 def write_stage(motion, stage, h, size):
     """Write the state at a stage of a step of h [s] into work[WORK.trial]."""
-    first = SHARES[stage, 0]
-    share = SHARES[stage]
+    first = RUNGE_KUTTA_MATRIX[stage, 0]
+    share = RUNGE_KUTTA_MATRIX[stage]
     for c in range(size):
         part = first * motion.work[0, c]
-        for j in range(BEFORE[stage], stage):
+        for j in range(FIRST_COLUMNS[stage], stage):
             part += share[j] * motion.work[j, c]
         motion.work[WORK.trial, c] = motion.state[c] + h * part
 
@@ -152,7 +160,9 @@ def take_step(motion, h):
     last = motion.work.shape[0] - 14
     for stage in range(1, last + 1):
         write_stage(motion, stage, h, size if stage == last else size - 3)
-        write_slopes(motion, t + PLACES[stage] * h, motion.work[WORK.trial], motion.work[stage])
+        write_slopes(
+            motion, t + STAGE_NODES[stage] * h, motion.work[WORK.trial], motion.work[stage]
+        )
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
@@ -181,8 +191,8 @@ def estimate_error(motion, h, tolerance):
         high = 0.0
         low = 0.0
         for j in range(12):
-            high += FIFTH[j] * motion.work[j, c]
-            low += THIRD[j] * motion.work[j, c]
+            high += ORDER_5_WEIGHTS[j] * motion.work[j, c]
+            low += ORDER_3_WEIGHTS[j] * motion.work[j, c]
         top = (
             max(abs(motion.state[c]), abs(motion.work[WORK.trial, c]), motion.work[WORK.sizes, c])
             if c < 2 * n
@@ -211,9 +221,11 @@ def extend_step(motion, h):
     size = motion.state.size
     for c in range(size):  # the stages overwrite it
         motion.work[WORK.extension + 7, c] = motion.work[WORK.trial, c]
-    for stage in range(13, STAGES):
+    for stage in range(13, N_STAGES):
         write_stage(motion, stage, h, size - 3)
-        write_slopes(motion, t + PLACES[stage] * h, motion.work[WORK.trial], motion.work[stage])
+        write_slopes(
+            motion, t + STAGE_NODES[stage] * h, motion.work[WORK.trial], motion.work[stage]
+        )
     for c in range(size):
         motion.work[WORK.trial, c] = motion.work[WORK.extension + 7, c]
         rise = motion.work[WORK.trial, c] - motion.state[c]
@@ -221,9 +233,9 @@ def extend_step(motion, h):
         motion.work[WORK.extension + 1, c] = h * motion.work[0, c] - rise
         motion.work[WORK.extension + 2, c] = 2 * rise - h * (motion.work[12, c] + motion.work[0, c])
         for k in range(4):
-            part = INSIDE[k, 0] * motion.work[0, c]
-            for j in range(5, STAGES):
-                part += INSIDE[k, j] * motion.work[j, c]
+            part = EXTENSION_WEIGHTS[k, 0] * motion.work[0, c]
+            for j in range(5, N_STAGES):
+                part += EXTENSION_WEIGHTS[k, j] * motion.work[j, c]
             motion.work[WORK.extension + 3 + k, c] = h * part
 
 

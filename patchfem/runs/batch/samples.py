@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from ...core import Response
-from ...dynamics.integrated import start_phase
+from ...dynamics.integrated import mean_slip_phase
 from ...response.loops import find_reversals, interface_loops, mean_half_range, secant_stiffness
 from ...response.measures import (
     COORDINATE_ROUND_OFF,
@@ -244,7 +244,7 @@ class Samples:
         return {
             "slip_amplitude": np.ptp(slip, axis=0) / 2,
             "stick_fraction": below.mean(axis=0),
-            "slip_start_phase": start_phase(count, *sums),
+            "slip_start_phase": mean_slip_phase(count, *sums),
         }
 
     def window_of(self, run: int, acceleration) -> Response:

@@ -367,7 +367,7 @@ def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[Memory
     width = 2.0 * len(rig.structure.frequencies) + 12 + 6 * len(rig.friction.interfaces)
     length_key = "drive.duration" if rig.drive.waveform.is_random else "drive.cycles"
     key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else length_key
-    turns = min(TURNS * rig.drive.cycles, checkpoint.MOST_KEPT)
+    turns = min(TURNS * rig.drive.cycles, checkpoint.MAX_EARLY_SAMPLES)
     early = history.cycle * rig.drive.cycles + history.turn * width * turns
     return (
         MemoryPart(

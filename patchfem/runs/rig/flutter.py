@@ -17,12 +17,13 @@ from .steady.balance import BalanceFinder
 NAME = "flutter_amplitude"
 ALONE = "no mode with negative damping moves an interface, so friction cannot dissipate the energy of such a mode"
 NONE = (
-    f"no unstable limit cycle was found at amplitudes between {limit_cycles.LOW:g} and {limit_cycles.HIGH:g} times "
-    "4 F/(pi |c| omega), where F is the friction force and c is the damping coefficient"
+    f"no unstable limit cycle was found at amplitudes between {limit_cycles.MIN_AMPLITUDE_RATIO:g} and "
+    f"{limit_cycles.MAX_AMPLITUDE_RATIO:g} times 4 F/(pi |c| omega), where F is the friction force and c is the "
+    "damping coefficient"
 )
 FEWER = (
-    f"no unstable limit cycle was found at amplitudes between {limit_cycles.SLIDING:g} and {limit_cycles.HIGH:g} "
-    "times 4 F/(pi |c| omega), and smaller free motions could not be followed"
+    f"no unstable limit cycle was found at amplitudes between {limit_cycles.MIN_SLIDING_RATIO:g} and "
+    f"{limit_cycles.MAX_AMPLITUDE_RATIO:g} times 4 F/(pi |c| omega), and smaller free motions could not be followed"
 )
 UNBALANCED = (
     'with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
@@ -91,7 +92,7 @@ def _cycles(model, numerics, patch) -> tuple:
     if len(rig.friction.interfaces) != 1 or f is None:
         return [], "limit cycles can be computed for one interface only", 0.0
     modes, row = rig.modes, rig.modes.interfaces[0]
-    if not row[limit_cycles.unstable_modes(modes)].any():
+    if not row[limit_cycles.find_unstable_modes(modes)].any():
         return [], ALONE, 0.0
     load = patch.pressure.load if patch is not None else model.point.load
     if reason := ENGINES["harmonic"].lacks(model, steady=True):
@@ -112,9 +113,9 @@ def _cycles(model, numerics, patch) -> tuple:
                     0.0,
                 )
             static, kinetic = contact.element.numbers[1:3]
-            return limit_cycles.of_relay(modes, row, kinetic, static), SLIDES, 0.0
+            return limit_cycles.find_relay_cycles(modes, row, kinetic, static), SLIDES, 0.0
         finder = BalanceFinder(model, numerics, patch)
-        cycles, looked = limit_cycles.of_balance(modes, finder.group, row, f.static * load)
+        cycles, looked = limit_cycles.find_balance_cycles(modes, finder.group, row, f.static * load)
         return cycles, NONE if not looked else FEWER, looked
     except NotConverged as missing:
         return [], str(missing), 0.0

@@ -17,7 +17,7 @@ from patchfem.dynamics.harmonic.harmonic import Balance
 from patchfem.dynamics.harmonic.laws import Jenkins, Spring, synthesis
 from patchfem.dynamics.harmonic.point import point
 from patchfem.dynamics.harmonic.stability import monodromy_of, with_stability
-from patchfem.dynamics.periodic import multipliers
+from patchfem.dynamics.periodic import find_multipliers
 
 W = 2 * np.pi * 143
 MASS = 0.884
@@ -196,7 +196,7 @@ def test_exact_a_perturbed_march_of_elements(omega):
     unit = np.repeat([1.0, omega], 5)
     block = (found[:10, :10] * unit[:, None] / unit)[:, [0, 1, 4, 5, 6]]
     assert np.abs(block - np.array(columns).T).max() < 1.5e-3 * np.abs(block).max()
-    assert np.sum(np.abs(multipliers(found)) < 1e-4) >= found.shape[0] - 10
+    assert np.sum(np.abs(find_multipliers(found)) < 1e-4) >= found.shape[0] - 10
 
 
 def test_exact_bonds_forget_as_a_march_does():

@@ -11,7 +11,7 @@ from patchfem.contact.unilateral import solve_forces
 from patchfem.core import InitialState, PatchfemError, SineDrive
 from patchfem.dynamics.march import march as plain
 from patchfem.dynamics.march import models, varying_load
-from patchfem.dynamics.propagator import propagator
+from patchfem.dynamics.propagator import make_propagator
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import FirstOrderBonds, advance_bonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
@@ -37,7 +37,7 @@ def reduced(sets, law, count=None, depth: float = 3e-8, tolerance: float = 1e-3)
 def dense(basis, drive, law, sets, response, steps: int) -> tuple:
     """Slides, friction forces and energy lost by a march on the nodes themselves: displacements u (m,) of the pieces
     behind the stiffness C^-1, bench laws, a general root finder; the nodal forces from heave and turn of a run."""
-    p = propagator(basis, drive, steps)
+    p = make_propagator(basis, drive, steps)
     table, beta = p.tables(drive, 0, steps), p.beta[0, 0]
     stiff = np.linalg.inv(giving(sets.x))
     motion = zip(-response.extra["heave"], response.extra["turn"])

@@ -40,7 +40,8 @@ SIZES = {  # constant -> what it bounds and how it is written
     "runs.rig.costs.MAX_EXACT_SECONDS": "estimated time to compute a whole motion by the event-to-event method [s]",
     "structure.drive_sizes.MAX_STORED_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
     "least 20 per cycle; of a longer release turning points and the last cycles",
-    "dynamics.checkpoint.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out",
+    "dynamics.checkpoint.MAX_EARLY_SAMPLES": "number of samples stored before the last cycles; longer records are "
+    "thinned out",
 }
 LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every

@@ -19,7 +19,7 @@ from ....dynamics.harmonic.laws import Interlock, Spring
 from ....dynamics.harmonic.point import point as periodic_point
 from ....dynamics.harmonic.point import refine_point
 from ....dynamics.harmonic.stability import with_stability
-from ....dynamics.integrated import Run
+from ....dynamics.integrated import EngineResult
 from ....formatting import format_length
 from ....response.errors import finer_errors
 from ....response.measures import compute_acceleration_peak
@@ -244,7 +244,7 @@ class BalanceFinder:
         top = found.amplitude(self.modes.output)
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
-        run = Run(response, response, extremes, np.zeros(1), book)
+        run = EngineResult(response, response, extremes, np.zeros(1), book)
         reader = Balanced(self.model, self.numerics, self.patch, steps=samples)
         reader.turns = found.turns()
         return reader.values(run, drive), response, book

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ....core import NotConverged, Outcome, SineDrive
-from ....dynamics.curve_points import adapted
+from ....dynamics.curve_points import sample_adaptively
 from ....response.levels import LEVEL_MEASURES, Level
 from ..solution import seen_by_gauge
 
@@ -162,7 +162,7 @@ def trace_curve(modes, drive, find) -> list:
         )
         return one.values.get(SHOWN["amplitude"], np.nan), one
 
-    return [one for _, one in adapted(found, starts_of(modes, drive), SHARE)[1]]
+    return [one for _, one in sample_adaptively(found, starts_of(modes, drive), SHARE)[1]]
 
 
 def starts_of(modes, drive) -> np.ndarray:
