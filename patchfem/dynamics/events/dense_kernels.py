@@ -4,7 +4,7 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .drive_kernels import expand_drive, fastest_drive_rate
 from .memory_kernels import RIGID_STIFFNESS
-from .positions_kernels import COLUMN, HOLD, N_COLUMNS, ROW, SEGMENT
+from .positions_kernels import COLUMN, CONSTRAINT, N_COLUMNS, ROW, SEGMENT
 from .search_kernels import displacement_at, expand_speed
 from .series_kernels import (
     MAX_RATE_TIME,
@@ -20,10 +20,25 @@ from .stick_kernels import constrain_slides
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def expand_row(row, h, modal_system, time_state, workspace):
-    """Expand the piece of a row over h [s] into the workspace; returns the highest power.
+    """Expand the piece of a row into the workspace.
 
-    The constraint is built again where the held interfaces differ from those of the row before;
-    constraint.status[HOLD.n_held] < 0 asks for it.
+    The constraint is built again where other interfaces stick than in the row before;
+    constraint.status[CONSTRAINT.n_sticking] < 0 requests it.
+
+    Parameters
+    ----------
+    row : ndarray
+        (w,) row of a piece, see `RowColumns`.
+    h : float
+        Duration [s].
+    modal_system : ModalSystem
+    time_state : TimeState
+    workspace : Workspace
+
+    Returns
+    -------
+    int
+        Highest power of the series.
     """
     constraint = workspace.constraint
     n = len(modal_system.omega_squared)
@@ -35,11 +50,11 @@ def expand_row(row, h, modal_system, time_state, workspace):
     for f in range(n_interfaces):
         workspace.polynomials[n_interfaces, f] = row[start + N_COLUMNS * f + COLUMN.force]
         workspace.stiffness[f] = row[start + N_COLUMNS * f + COLUMN.stiffness]
-        is_held = 1.0 if workspace.stiffness[f] == RIGID_STIFFNESS else 0.0
-        if constraint.is_held[f] != is_held:
-            constraint.is_held[f] = is_held
-            constraint.status[HOLD.n_held] = -1.0
-    if constraint.status[HOLD.n_held] < 0.0:
+        is_sticking = 1.0 if workspace.stiffness[f] == RIGID_STIFFNESS else 0.0
+        if constraint.is_sticking[f] != is_sticking:
+            constraint.is_sticking[f] = is_sticking
+            constraint.status[CONSTRAINT.n_sticking] = -1.0
+    if constraint.status[CONSTRAINT.n_sticking] < 0.0:
         constrain_slides(modal_system, workspace)
     modal_rate = bound_modal_rate(modal_system, workspace)
     rate = fastest_drive_rate(segment, time_state.period[0])
@@ -105,7 +120,7 @@ def evaluate_rows(rows, owner, tau, modal_system, time_state, workspace, out):
     last = -1
     top = 0
     h = 1.0
-    workspace.constraint.status[HOLD.n_held] = -1.0
+    workspace.constraint.status[CONSTRAINT.n_sticking] = -1.0
     for j in range(owner.size):
         row = rows[owner[j]]
         if owner[j] != last:
@@ -167,7 +182,7 @@ def find_peaks(rows, modal_system, time_state, base_moves, workspace, reactions)
     largest = 0.0
     n_interfaces = len(modal_system.inverse_mass)
     poly = workspace.polynomials[n_interfaces]
-    workspace.constraint.status[HOLD.n_held] = -1.0
+    workspace.constraint.status[CONSTRAINT.n_sticking] = -1.0
     for f in range(n_interfaces):
         reactions[f] = 0.0
     for j in range(rows.shape[0]):

@@ -14,7 +14,23 @@ from .series_kernels import DOUBLE_INTEGRAL
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def time_since_start(segment, cycle, offset, period):
-    """Return the time [s] since a segment began."""
+    """Return the time [s] since a segment began.
+
+    Parameters
+    ----------
+    segment : ndarray
+        (12,) segment of the drive, see `SegmentColumns`.
+    cycle : float
+        Number of the cycle.
+    offset : float
+        Time since the start of the cycle [s].
+    period : float
+        Duration of a cycle [s].
+
+    Returns
+    -------
+    float
+    """
     return (cycle - segment[SEGMENT.cycle]) * period + (offset - segment[SEGMENT.offset])
 
 
@@ -29,7 +45,25 @@ def fastest_drive_rate(segment, period):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def drive_phase(segment, cycle, offset, period):
-    """Return the phase of the drive [rad] in [0, 2 pi); along a straight line that of the cycle."""
+    """Return the phase of the drive [rad] in [0, 2 pi).
+
+    Along a straight line it is the phase of the cycle.
+
+    Parameters
+    ----------
+    segment : ndarray
+        (12,) segment of the drive, see `SegmentColumns`.
+    cycle : float
+        Number of the cycle.
+    offset : float
+        Time since the start of the cycle [s].
+    period : float
+        Duration of a cycle [s].
+
+    Returns
+    -------
+    float
+    """
     if segment[SEGMENT.kind] == KIND.sine:
         theta = segment[SEGMENT.phase] + segment[SEGMENT.omega] * offset
         cycles = cycle - segment[SEGMENT.cycle]
@@ -54,7 +88,23 @@ def drive_phase(segment, cycle, offset, period):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def drive_value(segment, cycle, offset, period):
-    """Return the acceleration [m s-2] of a segment at a time (cycle, offset [s])."""
+    """Return the acceleration of a segment of the drive [m s-2].
+
+    Parameters
+    ----------
+    segment : ndarray
+        (12,) segment of the drive, see `SegmentColumns`.
+    cycle : float
+        Number of the cycle.
+    offset : float
+        Time since the start of the cycle [s].
+    period : float
+        Duration of a cycle [s].
+
+    Returns
+    -------
+    float
+    """
     kind = segment[SEGMENT.kind]
     theta = drive_phase(segment, cycle, offset, period)
     time = time_since_start(segment, cycle, offset, period)

@@ -1,7 +1,6 @@
 """Parallel elements of an interface, rigid (Coulomb) and elastic-plastic, and their memory.
-
-All elements share the relative displacement of their interface. The elastic-plastic ones are sorted by yield slide, the
-stretch at which they slip.
+ All elements share the relative displacement of their interface. The elastic-plastic ones are
+sorted by yield slide, the stretch at which they slip.
 """
 
 from dataclasses import dataclass
@@ -23,9 +22,11 @@ class Elements:
 
     - stiffness: (t,) k_j [N/m]
     - yield_displacement: (t,) y_j [m], in increasing order
-    - rank: (a,) number of the element that each given element became part of; -1 for one without stiffness or yield
+    - rank: (a,) number of the element that each given element became part of; -1 for one without
+    stiffness or yield
       slide, which carries nothing
-    - static, kinetic: limits of the rigid element [N]; it holds the relative displacement until its reaction reaches
+    - static, kinetic: limits of the rigid element [N]; it holds the relative displacement until its
+    reaction reaches
       `static` and then slips under `kinetic`; static = 0 stands for no rigid element
     """
 
@@ -115,8 +116,8 @@ def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elemen
     count : int, optional
         Elements that become one, neighbours by yield slide.
     first : int, optional
-        First element that is merged with those after it; those before it become one too. The last one of an odd number
-        stays.
+        First element that is merged with those after it; those before it become one too. The last
+        one of an odd number stays.
 
     Returns
     -------
@@ -162,7 +163,8 @@ class ElementTable(NamedTuple):
 
     - n_elements: (i,) number of elements
     - yield_slide: (i, t + 1) [m], infinite after the last element
-    - stiffness_sum, limit_sum, energy_sum: (i, t + 1) sums of k [N/m], k y [N] and k y^2 [J] over the first j elements
+    - stiffness_sum, limit_sum, energy_sum: (i, t + 1) sums of k [N/m], k y [N] and k y^2 [J] over
+    the first j elements
     - static_limit, kinetic_limit: (i,) limits of the rigid elements [N], 0 where there is none
     """
 
@@ -200,14 +202,19 @@ class Memory(NamedTuple):
     """Memory of the elements of all interfaces (i).
 
     - slide: (i,) relative displacement [m]
-    - n_slipping, direction: (i,) number of elements that slip, the first ones of the list, and the sign of their slip
-    - n_groups: (i,) groups of elements that stopped together at a turning point, the innermost group last
+    - n_slipping, direction: (i,) number of elements that slip, the first ones of the list, and the
+    sign of their slip
+    - n_groups: (i,) groups of elements that stopped together at a turning point, the innermost
+    group last
     - group_end: (i, t + 2) end of a group in the list; it begins where the group inside it ends
-    - group_slide, group_sign: (i, t + 2) relative displacement [m] at which a group stopped, and the sign of its slip
-      before; the sign is 0 for elements that never slipped, which are unstretched at that displacement
+    - group_slide, group_sign: (i, t + 2) relative displacement [m] at which a group stopped, and
+    the sign of its slip
+      before; the sign is 0 for elements that never slipped, which are unstretched at that
+      displacement
     - force, slip: (i,) force [N], and mean slip [m] weighted with k y
     - work, loss: (i,) work done on the elements and energy that they dissipated [J]
-    - rigid_state: (i,) sign of the slip of the rigid element, 0 in stick, and twice the sign where it is at its limit
+    - rigid_state: (i,) sign of the slip of the rigid element, 0 in stick, and twice the sign where
+    it is at its limit
       while other interfaces hold this relative displacement
     """
 

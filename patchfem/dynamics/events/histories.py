@@ -412,9 +412,17 @@ class _Run:
     def run_to(self, cycles: float, keep=None, progress=None) -> None:
         """Run up to a time in cycles.
 
-        keep: is called with the rows as they are computed; None where none is needed. Where the
-        motion repeats and the rows are not needed one by one, the last cycle is counted for the
-        cycles that remain.
+        Where the motion repeats and the rows are not needed one by one, the last cycle is counted
+        for the cycles that remain.
+
+        Parameters
+        ----------
+        cycles : float
+            Time in cycles at which the run stops.
+        keep : callable or None
+            keep(rows) is called with rows as they are computed.
+        progress : callable or None
+            progress(fraction) is called with the fraction of the run that is done.
         """
         stop = split_time(cycles * self.period, self.period)
         rows = self.rows[:0] if keep is None else self.rows
@@ -848,7 +856,22 @@ class _Run:
         )
 
     def evaluate_rows(self, rows, owner, tau) -> np.ndarray:
-        """Return the columns of `dense_kernels.evaluate_rows` at tau (k,) [s] after rows (k,)."""
+        """Evaluate the motion at times after the starts of rows.
+
+        Parameters
+        ----------
+        rows : ndarray
+            (r, w) rows of pieces.
+        owner : ndarray
+            (k,) row of each time.
+        tau : ndarray
+            (k,) time since the start of that row [s].
+
+        Returns
+        -------
+        ndarray
+            (k, c) columns as of `dense_kernels.evaluate_rows`.
+        """
         out = np.empty((owner.size, 2 * self.modes.omega.size + 1 + 6 * len(self.groups)))
         self.dense.evaluate_rows(
             rows, owner, tau, self.modal_system, self.time_state, self.scratch, out

@@ -6,6 +6,8 @@ asks. An event is a yield, the release of an interface that a rigid element hold
 of an interface or of the output (`search_kernels`), or a border of the drive.
 """
 
+from typing import NamedTuple
+
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .drive_kernels import drive_phase, drive_value, expand_drive, fastest_drive_rate
@@ -13,7 +15,7 @@ from .memory_kernels import (
     find_force_and_energy,
     find_tangent,
     interface_force,
-    is_held,
+    is_sticking,
     next_yield_slide,
     release_next_element,
     store_turning_point,
@@ -32,7 +34,13 @@ from .positions_kernels import (
     TIME,
 )
 from .repeat_kernels import detect_repeat, forget_previous
-from .search_kernels import displacement_at, expand_speed, find_crossing, find_next_event
+from .search_kernels import (
+    NextEvent,
+    displacement_at,
+    expand_speed,
+    find_crossing,
+    find_next_event,
+)
 from .series_kernels import (
     EPS,
     MAX_RATE_TIME,
@@ -44,7 +52,12 @@ from .series_kernels import (
     find_highest_power,
 )
 from .slow_kernels import find_slow_rate, shorten_series
-from .stick_kernels import MAX_ORDER, choose_sticks, correct_held_slides, find_resting_slides
+from .stick_kernels import (
+    MAX_ORDER,
+    choose_sticks,
+    correct_sticking_slides,
+    find_resting_interfaces,
+)
 from .sum_kernels import add_piece_sums
 
 # fraction of a piece within which an interface that was at rest at a turning point still rests, so that no second
@@ -58,8 +71,23 @@ YIELD_MARGIN = 1.3
 MIN_FRACTION = 0.02
 # fraction of the sum of magnitudes of a velocity, below which it is round-off
 REST_TOL = 64 * EPS
-# [fraction of a cycle] progress below which an event counts as idle
+# progress in time as a fraction of a cycle, below which an event counts as idle
 MIN_PROGRESS = 1e-13
+
+
+class Piece(NamedTuple):
+    """A piece of the motion, whose series is in the workspace.
+
+    - duration: [s]
+    - rate: fastest rate [1/s], by which the duration was chosen
+    - top: highest power of the series
+    - remaining: time from its start to the next border [s]
+    """
+
+    duration: float
+    rate: float
+    top: int
+    remaining: float
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -84,11 +112,20 @@ def time_to_border(time_state, stop):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def step_to_border(time_state, stop, remaining):
-    """Move the time to the border that is `remaining` [s] away.
+    """Move the time to the next border.
 
-    Returns whether the drive changes there.
+    Parameters
+    ----------
+    time_state : TimeState
+    stop : tuple
+        Cycle and offset [s] at which the march stops.
+    remaining : float
+        Time to the border [s].
 
-    The drive changes from one sine to another, or by a jump.
+    Returns
+    -------
+    bool
+        Whether the drive changes there, from one sine to another or by a jump.
     """
     before = int(time_state.now[TIME.segment])
     cycle = time_state.now[TIME.cycle]
@@ -134,7 +171,7 @@ def step_to_border(time_state, stop, remaining):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def write_row(row, motion, duration, theta, begin, modal_system, table, memory, time_state):
+def write_row(row, motion, duration, phase, begin, modal_system, table, memory, time_state):
     """Write the row of a piece as it begins.
 
     Parameters
@@ -144,7 +181,7 @@ def write_row(row, motion, duration, theta, begin, modal_system, table, memory, 
     motion, modal_system, table, memory, time_state
     duration : float
         [s].
-    theta : float
+    phase : float
         Phase of the drive [rad].
     begin : float
         A number of `RowBegins`.
@@ -153,7 +190,7 @@ def write_row(row, motion, duration, theta, begin, modal_system, table, memory, 
     now = time_state.now
     row[ROW.time] = now[TIME.cycle] * time_state.period[0] + now[TIME.offset]
     row[ROW.duration] = duration
-    row[ROW.phase] = theta
+    row[ROW.phase] = phase
     row[ROW.segment] = now[TIME.segment]
     row[ROW.begin] = begin
     row[ROW.cycle] = now[TIME.cycle]
@@ -180,13 +217,31 @@ def write_row(row, motion, duration, theta, begin, modal_system, table, memory, 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def move_state(u, h, top, motion, modal_system, table, memory, time_state, run_sums, workspace):
-    """Move coordinates, interfaces and elements to u, and add their energies."""
+    """Move coordinates, interfaces and elements over a piece up to u, and add their energies.
+
+    Parameters
+    ----------
+    u : float
+        Fraction of the piece.
+    h : float
+        Duration of the piece [s].
+    top : int
+        Highest power of the series.
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    time_state : TimeState
+    run_sums : RunSums
+    workspace : Workspace
+    """
     n_interfaces = len(modal_system.inverse_mass)
     n = len(modal_system.omega_squared)
     coefs = workspace.coefficients
     ledger = run_sums.ledger
     for f in range(n_interfaces):
-        if is_held(f, table, memory):
+        if is_sticking(f, table, memory):
             memory.force[f] = evaluate_polynomial(workspace.constraint.reactions[f], 0, top - 2, u)
             continue
         stiffness, slipping, limit = find_tangent(f, table, memory)
@@ -211,19 +266,27 @@ def move_state(u, h, top, motion, modal_system, table, memory, time_state, run_s
         motion[1, i] = rate / h
         out += modal_system.output[i] * motion[0, i]
     for f in range(n_interfaces):
-        if is_held(f, table, memory):
+        if is_sticking(f, table, memory):
             continue
         place = 0.0
         for i in range(n):
             place += modal_system.interfaces[f, i] * motion[0, i]
         memory.slide[f] = place
-    correct_held_slides(motion, modal_system, memory, workspace)
+    correct_sticking_slides(motion, modal_system, memory, workspace)
     widen_extremes(out, time_state, run_sums)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def widen_extremes(out, time_state, run_sums):
-    """Widen the extremes of the present cycle by an output [m]."""
+    """Widen the extremes of the present cycle by an output.
+
+    Parameters
+    ----------
+    out : float
+        Displacement of the output [m].
+    time_state : TimeState
+    run_sums : RunSums
+    """
     cycle = int(time_state.now[TIME.cycle])
     run_sums.extremes[cycle, 0] = min(run_sums.extremes[cycle, 0], out)
     run_sums.extremes[cycle, 1] = max(run_sums.extremes[cycle, 1], out)
@@ -233,7 +296,20 @@ def widen_extremes(out, time_state, run_sums):
     error_model="numpy", cache=True, forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT
 )
 def stored_energy(motion, modal_system, table, memory):
-    """Return the energy [J] of the modes and of the elements."""
+    """Return the energy of the modes and of the elements [J].
+
+    Parameters
+    ----------
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+
+    Returns
+    -------
+    float
+    """
     out = 0.0
     for i in range(len(modal_system.omega_squared)):
         out += motion[1, i] ** 2 + modal_system.omega_squared[i] * motion[0, i] ** 2
@@ -244,10 +320,24 @@ def stored_energy(motion, modal_system, table, memory):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def choose_sticks_here(motion, modal_system, table, memory, time_state, workspace):
-    """Choose which interfaces stick from here on; returns whether a choice was found.
+def choose_current_sticks(motion, modal_system, table, memory, time_state, workspace):
+    """Choose which interfaces stick from the present time on.
 
-    workspace.choice holds the guess and which interfaces are at rest.
+    Parameters
+    ----------
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    time_state : TimeState
+    workspace : Workspace
+        Its `choice` holds the guess and which interfaces are at rest.
+
+    Returns
+    -------
+    bool
+        Whether a choice was found.
     """
     segment = time_state.segments[int(time_state.now[TIME.segment])]
     now = time_state.now
@@ -276,9 +366,24 @@ def choose_sticks_here(motion, modal_system, table, memory, time_state, workspac
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def choose_initial_sticks(motion, modal_system, table, memory, time_state, workspace):
-    """Choose which interfaces stick at the start of a run; returns whether a choice was found.
+    """Choose which interfaces stick at the start of a run.
 
     The guess is that a rigid element sticks where its interface is at rest.
+
+    Parameters
+    ----------
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    time_state : TimeState
+    workspace : Workspace
+
+    Returns
+    -------
+    bool
+        Whether a choice was found.
     """
     choice = workspace.choice
     has_rigid = False
@@ -304,12 +409,25 @@ def choose_initial_sticks(motion, modal_system, table, memory, time_state, works
         memory.rigid_state[f] = choice.slip_signs[f]
     if not has_rigid:
         return True
-    return choose_sticks_here(motion, modal_system, table, memory, time_state, workspace)
+    return choose_current_sticks(motion, modal_system, table, memory, time_state, workspace)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def estimate_time_to_yield(motion, modal_system, table, memory):
-    """Estimate the time [s] to the next yield from the present speeds."""
+    """Estimate the time to the next yield [s] from the present speeds.
+
+    Parameters
+    ----------
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+
+    Returns
+    -------
+    float
+    """
     time = 1e300
     for f in range(len(modal_system.inverse_mass)):
         speed = 0.0
@@ -331,12 +449,23 @@ def output_displacement(motion, modal_system):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def apply_event(kind, interface, sign, modal_system, table, memory, time_state):
-    """Apply an event to the elements, and record which interfaces are at rest."""
+def apply_event(event, modal_system, table, memory, time_state):
+    """Apply an event to the elements, and record which interfaces are at rest.
+
+    Parameters
+    ----------
+    event : NextEvent
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    time_state : TimeState
+    """
+    kind = event.kind
+    interface = event.interface
     if kind != EVENT.none and kind != EVENT.output_reversal:
         time_state.now[TIME.n_quiet] = 0.0
     if kind == EVENT.yielding:
-        release_next_element(interface, sign, table, memory)
+        release_next_element(interface, event.sign, table, memory)
     elif kind == EVENT.reversal:
         store_turning_point(interface, memory)
         time_state.is_at_turn[interface] = 1.0
@@ -350,10 +479,28 @@ def apply_event(kind, interface, sign, modal_system, table, memory, time_state):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def expand_piece(h, rate, slow_rate, motion, force, modal_system, time_state, workspace):
-    """Expand the motion over a piece of h [s]; returns the highest power.
+    """Expand the motion over a piece.
 
-    rate: fastest rate [1/s]; slow_rate: as of `find_slow_rate`, whose series is in the workspace
-    where it is not 0.
+    Parameters
+    ----------
+    h : float
+        Duration of the piece [s].
+    rate : float
+        Fastest rate [1/s].
+    slow_rate : float
+        As of `find_slow_rate`, whose series is in the workspace where it is not 0.
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    force : ndarray
+        (i,) forces at the start [N].
+    modal_system : ModalSystem
+    time_state : TimeState
+    workspace : Workspace
+
+    Returns
+    -------
+    int
+        Highest power of the series.
     """
     top = find_highest_power(rate * h)
     now = time_state.now
@@ -389,9 +536,25 @@ def expand_piece(h, rate, slow_rate, motion, force, modal_system, time_state, wo
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_travel_crossing(top, modal_system, motion, workspace, travel, u):
-    """Return u at which the output passes +-travel [m]; NO_ROOT if it does not.
+    """Return the fraction of a piece at which the output passes +-travel.
 
-    The output is monotone up to u.
+    Parameters
+    ----------
+    top : int
+        Highest power of the series.
+    modal_system : ModalSystem
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    workspace : Workspace
+    travel : float
+        Travel of the output [m].
+    u : float
+        Fraction of the piece up to which the output is monotone.
+
+    Returns
+    -------
+    float
+        NO_ROOT if it does not.
     """
     n_interfaces = len(modal_system.inverse_mass)
     poly = workspace.polynomials[n_interfaces + 1]
@@ -409,10 +572,26 @@ def find_travel_crossing(top, modal_system, motion, workspace, travel, u):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def choose_length(rate, remaining, motion, modal_system, table, memory):
-    """Return the duration [s] of the next piece, at most `remaining`; rate: fastest rate [1/s].
+    """Return the duration of the next piece [s].
 
-    It ends just after the next yield that the present speeds predict, but is at least MIN_FRACTION of
-    the longest piece.
+    The piece ends just after the next yield that the present speeds predict, but lasts at least
+    MIN_FRACTION of the longest piece.
+
+    Parameters
+    ----------
+    rate : float
+        Fastest rate [1/s].
+    remaining : float
+        Time to the next border [s], the largest duration.
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+
+    Returns
+    -------
+    float
     """
     to_yield = rate * estimate_time_to_yield(motion, modal_system, table, memory)
     return min(MAX_RATE_TIME / rate * min(1.0, max(to_yield, MIN_FRACTION)), remaining)
@@ -422,14 +601,21 @@ def choose_length(rate, remaining, motion, modal_system, table, memory):
 def start_piece(remaining, motion, modal_system, table, memory, time_state, workspace):
     """Choose the length of the next piece and expand the motion over it.
 
+    Parameters
+    ----------
+    remaining : float
+        Time to the next border [s].
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    time_state : TimeState
+    workspace : Workspace
+
     Returns
     -------
-    h : float
-        Duration [s], at most `remaining`.
-    rate : float
-        Fastest rate [1/s] by which it was chosen.
-    top : int
-        Highest power of the series.
+    Piece
     """
     n_interfaces = len(modal_system.inverse_mass)
     segment = time_state.segments[int(time_state.now[TIME.segment])]
@@ -447,16 +633,104 @@ def start_piece(remaining, motion, modal_system, table, memory, time_state, work
         h, rate, slow_rate, motion, memory.force, modal_system, time_state, workspace
     )
     for f in range(n_interfaces):
-        if is_held(f, table, memory):
+        if is_sticking(f, table, memory):
             memory.force[f] = workspace.constraint.reactions[f, 0]
-    return h, rate, top
+    return Piece(h, rate, top, remaining)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def find_piece_end(top, motion, modal_system, table, memory, time_state, run_sums, workspace):
+    """Find the first event of a piece, including the end of the travel of the output.
+
+    Parameters
+    ----------
+    top : int
+        Highest power of the series.
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    time_state : TimeState
+    run_sums : RunSums
+    workspace : Workspace
+
+    Returns
+    -------
+    NextEvent
+    """
+    event = find_next_event(top, modal_system, table, memory, time_state, workspace)
+    travel = run_sums.limits[LIMIT.travel]
+    if travel < 1e300 and event.u > 0:
+        root = find_travel_crossing(top, modal_system, motion, workspace, travel, event.u)
+        if root <= event.u:
+            return NextEvent(root, EVENT.travel, event.interface, event.sign)
+    return event
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def reaches_border(piece, u, now):
+    """Return whether a motion up to u of a piece reaches the border, to round-off.
+
+    Parameters
+    ----------
+    piece : Piece
+    u : float
+        Fraction of the piece.
+    now : ndarray
+        `TimeState.now` at the start of the piece.
+
+    Returns
+    -------
+    bool
+    """
+    if piece.duration != piece.remaining:
+        return False
+    offset = now[TIME.offset]
+    return u == 1.0 or offset + u * piece.duration >= offset + piece.remaining
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def reset_forces(modal_system, table, memory):
+    """Compute the forces of all interfaces from their memory, without accumulated round-off.
+
+    Parameters
+    ----------
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+        Its forces are written.
+    """
+    for f in range(len(modal_system.inverse_mass)):
+        memory.force[f] = interface_force(f, table, memory)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def cross_border(kind, remaining, stop, motion, modal_system, table, memory, previous, time_state):
-    """Pass the end of a cycle or of a segment.
+    """Pass the end of a cycle or of a segment of the drive.
 
-    Returns whether the drive changes, and whether the motion repeats.
+    Parameters
+    ----------
+    kind : int
+        Kind of the event there.
+    remaining : float
+        Time to the border [s].
+    stop : tuple
+        Cycle and offset [s] at which the march stops.
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    previous : PreviousCycle
+        State at the end of the cycle before.
+    time_state : TimeState
+
+    Returns
+    -------
+    drive_changes : bool
+    repeats : bool
+        Whether the motion repeats from here on.
     """
     drive_changes = step_to_border(time_state, stop, remaining)
     repeats = False
@@ -464,10 +738,8 @@ def cross_border(kind, remaining, stop, motion, modal_system, table, memory, pre
         repeats = detect_repeat(motion, modal_system, memory, time_state, previous)
     elif time_state.now[TIME.offset] == 0.0:
         forget_previous(previous)
-    for f in range(
-        len(modal_system.inverse_mass)
-    ):  # cleared at every border, so that a run in parts gives the same result as a single run
-        memory.force[f] = interface_force(f, table, memory)
+    # at every border, so that a run in parts gives the same result as a single run
+    reset_forces(modal_system, table, memory)
     return drive_changes, repeats
 
 
@@ -488,9 +760,19 @@ def is_before(now, stop):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def is_idle(progress, time_state, run_sums):
-    """Count the events without progress [s] in time.
+    """Count the events without progress in time.
 
-    Returns whether there are too many in a row.
+    Parameters
+    ----------
+    progress : float
+        Time from the event before [s].
+    time_state : TimeState
+    run_sums : RunSums
+
+    Returns
+    -------
+    bool
+        Whether there are too many in a row.
     """
     if progress < MIN_PROGRESS * time_state.period[0]:
         run_sums.limits[LIMIT.n_idle] += 1
@@ -501,7 +783,22 @@ def is_idle(progress, time_state, run_sums):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def next_begin(kind, changes_stick, drive_changes):
-    """Return what begins the next row, a number of `RowBegins`, after an event of some kind."""
+    """Return what begins the row that follows an event.
+
+    Parameters
+    ----------
+    kind : int
+        Kind of the event, a number of `EventKinds`.
+    changes_stick : bool
+        Whether an interface stops or is released.
+    drive_changes : bool
+        Whether the drive changes there.
+
+    Returns
+    -------
+    float
+        A number of `RowBegins`.
+    """
     if changes_stick:
         return float(BEGIN.stick_or_slip)
     if drive_changes:
@@ -511,6 +808,68 @@ def next_begin(kind, changes_stick, drive_changes):
     if kind == EVENT.reversal or kind == EVENT.output_reversal:
         return float(BEGIN.reversal)
     return float(BEGIN.none)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def move_over_piece(
+    piece,
+    event,
+    stop,
+    motion,
+    modal_system,
+    table,
+    memory,
+    previous,
+    time_state,
+    run_sums,
+    workspace,
+):
+    """Move motion, time and sums over a piece up to its event.
+
+    Parameters
+    ----------
+    piece : Piece
+    event : NextEvent
+    stop, motion, modal_system, table, memory, previous, time_state, run_sums, workspace
+        As of `march`.
+
+    Returns
+    -------
+    drive_changes : bool
+        Whether the drive changes at the end of the piece.
+    repeats : bool
+        Whether the motion repeats from there on.
+    """
+    now = time_state.now
+    h = piece.duration
+    u = event.u
+    drive_changes = False
+    repeats = False
+    add_piece_sums(piece.rate * h, u, h, piece.top, modal_system, time_state, run_sums, workspace)
+    clear_rests(u, time_state)
+    workspace.choice.orders[:] = 0.0
+    move_state(
+        u, h, piece.top, motion, modal_system, table, memory, time_state, run_sums, workspace
+    )
+    if reaches_border(piece, u, now):
+        drive_changes, repeats = cross_border(
+            event.kind,
+            piece.remaining,
+            stop,
+            motion,
+            modal_system,
+            table,
+            memory,
+            previous,
+            time_state,
+        )
+    else:
+        now[TIME.offset] += u * h
+    ledger = run_sums.ledger
+    energy = stored_energy(motion, modal_system, table, memory)
+    ledger[LEDGER.max_stored] = max(ledger[LEDGER.max_stored], energy)
+    ledger[LEDGER.n_pieces] += 1
+    return drive_changes, repeats
 
 
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -547,7 +906,6 @@ def march(
     used = 0
     now = time_state.now
     repeats = False
-    n_interfaces = len(modal_system.inverse_mass)
     begin = max(now[TIME.begin], float(BEGIN.yielding))
     now[TIME.begin] = 0.0
     if choice.orders[0, 0] < 0.0 and not choose_initial_sticks(
@@ -555,8 +913,7 @@ def march(
     ):
         return STATUS.undetermined, used
     if now[TIME.is_paused] == 0.0:
-        for f in range(n_interfaces):
-            memory.force[f] = interface_force(f, table, memory)
+        reset_forces(modal_system, table, memory)
     now[TIME.is_paused] = 0.0
     while is_before(now, stop):
         if used == rows.shape[0] and used > 0:
@@ -564,68 +921,63 @@ def march(
             now[TIME.begin] = begin
             now[TIME.is_paused] = 1.0
             return STATUS.full, used
-        remaining = time_to_border(time_state, stop)
         segment = time_state.segments[int(now[TIME.segment])]
-        theta = drive_phase(segment, now[TIME.cycle], now[TIME.offset], time_state.period[0])
-        h, rate, top = start_piece(
-            remaining, motion, modal_system, table, memory, time_state, workspace
+        phase = drive_phase(segment, now[TIME.cycle], now[TIME.offset], time_state.period[0])
+        remaining = time_to_border(time_state, stop)
+        piece = start_piece(remaining, motion, modal_system, table, memory, time_state, workspace)
+        event = find_piece_end(
+            piece.top, motion, modal_system, table, memory, time_state, run_sums, workspace
         )
-        is_to_border = h == remaining
-        u, kind, interface, sign = find_next_event(
-            top, modal_system, table, memory, time_state, workspace
-        )
-        if run_sums.limits[LIMIT.travel] < 1e300 and u > 0:
-            travel = run_sums.limits[LIMIT.travel]
-            root = find_travel_crossing(top, modal_system, motion, workspace, travel, u)
-            if root <= u:
-                u = root
-                kind = EVENT.travel
         changes_stick = False
-        if kind == EVENT.reversal or kind == EVENT.release:
-            changes_stick = table.static_limit[interface] > 0.0
+        if event.kind == EVENT.reversal or event.kind == EVENT.release:
+            changes_stick = table.static_limit[event.interface] > 0.0
         drive_changes = False
-        if changes_stick or is_to_border:
-            find_resting_slides(u, h, top, modal_system, table, memory, workspace)
-        if u > 0:
+        if changes_stick or piece.duration == remaining:
+            find_resting_interfaces(
+                event.u, piece.duration, piece.top, modal_system, table, memory, workspace
+            )
+        if event.u > 0:
             if now[TIME.offset] == 0.0:
                 widen_extremes(output_displacement(motion, modal_system), time_state, run_sums)
             if rows.shape[0] > 0:
+                duration = event.u * piece.duration
                 write_row(
-                    rows[used], motion, u * h, theta, begin, modal_system, table, memory, time_state
+                    rows[used],
+                    motion,
+                    duration,
+                    phase,
+                    begin,
+                    modal_system,
+                    table,
+                    memory,
+                    time_state,
                 )
                 used += 1
-            add_piece_sums(rate * h, u, h, top, modal_system, time_state, run_sums, workspace)
-            clear_rests(u, time_state)
-            choice.orders[:] = 0.0
-            move_state(
-                u, h, top, motion, modal_system, table, memory, time_state, run_sums, workspace
+            drive_changes, repeats = move_over_piece(
+                piece,
+                event,
+                stop,
+                motion,
+                modal_system,
+                table,
+                memory,
+                previous,
+                time_state,
+                run_sums,
+                workspace,
             )
-            # an event within round-off of the border
-            if is_to_border and (
-                u == 1.0 or now[TIME.offset] + u * h >= now[TIME.offset] + remaining
-            ):
-                drive_changes, repeats = cross_border(
-                    kind, remaining, stop, motion, modal_system, table, memory, previous, time_state
-                )
-            else:
-                now[TIME.offset] += u * h
-            run_sums.ledger[LEDGER.max_stored] = max(
-                run_sums.ledger[LEDGER.max_stored],
-                stored_energy(motion, modal_system, table, memory),
-            )
-            run_sums.ledger[LEDGER.n_pieces] += 1
-        if is_idle(u * h, time_state, run_sums):
+        if is_idle(event.u * piece.duration, time_state, run_sums):
             return STATUS.idle, used
-        begin = next_begin(kind, changes_stick, drive_changes)
-        apply_event(kind, interface, sign, modal_system, table, memory, time_state)
+        begin = next_begin(event.kind, changes_stick, drive_changes)
+        apply_event(event, modal_system, table, memory, time_state)
         if changes_stick:
-            choice.is_resting[interface] = 1.0
-            choice.slip_signs[interface] = sign if kind == EVENT.release else 0.0
-        if (changes_stick or drive_changes) and not choose_sticks_here(
+            choice.is_resting[event.interface] = 1.0
+            choice.slip_signs[event.interface] = event.sign if event.kind == EVENT.release else 0.0
+        if (changes_stick or drive_changes) and not choose_current_sticks(
             motion, modal_system, table, memory, time_state, workspace
         ):
             return STATUS.undetermined, used
-        if kind == EVENT.travel:
+        if event.kind == EVENT.travel:
             now[TIME.begin] = 0.0
             return STATUS.travel, used
         if repeats:

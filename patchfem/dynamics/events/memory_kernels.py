@@ -1,14 +1,14 @@
 """Memory of elastic-plastic elements under one relative displacement (compiled).
-
-The elements of an interface are sorted by yield slide, the relative displacement at which they yield. The elements that
-slip are always the first ones of the list: all were stretched by the same moves, so an element with a shorter yield
-slide yields before one with a longer one (Masing). At a turning point the elements that slip stop together, stretched to
-+-y, and stay a group: each slips again after 2 y in the other direction, or all of them where the relative displacement
-comes back to the turning point. A group that slips as a whole is forgotten. So every event costs the same, whatever the
-number of elements. The tests compare with elements that are followed one by one.
-
-A rigid element, Coulomb friction, may stand before the list. While it sticks the relative displacement does not change
-(`stick_kernels` chooses which ones stick after an event); while it slips it adds a constant force.
+ The elements of an interface are sorted by yield slide, the relative displacement at which they
+yield. The elements that slip are always the first ones of the list: all were stretched by the same
+moves, so an element with a shorter yield slide yields before one with a longer one (Masing). At a
+turning point the elements that slip stop together, stretched to +-y, and stay a group: each slips
+again after 2 y in the other direction, or all of them where the relative displacement comes back to
+the turning point. A group that slips as a whole is forgotten. So every event costs the same,
+whatever the number of elements. The tests compare with elements that are followed one by one.
+ A rigid element, Coulomb friction, may stand before the list. While it sticks the relative
+displacement does not change (`stick_kernels` chooses which ones stick after an event); while it
+slips it adds a constant force.
 """
 
 from math import inf
@@ -40,7 +40,18 @@ class Tangent(NamedTuple):
 def next_yield_slide(interface, direction, table, memory):
     """Return the relative displacement [m] at which the next element slips in a direction.
 
-    It is +-NO_YIELD where all elements slip.
+    Parameters
+    ----------
+    interface : int
+    direction : float
+        1 or -1.
+    table : ElementTable
+    memory : Memory
+
+    Returns
+    -------
+    float
+        +-NO_YIELD where all elements slip.
     """
     first = memory.n_slipping[interface]
     if first >= table.n_elements[interface]:
@@ -58,6 +69,14 @@ def release_next_element(interface, direction, table, memory):
     """Let the next element slip in a direction.
 
     If the innermost group slipped in this direction before, the whole group slips.
+
+    Parameters
+    ----------
+    interface : int
+    direction : float
+        1 or -1.
+    table : ElementTable
+    memory : Memory
     """
     group = memory.n_groups[interface] - 1
     if memory.group_sign[interface, group] == direction:
@@ -84,17 +103,39 @@ def store_turning_point(interface, memory):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def is_held(interface, table, memory):
-    """Return whether the rigid element of an interface sticks and holds the relative displacement."""
+def is_sticking(interface, table, memory):
+    """Return whether the rigid element of an interface sticks.
+
+    Parameters
+    ----------
+    interface : int
+    table : ElementTable
+    memory : Memory
+
+    Returns
+    -------
+    bool
+    """
     return table.static_limit[interface] > 0.0 and memory.rigid_state[interface] == 0.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rigid_friction(interface, table, memory):
-    """Return the friction force [N] of the rigid element of an interface.
+    """Return the friction force of the rigid element of an interface [N].
 
-    It is the kinetic limit in slip, and the static limit where other elements hold the relative displacement. It is 0
-    in stick, where the constraint tells the reaction, and without a rigid element.
+    It is the kinetic limit in slip, and the static limit where other elements hold the relative
+    displacement. It is 0 in stick, where the constraint determines the reaction, and without a
+    rigid element.
+
+    Parameters
+    ----------
+    interface : int
+    table : ElementTable
+    memory : Memory
+
+    Returns
+    -------
+    float
     """
     state = memory.rigid_state[interface]
     if abs(state) == 1.0:
@@ -104,7 +145,18 @@ def rigid_friction(interface, table, memory):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def interface_force(interface, table, memory):
-    """Return the friction force [N] of an interface without the reaction of its rigid element."""
+    """Return the friction force [N] of an interface without the reaction of its rigid element.
+
+    Parameters
+    ----------
+    interface : int
+    table : ElementTable
+    memory : Memory
+
+    Returns
+    -------
+    float
+    """
     return (
         rigid_friction(interface, table, memory)
         + find_force_and_energy(interface, table, memory)[0]
@@ -113,7 +165,21 @@ def interface_force(interface, table, memory):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_force_and_energy(interface, table, memory):
-    """Sum force [N] and elastic energy [J] of the elastic-plastic elements, group by group."""
+    """Sum the forces and energies of the elastic-plastic elements, group by group.
+
+    Parameters
+    ----------
+    interface : int
+    table : ElementTable
+    memory : Memory
+
+    Returns
+    -------
+    force : float
+        [N].
+    energy : float
+        Elastic energy [J].
+    """
     first = memory.n_slipping[interface]
     slide = memory.slide[interface]
     force = memory.direction[interface] * table.limit_sum[interface, first]
@@ -133,7 +199,18 @@ def find_force_and_energy(interface, table, memory):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_tangent(interface, table, memory):
-    """Return the Tangent of an interface."""
+    """Return the tangent of an interface.
+
+    Parameters
+    ----------
+    interface : int
+    table : ElementTable
+    memory : Memory
+
+    Returns
+    -------
+    Tangent
+    """
     first = memory.n_slipping[interface]
     n_elements = table.n_elements[interface]
     limit = table.limit_sum[interface, first]

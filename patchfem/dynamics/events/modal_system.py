@@ -7,7 +7,7 @@ import numpy as np
 from ...compiled import get_kernel_module
 from ...core import ModalBasis, PatchfemError
 from .elements import ElementTable, Memory, unstretched_memory
-from .positions_kernels import HOLD, KIND, LEDGER, LIMIT, PREVIOUS, SEGMENT, TIME
+from .positions_kernels import CONSTRAINT, KIND, LEDGER, LIMIT, PREVIOUS, SEGMENT, TIME
 
 # rate of the drive over the slowest rate of the modes; a slower drive is followed quasi-statically (`slow_kernels`)
 MAX_SLOW_RATE_RATIO = 0.02
@@ -22,19 +22,22 @@ series = get_kernel_module("dynamics.events.series_kernels")
 class ModalSystem(NamedTuple):
     """Modes as arrays for the kernels.
 
-    The kernels take the number of modes from the length of `omega_squared`, and that of interfaces from `inverse_mass`.
-    Of one mode behind one interface both are tuples: their length is then part of their type, and the same text is
-    compiled for one of each, which is three times as fast.
+    The kernels take the number of modes from the length of `omega_squared`, and that of interfaces
+    from `inverse_mass`. Of one mode behind one interface both are tuples: their length is then part
+    of their type, and the same text is compiled for one of each, which is three times as fast.
 
     - omega_squared: (n,) squares of the natural frequencies [1/s2]
     - damping: (n, n) damping matrix D [1/s]; is_coupled: whether it is more than its diagonal
     - base, output: (n,) excitation by the base, and participation of the output [1]
     - interfaces: (i, n) relative displacement of every interface per modal coordinate [1]
-    - inverse_mass: (i,) |row of interfaces|^2/mass [1/kg]; a spring there adds it times its stiffness to a squared rate
+    - inverse_mass: (i,) |row of interfaces|^2/mass [1/kg]; a spring there adds it times its
+    stiffness to a squared rate
     - mass: modal mass [kg]
-    - max_omega_squared, damping_norm: norms of the stiffness [1/s2] and of the damping [1/s] of the modes
+    - max_omega_squared, damping_norm: norms of the stiffness [1/s2] and of the damping [1/s] of the
+    modes
     - output_interface: number of an interface that moves as the output does, -1 where none does
-    - slow_rate: largest rate [1/s] of a drive that the modes follow quasi-statically, 0 where they never do
+    - slow_rate: largest rate [1/s] of a drive that the modes follow quasi-statically, 0 where they
+    never do
     """
 
     omega_squared: np.ndarray
@@ -283,17 +286,19 @@ def start_previous_cycle(modal_system: ModalSystem, table: ElementTable) -> Prev
 class Constraint(NamedTuple):
     """Interfaces whose rigid elements stick, as a constraint on the modes (`stick_kernels.constrain_slides`).
 
-    - is_held: (i,) 1 where the relative displacement is held
-    - status: (2,) see `HoldPositions`
-    - basis: (i, n) orthogonal rows that span those of the held interfaces, 0 in the dependent ones
-    - inverse: (i, n) transposed pseudo-inverse of the held rows, 0 in the others
-    - is_tied: (i,) 1 where the held rows hold this interface too
+    - is_sticking: (i,) 1 where the rigid element of an interface sticks
+    - status: (2,) see `ConstraintPositions`
+    - basis: (i, n) orthogonal rows that span those of the sticking interfaces, 0 in the dependent
+    ones
+    - inverse: (i, n) transposed pseudo-inverse of the rows of the sticking interfaces, 0 in the
+    others
+    - is_tied: (i,) 1 where the sticking interfaces hold this one too
     - reactions: (i, terms) series of the reactions [N] over a piece
     - matrix: (i, i) the transformation to `basis`, or a matrix to solve with
     - scratch: (2, i)
     """
 
-    is_held: np.ndarray
+    is_sticking: np.ndarray
     status: np.ndarray
     basis: np.ndarray
     inverse: np.ndarray
@@ -308,8 +313,10 @@ class Choice(NamedTuple):
 
     - is_resting: (i,) 1 where an interface with a rigid element has no velocity
     - slip_signs, guess: (i,) directions of slip, 0 in stick, at first and as they are tried
-    - orders: (i, 2) orders of the terms that vanish where the next piece begins, -1 before the first choice
-    - motion_sizes, reaction_sizes: (terms, n), (i, terms) magnitudes that the terms of motion and reactions are added
+    - orders: (i, 2) orders of the terms that vanish where the next piece begins, -1 before the
+    first choice
+    - motion_sizes, reaction_sizes: (terms, n), (i, terms) magnitudes that the terms of motion and
+    reactions are added
       from, the scale of their round-off
     """
 
@@ -327,7 +334,8 @@ class Workspace(NamedTuple):
     - coefficients: (terms, n) series of the modal coordinates [m]
     - drive: (3, terms) series of the drive [m s-2], and workspace for it
     - polynomials: (i + 3, terms) series of the speeds of the interfaces, and workspace
-    - pull, stiffness: (i,) forces over the mass [m s-2], and stiffness [N/m] of the interfaces
+    - friction_accel: (i,) friction forces over the modal mass [m s-2]
+    - stiffness: (i,) stiffness of the interfaces [N/m]
     - rates: (n, 4) modal rates at four Gauss points
     - hulls: Bernstein coefficients of the intervals in which a root is searched for
     - constraint, choice
@@ -336,7 +344,7 @@ class Workspace(NamedTuple):
     coefficients: np.ndarray
     drive: np.ndarray
     polynomials: np.ndarray
-    pull: np.ndarray
+    friction_accel: np.ndarray
     stiffness: np.ndarray
     rates: np.ndarray
     hulls: np.ndarray
@@ -349,8 +357,8 @@ def make_workspace(modal_system: ModalSystem) -> Workspace:
     i, n = modal_system.interfaces.shape
     n_terms = series.MAX_POWER + 5
     constraint = Constraint(
-        is_held=np.empty(i),
-        status=np.empty(len(HOLD)),
+        is_sticking=np.empty(i),
+        status=np.empty(len(CONSTRAINT)),
         basis=np.empty((i, n)),
         inverse=np.empty((i, n)),
         is_tied=np.empty(i),
@@ -370,7 +378,7 @@ def make_workspace(modal_system: ModalSystem) -> Workspace:
         coefficients=np.empty((n_terms, n)),
         drive=np.empty((3, n_terms)),
         polynomials=np.empty((i + 3, n_terms)),
-        pull=np.empty(i),
+        friction_accel=np.empty(i),
         stiffness=np.empty(i),
         rates=np.empty((n, 4)),
         hulls=np.empty((series.MAX_HALVINGS + 2, series.HULL_WIDTH)),

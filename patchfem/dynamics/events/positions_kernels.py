@@ -1,7 +1,7 @@
 """Named positions in the arrays of the event engine.
-
-A kernel reads `row[ROW.duration]` or `sums[LEDGER.drive_work]`. The classes below state unit and meaning of every
-position; their instances at the end of the module are what kernels and callers import.
+ A kernel reads `row[ROW.duration]` or `sums[LEDGER.drive_work]`. The classes below state unit and
+meaning of every position; their instances at the end of the module are what kernels and callers
+import.
 """
 
 from typing import NamedTuple
@@ -14,13 +14,16 @@ class SegmentColumns(NamedTuple):
     - kind: a number of `SegmentKinds`
     - constant: constant acceleration [m s-2]
     - amplitude: of the sine, [m s-2] or, where is_displacement is 1, [m]
-    - omega, phase: angular frequency [rad/s] and phase [rad], both at the start of the first cycle of a sine, or at the
+    - omega, phase: angular frequency [rad/s] and phase [rad], both at the start of the first cycle
+    of a sine, or at the
       start of a sweep
     - slope: of the line [m s-3], of omega [rad/s2], or of the logarithm of omega [1/s]
     - is_displacement: 1 where the amplitude is a displacement
     - rate: largest rate [1/s]
-    - turns, turns_remainder: what the revolutions per cycle exceed a whole number by, in two parts; the first has 24
-      bits, so its product with a number of cycles is exact and the phase keeps its digits over a million cycles
+    - turns, turns_remainder: what the revolutions per cycle exceed a whole number by, in two parts;
+    the first has 24
+      bits, so its product with a number of cycles is exact and the phase keeps its digits over a
+      million cycles
     """
 
     cycle: int = 0
@@ -54,7 +57,8 @@ class RowColumns(NamedTuple):
     - segment: number of the segment of the drive
     - begin: what begins the piece, a number of `RowBegins`
     - cycle, offset: number of the cycle, and time since it began [s]
-    - motion: first of n modal coordinates [m] and n rates [m/s]; `InterfaceColumns` of every interface follow
+    - motion: first of n modal coordinates [m] and n rates [m/s]; `InterfaceColumns` of every
+    interface follow
     """
 
     time: int = 0
@@ -73,7 +77,8 @@ class InterfaceColumns(NamedTuple):
     - force: friction force [N]; the reaction while a rigid element holds the relative displacement
     - stiffness: of the elements that stick [N/m], infinite while a rigid element holds
     - slipping, limit: fraction of the friction limit that slips, and the limit [N] of what slips
-    - slip, work, loss: irreversible slip [m], work done on the interface and energy dissipated there [J]
+    - slip, work, loss: irreversible slip [m], work done on the interface and energy dissipated
+    there [J]
     - direction: sign of the slip, 0 in stick
     - slide: relative displacement [m]
     """
@@ -182,14 +187,15 @@ class LimitPositions(NamedTuple):
     n_idle: int = 1
 
 
-class HoldPositions(NamedTuple):
+class ConstraintPositions(NamedTuple):
     """Positions in `Constraint.status`.
 
-    - n_held: number of interfaces whose rigid elements stick; below 0 where the constraint is to be built again
+    - n_sticking: number of interfaces whose rigid elements stick; below 0 where the constraint is
+    to be built again
     - is_immobile: 1 where they leave no motion of the modes
     """
 
-    n_held: int = 0
+    n_sticking: int = 0
     is_immobile: int = 1
 
 
@@ -212,11 +218,14 @@ class RunMeasures(NamedTuple):
     - min_output, max_output: of the output [m]
     - max_coordinate: largest modal coordinate [m]
     - max_acceleration: largest acceleration of the output [m s-2]
-    - cos_1, sin_1, cos_3, sin_3: integrals of the acceleration times cosine and sine of the cycle and of its third
+    - cos_1, sin_1, cos_3, sin_3: integrals of the acceleration times cosine and sine of the cycle
+    and of its third
       harmonic [m s-1]
-    - n_releases, release_cos, release_sin: releases of the first interface, and sums of the cosine and the sine of
+    - n_releases, release_cos, release_sin: releases of the first interface, and sums of the cosine
+    and the sine of
       twice their phases
-    - ring, ring_angle: of one mode behind one interface, the largest acceleration [m s-2] of the free vibration while
+    - ring, ring_angle: of one mode behind one interface, the largest acceleration [m s-2] of the
+    free vibration while
       the interface sticks, and the largest angle [rad] by which it turns in one stick
     """
 
@@ -241,11 +250,14 @@ class InterfaceMeasures(NamedTuple):
     - min_slide, max_slide, min_slip, max_slip: of relative displacement and slip [m]
     - max_force: largest force [N]
     - stuck_time: time in which less than half of the interface slips [s]
-    - work, end_work, path_work: friction work by the sums of the march, by the ends of the pieces, and the integral of
+    - work, end_work, path_work: friction work by the sums of the march, by the ends of the pieces,
+    and the integral of
       the magnitude of its power [J]
-    - slide_cos, slide_sin, force_cos, force_sin: integrals of relative displacement [m s] and force [N s] times cosine
+    - slide_cos, slide_sin, force_cos, force_sin: integrals of relative displacement [m s] and force
+    [N s] times cosine
       and sine of the cycle
-    - first_slide, last_slide, first_force, last_force: integrals of both over the first and over the last cycle
+    - first_slide, last_slide, first_force, last_force: integrals of both over the first and over
+    the last cycle
     - start_slide, end_slide: relative displacement at both ends [m]
     - mean_range: mean range of the relative displacement in a cycle [m]
     - secant: mean secant stiffness of the cycles that show it [N/m], NaN where none does
@@ -284,7 +296,7 @@ EVENT = EventKinds()
 TIME = TimePositions()
 LEDGER = LedgerPositions()
 LIMIT = LimitPositions()
-HOLD = HoldPositions()
+CONSTRAINT = ConstraintPositions()
 PREVIOUS = PreviousPositions()
 RUN = RunMeasures()
 INTERFACE = InterfaceMeasures()

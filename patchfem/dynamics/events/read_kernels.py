@@ -9,7 +9,7 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .dense_kernels import expand_row
 from .memory_kernels import RIGID_STIFFNESS
-from .positions_kernels import COLUMN, HOLD, INTERFACE, N_COLUMNS, ROW, RUN, SEGMENT
+from .positions_kernels import COLUMN, CONSTRAINT, INTERFACE, N_COLUMNS, ROW, RUN, SEGMENT
 from .search_kernels import displacement_at
 from .series_kernels import (
     GAUSS_POINTS,
@@ -40,13 +40,37 @@ def force_column(interface, modal_system):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def row_slide(row, interface, modal_system):
-    """Return the relative displacement [m] of an interface where a row begins."""
+    """Return the relative displacement [m] of an interface where a row begins.
+
+    Parameters
+    ----------
+    row : ndarray
+        (w,) row of a piece, see `RowColumns`.
+    interface : int
+    modal_system : ModalSystem
+
+    Returns
+    -------
+    float
+    """
     return row[force_column(interface, modal_system) + COLUMN.slide]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def row_rate(row, interface, modal_system):
-    """Return the relative velocity [m/s] of an interface where a row begins."""
+    """Return the relative velocity [m/s] of an interface where a row begins.
+
+    Parameters
+    ----------
+    row : ndarray
+        (w,) row of a piece, see `RowColumns`.
+    interface : int
+    modal_system : ModalSystem
+
+    Returns
+    -------
+    float
+    """
     n = len(modal_system.omega_squared)
     rate = 0.0
     for i in range(n):
@@ -56,7 +80,21 @@ def row_rate(row, interface, modal_system):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def end_force(rows, j, interface, modal_system):
-    """Return the force [N] of a free interface at the end of row j."""
+    """Return the force [N] of a free interface at the end of row j.
+
+    Parameters
+    ----------
+    rows : ndarray
+        (k, w) rows of pieces, see `RowColumns`.
+    j : int
+        Number of the row.
+    interface : int
+    modal_system : ModalSystem
+
+    Returns
+    -------
+    float
+    """
     at = force_column(interface, modal_system)
     step = row_slide(rows[j + 1], interface, modal_system) - row_slide(
         rows[j], interface, modal_system
@@ -66,10 +104,26 @@ def end_force(rows, j, interface, modal_system):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def peak_acceleration(top, h, modal_system, base_moves, workspace, largest):
-    """Return the larger of `largest` and the peak acceleration [m s-2] of the piece.
+    """Return the larger of a bound and the peak acceleration of the output in a piece [m s-2].
 
-    Its series is left in the last but one of workspace.polynomials; base_moves: 1 where the base
-    moves, else 0.
+    The series of the acceleration is left in the last but one of workspace.polynomials.
+
+    Parameters
+    ----------
+    top : int
+        Highest power of the series.
+    h : float
+        Duration of the piece [s].
+    modal_system : ModalSystem
+    base_moves : float
+        1 where the base moves, else 0.
+    workspace : Workspace
+    largest : float
+        A lower bound of the result [m s-2].
+
+    Returns
+    -------
+    float
     """
     poly = workspace.polynomials[len(modal_system.inverse_mass) + 1]
     bound = 0.0
@@ -92,7 +146,23 @@ def add_integrals(
 ):
     """Add the integrals over the piece in the workspace to the measures.
 
-    border: whether the piece lies in the first cycle, and whether it lies in the last.
+    Parameters
+    ----------
+    row : ndarray
+        (w,) row of a piece, see `RowColumns`.
+    h : float
+        Duration of the piece [s].
+    top : int
+        Highest power of the series.
+    border : tuple of bool
+        Whether the piece lies in the first cycle, and whether it lies in the last.
+    modal_system : ModalSystem
+    time_state : TimeState
+    workspace : Workspace
+    run_values : ndarray
+        (13,) see `RunMeasures`; they are written.
+    interface_values : ndarray
+        (i, 21) see `InterfaceMeasures`; they are written.
     """
     n_interfaces = len(modal_system.inverse_mass)
     omega = 2 * pi / time_state.period[0]
@@ -142,7 +212,18 @@ def add_integrals(
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def add_row_state(row, modal_system, run_values, interface_values):
-    """Widen the ranges by the state where a row begins."""
+    """Widen the ranges by the state where a row begins.
+
+    Parameters
+    ----------
+    row : ndarray
+        (w,) row of a piece, see `RowColumns`.
+    modal_system : ModalSystem
+    run_values : ndarray
+        (13,) see `RunMeasures`; they are written.
+    interface_values : ndarray
+        (i, 21) see `InterfaceMeasures`; they are written.
+    """
     output = 0.0
     for i in range(len(modal_system.omega_squared)):
         output += modal_system.output[i] * row[ROW.motion + i]
@@ -163,7 +244,21 @@ def add_row_state(row, modal_system, run_values, interface_values):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def add_forces(rows, j, top, modal_system, workspace, interface_values):
-    """Widen the ranges of the forces by the piece of row j, and add the work computed from its ends."""
+    """Widen the ranges of the forces by the piece of a row, and add the work of its ends.
+
+    Parameters
+    ----------
+    rows : ndarray
+        (k, w) rows of pieces, see `RowColumns`.
+    j : int
+        Number of the row.
+    top : int
+        Highest power of the series.
+    modal_system : ModalSystem
+    workspace : Workspace
+    interface_values : ndarray
+        (i, 21) see `InterfaceMeasures`; they are written.
+    """
     for f in range(len(modal_system.inverse_mass)):
         values = interface_values[f]
         at = force_column(f, modal_system)
@@ -189,11 +284,27 @@ def add_forces(rows, j, top, modal_system, workspace, interface_values):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def turning_force(rows, j, n_rows, interface, modal_system, min_motion):
-    """Return the force [N] of an interface at a reversal where row j begins.
+    """Return the force of an interface at a reversal where a row begins [N].
 
-    It is the mean of the forces before and after the rest there, and NaN where the force jumps and
-    one of both is unknown. min_motion: a piece with a smaller change of the relative displacement
-    [m] is a rest.
+    It is the mean of the forces before and after the rest there.
+
+    Parameters
+    ----------
+    rows : ndarray
+        (k, w) rows of pieces, see `RowColumns`.
+    j : int
+        Number of the row.
+    n_rows : int
+        Number of rows but the last one.
+    interface : int
+    modal_system : ModalSystem
+    min_motion : float
+        A piece in which the interface moves less [m] is a rest.
+
+    Returns
+    -------
+    float
+        NaN where the force jumps and one of both is unknown.
     """
     back = j - 1
     on = j
@@ -233,7 +344,30 @@ def turning_force(rows, j, n_rows, interface, modal_system, min_motion):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_turn_near_border(rows, j, n_rows, forward, interface, modal_system, period, rest_rate):
-    """Return the row near a border of a cycle at which an interface reverses, -1 if none."""
+    """Return the row near a border of a cycle at which an interface reverses.
+
+    Parameters
+    ----------
+    rows : ndarray
+        (k, w) rows of pieces, see `RowColumns`.
+    j : int
+        Number of the row at the border.
+    n_rows : int
+        Number of rows but the last one.
+    forward : bool
+        Whether the rows after it are examined, else those before.
+    interface : int
+    modal_system : ModalSystem
+    period : float
+        Duration of a cycle [s].
+    rest_rate : float
+        Relative velocity below which the interface is at rest [m/s].
+
+    Returns
+    -------
+    int
+        -1 if there is none.
+    """
     k = j
     while (
         0 <= k <= n_rows and abs(rows[k, ROW.time] - rows[j, ROW.time]) <= MAX_TURN_DELAY * period
@@ -246,7 +380,23 @@ def find_turn_near_border(rows, j, n_rows, forward, interface, modal_system, per
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def measure_cycles(rows, n_rows, cycles, interface, modal_system, period, values):
-    """Measure the mean range [m] and secant stiffness [N/m] of the cycles of an interface."""
+    """Measure the mean range [m] and secant stiffness [N/m] of the cycles of an interface.
+
+    Parameters
+    ----------
+    rows : ndarray
+        (k, w) rows of pieces, see `RowColumns`.
+    n_rows : int
+        Number of rows but the last one.
+    cycles : int
+        Number of cycles.
+    interface : int
+    modal_system : ModalSystem
+    period : float
+        Duration of a cycle [s].
+    values : ndarray
+        (21,) see `InterfaceMeasures`; they are written.
+    """
     fast = 0.0
     n_secants = 0
     low = 0
@@ -306,10 +456,24 @@ def measure_cycles(rows, n_rows, cycles, interface, modal_system, period, values
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def measure_ringing(rows, first, last, modal_system, segment, values):
-    """Measure the free vibration in a stick, rows first to last - 1, of one mode.
+    """Measure the free vibration in a stick of a single mode.
 
-    It takes the angle by which the vibration turns, and its largest acceleration by the rule of
-    `response.ringing`.
+    The measures are the angle by which the vibration turns, and its largest acceleration by the
+    rule of `response.ringing`.
+
+    Parameters
+    ----------
+    rows : ndarray
+        (k, w) rows of pieces, see `RowColumns`.
+    first : int
+        First row of the stick.
+    last : int
+        First row after it.
+    modal_system : ModalSystem
+    segment : ndarray
+        (12,) segment of the drive, see `SegmentColumns`.
+    values : ndarray
+        (13,) see `RunMeasures`; they are written.
     """
     swing = 0.0
     row = rows[first]
@@ -361,7 +525,19 @@ def measure_ringing(rows, first, last, modal_system, segment, values):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def measure_sticks_and_releases(rows, n_rows, modal_system, time_state, values):
-    """Count the releases of the first interface, and measure the vibration in its sticks."""
+    """Count the releases of the first interface, and measure the vibration in its sticks.
+
+    Parameters
+    ----------
+    rows : ndarray
+        (k, w) rows of pieces, see `RowColumns`.
+    n_rows : int
+        Number of rows but the last one.
+    modal_system : ModalSystem
+    time_state : TimeState
+    values : ndarray
+        (13,) see `RunMeasures`; they are written.
+    """
     begun = rows[0, ROW.time]
     period = time_state.period[0]
     at = force_column(0, modal_system)
@@ -424,7 +600,7 @@ def read_rows(
     period = time_state.period[0]
     run_values[:] = 0.0
     interface_values[:] = 0.0
-    workspace.constraint.status[HOLD.n_held] = -1.0
+    workspace.constraint.status[CONSTRAINT.n_sticking] = -1.0
     run_values[RUN.min_output] = inf
     run_values[RUN.max_output] = -inf
     for f in range(n_interfaces):

@@ -24,9 +24,24 @@ MAX_APPROACH_CYCLES = 9000.0
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def measure_change(motion, modal_system, memory, time_state, previous):
-    """Return the change of the state since the last cycle and the size of the motion [m].
+    """Return the change of the state since the last cycle and the size of the motion.
 
-    The change is 1e300 where other elements slip, or where the drive is no sine.
+    Parameters
+    ----------
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    memory : Memory
+    time_state : TimeState
+    previous : PreviousCycle
+        State at the end of the cycle before.
+
+    Returns
+    -------
+    change : float
+        [m]; 1e300 where other elements slip, or where the drive is no sine.
+    size : float
+        [m].
     """
     omega = 2 * pi / time_state.period[0]
     change = 0.0
@@ -81,6 +96,20 @@ def detect_repeat(motion, modal_system, memory, time_state, previous):
 
     There and at all later ends of cycles the state takes the digits of the previous one; elsewhere
     the state is stored.
+
+    Parameters
+    ----------
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    memory : Memory
+    time_state : TimeState
+    previous : PreviousCycle
+        State at the end of the cycle before.
+
+    Returns
+    -------
+    bool
     """
     n = len(modal_system.omega_squared)
     n_interfaces = len(modal_system.inverse_mass)

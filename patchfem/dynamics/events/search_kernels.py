@@ -7,26 +7,56 @@ monotone function: no event can be missed.
 """
 
 from math import sqrt
+from typing import NamedTuple
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .memory_kernels import is_held, next_yield_slide
-
-# kinds of events that end a piece
+from .memory_kernels import is_sticking, next_yield_slide
 from .positions_kernels import EVENT
 from .series_kernels import EPS, NO_ROOT, SINGLE_INTEGRAL, find_first_root, refine_root
 
-# fraction of the sum of the terms of a speed: a smaller term is round-off, whose sign is not significant
+# fraction of the sum of the terms of a speed, below which a term is round-off and has no sign
 ACCELERATION_TOL = 1e-14
 
 
+class NextEvent(NamedTuple):
+    """First event of a piece.
+
+    - u: fraction of the piece; 1 where no event ends the piece, 0 where the elements change before
+      anything moves
+    - kind: a number of `EventKinds`
+    - interface: its number
+    - sign: sign of the slip that follows
+    """
+
+    u: float
+    kind: int
+    interface: int
+    sign: float
+
+
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def initial_direction(poly, top, rests):
+def initial_direction(poly, top, is_at_rest):
     """Return the order of the first term of a speed that is not round-off, and its sign.
 
     rests: whether the speed is zero at the start, so that the term of order 0 does not count.
+
+    Parameters
+    ----------
+    poly : ndarray
+        Series of the speed.
+    top : int
+        Highest power of the series.
+    is_at_rest : bool
+        Whether the speed is 0 at the start, so that the term of order 0 does not count.
+
+    Returns
+    -------
+    order : int
+    sign : float
+        0 where all terms are round-off.
     """
-    if not rests and poly[0] != 0.0:
+    if not is_at_rest and poly[0] != 0.0:
         return 0, 1.0 if poly[0] > 0 else -1.0
     size = 0.0
     for k in range(top):
@@ -39,7 +69,21 @@ def initial_direction(poly, top, rests):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def expand_speed(row, count, coefs, top, poly):
-    """Write the series over u of the speed along a row (n,) into poly (top,)."""
+    """Write the series over u of the speed along a row of participations.
+
+    Parameters
+    ----------
+    row : ndarray
+        (n,) displacement per coordinate.
+    count : int
+        Number n of coordinates.
+    coefs : ndarray
+        (terms, n) series of the coordinates.
+    top : int
+        Highest power of the series.
+    poly : ndarray
+        (top,) series of the speed, which is written.
+    """
     for k in range(top):
         part = 0.0
         for i in range(count):
@@ -49,7 +93,21 @@ def expand_speed(row, count, coefs, top, poly):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def displacement_at(poly, top, u):
-    """Return the integral from 0 to u of a speed with the series poly (top,)."""
+    """Return the integral of a speed from 0 to u.
+
+    Parameters
+    ----------
+    poly : ndarray
+        (top,) series of the speed.
+    top : int
+        Highest power of the series.
+    u : float
+        Fraction of the piece.
+
+    Returns
+    -------
+    float
+    """
     out = poly[top - 1] * SINGLE_INTEGRAL[top]
     for k in range(top - 2, -1, -1):
         out = out * u + poly[k] * SINGLE_INTEGRAL[k + 1]
@@ -93,9 +151,23 @@ def find_crossing(poly, top, distance, limit, scratch):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_release(interface, top, limit, workspace):
-    """Return u and sign where the reaction of a held interface first exceeds its limit [N].
+    """Find where the reaction of a sticking interface first exceeds its limit.
 
-    u is NO_ROOT where it does not.
+    Parameters
+    ----------
+    interface : int
+    top : int
+        Highest power of the series.
+    limit : float
+        Limit of the reaction [N].
+    workspace : Workspace
+
+    Returns
+    -------
+    u : float
+        NO_ROOT where it does not.
+    sign : float
+        Sign of the slip that follows.
     """
     choice = workspace.choice
     reaction = workspace.constraint.reactions[interface]
@@ -131,109 +203,141 @@ def find_release(interface, top, limit, workspace):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def find_speed_root(order, direction, poly, top, workspace):
+    """Return the first u at which a speed reverses, NO_ROOT if it does not.
+
+    Parameters
+    ----------
+    order : int
+        Order of the first term that counts; lower terms are round-off.
+    direction : float
+        Sign of the speed just after the start of the piece.
+    poly : ndarray
+        (top,) series of the speed.
+    top : int
+        Highest power of the series of the coordinates.
+    workspace : Workspace
+
+    Returns
+    -------
+    float
+    """
+    if order >= top:
+        return NO_ROOT
+    scratch = workspace.polynomials[workspace.constraint.inverse.shape[0]]
+    for k in range(order, top):
+        scratch[k] = direction * poly[k]
+    return find_first_root(scratch, order, top - 1, workspace.hulls)
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_stop(interface, direction, poly, top, workspace):
     """Return u at which the slip of a rigid element first comes to rest; NO_ROOT if it does not.
 
-    direction: sign of the slip; poly: series of its speed.
+    Parameters
+    ----------
+    interface : int
+    direction, poly, top, workspace
+        As of `find_speed_root`.
+
+    Returns
+    -------
+    float
     """
-    scratch = workspace.polynomials[workspace.constraint.inverse.shape[0]]
     order = int(workspace.choice.orders[interface, 0])
     if order == 0 and direction * poly[0] <= 0.0:
         return 0.0
-    for k in range(order, top):
-        scratch[k] = direction * poly[k]
-    return find_first_root(scratch, order, top - 1, workspace.hulls) if order < top else NO_ROOT
+    return find_speed_root(order, direction, poly, top, workspace)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def find_output_reversal(event, top, modal_system, time_state, workspace):
+    """Return the reversal of the output if it comes before an event, else the event.
+
+    Parameters
+    ----------
+    event : NextEvent
+        First event of the interfaces.
+    top : int
+        Highest power of the series.
+    modal_system : ModalSystem
+    time_state : TimeState
+    workspace : Workspace
+
+    Returns
+    -------
+    NextEvent
+    """
+    n_interfaces = len(modal_system.inverse_mass)
+    poly = workspace.polynomials[n_interfaces + 1]
+    n = len(modal_system.omega_squared)
+    expand_speed(modal_system.output, n, workspace.coefficients, top, poly)
+    is_at_rest = time_state.is_at_turn[n_interfaces] == 1.0
+    order, direction = initial_direction(poly, top, is_at_rest)
+    if direction == 0.0:
+        return event
+    root = find_speed_root(order, direction, poly, top, workspace)
+    if root < event.u:
+        return NextEvent(root, EVENT.output_reversal, n_interfaces, -direction)
+    return event
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_next_event(top, modal_system, table, memory, time_state, workspace):
-    """Return the first event of a piece.
+    """Find the first event of a piece.
+
+    Parameters
+    ----------
+    top : int
+        Highest power of the series.
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    time_state : TimeState
+    workspace : Workspace
+        Its coefficients are the series of the coordinates; polynomials[i] becomes that of the speed
+        of interface i.
 
     Returns
     -------
-    u : float
-        1 where no event ends the piece; 0 where the state changes before anything moves.
-    kind : int
-        A number of `EventKinds`.
-    interface : int
-    sign : float
-        Sign of the slip that follows.
+    NextEvent
     """
     n = len(modal_system.omega_squared)
     n_interfaces = len(modal_system.inverse_mass)
     polynomials = workspace.polynomials
-    u = 1.0
-    kind = EVENT.none
-    interface = 0
-    sign = 0.0
+    event = NextEvent(1.0, EVENT.none, 0, 0.0)
     for f in range(n_interfaces):
         poly = polynomials[f]
-        expand_speed(
-            modal_system.interfaces[f],
-            n,
-            workspace.coefficients,
-            top,
-            poly,
-        )
-        if is_held(f, table, memory):
+        expand_speed(modal_system.interfaces[f], n, workspace.coefficients, top, poly)
+        if is_sticking(f, table, memory):
             root, direction = find_release(f, top, table.static_limit[f], workspace)
-            if root <= u:
-                u = root
-                kind = EVENT.release
-                interface = f
-                sign = direction
+            if root <= event.u:
+                event = NextEvent(root, EVENT.release, f, direction)
             continue
         if table.static_limit[f] > 0.0:
             direction = memory.rigid_state[f]
             if abs(direction) == 2.0:
                 continue
             root = find_stop(f, direction, poly, top, workspace)
-            if root <= u:
-                u = root
-                kind = EVENT.reversal
-                interface = f
-                sign = -direction
-            if table.n_elements[f] == 0 or u == 0.0:
+            if root <= event.u:
+                event = NextEvent(root, EVENT.reversal, f, -direction)
+            if table.n_elements[f] == 0 or event.u == 0.0:
                 continue
         else:
             order, direction = initial_direction(poly, top, time_state.is_at_turn[f] == 1.0)
             if direction == 0.0:
                 continue
             if memory.n_slipping[f] > 0 and direction != memory.direction[f]:
-                return 0.0, EVENT.reversal, f, direction
-            scratch = polynomials[n_interfaces]
-            for k in range(order, top):
-                scratch[k] = direction * poly[k]
-            root = find_first_root(scratch, order, top - 1, workspace.hulls)
-            if root < u:
-                u = root
-                kind = EVENT.reversal
-                interface = f
-                sign = -direction
+                return NextEvent(0.0, EVENT.reversal, f, direction)
+            root = find_speed_root(order, direction, poly, top, workspace)
+            if root < event.u:
+                event = NextEvent(root, EVENT.reversal, f, -direction)
         gap = next_yield_slide(f, direction, table, memory) - memory.slide[f]
         if direction * gap <= 0:
-            return 0.0, EVENT.yielding, f, direction
-        root = find_crossing(poly, top, gap, u, polynomials[n_interfaces])
-        if root <= u:
-            u = root
-            kind = EVENT.yielding
-            interface = f
-            sign = direction
+            return NextEvent(0.0, EVENT.yielding, f, direction)
+        root = find_crossing(poly, top, gap, event.u, polynomials[n_interfaces])
+        if root <= event.u:
+            event = NextEvent(root, EVENT.yielding, f, direction)
     if modal_system.output_interface < 0:
-        poly = polynomials[n_interfaces + 1]
-        scratch = polynomials[n_interfaces]
-        expand_speed(modal_system.output, n, workspace.coefficients, top, poly)
-        order, direction = initial_direction(poly, top, time_state.is_at_turn[n_interfaces] == 1.0)
-        for k in range(order, top):
-            scratch[k] = direction * poly[k]
-        root = (
-            find_first_root(scratch, order, top - 1, workspace.hulls)
-            if direction != 0.0
-            else NO_ROOT
-        )
-        if root < u:
-            u = root
-            kind = EVENT.output_reversal
-            interface = n_interfaces
-            sign = -direction
-    return u, kind, interface, sign
+        return find_output_reversal(event, top, modal_system, time_state, workspace)
+    return event

@@ -14,7 +14,7 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .memory_kernels import RIGID_STIFFNESS
-from .positions_kernels import HOLD
+from .positions_kernels import CONSTRAINT
 
 # longest piece times the fastest rate of the system [1]; 28 powers are then exact to round-off
 MAX_RATE_TIME = 2.0
@@ -112,14 +112,22 @@ def bound_fastest_rate(modal_system, springs):
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bound_modal_rate(modal_system, workspace):
     """Return the bound of `bound_fastest_rate` for workspace.stiffness; 0 without free motions."""
-    if workspace.constraint.status[HOLD.is_immobile] == 1.0:
+    if workspace.constraint.status[CONSTRAINT.is_immobile] == 1.0:
         return 0.0
     return bound_fastest_rate(modal_system, workspace.stiffness)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def expand_single_mode(coordinates, rate, force, spring, modal_system, drive, h, top, coefs):
-    """Write the series of one mode with one interface, as `expand_motion`, three times as fast."""
+    """Write the series of one mode with one interface, as `expand_motion`, three times as fast.
+
+    Parameters
+    ----------
+    coordinates, rate, modal_system, drive, h, top, coefs
+        As of `expand_motion`.
+    force, spring : float
+        Of the interface [N], [N/m].
+    """
     row = modal_system.interfaces[0, 0] / modal_system.mass
     h_squared = h * h
     base = modal_system.base[0]
@@ -149,7 +157,15 @@ def expand_single_mode(coordinates, rate, force, spring, modal_system, drive, h,
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def expand_two_modes(coordinates, rate, force, spring, modal_system, drive, h, top, coefs):
-    """Write the series of two uncoupled modes with one interface, as `expand_motion`."""
+    """Write the series of two uncoupled modes with one interface, as `expand_motion`.
+
+    Parameters
+    ----------
+    coordinates, rate, modal_system, drive, h, top, coefs
+        As of `expand_motion`.
+    force, spring : float
+        Of the interface [N], [N/m].
+    """
     h_squared = h * h
     face_1 = modal_system.interfaces[0, 0]
     face_2 = modal_system.interfaces[0, 1]
@@ -191,9 +207,14 @@ def expand_two_modes(coordinates, rate, force, spring, modal_system, drive, h, t
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def expand_immobile(coordinates, force, modal_system, drive, top, coefs, workspace):
-    """Write the series of `expand_motion` where the held interfaces stop all motion.
+    """Write the series of `expand_motion` where the sticking interfaces stop all motion.
 
     Only the reactions depend on time.
+
+    Parameters
+    ----------
+    coordinates, force, modal_system, drive, top, coefs, workspace
+        As of `expand_motion`.
     """
     constraint = workspace.constraint
     n_interfaces = len(modal_system.inverse_mass)
@@ -217,11 +238,20 @@ def expand_immobile(coordinates, force, modal_system, drive, top, coefs, workspa
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def remove_held_motion(k, scale, modal_system, coefs, workspace):
-    """Remove what moves held interfaces from coefficients k + 2, and store the reactions [N].
+def remove_sticking_motion(k, scale, modal_system, coefs, workspace):
+    """Remove the motion of sticking interfaces from coefficients k + 2, and store the reactions.
 
     The remaining acceleration is a - interfaces^T r/mass with r = mass (interfaces interfaces^T)^+
     interfaces a.
+
+    Parameters
+    ----------
+    k : int
+        Power of the acceleration.
+    scale : float
+        Ratio of the coefficient to the acceleration [s2].
+    modal_system, coefs, workspace
+        As of `expand_motion`.
     """
     constraint = workspace.constraint
     n = len(modal_system.omega_squared)
@@ -239,7 +269,7 @@ def remove_held_motion(k, scale, modal_system, coefs, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def expand_motion(coordinates, rate, force, springs, modal_system, drive, h, top, coefs, workspace):
-    """Write the power series of the modes over a piece, and the reactions of held interfaces.
+    """Write the power series of the modes over a piece, and the reactions of sticking interfaces.
 
     The equation is z'' = -D z' - omega^2 z - base a - interfaces^T (force + springs slide)/mass.
     Interfaces with infinite springs are held; workspace.constraint.reactions (i, >= top - 1) are
@@ -267,9 +297,9 @@ def expand_motion(coordinates, rate, force, springs, modal_system, drive, h, top
     n = len(modal_system.omega_squared)
     faces = modal_system.interfaces
     h_squared = h * h
-    pulls = workspace.pull
-    held = workspace.constraint.status[HOLD.n_held] > 0.0
-    if workspace.constraint.status[HOLD.is_immobile] == 1.0:
+    pulls = workspace.friction_accel
+    held = workspace.constraint.status[CONSTRAINT.n_sticking] > 0.0
+    if workspace.constraint.status[CONSTRAINT.is_immobile] == 1.0:
         expand_immobile(coordinates, force, modal_system, drive, top, coefs, workspace)
         return
     if n == 1 and n_interfaces == 1:
@@ -310,14 +340,30 @@ def expand_motion(coordinates, rate, force, springs, modal_system, drive, h, top
                 damped = modal_system.damping[i, i] * coefs[k + 1, i]
             coefs[k + 2, i] = scale * part - damp * damped
         if held:
-            remove_held_motion(k, scale, modal_system, coefs, workspace)
+            remove_sticking_motion(k, scale, modal_system, coefs, workspace)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def evaluate_polynomial(poly, low, top, u):
     """Return the sum of poly[k] u^(k - low) for k from low to top.
 
-    Even and odd powers are added apart, which halves the length of the dependency chain.
+    Terms with even and with odd powers are added separately, which halves the length of the
+    dependency chain.
+
+    Parameters
+    ----------
+    poly : ndarray
+        Coefficients of the polynomial.
+    low : int
+        Index of the lowest coefficient.
+    top : int
+        Index of the highest coefficient.
+    u : float
+        Argument.
+
+    Returns
+    -------
+    float
     """
     # two independent sums of half the length, which the processor computes at the same time
     square = u * u
@@ -333,7 +379,19 @@ def evaluate_polynomial(poly, low, top, u):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def evaluate_with_slope(poly, low, top, u):
-    """Return the sum of `evaluate_polynomial` and its derivative."""
+    """Return the sum of `evaluate_polynomial` and its derivative.
+
+    Parameters
+    ----------
+    poly, low, top, u
+        As of `evaluate_polynomial`.
+
+    Returns
+    -------
+    value : float
+    slope : float
+        Its derivative.
+    """
     square = u * u
     k = top - 1
     # slopes over u^2
@@ -358,7 +416,20 @@ def evaluate_with_slope(poly, low, top, u):
 def refine_root(poly, low, top, left, right, u):
     """Return the root in [left, right] of a polynomial that decreases through zero there.
 
-    Newton's method from u, guarded by bisection. poly, low, top: as of `evaluate_polynomial`.
+    Newton's method is guarded by bisection.
+
+    Parameters
+    ----------
+    poly, low, top
+        As of `evaluate_polynomial`.
+    left, right : float
+        Interval of the root.
+    u : float
+        Start of Newton's method.
+
+    Returns
+    -------
+    float
     """
     last = right - left
     for _ in range(100):
@@ -385,7 +456,15 @@ def refine_root(poly, low, top, left, right, u):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def fill_bernstein(poly, low, top, hull):
-    """Write the Bernstein coefficients on [0, 1] of poly[low] ... poly[top] into hull."""
+    """Write the Bernstein coefficients of a polynomial.
+
+    Parameters
+    ----------
+    poly, low, top
+        As of `evaluate_polynomial`.
+    hull : ndarray
+        Bernstein coefficients on [0, 1], which are written.
+    """
     # whole registers
     degree = top - low
     wide = (top - low) // 4 * 4 + 4
@@ -399,10 +478,22 @@ def fill_bernstein(poly, low, top, hull):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_possible_root(poly, low, top, hull):
-    """Return a position near which the first root may lie; NO_ROOT if there is none.
+    """Return a position near which the first root in [0, 1] may lie.
 
-    The Bernstein coefficients of the first terms are compared with the sum of the magnitudes of
-    the other terms.
+    The Bernstein coefficients of the first terms are compared with the sum of the magnitudes of the
+    other terms.
+
+    Parameters
+    ----------
+    poly, low, top
+        As of `evaluate_polynomial`.
+    hull : ndarray
+        Workspace.
+
+    Returns
+    -------
+    float
+        NO_ROOT if there is none.
     """
     remainder = 0.0
     wide = FIRST_LOOK_POWER // 4 * 4 + 4
@@ -426,10 +517,22 @@ def find_possible_root(poly, low, top, hull):
 def prove_first_root(poly, low, top, u, workspace):
     """Return the root near u if it is proved to be the first one, else NO_ROOT.
 
-    Newton's method finds it.
+    Newton's method finds the root r. The polynomial p(r s) is (1 - s) q(s), and the coefficients of
+    q are sums of the last coefficients of p(r s). If q has no root in [0, 1], then p has none
+    before r.
 
-    With p(r) = 0, p(r s) is (1 - s) q(s), and the coefficients of q are sums of the last ones of
-    p(r s). If q has no root in [0, 1], then p has none before r. workspace: two rows.
+    Parameters
+    ----------
+    poly, low, top
+        As of `evaluate_polynomial`.
+    u : float
+        Start of Newton's method.
+    workspace : ndarray
+        Two rows.
+
+    Returns
+    -------
+    float
     """
     last = 1.0
     for _ in range(9):
@@ -566,10 +669,24 @@ def _take_right_half(hulls, depth, width, degree):
 
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_largest_magnitude(poly, top, best, hulls):
-    """Return the larger of `best` and max |sum poly[k] u^k| over [0, 1], to 1e-14 of it.
+    """Return the larger of `best` and the largest magnitude of a polynomial on [0, 1].
 
-    Intervals are halved until their Bernstein coefficients do not exceed the best value, or show
-    at most one extremum, which Newton's method finds.
+    The relative error is 1e-14. Intervals are halved until their Bernstein coefficients do not
+    exceed the best value, or show at most one extremum, which Newton's method finds.
+
+    Parameters
+    ----------
+    poly : ndarray
+        Coefficients of u^0 to u^top.
+    top : int
+    best : float
+        A lower bound of the result.
+    hulls : ndarray
+        (MAX_HALVINGS + 2, HULL_WIDTH) workspace.
+
+    Returns
+    -------
+    float
     """
     best = max(best, abs(poly[0]), abs(evaluate_polynomial(poly, 0, top, 1.0)))
     fill_bernstein(poly, 0, top, hulls[0])

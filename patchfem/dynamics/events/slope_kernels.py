@@ -8,23 +8,27 @@ at rest there, so the derivative of the new turning place is that of the relativ
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .drive_kernels import expand_drive, fastest_drive_rate
+from .drive_kernels import fastest_drive_rate
 from .march_kernels import (
+    Piece,
     apply_event,
     choose_length,
     clear_rests,
+    expand_piece,
     is_before,
     is_idle,
     move_state,
     output_displacement,
+    reaches_border,
+    reset_forces,
     step_to_border,
     time_to_border,
     widen_extremes,
 )
-from .memory_kernels import find_tangent, interface_force
+from .memory_kernels import find_tangent
 from .positions_kernels import EVENT, TIME
 from .search_kernels import find_next_event
-from .series_kernels import bound_fastest_rate, expand_motion, find_highest_power
+from .series_kernels import bound_fastest_rate, expand_motion
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -86,6 +90,33 @@ def move_slopes(u, h, top, slopes, turning_slopes, modal_system, table, memory, 
             slopes[1, i, s] = rate / h
 
 
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def store_turning_slope(interface, slopes, turning_slopes, modal_system, memory):
+    """Write the derivative of a new turning place of an interface, which is that of its slide.
+
+    Parameters
+    ----------
+    interface : int
+    slopes, turning_slopes : ndarray
+        As of `move_slopes`; turning_slopes is written.
+    modal_system : ModalSystem
+    memory : Memory
+    """
+    for s in range(slopes.shape[2]):
+        slope = 0.0
+        for i in range(len(modal_system.omega_squared)):
+            slope += modal_system.interfaces[interface, i] * slopes[0, i, s]
+        turning_slopes[interface, memory.n_groups[interface], s] = slope
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def count_elements(memory, counts):
+    """Widen the range of the numbers of slipping elements and of groups, see `march_with_slopes`."""
+    for f in range(counts.shape[1]):
+        counts[0, f] = max(counts[0, f], memory.n_slipping[f])
+        counts[1, f] = min(counts[1, f], memory.n_groups[f])
+
+
 @njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def march_with_slopes(
     stop,
@@ -124,51 +155,26 @@ def march_with_slopes(
         Number of pieces, -1 where events follow each other without progress.
     """
     n_interfaces = len(modal_system.inverse_mass)
-    for f in range(n_interfaces):
-        memory.force[f] = interface_force(f, table, memory)
+    reset_forces(modal_system, table, memory)
     now = time_state.now
-    n = len(modal_system.omega_squared)
     pieces = 0
     for k in range(workspace.drive.shape[1]):
         workspace.drive[1, k] = 0.0
     while is_before(now, stop):
-        remaining = time_to_border(time_state, stop)
+        count_elements(memory, counts)
         segment = time_state.segments[int(now[TIME.segment])]
         for f in range(n_interfaces):
             workspace.stiffness[f] = find_tangent(f, table, memory).stiffness
-            counts[0, f] = max(counts[0, f], memory.n_slipping[f])
-            counts[1, f] = min(counts[1, f], memory.n_groups[f])
         rate = max(
             bound_fastest_rate(modal_system, workspace.stiffness),
             fastest_drive_rate(segment, time_state.period[0]),
         )
+        remaining = time_to_border(time_state, stop)
         h = choose_length(rate, remaining, motion, modal_system, table, memory)
-        is_to_border = h == remaining
-        top = find_highest_power(rate * h)
-        expand_drive(
-            segment,
-            now[TIME.cycle],
-            now[TIME.offset],
-            time_state.period[0],
-            h,
-            top,
-            workspace.drive,
-        )
-        expand_motion(
-            motion[0],
-            motion[1],
-            memory.force,
-            workspace.stiffness,
-            modal_system,
-            workspace.drive[0],
-            h,
-            top,
-            workspace.coefficients,
-            workspace,
-        )
-        u, kind, interface, sign = find_next_event(
-            top, modal_system, table, memory, time_state, workspace
-        )
+        top = expand_piece(h, rate, 0.0, motion, memory.force, modal_system, time_state, workspace)
+        piece = Piece(h, rate, top, remaining)
+        event = find_next_event(top, modal_system, table, memory, time_state, workspace)
+        u = event.u
         if u > 0:
             if now[TIME.offset] == 0.0:
                 widen_extremes(output_displacement(motion, modal_system), time_state, run_sums)
@@ -179,23 +185,15 @@ def march_with_slopes(
             move_state(
                 u, h, top, motion, modal_system, table, memory, time_state, run_sums, workspace
             )
-            if is_to_border and (
-                u == 1.0 or now[TIME.offset] + u * h >= now[TIME.offset] + remaining
-            ):
+            if reaches_border(piece, u, now):
                 step_to_border(time_state, stop, remaining)
             else:
                 now[TIME.offset] += u * h
             pieces += 1
         if is_idle(u * h, time_state, run_sums):
             return -1
-        if kind == EVENT.reversal and memory.n_slipping[interface] > 0:
-            for s in range(slopes.shape[2]):
-                moved = 0.0
-                for i in range(n):
-                    moved += modal_system.interfaces[interface, i] * slopes[0, i, s]
-                turning_slopes[interface, memory.n_groups[interface], s] = moved
-        apply_event(kind, interface, sign, modal_system, table, memory, time_state)
-    for f in range(n_interfaces):
-        counts[0, f] = max(counts[0, f], memory.n_slipping[f])
-        counts[1, f] = min(counts[1, f], memory.n_groups[f])
+        if event.kind == EVENT.reversal and memory.n_slipping[event.interface] > 0:
+            store_turning_slope(event.interface, slopes, turning_slopes, modal_system, memory)
+        apply_event(event, modal_system, table, memory, time_state)
+    count_elements(memory, counts)
     return pieces

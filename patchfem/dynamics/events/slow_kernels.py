@@ -24,13 +24,19 @@ MIN_SHORT_PIECES = 16.0
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def factor_compliance(springs, modal_system, workspace):
+def factorise_compliance(springs, modal_system, workspace):
     """Factorise the compliance at the interfaces into constraint.matrix (i, i).
 
-    It is row omega^-2 row^T/mass + 1/spring.
+    The compliance is row omega^-2 row^T/mass + 1/spring.
 
-    The rows are left in constraint.basis: those of held interfaces as `constrain_slides` leaves
-    them, 0 without force.
+    Parameters
+    ----------
+    springs : ndarray
+        (i,) stiffness of the interfaces [N/m].
+    modal_system : ModalSystem
+    workspace : Workspace
+        Its constraint.basis becomes the rows: those of sticking interfaces as `constrain_slides`
+        leaves them, 0 without force.
     """
     constraint = workspace.constraint
     n = len(modal_system.omega_squared)
@@ -54,7 +60,20 @@ def factor_compliance(springs, modal_system, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_imbalance(force, coordinates, springs, modal_system, imbalance):
-    """Write a force (n,) [m s-2] minus that of modes and springs into imbalance (n,)."""
+    """Write a force minus that of modes and springs into `imbalance`.
+
+    Parameters
+    ----------
+    force : ndarray
+        (n,) modal accelerations [m s-2].
+    coordinates : ndarray
+        (n,) [m].
+    springs : ndarray
+        (i,) stiffness of the interfaces [N/m].
+    modal_system : ModalSystem
+    imbalance : ndarray
+        (n,) [m s-2], which is written.
+    """
     n = len(modal_system.omega_squared)
     for i in range(n):
         imbalance[i] = force[i] - modal_system.omega_squared[i] * coordinates[i]
@@ -69,9 +88,18 @@ def find_imbalance(force, coordinates, springs, modal_system, imbalance):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def solve_equilibrium(force, coordinates, springs, modal_system, imbalance, workspace):
-    """Write K^-1 force into coordinates (n,) [m]; held interfaces do not move.
+    """Solve the static equilibrium under a force, in which sticking interfaces do not move.
 
-    imbalance (n,) [m s-2] becomes what the held interfaces carry.
+    Parameters
+    ----------
+    force, springs, modal_system
+        As of `find_imbalance`.
+    coordinates : ndarray
+        (n,) [m], which become K^-1 force.
+    imbalance : ndarray
+        (n,) [m s-2], which becomes the part that the sticking interfaces carry.
+    workspace : Workspace
+        As `factorise_compliance` leaves it.
     """
     constraint = workspace.constraint
     n = len(modal_system.omega_squared)
@@ -101,11 +129,9 @@ def solve_equilibrium(force, coordinates, springs, modal_system, imbalance, work
 def expand_slow_motion(coordinates, rate, force, springs, modal_system, h, top, workspace):
     """Write the series of a motion that follows the drive.
 
-    Returns the fraction that vibrates freely besides.
-
     Parameters
     ----------
-    place, rate : ndarray
+    coordinates, rate : ndarray
         (n,) coordinates [m] and rates [m/s] at the start.
     force, springs, modal_system, h, top, workspace
         As of `expand_motion`; workspace.drive[0] is the series of the drive.
@@ -122,7 +148,7 @@ def expand_slow_motion(coordinates, rate, force, springs, modal_system, h, top, 
     coefs = workspace.coefficients
     drive = workspace.drive[0]
     pull = choice.motion_sizes[0]
-    factor_compliance(springs, modal_system, workspace)
+    factorise_compliance(springs, modal_system, workspace)
     for i in range(n):
         coefs[top + 1, i] = 0.0
         coefs[top + 2, i] = 0.0
@@ -179,9 +205,19 @@ def expand_slow_piece(
 ):
     """Expand a piece as long as the drive allows.
 
-    Returns the fraction of the motion that vibrates freely.
-
     It is compiled once for all callers, because it runs rarely.
+
+    Parameters
+    ----------
+    segment, cycle, offset, period
+        As of `drive_kernels.expand_drive`.
+    coordinates, rate, force, modal_system, workspace
+        As of `expand_slow_motion`.
+
+    Returns
+    -------
+    float
+        Free vibration over the motion.
     """
     h = MAX_RATE_TIME / fastest_drive_rate(segment, period)
     top = find_highest_power(MAX_RATE_TIME)
@@ -193,9 +229,24 @@ def expand_slow_piece(
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_slow_rate(motion, force, modal_system, time_state, workspace):
-    """Return the rate of the drive [1/s] where the motion follows it quasi-statically, else 0.
+    """Return the rate of the drive [1/s] where the motion follows it quasi-statically.
 
     The series is then in the workspace as `expand_slow_piece` leaves it.
+
+    Parameters
+    ----------
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    force : ndarray
+        (i,) forces at the start [N].
+    modal_system : ModalSystem
+    time_state : TimeState
+    workspace : Workspace
+
+    Returns
+    -------
+    float
+        0 where it does not.
     """
     now = time_state.now
     segment = time_state.segments[int(time_state.now[TIME.segment])]
@@ -226,7 +277,17 @@ def find_slow_rate(motion, force, modal_system, time_state, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def shorten_series(fraction, top, n_interfaces, workspace):
-    """Rescale the series of a piece in the workspace to a fraction of the piece."""
+    """Rescale the series of a piece in the workspace to a fraction of the piece.
+
+    Parameters
+    ----------
+    fraction : float
+        New duration over the old one.
+    top : int
+        Highest power of the series.
+    n_interfaces : int
+    workspace : Workspace
+    """
     power = 1.0
     for k in range(top + 1):
         for i in range(workspace.coefficients.shape[1]):

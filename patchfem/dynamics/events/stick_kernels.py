@@ -1,49 +1,48 @@
 """Choice of the interfaces that stick after an event, Coulomb friction (compiled).
 
-With some interfaces held, the acceleration is z'' = P a: a is that without their friction, and P
-projects onto motions that leave them alone; the reactions are what the projection takes away.
-Dependent interfaces (1-0, 2-0 and 1-2) share it by least squares: the motion is unique, the split
-between them is not. An interface that this split would overload while the others hold it carries
-its limit and leaves the rest to them.
+While some interfaces stick, the acceleration is z'' = P a: a is the acceleration without
+their friction, and P projects onto the motions in which they stay at rest; the reactions are the
+components that the projection removes. Dependent interfaces (1-0, 2-0 and 1-2) carry the reaction
+in the distribution of least norm: the motion is unique, the distribution is not. An interface
+that this distribution would overload while the others hold it carries its limit, and the others
+carry the remainder.
 
-A choice obeys the law if every held interface is below its limit, or at it with a decreasing
+A choice obeys the law if every sticking interface is below its limit, or at it with a decreasing
 reaction, and every other one starts to move in the direction of its slip. The first term of the
-power series that is not round-off decides. `choose_sticks` tries the guess, then exchanges single
-interfaces by the rule of least index (Murty 1974), and tries all choices of up to eight
-interfaces.
+power series that is not round-off decides. `choose_sticks` exchanges
+single interfaces by the rule of least index (Murty 1974), from the guess on; where that finds
+none, it tries all choices of up to eight interfaces.
 """
 
 from math import sqrt
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
-from .memory_kernels import RIGID_STIFFNESS, find_tangent, interface_force, is_held
-from .positions_kernels import HOLD
+from .memory_kernels import RIGID_STIFFNESS, find_tangent, interface_force, is_sticking
+from .positions_kernels import CONSTRAINT
 from .series_kernels import DOUBLE_INTEGRAL, EPS, expand_motion
 
 # fraction of the sum of magnitudes of a term, below which the term counts as round-off
 NOISE_TOL = 64 * EPS
-# times NOISE_TOL for a second try, which badly conditioned rows of interfaces need
+# factor of NOISE_TOL in a second try, which ill-conditioned rows of interfaces need
 LOOSE_NOISE_FACTOR = 1e4
-# order of the terms that decide a choice; higher ones are taken for round-off
+# number of terms of a power series that may decide a choice; later ones are round-off
 MAX_ORDER = 8
-# interfaces at rest up to which all choices (at most 81) are tried without an exchange
-MAX_ENUMERATED_FIRST = 4
-# interfaces at rest up to which all choices (at most 6561) are tried where the exchange finds none
+# largest number of interfaces at rest of which all choices (at most 6561) are tried
 MAX_ENUMERATED = 8
-# exchanges per interface, after which a choice by exchange is given up
-MAX_EXCHANGES_PER_SLIDE = 8
+# largest number of exchanges per interface; a solvable choice takes fewer
+MAX_EXCHANGES_PER_INTERFACE = 8
 # largest number of sweeps of Jacobi rotations; about five suffice
-MAX_SWEEPS = 40
-# length of an orthogonal row over the longest one, below which the row depends on the others
+MAX_JACOBI_SWEEPS = 40
+# length of an orthogonal row over the longest one, below which it is linearly dependent
 DEPENDENT_TOL = 1e-10
-# remainder of a row after projection over the row, below which the interface is held too
+# remainder of a row after projection over the row, below which the other interfaces hold this one too
 TIED_TOL = 1e-9
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def orthogonalise_rows(modal_system, workspace):
-    """Transform the rows of the held interfaces until they are orthogonal.
+    """Transform the rows of the sticking interfaces until they are orthogonal.
 
     Returns the length of the longest.
 
@@ -55,11 +54,11 @@ def orthogonalise_rows(modal_system, workspace):
     for f in range(n_interfaces):
         for i in range(n):
             constraint.basis[f, i] = (
-                modal_system.interfaces[f, i] if constraint.is_held[f] == 1.0 else 0.0
+                modal_system.interfaces[f, i] if constraint.is_sticking[f] == 1.0 else 0.0
             )
         for g in range(n_interfaces):
             constraint.matrix[f, g] = 1.0 if f == g else 0.0
-    for _ in range(MAX_SWEEPS if constraint.status[HOLD.n_held] > 1.0 else 0):
+    for _ in range(MAX_JACOBI_SWEEPS if constraint.status[CONSTRAINT.n_sticking] > 1.0 else 0):
         quiet = True
         for f in range(n_interfaces):
             for g in range(f + 1, n_interfaces):
@@ -99,7 +98,7 @@ def orthogonalise_rows(modal_system, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def constrain_slides(modal_system, workspace):
-    """Build the constraint of the interfaces in constraint.is_held (i,).
+    """Build the constraint of the interfaces in constraint.is_sticking (i,).
 
     It fills basis, inverse, is_tied and status of `modal_system.Constraint`.
     """
@@ -108,12 +107,12 @@ def constrain_slides(modal_system, workspace):
     n_interfaces = len(modal_system.inverse_mass)
     count = 0.0
     for f in range(n_interfaces):
-        count += constraint.is_held[f]
+        count += constraint.is_sticking[f]
         constraint.is_tied[f] = 0.0
         for i in range(n):
             constraint.inverse[f, i] = 0.0
-    constraint.status[HOLD.n_held] = count
-    constraint.status[HOLD.is_immobile] = 0.0
+    constraint.status[CONSTRAINT.n_sticking] = count
+    constraint.status[CONSTRAINT.is_immobile] = 0.0
     if count == 0.0:
         return
     most = orthogonalise_rows(modal_system, workspace)
@@ -126,7 +125,7 @@ def constrain_slides(modal_system, workspace):
                 constraint.basis[p, i] = 0.0
             continue
         for q in range(n_interfaces):
-            if constraint.is_held[q] == 1.0:
+            if constraint.is_sticking[q] == 1.0:
                 for i in range(n):
                     constraint.inverse[q, i] += (
                         constraint.matrix[p, q] * constraint.basis[p, i] / size
@@ -140,7 +139,7 @@ def constrain_slides(modal_system, workspace):
                     part -= constraint.inverse[f, i] * modal_system.interfaces[f, j]
                 mobility = max(mobility, abs(part))
     if mobility < TIED_TOL:
-        constraint.status[HOLD.is_immobile] = 1.0
+        constraint.status[CONSTRAINT.is_immobile] = 1.0
     for f in range(n_interfaces):
         gap = 0.0
         size = 0.0
@@ -153,17 +152,25 @@ def constrain_slides(modal_system, workspace):
                 part -= along * modal_system.interfaces[g, j]
             gap += part * part
             size += modal_system.interfaces[f, j] ** 2
-        if constraint.status[HOLD.is_immobile] == 1.0 or gap < TIED_TOL**2 * size:
+        if constraint.status[CONSTRAINT.is_immobile] == 1.0 or gap < TIED_TOL**2 * size:
             constraint.is_tied[f] = 1.0
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def remove_held_rates(rates, modal_system, workspace):
-    """Remove from rates (n,) the part that moves the held interfaces."""
+def remove_sticking_rates(rates, modal_system, workspace):
+    """Remove the part of modal rates that moves the sticking interfaces.
+
+    Parameters
+    ----------
+    rates : ndarray
+        (n,) modal rates [m/s], which are changed.
+    modal_system : ModalSystem
+    workspace : Workspace
+    """
     constraint = workspace.constraint
     n_interfaces = len(modal_system.inverse_mass)
     n = len(modal_system.omega_squared)
-    if constraint.status[HOLD.is_immobile] == 1.0:
+    if constraint.status[CONSTRAINT.is_immobile] == 1.0:
         for i in range(n):
             rates[i] = 0.0
         return
@@ -177,14 +184,26 @@ def remove_held_rates(rates, modal_system, workspace):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def correct_held_slides(motion, modal_system, memory, workspace):
-    """Remove the round-off of held interfaces from coordinates and rates."""
+def correct_sticking_slides(motion, modal_system, memory, workspace):
+    """Remove the round-off of sticking interfaces from coordinates and rates.
+
+    Parameters
+    ----------
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    memory : Memory
+    workspace : Workspace
+    """
     constraint = workspace.constraint
     n_interfaces = len(modal_system.inverse_mass)
-    if constraint.status[HOLD.n_held] == 0.0 or constraint.status[HOLD.is_immobile] == 1.0:
+    if (
+        constraint.status[CONSTRAINT.n_sticking] == 0.0
+        or constraint.status[CONSTRAINT.is_immobile] == 1.0
+    ):
         return
     n = len(modal_system.omega_squared)
-    remove_held_rates(motion[1], modal_system, workspace)
+    remove_sticking_rates(motion[1], modal_system, workspace)
     for f in range(n_interfaces):
         constraint.scratch[0, f] = memory.slide[f]
         for i in range(n):
@@ -219,12 +238,12 @@ def estimate_round_off(motion, force, springs, modal_system, h, workspace):
         scale = DOUBLE_INTEGRAL[k + 2] * squared
         damp = DOUBLE_INTEGRAL[k + 2] * h * (k + 1)
         for f in range(n_interfaces):
-            workspace.pull[f] = 0.0
+            workspace.friction_accel[f] = 0.0
             if springs[f] < RIGID_STIFFNESS and k == 0:
-                workspace.pull[f] = abs(force[f]) / modal_system.mass
+                workspace.friction_accel[f] = abs(force[f]) / modal_system.mass
             elif springs[f] < RIGID_STIFFNESS:
                 for i in range(n):
-                    workspace.pull[f] += (
+                    workspace.friction_accel[f] += (
                         abs(interfaces[f, i])
                         * choice.motion_sizes[k, i]
                         * springs[f]
@@ -236,11 +255,11 @@ def estimate_round_off(motion, force, springs, modal_system, h, workspace):
             )
             damped = 0.0
             for f in range(n_interfaces):
-                part += abs(interfaces[f, i]) * workspace.pull[f]
+                part += abs(interfaces[f, i]) * workspace.friction_accel[f]
             for j in range(n):
                 damped += abs(modal_system.damping[i, j]) * choice.motion_sizes[k + 1, j]
             choice.motion_sizes[k + 2, i] = scale * part + damp * damped
-        if workspace.constraint.status[HOLD.n_held] == 0.0:
+        if workspace.constraint.status[CONSTRAINT.n_sticking] == 0.0:
             continue
         for f in range(n_interfaces):
             choice.reaction_sizes[f, k] = 0.0
@@ -256,9 +275,24 @@ def estimate_round_off(motion, force, springs, modal_system, h, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def leading_slip_term(interface, sign, noise, modal_system, workspace):
-    """Return order and sign of the first term of the slip speed above round-off.
+    """Find the first term of the slip speed above round-off.
 
-    They are (MAX_ORDER, 0) where there is none.
+    Parameters
+    ----------
+    interface : int
+    sign : float
+        Sign of the slip.
+    noise : float
+        Fraction of the sum of magnitudes of a term, below which the term is round-off.
+    modal_system : ModalSystem
+    workspace : Workspace
+
+    Returns
+    -------
+    order : float
+        MAX_ORDER where there is none.
+    sign : float
+        0 where there is none.
     """
     for k in range(1, MAX_ORDER):
         rate = 0.0
@@ -275,9 +309,25 @@ def leading_slip_term(interface, sign, noise, modal_system, workspace):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def leading_margin_term(interface, side, noise, limit, workspace):
-    """Return order and sign of the first term of limit - side reaction above round-off.
+    """Find the first term of limit - side reaction above round-off.
 
-    They are (MAX_ORDER, 0) where there is none.
+    Parameters
+    ----------
+    interface : int
+    side : int
+        Sign of the reaction, 1 or -1.
+    noise : float
+        Fraction of the sum of magnitudes of a term, below which the term is round-off.
+    limit : float
+        Limit of the reaction [N].
+    workspace : Workspace
+
+    Returns
+    -------
+    order : float
+        MAX_ORDER where there is none.
+    sign : float
+        0 where there is none.
     """
     for k in range(MAX_ORDER):
         gap = -side * workspace.constraint.reactions[interface, k]
@@ -307,7 +357,7 @@ def find_violation(noise, motion, modal_system, table, memory, h, workspace):
     choice = workspace.choice
     n_interfaces = len(modal_system.inverse_mass)
     for f in range(n_interfaces):
-        workspace.constraint.is_held[f] = (
+        workspace.constraint.is_sticking[f] = (
             1.0 if table.static_limit[f] > 0.0 and choice.guess[f] == 0.0 else 0.0
         )
     constrain_slides(modal_system, workspace)
@@ -364,15 +414,31 @@ def find_violation(noise, motion, modal_system, table, memory, h, workspace):
 def choose_by_exchange(noise, motion, modal_system, table, memory, h, workspace):
     """Exchange the first interface that violates the law, until none does.
 
-    Returns whether a choice is found.
-
     This is the rule of least index (Murty, Opsearch 11, 148, 1974). It ends with the only solution
     wherever the complementarity problem has a P-matrix, also over power series in time, which are
     ordered by their first term. That is the case for independent interfaces that break at their
     kinetic limit. Of 1800 random choices among 5 to 16 interfaces at rest, it and
     `choose_by_enumeration` together missed 26, all of more than eight interfaces of fewer modes.
+
+    Parameters
+    ----------
+    noise : float
+        Fraction of the sum of magnitudes of a term, below which the term is round-off.
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    h : float
+        Duration of the piece [s].
+    workspace : Workspace
+
+    Returns
+    -------
+    bool
+        Whether a choice was found.
     """
-    for _ in range(MAX_EXCHANGES_PER_SLIDE * len(modal_system.inverse_mass)):
+    for _ in range(MAX_EXCHANGES_PER_INTERFACE * len(modal_system.inverse_mass)):
         slide, side = find_violation(noise, motion, modal_system, table, memory, h, workspace)
         if slide < 0:
             return True
@@ -384,7 +450,23 @@ def choose_by_exchange(noise, motion, modal_system, table, memory, h, workspace)
 def choose_by_enumeration(noise, motion, modal_system, table, memory, h, workspace):
     """Try all choices of the interfaces at rest, those with few slipping first.
 
-    Returns whether one obeys.
+    Parameters
+    ----------
+    noise : float
+        Fraction of the sum of magnitudes of a term, below which the term is round-off.
+    motion : ndarray
+        (2, n) modal coordinates [m] and rates [m/s].
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    h : float
+        Duration of the piece [s].
+    workspace : Workspace
+
+    Returns
+    -------
+    bool
+        Whether one satisfies the law.
     """
     choice = workspace.choice
     n_interfaces = len(modal_system.inverse_mass)
@@ -429,17 +511,17 @@ def choose_sticks(motion, modal_system, table, memory, h, workspace):
     Returns
     -------
     bool
-        Whether a choice was found. The rates of held interfaces are removed from the motion.
+        Whether a choice was found. The rates of sticking interfaces are removed from the motion.
     """
     choice = workspace.choice
     constraint = workspace.constraint
     n_interfaces = len(modal_system.inverse_mass)
     count = 0
     for f in range(n_interfaces):
-        constraint.is_held[f] = choice.is_resting[f]
+        constraint.is_sticking[f] = choice.is_resting[f]
     constrain_slides(modal_system, workspace)
-    if constraint.status[HOLD.n_held] > 0.0:
-        remove_held_rates(motion[1], modal_system, workspace)
+    if constraint.status[CONSTRAINT.n_sticking] > 0.0:
+        remove_sticking_rates(motion[1], modal_system, workspace)
     for f in range(n_interfaces):
         if table.static_limit[f] > 0.0 and constraint.is_tied[f] == 1.0:
             choice.is_resting[f] = 1.0
@@ -447,11 +529,7 @@ def choose_sticks(motion, modal_system, table, memory, h, workspace):
     for noise in (NOISE_TOL, LOOSE_NOISE_FACTOR * NOISE_TOL):
         for f in range(n_interfaces):
             choice.guess[f] = choice.slip_signs[f]
-        if find_violation(noise, motion, modal_system, table, memory, h, workspace)[0] < 0:
-            return True
-        if count > MAX_ENUMERATED_FIRST and choose_by_exchange(
-            noise, motion, modal_system, table, memory, h, workspace
-        ):
+        if choose_by_exchange(noise, motion, modal_system, table, memory, h, workspace):
             return True
         if count <= MAX_ENUMERATED and choose_by_enumeration(
             noise, motion, modal_system, table, memory, h, workspace
@@ -461,18 +539,31 @@ def choose_sticks(motion, modal_system, table, memory, h, workspace):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def find_resting_slides(u, h, top, modal_system, table, memory, workspace):
+def find_resting_interfaces(u, h, top, modal_system, table, memory, workspace):
     """Find the interfaces with rigid elements that have no velocity at u of a piece.
 
-    They are the held ones and those whose speed is round-off; choice.is_resting and
+    They are those that stick and those whose speed is round-off; choice.is_resting and
     choice.slip_signs are written.
+
+    Parameters
+    ----------
+    u : float
+        Fraction of the piece.
+    h : float
+        Duration of the piece [s].
+    top : int
+        Highest power of the series.
+    modal_system : ModalSystem
+    table : ElementTable
+    memory : Memory
+    workspace : Workspace
     """
     choice = workspace.choice
     for f in range(len(modal_system.inverse_mass)):
         head = memory.rigid_state[f]
         choice.slip_signs[f] = min(max(head, -1.0), 1.0)
         choice.is_resting[f] = 1.0 if table.static_limit[f] > 0.0 else 0.0
-        if is_held(f, table, memory) or table.static_limit[f] == 0.0 or abs(head) == 2.0:
+        if is_sticking(f, table, memory) or table.static_limit[f] == 0.0 or abs(head) == 2.0:
             continue
         speed = 0.0
         size = 0.0

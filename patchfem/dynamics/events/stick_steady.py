@@ -3,7 +3,7 @@
 Newton's method finds the fixed point of the map over a period.
 
 Between two events the motion is linear, so its derivative is the exponential of its system without
-the held interfaces. A perturbation dx moves an event with the condition e by dt = -(grad e .
+the sticking interfaces. A perturbation dx moves an event with the condition e by dt = -(grad e .
 dx)/e', so dx+ = R (dx + f- dt) - f+ dt with the motions f before and after and R removing the
 rates of stopped interfaces (saltation matrix; Leine and Nijmeijer 2004, ch. 7). The eigenvalues of
 the product are the Floquet multipliers.
@@ -60,7 +60,8 @@ class PeriodMapping(NamedTuple):
     - rubs: (i,) whether the interface has friction
     - swing: half the range of the output [m]
     - sizes: (2n,) sizes of the state on the way
-    - first: (n, n) projector of the first phase onto motions that leave the held interfaces alone
+    - first: (n, n) projector of the first phase onto motions that leave the sticking interfaces
+    alone
     - alone: as of `SteadyState`
     """
 
@@ -114,13 +115,28 @@ class LinearPhase:
         return matrix_exponential(left * self.span) @ self.taken_out()
 
     def taken_out(self) -> np.ndarray:
-        """Return the derivative (2n, 2n) of a state whose held interfaces come to rest."""
+        """Return the derivative (2n, 2n) of a state whose sticking interfaces come to rest."""
         out = np.eye(2 * len(self.square))
         out[len(self.square) :, len(self.square) :] = self.project
         return out
 
     def acceleration(self, z, v, push: float) -> tuple:
-        """Return accelerations (n,) [m s-2] with and without the reactions."""
+        """Return the modal accelerations with and without the reactions.
+
+        Parameters
+        ----------
+        z : ndarray
+            (n,) coordinates [m].
+        v : ndarray
+            (n,) rates [m/s].
+        push : float
+            Drive [m s-2].
+
+        Returns
+        -------
+        with_reactions, without_reactions : ndarray
+            (n,) [m s-2].
+        """
         pull = -self.square @ z - self.dampers @ v - self.run.modes.base * push - self.given
         return self.project @ pull, pull
 
@@ -189,7 +205,7 @@ def matrix_exponential(left) -> np.ndarray:
 def _identify_event(one: LinearPhase, later: LinearPhase, changed, reactions) -> tuple:
     """Return the interface of the event between two phases and whether its slip stopped.
 
-    reactions: (h,) [N] of the held interfaces.
+    reactions: (h,) [N] of the sticking interfaces.
     """
     turned = np.flatnonzero(changed & (one.signs != 0))
     if turned.size:

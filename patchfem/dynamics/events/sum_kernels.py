@@ -10,7 +10,23 @@ from .series_kernels import GAUSS_POINTS, GAUSS_WEIGHTS, count_gauss_points, eva
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def evaluate_at_four(poly, low, top, u):
-    """Return the values of a polynomial at four points, as `evaluate_polynomial` does."""
+    """Return the values of a polynomial at four points, as `evaluate_polynomial` does.
+
+    Parameters
+    ----------
+    poly : ndarray
+        Coefficients of the polynomial.
+    low : int
+        Index of the lowest coefficient.
+    top : int
+        Index of the highest coefficient.
+    u : tuple of float
+        The four points.
+
+    Returns
+    -------
+    tuple of float
+    """
     a = b = c = d = poly[top]
     for k in range(top - 1, low - 1, -1):
         part = poly[k]
@@ -23,7 +39,23 @@ def evaluate_at_four(poly, low, top, u):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def evaluate_rates_at_four(coefs, i, top, u):
-    """Return the derivatives with respect to u of the coordinate i at four points."""
+    """Return the derivatives of a coordinate with respect to u at four points.
+
+    Parameters
+    ----------
+    coefs : ndarray
+        (terms, n) series of the coordinates.
+    i : int
+        Number of the coordinate.
+    top : int
+        Highest power of the series.
+    u : tuple of float
+        The four points.
+
+    Returns
+    -------
+    tuple of float
+    """
     a = b = c = d = top * coefs[top, i]
     for k in range(top - 1, 0, -1):
         part = k * coefs[k, i]
@@ -38,8 +70,22 @@ def evaluate_rates_at_four(coefs, i, top, u):
 def add_piece_sums(x, u, h, top, modal_system, time_state, run_sums, workspace):
     """Add drive work, viscous loss and output phasor of a piece up to u to the sums.
 
-    x: duration of the piece times the fastest rate. Four points are evaluated at a time, in
-    registers.
+    Four points are evaluated at a time, in registers.
+
+    Parameters
+    ----------
+    x : float
+        Duration of the piece times the fastest rate.
+    u : float
+        Fraction of the piece.
+    h : float
+        Duration of the piece [s].
+    top : int
+        Highest power of the series.
+    modal_system : ModalSystem
+    time_state : TimeState
+    run_sums : RunSums
+    workspace : Workspace
     """
     n = len(modal_system.omega_squared)
     count = count_gauss_points(x * u)
