@@ -6,6 +6,7 @@ in groups.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Hashable, Sequence
 from functools import cache, partial
 from importlib import import_module
@@ -172,7 +173,7 @@ def solve_models(
     models = (
         models if isinstance(models, SimilarModels) else [_without_joint(one) for one in models]
     )
-    found, groups = CaseResults.blank(len(models)), {}
+    found, groups, failures = CaseResults.blank(len(models)), {}, Counter()
     left, study = np.arange(len(models)), study or len(models)
     if keep is None:
         left, groups = _by_columns(models, study)
@@ -181,7 +182,12 @@ def solve_models(
         if isinstance(model, PatchfemError):
             found.fail(case, str(model))
             continue
-        groups.setdefault(_place(model, study) if keep is None else (None, None), []).append(case)
+        place = _place(model, study) if keep is None else ALONE
+        groups.setdefault(place[:2], []).append(case)
+        if place.failure:
+            failures[place.failure] += 1
+    for failure, count in failures.items():
+        _say_failure(say, count, failure)
     for (batch, _), cases in groups.items():
         found.place(
             cases,
@@ -229,13 +235,41 @@ def _by_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
     return left, out
 
 
-def _place(model: Model, study: int) -> tuple:
-    """Return the batch and the group of a model; (None, None) if it is run by itself."""
+class Place(NamedTuple):
+    """Batch and group of a model.
+
+    - batch, group: None if the model is run by itself.
+    - failure: batch and error, if the search for the group failed; else "".
+    """
+
+    batch: Batch | None
+    group: Hashable
+    failure: str = ""
+
+
+ALONE = Place(None, None)
+
+
+def _place(model: Model, study: int) -> Place:
+    """Return the batch and the group of a model in a study of so many cases."""
+    batch = None
     try:
         batch = batch_of(model, study)
-        return (batch, batch.group(model)) if batch is not None else (None, None)
-    except Exception:  # the model is run again by itself, which reports its error
-        return None, None
+        return ALONE if batch is None else Place(batch, batch.group(model))
+    except Exception as error:  # the model is run again by itself, which reports its error
+        return ALONE._replace(failure=_describe_failure(batch, error))
+
+
+def _describe_failure(batch: Batch | None, error: Exception) -> str:
+    """Return the name of a batch, if it is known, and the error that it raised."""
+    name = "" if batch is None else f"{batch.name}: "
+    return f"{name}{type(error).__name__}: {error}"
+
+
+def _say_failure(say: Callable | None, count: int, failure: str) -> None:
+    """Say that cases are run one by one, with the batch and the error that caused this."""
+    if say is not None:
+        say(f"{count} cases are run one by one, because running them together failed: {failure}")
 
 
 def _with_case_indices(keep: Callable | None, cases: list) -> Callable | None:
@@ -254,9 +288,5 @@ def _solve_cases(
                 compiled.record_run(_kind(batch, models[0]))
             return out
         except Exception as error:  # each case is run again by itself, which names the one at fault
-            if say is not None:
-                say(
-                    f"{len(models)} cases are run one by one, because running them together failed: {batch.name}: "
-                    f"{type(error).__name__}: {error}"
-                )
+            _say_failure(say, len(models), _describe_failure(batch, error))
     return alone(models, say)

@@ -72,7 +72,30 @@ def test_exact_a_failing_batch_is_made_up_for_by_single_runs(use_batches):
 def test_exact_a_batch_that_fails_to_look_at_a_model_leaves_it_to_a_single_run(use_batches):
     batch = batches.Batch("blind", lambda model: 1 / 0, lambda model: 0, lambda models, say: 1 / 0)
     use_batches(batch)
-    same(batches.solve_models([pf.build(BENCH)]), 0, pf.run(BENCH))
+    said = []
+    same(batches.solve_models([pf.build(BENCH)], say=said.append), 0, pf.run(BENCH))
+    (sentence,) = [text for text in said if "one by one" in text]
+    assert sentence.startswith("1 cases are run one by one") and "ZeroDivisionError" in sentence
+
+
+def test_always_a_batch_that_cannot_group_its_models_says_so_once(use_batches):
+    """Three benches whose group fails are run one by one; the rig, which the batch refuses, is not counted."""
+    batch = batches.Batch(
+        "groups",
+        lambda model: "" if model.kind == "bench" else "no",
+        lambda model: model.no_such_name,
+        lambda models, say: 1 / 0,
+    )
+    use_batches(batch)
+    models = [pf.build(text) for text in (BENCH, RIG, BENCH, BENCH)]
+    said = []
+    found = batches.solve_models(models, say=said.append)
+    for case, text in enumerate((BENCH, RIG, BENCH, BENCH)):
+        same(found, case, pf.run(text))
+    (sentence,) = [text for text in said if "one by one" in text]
+    assert sentence.startswith(
+        "3 cases are run one by one, because running them together failed: groups: AttributeError"
+    )
 
 
 def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(use_batches):
