@@ -82,7 +82,7 @@ def make_no_onset_reason(kind: str, length: float | None = None) -> str:
         kind,
         f"has an acceleration whose third harmonic is more than {MIN_DISTORTION:g} of its first harmonic",
     )
-    return f"no level of the rising sequence {what}"
+    return f"no level of the increasing sequence {what}"
 
 
 def bracket_onset(levels, past: Callable[[Level], bool]) -> tuple | None:

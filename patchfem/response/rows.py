@@ -342,7 +342,7 @@ ROWS = (
         1e-10,
         "half the peak-to-peak displacement at the output, relative to "
         "the base; of a release, that of the last whole cycle of the "
-        "motion, from one turn to the next but one",
+        "motion, from a reversal to the second reversal after it",
         lambda s: (
             float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2
             if s.own.output_amplitude is None
@@ -562,8 +562,8 @@ ROWS = (
         "m",
         1e-10,
         "steady amplitude under a periodic drive, extrapolated if the motion has not settled or may still change by "
-        "more than 0.02 tolerance × amplitude; absent if it may not, null if the motion has not settled and does not "
-        "show what to",
+        "more than 0.02 tolerance × amplitude; absent if it has settled and cannot change by more; null if the motion "
+        "has not settled and its limit cannot be extrapolated",
     ),
     MeasureDefinition(
         "peak_frequency",
@@ -661,8 +661,8 @@ ROWS = (
         "level_hysteresis",
         "m",
         0.0,
-        "hysteresis: largest difference between the amplitudes reached at the same level with rising and with falling "
-        "levels",
+        "hysteresis: largest difference between the amplitudes reached at the same level while the levels "
+        "increase and while they decrease",
     ),
     *SINGLE_RUN_ROWS,
 )

@@ -189,7 +189,7 @@ def test_refuses_a_script_without_its_fields_or_of_nothing_that_moves(
     bench, written, tmp_path, monkeypatch
 ):
     (tmp_path / "alone.py").write_text(written.read_text("utf-8"), "utf-8")
-    with pytest.raises(SystemExit, match="is not there"):
+    with pytest.raises(SystemExit, match="does not exist"):
         played(tmp_path / "alone.py", monkeypatch)
     write_small(tmp_path / "still", 1)
     answer = cli("export", tmp_path / "still", "-o", tmp_path / "a.py")

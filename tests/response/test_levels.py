@@ -91,7 +91,7 @@ def test_exact_no_onset_where_every_level_holds():
     _, found = measured('law = "coulomb"', '["1 g", "3 g"]')
     assert (
         found["onset_level"].value is None
-        and found["onset_level"].reason == "no level of the rising sequence slips"
+        and found["onset_level"].reason == "no level of the increasing sequence slips"
     )
     assert (
         found["jump_level"].value is None
@@ -144,7 +144,7 @@ def test_exact_onset_by_a_gauge_is_where_the_output_passes_its_length():
     ).measures
     assert (
         never["onset_level"].reason
-        == "no level of the rising sequence has an amplitude of more than 1 m at the output"
+        == "no level of the increasing sequence has an amplitude of more than 1 m at the output"
     )
 
 

@@ -34,14 +34,15 @@ STRESSES = {
 STATUS = "status"  # state of the interface: 0 open, 1 sticks, 2 slips
 
 SCRIPT = '''\
-"""Both pieces through the last cycle: {title} in them, contact pressure on their interface.
+"""Show the last cycle: {title} in both pieces, contact pressure on their interface.
 
     pvpython THIS.py            plays the cycle three times
-    pvpython THIS.py cycle.png  writes a picture of every frame; .avi or .ogv where ParaView can write films
-    paraview --script=THIS.py   opens it
-    xvfb-run -a pvpython THIS.py cycle.png  where there is no display (apt-get install xvfb)
+    pvpython THIS.py cycle.png  writes a picture of each frame; .avi or .ogv writes a film, if ParaView can write it
+    paraview --script=THIS.py   opens the window of ParaView
+    xvfb-run -a pvpython THIS.py cycle.png  works without a display (apt-get install xvfb)
 
-For ParaView 5.11 and later. The fields stand beside this script, in a .pvd of the same name and its folder.
+The script needs ParaView 5.11 or later. The fields are in the .pvd file of the same name next to this script,
+and in the folder that the file refers to.
 """
 
 import os
@@ -51,30 +52,30 @@ from paraview import simple
 
 HERE = os.path.dirname(os.path.abspath(__file__)) if "__file__" in globals() else os.getcwd()
 FIELDS = os.path.join(HERE, {fields!r})
-MOTION = {motion!r}  # factor of the motion and the gap
-SLIDE = {slide!r}  # factor of the slide of the upper piece as a whole
-STRESS = {stress!r}  # MPa, ends of the colours in every frame
-PRESSURE = {pressure!r}  # MPa, ends of the colours in every frame
-STATUS = {status!r}  # whether the interface shows where it is open, sticks and slips, in place of its pressure
-TIMES = 3  # the cycle is played
+MOTION = {motion!r}  # magnification of the motion and the gap
+SLIDE = {slide!r}  # magnification of the rigid slide of the upper piece
+STRESS = {stress!r}  # range of the colours [MPa], the same in all frames
+PRESSURE = {pressure!r}  # range of the colours [MPa], the same in all frames
+STATUS = {status!r}  # whether the interface is coloured by open, stick and slip instead of by its pressure
+TIMES = 3  # how often the cycle is played
 PACE = {pace!r}  # frames per second of a film
 
 
 def without_display():
-    """Whether this ParaView draws on an X display and there is none: it would end by a crash."""
+    """Return whether this ParaView needs an X display and there is none, so that it would crash."""
     if not sys.platform.startswith("linux") or os.environ.get("DISPLAY"):
         return False
-    import vtkmodules.vtkRenderingOpenGL2  # without it the kind of window of this build is not known
+    import vtkmodules.vtkRenderingOpenGL2  # this import registers the window class of this build
     from vtkmodules.vtkRenderingCore import vtkRenderWindow
 
     return vtkRenderWindow().GetClassName() == "vtkXOpenGLRenderWindow"
 
 
 if not os.path.isfile(FIELDS):
-    raise SystemExit(FIELDS + " is not there; run this script in the folder where it was written")
+    raise SystemExit(FIELDS + " does not exist; keep this script in the folder in which it was written")
 if without_display():
-    raise SystemExit("there is no display, without which this ParaView crashes; xvfb-run -a pvpython THIS.py cycle.png "
-                     "writes pictures (apt-get install xvfb), and so does a ParaView built for EGL or OSMesa")
+    raise SystemExit("there is no display, which this ParaView needs; xvfb-run -a pvpython THIS.py cycle.png writes "
+                     "pictures without one (apt-get install xvfb), as does a ParaView built for EGL or OSMesa")
 
 reader = simple.PVDReader(registrationName={fields!r}, FileName=FIELDS)
 bent = simple.WarpByVector(registrationName="motion", Input=reader)
@@ -96,7 +97,7 @@ view.OrientationAxesVisibility = 0
 
 
 def show(source, where, name, title, ends, colours, unit="[MPa]"):
-    """Show a source coloured by one of its arrays, with the same colours in every frame."""
+    """Show a source, coloured by one of its arrays with the same range in all frames."""
     shown = simple.Show(source, view)
     simple.ColorBy(shown, (where, name))
     table = simple.GetColorTransferFunction(name)
@@ -106,7 +107,7 @@ def show(source, where, name, title, ends, colours, unit="[MPa]"):
     shown.SetScalarBarVisibility(view, True)
     bar = simple.GetScalarBar(table, view)
     bar.Title, bar.ComponentTitle = title, unit
-    shown.Ambient, shown.Diffuse = 1.0, 0.0  # the colours of the bar, without light and shade
+    shown.Ambient, shown.Diffuse = 1.0, 0.0  # no light and shade, so that the colours are those of the scale
     return shown
 
 
@@ -130,7 +131,7 @@ simple.ResetCamera(view)
 simple.Render(view)
 films = [word for word in sys.argv[1:] if word.endswith((".png", ".avi", ".ogv"))]
 if films:
-    view.ViewSize = [1280, 800]  # so wide that the scales stand beside the pieces
+    view.ViewSize = [1280, 800]  # wide enough to show the scales next to the pieces
 for film in films:
     simple.SaveAnimation(film, view, FrameRate=PACE)
 if not films:

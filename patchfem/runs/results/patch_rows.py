@@ -53,7 +53,7 @@ ROWS = (
         "approach",
         "m",
         1e-13,
-        "distance by which the holders approach each other at x = 0, counted from the first "
+        "distance by which the holders approach each other at x = 0, measured from the first "
         "touch of the unloaded flat pieces",
         group="patch",
     ),

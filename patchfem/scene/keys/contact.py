@@ -134,7 +134,7 @@ class Approach(Table):
     distance: key(
         quantity("length", ge=0),
         "distance by which the holders approach each other at x = 0 in place of a "
-        "load, counted from the first touch of the flat pieces without tilt and crown",
+        "load, measured from the first touch of the flat pieces without tilt and crown",
     )
 
 
