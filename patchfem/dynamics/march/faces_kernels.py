@@ -3,9 +3,12 @@
 Port p is a row of slides. The contact, if there is one, acts on port 0, and every element on its own port. Over a step the
 path-mean forces F satisfy d = free - beta F together with every law. Each law is solved in turn under the forces of the
 others, which is block descent on a convex problem for laws that dissipate. All set-valued elements are one block, which is
-followed from stop to release inside the step (`stops_kernels`). Where the turns converge slowly, a Newton step on all
-forces takes over (`together_kernels`). The text runs with any contact and any laws; `instances` makes an instance of it.
+followed from stop to release inside the step (`stops_kernels`). If that fails, `solve_coupled_forces` finds mean forces of
+the whole step, which always exist. Where the turns converge slowly, a Newton step on all forces takes over
+(`together_kernels`). The text runs with any contact and any laws; `instances` makes an instance of it.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -65,11 +68,23 @@ MAX_TURNS = 1000  # sweeps over all elements after which a step has failed
 MAX_EVENT_TURNS = (
     60  # the same with stops and releases inside the step; the first half settles which they are
 )
+FIRST_NEWTON_TURN = 5  # turn after which a Newton step on all forces is worth its cost
 # smallest residual that can be reached, as a fraction of a free slide over its compliance, and of a force
 ROUND_OFF = 4e-15
 ELEMENT_COLUMNS = (
     5  # slide, speed, force, slip, and mean force of the step that follows, of an element in a row
 )
+
+
+class NewtonPace(NamedTuple):
+    """Turn of the next Newton step on all forces, pause between two, and change before the last one.
+
+    The pause is a number of turns. The change is the largest one of a force, over its tolerance.
+    """
+
+    next_turn: int
+    pause: int
+    worst: float
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -270,7 +285,8 @@ def solve_one_element(e, turn, faces, dt):
     mine = faces.port[FREE_SLIDE, p] - slide_by_others(e, p, faces)
     if HAS_STOPS:
         if faces.num[e, 0] == SET_VALUED:
-            dq = solve_coulomb_step(mine, beta, faces.num[e, 1], faces.num[e, 2])[0]
+            limit = faces.each[MAX_FORCE, e]
+            dq = solve_coulomb_step(mine, beta, limit, limit)[0]
     if HAS_SLOPES:
         if faces.num[e, 0] != SET_VALUED:
             guess = (
@@ -393,6 +409,11 @@ def solve_coupled_forces(q, v, modal_system, interface, faces):
     Each is solved in turn under the forces of the others, into faces.own and faces.each. A Newton step on all
     forces speeds up turns that converge slowly.
 
+    With one friction limit per set-valued element the problem is convex, and block descent converges. So each of
+    them begins with its static friction; those that slip under it are released to their kinetic friction, and the
+    turns go on. No element gets its static friction back, so there are at most as many releases as elements. In
+    the end an element at rest carries at most its static friction, and one that slips has its kinetic friction.
+
     Parameters
     ----------
     q : float
@@ -411,39 +432,70 @@ def solve_coupled_forces(q, v, modal_system, interface, faces):
     int
         Number of iterations, negative if the forces do not converge.
     """
-    count = faces.of.shape[1]
     dt = modal_system.dt
     iterations = 0
     last_worst = np.inf
+    pace = NewtonPace(FIRST_NEWTON_TURN, 1, np.inf)
     dq = 0.0
+    if HAS_STOPS:
+        set_static_limits(faces)
     for turn in range(MAX_TURNS):
         worst = 0.0
         if HAS_CONTACT:
             dq, worst, tries = solve_contact(q, v, dt, interface, faces)
             iterations += tries
-        for e in range(count):
+        for e in range(faces.of.shape[1]):
             change, tries = solve_one_element(e, turn, faces, dt)
             worst = max(worst, change)
             iterations += tries
+        if not IS_COUPLED:
+            if worst == np.inf:
+                return dq, -iterations
+            worst = 0.0
         if worst <= 1.0:
+            if HAS_STOPS:
+                if release_slipping(faces):
+                    last_worst = np.inf
+                    continue
             return dq, iterations
-        if IS_COUPLED:
-            if turn > 1:
-                iterations += speed_up_turns(turn, worst, last_worst, modal_system, faces)
-        else:
-            return dq, iterations if worst < np.inf else -iterations
+        if turn > 1:
+            pace, tries = speed_up_turns(turn, worst, last_worst, pace, modal_system, faces)
+            iterations += tries
         last_worst = worst
     return dq, -iterations
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def speed_up_turns(turn, worst, last_worst, modal_system, faces):
-    """Take a Newton step on the forces of all elements at once; return the iterations.
+def set_static_limits(faces):
+    """Let every set-valued element carry up to its static friction."""
+    for i in range(faces.stops.names.size):
+        e = faces.stops.element[i]
+        faces.each[MAX_FORCE, e] = faces.num[e, 1]
 
-    This is done only without a contact.
 
-    Laws with a slope are solved to the minimum of their potential; others take a Newton step if the turns are
-    slow.
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def release_slipping(faces):
+    """Limit the forces of set-valued elements that slip to their kinetic friction.
+
+    Returns whether one of them had a higher limit.
+    """
+    is_released = False
+    for i in range(faces.stops.names.size):
+        e = faces.stops.element[i]
+        if faces.each[INCREMENT, e] != 0.0 and faces.each[MAX_FORCE, e] > faces.num[e, 2]:
+            faces.each[MAX_FORCE, e] = faces.num[e, 2]
+            is_released = True
+    return is_released
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def speed_up_turns(turn, worst, last_worst, pace, modal_system, faces):
+    """Take a Newton step on the forces of all elements at once.
+
+    This is done only without a contact. Laws with a slope are solved to the minimum of their potential; others
+    take a Newton step if the turns are slow. Newton's method can cycle between two states where laws are steep. So
+    the pause doubles after each Newton step that did not reduce the change of the forces, and the turns between
+    two steps converge.
 
     Parameters
     ----------
@@ -453,23 +505,28 @@ def speed_up_turns(turn, worst, last_worst, modal_system, faces):
         Largest change of a force in the turn, over its tolerance.
     last_worst : float
         The same of the turn before.
+    pace : NewtonPace
     modal_system : interfaces.arrays.ModalArrays
     faces : interfaces.arrays.PortElements
 
     Returns
     -------
+    NewtonPace
     int
+        Number of iterations.
     """
     if HAS_CONTACT:
-        return 0
+        return pace, 0
     elif HAS_SLOPES:
         if HAS_PLANES:  # the force of an element in a plane has no potential
             pass
         elif faces.stops.names.size == 0 and modal_system.dense.size == 0:
-            return abs(together.solve_smooth(faces, modal_system.dt))
-    if turn > 4 and worst > 0.2 * last_worst:
+            return pace, abs(together.solve_smooth(faces, modal_system.dt))
+    if turn >= pace.next_turn and worst > 0.2 * last_worst:
         together.newton_step(faces, modal_system.dt, False)
-    return 0
+        pause = pace.pause if worst < pace.worst else 2 * pace.pause
+        return NewtonPace(turn + pause, pause, worst), 0
+    return pace, 0
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)

@@ -43,8 +43,8 @@ CONTACT_INCREMENT = 1
 CONTACT_SAMPLE = 2
 CONTACT_TOL = 3
 STOPS_KNOWN = 4
-# `each`: of an element its mean force [N], slide, speed, bond length, increment of slide, residual, largest force,
-# tolerance of the force, and increments of the last two steps.
+# `each`: of an element its mean force [N], slide, speed, bond length, increment of slide, residual, largest force (if
+# it is set-valued, of a step by mean forces alone), tolerance of the force, and increments of the last two steps.
 ELEMENT_FORCE = 0
 ELEMENT_SLIDE = 1
 ELEMENT_SPEED = 2

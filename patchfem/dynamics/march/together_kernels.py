@@ -24,7 +24,9 @@ from .stops_kernels import (
     ELEMENT_SLIDE,
     FORCE_TOL,
     FREE_SLIDE,
+    INCREMENT,
     MATE,
+    MAX_FORCE,
     MODAL_SCRATCH,
     PORT,
     SET_VALUED,
@@ -216,10 +218,7 @@ def force_equations(faces, dt, known):
         for k in range(count):
             dq -= beta[p, faces.of[PORT, k]] * faces.each[ELEMENT_FORCE, k]
         if faces.num[e, 0] == SET_VALUED:
-            holds = (
-                abs(faces.each[ELEMENT_FORCE, e]) < faces.num[e, 1] * (1 - 1e-12)
-                and abs(faces.each[ELEMENT_FORCE, e]) != faces.num[e, 2]
-            )
+            holds = faces.each[INCREMENT, e] == 0.0
             goal = 0.0
             if known:
                 holds = faces.stops.field[SLIDES_ON, face] == 0.0
@@ -311,7 +310,6 @@ def newton_step(faces, dt, known):
     for e in range(count):
         faces.each[ELEMENT_FORCE, e] += miss[e]
         if faces.num[e, 0] == SET_VALUED:
-            faces.each[ELEMENT_FORCE, e] = min(
-                max(faces.each[ELEMENT_FORCE, e], -faces.num[e, 1]), faces.num[e, 1]
-            )
+            limit = faces.num[e, 1] if known else faces.each[MAX_FORCE, e]
+            faces.each[ELEMENT_FORCE, e] = min(max(faces.each[ELEMENT_FORCE, e], -limit), limit)
     return True

@@ -256,11 +256,9 @@ def march_random_chain(seed):
 
 @given(st.integers(0, 10_000))
 def test_always_energy_closes_and_friction_only_takes(seed):
-    """The balance of a converged run closes to round-off, and no law exceeds its limit."""
+    """Every step has a solution, the balance closes to round-off, and no law exceeds its limit."""
     got, limit = march_random_chain(seed)
-    if got.outcome is not None:
-        assert "error of the friction force above the permitted" in got.message
-        return
+    assert got.outcome is None
     book = got.ledger
     miss = book["work_in"] - book["stored"] - book["viscous"] - book["friction"]
     assert abs(miss) <= 1e-9 * (book["power"] + book["peak_stored"])
@@ -271,10 +269,15 @@ def test_always_energy_closes_and_friction_only_takes(seed):
     assert np.all(forces <= limit * (1 + 1e-9))
 
 
-def test_always_nearly_all_random_chains_converge():
-    """Of 1500 chains 28 have steps whose states of stick and slip are not found, and say so."""
-    missed = [seed for seed in range(200) if march_random_chain(seed)[0].outcome is not None]
-    assert len(missed) <= 2  # 134 and 173
+# Kinetic below static friction: block descent alternated between stick and slip.
+STICK_OR_SLIP = [134, 173, 242, 319, 388, 514, 641, 667, 672, 677, 744, 817, 863, 905, 917, 960]
+STEEP_LAWS = [1025, 1854, 2651, 3069, 4822]  # Newton's method alternated between two states
+
+
+@pytest.mark.parametrize("seed", STICK_OR_SLIP + STEEP_LAWS)
+def test_random_chains_whose_solution_was_hard_to_find_converge(seed):
+    """Each of these chains had a step whose states of stick and slip were not found."""
+    assert march_random_chain(seed)[0].outcome is None
 
 
 @pytest.mark.parametrize(
