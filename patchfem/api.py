@@ -438,7 +438,7 @@ def cost(
     if out is not None:
         cost_files.write(Path(out), {setting: curve})
         cost_files.write_picture(Path(out), setting, curve, tolerance)
-    return {setting: cost_files.answer_of(setting, curve, tolerance)}
+    return {setting: cost_files.cost_data(setting, curve, tolerance)}
 
 
 def backbone(
@@ -574,21 +574,21 @@ def sweep(
         raise SceneError(mistakes)
     if empty := [key for key, values in values_by_key.items() if _is_empty(values)]:
         raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
-    asked = case_models.Asked(*_read_scene_text(scene), of=of)
+    asked = case_models.SweepScene(*_read_scene_text(scene), of=of)
     ranges = [f"{key}={_format_range(key, values)}" for key, values in values_by_key.items()]
     request = parse_request.Request(ranges, None, draw, sobol, seed, of)
-    cases = parse_request.cases_of(asked, request)
-    pool = executors.of(executor, jobs)
+    cases = parse_request.read_cases(asked, request)
+    pool = executors.make_executor(executor, jobs)
     if out is None:
-        results = sweep_run.swept(asked, cases, pool, _print_to_stderr)
+        results = sweep_run.compute_in_memory(asked, cases, pool, _print_to_stderr)
         names = []
     else:
-        place = sweep_run.Place(Path(out), resume)
+        place = sweep_run.SweepTarget(Path(out), resume)
         results = sweep_run.sweep_into(asked, cases, place, pool, _print_to_stderr)
         names = [] if place.kept(len(cases)) == "none" else cases.names(asked)
     keys = [folder.key_of(name) for name in names]
     table = page.table_of(asked, cases, results, (), Path(out or ""))
-    answer = headline.lead_of(table).answer()
+    answer = headline.summarise_sweep(table).answer()
     return tables.contents(asked, cases, results, keys, answer).to_xarray()
 
 
@@ -641,7 +641,7 @@ class SweepPlots:
             raise PatchfemError(
                 "plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors"
             )
-        figure = pictures.draw.figure([swept.sweep_chart(dataset, measure)], onto=ax)
+        figure = pictures.draw_charts.figure([swept.sweep_chart(dataset, measure)], onto=ax)
         return figure.axes[0] if ax is None else ax
 
     @staticmethod
@@ -685,7 +685,7 @@ class SweepPlots:
                 "plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
                 + (f"; {reason}" if reason else "")
             )
-        figure = pictures.draw.figure(backbone_files.drawn(curves), onto=ax)
+        figure = pictures.draw_charts.figure(backbone_files.drawn(curves), onto=ax)
         return figure.axes[0] if ax is None else ax
 
 
@@ -1112,7 +1112,7 @@ def import_(
     texts = {name: _require_text(value, f"import_: {name}") for name, value in how.items()}
     estimate = imported.Estimate(decay=decay, **texts)
     channels = _require_texts(map, "import_: map")
-    return {"file": str(out), **imported.imported(file, out, channels, zero, estimate)}
+    return {"file": str(out), **imported.convert_file(file, out, channels, zero, estimate)}
 
 
 def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> Path:
@@ -1455,8 +1455,11 @@ class Result(run_result.Result):
     def _repr_html_(self) -> str:
         """Return the answer for a notebook: outcome, headline, measures in their groups, warnings."""
         summary = summaries.summary_of(self)
-        return sentences.fragment(
-            summary, sentences.verdict(summary), summaries.cycles_of(self), released.released(self)
+        return sentences.notebook_html(
+            summary,
+            sentences.verdict(summary),
+            summaries.cycles_of(self),
+            released.describe_release(self),
         )
 
     @property

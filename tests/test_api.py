@@ -14,7 +14,7 @@ from scene_texts import BENCH, COULOMB, LINEAR, POINT, SHORT, SMALL_PATCH, STRUC
 import patchfem as pf
 from patchfem import api
 from patchfem.core import Measure
-from patchfem.export.pages.sentences import pair
+from patchfem.export.pages.sentences import format_with_error
 from patchfem.export.summary import measure_object
 from patchfem.response.rows import TABLE
 from patchfem.runs.results.result import meaning
@@ -337,7 +337,7 @@ def test_exact_a_table_is_aligned_and_rounded_by_the_error(runs):
     assert len(lines) == len(runs["patch"].measures) and all(len(line) < 80 for line in lines)
     for line, (name, one) in zip(lines, runs["patch"].measures.items(), strict=True):
         first, text = line.split(None, 1)
-        assert first == name and text == pair(name, measure_object(one))
+        assert first == name and text == format_with_error(name, measure_object(one))
     assert repr(api.Measures({})) == ""
     assert repr(api.Measures({"a": Measure(2.0, "m")})) == "motion\n  a  2 m (error unknown)"
 
@@ -455,7 +455,7 @@ def test_exact_a_notebook_shows_the_answer_and_what_it_holds_as_text(runs):
     found = dict(row for row in cells if len(row) == 2)
     assert set(found) == set(result.measures)
     for name, one in result.measures.items():
-        assert one.value is None or found[name].split(", ")[0] == pair(
+        assert one.value is None or found[name].split(", ")[0] == format_with_error(
             name, {"value": one.value, "unit": one.unit, "error": one.error}
         )
     assert result.outcome.sentence in shown

@@ -1,6 +1,6 @@
 """Measures of a scene with the surface before and with the surface after wear, side by side.
 
-In: two models that differ only in the gap. Out: `Pressed`, the measures of both runs with their
+In: two models that differ only in the gap. Out: `SurfaceRuns`, the measures of both runs with their
 errors.
 """
 
@@ -15,7 +15,7 @@ from ..runs.plan import plan
 from ..runs.results.result import surface_of
 from ..runs.run import run
 
-SHOWN = {  # by measure: its text in a sentence, and what a scene needs for it
+COMPARED_MEASURES = {  # by measure: its text in a sentence, and what a scene needs for it
     "pressure_peak": ("largest pressure", "[contact]"),
     "contact_fraction": ("fraction of the patch length that is in contact", "[contact]"),
     "normal_stiffness": ("normal stiffness K_n", "[contact]"),
@@ -31,7 +31,7 @@ SHOWN = {  # by measure: its text in a sentence, and what a scene needs for it
 }
 
 
-class Side(NamedTuple):
+class SurfaceResult(NamedTuple):
     """Results of one run.
 
     Attributes
@@ -57,14 +57,14 @@ class Side(NamedTuple):
     warnings: list
 
 
-class Pressed(NamedTuple):
+class SurfaceRuns(NamedTuple):
     """A scene that was run with both surfaces.
 
     Attributes
     ----------
     title : str
         Title of the scene.
-    before, after : Side or None
+    before, after : SurfaceResult or None
         None if the run failed.
     failed : tuple of str
         Reasons why runs failed.
@@ -73,8 +73,8 @@ class Pressed(NamedTuple):
     """
 
     title: str
-    before: Side | None
-    after: Side | None
+    before: SurfaceResult | None
+    after: SurfaceResult | None
     failed: tuple
     lacking: tuple
 
@@ -86,17 +86,19 @@ class Pressed(NamedTuple):
         sides = [one.measures if one is not None else {} for one in (self.before, self.after)]
         return [
             (name, words, *(side.get(name) for side in sides))
-            for name, (words, _) in SHOWN.items()
-            if any(_there(side.get(name)) for side in sides)
+            for name, (words, _) in COMPARED_MEASURES.items()
+            if any(_is_known(side.get(name)) for side in sides)
         ]
 
 
-def _there(measure: Measure | None) -> bool:
+def _is_known(measure: Measure | None) -> bool:
     """Return whether a measure is known."""
     return measure is not None and measure.value is not None
 
 
-def pressed(before: Model, after: Model, title: str, say: Callable | None = None) -> Pressed:
+def run_both_surfaces(
+    before: Model, after: Model, title: str, say: Callable | None = None
+) -> SurfaceRuns:
     """Run a model with the surface before and one with the surface after; all else is equal.
 
     A run that is refused or does not converge is described in `failed`; the other run is still
@@ -112,7 +114,7 @@ def pressed(before: Model, after: Model, title: str, say: Callable | None = None
 
     Returns
     -------
-    Pressed
+    SurfaceRuns
     """
     sides, failed = [], []
     for name, model in (("before", before), ("after", after)):
@@ -122,25 +124,25 @@ def pressed(before: Model, after: Model, title: str, say: Callable | None = None
             sides.append(None)
             failed.append(f"the surface {name}: {error}")
     known = {
-        name for one in sides if one is not None for name, m in one.measures.items() if _there(m)
+        name for one in sides if one is not None for name, m in one.measures.items() if _is_known(m)
     }
     lacking = (
         tuple(
             f"{words}: not computed, because the scene lacks {need}"
-            for name, (words, need) in SHOWN.items()
+            for name, (words, need) in COMPARED_MEASURES.items()
             if name not in known
         )
         if any(sides)
         else ()
     )
-    return Pressed(title, *sides, tuple(failed), lacking)
+    return SurfaceRuns(title, *sides, tuple(failed), lacking)
 
 
-def _side(model: Model, say) -> Side:
+def _side(model: Model, say) -> SurfaceResult:
     """Run a model and return its results."""
     result = run(plan(model), say)
     outcome, surface = result.outcome, surface_of(result.patch, result.fields)
-    return Side(
+    return SurfaceResult(
         dict(result.measures),
         str(outcome),
         outcome.sentence,
@@ -150,7 +152,7 @@ def _side(model: Model, say) -> Side:
     )
 
 
-def data_of(found: Pressed) -> dict:
+def data_of(found: SurfaceRuns) -> dict:
     """Return the runs as plain data in SI."""
 
     def side(one: Measure | None):

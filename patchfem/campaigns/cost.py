@@ -27,37 +27,46 @@ from ..runs.patch.ladder import solve_split
 from ..runs.patch.measures import measures
 from ..runs.plan import plan
 from ..runs.run import run
-from .numerical_settings import KNOBS, Setting, knobs_of, settings, with_setting, with_tolerance
+from .numerical_settings import (
+    NUMERICAL_SETTINGS,
+    Setting,
+    applicable_settings,
+    settings,
+    with_setting,
+    with_tolerance,
+)
 
 __all__ = [
-    "KNOBS",
+    "NUMERICAL_SETTINGS",
     "TOLERANCE",
     "Cost",
-    "cheapest",
+    "applicable_settings",
+    "changed_measures",
     "curve",
-    "knobs_of",
-    "quickest",
+    "fastest_by_measure",
+    "fastest_run",
     "sentence",
     "tolerance_curve",
-    "turned_by",
 ]
-TOLERANCE = "tolerance"  # name of the curve over tolerances, which is accepted in addition to KNOBS
+TOLERANCE = "tolerance"  # name of the curve over tolerances, which is accepted in addition to NUMERICAL_SETTINGS
 # Timings of a short run; the shortest one counts, because other work on the machine only adds time.
 TIMINGS = 3
 # CPU seconds above which a run is timed only once, because its timings differ by a few percent
-LONG = 0.3
+MIN_SECONDS_TIMED_ONCE = 0.3
 # CPU seconds that runs with proposed settings may take in total, so that `cost` ends within seconds
 MAX_TRIAL_SECONDS = 10.0
 # A warning of a run ends with its tolerance and what to do; this second part may name a setting
 # that can be tried here.
 _REMEDY = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 _PROPOSED = re.compile(r"set accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)")
-APART = 1.5  # elapsed time / CPU time above which both times are reported
-NOISE = 1.1  # ratio of CPU seconds up to which two runs count as equally expensive
-JITTER = 2e-3  # CPU seconds by which timings of the same short run differ
-STUCK = 0.9  # smallest / largest error above which a setting does not help
-UNTURNED = 1e-11  # relative change of a measure below which a setting does not affect it
-ROUND = 1e-6  # fraction of the floor of a measure below which a change of it is round-off
+MIN_ELAPSED_RATIO = 1.5  # elapsed time / CPU time above which both times are reported
+EQUAL_COST_RATIO = 1.1  # ratio of CPU seconds up to which two runs count as equally expensive
+TIMING_SCATTER = 2e-3  # CPU seconds by which timings of the same short run differ
+NO_EFFECT_RATIO = 0.9  # smallest / largest error above which a setting does not help
+UNCHANGED_TOL = 1e-11  # relative change of a measure below which a setting does not affect it
+ROUND_OFF_FRACTION = (
+    1e-6  # fraction of the floor of a measure below which a change of it is round-off
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -125,7 +134,7 @@ class Cost:
 
     def waited(self) -> bool:
         """Return whether the elapsed time exceeds the CPU time so much that both are reported."""
-        return self.wall_seconds > APART * self.seconds
+        return self.wall_seconds > MIN_ELAPSED_RATIO * self.seconds
 
     def same_as(self, other) -> bool:
         """Return whether two settings that are numbers gave the same run bit for bit."""
@@ -165,10 +174,10 @@ def tolerance_curve(model: Model, say=None) -> list:
     with locate_errors(model.source):
         wanted = with_tolerance(model)
         # The first run includes imports and compilation, which the timings must not contain.
-        _tried(wanted[0], "first run, not timed", None)
+        _run_setting(wanted[0], "first run, not timed", None)
         runs, spent = [], 0.0
         for setting in wanted:
-            one = _timed(setting, True, say)
+            one = _time_setting(setting, True, say)
             while one is not None:
                 # The runs are identical, so the faster timing holds for both.
                 if runs and one.same_as(runs[-1]):
@@ -181,18 +190,18 @@ def tolerance_curve(model: Model, say=None) -> list:
                 setting = (
                     None
                     if one.meets_tolerance()
-                    else _proposed(setting, one, MAX_TRIAL_SECONDS - spent)
+                    else _proposed_setting(setting, one, MAX_TRIAL_SECONDS - spent)
                 )
                 if setting is None:
                     break
-                one = _timed(setting, True, say)
+                one = _time_setting(setting, True, say)
                 spent += one.seconds if one is not None else 0.0
     if not runs:
         raise NotConverged("cost: no run of this scene succeeded", "")
     return runs
 
 
-def _proposed(setting: Setting, one: Cost, seconds: float) -> Setting | None:
+def _proposed_setting(setting: Setting, one: Cost, seconds: float) -> Setting | None:
     """Return the setting that the warnings of a run propose, or None.
 
     None if no warning proposes a setting that is larger than the present one, or if the run with it
@@ -234,7 +243,7 @@ def curve(model: Model, knob: str, say=None) -> list:
     ----------
     model : Model
     knob : str
-        One of KNOBS, or TOLERANCE.
+        One of NUMERICAL_SETTINGS, or TOLERANCE.
     say : callable, optional
         Takes a line of text per run.
 
@@ -252,7 +261,7 @@ def curve(model: Model, knob: str, say=None) -> list:
     if knob == TOLERANCE:
         return tolerance_curve(model, say)
     with locate_errors(model.source):
-        mine = knobs_of(model)
+        mine = applicable_settings(model)
         if knob not in mine:
             raise PatchfemError(
                 f"cost --over {knob}: the cost of this setting cannot be measured for this scene; "
@@ -261,14 +270,14 @@ def curve(model: Model, knob: str, say=None) -> list:
             )
         wanted = settings(model, knob)
         # The first run includes imports and compilation, which the timings must not contain.
-        _tried(wanted[0], "first run, not timed", None)
+        _run_setting(wanted[0], "first run, not timed", None)
         runs, done = [], 0
         for one in wanted:
-            found = _timed(one, one is not wanted[-1], say, runs[-1:])
+            found = _time_setting(one, one is not wanted[-1], say, runs[-1:])
             if found is not None:
                 done += 1
                 runs[-1:] = (
-                    [_one_run(runs[-1], found)]
+                    [_merge_identical_runs(runs[-1], found)]
                     if runs and found.same_as(runs[-1])
                     else [*runs[-1:], found]
                 )
@@ -307,7 +316,7 @@ def _distances(one: Cost, best: Cost) -> dict:
     }
 
 
-def _one_run(first: Cost, second: Cost) -> Cost:
+def _merge_identical_runs(first: Cost, second: Cost) -> Cost:
     """Merge two settings that gave the same run into one run with both labels.
 
     In a sentence it is named by the shorter text, which is that of the setting without a number,
@@ -324,7 +333,7 @@ def _one_run(first: Cost, second: Cost) -> Cost:
     )
 
 
-def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
+def _time_setting(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
     """Run a setting several times and return its cost; None if it cannot be run.
 
     It is timed TIMINGS times, or once if the run is long and nothing was compiled, or if it repeats
@@ -344,8 +353,8 @@ def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
     while one is None or (
         len(timings) < TIMINGS and not any(one.same_as(other) for other in before)
     ):
-        kept, begin = _compiled(), (_cpu(), perf_counter())
-        found = _tried(setting, setting.label, say, coarse)
+        kept, begin = _count_compiled(), (_cpu(), perf_counter())
+        found = _run_setting(setting, setting.label, say, coarse)
         if found is None:
             return None
         timings.append((_cpu() - begin[0], perf_counter() - begin[1]))
@@ -365,7 +374,7 @@ def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
             tuple(remedy[1] for text in warnings if (remedy := _REMEDY.search(text))),
             steps,
         )
-        if one.seconds >= LONG and _compiled() == kept:
+        if one.seconds >= MIN_SECONDS_TIMED_ONCE and _count_compiled() == kept:
             break
     again = "".join(
         f", the same run as with {other.words}" for other in before if one.same_as(other)
@@ -385,7 +394,7 @@ def _cpu() -> float:
     return process_time() + children.children_user + children.children_system
 
 
-def _compiled() -> int:
+def _count_compiled() -> int:
     """Return the number of functions whose machine code is cached.
 
     A run that increases this number has compiled a function.
@@ -396,7 +405,7 @@ def _compiled() -> int:
         return 0
 
 
-def _tried(setting: Setting, label: str, say, coarse: bool = True) -> tuple | None:
+def _run_setting(setting: Setting, label: str, say, coarse: bool = True) -> tuple | None:
     """Return (measures, warnings, steps per cycle) of a setting; None if the run fails.
 
     The pieces are condensed again. The run fails if it does not converge or needs more memory
@@ -418,10 +427,10 @@ def _tried(setting: Setting, label: str, say, coarse: bool = True) -> tuple | No
         return None
 
 
-def turned_by(runs: list) -> list:
+def changed_measures(runs: list) -> list:
     """Return the names of the measures that the setting changes, in the order of the runs.
 
-    A measure counts as changed if it differs by more than UNTURNED times its value and by more than
+    A measure counts as changed if it differs by more than UNCHANGED_TOL times its value and by more than
     the round-off of its floor.
     """
     return [
@@ -429,21 +438,21 @@ def turned_by(runs: list) -> list:
         for name in runs[0].values
         if any(
             one.distances.get(name, 0.0)
-            > max(UNTURNED * abs(one.values[name]), ROUND * one.floors[name])
+            > max(UNCHANGED_TOL * abs(one.values[name]), ROUND_OFF_FRACTION * one.floors[name])
             for one in runs
             if name in one.values
         )
     ]
 
 
-def cheapest(runs: list, tolerance: float) -> dict:
+def fastest_by_measure(runs: list, tolerance: float) -> dict:
     """Return, by measure, the label of the fastest run within the tolerance, or None.
 
     A coarse run that is accurate by chance does not count: no finer run may exceed the tolerance
     again.
     """
     out = {}
-    for name in turned_by(runs):
+    for name in changed_measures(runs):
         good = _confirmed(runs, lambda one, name=name: one.within(name, tolerance))
         out[name] = min(good, key=lambda one: one.seconds).label if good else None
     return out
@@ -469,26 +478,31 @@ def _confirmed(runs: list, good) -> list:
     return out + [one for one in alone if good(one)]
 
 
-def quickest(runs: list, tolerance: float) -> Cost | None:
+def fastest_run(runs: list, tolerance: float) -> Cost | None:
     """Return the run with the fewest CPU seconds that has all measures within a tolerance.
 
     Of runs that are equally expensive it is the one that comes first, with the coarsest setting.
     None if there is no such run.
     """
-    names = stated_names(runs)
+    names = measures_with_error(runs)
     good = _confirmed(
         runs, lambda one: all(one.within(name, tolerance) for name in names if name in one.values)
     )
     least = min((one.seconds for one in good), default=inf)
     return next(
-        (one for one in runs if one in good and one.seconds <= NOISE * least + JITTER), None
+        (
+            one
+            for one in runs
+            if one in good and one.seconds <= EQUAL_COST_RATIO * least + TIMING_SCATTER
+        ),
+        None,
     )
 
 
 def sentence(runs: list, tolerance: float) -> str:
     """Return which setting meets a tolerance in the least time, or which measure misses it."""
-    names = stated_names(runs)
-    if one := quickest(runs, tolerance):
+    names = measures_with_error(runs)
+    if one := fastest_run(runs, tolerance):
         return (
             f"{one.words}: {_seconds(one)} per run, with every measure within the tolerance {tolerance:g}"
             + _effect(runs, tolerance)
@@ -498,7 +512,7 @@ def sentence(runs: list, tolerance: float) -> str:
         ((worst_error(one, names, tolerance), one) for one in known), key=lambda found: found[0]
     )
     share = format_number(worst.share, 2)
-    if worst.share >= STUCK * max(
+    if worst.share >= NO_EFFECT_RATIO * max(
         worst_error(one, [worst.name], tolerance).share for one in known if worst.name in one.values
     ):
         return (
@@ -513,7 +527,7 @@ def sentence(runs: list, tolerance: float) -> str:
 
 def _effect(runs: list, tolerance: float) -> str:
     """Return a clause on settings that change nothing relevant; "" if they change something."""
-    turned = turned_by(runs)
+    turned = changed_measures(runs)
     if len(runs) < 2 or any(
         one.distances.get(name, 0.0)
         > compute_allowed_error(tolerance, abs(one.values[name]), one.floors[name])
@@ -561,7 +575,7 @@ def worst_of_run(one: Cost) -> WorstError:
     return worst_error(one, list(one.values), one.tolerance)
 
 
-def stated_names(runs: list) -> list:
+def measures_with_error(runs: list) -> list:
     """Return the measures whose error is stated by any run; all measures if no run states one."""
     return [name for name in runs[-1].values if any(name in one.errors for one in runs)] or list(
         runs[-1].values

@@ -10,8 +10,8 @@ from ..runs.plan import plan
 from ..runs.rig import numerics
 from ..scene.rules.accuracy import has_effect
 
-KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
-LEVELS = 5  # number of values of a setting; each is twice as fine as the one before
+NUMERICAL_SETTINGS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
+N_VALUES = 5  # number of values of a setting; each is twice as fine as the one before
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)  # tolerances of a mesh that is chosen automatically
 # Tolerances of a whole scene; smaller ones take long, and few scenes meet them.
 SCENE_TOLERANCES = (
@@ -20,9 +20,9 @@ SCENE_TOLERANCES = (
     1e-3,
     1e-4,
 )
-MOST_CELLS = 1600  # columns of the finest uniform mesh
-MOST_STEPS = 12800
-MIDDLE = {"shear_modes": 8, "jumps": 8}  # middle value, if the scene does not set the key
+MAX_CELLS = 1600  # columns of the finest uniform mesh
+MAX_STEPS = 12800
+DEFAULT_MIDDLES = {"shear_modes": 8, "jumps": 8}  # middle value, if the scene does not set the key
 
 
 class Setting(NamedTuple):
@@ -48,8 +48,8 @@ class Setting(NamedTuple):
     level: int = 0
 
 
-def knobs_of(model: Model) -> list:
-    """Return the settings, of KNOBS, that have an effect on a model.
+def applicable_settings(model: Model) -> list:
+    """Return the settings, of NUMERICAL_SETTINGS, that have an effect on a model.
 
     They are its element size, time steps, shear modes, and the jumps over cycles of wear.
     """
@@ -83,8 +83,8 @@ def settings(model: Model, knob: str) -> list:
                 )
                 for level in range(3)
             ]
-        return _by_tolerance(model) if model.patch.mesh.is_automatic else _even(model)
-    return _counted(model, knob)
+        return _by_tolerance(model) if model.patch.mesh.is_automatic else _uniform_meshes(model)
+    return _integer_values(model, knob)
 
 
 def _split_words(level: int) -> str:
@@ -128,13 +128,13 @@ def _by_tolerance(model: Model) -> list:
     ]
 
 
-def _even(model: Model) -> list:
+def _uniform_meshes(model: Model) -> list:
     """Return uniform meshes, and for a static patch also the mesh that its tolerance chooses."""
     length, out = model.patch.pieces.length, []
     middle = round(length / model.patch.even_element_size)
-    for power in range(-3, LEVELS - 3):
+    for power in range(-3, N_VALUES - 3):
         cells = round(middle * 2.0**power)
-        if 8 <= cells <= MOST_CELLS or not power:
+        if 8 <= cells <= MAX_CELLS or not power:
             label, size = f"{1e6 * length / cells:.4g} um", length / cells
             turned = replace(model, patch=model.patch.with_element_size(size)) if power else model
             out.append(Setting(label, size, f"element size {label}", turned))
@@ -144,15 +144,15 @@ def _even(model: Model) -> list:
     return out
 
 
-def _counted(model: Model, knob: str) -> list:
+def _integer_values(model: Model, knob: str) -> list:
     """Return values of a setting that is a whole number, around the value of the scene."""
-    pinned, middle = _pinned(model, knob), _middle(model, knob)
+    pinned, middle = _scene_value(model, knob), _middle(model, knob)
     words, out = "{} " + knob.replace("_", " "), []
-    for power in range(-2, LEVELS - 2):
+    for power in range(-2, N_VALUES - 2):
         value = max(1, round(middle * 2.0**power))
         own = not power and (pinned or knob == "steps_per_cycle")
-        if own or knob != "steps_per_cycle" or 4 <= value <= MOST_STEPS:
-            turned = model if own else _with(model, knob, value)
+        if own or knob != "steps_per_cycle" or 4 <= value <= MAX_STEPS:
+            turned = model if own else _with_integer(model, knob, value)
             out.append(Setting(str(value), float(value), words.format(value), turned))
     if not pinned and knob != "steps_per_cycle":
         out.append(
@@ -161,7 +161,7 @@ def _counted(model: Model, knob: str) -> list:
     return out
 
 
-def _pinned(model: Model, knob: str) -> int | None:
+def _scene_value(model: Model, knob: str) -> int | None:
     """Return the value of a setting in the scene; None if it does not set one."""
     return model.wear.jumps if knob == "jumps" else getattr(model.accuracy, knob)
 
@@ -169,14 +169,14 @@ def _pinned(model: Model, knob: str) -> int | None:
 def _middle(model: Model, knob: str) -> int:
     """Return the middle of the values of a setting."""
     if knob != "steps_per_cycle":
-        return _pinned(model, knob) or MIDDLE[knob]
+        return _scene_value(model, knob) or DEFAULT_MIDDLES[knob]
     if model.kind == "bench":
         return engine.steps_of(model)
 
     return numerics.choose(model).steps
 
 
-def _with(model: Model, knob: str, value: int) -> Model:
+def _with_integer(model: Model, knob: str, value: int) -> Model:
     """Return a model with another value of a setting that is a whole number."""
     if knob == "jumps":
         return replace(model, wear=replace(model.wear, jumps=value))

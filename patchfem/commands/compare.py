@@ -236,4 +236,4 @@ def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
                 scene, (*sets, f"contact.profile.file={path}", "contact.profile.heights=surface")
             )
         )
-    return pressing.pressed(*models, scene.name, None if quiet else say)
+    return pressing.run_both_surfaces(*models, scene.name, None if quiet else say)

@@ -64,7 +64,7 @@ def import_(
 
     Example: patchfem import bench.uff --map "force=Load cell [lbf]" --map displacement=12:+x -o loop.csv
     """
-    answer = imported.imported(file, out, map_, zero, imported.Estimate(**vars(modes)))
+    answer = imported.convert_file(file, out, map_, zero, imported.Estimate(**vars(modes)))
     told = answer.pop("told")
     if json_:
         print(json.dumps({"file": str(out), **answer}, ensure_ascii=False))

@@ -52,7 +52,7 @@ def run(
     """
     talk = (lambda text: None) if quiet else say
     what = plan.plan(scene_of(scene, set_))
-    if resume and not folder.keeps(what):
+    if resume and not folder.saves_state(what):
         raise Refused(
             "run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
             "state; run the scene again without --resume"
@@ -117,10 +117,12 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     answer = written.summary
     if answer["title"]:
         sets = written.result.plan.model.source.sets
-        print(f"{answer['title']}{f'; changed: {driven.changed(sets)}' if sets else ''}")
+        print(f"{answer['title']}{f'; changed: {driven.list_changed_keys(sets)}' if sets else ''}")
     print(f"{answer['outcome']}: {sentences.verdict(answer)}")
     if text := sentences.headline(
-        answer, summary.cycles_of(written.result), released=released.released(written.result)
+        answer,
+        summary.cycles_of(written.result),
+        released=released.describe_release(written.result),
     ):
         print(text)
     sys.stdout.flush()

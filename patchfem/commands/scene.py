@@ -9,7 +9,7 @@ from cyclopts import Parameter
 from .. import cost_model
 from ..campaigns.sweeps import estimate, parse_request
 from ..effects import law_has_trait, list_displayed_absent_effects
-from ..export.written import brief
+from ..export.written import shorten
 from ..formatting import format_quantity, rewrite_powers_of_ten
 from ..mesh import files as mesh_files
 from ..model import files as model_files
@@ -58,7 +58,7 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
 
 def _swept(scene: Path, sets, what: Over) -> tuple:
     """Return what the cases of a sweep share, and the cases."""
-    return parse_request.asked_of(scene, sets, what.request())
+    return parse_request.read_sweep(scene, sets, what.request())
 
 
 def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
@@ -127,7 +127,7 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> No
         return
     print(
         "case     "
-        + ", ".join(f"{key} {brief(text)}" for key, text in answer["case"].items())
+        + ", ".join(f"{key} {shorten(text)}" for key, text in answer["case"].items())
         + " (the first case); the lines below describe this case, except that `cost` and `sweep` are for the whole "
         "sweep"
     )

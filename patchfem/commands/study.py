@@ -53,19 +53,21 @@ def cost(
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
     found = model_of(scene, set_)
-    if over and over not in cost_curves.KNOBS:
-        raise Refused(f"cost --over {over}: unknown key; use one of {', '.join(cost_curves.KNOBS)}")
+    if over and over not in cost_curves.NUMERICAL_SETTINGS:
+        raise Refused(
+            f"cost --over {over}: unknown key; use one of {', '.join(cost_curves.NUMERICAL_SETTINGS)}"
+        )
     knobs = (
         [over]
         if over
-        else [cost_curves.TOLERANCE, *(cost_curves.knobs_of(found) if verbose else ())]
+        else [cost_curves.TOLERANCE, *(cost_curves.applicable_settings(found) if verbose else ())]
     )
     target, curves, answer = placed(out, f"{found.source.path.stem}-cost"), {}, {}
     for knob in knobs:
         runs = curves[knob] = cost_curves.curve(found, knob, None if quiet else say)
         table = cost_files.write(target, curves)
         picture = cost_files.write_picture(target, knob, runs, found.accuracy.tolerance)
-        answer[knob] = cost_files.answer_of(knob, runs, found.accuracy.tolerance)
+        answer[knob] = cost_files.cost_data(knob, runs, found.accuracy.tolerance)
         if not json_:
             tabled = verbose and knob != cost_curves.TOLERANCE
             lines = cost_files.details_of if tabled else cost_files.lines_of

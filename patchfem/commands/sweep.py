@@ -182,14 +182,14 @@ def sweep(
     signed = (
         ""
         if by.collect or part or keep not in (None, "none")
-        else manifest.sign(
+        else manifest.hash_request(
             scene, (what or Over()).words(*set_, f"page={not no_page}"), what and what.cases
         )
     )
     if resume and (written := manifest.read(target, signed)):  # all of it is there
         _answer(written["cases"]["count"], {}, written, told)
         return
-    asked, cases = parse_request.asked_of(scene, set_, (what or Over()).request())
+    asked, cases = parse_request.read_sweep(scene, set_, (what or Over()).request())
     if by.collect:
         _answered(run.collect(asked, cases, target, not no_page), told)
         return
@@ -199,9 +199,14 @@ def sweep(
         note(wrong)
     line = Progress(quiet)
     try:
-        place = run.Place(target, resume, keep or "", part, not no_page)
+        place = run.SweepTarget(target, resume, keep or "", part, not no_page)
         found = run.sweep_into(
-            asked, cases, place, executors.of(by.executor, by.jobs), None if quiet else say, line
+            asked,
+            cases,
+            place,
+            executors.make_executor(by.executor, by.jobs),
+            None if quiet else say,
+            line,
         )
     except (KeyboardInterrupt, core.Missing) as why:
         line.end()
@@ -267,7 +272,9 @@ class Progress:
         self.text, self.done = f"{done}/{total} cases", done
         if not self.silent and perf_counter() - self.said >= (0.2 if self.open else self.WAIT):
             self._show(
-                f"{self.text}, {sweeping.lasting(left)} left" if left is not None else self.text
+                f"{self.text}, {sweeping.format_duration(left)} left"
+                if left is not None
+                else self.text
             )
 
     def _waits(self) -> None:
@@ -275,7 +282,9 @@ class Progress:
         wait = self.WAIT
         while not self.over.wait(wait):
             if perf_counter() - self.said >= wait:
-                self._show(f"{self.text}, {sweeping.lasting(perf_counter() - self.begin)} so far")
+                self._show(
+                    f"{self.text}, {sweeping.format_duration(perf_counter() - self.begin)} so far"
+                )
                 wait *= 2
 
     def _show(self, text: str) -> None:

@@ -10,7 +10,7 @@ from ..campaigns.backbone.records import Backbone, Curve
 from ..disk.atomic_write import write_rows, write_text
 from .drawing import charts, pictures
 from .netcdf import Contents, write
-from .pages.document import Section, document, prose, table
+from .pages.document import Section, document, sentence_html, table
 from .results import Folder
 from .summary import write_json
 
@@ -124,7 +124,7 @@ def write_into(
     write_json(answer, folder.path / "backbone.json")
     write_text(folder.path / "scene.resolved.toml", resolved)
     if found.curves:
-        write_text(folder.path / "backbone.svg", pictures.draw(drawn(found.curves)))
+        write_text(folder.path / "backbone.svg", pictures.draw_charts(drawn(found.curves)))
     if with_page:
         write_text(folder.path / "report.html", page(found, title))
     return answer
@@ -175,8 +175,8 @@ def page(found: Backbone, title: str) -> str:
     if found.curves:
         made = [one | {"anchor": f"chart{k}"} for k, one in enumerate(drawn(found.curves))]
     first, *more = sentences(found)
-    paragraphs = "".join(f"<p>{prose(text)}</p>" for text in more)
-    lead = f"<div class=verdict><b>{prose(first)}</b>{paragraphs}</div>"
+    paragraphs = "".join(f"<p>{sentence_html(text)}</p>" for text in more)
+    lead = f"<div class=verdict><b>{sentence_html(first)}</b>{paragraphs}</div>"
     sections = [
         Section("curves", "Frequency and damping against amplitude", _figure(found, made)),
         Section("ways", "How the curves were computed", _methods(found)),
@@ -209,10 +209,10 @@ def _methods(found: Backbone) -> str:
     rows = []
     for method, text in DESCRIPTIONS.items():
         if method in found.curves:
-            rows.append([escape(method), prose(text)])
+            rows.append([escape(method), sentence_html(text)])
         elif method in found.missing:
-            rows.append([escape(method), prose(f"not known: {found.missing[method]}")])
-    notes = "".join(f"<p>{prose(text[0].upper() + text[1:])}.</p>" for text in found.notes)
+            rows.append([escape(method), sentence_html(f"not known: {found.missing[method]}")])
+    notes = "".join(f"<p>{sentence_html(text[0].upper() + text[1:])}.</p>" for text in found.notes)
     return table(("", ""), rows) + notes
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from ..campaigns.cost import (
     TOLERANCE,
     Cost,
-    cheapest,
+    changed_measures,
+    fastest_by_measure,
+    measures_with_error,
     sentence,
-    stated_names,
-    turned_by,
     worst_error,
     worst_of_run,
 )
@@ -40,13 +40,15 @@ MAIN = (
     "normal_stiffness",
     "tangential_stiffness",
 )
-EXACT = 1e-12  # relative error below which an error is round-off
+ROUND_OFF = 1e-12  # relative error below which an error is round-off
 LABEL_HEIGHT = 0.06  # smallest distance of two labels / height of the axes
 HEIGHT = 210.0  # height of the axes [points]
 TALL = 4.2  # height of the picture [inch]
 # fraction of the width beyond which a label does not fit to the right of its point
-RIGHT_PART = 0.6
-MARGIN = 0.15  # margin on both sides of a logarithmic axis / logarithm of the range of its values
+LABEL_LEFT_FRACTION = 0.6
+AXIS_MARGIN = (
+    0.15  # margin on both sides of a logarithmic axis / logarithm of the range of its values
+)
 # smallest ratio of the ends of the time axis, for runs that take equally long
 MIN_SECONDS_RATIO = 2.0
 MIN_ERROR_RATIO = 10.0  # smallest ratio of the ends of the error axis, for equal errors
@@ -68,7 +70,7 @@ def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
     list of str
     """
     if knob != TOLERANCE:
-        names = stated_names(runs)
+        names = measures_with_error(runs)
         rows = [(one, worst_error(one, names, tolerance), "") for one in runs]
         last = [sentence(runs, tolerance)]
     else:
@@ -81,7 +83,7 @@ def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
     width = max(len(knob), *(len(one.label) for one, *_ in rows))
     out = [f"{knob:<{width}}  {'CPU s':>6}  {'error':>8}  worst measure"]
     for one, worst, comment in rows:
-        share = format_number(worst.share, 2) if worst.share > EXACT else "exact"
+        share = format_number(worst.share, 2) if worst.share > ROUND_OFF else "exact"
         text = f"{one.label:<{width}}  {format_number(one.seconds, 2):>6}  {share:>8}  {worst.name}"
         out.append(f"{text.rstrip()}{comment}")
     return [*out, *last]
@@ -130,7 +132,7 @@ def details_of(knob: str, runs: list, tolerance: float) -> list[str]:
     -------
     list of str
     """
-    names = shown(runs, tolerance)
+    names = detailed_measures(runs, tolerance)
     waited, width = (
         any(one.waited() for one in runs),
         max(len(knob), *(len(one.label) for one in runs)),
@@ -170,18 +172,18 @@ def _shares(one: Cost, name: str) -> str:
         part[name] / size if size and name in part else None for part in (one.errors, one.distances)
     )
     stated, away = (
-        "-" if one is None else "exact" if one < EXACT else f"{one:.1e}" for one in shares
+        "-" if one is None else "exact" if one < ROUND_OFF else f"{one:.1e}" for one in shares
     )
     return f"{stated} ({away})"
 
 
-def shown(runs: list, tolerance: float) -> list:
+def detailed_measures(runs: list, tolerance: float) -> list:
     """Return the measures of the detailed table.
 
     They are those of MAIN that the setting changes, and the worst measure of each run; if there are
     none of these, all measures that it changes.
     """
-    turned, names = turned_by(runs) or stated_names(runs), stated_names(runs)
+    turned, names = changed_measures(runs) or measures_with_error(runs), measures_with_error(runs)
     worst = {worst_error(one, names, tolerance).name for one in runs if one.errors or one.distances}
     return [name for name in (*MAIN, *sorted(worst.difference(MAIN))) if name in turned] or turned
 
@@ -244,11 +246,11 @@ def write_picture(folder: Path, knob: str, runs: list, tolerance: float) -> Path
     Its name is cost.svg, or cost_KNOB.svg.
     """
     picture = Path(folder) / ("cost.svg" if knob == TOLERANCE else f"cost_{knob}.svg")
-    write_text(picture, pictures.draw([cost_chart(knob, runs, tolerance)], height=TALL))
+    write_text(picture, pictures.draw_charts([cost_chart(knob, runs, tolerance)], height=TALL))
     return picture
 
 
-def answer_of(knob: str, runs: list, tolerance: float) -> dict:
+def cost_data(knob: str, runs: list, tolerance: float) -> dict:
     """Return the results of the runs of a curve as plain lists and dicts, in SI.
 
     `runs`: label, value of the setting, tolerance, CPU seconds, elapsed seconds, and values, errors
@@ -282,7 +284,7 @@ def answer_of(knob: str, runs: list, tolerance: float) -> dict:
     alone = knob != TOLERANCE
     return {
         "runs": out,
-        "cheapest": cheapest(runs, tolerance) if alone else None,
+        "cheapest": fastest_by_measure(runs, tolerance) if alone else None,
         "sentence": sentence(runs, tolerance) if alone else None,
     }
 
@@ -301,7 +303,7 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
     tolerance : float
         That of the scene, drawn as a dashed line.
     """
-    names = stated_names(runs)
+    names = measures_with_error(runs)
     worst = [
         worst_of_run(one) if knob == TOLERANCE else worst_error(one, names, tolerance)
         for one in runs
@@ -309,7 +311,7 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
     points = [
         Point(one, found.share)
         for one, found in zip(runs, worst, strict=True)
-        if found.share > EXACT
+        if found.share > ROUND_OFF
     ]
     marks = [
         charts.line(
@@ -341,7 +343,7 @@ class Point(NamedTuple):
 
 def _padded(values: list, min_ratio: float) -> list:
     """Return the ends of a logarithmic axis with room for labels around its values."""
-    room = max(max(values) / min(values), min_ratio) ** MARGIN
+    room = max(max(values) / min(values), min_ratio) ** AXIS_MARGIN
     return [min(values) / room, max(values) * room]
 
 
@@ -359,7 +361,7 @@ def _labels(points: list, x_range: list, y_range: list) -> list:
     for (seconds, share), texts in sorted(groups.items(), key=lambda group: group[0][1]):
         place = np.log(share / y_range[0]) / decades
         height = max(place, height + LABEL_HEIGHT)
-        is_right = np.log(seconds / x_range[0]) >= RIGHT_PART * width
+        is_right = np.log(seconds / x_range[0]) >= LABEL_LEFT_FRACTION * width
         out.append(
             {
                 "text": "; ".join(texts),

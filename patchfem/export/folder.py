@@ -15,13 +15,13 @@ from . import netcdf, report
 from .fields import bodies as body_fields
 from .histories import contents
 from .pages import player
-from .results import INTERFACES, MOST, PAGE, STATE, Folder, is_state
+from .results import INTERFACES_FOLDER, MAX_INTERFACES, PAGE, STATE, Folder, is_state
 from .summary import read_summary, summary_of, write_json
 
 SCENE = "scene.resolved.toml"
 
 
-class Written(NamedTuple):
+class WrittenRun(NamedTuple):
     """A run whose results are on disk.
 
     summary: content of summary.json; result: the run; bodies: the pressed pieces for a picture, or
@@ -36,7 +36,7 @@ class Written(NamedTuple):
 
 def run_into(
     what, target: Path, say=None, progress=None, fresh: bool = False, resume: bool = False
-) -> Written:
+) -> WrittenRun:
     """Run a plan into a results folder; `write_page` writes the page afterwards.
 
     The folder is locked first. An older results folder is replaced only when the new one is
@@ -58,7 +58,7 @@ def run_into(
 
     Returns
     -------
-    Written
+    WrittenRun
 
     Raises
     ------
@@ -70,7 +70,7 @@ def run_into(
     with Folder(target, resume) as folder:
         if folder.dropped and say is not None:
             say(folder.dropped)
-        kept = StateFile(folder.path / STATE, __version__, resume) if keeps(what) else None
+        kept = StateFile(folder.path / STATE, __version__, resume) if saves_state(what) else None
         try:
             result = run(what, say, progress, fresh=fresh, kept=kept)
         except NotConverged as error:
@@ -78,11 +78,11 @@ def run_into(
                 raise NotConverged(
                     f"{error}; the run stopped before any result, so there is no results folder"
                 ) from None
-            result = _marked(error)
+            result = _partial_result(error)
         return write(result, folder.path)
 
 
-def _marked(error: NotConverged) -> Result:
+def _partial_result(error: NotConverged) -> Result:
     """Return what a run had computed before it failed to converge, with the reason as a warning."""
     found = error.partial_result
     return replace(
@@ -91,7 +91,7 @@ def _marked(error: NotConverged) -> Result:
     )
 
 
-def keeps(what) -> bool:
+def saves_state(what) -> bool:
     """Return whether the run of a plan saves its state."""
     return (what.model.wear is not None and what.model.patch is not None) or marches(what)
 
@@ -119,7 +119,7 @@ def is_complete(what, target: Path) -> bool:
     )
 
 
-def write(result: Result, path: Path) -> Written:
+def write(result: Result, path: Path) -> WrittenRun:
     """Write all files of a run except its page into the folder `path`."""
     begin, bodies = perf_counter(), {}
     text = result.plan.model.source.resolved
@@ -127,8 +127,8 @@ def write(result: Result, path: Path) -> Written:
     netcdf.write(contents(result), path / "result.nc")
     if result.patch is not None:
         bodies = body_fields.write_fields(result, path / "fields.vtkhdf")
-    for face in result.extra.get("faces", ())[:MOST]:
-        place = path / INTERFACES / face.folder
+    for face in result.extra.get("faces", ())[:MAX_INTERFACES]:
+        place = path / INTERFACES_FOLDER / face.folder
         place.mkdir(parents=True, exist_ok=True)
         own = replace(
             result,
@@ -142,25 +142,25 @@ def write(result: Result, path: Path) -> Written:
     result.seconds["files"] = perf_counter() - begin
     answer = summary_of(result)
     write_json(answer, path / "summary.json")
-    return Written(answer, result, bodies, _place(path))
+    return WrittenRun(answer, result, bodies, _folder_identity(path))
 
 
-def write_page(written: Written, folder: Path) -> Path:
+def write_page(written: WrittenRun, folder: Path) -> Path:
     """Write the page of a run into its complete results folder, and return the path of the page.
 
     Missing if another run has replaced the folder in the meantime.
     """
     text, path = (
-        report.page_of(written.result, written.bodies, player.reel(folder)),
+        report.page_of(written.result, written.bodies, player.player_data(folder)),
         Path(folder) / PAGE,
     )
-    if not path.parent.is_dir() or _place(path.parent) != written.place:
+    if not path.parent.is_dir() or _folder_identity(path.parent) != written.place:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")
     write_text(path, text)
     return path
 
 
-def _place(folder: Path) -> tuple:
+def _folder_identity(folder: Path) -> tuple:
     """Return device and inode of a folder."""
     found = os.stat(folder)
     return found.st_dev, found.st_ino

@@ -31,7 +31,9 @@ def contents(result: Result) -> netcdf.Contents:
     levels = _levels(extra["levels"]) if "levels" in extra else None
     rig = result.plan.model.rig
     names = list(rig.friction.names) if found and rig is not None else []
-    data = netcdf.of_run(found, modal, fields, x, weight, strips, levels, names, _coordinate(rig))
+    data = netcdf.run_contents(
+        found, modal, fields, x, weight, strips, levels, names, _coordinate(rig)
+    )
     if patch is not None:
         data = netcdf.with_surfaces(data, surface.unloaded_gap)
     if "faces" in extra:
@@ -55,7 +57,9 @@ def contents(result: Result) -> netcdf.Contents:
         data = data.also(
             attributes={"regime": extra["regime"], "largest_multiplier": largest_multiplier(extra)}
         )
-    return netcdf.described(data, summary_of(result), result.plan.model.source.resolved, versions())
+    return netcdf.with_provenance(
+        data, summary_of(result), result.plan.model.source.resolved, versions()
+    )
 
 
 def largest_multiplier(extra: dict) -> float:

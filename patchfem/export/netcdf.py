@@ -15,10 +15,10 @@ import numpy as np
 
 from ..disk.atomic_write import open_lossy, write_atomically, write_bytes
 
-LARGE = 10_000_000  # number of values above which a file is written to disk directly
+MAX_VALUES_IN_MEMORY = 10_000_000  # number of values above which a file is written to disk directly
 CACHE = 1 << 18  # bytes of each variable that stay in memory until its file is closed
 
-LONG = {
+VARIABLES = {
     "relative_displacement": ("m", "displacement of the output relative to the base"),
     "slide": (
         "m",
@@ -66,7 +66,7 @@ LONG = {
     "unloaded_gap": ("m", "gap of the unloaded surfaces, wear included"),
 }
 
-BETWEEN = {
+INTERFACE_DESCRIPTIONS = {
     "relative_displacement": "displacement of the first mass of an interface relative to its second mass",
     "relative_velocity": "velocity of the first mass of an interface relative to its second mass",
     "friction_force": "friction force of an interface, positive when it opposes positive slip",
@@ -131,7 +131,7 @@ def _variable(xr, dimensions, values, attributes=None):
     )
 
 
-def of_run(
+def run_contents(
     histories: dict,
     modal,
     fields: dict,
@@ -294,7 +294,7 @@ def with_events(
 
 
 # Columns of a curve of steady motions: unit and text.
-READ = {
+CURVE_COLUMNS = {
     "amplitude": ("m", "half the peak-to-peak motion at the output"),
     "acceleration_peak": ("m s-2", "largest absolute acceleration"),
     "acceleration_fundamental": ("m s-2", "first harmonic of the absolute acceleration"),
@@ -309,7 +309,7 @@ def with_curve(data: Contents, curve: dict) -> Contents:
     """Return the content with a curve of steady motions (c,).
 
     curve: frequency [Hz], level, amplitude [m], regime, multiplier, folds, and if they exist the
-    columns of READ and the errors of all that is read.
+    columns of CURVE_COLUMNS and the errors of all that is read.
     """
     names, number = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
     point, meanings = "curve_point", [name.replace(" ", "_") for name in names]
@@ -342,7 +342,7 @@ def with_curve(data: Contents, curve: dict) -> Contents:
             {"units": "1", "long_name": "largest Floquet multiplier"},
         ),
     }
-    for name, (unit, text) in READ.items():
+    for name, (unit, text) in CURVE_COLUMNS.items():
         if name in curve:
             out[f"curve_{name}"] = (
                 point,
@@ -455,7 +455,7 @@ def with_faces(data: Contents, faces) -> Contents:
     out, places = {}, {}
     for face in faces:
         number, surface = face.number + 1, face.surface
-        one = of_run({}, None, face.fields, surface.x, surface.weight)
+        one = run_contents({}, None, face.fields, surface.x, surface.weight)
         frame = "frame" if face.fields["time"].size > 1 else "frame_at_rest"
         over = {"x": f"x_{number}", "frame": frame}
         for part, found, ending in (
@@ -507,13 +507,13 @@ def with_wear(data: Contents, history: dict, units: dict) -> Contents:
 
 def _attributes(name: str, dimensions: int = 1) -> dict:
     """Return unit and description of a variable."""
-    unit, text = LONG[name]
-    if dimensions == 2 and name in BETWEEN:
-        text = BETWEEN[name]
+    unit, text = VARIABLES[name]
+    if dimensions == 2 and name in INTERFACE_DESCRIPTIONS:
+        text = INTERFACE_DESCRIPTIONS[name]
     return {"units": unit, "long_name": text}
 
 
-def described(data: Contents, summary: dict, scene_text: str, versions: dict) -> Contents:
+def with_provenance(data: Contents, summary: dict, scene_text: str, versions: dict) -> Contents:
     """Return the content with its origin: program, scene, outcome, measures and versions.
 
     It names neither host nor path.
@@ -548,20 +548,22 @@ def write(data: Contents, path: Path) -> None:
     """Write the content as netCDF4 to `path`.
 
     A file is created in memory, so that a full disk gives one OSError and leaves nothing open. A
-    file with more than LARGE numbers is created on disk; errors of writing are raised when it is
+    file with more than MAX_VALUES_IN_MEMORY numbers is created on disk; errors of writing are raised when it is
     closed.
     """
     path = Path(path)
     size = sum(np.size(one[1]) for one in (data.variables | data.coordinates).values())
-    if size > LARGE:
+    if size > MAX_VALUES_IN_MEMORY:
         with (
             write_atomically(path) as partial,
             open_lossy(partial) as kept,
-            _Opened(kept, "w", track_order=True, rdcc_nbytes=CACHE) as file,
+            _CachingFile(kept, "w", track_order=True, rdcc_nbytes=CACHE) as file,
         ):
             _write(file, data)
         return
-    with _Opened(path.name, "w", driver="core", backing_store=False, track_order=True) as memory:
+    with _CachingFile(
+        path.name, "w", driver="core", backing_store=False, track_order=True
+    ) as memory:
         _write(memory, data)
         memory.flush()
         image = memory.id.get_file_image()
@@ -575,7 +577,7 @@ def _write(opened: h5py.File, data: Contents) -> None:
         _write_variables(file, data)
 
 
-class _Opened(h5py.File):
+class _CachingFile(h5py.File):
     """HDF5 file that opens each of its objects only once.
 
     h5netcdf opens an object again whenever it needs one of its properties, 680 times for 26

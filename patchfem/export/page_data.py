@@ -12,8 +12,8 @@ from ..response import spectrum
 from ..runs.results.result import Result, surface_of
 from ..structure.drive_sizes import find_max_acceleration
 from .histories import largest_multiplier
-from .pages.driven import command, driven
-from .pages.released import released
+from .pages.driven import describe_drive, run_command
+from .pages.released import describe_release
 from .pages.sentences import verdict
 from .summary import cycles_of, summary_of, versions
 
@@ -81,7 +81,7 @@ class PressedPatch:
     bodies : dict or None
         The pressed pieces, from `fields.bodies.write_fields`.
     film : dict or None
-        From `pages.player.reel`.
+        From `pages.player.player_data`.
     """
 
     x: np.ndarray | None = None
@@ -213,8 +213,8 @@ def data_of(result: Result) -> RunData:
             source.text,
             source.resolved,
             source.sets,
-            driven(tables),
-            command(source.path, source.sets),
+            describe_drive(tables),
+            run_command(source.path, source.sets),
         ),
         verdict=_verdict(result),
         versions=versions(),
@@ -235,7 +235,7 @@ def _verdict(result: Result) -> Verdict:
         summary=summary,
         sentence=verdict(summary),
         cycles=cycles_of(result),
-        released=released(result),
+        released=describe_release(result),
         steady=steady,
         engine=result.extra.get("engine", ""),
         means={name: measure.text for name, measure in result.measures.items()},

@@ -12,9 +12,9 @@ import numpy as np
 
 from ..core import PatchfemError
 
-HUGE = 1e100  # largest number; the squares of larger ones overflow
+MAX_NUMBER = 1e100  # largest number; the squares of larger ones overflow
 # Coordinates, which contain finite numbers along the dimension of the same name.
-ALONG = (
+COORDINATES = (
     "time",
     "frame_time",
     "x",
@@ -22,7 +22,7 @@ ALONG = (
 )
 
 
-class Held(NamedTuple):
+class Variable(NamedTuple):
     """A variable of a netCDF file: names of its dimensions, values, and unit as in the file."""
 
     dims: tuple
@@ -31,7 +31,7 @@ class Held(NamedTuple):
 
 
 @contextmanager
-def readable(path: Path, form: str) -> Iterator[None]:
+def reading_errors(path: Path, form: str) -> Iterator[None]:
     """Raise PatchfemError with the name of the file for any error while it is read.
 
     form: what the file should be. Only code that reads and checks shapes belongs into this context,
@@ -69,10 +69,10 @@ def variables(path: Path, names: set | None = None) -> tuple:
     """
     import h5netcdf
 
-    with readable(path, "netCDF"), h5netcdf.File(path, "r") as file:
+    with reading_errors(path, "netCDF"), h5netcdf.File(path, "r") as file:
         about = {name: file.attrs[name] for name in file.attrs}
         found = {
-            name: Held(
+            name: Variable(
                 tuple(one.dimensions), np.asarray(one[...]), str(one.attrs.get("units", "1"))
             )
             for name, one in file.variables.items()
@@ -80,11 +80,11 @@ def variables(path: Path, names: set | None = None) -> tuple:
         }
         sizes = {}
         for name, one in found.items():
-            _looked(name, one, sizes)
+            _check_variable(name, one, sizes)
         return about, found
 
 
-def _looked(name: str, one: Held, sizes: dict) -> None:
+def _check_variable(name: str, one: Variable, sizes: dict) -> None:
     """Raise ValueError for a variable that cannot be one of results.
 
     sizes: lengths of the dimensions so far, to which those of this variable are added.
@@ -94,26 +94,26 @@ def _looked(name: str, one: Held, sizes: dict) -> None:
     for dim, size in zip(one.dims, one.values.shape):
         if sizes.setdefault(dim, size) != size:
             raise ValueError(f"{name} has {size} values along {dim}, others {sizes[dim]}")
-    if name in ALONG and not (
+    if name in COORDINATES and not (
         one.values.ndim == 1
         and one.values.size
-        and numeric(one.values)
+        and is_real(one.values)
         and np.isfinite(one.values).all()
     ):
         raise ValueError(f"{name} is not a row of numbers")
     if (
         one.values.dtype.kind == "f"
-        and np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0) > HUGE
+        and np.abs(one.values[np.isfinite(one.values)]).max(initial=0.0) > MAX_NUMBER
     ):
-        raise ValueError(f"{name} contains a number beyond {HUGE:g}")
+        raise ValueError(f"{name} contains a number beyond {MAX_NUMBER:g}")
 
 
-def numeric(values) -> bool:
+def is_real(values) -> bool:
     """Return whether an array contains real numbers."""
     return values.dtype.kind in "iuf"
 
 
-def wanted(fine: bool, text: str) -> None:
+def require(fine: bool, text: str) -> None:
     """Raise ValueError with a message unless a condition is true."""
     if not fine:
         raise ValueError(text)

@@ -13,21 +13,21 @@ from ..runs.results.result import Result
 from .drawing import charts, pictures
 from .page_data import RunData, data_of
 from .pages import player
-from .pages.document import Section, document, prose, table, warned
-from .pages.driven import changed
+from .pages.document import Section, document, sentence_html, table, warning_box
+from .pages.driven import list_changed_keys
 from .pages.sentences import (
-    SHARP,
+    EXACT_NOTE,
     G,
+    format_imperial,
+    format_value_and_error,
+    format_with_error,
     headline,
-    in_order,
-    linked,
-    of_records,
-    others,
-    pair,
-    texts,
+    measure_link,
+    order_measures,
+    record_interval,
     units,
 )
-from .results import MOST
+from .results import MAX_INTERFACES
 
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
@@ -49,11 +49,11 @@ FILES = (
 def verdict(data: RunData) -> str:
     """Return the results of a run in a few sentences of HTML, with the error of each number."""
     known = data.verdict
-    answer = f"<b>{escape(known.summary['outcome'])}</b>: {prose(known.sentence)}"
+    answer = f"<b>{escape(known.summary['outcome'])}</b>: {sentence_html(known.sentence)}"
     text = headline(
         known.summary,
         known.cycles,
-        lambda number, name: linked(number, name, " class=v"),
+        lambda number, name: measure_link(number, name, " class=v"),
         known.released,
     )
     return f"{answer}{escape(charts.regime(known.steady))} {text}".strip()
@@ -65,7 +65,7 @@ def page(data: RunData) -> str:
     title = summary["title"] or data.source.name or "patchfem run"
     # The title of the scene refers to the values before keys were set.
     of = f"Scene: {escape(title)} &middot; " if data.source.sets else ""
-    title = changed(data.source.sets) if of else title
+    title = list_changed_keys(data.source.sets) if of else title
     motion = f" &middot; {escape(data.source.driven)}" if data.source.driven else ""
     lead = [
         f"<p class=soft>{of}patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])}{motion} "
@@ -74,10 +74,10 @@ def page(data: RunData) -> str:
         f"<p class=verdict>{verdict(data)}</p>",
     ]
     warnings = [w for w in summary["warnings"] if w != data.verdict.sentence]
-    lead.append(warned(warnings, "Warnings"))
-    lead += [f"<p class=soft>Note: {prose(text)}</p>" for text in summary["notes"]]
+    lead.append(warning_box(warnings, "Warnings"))
+    lead += [f"<p class=soft>Note: {sentence_html(text)}</p>" for text in summary["notes"]]
     drawn, shown = figures(data)
-    drawn = charts.within(drawn, ROOM)
+    drawn = charts.limit_characters(drawn, ROOM)
     sections = [Section("pictures", "Pictures", shown)] if drawn else []
     film = data.patch.film if data.patch.touches() else None
     if film is not None:
@@ -116,7 +116,7 @@ def figures(data: RunData) -> tuple:
             for one in made
         )
         places.append(
-            f"<figure><div class=row>{cells}</div><figcaption>{prose(found.caption)}</figcaption></figure>"
+            f"<figure><div class=row>{cells}</div><figcaption>{sentence_html(found.caption)}</figcaption></figure>"
         )
         drawn += made
     return drawn, "\n".join(places)
@@ -161,7 +161,8 @@ def _spectra(data: RunData) -> Picture | None:
         else (
             " The peak of H1 is marked by a ring. It is the peak of a mode at {} ({}) with a damping ratio of {} ({}), "
             "friction included.".format(
-                *of_records("response_frequency", found), *of_records("response_damping", found)
+                *record_interval("response_frequency", found),
+                *record_interval("response_damping", found),
             )
         )
     )
@@ -171,7 +172,7 @@ def _spectra(data: RunData) -> Picture | None:
         "One-sided spectral densities of output and drive, and the "
         "frequency response H1 (displacement of the output divided "
         "by acceleration of the base). H1 is drawn "
-        f"faint where the coherence is below {charts.COHERENT:g}.{told}",
+        f"faint where the coherence is below {charts.MIN_COHERENCE:g}.{told}",
     )
 
 
@@ -287,7 +288,7 @@ def _faces(data: RunData) -> Picture | None:
     return (
         Picture(
             charts.faces,
-            (found[:MOST],),
+            (found[:MAX_INTERFACES],),
             f"Normal stress of the pressed patch of each interface{moved}."
             f"{' Only the part in contact is drawn.' * part}{_first(found)}",
         )
@@ -299,7 +300,9 @@ def _faces(data: RunData) -> Picture | None:
 def _first(found: list) -> str:
     """Return the sentence, for the end of a caption, on charts that are left out."""
     return (
-        f" Only the first {MOST} of {len(found)} interfaces are shown." if len(found) > MOST else ""
+        f" Only the first {MAX_INTERFACES} of {len(found)} interfaces are shown."
+        if len(found) > MAX_INTERFACES
+        else ""
     )
 
 
@@ -385,7 +388,7 @@ def _loop(data: RunData) -> Picture | None:
     if each := own.get("each"):
         return Picture(
             charts.loops,
-            (each[:MOST],),
+            (each[:MAX_INTERFACES],),
             f"Friction force against the slide of each interface, over {span}."
             f"{_under(data)}{_first(each)}",
         )
@@ -426,7 +429,7 @@ def _histories(data: RunData) -> Picture | None:
         f"{bodies}.{_under(data)}"
     )
     begin, swings = (
-        charts.whole_from(history["time"], period, w["time"][0]),
+        charts.first_complete_time(history["time"], period, w["time"][0]),
         bool(data.verdict.released),
     )
     kept = int(np.sum(history["time"] < begin))
@@ -543,7 +546,7 @@ def _table_one(data: RunData) -> list:
             ratio = f"{mine / value:.2f}" if value else "&ndash;"
             rows.append(
                 [
-                    linked(kind, key),
+                    measure_link(kind, key),
                     f"{value / scale:.3g} {unit}",
                     f"{mine / scale:.3g} {unit}",
                     ratio,
@@ -578,7 +581,7 @@ def _table_of_levels(levels: list) -> Section:
         for name, unit in OF_LEVELS:
             value, error = one["values"].get(name), one["errors"].get(name)
             there = value is not None and np.isfinite(value)
-            cells.append(pair(name, measure(value, unit, error)) if there else DASH)
+            cells.append(format_with_error(name, measure(value, unit, error)) if there else DASH)
         drive = f"{one['drive']:.4g} N" if one.get("unit") == "N" else f"{one['drive'] / G:.4g} g"
         rows.append(
             [
@@ -599,7 +602,7 @@ def _table_of_levels(levels: list) -> Section:
     heads = [
         ">level",
         f">{sized}",
-        *(f">{linked(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS)),
+        *(f">{measure_link(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS)),
         *(["outcome"] if judged else []),
         "interface",
     ]
@@ -615,20 +618,20 @@ def _measures(data: RunData) -> Section:
     """Return the section on all measures with errors, in other units, and with definitions."""
     rows, means = [], data.verdict.means
     found = data.verdict.summary["measures"]
-    for name, m in in_order(found).items():
-        value, error = texts(name, m)
+    for name, m in order_measures(found).items():
+        value, error = format_value_and_error(name, m)
         cells = [f"<td id='measure-{escape(name)}'>{escape(name)}</td>", value]
         if m["value"] is None:
-            cells.append(f"<td class=soft colspan=3>{prose(m.get('reason', ''))}</td>")
+            cells.append(f"<td class=soft colspan=3>{sentence_html(m.get('reason', ''))}</td>")
         else:
             unit = units(name, m["value"], m["unit"], m["error"])[0][0]
             error = error or ("unknown" if m["error"] is None else DASH)
-            cells += [error, f"<td class=v>{escape(unit)}</td>", escape(others(name, m))]
-        others_lie = of_records(name, found)[1]
+            cells += [error, f"<td class=v>{escape(unit)}</td>", escape(format_imperial(name, m))]
+        others_lie = record_interval(name, found)[1]
         text = means.get(name, "") + (
             f"; {others_lie} for other records of the random drive" if others_lie else ""
         )
-        rows.append([*cells, f"<td class=soft>{prose(text)}</td>"])
+        rows.append([*cells, f"<td class=soft>{sentence_html(text)}</td>"])
     note = (
         (
             f"<p class=soft>The run covers only {data.verdict.cycles:.2g} of a cycle, so measures per cycle do not "
@@ -643,7 +646,7 @@ def _measures(data: RunData) -> Section:
         "measures",
         "Measures",
         table(heads, rows, "across many")
-        + f"<p class=soft>Value and error have the same unit; {SHARP.replace('±', 'error')}. summary.json "
+        + f"<p class=soft>Value and error have the same unit; {EXACT_NOTE.replace('±', 'error')}. summary.json "
         f"has all digits in SI.</p>{note}",
     )
 
@@ -705,7 +708,7 @@ def page_of(result: Result, bodies: dict | None = None, film: dict | None = None
     bodies : dict or None
         The pressed pieces, from `fields.bodies.write_fields`.
     film : dict or None
-        From `pages.player.reel`.
+        From `pages.player.player_data`.
     """
     return page(_with_pieces(data_of(result), bodies, film))
 
@@ -733,8 +736,8 @@ def axes(result: Result, names: tuple, onto=None, bodies: dict | None = None):
     if shown is None:
         return None
     if onto is None:
-        return pictures.draw.figure(shown.charts(*shown.values)).axes[0]
-    pictures.draw.figure(shown.charts(*shown.values), onto=onto)
+        return pictures.draw_charts.figure(shown.charts(*shown.values)).axes[0]
+    pictures.draw_charts.figure(shown.charts(*shown.values), onto=onto)
     return onto
 
 

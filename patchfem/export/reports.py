@@ -44,11 +44,13 @@ def report_of(folders: list, out: Path | None = None) -> Path:
         else (folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE))
     )
     if not many[0]:
-        return _written(several_runs.page([several_runs.read(folder) for folder in folders]), out)
-    tables = [sweeps.seen_from(sweeps.read_table(folder), folder, out) for folder in folders]
-    names = several_runs.distinct([folder.resolve().name for folder in folders])
+        return _written(
+            several_runs.page([several_runs.read_run(folder) for folder in folders]), out
+        )
+    tables = [sweeps.relink_cases(sweeps.read_table(folder), folder, out) for folder in folders]
+    names = several_runs.number_duplicates([folder.resolve().name for folder in folders])
     return _written(
-        sweep.page(tables[0] if len(tables) == 1 else sweeps.joined(tables, names)), out
+        sweep.page(tables[0] if len(tables) == 1 else sweeps.join_tables(tables, names)), out
     )
 
 

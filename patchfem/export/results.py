@@ -16,7 +16,7 @@ from ..disk.lock import FolderLock
 
 PAGE = "report.html"
 # Folder with the fields of interfaces that have a patch, and the largest number that is written.
-INTERFACES, MOST = (
+INTERFACES_FOLDER, MAX_INTERFACES = (
     "interfaces",
     6,
 )
@@ -28,7 +28,7 @@ FILES = (
     "scene.resolved.toml",
     "fields.pvd",
     "fields_frames",
-    INTERFACES,
+    INTERFACES_FOLDER,
     "fit.json",
     "fit.csv",
     "fit.svg",

@@ -16,7 +16,9 @@ from ..runs.patch import values
 from ..runs.results.result import Result, choices, measure_engines
 from ..runs.rig import plan as rig_plan
 
-KNOWN = 10.0  # Number of errors of a stiffness, below which nothing is divided by it.
+MIN_STIFFNESS_ERRORS = (
+    10.0  # Number of errors of a stiffness, below which nothing is divided by it.
+)
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 
@@ -96,8 +98,8 @@ def read_summary(path: Path) -> dict:
     """
     text = path.read_text(encoding="utf-8")
     try:
-        _shape().model_validate_json(text, strict=True)
-        return json.loads(text, parse_int=_whole)
+        _summary_model().model_validate_json(text, strict=True)
+        return json.loads(text, parse_int=_parse_int)
     except RecursionError:
         raise ValueError("nested deeper than a summary is") from None
     except ValueError as fault:  # an error of pydantic has many lines
@@ -110,7 +112,7 @@ def read_summary(path: Path) -> dict:
         ) from None
 
 
-def _whole(digits: str) -> int:
+def _parse_int(digits: str) -> int:
     """Return an integer; ValueError if no float can represent it."""
     if len(digits) > 300:
         raise ValueError(f"a whole number of {len(digits)} digits cannot come from a run")
@@ -118,7 +120,7 @@ def _whole(digits: str) -> int:
 
 
 @cache
-def _shape() -> type:
+def _summary_model() -> type:
     """Return the pydantic model of what readers of a summary rely on."""
     from pydantic import BaseModel
 
@@ -157,11 +159,15 @@ def summary_of(result: Result) -> dict:
     )
     numerics = choices(result) | {"measures": measure_engines(result)}
     return (
-        answer | {"numerics": numerics} | contact_of(result) | run_away_of(result) | loop_of(result)
+        answer
+        | {"numerics": numerics}
+        | contact_of(result)
+        | runaway_data(result)
+        | loop_of(result)
     )
 
 
-def run_away_of(result: Result) -> dict:
+def runaway_data(result: Result) -> dict:
     """Return drive and knee [m s-2] of a motion that did not settle above the knee; else {}.
 
     It is {"run_away": {"drive", "knee"}}: the acceleration of the base, and the one above which
@@ -190,7 +196,7 @@ def loop_of(result: Result) -> dict:
     ):
         return {}
     amplitude, open_ = result.plan.model.slide.amplitude, stiffness.error or stiffness.floor
-    if stiffness.value <= KNOWN * open_ or work.value < 0:
+    if stiffness.value <= MIN_STIFFNESS_ERRORS * open_ or work.value < 0:
         return {}
     factor = work.value / (math.pi * stiffness.value * amplitude**2)
     error = (

@@ -16,13 +16,13 @@ FIRST = (
     "contact_fraction",
 )
 # Text for a measure whose label is not clear in a sentence.
-LONGER = {
+LONG_NAMES = {
     "relative_displacement_amplitude_steady": "the displacement amplitude to which the motion would settle"
 }
-ZERO = 10.0  # error / value above which a value counts as 0
+ZERO_ERROR_RATIO = 10.0  # error / value above which a value counts as 0
 
 
-def over(one: dict, tolerance) -> np.ndarray:
+def is_over_tolerance(one: dict, tolerance) -> np.ndarray:
     """Return whether (n,) the error of a measure exceeds tolerance * |value| + floor.
 
     This is the limit of the warning of a single run.
@@ -41,11 +41,11 @@ def over(one: dict, tolerance) -> np.ndarray:
         return errors > compute_allowed_error(tolerance, values, floors)
 
 
-def by_floor(one: dict, tolerance) -> np.ndarray:
+def is_within_by_floor(one: dict, tolerance) -> np.ndarray:
     """Return whether (n,) an error meets the tolerance only by the floor of its measure.
 
     The value must exceed this floor, so that a reader sees it with its error. The arguments are
-    those of `over`.
+    those of `is_over_tolerance`.
     """
     values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
@@ -53,7 +53,7 @@ def by_floor(one: dict, tolerance) -> np.ndarray:
         return (
             (errors > tolerance * np.abs(values))
             & (np.abs(values) > floors)
-            & ~over(one, tolerance)
+            & ~is_over_tolerance(one, tolerance)
         )
 
 
@@ -63,10 +63,10 @@ def floor_of(one: dict, cases: np.ndarray) -> str:
     return format_quantity(float(floors[cases].max()), one.get("unit", "1"), 2)
 
 
-def counted(measures: dict, tolerance) -> dict:
+def count_over_tolerance(measures: dict, tolerance) -> dict:
     """Count the cases over the tolerance by measure, for measures with any.
 
-    measures: {name: as for `over`}.
+    measures: {name: as for `is_over_tolerance`}.
 
     Returns
     -------
@@ -76,8 +76,8 @@ def counted(measures: dict, tolerance) -> dict:
     """
     out = {}
     for name, one in measures.items():
-        if (missed := over(one, tolerance)).any():
-            share = _share(one)[missed & (np.asarray(one["values"], float) != 0)]
+        if (missed := is_over_tolerance(one, tolerance)).any():
+            share = _relative_error(one)[missed & (np.asarray(one["values"], float) != 0)]
             out[name] = {
                 "count": int(missed.sum()),
                 "worst": float(share.max()) if share.size else None,
@@ -93,7 +93,7 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
     Parameters
     ----------
     measures : dict
-        {name: as for `over`}.
+        {name: as for `is_over_tolerance`}.
     tolerance : float or (n,) array
     where : callable
         Number of a case -> its swept values as text.
@@ -111,7 +111,7 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
     if not any(found.any() for found in known.values()) or not np.isfinite(limits).any():
         return ""
     asked = f"the tolerance of {100 * limits[0]:g} %" if np.ptp(limits) == 0 else "their tolerance"
-    lost = {name: over(one, tolerance) for name, one in measures.items()}
+    lost = {name: is_over_tolerance(one, tolerance) for name, one in measures.items()}
     lost = {name: missed for name, missed in lost.items() if missed.any()}
     if not lost:
         ran = int(
@@ -123,7 +123,8 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
             (
                 (name, cases)
                 for name in FIRST
-                if name in measures and (cases := by_floor(measures[name], tolerance)).any()
+                if name in measures
+                and (cases := is_within_by_floor(measures[name], tolerance)).any()
             ),
             None,
         )
@@ -140,7 +141,7 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
     if first in measures and first not in lost:
         return f"In {label(first)} all {number} cases meet {asked}; {_others(len(lost))}."
     beyond = {
-        name: float(np.max(_beyond(measures[name], tolerance), initial=0.0, where=missed))
+        name: float(np.max(_error_ratio(measures[name], tolerance), initial=0.0, where=missed))
         for name, missed in lost.items()
     }
     name = (
@@ -148,14 +149,14 @@ def sentence(measures: dict, tolerance, where, first: str = "") -> str:
         if first in lost
         else max([name for name in FIRST if name in lost] or lost, key=beyond.get)
     )
-    share = np.where(lost[name], _share(measures[name]), 0.0)
+    share = np.where(lost[name], _relative_error(measures[name]), 0.0)
     count, case, others = int(lost[name].sum()), int(np.argmax(share)), len(lost) - 1
     known = (
         f"{format_number(100 * share[case], 2)} % of its value"
-        if share[case] <= ZERO
+        if share[case] <= ZERO_ERROR_RATIO
         else "larger than the value"
     )
-    called = LONGER.get(name) or label(name)
+    called = LONG_NAMES.get(name) or label(name)
     more = f"; {_others(others)}" if others else ""
     return (
         f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {called}; the largest error, at "
@@ -168,7 +169,7 @@ def _others(count: int) -> str:
     return f"{count} other measure{'s' * (count > 1)} miss{'es' * (count == 1)} the tolerance in some cases"
 
 
-def _beyond(one: dict, tolerance) -> np.ndarray:
+def _error_ratio(one: dict, tolerance) -> np.ndarray:
     """Return the error over the allowed error (n,)."""
     floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -177,7 +178,7 @@ def _beyond(one: dict, tolerance) -> np.ndarray:
         )
 
 
-def _share(one: dict) -> np.ndarray:
+def _relative_error(one: dict) -> np.ndarray:
     """Return error over |value| (n,); inf if the value is 0."""
     values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
     with np.errstate(divide="ignore", invalid="ignore"):

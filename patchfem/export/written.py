@@ -5,11 +5,11 @@ import re
 from ..formatting import format_number
 
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z")
-LONG = 9  # characters of a number from which it comes from a range, not from a person
-MOST = 6  # largest number of digits of a shortened number
+MIN_LONG_NUMBER = 9  # characters of a number from which it comes from a range, not from a person
+MAX_DIGITS = 6  # largest number of digits of a shortened number
 # Distance to the nearest other value, of which this fraction is the largest error of a shortened
 # value.
-OFF = 0.05
+MAX_ERROR_FRACTION = 0.05
 
 
 def label(name: str) -> str:
@@ -17,15 +17,15 @@ def label(name: str) -> str:
     return name.replace("_", " ")
 
 
-def brief(text: str) -> str:
+def shorten(text: str) -> str:
     """Return a value as written, with at most six digits.
 
     For example, 3.16227766016838e-06 rad becomes 3.16228e-06 rad.
     """
-    return _short(text, MOST)
+    return _short(text, MAX_DIGITS)
 
 
-def resolved(text: str, value: float, apart: float) -> str:
+def shorten_to_spacing(text: str, value: float, apart: float) -> str:
     """Return a value as written, with as few digits as distinguish it from its neighbours.
 
     For example, 3.16227766016838 urad between 1 urad and 10 urad becomes 3.2 urad.
@@ -39,17 +39,17 @@ def resolved(text: str, value: float, apart: float) -> str:
     apart : float
         Distance to the nearest other value [SI].
     """
-    for digits in range(2, MOST):
+    for digits in range(2, MAX_DIGITS):
         short = _short(text, digits)
         if short == text:
             break
         number, near = (float(NUMBER.match(one)[1]) for one in (text, short))
-        if abs((near - number) * value) <= abs(OFF * apart * number):
+        if abs((near - number) * value) <= abs(MAX_ERROR_FRACTION * apart * number):
             return short
-    return brief(text)
+    return shorten(text)
 
 
-def bare(text: str, beside: str) -> str:
+def without_unit(text: str, beside: str) -> str:
     """Return a value without its unit if the next value has the same: 0.1 before 0.2 mrad."""
     number, _, unit = text.partition(" ")
     return number if unit and unit == beside.partition(" ")[2] else text
@@ -58,6 +58,6 @@ def bare(text: str, beside: str) -> str:
 def _short(text: str, digits: int) -> str:
     """Shorten a number with many digits."""
     found = NUMBER.match(text)
-    if found is None or len(found[1]) < LONG:
+    if found is None or len(found[1]) < MIN_LONG_NUMBER:
         return text
     return f"{format_number(float(found[1]), digits)} {found[2] or ''}".strip()

@@ -32,8 +32,8 @@ from figure_27 import POINT
 from modal_test import marched
 from told import told
 
-from patchfem.campaigns.rows.asked import Question
-from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
+from patchfem.campaigns.rows.asked import FitRequest
+from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.inputs.measured import read_table
 from patchfem.scene.ranges import read_ranges
@@ -138,7 +138,8 @@ def fitted(gauge: bool):
     wanted, wrong = read_ranges((*FREE, *((GAUGE,) if gauge else ())))
     assert not wrong
     return fit_rows(
-        Question(scene, wanted, TABLE), RowsOptions((HOLD,), how=Search(STARTS, SEED, "bound"))
+        FitRequest(scene, wanted, TABLE),
+        RowsOptions((HOLD,), how=SearchSettings(STARTS, SEED, "bound")),
     )
 
 

@@ -36,11 +36,11 @@ from peer import Peer, run, timed
 from rig_texts import TEXTS
 from switched import PROBLEMS, follow
 
-from patchfem.campaigns.sweeps.case_models import Asked
+from patchfem.campaigns.sweeps.case_models import SweepScene
 from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.core import Missing
-from patchfem.export.sweeps.run import swept
+from patchfem.export.sweeps.run import compute_in_memory
 from patchfem.runs.batch import batches
 from patchfem.scene.axes import make_axis
 from patchfem.scene.scene import loads
@@ -150,7 +150,9 @@ def by_patchfem(cases: np.ndarray):
             ("friction.static", "structure.mode.block.damping"), cases.T.tolist()
         )
     ]
-    return swept(Asked(Path("block.toml"), SCENE), Cases(tuple(axes), True), LocalExecutor())
+    return compute_in_memory(
+        SweepScene(Path("block.toml"), SCENE), Cases(tuple(axes), True), LocalExecutor()
+    )
 
 
 def by_exact(cases: np.ndarray):
@@ -307,7 +309,7 @@ def of_family(name: str, count: int, seed: int):
         )
         for key, draw in keys.items()
     ]
-    return swept(Asked(RIG, text), Cases(tuple(axes), True), LocalExecutor())
+    return compute_in_memory(SweepScene(RIG, text), Cases(tuple(axes), True), LocalExecutor())
 
 
 def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float = 1.0) -> list[dict]:

@@ -9,8 +9,8 @@ from math import pi
 
 import numpy as np
 
-from patchfem.campaigns.rows.asked import Asked, Question
-from patchfem.campaigns.rows.computed import Computed
+from patchfem.campaigns.rows.asked import ConditionModels, FitRequest
+from patchfem.campaigns.rows.computed import ModelReadings
 from patchfem.core import frozen_array
 from patchfem.model.model import build
 
@@ -36,18 +36,18 @@ class Number:
     unit: str = "1"
 
 
-class Derived(Question):
+class Derived(FitRequest):
     """A Question of which the last numbers become --set strings together: derive(*numbers) -> strings."""
 
     def __init__(self, scene, wanted, measured, derive):
         super().__init__(scene, wanted, measured)
         self.derive = derive
 
-    def asked(self, conditions, *sets: str) -> Asked:
+    def asked(self, conditions, *sets: str) -> ConditionModels:
         return DerivedAsked(self.scene, conditions, self.wanted, self.measured, self.derive)
 
 
-class DerivedAsked(Asked):
+class DerivedAsked(ConditionModels):
     """What Derived asks."""
 
     def __init__(self, scene, conditions, wanted, measured, derive):
@@ -105,7 +105,7 @@ def by_row(cells):
     )
 
 
-class Worn(Computed):
+class Worn(ModelReadings):
     """A Computed of a Derived question whose conditions are the rows of the table in the order in which they were run.
 
     The friction of a row is that of new pieces times 1 + (factor - 1) depth/DEPTH, `factor` the last value: as

@@ -11,10 +11,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 from derived import Worn, by_row
 from rungs import CONTAINS, HELD, HERE, ROOT2, RUNGS, SCREEN, SEED, STUCK, TABLE, UNDER
 
-from patchfem.campaigns.rows.cells import cells_of, scores
-from patchfem.campaigns.rows.computed import Computed
-from patchfem.campaigns.rows.null_models import predicted
-from patchfem.campaigns.rows.search import residual_of
+from patchfem.campaigns.rows.cells import read_readings, scores
+from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns.rows.null_models import fit_null_model
+from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N
 from patchfem.identify.least_squares import NEAR_BOUND_FRACTION, run_descents
 from patchfem.identify.space import CubeResidual, make_space
@@ -62,16 +62,16 @@ def stuck_gain(cells, seen) -> float:
 
 def cells_for(rung: str):
     """The readings of Table 1 as a rung is asked for them."""
-    cells = cells_of(TABLE)
+    cells = read_readings(TABLE)
     return by_row(cells) if RUNGS[rung].worn else cells
 
 
-def computed_for(rung: str, reading: str, cells, seen, placebo: str = "") -> Computed:
+def computed_for(rung: str, reading: str, cells, seen, placebo: str = "") -> ModelReadings:
     """What computes the conditions of a rung under a reading, the gain of stuck readings taken from those `seen`."""
     more = [f"measured.acceleration_gain={stuck_gain(cells, seen)!r}"] if reading == STUCK else []
     one = RUNGS[rung]
     question = one.question(reading, *more, *([placebo] if placebo else []))
-    return (Worn if one.worn else Computed)(question.asked(cells.conditions))
+    return (Worn if one.worn else ModelReadings)(question.asked(cells.conditions))
 
 
 def fitted(
@@ -153,7 +153,7 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
     valleys: {"starts", "best": how many of them ended in the best valley, "tied": of every other valley within TIED of
     the best training score its training score and the scores of the readings that were not fitted}.
     """
-    wanted, residual = computed.asked.wanted, residual_of(cells, computed, seen, "bound")
+    wanted, residual = computed.asked.wanted, make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
     quick, drawn, random = CubeResidual(residual, box, quick=True), np.random.default_rng(SEED), 0
     ends = run_descents(quick, [box.unit(one) for one in begins], before=computed.forget)
@@ -199,7 +199,7 @@ def screened(quick, points, forget) -> np.ndarray:
 def valleys_of(cells, computed, seen, last, ends) -> tuple:
     """(number of ends in the best valley, the other valleys near it) of (values, rms) at the ends of the starts; last:
     the Descent to the bottom of the best."""
-    wanted, residual = computed.asked.wanted, residual_of(cells, computed, seen, "bound")
+    wanted, residual = computed.asked.wanted, make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
 
     def at(values) -> np.ndarray:
@@ -247,7 +247,7 @@ def bootstrap(cells, logs, seen) -> dict:
     {"fitted", "others": {kind: [low, high]}, "better": {null: {kind: share of draws in which the model scores the
     others better}}}; None where there is nothing to draw."""
     out = {"fitted": intervals(cells, logs, seen), "others": intervals(cells, logs, ~seen)}
-    nulls = {name: predicted(cells, null, seen)[0] for name, null in NULLS.items()}
+    nulls = {name: fit_null_model(cells, null, seen)[0] for name, null in NULLS.items()}
     return out | {
         "better": {name: better(cells, logs, null, ~seen) for name, null in nulls.items()}
     }

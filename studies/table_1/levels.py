@@ -24,7 +24,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from rungs import HERE, ROOT2, RUNGS, STUCK
 
-from patchfem.campaigns.rows.computed import Computed
+from patchfem.campaigns.rows.computed import ModelReadings
 from patchfem.core import G_N
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -53,7 +53,7 @@ def measured(scene, frequency: float, level: float, name: str) -> float | None:
 
 def runaway(question, values, frequency: float) -> float | None:
     """Lowest level [g] on the grid at which a model runs away; None where it does not up to 12 g."""
-    computed = Computed(question.asked([(frequency, level * G_N) for level in RUNAWAYS]))
+    computed = ModelReadings(question.asked([(frequency, level * G_N) for level in RUNAWAYS]))
     for k, level in enumerate(RUNAWAYS):
         computed.forget()
         if computed(values, [k])[1][k] > AWAY:

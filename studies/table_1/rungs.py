@@ -27,7 +27,7 @@ from pathlib import Path
 
 from derived import Derived, Number, rods
 
-from patchfem.campaigns.rows.asked import Question
+from patchfem.campaigns.rows.asked import FitRequest
 from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import Scene, load, loads
 
@@ -112,7 +112,7 @@ class Rung:
         sets = list({one.partition("=")[0]: one for one in sets}.values())
         return loads(text, path, sets) if self.point else load(path, sets)
 
-    def question(self, reading: str, *more: str) -> Question:
+    def question(self, reading: str, *more: str) -> FitRequest:
         """What `campaigns.rows` is asked: the scene and the ranges of its free keys and of its reading.
 
         Grooves of another wavelength are searched between the amplitudes that bend alike, as far as they do not lock.
@@ -136,7 +136,7 @@ class Rung:
         return (
             Derived(scene, [*wanted, *self.numbers], TABLE, self.derive)
             if self.numbers
-            else Question(scene, wanted, TABLE)
+            else FitRequest(scene, wanted, TABLE)
         )
 
 

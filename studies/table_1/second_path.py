@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem.campaigns.rows.asked import Question
-from patchfem.campaigns.rows.cells import cells_of, scores
-from patchfem.campaigns.rows.computed import Computed
-from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
+from patchfem.campaigns.rows.asked import FitRequest
+from patchfem.campaigns.rows.cells import read_readings, scores
+from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.scene.ranges import read_ranges
 from patchfem.scene.scene import load, loads
 
@@ -37,19 +37,19 @@ POINT = (
 )
 
 
-def question(point: bool = False) -> Question:
+def question(point: bool = False) -> FitRequest:
     """The scene with the patch, or with one elastic-plastic point in its place, and its free numbers."""
     path = HERE / "second_path.toml"
     text = path.read_text("utf-8")
     if point:
         text = POINT + text[text.index("static =") :]
-    return Question(loads(text, path) if point else load(path), read_ranges(FREE)[0], TABLE)
+    return FitRequest(loads(text, path) if point else load(path), read_ranges(FREE)[0], TABLE)
 
 
 def as_it_stands(point: bool = False) -> dict:
     """Scores of the scene's own numbers and the seconds of its 27 readings, the second time that they are asked."""
-    cells, asked = cells_of(TABLE), question(point)
-    held, computed = cells.chosen(HELD), Computed(asked.asked(cells.conditions))
+    cells, asked = read_readings(TABLE), question(point)
+    held, computed = cells.chosen(HELD), ModelReadings(asked.asked(cells.conditions))
     own = asked.scene
     values = [
         own.friction.static,
@@ -72,7 +72,7 @@ def as_it_stands(point: bool = False) -> dict:
 
 def fitted(point: bool = False, starts: int = 8):
     """The numbers fitted to 143 Hz from random starts, as FittedRows."""
-    return fit_rows(question(point), RowsOptions(hold=(HELD,), how=Search(starts)))
+    return fit_rows(question(point), RowsOptions(hold=(HELD,), how=SearchSettings(starts)))
 
 
 def main(starts: int = 8) -> dict:

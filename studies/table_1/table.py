@@ -16,8 +16,8 @@ from fitting import KIND, better, intervals, known, training
 from fitting import NULLS as RIVALS
 from rungs import EACH, HERE, ROOT2, RUNGS, STUCK, TABLE, variants
 
-from patchfem.campaigns.rows.cells import cells_of, scores
-from patchfem.campaigns.rows.null_models import NULLS, predicted
+from patchfem.campaigns.rows.cells import read_readings, scores
+from patchfem.campaigns.rows.null_models import NULLS, fit_null_model
 
 UNITS = {
     "static": "",
@@ -122,7 +122,7 @@ def folds_of(rows: dict, rung: str, reading: str) -> list | None:
 
 def left_logs(folds) -> np.ndarray:
     """Logarithms (n,) of every reading by the fit that did not see its frequency."""
-    cells = cells_of(TABLE)
+    cells = read_readings(TABLE)
     logs = np.full(cells.row.size, np.nan)
     for fold in folds:
         out = ~training(cells, fold["protocol"])
@@ -136,16 +136,16 @@ def left_out(rows: dict, rung: str, reading: str) -> dict | None:
     if folds is None:
         return None
     logs = left_logs(folds)
-    return scores(cells_of(TABLE), logs, np.ones(logs.size, bool))
+    return scores(read_readings(TABLE), logs, np.ones(logs.size, bool))
 
 
 def null_left(name: str) -> np.ndarray:
     """`left_logs` of a model without mechanics."""
-    cells = cells_of(TABLE)
+    cells = read_readings(TABLE)
     out = np.full(cells.row.size, np.nan)
     for protocol in EACH[1:]:
         fold = training(cells, protocol)
-        out[~fold] = predicted(cells, name, fold)[0][~fold]
+        out[~fold] = fit_null_model(cells, name, fold)[0][~fold]
     return out
 
 
@@ -180,10 +180,13 @@ def found(row: dict) -> str:
 
 def nulls() -> list:
     """Rows (name, numbers of the accelerations, fitted to 143 Hz, held out, left out, all) of scores."""
-    cells, out = cells_of(TABLE), []
+    cells, out = read_readings(TABLE), []
     seen, every = training(cells, "143"), np.ones(cells.row.size, bool)
     for name in NULLS:
-        logs, (whole, made) = predicted(cells, name, seen)[0], predicted(cells, name, every)
+        logs, (whole, made) = (
+            fit_null_model(cells, name, seen)[0],
+            fit_null_model(cells, name, every),
+        )
         out.append(
             (
                 name,
@@ -254,7 +257,7 @@ def shared(rows: dict) -> list:
 
 def _left(rows: dict) -> list:
     """Each frequency left out: scores with their bootstrap, and how often the rows drawn anew prefer the model."""
-    cells = cells_of(TABLE)
+    cells = read_readings(TABLE)
     every = np.ones(cells.row.size, bool)
     out = [
         "| model | accelerometer shows | score of all readings | score of accelerations | score of displacements | "

@@ -17,7 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from rig_texts import TEXTS
 
-from patchfem.campaigns.rows.cells import cells_of, scores
+from patchfem.campaigns.rows.cells import read_readings, scores
 from patchfem.core import G_N
 from patchfem.runs import run as runner
 from patchfem.scene import scene
@@ -47,7 +47,7 @@ def answer(name: str, frequency: float, level: float, cycles: float, estimate: b
 def main(cycles: float = 800, models=("coulomb", "patch")) -> dict:
     """Print cells and scores; returns {model: {"cells" (2, c) [m s-2] and [m], "all", "acceleration", "displacement"},
     "null"}."""
-    cells = cells_of(RIG / "table1.csv")
+    cells = read_readings(RIG / "table1.csv")
     every = np.ones(cells.row.size, bool)
     out = {
         "null": scores(

@@ -51,7 +51,7 @@ cycles = 20
 def written(found) -> str:
     """The page of a backbone, after its picture, its table and its netCDF contents have been made."""
     if found.curves:
-        pictures.draw(backbone_files.drawn(found.curves))
+        pictures.draw_charts(backbone_files.drawn(found.curves))
     backbone_files.contents(found)
     backbone_files.lines_of(found)
     return backbone_files.page(found, "title")

@@ -12,7 +12,14 @@ from scene_texts import BENCH, PIECE
 import patchfem as pf
 from patchfem import build
 from patchfem.campaigns import numerical_settings
-from patchfem.campaigns.cost import TOLERANCE, Cost, cheapest, curve, quickest, sentence
+from patchfem.campaigns.cost import (
+    TOLERANCE,
+    Cost,
+    curve,
+    fastest_by_measure,
+    fastest_run,
+    sentence,
+)
 from patchfem.export.cost import lines_of
 from patchfem.runs.run import run
 
@@ -97,8 +104,10 @@ def test_exact_the_cheapest_run_is_confirmed_by_finer_ones():
         made("good", 3, 1e-3, 1e-3),
         made("best", 9, 1e-5),
     ]
-    assert cheapest(runs, 1e-2) == {"a": "good"} and cheapest(runs, 1e-6) == {"a": None}
-    assert cheapest(runs, 0.2) == {"a": "lucky"}
+    assert fastest_by_measure(runs, 1e-2) == {"a": "good"} and fastest_by_measure(runs, 1e-6) == {
+        "a": None
+    }
+    assert fastest_by_measure(runs, 0.2) == {"a": "lucky"}
 
 
 def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
@@ -122,12 +131,12 @@ def test_exact_of_settings_of_equal_cost_the_smallest_is_named():
     """1600 steps per cycle at 0.042 CPU s were named where 100 at 0.040 s met the tolerance, with the same results."""
     seconds = {"100": 0.0402, "200": 0.0401, "400": 0.0404, "800": 0.0415, "1600": 0.0423}
     still = [made(label, each, 1e-3, 0.0) for label, each in seconds.items()]
-    assert quickest(still, 1e-2).label == "100" and sentence(still, 1e-2) == (
+    assert fastest_run(still, 1e-2).label == "100" and sentence(still, 1e-2) == (
         "a knob at 100: 0.04 CPU s per run, with every measure within the tolerance 0.01; the other settings change no "
         "result of this scene"
     )
     slow = [made("2", 1.0, 8e-3, 6e-3), made("4", 0.96, 2e-3, 1e-3), made("8", 1.2, 1e-3)]
-    assert quickest(slow, 1e-2).label == "2" and quickest(slow, 5e-3).label == "4"
+    assert fastest_run(slow, 1e-2).label == "2" and fastest_run(slow, 5e-3).label == "4"
     assert sentence(slow, 1e-2).endswith(
         "; the other settings change no result by more than the tolerance"
     )
@@ -209,5 +218,5 @@ def test_exact_a_bench_without_pieces_has_the_steps_as_its_knob():
     """A law with a memory and one without; settings that gave the same run would be one."""
     for text in (BENCH, BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')):
         found = build(text)
-        assert numerical_settings.knobs_of(found) == ["steps_per_cycle"]
+        assert numerical_settings.applicable_settings(found) == ["steps_per_cycle"]
     assert len(curve(found, "steps_per_cycle")) > 2

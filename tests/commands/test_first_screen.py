@@ -15,11 +15,11 @@ from patchfem.__main__ import SCREEN, app, known
 from patchfem.commands import shared
 from patchfem.core import Measure, Outcome
 from patchfem.export.pages.sentences import (
+    EXACT_NOTE,
     GROUPS,
-    SHARP,
+    format_with_error,
     group_of,
     headline,
-    pair,
     table_of,
     tolerance_sentence,
     verdict,
@@ -67,11 +67,15 @@ def test_exact_the_numbers_are_those_of_the_summary(tmp_path):
     measures = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))["measures"]
     assert lines[0] == "A rubbing block on flexures, shaken at one frequency"
     assert lines[1] == f"steady: {Outcome.STEADY.sentence}"
-    amplitude = pair("relative_displacement_amplitude", measures["relative_displacement_amplitude"])
+    amplitude = format_with_error(
+        "relative_displacement_amplitude", measures["relative_displacement_amplitude"]
+    )
     assert lines[2].startswith(
         f"Displacement amplitude at the output {amplitude} (half peak-to-peak); peak acceleration "
     )
-    assert lines[3] == f"Every measure with an error estimate meets the tolerance 0.001; {SHARP}."
+    assert (
+        lines[3] == f"Every measure with an error estimate meets the tolerance 0.001; {EXACT_NOTE}."
+    )
     shown = dict(line.split(None, 1) for line in lines if line.startswith("  "))
     assert set(shown) == set(measures)
     for name, text in shown.items():
@@ -255,11 +259,11 @@ def test_exact_the_largest_error_is_that_of_a_value_that_a_reader_sees():
     assert (
         "; the largest error is 0.008 of the value (friction_force_peak, 1.0000 ± 0.0080 N)" in said
     )
-    assert "moment" not in said and SHARP not in said.split(";")[0]
+    assert "moment" not in said and EXACT_NOTE not in said.split(";")[0]
     unknown = tolerance_said(
         loop_area=Measure(1.0, "J", 0.0), friction_work=Measure(1.0, "J", None)
     )
-    assert unknown.endswith(f"; {SHARP}, except where the error is unknown.")
+    assert unknown.endswith(f"; {EXACT_NOTE}, except where the error is unknown.")
 
 
 @pytest.mark.parametrize(
@@ -415,7 +419,11 @@ def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):
 
 def test_exact_a_second_interface_reads_in_the_units_of_the_first():
     one = {"value": 1.0, "error": 0.0, "unit": "1"}
-    assert pair("stick_fraction_2", one) == pair("stick_fraction", one) == "100 %"
+    assert (
+        format_with_error("stick_fraction_2", one)
+        == format_with_error("stick_fraction", one)
+        == "100 %"
+    )
 
 
 @pytest.mark.parametrize(

@@ -202,7 +202,7 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
     computed = ComputedCases(monkeypatch)
     computed.chunks_before_interrupt = 2
     # Each chunk has one case, which is computed before the sweep can be stopped within it.
-    monkeypatch.setattr(sweep, "SPAN", 0.0)
+    monkeypatch.setattr(sweep, "CHUNK_SECONDS", 0.0)
     out = tmp_path / "swept"
     answer = cli("sweep", scene, *OVER, "-o", out)
     assert answer.code == 130 and "--resume" in answer.err
@@ -325,7 +325,7 @@ def test_exact_tables_of_many_cases_are_written_where_they_are_asked_for(
 ):
     out = tmp_path / "swept"
     with monkeypatch.context() as many:
-        many.setattr("patchfem.export.sweeps.run.TABLED", 5)
+        many.setattr("patchfem.export.sweeps.run.MAX_CASES_WITH_TABLES", 5)
         said = cli("sweep", scene, *OVER, "-o", out)
         assert not (out / "sweep.csv").exists() and not (out / "sweep.nc").exists()
         assert "run the same command with --collect" in said.out

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from patchfem.campaigns.sweeps.table import read
+from patchfem.campaigns.sweeps.table import read_case_table
 from patchfem.disk import open_with_timeout
 from patchfem.scene import scene, toml_text
 
@@ -48,7 +48,7 @@ def test_refuses_a_pipe_that_nobody_writes_to(pipe, monkeypatch):
         scene.SceneError, match=r"x\.toml: cannot be read: this is a pipe, and no data came"
     ):
         toml_text.read_text(pipe)
-    assert read(pipe)[1] == [
+    assert read_case_table(pipe)[1] == [
         f"{pipe}: cannot be read: this is a pipe, and no data came through it within 0 s"
     ]
 

@@ -11,7 +11,7 @@ from patchfem.export import netcdf
 
 def test_exact_a_large_file_is_made_on_the_disk_with_the_same_contents(tmp_path):
     """And one that finds no room there leaves nothing."""
-    count = netcdf.LARGE + 1
+    count = netcdf.MAX_VALUES_IN_MEMORY + 1
     outcomes = np.array(["steady", "stuck"], object)
     data = netcdf.Contents(
         {

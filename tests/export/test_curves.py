@@ -75,11 +75,15 @@ def written(tmp_path_factory):
 
 
 def test_exact_spans_of_a_curve():
-    assert charts.spans(FOLDED) == [("stable", 0, 4), ("unstable", 4, 7), ("stable", 7, 9)]
+    assert charts.regime_stretches(FOLDED) == [
+        ("stable", 0, 4),
+        ("unstable", 4, 7),
+        ("stable", 7, 9),
+    ]
 
 
 def test_exact_a_picture_of_a_folded_curve():
-    text = pictures.draw(charts.curve(FOLDED))
+    text = pictures.draw_charts(charts.curve(FOLDED))
     for word in (
         "stable",
         "unstable",
@@ -88,7 +92,7 @@ def test_exact_a_picture_of_a_folded_curve():
         "half the peak-to-peak motion [um]",
     ):
         assert f">{word}<" in text, word
-    assert "stroke-dasharray" in text and pictures.draw(charts.curve(FOLDED)) == text
+    assert "stroke-dasharray" in text and pictures.draw_charts(charts.curve(FOLDED)) == text
     said = charts.caption(FOLDED)
     assert (
         "9 points" in said
@@ -106,10 +110,10 @@ def test_exact_a_curve_over_the_level_with_no_bounded_motion_at_its_end():
         "regime": np.array(["stuck", "2 stops", "sliding", "unbounded"]),
         "multiplier": np.zeros(4),
     }
-    assert charts.axis_of(found)[0] == pytest.approx([1, 2, 3, 4]) and charts.axis_of(found)[
+    assert charts.curve_axis(found)[0] == pytest.approx([1, 2, 3, 4]) and charts.curve_axis(found)[
         1:
     ] == ("drive level", "g")
-    assert "no bounded motion" in charts.caption(found) and ">unbounded<" in pictures.draw(
+    assert "no bounded motion" in charts.caption(found) and ">unbounded<" in pictures.draw_charts(
         charts.curve(found)
     )
 
@@ -215,7 +219,7 @@ def test_exact_the_arrows_of_the_levels_point_along_the_test():
         for d, a in ((1.0, 0.0), (2.0, 1e-6), (3.0, 4e-6), (2.0, 2e-6))
     ]
     axes = Figure().subplots()
-    pictures.draw(charts.levels(rows), onto=axes)
+    pictures.draw_charts(charts.levels(rows), onto=axes)
     arrows = [text for text in axes.texts if isinstance(text, Annotation) and text.arrow_patch]
     upwards = [(arrow.xyann[0] < arrow.xy[0], arrow.xyann[1] < arrow.xy[1]) for arrow in arrows]
     assert upwards == [(True, True), (True, True), (False, False)]
@@ -266,5 +270,5 @@ def test_exact_levels_over_more_than_three_decades_are_drawn_over_their_logarith
     assert not charts.levels(few)[0]["y"]["log"]
     for some, scale in ((rows, "log"), (few, "linear")):
         axes = Figure().subplots()
-        pictures.draw(charts.levels(some), onto=axes)
+        pictures.draw_charts(charts.levels(some), onto=axes)
         assert axes.get_yscale() == scale

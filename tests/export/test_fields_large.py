@@ -24,7 +24,7 @@ from patchfem.elasticity.elasticity import lame
 from patchfem.elasticity.recovery import get_cells, make_points
 from patchfem.export.fields import bodies, vtkhdf
 from patchfem.export.fields.series import Series
-from patchfem.export.fields.vtkhdf import NAME, rounded, stepped
+from patchfem.export.fields.vtkhdf import NAME, round_to_bits, round_to_step
 from patchfem.export.fields.vtu import export
 
 KILLED = """\
@@ -33,7 +33,7 @@ from pathlib import Path
 from patchfem.export.fields import vtkhdf
 sys.path[:0] = {paths!r}
 from exported import write_small, write_waves
-calls, inner, vtkhdf.LARGE = [0], vtkhdf._nearest, 0
+calls, inner, vtkhdf.MIN_FRAMEWISE_BYTES = [0], vtkhdf._nearest, 0
 def counted(nearest):
     def one(values):
         calls[0] += 1
@@ -87,7 +87,7 @@ def rubbing(tmp_path_factory):
         0.3 * np.cos(np.pi * fields["time"] / 8e-3)[:, None] * fields["normal_stress"]
     )
     with pytest.MonkeyPatch.context() as changed:
-        changed.setattr(vtkhdf, "LARGE", 0)
+        changed.setattr(vtkhdf, "MIN_FRAMEWISE_BYTES", 0)
         changed.setattr(
             bodies,
             "write_series",
@@ -156,7 +156,7 @@ def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rub
 @pytest.fixture
 def always_large(monkeypatch):
     """Every series is written as a large one."""
-    monkeypatch.setattr(vtkhdf, "LARGE", 0)
+    monkeypatch.setattr(vtkhdf, "MIN_FRAMEWISE_BYTES", 0)
 
 
 @pytest.mark.usefixtures("always_large")
@@ -171,7 +171,7 @@ def test_exact_a_large_series_holds_every_frame_rounded_as_it_says(tmp_path):
                 for array, values in theirs.items():
                     wanted = at(values, number)
                     if wanted.dtype == np.float32:
-                        wanted = rounded(wanted, vtkhdf.BITS.get(array, vtkhdf.MOST_BITS))
+                        wanted = round_to_bits(wanted, vtkhdf.BITS.get(array, vtkhdf.MOST_BITS))
                     assert np.array_equal(data[array], wanted), array
     assert number == 4
     with Series(tmp_path / "out") as series:
@@ -179,7 +179,7 @@ def test_exact_a_large_series_holds_every_frame_rounded_as_it_says(tmp_path):
         bits = series.root["upper/CellData/stress"].attrs["significant_bits"]
         assert np.array_equal(
             series.frame(3).blocks["upper"].cell_data["stress"],
-            rounded(given.blocks["upper"].cell_data["stress"][3], bits),
+            round_to_bits(given.blocks["upper"].cell_data["stress"][3], bits),
         )
 
 
@@ -202,7 +202,9 @@ def test_always_a_killed_writer_leaves_its_whole_frames_and_no_file_of_the_name(
         assert count == 47 // len(packed) - 1 > 0
     given = write_small(tmp_path / "whole", 6)
     for number, grids in enumerate(by_vtk(left)):
-        wanted = rounded(given.blocks["upper"].cell_data["von_mises"][number], vtkhdf.MOST_BITS)
+        wanted = round_to_bits(
+            given.blocks["upper"].cell_data["von_mises"][number], vtkhdf.MOST_BITS
+        )
         assert np.array_equal(grids["upper"].cell_data["von_mises"], wanted)
     assert number == count - 1
 
@@ -244,9 +246,9 @@ def test_exact_rounding_to_a_step_is_to_the_nearest_multiple(power):
         * 10.0 ** np.arange(-3, 9).repeat(500)
     )
     values = values.astype(np.float32)
-    found = stepped(values, step)
+    found = round_to_step(values, step)
     whole = found.astype(float) / step
     assert found.dtype == np.float32 and np.array_equal(whole, np.round(whole))
     assert (abs(found.astype(float) - values) <= step / 2).all() and (found != values).any()
     odd = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 3e38], np.float32)
-    assert np.array_equal(stepped(odd, step), odd, equal_nan=True)
+    assert np.array_equal(round_to_step(odd, step), odd, equal_nan=True)

@@ -12,10 +12,10 @@ from command_line import cli
 from exported import write_small
 from PIL import Image
 
-from patchfem.export.drawing.film import DPI, FRAME_SIZE, film_of
+from patchfem.export.drawing.film import DPI, FRAME_SIZE, make_film
 from patchfem.export.drawing.flat import LOOK, Picture
 from patchfem.export.drawing.panels import slide_of, upper_points
-from patchfem.export.fields.series import APART, Series, moving
+from patchfem.export.fields.series import MIN_STEP_RATIO, Series, last_consecutive_frames
 
 WIDE, HIGH = 1200, 680
 TITLE = 180  # rows of the titles, of which one names the folder
@@ -56,23 +56,25 @@ def pixels(series, film, number) -> np.ndarray:
 def drawn(small):
     """(Film, pictures) of the small series, each frame drawn by itself."""
     with Series(small) as series:
-        film = film_of(series)
+        film = make_film(series)
         return film, [pixels(series, film, number) for number in film.numbers]
 
 
 def test_exact_the_last_cycle_is_without_the_pressed_state():
     cycle = 0.007 * np.arange(1, 17) / 16
-    assert moving(np.array([0.0, *(1.39 + cycle)])) == tuple(range(1, 17))
+    assert last_consecutive_frames(np.array([0.0, *(1.39 + cycle)])) == tuple(range(1, 17))
     # a bench's: as even as steps allow
-    assert moving(np.cumsum([0, 4, 6, 6, 4, 4, 6])) == tuple(range(7))
-    assert moving(np.array([0.0, 1.0, 2.0, 3.0 + APART])) == (3,)
-    assert moving(np.array([0.0])) == (0,) and moving(np.array([0.0, 2.0])) == (0, 1)
+    assert last_consecutive_frames(np.cumsum([0, 4, 6, 6, 4, 4, 6])) == tuple(range(7))
+    assert last_consecutive_frames(np.array([0.0, 1.0, 2.0, 3.0 + MIN_STEP_RATIO])) == (3,)
+    assert last_consecutive_frames(np.array([0.0])) == (0,) and last_consecutive_frames(
+        np.array([0.0, 2.0])
+    ) == (0, 1)
 
 
 @pytest.mark.slow
 def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(bench):
     with Series(bench) as series:
-        film = film_of(series)
+        film = make_film(series)
         assert film.numbers == tuple(range(len(series))) and len(series) > 10
         frames = [series.frame(number) for number in film.numbers]
     mises = np.array([one.cell_data["von_mises"][one.cell_data["part"] < 2] for one in frames])
@@ -109,7 +111,7 @@ def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(ben
 @pytest.mark.slow
 def test_exact_the_slide_is_taken_out_before_the_rest_is_magnified(bench):
     with Series(bench) as series:
-        film = film_of(series)
+        film = make_film(series)
         frames = [series.frame(number) for number in film.numbers]
     slides = np.array([slide_of(one) for one in frames])
     length = 12.7e-3
@@ -128,7 +130,7 @@ def test_exact_the_slide_is_taken_out_before_the_rest_is_magnified(bench):
 
 def test_exact_the_range_of_colours_is_the_same_in_every_frame(small):
     with Series(small) as series:
-        film = film_of(series)
+        film = make_film(series)
         first = series.frame(film.numbers[0])
         picture = Picture(first, "", film.panels(first), FRAME_SIZE, film.reach)
         assert len(picture.bodies[0].cells) == 2  # triangles and quadrilaterals

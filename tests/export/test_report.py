@@ -19,7 +19,7 @@ from patchfem.export import report
 from patchfem.export.drawing import charts
 from patchfem.export.page_data import Measured, Motion, PressedPatch, RunData, SceneText, Verdict
 from patchfem.export.pages import sentences
-from patchfem.export.pages.document import prose
+from patchfem.export.pages.document import sentence_html
 from patchfem.response.rows import TABLE as MOTION
 
 PERIOD, MIL = 1 / 143, 25.4e-6
@@ -259,7 +259,7 @@ def test_always_the_verdict_first_and_every_measure_listed(pages, name):
     ],
 )
 def test_exact_a_sentence_on_a_page_has_its_quoted_words_as_code(text, html):
-    assert prose(text) == html
+    assert sentence_html(text) == html
 
 
 def test_always_no_sentence_of_a_page_shows_back_quotes(pages):
@@ -354,7 +354,7 @@ def test_exact_the_same_data_give_the_same_bytes(tmp_path, name):
     ],
 )
 def test_exact_units_follow_the_size(name, value, unit, error, text):
-    assert sentences.others(name, measure(value, unit, error)) == text
+    assert sentences.format_imperial(name, measure(value, unit, error)) == text
 
 
 def test_exact_the_band_joins_the_reversals_of_each_cycle():
@@ -420,12 +420,12 @@ def test_exact_a_stress_without_bound_is_named_where_it_is_the_largest(cell, sai
 def test_exact_a_fraction_that_is_extrapolated_is_told_from_the_places_of_the_finest_mesh():
     """59.2 % from x = -1.724 to 1.724 of 6 mm were two answers, as these ends give 57.5 %."""
     contact = {"from": -3e-3, "to": 3e-3, "stretches": [[-1.724e-3, 1.724e-3]]}
-    assert sentences.placed(contact, 0.592) == (
+    assert sentences.describe_contact(contact, 0.592) == (
         ", from x = -1.724 to 1.724 mm on the finest mesh (57.5 %; the fraction "
         "before is extrapolated from all meshes)"
     )
     assert (
-        sentences.placed(contact, 1.724 / 3)
-        == sentences.placed(contact)
+        sentences.describe_contact(contact, 1.724 / 3)
+        == sentences.describe_contact(contact)
         == ", from x = -1.724 to 1.724 mm"
     )

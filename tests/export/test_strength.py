@@ -10,7 +10,7 @@ import pytest
 from command_line import cli
 
 import patchfem as pf
-from patchfem.export.fields.strength import beyond_yield
+from patchfem.export.fields.strength import find_yielding
 from patchfem.scene.keys.materials import MATERIALS, YIELD
 
 RADIUS, WIDTH = 14.5e-3, 10e-3
@@ -140,7 +140,7 @@ def test_exact_a_coating_of_the_same_metal_is_not_the_other_piece():
         }
         for side, stress in (("lower", 100e6), ("upper", 300e6))
     }
-    (told,) = beyond_yield(
+    (told,) = find_yielding(
         SimpleNamespace(pieces=SimpleNamespace(lower=piece, upper=piece)), bodies
     ).values()
     assert "300 MPa in the steel of the upper piece" in told and "other piece" not in told

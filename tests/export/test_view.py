@@ -14,7 +14,15 @@ from hypothesis import strategies as st
 
 from patchfem.export.drawing import view
 from patchfem.export.drawing.flat import Picture
-from patchfem.export.drawing.panels import areas, borders, curves, moved, panels, rounded, slide_of
+from patchfem.export.drawing.panels import (
+    areas,
+    borders,
+    curves,
+    drawn_displacement,
+    panels,
+    round_factor,
+    slide_of,
+)
 from patchfem.export.fields.series import Series
 
 # Modules that stand in for pyvista where OpenGL does not work; the child process that draws a test picture imports them.
@@ -62,7 +70,7 @@ def test_exact_a_slide_is_found_and_not_magnified(bench, slide):
     for panel in panels(frame):
         assert panel.factor > 10
         aside = panel.places[upper, 0] - 1e3 * frame.points[upper, 0]
-        bent = panel.factor * 1e3 * np.abs(moved(frame)[upper, 0] - slide).max()
+        bent = panel.factor * 1e3 * np.abs(drawn_displacement(frame)[upper, 0] - slide).max()
         assert np.abs(aside).max() <= 1e3 * abs(slide) + bent * (1 + 1e-9)
         assert np.abs(aside).max() < 0.1 * 12.7
         assert ("the slide of" in panel.title()) == (slide != 0)
@@ -119,11 +127,11 @@ def test_exact_any_cells_are_drawn_whole(tmp_path):
 
 @given(st.floats(1e-3, 1e12))
 def test_always_the_factor_is_round_and_just_below(factor):
-    found = rounded(factor, 0.0)
+    found = round_factor(factor, 0.0)
     assert factor / 2.5 * (1 - 1e-9) <= found <= factor * (1 + 1e-9)
     lead = found / 10.0 ** np.floor(np.log10(found * (1 + 1e-9)))
     assert min(abs(lead - step) for step in (1, 2, 5)) <= 1e-9
-    assert rounded(factor) == max(1.0, rounded(factor))
+    assert round_factor(factor) == max(1.0, round_factor(factor))
 
 
 @pytest.mark.slow

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from study_module import ROOT, study
 
-from patchfem.campaigns.rows.cells import cells_of
-from patchfem.campaigns.rows.computed import Computed
+from patchfem.campaigns.rows.cells import read_readings
+from patchfem.campaigns.rows.computed import ModelReadings
 from patchfem.core import NotConverged
 
 ROOT2 = "fundamental x sqrt2"
@@ -19,7 +19,7 @@ def fitting():
 
 def test_always_every_rung_can_be_asked_under_every_reading(fitting):
     """20 conditions each; the numbers of its scene lie between the ends that are searched, what is 0 there apart."""
-    cells = cells_of(fitting.TABLE)
+    cells = read_readings(fitting.TABLE)
     for rung in fitting.RUNGS.values():
         for reading in rung.readings:
             asked = rung.question(reading).asked(cells.conditions)
@@ -42,7 +42,7 @@ def test_always_the_grooves_of_a_placebo_bend_as_those_of_the_report(fitting):
 def test_exact_what_a_protocol_fits_and_what_it_predicts(fitting):
     """Table 1 counted by hand: 27 accelerations and 8 displacements, 13 readings at 143 Hz, 12 at 135, 5 at 150 and
     155 Hz each; those left out in turn are all of them, once."""
-    cells = cells_of(fitting.TABLE)
+    cells = read_readings(fitting.TABLE)
     assert int(cells.felt.sum()) == 27 and cells.row.size == 35
     assert int(fitting.training(cells, "143").sum()) == 13 and fitting.training(cells, "all").all()
     left = [~fitting.training(cells, f"without {one}") for one in (135, 143, 150, 155)]
@@ -63,16 +63,16 @@ def test_always_a_motion_found_by_harmonics_is_no_start_for_the_map_of_yields(fi
             raise failures.pop()
         return find_steady(*given)
 
-    computed = Computed(asked)
+    computed = ModelReadings(asked)
     monkeypatch.setattr(steady, "solve_steady", lost)
     by_balance, after = np.array(computed(values, [0])), np.array(computed(values * 1.0001, [0]))
-    assert by_balance == pytest.approx(np.array(Computed(asked)(values, [0])), rel=0.02)
-    assert after == pytest.approx(np.array(Computed(asked)(values * 1.0001, [0])), rel=1e-9)
+    assert by_balance == pytest.approx(np.array(ModelReadings(asked)(values, [0])), rel=0.02)
+    assert after == pytest.approx(np.array(ModelReadings(asked)(values * 1.0001, [0])), rel=1e-9)
 
 
 def test_exact_the_gain_of_a_fold_comes_from_its_own_readings(fitting):
     """By hand: 4 g reads 5.0 and 4.9 at 143 Hz, 5.0 at 155 Hz, 5.1 at 150 Hz, 5.8 and 6.0 at 135 Hz."""
-    cells = cells_of(fitting.TABLE)
+    cells = read_readings(fitting.TABLE)
     gains = {
         one: fitting.stuck_gain(cells, fitting.training(cells, one))
         for one in ("143", "all", "without 135", "without 143", "without 150", "without 155")
@@ -109,7 +109,7 @@ def test_exact_rods_are_the_two_masses_that_they_stand_for(fitting):
 
 def test_exact_friction_that_wear_does_not_change_gives_the_rung_beside_it(fitting):
     """Factor 1: the rows one after the other are those of "spring and yaw"; factor 2 doubles the friction per um."""
-    cells, rows = cells_of(fitting.TABLE), fitting.cells_for("spring and yaw, worn")
+    cells, rows = read_readings(fitting.TABLE), fitting.cells_for("spring and yaw, worn")
     seen, values, few = fitting.training(cells, "143"), [0.45, 5e6, 0.09], [0, 1]
     worn = fitting.computed_for("spring and yaw, worn", ROOT2, rows, fitting.training(rows, "143"))
     plain = fitting.computed_for("spring and yaw", ROOT2, cells, seen)
@@ -128,7 +128,7 @@ def test_exact_friction_that_wear_does_not_change_gives_the_rung_beside_it(fitti
 
 def test_exact_the_bootstrap_is_that_of_rows_drawn_one_by_one(fitting):
     """Ten draws by hand: whole rows with their acceleration and displacement, and the score of what came up."""
-    cells = cells_of(fitting.TABLE)
+    cells = read_readings(fitting.TABLE)
     logs, among = np.sin(1.0 + np.arange(cells.row.size)), ~fitting.training(cells, "143")
     often, rows = fitting.drawn(cells, among), np.unique(cells.row[among])
     draws = np.random.default_rng(0).integers(0, rows.size, (fitting.DRAWS, rows.size))
@@ -147,7 +147,7 @@ def test_exact_the_bootstrap_is_that_of_rows_drawn_one_by_one(fitting):
 def test_always_starts_double_until_the_best_valley_is_found_twice(fitting, monkeypatch):
     """A made model with valleys at 0.1 and 0.8, the second 2 % deeper: it wins, and the first is told beside it. One
     start alone has found its valley once."""
-    number, cells = study("table_1/derived.py").Number("x", 0.0, 1.0), cells_of(fitting.TABLE)
+    number, cells = study("table_1/derived.py").Number("x", 0.0, 1.0), read_readings(fitting.TABLE)
 
     class Made:
         asked = type("Asked", (), {"wanted": [number]})
@@ -164,7 +164,7 @@ def test_always_starts_double_until_the_best_valley_is_found_twice(fitting, monk
         )
 
     seen = fitting.training(cells, "143")
-    monkeypatch.setattr(fitting, "residual_of", lambda *given: residual)
+    monkeypatch.setattr(fitting, "make_residual", lambda *given: residual)
     monkeypatch.setattr(fitting, "APART", 1e-4)
     values, ends, valleys = fitting.best_of(cells, Made(), seen, 8, 32)
     assert (
@@ -212,7 +212,7 @@ def test_always_a_fit_sees_nothing_but_its_training_readings(fitting):
     assert found["valleys"]["best"] == sum(
         one < 1.001 * min(found["starts"]) for one in found["starts"]
     )
-    logs, seen = np.array(found["logs"]), fitting.training(cells_of(fitting.TABLE), "143")
+    logs, seen = np.array(found["logs"]), fitting.training(read_readings(fitting.TABLE), "143")
     assert found["fitted"]["all"] == pytest.approx(np.sqrt(np.mean(logs[seen] ** 2)), rel=1e-3)
     assert found["others"]["all"] == pytest.approx(np.sqrt(np.mean(logs[~seen] ** 2)), rel=1e-3)
 
@@ -260,7 +260,7 @@ def test_always_the_readme_holds_what_the_scores_give(records):
 def test_always_a_record_tells_its_valleys_gain_bounds_and_bootstrap(fitting, records):
     """What touches an end is marked, a gain is that of the training rows, and no fit is worse in training than one that
     it contains, to half a per cent; a patch is not a point, and a damper alone lacks the spring of Fig. 27."""
-    cells = cells_of(fitting.TABLE)
+    cells = read_readings(fitting.TABLE)
     for (rung, reading, protocol, placebo), row in records.items():
         question = fitting.RUNGS[rung].question(reading, *([placebo] if placebo else []))
         assert row["at_bound"] == fitting.bounds(question.wanted, row["values"])
@@ -322,7 +322,7 @@ def test_table_1_the_scores_that_the_study_tells(records, fitting):
     assert all(one["path"]["fitted"][kind] > one["spring"]["fitted"][kind] for kind in table.KIND)
     assert abs(one["lift"]["others"]["all"] - spring["all"]) < 0.01
     left = [
-        table.scores(cells_of(fitting.TABLE), logs, np.ones(35, bool))
+        table.scores(read_readings(fitting.TABLE), logs, np.ones(35, bool))
         for *_, logs in table.shared(records)
     ]
     assert len(left) >= 14

@@ -114,7 +114,7 @@ def made(seed: int, place: Path) -> Made:
             + "".join(f"{t!r},{y!r}\n" for t, y in zip(time.tolist(), x.tolist()))
         )
         try:
-            imported.imported(record, place, (), False, imported.Estimate(decay=True))
+            imported.convert_file(record, place, (), False, imported.Estimate(decay=True))
             break
         except PatchfemError:
             continue

@@ -15,23 +15,23 @@ from ..fits.problem import model_without_joint
 READINGS = ("measured.acceleration_gain", "measured.displacement_gain")
 
 
-class Question:
+class FitRequest:
     """Problem of a fit: the scene of a rig, the ranges of its free keys, and a file of rows."""
 
     def __init__(self, scene: Scene, wanted, measured):
         self.scene, self.wanted, self.measured = scene, wanted, measured
 
-    def asked(self, conditions, *sets: str) -> Asked:
+    def asked(self, conditions, *sets: str) -> ConditionModels:
         """Return the models of the scene at conditions (c, 2), with additional --set strings."""
         scene = (
             loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets])
             if sets
             else self.scene
         )
-        return Asked(scene, conditions, self.wanted, self.measured)
+        return ConditionModels(scene, conditions, self.wanted, self.measured)
 
 
-class Asked:
+class ConditionModels:
     """A scene of a rig under a sine of its base, at measured conditions and with free keys.
 
     If the scene names no method, its steady motions are computed, provided that the method
@@ -63,7 +63,7 @@ class Asked:
         start = loads(scene.text, scene.path, [*scene.sets, *self.sets])
         self.base, self.read = BaseScene(start), start.measured
         self.inner = [k for k, one in enumerate(wanted) if one.key not in READINGS]
-        self.rigs = [build(self.base.override(sets_of(*one))).rig for one in conditions]
+        self.rigs = [build(self.base.override(condition_sets(*one))).rig for one in conditions]
 
     def _refuse(self, measured) -> None:
         """Raise PatchfemError for a scene or a key that cannot be fitted to rows."""
@@ -127,7 +127,7 @@ class Asked:
         return any(one.key.startswith("contact.") for one in self.wanted)
 
 
-def sets_of(frequency: float, level: float) -> list:
+def condition_sets(frequency: float, level: float) -> list:
     """Return the --set strings of a condition: frequency [Hz], input [m s-2]."""
     return [
         f"drive.frequency={float(frequency)!r} Hz",

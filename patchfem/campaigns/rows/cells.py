@@ -11,15 +11,15 @@ from ...inputs.measured import read_table
 from ...scene.keys.quantities import parse_quantity
 
 # Smallest displacement [m] in a ratio: one digit of the printed displacements, 0.01 mil.
-FLOOR = 0.01 * 25.4e-6
+MIN_DISPLACEMENT = 0.01 * 25.4e-6
 # Largest absolute logarithm; a motion that grows without bound or is zero gets this value.
-MOST = log(1e3)
-ALIKE = 1e-9  # relative difference below which two inputs are the same condition
+MAX_LOG = log(1e3)
+EQUAL_TOL = 1e-9  # relative difference below which two inputs are the same condition
 KINDS = {"frequency": "frequency", "input": "acceleration"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Cells:
+class Readings:
     """The n readings of a table, row by row; the acceleration of a row comes first.
 
     Attributes
@@ -104,7 +104,7 @@ class Cells:
             wanted = parse_quantity(text, KINDS[name])
         except ValueError as error:
             raise PatchfemError(f"--hold {name}={text}: {error}") from None
-        return abs(value - wanted) <= ALIKE * abs(wanted)
+        return abs(value - wanted) <= EQUAL_TOL * abs(wanted)
 
     def parts(self, name: str, among) -> list:
         """Return pairs (name, readings (n,) bool) of every distinct value of a column.
@@ -121,7 +121,7 @@ class Cells:
     def logs(self, acceleration, displacement) -> np.ndarray:
         """Return ln(computed/measured) (n,) of all readings.
 
-        It is NaN if nothing was computed, and MOST if a motion is not finite.
+        It is NaN if nothing was computed, and MAX_LOG if a motion is not finite.
 
         Parameters
         ----------
@@ -130,10 +130,10 @@ class Cells:
         """
         both = np.array([displacement, acceleration], float)
         computed = both[self.felt.astype(int), self.condition]
-        least = np.where(self.felt, 1e-300, FLOOR)
+        least = np.where(self.felt, 1e-300, MIN_DISPLACEMENT)
         with np.errstate(invalid="ignore", divide="ignore"):
             ratio = np.log(np.maximum(computed, least)) - np.log(np.maximum(self.measured, least))
-        return np.clip(ratio, -MOST, MOST)
+        return np.clip(ratio, -MAX_LOG, MAX_LOG)
 
 
 def _shown(name: str, value) -> str:
@@ -142,7 +142,7 @@ def _shown(name: str, value) -> str:
     return f"{value:.6g}{unit}" if unit else str(value) or "(none)"
 
 
-def cells_of(path: Path) -> Cells:
+def read_readings(path: Path) -> Readings:
     """Read the readings from a CSV file of measured responses (`inputs.measured.read_table`).
 
     Repeats of a condition remain separate readings. PatchfemError names what is wrong with the
@@ -174,8 +174,8 @@ def cells_of(path: Path) -> Cells:
     for one in asked:
         if (
             not conditions
-            or abs(one[0] - conditions[-1][0]) > ALIKE * one[0]
-            or abs(one[1] - conditions[-1][1]) > ALIKE * one[1]
+            or abs(one[0] - conditions[-1][0]) > EQUAL_TOL * one[0]
+            or abs(one[1] - conditions[-1][1]) > EQUAL_TOL * one[1]
         ):
             conditions.append(one)
     conditions = np.array(conditions)
@@ -185,7 +185,7 @@ def cells_of(path: Path) -> Cells:
     ]
     unstable = [("U" in rows[k].flag) for k in row]
     runs = tuple(f"{one.frequency:.6g} Hz" + " repeat" * ("R" in one.flag) for one in rows)
-    return Cells(
+    return Readings(
         Path(path),
         rows,
         frozen_array(row, np.int64),
@@ -198,12 +198,12 @@ def cells_of(path: Path) -> Cells:
     )
 
 
-def scores(cells: Cells, logs, among) -> dict | None:
+def scores(cells: Readings, logs, among) -> dict | None:
     """Return the root mean square of logarithms of readings; None if there are no readings.
 
     Parameters
     ----------
-    cells : Cells
+    cells : Readings
     logs : (n,) array
         ln(computed/measured).
     among : (n,) bool

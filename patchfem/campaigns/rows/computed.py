@@ -6,11 +6,11 @@ from ...model.source import locate_errors
 from ...response.spectrum import read_instrument
 from ...runs.batch.watched import MotionObserver
 from ..fits.problem import press_patch
-from .asked import READINGS, Asked
+from .asked import READINGS, ConditionModels
 
 
-class Computed:
-    """Readings of the models of an Asked, as a function of values (n,) and conditions.
+class ModelReadings:
+    """Readings of the models of a ConditionModels, as a function of values (n,) and conditions.
 
     A motion starts from the motion of the values before, so that a descent is fast. After `forget`
     it starts from rest, so that the result does not depend on earlier evaluations.
@@ -19,7 +19,7 @@ class Computed:
     NaN at conditions that were not requested, and infinite if no bounded motion is found.
     """
 
-    def __init__(self, asked: Asked, say=None):
+    def __init__(self, asked: ConditionModels, say=None):
         self.asked, self.say = asked, say
         self.patch, self.near, self.last, self.watcher = None, {}, (None, {}), None
         self.runs = 0

@@ -18,11 +18,11 @@ import numpy as np
 
 from ...core import PatchfemError
 from ..fits.problem import FittedKeys, Problem
-from .asked import Asked, Question
-from .cells import MOST, Cells, cells_of, scores
-from .computed import Computed
-from .null_models import NULLS, predicted
-from .search import Found, Search, residual_of, searched
+from .asked import ConditionModels, FitRequest
+from .cells import MAX_LOG, Readings, read_readings, scores
+from .computed import ModelReadings
+from .null_models import NULLS, fit_null_model
+from .search import BestFit, SearchSettings, fit_readings, make_residual
 
 SAME_SCORE = 1.01  # Ratio of two scores, below which two searches found the same fit.
 
@@ -36,7 +36,7 @@ class Fold:
 
     name: str
     readings: np.ndarray
-    found: Found
+    found: BestFit
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,7 +47,7 @@ class Placebo:
     """
 
     text: str
-    found: Found
+    found: BestFit
     logs: np.ndarray
 
 
@@ -71,14 +71,14 @@ class FittedRows:
     ----------
     keys : FittedKeys
         The fit of all readings that are not held out.
-    asked : Asked
+    asked : ConditionModels
         The models of the scene.
-    cells : Cells
+    cells : Readings
         The n measured readings.
-    how : Search
+    how : SearchSettings
     held : (n,) bool
         Readings held out.
-    found : Found
+    found : BestFit
         The searches of the fit.
     computed : (2, c) array
         Acceleration reading [m s-2] and displacement [m] of every condition.
@@ -95,11 +95,11 @@ class FittedRows:
     """
 
     keys: FittedKeys
-    asked: Asked
-    cells: Cells
-    how: Search
+    asked: ConditionModels
+    cells: Readings
+    how: SearchSettings
     held: np.ndarray
-    found: Found
+    found: BestFit
     computed: np.ndarray
     logs: np.ndarray
     folds: tuple
@@ -138,17 +138,17 @@ class RowsOptions:
     """Options of a fit: readings to hold or leave out, placebos, and settings of the search.
 
     hold: rows held out, "column=value,value"; leave_out: the column of which each value is left out in
-    turn; placebos: "key=value,value" strings; how: the Search.
+    turn; placebos: "key=value,value" strings; how: the SearchSettings.
     """
 
     hold: tuple = ()
     leave_out: str = ""
     placebos: tuple = ()
-    how: Search = field(default_factory=Search)
+    how: SearchSettings = field(default_factory=SearchSettings)
 
 
 def fit_rows(
-    question: Question,
+    question: FitRequest,
     options: RowsOptions,
     say: Callable | None = None,
     progress: Callable | None = None,
@@ -157,7 +157,7 @@ def fit_rows(
 
     Parameters
     ----------
-    question : Question
+    question : FitRequest
         The scene, its free keys and the file of rows.
     options : RowsOptions
     say : Callable, optional
@@ -179,13 +179,13 @@ def fit_rows(
     begin = perf_counter()
     how = options.how
     count = len(question.wanted)
-    cells = cells_of(question.measured)
+    cells = read_readings(question.measured)
     held = np.zeros(cells.row.size, bool)
     for text in options.hold:
         held |= cells.chosen(text)
     _require_enough_readings(cells, ~held, count, how)
     asked = question.asked(cells.conditions)
-    computed = Computed(asked, say)
+    computed = ModelReadings(asked, say)
     parts = cells.parts(options.leave_out, ~held) if options.leave_out else []
     if len(parts) == 1:
         raise PatchfemError(
@@ -199,26 +199,26 @@ def fit_rows(
     texts = [text for given in options.placebos for text in _split_placebo(given, question.wanted)]
     placebos = [(text, question.asked(cells.conditions, text)) for text in texts]
     tell = _count_starts(progress, how.starts * (1 + len(parts) + len(placebos)))
-    found = searched(cells, computed, ~held, how, name="all", tell=tell)
+    found = fit_readings(cells, computed, ~held, how, name="all", tell=tell)
     answer = _predict_from_rest(computed, found.fit.values, range(len(cells.conditions)))
     logs = cells.logs(*answer)
     left = np.full(held.size, np.nan)
     folds = []
     for name, part in parts:
         training = ~held & ~part
-        fold = searched(cells, computed, training, how, "", f"without {name}", tell)
+        fold = fit_readings(cells, computed, training, how, "", f"without {name}", tell)
         conditions = sorted(set(cells.condition[part].tolist()))
         seen = _predict_from_rest(computed, fold.fit.values, conditions)
         left[part] = cells.logs(*seen)[part]
         folds.append(Fold(name, part, fold))
     tried = []
     for text, other in placebos:
-        model = Computed(other, say)
-        refit = searched(cells, model, ~held, how, "", text, tell)
+        model = ModelReadings(other, say)
+        refit = fit_readings(cells, model, ~held, how, "", text, tell)
         seen = _predict_from_rest(model, refit.fit.values, range(len(cells.conditions)))
         tried.append(Placebo(text, refit, cells.logs(*seen)))
     nulls = {name: _predict_null(cells, name, held, parts) for name in NULLS}
-    residual = residual_of(cells, computed, ~held, how.unstable)
+    residual = make_residual(cells, computed, ~held, how.unstable)
     problem = Problem(asked.scene, asked.wanted, residual, sets=asked.sets, notes=asked.notes)
     keys = problem.conclude(found.fit, begin, _doubts(cells, found, logs, how))
     return FittedRows(
@@ -238,7 +238,7 @@ def fit_rows(
     )
 
 
-def _require_enough_readings(cells: Cells, training, count: int, how: Search) -> None:
+def _require_enough_readings(cells: Readings, training, count: int, how: SearchSettings) -> None:
     """Raise PatchfemError if a fit has no more readings than values."""
     used = training & ~cells.unstable if how.unstable == "out" else training
     if used.sum() <= count:
@@ -248,7 +248,7 @@ def _require_enough_readings(cells: Cells, training, count: int, how: Search) ->
         )
 
 
-def _predict_from_rest(computed: Computed, values, conditions) -> np.ndarray:
+def _predict_from_rest(computed: ModelReadings, values, conditions) -> np.ndarray:
     """Predict the readings (2, c) of all conditions from motions that begin at rest."""
     computed.forget()
     return np.array(computed(values, list(conditions)))
@@ -291,16 +291,16 @@ def _split_placebo(text: str, wanted) -> list:
     return [f"{key}={value.strip()}" for value in values.split(",")]
 
 
-def _predict_null(cells: Cells, name: str, held, parts) -> NullPrediction:
+def _predict_null(cells: Readings, name: str, held, parts) -> NullPrediction:
     """Return the prediction by a null model, also of the readings that are left out."""
-    logs, numbers = predicted(cells, name, ~held)
+    logs, numbers = fit_null_model(cells, name, ~held)
     left = np.full(held.size, np.nan)
     for _, part in parts:
-        left[part] = predicted(cells, name, ~held & ~part)[0][part]
+        left[part] = fit_null_model(cells, name, ~held & ~part)[0][part]
     return NullPrediction(logs, left, numbers)
 
 
-def _doubts(cells: Cells, found: Found, logs, how: Search) -> list:
+def _doubts(cells: Readings, found: BestFit, logs, how: SearchSettings) -> list:
     """Return warnings on the rows and on the search."""
     out = []
     if cells.empty:
@@ -324,13 +324,13 @@ def _doubts(cells: Cells, found: Found, logs, how: Search) -> list:
         {
             f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2"
             for k, log in zip(cells.row, logs)
-            if abs(log) >= MOST
+            if abs(log) >= MAX_LOG
         }
     )
     if lost:
         out.append(
             f"no bounded motion is found at {'; '.join(lost)}: each row at these inputs counts as "
-            f"if the model were wrong by a factor of {np.exp(MOST):.0f}"
+            f"if the model were wrong by a factor of {np.exp(MAX_LOG):.0f}"
         )
     alike = int((found.rms <= np.nanmin(found.rms) * SAME_SCORE).sum())
     if alike == 1 and how.starts > 1:

@@ -7,12 +7,12 @@ flagged U count as they are, which can only favour these models.
 
 import numpy as np
 
-from .cells import FLOOR, Cells
+from .cells import MIN_DISPLACEMENT, Readings
 
 NULLS = ("constant", "power_input", "power_input_frequency")
 
 
-def predicted(cells: Cells, name: str, training) -> tuple:
+def fit_null_model(cells: Readings, name: str, training) -> tuple:
     """Fit a null model to some readings and predict all of them.
 
     The models are y = C a ("constant"), y = C a^p ("power_input") and y = C a^p f^q
@@ -21,7 +21,7 @@ def predicted(cells: Cells, name: str, training) -> tuple:
 
     Parameters
     ----------
-    cells : Cells
+    cells : Readings
     name : str
         One of NULLS.
     training : (n,) bool
@@ -39,7 +39,7 @@ def predicted(cells: Cells, name: str, training) -> tuple:
         here = which & training
         if not here.any():
             continue
-        low = 0.0 if kind == "acceleration" else FLOOR
+        low = 0.0 if kind == "acceleration" else MIN_DISPLACEMENT
         y = np.log(np.maximum(cells.measured, low if low else 1e-300)) - at[:, 1]
         columns = [np.ones(len(at))]
         middle = at[here].mean(axis=0)

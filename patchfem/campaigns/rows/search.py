@@ -11,15 +11,15 @@ import numpy as np
 from ...core import NotConverged
 from ...identify.least_squares import Descent, Fit, assemble_fit, run_descents
 from ...identify.space import CubeResidual, make_space
-from .cells import Cells
-from .computed import Computed
+from .cells import Readings
+from .computed import ModelReadings
 
 # how a reading flagged U counts in a fit: as a lower bound, not at all, or as any other
 UNSTABLE = ("bound", "out", "read")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Found:
+class BestFit:
     """The best fit of several starts.
 
     Attributes
@@ -41,7 +41,7 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Search:
+class SearchSettings:
     """Settings of the search for the best values.
 
     Attributes
@@ -63,13 +63,13 @@ class Search:
     kept: Callable = lambda *given: None
 
 
-def residual_of(cells: Cells, computed: Computed, training, unstable: str) -> Callable:
+def make_residual(cells: Readings, computed: ModelReadings, training, unstable: str) -> Callable:
     """Return the residual ln(computed/measured) of some readings, as a function of the values.
 
     Parameters
     ----------
-    cells : Cells
-    computed : Computed
+    cells : Readings
+    computed : ModelReadings
     training : (n,) bool
         Readings of the residual.
     unstable : str
@@ -88,15 +88,15 @@ def residual_of(cells: Cells, computed: Computed, training, unstable: str) -> Ca
     return residual
 
 
-def searched(
-    cells: Cells,
-    computed: Computed,
+def fit_readings(
+    cells: Readings,
+    computed: ModelReadings,
     training,
-    how: Search,
+    how: SearchSettings,
     bars: str = "rows",
     name: str = "",
     tell: Callable | None = None,
-) -> Found:
+) -> BestFit:
     """Fit the free values to some readings within their ranges.
 
     Each start begins with motions from rest, so that its result depends only on its starting values
@@ -105,11 +105,11 @@ def searched(
 
     Parameters
     ----------
-    cells : Cells
-    computed : Computed
+    cells : Readings
+    computed : ModelReadings
     training : (n,) bool
         Readings of the fit.
-    how : Search
+    how : SearchSettings
     bars : str
         Kind of intervals, as in `identify.least_squares.fit`.
     name : str
@@ -119,7 +119,7 @@ def searched(
 
     Returns
     -------
-    Found
+    BestFit
 
     Raises
     ------
@@ -128,7 +128,7 @@ def searched(
     """
     wanted = computed.asked.wanted
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
-    residual, n = residual_of(cells, computed, training, how.unstable), len(wanted)
+    residual, n = make_residual(cells, computed, training, how.unstable), len(wanted)
     quick = CubeResidual(residual, box, quick=True)
     begins = np.random.default_rng(how.seed).random((how.starts, n))
 
@@ -161,4 +161,4 @@ def searched(
     values = np.array(
         [box.values(one.u) if np.isfinite(one.cost) else np.full(n, np.nan) for one in ends]
     )
-    return Found(found, np.array([box.values(u) for u in begins]), values, rms)
+    return BestFit(found, np.array([box.values(u) for u in begins]), values, rms)

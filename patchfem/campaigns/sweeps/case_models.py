@@ -27,7 +27,7 @@ from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class SweepScene:
     """Scene of a sweep in its written form.
 
     Attributes
@@ -74,7 +74,7 @@ class Asked:
         try:
             return self._like(sets, values) or build(self.scene(sets))
         except SceneError as error:
-            raise PatchfemError("; ".join(_of_case(error))) from None
+            raise PatchfemError("; ".join(_case_mistakes(error))) from None
         except PatchfemError:
             raise
         except (
@@ -127,7 +127,7 @@ class Asked:
         try:
             self.scene(sets)
         except SceneError as error:
-            return _of_case(error)
+            return _case_mistakes(error)
         return []
 
     def axes(self) -> tuple[list, list[str]]:
@@ -186,7 +186,7 @@ class Asked:
 
 
 @lru_cache(maxsize=2)
-def _base(asked: Asked) -> BaseScene | None:
+def _base(asked: SweepScene) -> BaseScene | None:
     """Return the scene from which those of all cases derive.
 
     None if the text is no valid scene without the values of a case.
@@ -198,7 +198,7 @@ def _base(asked: Asked) -> BaseScene | None:
 
 
 @lru_cache(maxsize=2)
-def _first(asked: Asked) -> dict[tuple, tuple | None]:
+def _first(asked: SweepScene) -> dict[tuple, tuple | None]:
     """Return the cache of what models of similar cases derive from, by the names of their keys.
 
     An entry is None if no models can be derived.
@@ -206,6 +206,6 @@ def _first(asked: Asked) -> dict[tuple, tuple | None]:
     return {}
 
 
-def _of_case(error: SceneError) -> list[str]:
+def _case_mistakes(error: SceneError) -> list[str]:
     """Return the mistakes of a case without the prefix of values that were set."""
     return [text.removeprefix("--set: ") for text in error.mistakes]

@@ -12,9 +12,9 @@ from math import isfinite, prod
 import numpy as np
 
 from ...scene.axes import Axis
-from .case_models import Asked
+from .case_models import SweepScene
 
-PIECES = tuple(
+PIECE_KEYS = tuple(
     f"contact.{name}"
     for name in (
         "length",
@@ -139,7 +139,7 @@ class Cases:
         """
         slow = sorted(
             (k for k, axis in enumerate(self.axes) if axis.key.startswith("contact.")),
-            key=lambda k: not self.axes[k].key.startswith(PIECES),
+            key=lambda k: not self.axes[k].key.startswith(PIECE_KEYS),
         )
         if not slow:
             return list(numbers)
@@ -155,7 +155,7 @@ class Cases:
 
         return sorted(numbers, key=patch)
 
-    def names(self, asked: Asked, numbers: Sequence[int] | None = None) -> np.ndarray:
+    def names(self, asked: SweepScene, numbers: Sequence[int] | None = None) -> np.ndarray:
         """Return names (n,) uint64 of cases, which follow from what each case computes.
 
         The same values in other units or in another order have the same name, also as part of
@@ -164,7 +164,7 @@ class Cases:
 
         Parameters
         ----------
-        asked : Asked
+        asked : SweepScene
         numbers : sequence of int, optional
             Numbers of the cases; by default all.
         """
@@ -172,7 +172,7 @@ class Cases:
         order = sorted(range(len(self.axes)), key=lambda k: json.dumps(self.axes[k].key))
         keys = [json.dumps(axis.key) for axis in self.axes]
         mark = lru_cache(0 if self.drawn else None)(
-            lambda k, place: _mark(keys[k], self.axes[k].values[place], asked)
+            lambda k, place: _value_json(keys[k], self.axes[k].values[place], asked)
         )
 
         def signs(shared: str, of: Sequence[int]) -> np.ndarray:
@@ -189,7 +189,7 @@ class Cases:
         return signs(shared, range(len(self)) if numbers is None else numbers)
 
 
-def _mark(key: str, value: float | str, asked: Asked) -> str:
+def _value_json(key: str, value: float | str, asked: SweepScene) -> str:
     """Return a key, given as JSON, and a value as JSON, with the hash of the file that it names."""
     if isinstance(value, float) and isfinite(value):
         return f'[{key}, {value!r}, ""]'

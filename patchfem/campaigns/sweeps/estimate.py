@@ -11,25 +11,33 @@ from ...core import PatchfemError
 from ...runs.batch.batches import batch_compile_seconds, batch_of
 from ...runs.plan import plan
 from ...scene.axes import Axis
-from .case_models import Asked
+from .case_models import SweepScene
 from .cases import Cases
 
 LOOKED = 9  # number of cases, spread over the sweep, whose plans estimate the cost of all
-ONCE = 0.75  # seconds that a sweep needs in total to start and to write its files and its page
-ALONE = 8e-3  # seconds of a case that is not computed in a batch, in addition to those of its plan
-RANKED = 0.8  # seconds to rank the keys by their influence, from random cases
+SWEEP_SECONDS = (
+    0.75  # seconds that a sweep needs in total to start and to write its files and its page
+)
+CASE_SECONDS = (
+    8e-3  # seconds of a case that is not computed in a batch, in addition to those of its plan
+)
+RANKING_SECONDS = 0.8  # seconds to rank the keys by their influence, from random cases
 # If the planned cases form at most this number of groups, all cases are assumed to form no more groups.
-FIXED = 3
+MAX_GROUPS = 3
 # Seconds to compute the columns of a case in a batch from its values (0.8 to 1.5 ms of 2000 lumped cases).
-TOGETHER = 1.2e-3
-FEW = 1000  # maximum number of cases of which a sweep writes a summary each by default
-TABLED = 200_000  # maximum number of cases for which a sweep writes tables by default
+BATCHED_CASE_SECONDS = 1.2e-3
+MAX_CASES_WITH_SUMMARY = (
+    1000  # maximum number of cases of which a sweep writes a summary each by default
+)
+MAX_CASES_WITH_TABLES = (
+    200_000  # maximum number of cases for which a sweep writes tables by default
+)
 # Bytes per case: with a summary; with tables, page and columns (10 000 cases); with only the columns
 # (a million cases).
 DISK, COLUMNS, BARE = 6000, 1600, 400
 
 
-def estimate(asked: Asked, cases: Cases) -> dict:
+def estimate(asked: SweepScene, cases: Cases) -> dict:
     """Return the plan of a sweep as a dict that can be written as JSON.
 
     It is the plan of the first valid case, which `case` {key: value as written} names, with seconds
@@ -52,10 +60,10 @@ def estimate(asked: Asked, cases: Cases) -> dict:
         raise wrong
     batches = [batch_of(one.model, len(cases)) for one in plans]
     once, alone = _alone(plans)
-    once += RANKED * (cases.drawn and len(cases.axes) > 1)
+    once += RANKING_SECONDS * (cases.drawn and len(cases.axes) > 1)
     keys = [None if batch is None else batch.group(one.model) for one, batch in zip(plans, batches)]
     each = [
-        one if key is None else max(TOGETHER, batch.share * one)
+        one if key is None else max(BATCHED_CASE_SECONDS, batch.share * one)
         for one, key, batch in zip(alone, keys, batches)
     ]
     groups = {
@@ -69,7 +77,7 @@ def estimate(asked: Asked, cases: Cases) -> dict:
         )
         once += (
             len(groups)
-            * (len(cases) / len(plans) if len(groups) > FIXED else 1.0)
+            * (len(cases) / len(plans) if len(groups) > MAX_GROUPS else 1.0)
             * max(float(begun), 0.0)
         )
     seconds = once + sum(each) / len(plans) * len(cases)
@@ -79,12 +87,18 @@ def estimate(asked: Asked, cases: Cases) -> dict:
     )
     return plans[0].as_json() | {
         "compile_seconds": compiles,
-        "seconds": round(ONCE + seconds, 2),
+        "seconds": round(SWEEP_SECONDS + seconds, 2),
         "seconds_per_case": round(seconds / len(cases), 4),
         "bytes": max(one.bytes for one in plans),
         "cases": len(cases),
         "case": {axis.key: text for axis, text in zip(cases.axes, cases.texts(numbers[0]))},
-        "disk_bytes": (DISK if len(cases) <= FEW else COLUMNS if len(cases) <= TABLED else BARE)
+        "disk_bytes": (
+            DISK
+            if len(cases) <= MAX_CASES_WITH_SUMMARY
+            else COLUMNS
+            if len(cases) <= MAX_CASES_WITH_TABLES
+            else BARE
+        )
         * len(cases),
         "values": {axis.key: _values(axis) for axis in cases.axes},
     }
@@ -111,7 +125,7 @@ def _alone(plans: list) -> tuple[float, list]:
         sum(seconds for name, seconds in cost.times.items() if name not in left_out)
         for cost in costs
     ]
-    return shared, [seconds + ALONE for seconds in own]
+    return shared, [seconds + CASE_SECONDS for seconds in own]
 
 
 def _values(axis: Axis) -> int:

@@ -1,6 +1,6 @@
 """Read the request for a sweep: scene and cases, with all mistakes reported at once.
 
-In: a file, --set strings and a `Request`. Out: `Asked` and `Cases`, or a SceneError.
+In: a file, --set strings and a `Request`. Out: `SweepScene` and `Cases`, or a SceneError.
 """
 
 from __future__ import annotations
@@ -21,13 +21,15 @@ from ...scene.lines import split_key
 from ...scene.scene import SceneError
 from ...scene.toml_text import read_text
 from . import samples, table
-from .case_models import Asked
+from .case_models import SweepScene
 from .cases import Cases, product
 
-LOOKED = 32  # cases that are read before a sweep starts, to find a valid one
-SHOWN = 12  # number of mistakes that are printed
-NEAR = 4  # number of measures that a mistyped name may mean
-MOST = 3_000_000  # cases of a sweep; the names and columns of more would need several gigabytes
+N_CHECKED = 32  # cases that are read before a sweep starts, to find a valid one
+MAX_PRINTED = 12  # number of mistakes that are printed
+MAX_SUGGESTIONS = 4  # number of measures that a mistyped name may mean
+MAX_CASES = (
+    3_000_000  # cases of a sweep; the names and columns of more would need several gigabytes
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +59,7 @@ class Request:
     of: str = ""
 
 
-def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, Cases]:
+def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[SweepScene, Cases]:
     """Read the scene of a sweep and its cases.
 
     Parameters
@@ -70,15 +72,15 @@ def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, 
 
     Returns
     -------
-    tuple of Asked and Cases
+    tuple of SweepScene and Cases
 
     Raises
     ------
     SceneError
-        As from `cases_of`, and if a key is both set for all cases and swept.
+        As from `read_cases`, and if a key is both set for all cases and swept.
     """
-    asked = Asked(Path(path), read_text(path), tuple(sets), request.of)
-    cases = cases_of(asked, request)
+    asked = SweepScene(Path(path), read_text(path), tuple(sets), request.of)
+    cases = read_cases(asked, request)
     swept = {asked.place(axis.key): axis.key for axis in cases.axes}
     both = [
         (one, swept.get(asked.place(".".join(split_key(one.partition("=")[0]))))) for one in sets
@@ -95,7 +97,7 @@ def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, 
     return asked, cases
 
 
-def cases_of(asked: Asked, request: Request) -> Cases:
+def read_cases(asked: SweepScene, request: Request) -> Cases:
     """Return the cases of a request: all combinations of the values that it names.
 
     If it names none, the values are those of the table [sweep].
@@ -114,9 +116,9 @@ def cases_of(asked: Asked, request: Request) -> Cases:
             ]
         )
     if request.file is not None:
-        listed, wrong = table.read(request.file)
+        listed, wrong = table.read_case_table(request.file)
         parts += [listed] if listed is not None else []
-    wrong += _unknown(request.of)
+    wrong += _check_measure(request.of)
     axes, mistakes = read_axes(request.over, sampled=request.count > 0)
     wrong += [f"--over {one.removeprefix('--over ')}" for one in mistakes]
     if not request.over and request.file is None:
@@ -133,7 +135,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         for key in sorted(twice)
     ]
     if not wrong:
-        wrong += _same(
+        wrong += _find_equal_keys(
             asked, [axis.key for axis in (*axes, *(one for part in parts for one in part.axes))]
         )
     if wrong:
@@ -149,25 +151,25 @@ def cases_of(asked: Asked, request: Request) -> Cases:
             *([request.count] if request.count else [len(axis.texts) for axis in axes]),
         ]
     )
-    if count > MOST:
+    if count > MAX_CASES:
         raise SceneError(
             [
-                f"{asked.path}: the sweep has {count} cases, more than the largest number possible ({MOST}); "
+                f"{asked.path}: the sweep has {count} cases, more than the largest number possible ({MAX_CASES}); "
                 "give fewer values for each key, or draw N cases from the ranges with --sobol N"
             ]
         )
     if request.count and axes:
-        parts.append(samples.drawn(axes, request.count, request.sobol, request.seed))
+        parts.append(samples.draw_cases(axes, request.count, request.sobol, request.seed))
     elif axes:
         parts.append(Cases(tuple(axes)))
     cases = product(parts)
     if cases.rows:
-        cases = replace(cases, words=_words(request, asked.path.parent))
+        cases = replace(cases, words=_repeat_words(request, asked.path.parent))
     _refuse_all(asked, cases)
     return cases
 
 
-def _words(request: Request, folder: Path) -> tuple[str, ...]:
+def _repeat_words(request: Request, folder: Path) -> tuple[str, ...]:
     """Return the arguments of a command that computes the same cases again from a folder.
 
     They are () if the file of cases is a pipe, which cannot be read again.
@@ -188,7 +190,7 @@ def _words(request: Request, folder: Path) -> tuple[str, ...]:
     )
 
 
-def _unknown(measure: str) -> list[str]:
+def _check_measure(measure: str) -> list[str]:
     """Return a mistake if no run has a measure, with the measures that may be meant.
 
     They are those whose name contains the word, or else the one with the most similar name.
@@ -197,7 +199,7 @@ def _unknown(measure: str) -> list[str]:
     if not measure or rows.remove_interface_number(measure) in known:
         return []
     parts = [name for name in known if measure in name.split("_") and not name.endswith("_scatter")]
-    near = parts if 0 < len(parts) <= NEAR else get_close_matches(measure, known, 1, 0.5)
+    near = parts if 0 < len(parts) <= MAX_SUGGESTIONS else get_close_matches(measure, known, 1, 0.5)
     *others, last = map(repr, near or [""])
     return [
         f"--of {measure}: unknown measure; "
@@ -209,7 +211,7 @@ def _unknown(measure: str) -> list[str]:
     ]
 
 
-def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
+def _find_equal_keys(asked: SweepScene, keys: Sequence[str]) -> list[str]:
     """Return a mistake for each key that means the same value as a key before it.
 
     Two keys do so if they name a mode by its name and by its number.
@@ -225,10 +227,10 @@ def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
     return wrong
 
 
-def _refuse_all(asked: Asked, cases: Cases) -> None:
+def _refuse_all(asked: SweepScene, cases: Cases) -> None:
     """Raise SceneError if none of several cases spread over the sweep is a valid scene."""
     found = {}
-    for number in cases.looked(LOOKED):
+    for number in cases.looked(N_CHECKED):
         mistakes = asked.mistakes(cases.sets(number))
         if not mistakes:
             return
@@ -237,17 +239,18 @@ def _refuse_all(asked: Asked, cases: Cases) -> None:
             found.setdefault(re.sub(NUMBER_PATTERN, "", one) if cases.drawn else one, one)
     lines = list(found.values())
     raise SceneError(
-        lines[:SHOWN] + ([f"and {len(lines) - SHOWN} more"] if len(lines) > SHOWN else [])
+        lines[:MAX_PRINTED]
+        + ([f"and {len(lines) - MAX_PRINTED} more"] if len(lines) > MAX_PRINTED else [])
     )
 
 
-def contradictions(asked: Asked, cases: Cases) -> str:
+def contradictions(asked: SweepScene, cases: Cases) -> str:
     """Return a warning that cases will fail because a swept key contradicts another key.
 
-    It says how to avoid this. It is "" if each of the LOOKED cases that are checked is a valid
+    It says how to avoid this. It is "" if each of the N_CHECKED cases that are checked is a valid
     scene.
     """
-    numbers = cases.looked(LOOKED)
+    numbers = cases.looked(N_CHECKED)
     found = [one for one in map(asked.mistakes, map(cases.sets, numbers)) if one]
     if not found:
         return ""

@@ -16,17 +16,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-MOST = 640  # number of cases that a surface interpolates, because its equations are dense
-POINTS = 1024  # points of a Sobol sequence per key, which give an index to about 0.01
-HALVES = 6  # number of surfaces through half of the cases
-SMOOTH = (1e-8, 1e-4, 1e-2, 1.0)  # smoothing of a surface, from interpolation to almost a plane
-LEAST = 16  # cases per key; with fewer, surfaces through half of the cases do not show the error of an index
-CLOSE = 0.005  # error of an index due to the finite number POINTS
+MAX_SURFACE_CASES = (
+    640  # number of cases that a surface interpolates, because its equations are dense
+)
+N_SOBOL_POINTS = 1024  # points of a Sobol sequence per key, which give an index to about 0.01
+N_HALF_SURFACES = 6  # number of surfaces through half of the cases
+SMOOTHINGS = (1e-8, 1e-4, 1e-2, 1.0)  # smoothing of a surface, from interpolation to almost a plane
+MIN_CASES_PER_KEY = 16  # cases per key; with fewer, surfaces through half of the cases do not show the error of an index
+INDEX_ERROR = 0.005  # error of an index due to the finite number N_SOBOL_POINTS
 # fraction of the variance that a surface has to explain in cases that it was not fitted to
-TOLD = 0.5
+MIN_EXPLAINED_FRACTION = 0.5
 
 
-class Share(NamedTuple):
+class SobolIndex(NamedTuple):
     """Sobol indices of one key for a measure.
 
     first: first-order index; total: total index; low, high: interval of the total index.
@@ -39,7 +41,7 @@ class Share(NamedTuple):
     high: float
 
 
-def ranking(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
+def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
     """Compute the Sobol indices of each measure that changes, if the cases determine them.
 
     A measure that a tenth of the cases lack is left out, because the other cases are not a random
@@ -58,7 +60,7 @@ def ranking(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
     Returns
     -------
     dict
-        By measure a list of Share, the largest total first.
+        By measure a list of SobolIndex, the largest total first.
     """
     moving = [(name, np.asarray(values)) for name, values in keys if np.unique(values).size > 1]
     changing = {
@@ -71,12 +73,13 @@ def ranking(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
     names = [name for name, _ in moving]
     if shape is not None:
         whole = {name: values for name, values in changing.items() if np.isfinite(values).all()}
-        found = {name: _of_grid(values.reshape(shape)) for name, values in whole.items()}
+        found = {name: _grid_indices(values.reshape(shape)) for name, values in whole.items()}
         along = [place for place, (name, _) in enumerate(keys) if name in names]
         return {
-            name: _sorted(names, [one[along] for one in shares]) for name, shares in found.items()
+            name: _sort_shares(names, [one[along] for one in shares])
+            for name, shares in found.items()
         }
-    levels = np.stack([_level(values) for _, values in moving], axis=1)
+    levels = np.stack([_rank_fraction(values) for _, values in moving], axis=1)
     out = {}
     for there in {
         np.isfinite(values).tobytes(): np.isfinite(values) for values in changing.values()
@@ -84,11 +87,15 @@ def ranking(keys: Sequence[tuple], measures: dict, shape: tuple | None) -> dict:
         alike = [
             name for name, values in changing.items() if np.array_equal(np.isfinite(values), there)
         ]
-        if there.sum() < LEAST * len(moving):
+        if there.sum() < MIN_CASES_PER_KEY * len(moving):
             continue
-        found = _of_draw(levels[there], np.stack([changing[name][there] for name in alike], axis=1))
+        found = _random_indices(
+            levels[there], np.stack([changing[name][there] for name in alike], axis=1)
+        )
         out |= {
-            name: _sorted(names, shares) for name, shares in zip(alike, found) if shares is not None
+            name: _sort_shares(names, shares)
+            for name, shares in zip(alike, found)
+            if shares is not None
         }
     return {name: out[name] for name in changing if name in out}
 
@@ -104,13 +111,13 @@ def _changes(values: np.ndarray, errors: np.ndarray) -> bool:
     )
 
 
-def _level(values: np.ndarray) -> np.ndarray:
+def _rank_fraction(values: np.ndarray) -> np.ndarray:
     """Return the fraction of the cases below each value, which is uniform between 0 and 1."""
     _, same, counts = np.unique(values, return_inverse=True, return_counts=True)
     return ((np.cumsum(counts) - counts / 2) / values.size)[same]
 
 
-def _of_grid(values: np.ndarray) -> tuple:
+def _grid_indices(values: np.ndarray) -> tuple:
     """Return first-order and total indices and their interval (4 of (keys,)) on a full grid."""
     axes, whole = range(values.ndim), values.var()
     first = (
@@ -123,7 +130,7 @@ def _of_grid(values: np.ndarray) -> tuple:
     return first, total, total, total
 
 
-def _of_draw(levels: np.ndarray, values: np.ndarray) -> list:
+def _random_indices(levels: np.ndarray, values: np.ndarray) -> list:
     """Return (first, total, low, high), (keys,) each, of each column of values.
 
     None for a column that a surface does not explain well enough.
@@ -135,14 +142,14 @@ def _of_draw(levels: np.ndarray, values: np.ndarray) -> list:
     values : (n, columns) array
     """
     rng = np.random.default_rng(0)
-    if len(levels) > MOST:
-        some = np.sort(rng.choice(len(levels), MOST, replace=False))
+    if len(levels) > MAX_SURFACE_CASES:
+        some = np.sort(rng.choice(len(levels), MAX_SURFACE_CASES, replace=False))
         levels, values = levels[some], values[some]
     scaled = (values - values.mean(axis=0)) / values.std(axis=0)
-    halves = [rng.permutation(len(levels)) for _ in range(HALVES)]
+    halves = [rng.permutation(len(levels)) for _ in range(N_HALF_SURFACES)]
     half = len(levels) // 2
     smooth = min(
-        SMOOTH, key=lambda one: np.median(_unexplained(levels, scaled, halves[0], half, one))
+        SMOOTHINGS, key=lambda one: np.median(_unexplained(levels, scaled, halves[0], half, one))
     )
     left = np.mean([_unexplained(levels, scaled, order, half, smooth) for order in halves], axis=0)
     first, total = _indices(levels, scaled, smooth)
@@ -153,12 +160,12 @@ def _of_draw(levels: np.ndarray, values: np.ndarray) -> list:
         ]
     )
     low, high = (
-        others.min(axis=0) - left[:, None] - CLOSE,
-        others.max(axis=0) + left[:, None] + CLOSE,
+        others.min(axis=0) - left[:, None] - INDEX_ERROR,
+        others.max(axis=0) + left[:, None] + INDEX_ERROR,
     )
     parts = [np.clip(one, 0.0, 1.0) for one in (first, total, low, high)]
     return [
-        tuple(part[k] for part in parts) if left[k] < 1 - TOLD else None
+        tuple(part[k] for part in parts) if left[k] < 1 - MIN_EXPLAINED_FRACTION else None
         for k in range(values.shape[1])
     ]
 
@@ -190,16 +197,16 @@ def _indices(levels: np.ndarray, values: np.ndarray, smooth: float) -> tuple:
         warnings.simplefilter("ignore", UserWarning)
         found = sobol_indices(
             func=lambda x: surface(x.T).T,
-            n=POINTS,
+            n=N_SOBOL_POINTS,
             dists=[uniform()] * levels.shape[1],
             rng=np.random.default_rng(1),
         )
     return tuple(np.atleast_2d(one) for one in (found.first_order, found.total_order))
 
 
-def _sorted(names: list, shares: Sequence) -> list:
+def _sort_shares(names: list, shares: Sequence) -> list:
     """Return the Share of each key, the largest total first."""
     return sorted(
-        (Share(name, *map(float, numbers)) for name, *numbers in zip(names, *shares)),
+        (SobolIndex(name, *map(float, numbers)) for name, *numbers in zip(names, *shares)),
         key=lambda one: -one.total,
     )

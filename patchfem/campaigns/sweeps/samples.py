@@ -11,7 +11,7 @@ from ...scene.axes import Axis, SampledRange
 from .cases import Cases
 
 
-def drawn(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, seed: int) -> Cases:
+def draw_cases(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, seed: int) -> Cases:
     """Draw cases from ranges and lists of values; the same seed draws the same cases.
 
     A range is sampled uniformly between its ends, or uniformly in its logarithm; the values of a
@@ -37,7 +37,7 @@ def drawn(parts: Sequence[Axis | SampledRange], count: int, sobol: bool, seed: i
         else np.random.default_rng(seed).random((count, len(parts)))
     )
     return Cases(
-        tuple(map(_picked, parts, shares.T)),
+        tuple(map(_select_values, parts, shares.T)),
         True,
         True,
     )
@@ -53,7 +53,7 @@ def _sobol(width: int, count: int, seed: int) -> np.ndarray:
         return qmc.Sobol(width, scramble=True, rng=np.random.default_rng(seed)).random(count)
 
 
-def _picked(axis: Axis | SampledRange, shares: np.ndarray) -> Axis:
+def _select_values(axis: Axis | SampledRange, shares: np.ndarray) -> Axis:
     """Return the values of a key that random numbers (n,) between 0 and 1 select."""
     if isinstance(axis, SampledRange):
         return axis.make_axis(shares.tolist())

@@ -2,7 +2,7 @@
 
 A chunk whose worker dies is repeated in halves.
 
-In: `Work`, numbers of cases and an executor of `executors/`. Out: chunk after chunk from `solved`.
+In: `Work`, numbers of cases and an executor of `executors/`. Out: chunk after chunk from `iterate_chunks`.
 """
 
 from __future__ import annotations
@@ -22,13 +22,15 @@ from ...runs import plan
 from ...runs.batch import batches
 from ...runs.batch.case_results import CaseResults
 from ...runs.batch.meshes import Shared
-from .case_models import Asked
+from .case_models import SweepScene
 from .cases import Cases
 
-TRIES = 3  # failures of a case, the last as the only case of a chunk, after which it is abandoned
+MAX_DEATHS = (
+    3  # failures of a case, the last as the only case of a chunk, after which it is abandoned
+)
 # Seconds that a chunk should take: long compared with its transfer to a worker, short compared with
 # a sweep.
-SPAN = 1.0
+CHUNK_SECONDS = 1.0
 MOST = 4096  # cases of a chunk
 LOOKED = 256  # cases from which the meshes of a sweep are chosen
 
@@ -41,7 +43,7 @@ class Work:
 
     Attributes
     ----------
-    asked : Asked
+    asked : SweepScene
     cases : Cases
     tell : callable, optional
         tell(number, model or error, CaseResults, index in them) returns what is kept of a case
@@ -57,7 +59,7 @@ class Work:
         Meshes that the cases share, chosen from all of them by `with_meshes`.
     """
 
-    asked: Asked
+    asked: SweepScene
     cases: Cases
     tell: Callable | None = None
     keep: Callable | None = None
@@ -73,7 +75,7 @@ class Died:
     reason: str
 
 
-def warmed(work: Work) -> None:
+def warm_up(work: Work) -> None:
     """Compile and import what the first case needs, although its meshes are not chosen yet.
 
     Errors are ignored, because the run of the case reports them.
@@ -86,7 +88,7 @@ def warmed(work: Work) -> None:
         return
 
 
-def answer(
+def compute_chunk(
     work: Work, numbers: Sequence[int], say: Callable | None = None
 ) -> tuple[CaseResults | None, list]:
     """Compute a chunk of cases, as a worker does.
@@ -116,20 +118,20 @@ def answer(
             for case, (number, model) in enumerate(zip(numbers, models))
         ]
     )
-    return handed(work, numbers, found, told)
+    return write_or_return(work, numbers, found, told)
 
 
-def timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple:
-    """Compute a chunk with `answer`, and return its seconds and the result.
+def compute_timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple:
+    """Compute a chunk with `compute_chunk`, and return its seconds and the result.
 
     The seconds do not include compilation, which no later case needs.
     """
     begin, made = perf_counter(), compiled.COMPILE_SECONDS[0]
-    found = answer(work, numbers, say)
+    found = compute_chunk(work, numbers, say)
     return perf_counter() - begin - (compiled.COMPILE_SECONDS[0] - made), found
 
 
-def handed(
+def write_or_return(
     work: Work, numbers: Sequence[int], found: CaseResults, told: list
 ) -> tuple[CaseResults | None, list]:
     """Return the results of a chunk, or (None, []) if `work.write` has written them."""
@@ -209,7 +211,7 @@ class Chunks:
         self.least = least
         self.left, self.suspect, self.workers = deque(numbers), deque(), max(workers, 1)
         self.deaths: dict[int, int] = {}
-        self.each = SPAN  # seconds per case, from the last chunk
+        self.each = CHUNK_SECONDS  # seconds per case, from the last chunk
 
     def take(self, idle: bool = True) -> list | None:
         """Return the next chunk; None if there is none for now.
@@ -224,7 +226,7 @@ class Chunks:
         # time.
         fair = -(-len(self.left) // (2 * self.workers))
         fair = fair if self.workers > 1 else len(self.left)
-        count = max(1, min(max(int(SPAN / max(self.each, 1e-9)), self.least), MOST, fair))
+        count = max(1, min(max(int(CHUNK_SECONDS / max(self.each, 1e-9)), self.least), MOST, fair))
         return [self.left.popleft() for _ in range(min(count, len(self.left)))]
 
     def done(self, numbers: Sequence[int], seconds: float) -> None:
@@ -234,18 +236,18 @@ class Chunks:
     def died(self, numbers: Sequence[int]) -> list:
         """Return the cases to abandon; split the other cases of a failed chunk into halves.
 
-        A case is abandoned if it was the only one of its chunk and has failed TRIES times.
+        A case is abandoned if it was the only one of its chunk and has failed MAX_DEATHS times.
         """
         for number in numbers:
             self.deaths[number] = self.deaths.get(number, 0) + 1
-        if len(numbers) == 1 and self.deaths[numbers[0]] >= TRIES:
+        if len(numbers) == 1 and self.deaths[numbers[0]] >= MAX_DEATHS:
             return list(numbers)
         half = (len(numbers) + 1) // 2
         self.suspect += [part for part in (list(numbers[:half]), list(numbers[half:])) if part]
         return []
 
 
-def solved(
+def iterate_chunks(
     work: Work, numbers: Sequence[int], executor, say: Callable | None = None
 ) -> Iterator[tuple]:
     """Compute cases chunk by chunk and return the results as they come in.
@@ -256,7 +258,7 @@ def solved(
     numbers : sequence of int
         Numbers of the cases.
     executor : object
-        Has `workers` and run(work, take, say), which yields (chunk, seconds, result of `answer` or
+        Has `workers` and run(work, take, say), which yields (chunk, seconds, result of `compute_chunk` or
         Died) of every chunk that `take` returns until it returns None. If it has begin(work, count,
         say), this is called before the meshes of all cases are chosen, and end() is called at the
         end.
@@ -288,7 +290,7 @@ def solved(
 
 
 def _handed(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
-    """Yield what `solved` yields, for the chunks that an executor has computed."""
+    """Yield what `iterate_chunks` yields, for the chunks that an executor has computed."""
     for chunk, seconds, found in done:
         if isinstance(found, Died):
             lost = chunks.died(chunk)
@@ -302,7 +304,7 @@ def _handed(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
         yield chunk, *found, seconds
 
 
-class Clock:
+class RemainingTime:
     """Estimate of the remaining time of a sweep from the chunks so far.
 
     The weight of a chunk halves with every later chunk. total: number of cases.
@@ -329,7 +331,7 @@ class Clock:
         return self.left * self.work / self.cases / self.workers if self.cases else None
 
 
-def lasting(seconds: float) -> str:
+def format_duration(seconds: float) -> str:
     """Format a time [s] in seconds, minutes or hours."""
     if seconds < 90:
         return f"{seconds:.0f} s"

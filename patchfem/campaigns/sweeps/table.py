@@ -17,11 +17,11 @@ from ...scene.axes import Axis, make_axis
 from .cases import Cases
 
 _HEAD = re.compile(r"\s*((?:[^\[\]]|\[[1-9][0-9]*\](?=\.))+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
-OUTCOME = "outcome"  # column of a sweep.csv; this column and those after it are results
+OUTCOME_COLUMN = "outcome"  # column of a sweep.csv; this column and those after it are results
 HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 
 
-def read(path: Path) -> tuple[Cases | None, list[str]]:
+def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
     """Read the cases of a file, and the mistakes in it.
 
     Returns
@@ -49,7 +49,7 @@ def read(path: Path) -> tuple[Cases | None, list[str]]:
     first = lines[0][1]
     heads = [
         _HEAD.fullmatch(cell)
-        for cell in first[: first.index(OUTCOME) if OUTCOME in first else None]
+        for cell in first[: first.index(OUTCOME_COLUMN) if OUTCOME_COLUMN in first else None]
     ]
     if not heads or not all(heads):
         return None, [

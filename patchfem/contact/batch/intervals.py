@@ -100,7 +100,7 @@ class Intervals:
 
         Returns
         -------
-        Pressed
+        ContactBatch
             `residual` shows whether a contact is a single stretch.
         """
         is_free = moment is not None
@@ -264,7 +264,7 @@ class Intervals:
 
         Parameters
         ----------
-        contacts : Pressed
+        contacts : ContactBatch
         softness : (m,) ndarray
             Compliance [m/N] of the asperity layer alone; 0 without asperities.
         row_height : float

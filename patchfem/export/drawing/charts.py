@@ -24,7 +24,7 @@ REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
 MIL = 25.4e-6
 # Samples per cycle below which a line through them does not show the motion; cycles of an envelope.
-SPARSE, BANDS = (
+MIN_SAMPLES_PER_CYCLE, MAX_ENVELOPE_CYCLES = (
     20,
     1500,
 )
@@ -37,9 +37,9 @@ WORN = {
     "relative_displacement_amplitude": "amplitude",
 }
 PROFILES = 6  # number of profiles of a patch that wears
-COHERENT = 0.5  # coherence above which H1 is drawn as known
+MIN_COHERENCE = 0.5  # coherence above which H1 is drawn as known
 # Height and largest width [px] of a frame in which both axes have the same scale.
-TALL, WIDEST = 270, 300
+FRAME_HEIGHT, MAX_FRAME_WIDTH = 270, 300
 
 
 def axis(label: str, unit: str = "", log: bool = False) -> dict:
@@ -89,7 +89,7 @@ def sampled(x, y, most: int) -> np.ndarray:
     return np.unique(np.concatenate([[0], ends, [x.size - 1]]))
 
 
-def within(made: list, room: int) -> list:
+def limit_characters(made: list, room: int) -> list:
     """Reduce lines and bands so that all charts take about `room` characters.
 
     A number takes NUMBER characters.
@@ -102,11 +102,12 @@ def within(made: list, room: int) -> list:
     if (total := NUMBER * sum(sizes)) <= room:
         return made
     return [
-        found | {"marks": [_slim(one, room / total) for one in found["marks"]]} for found in made
+        found | {"marks": [_reduce_mark(one, room / total) for one in found["marks"]]}
+        for found in made
     ]
 
 
-def _slim(one: dict, share: float) -> dict:
+def _reduce_mark(one: dict, share: float) -> dict:
     """Reduce a line or band to a fraction of its points."""
     rows = {"line": ("x", "y"), "band": ("x", "low", "high")}.get(one["kind"])
     if rows is None or np.size(one["x"]) <= FEWEST:
@@ -187,7 +188,7 @@ def faces(found: list) -> list:
     return [one for each in found for one in interface(*each)]
 
 
-def closer(x, depth, sigma, ratio: float) -> tuple:
+def contact_window(x, depth, sigma, ratio: float) -> tuple:
     """Return the part (left, right, height) [m] of both pieces that shows the contact.
 
     Its proportions are right - left = 2 height ratio.
@@ -227,7 +228,7 @@ def bodies(x, depths, mises, sigma) -> list:
         Normal stress [Pa].
     """
     depth = max(depths, key=lambda rows: rows[-1])
-    box = closer(x, depth, sigma, 1.3)
+    box = contact_window(x, depth, sigma, 1.3)
     (unit, scale), top, out = (
         choose_axis_unit(np.concatenate([np.ravel(part) for part in mises]), "Pa"),
         0.0,
@@ -244,7 +245,7 @@ def bodies(x, depths, mises, sigma) -> list:
         top = top or float(np.quantile(np.concatenate([part.ravel() for part in cells]), 0.998))
         marks = []
         for side, row, part in zip((-1, 1), rows, cells):
-            along, down, means = coarser(x[i], row, part, GRID)
+            along, down, means = reduce_grid(x[i], row, part, GRID)
             # four digits suffice, because the values are shown as colours
             values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(
                 means.shape
@@ -278,7 +279,7 @@ def worn_map(x, width: float, depth) -> list:
         choose_axis_unit(depth, "m"),
         choose_axis_unit(np.concatenate([x, edges]), "m"),
     )
-    along, over, means = coarser(x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, GRID)
+    along, over, means = reduce_grid(x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, GRID)
     values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(means.shape)
     marks = [
         mark(
@@ -301,7 +302,7 @@ def worn_map(x, width: float, depth) -> list:
     ]
 
 
-def coarser(x, depth, cells, most: int) -> tuple:
+def reduce_grid(x, depth, cells, most: int) -> tuple:
     """Reduce a grid to about `most` cells, each with the mean over its area.
 
     Parameters
@@ -332,9 +333,9 @@ def coarser(x, depth, cells, most: int) -> tuple:
 
 def _frame(ratio: float) -> list:
     """Return width and height [px] of a frame with this ratio of both."""
-    return (
-        [round(TALL * ratio), TALL] if TALL * ratio <= WIDEST else [WIDEST, round(WIDEST / ratio)]
-    )
+    if FRAME_HEIGHT * ratio <= MAX_FRAME_WIDTH:
+        return [round(FRAME_HEIGHT * ratio), FRAME_HEIGHT]
+    return [MAX_FRAME_WIDTH, round(MAX_FRAME_WIDTH / ratio)]
 
 
 def loop(slide, force, title: str, measured: tuple | None = None) -> list:
@@ -385,7 +386,7 @@ def envelope(time, value, period: float) -> tuple:
     period : float
         [s]
     """
-    many = int(np.ceil(max(1.0, (time[-1] - time[0]) / period / BANDS)))
+    many = int(np.ceil(max(1.0, (time[-1] - time[0]) / period / MAX_ENVELOPE_CYCLES)))
     number = np.floor(time / (many * period) + 1e-9).astype(int)
     count = number[-1] + 1
     low, high = np.full(count, np.inf), np.full(count, -np.inf)
@@ -396,10 +397,10 @@ def envelope(time, value, period: float) -> tuple:
     return (np.arange(count) + 0.5) * many * period, low, high
 
 
-def whole_from(time, period: float, window_start: float) -> float:
+def first_complete_time(time, period: float, window_start: float) -> float:
     """Return the time [s] after which the stored samples show the motion itself.
 
-    Every later cycle has at least SPARSE samples. The last window is always stored completely, so
+    Every later cycle has at least MIN_SAMPLES_PER_CYCLE samples. The last window is always stored completely, so
     the time is never after its start.
 
     Parameters
@@ -412,7 +413,7 @@ def whole_from(time, period: float, window_start: float) -> float:
         Start of the last window [s].
     """
     counts = np.bincount(np.floor(time / period + 1e-9).astype(int))[:-1]
-    thin = np.flatnonzero(counts < SPARSE)
+    thin = np.flatnonzero(counts < MIN_SAMPLES_PER_CYCLE)
     return min((thin[-1] + 1) * period, window_start) if thin.size else float(time[0])
 
 
@@ -444,7 +445,11 @@ def histories(
         choose_axis_unit(history["time"], "s"),
     )
     unit, scale = choose_axis_unit(value, "m")
-    begin = whole_from(time, period, window["time"][0] if window else 0.0) if period else time[0]
+    begin = (
+        first_complete_time(time, period, window["time"][0] if window else 0.0)
+        if period
+        else time[0]
+    )
     late, marks = time >= begin, []
     if joined and not late.all():
         early = slice(0, int(np.argmax(late)) + 1)
@@ -559,7 +564,7 @@ def measured(rows: list, frequency: float, level: float, acceleration, displacem
     return out
 
 
-def spans(curve: dict) -> list:
+def regime_stretches(curve: dict) -> list:
     """Return stretches [(regime, first, last + 1)] of neighbouring points with the same regime.
 
     curve: a curve of steady motions.
@@ -569,7 +574,7 @@ def spans(curve: dict) -> list:
     return [(str(regime[a]), int(a), int(b)) for a, b in pairwise(edges)]
 
 
-def axis_of(curve: dict) -> tuple:
+def curve_axis(curve: dict) -> tuple:
     """Return the horizontal axis of a curve: its values, their name and unit."""
     if np.ptp(curve["frequency"]) > 0:
         return np.asarray(curve["frequency"]), "drive frequency", "Hz"
@@ -591,7 +596,7 @@ def regime(steady: dict | None) -> str:
 
 def caption(found: dict) -> str:
     """Return the caption of a curve of steady motions: content, regimes, folds and gaps."""
-    what, parts = axis_of(found)[1], [regime for regime, _, _ in spans(found)]
+    what, parts = curve_axis(found)[1], [regime for regime, _, _ in regime_stretches(found)]
     count, folds = np.asarray(found["amplitude"]).size, len(found.get("folds", ()))
     text = f"Half the peak-to-peak steady motion at the output against the {what}, {count} points; "
     text += "colour and line style show the regime: " + ", ".join(dict.fromkeys(parts)) + "."
@@ -608,9 +613,9 @@ def curve(found: dict) -> list:
     They show the amplitude, with the regime as colour and line style and with the folds, and the
     largest acceleration with its first harmonic.
     """
-    along, what, unit = axis_of(found)
+    along, what, unit = curve_axis(found)
     name, scale = choose_axis_unit(found["amplitude"], "m")
-    value, parts = np.asarray(found["amplitude"]) * scale, spans(found)
+    value, parts = np.asarray(found["amplitude"]) * scale, regime_stretches(found)
     colours = dict(zip(dict.fromkeys(part[0] for part in parts), COLOURS * 9))
     lost = np.concatenate([[False], ~np.isfinite(value), [False]]).astype(int)
     marks = [
@@ -693,7 +698,7 @@ def spectra(found, frequency: float | None) -> list:
             ],
         )
     )
-    gain, told = np.abs(found.gain) * G_N, found.coherence >= COHERENT
+    gain, told = np.abs(found.gain) * G_N, found.coherence >= MIN_COHERENCE
     unit, scale = choose_axis_unit([gain.max(initial=0.0)], "m")
     marks = [
         _above(hertz, gain * scale, "soft"),

@@ -17,17 +17,19 @@ import matplotlib
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ..fields.series import Frame, Series, moving
+from ..fields.series import Frame, Series, last_consecutive_frames
 from .flat import LOOK, Picture
-from .panels import near, panels, rounded, slide_of
+from .panels import contact_window, panels, round_factor, slide_of
 
 ENDINGS = (".gif", ".mp4")
 FRAME_SIZE = (12.0, 6.8)  # width and height of a frame [inch]
 DPI = 100  # pixels per inch; with FRAME_SIZE an even number of pixels, which video formats require
 BIT_RATE = 4000  # of a video [kbit/s]
 SLIDE = 0.03  # largest slide as drawn / length of the pieces
-LASTS = 2.4  # duration of a cycle [s], unless LEAST or MOST limits it
-LEAST, MOST = 0.04, 0.3  # shortest and longest duration of a frame [s]
+CYCLE_SECONDS = (
+    2.4  # duration of a cycle [s], unless MIN_FRAME_SECONDS or MAX_FRAME_SECONDS limits it
+)
+MIN_FRAME_SECONDS, MAX_FRAME_SECONDS = 0.04, 0.3  # shortest and longest duration of a frame [s]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +71,9 @@ class Film:
     @property
     def seconds(self) -> float:
         """Duration of a frame [s]."""
-        return float(np.clip(LASTS / len(self.numbers), LEAST, MOST))
+        return float(
+            np.clip(CYCLE_SECONDS / len(self.numbers), MIN_FRAME_SECONDS, MAX_FRAME_SECONDS)
+        )
 
     def panels(self, frame: Frame) -> tuple:
         """Return the panels of a frame, with the windows and colours of the film."""
@@ -84,7 +88,7 @@ class Film:
         )
 
 
-def film_of(series: Series, magnify: float | None = None) -> Film:
+def make_film(series: Series, magnify: float | None = None) -> Film:
     """Return what the frames of the last cycle of a series have in common.
 
     Parameters
@@ -99,7 +103,7 @@ def film_of(series: Series, magnify: float | None = None) -> Film:
     PatchfemError
         If there is only one frame.
     """
-    numbers = moving(series.times)
+    numbers = last_consecutive_frames(series.times)
     if len(numbers) < 2:
         raise PatchfemError(
             f"{series.path}: contains only one frame, so there is no motion to show; write a picture "
@@ -109,7 +113,7 @@ def film_of(series: Series, magnify: float | None = None) -> Film:
     for number in numbers:
         one = series.frame(number)
         seen.append(panels(one, magnify))
-        windows.append(near(one))
+        windows.append(contact_window(one))
         slides.append(abs(slide_of(one)) * 1e3)
         line = one.interface()
         for name in reach.keys() & one.point_data.keys():
@@ -121,7 +125,7 @@ def film_of(series: Series, magnify: float | None = None) -> Film:
     close = (*_hull(windows)[:2], *windows[0][2:])
     left, right = np.array([pair[0].window for pair in seen])[:, :2].T
     length = float((right - left).max())
-    aside = rounded(SLIDE * length / max(slides)) if max(slides) > 0 else 1.0
+    aside = round_factor(SLIDE * length / max(slides)) if max(slides) > 0 else 1.0
     both = [value for values in reach.values() for value in values]
     film = Film(
         numbers,
@@ -149,7 +153,7 @@ def _hull(windows: list) -> tuple:
     return (float(low[0]), float(high[1]), float(low[2]), float(high[3]))
 
 
-def shoot(series: Series, head: str, magnify: float | None, out: Path) -> str:
+def write_film(series: Series, head: str, magnify: float | None, out: Path) -> str:
     """Write the film of a series in the format that the suffix of `out` names.
 
     Parameters
@@ -174,7 +178,7 @@ def shoot(series: Series, head: str, magnify: float | None, out: Path) -> str:
     Missing
         ffmpeg is not installed or cannot write the file.
     """
-    film, picture = film_of(series, magnify), None
+    film, picture = make_film(series, magnify), None
     with matplotlib.rc_context(LOOK | {"savefig.bbox": None, "savefig.dpi": "figure"}):
         writer = _writer_of(out, film.seconds)
         for number in film.numbers:

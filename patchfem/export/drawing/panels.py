@@ -7,13 +7,13 @@ import numpy as np
 from ...formatting import choose_axis_unit
 from ..fields.series import Frame
 
-SHOWN = 0.995  # fraction of the area of a panel whose stresses the colours distinguish
+COLOURED_AREA = 0.995  # fraction of the area of a panel whose stresses the colours distinguish
 # Ratio of that stress to the largest one, above which the colours cover the whole range.
-CLIPPED = 0.8
+MIN_PEAK_RATIO = 0.8
 # Fraction of the largest motion that is round-off: fields are stored in single precision, and a
 # slide is a difference.
 ROUND_OFF = 1e-5
-VISIBLE = 0.05  # Largest motion or gap as drawn / height of a panel.
+DRAWN_MOTION_FRACTION = 0.05  # Largest motion or gap as drawn / height of a panel.
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -90,7 +90,7 @@ def panels(
         Factor of the motion, for both panels or for each; by default one that makes it visible, for
         each.
     close : tuple, optional
-        Window of the second panel [mm]; by default that of `near`.
+        Window of the second panel [mm]; by default that of `contact_window`.
     aside : float
         Factor of the slide of the upper piece as a whole.
 
@@ -98,14 +98,14 @@ def panels(
     -------
     tuple of Panel
     """
-    motion = moved(frame), slide_of(frame), aside
+    motion = drawn_displacement(frame), slide_of(frame), aside
     used = np.unique(
         np.concatenate([block.ravel() for part in (0, 1) for block in frame.cells(part)])
     )
     x, y = frame.points[used, :2].T * 1e3
     whole = (x.min(), x.max(), y.min(), y.max())
     factors = magnify if isinstance(magnify, tuple) else (magnify, magnify)
-    windows = (whole, near(frame) if close is None else close)
+    windows = (whole, contact_window(frame) if close is None else close)
     inside = [_inside(frame, window) for window in windows]
     mises, area = frame.cell_data["von_mises"], areas(frame)
     # Panels side by side have the same scale.
@@ -116,7 +116,7 @@ def panels(
 def _inside(frame: Frame, window: tuple) -> np.ndarray:
     """Return which cells (cells,) bool of a window have a stress."""
     left, right, bottom, top = window
-    x, y = middles(frame).T
+    x, y = cell_centres(frame).T
     return (
         (x >= left)
         & (x <= right)
@@ -131,8 +131,8 @@ def _limit(mises, area) -> float:
 
     It is the largest stress, unless this is a peak in a corner.
     """
-    largest, most = float(mises.max(initial=0.0)), float(_exceeded(mises, area, SHOWN))
-    return most if most < CLIPPED * largest else largest
+    largest, most = float(mises.max(initial=0.0)), float(_exceeded(mises, area, COLOURED_AREA))
+    return most if most < MIN_PEAK_RATIO * largest else largest
 
 
 def _panel(
@@ -160,7 +160,9 @@ def _panel(
     mine = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
     if magnify is None:
         largest = np.abs(move[mine, 1]).max(initial=0.0) * 1e3
-        magnify = rounded(VISIBLE * (top - bottom) / largest) if largest > 0 else 0.0
+        magnify = (
+            round_factor(DRAWN_MOTION_FRACTION * (top - bottom) / largest) if largest > 0 else 0.0
+        )
     largest = float(frame.cell_data["von_mises"][here].max(initial=0.0))
     whole = np.zeros_like(move)
     whole[upper_points(frame), 0] = slide
@@ -227,7 +229,7 @@ def slides(points, moves) -> np.ndarray:
     return np.where(np.abs(slide) > ROUND_OFF * np.abs(moves).max(axis=(1, 2)), slide, 0.0)
 
 
-def moved(frame: Frame) -> np.ndarray:
+def drawn_displacement(frame: Frame) -> np.ndarray:
     """Return the displacement (N, 2) [m] as drawn.
 
     For the upper piece it includes the shape of its surface, decreasing towards its far face, so
@@ -236,13 +238,13 @@ def moved(frame: Frame) -> np.ndarray:
     move = frame.points[:, :2] * 0 + frame.point_data["displacement"][:, :2]
     line, upper = frame.interface(), upper_points(frame)
     surface = move[line, 1] + frame.point_data["gap"][line]
-    move[upper, 1] += shape(
+    move[upper, 1] += surface_shape_motion(
         frame.points[upper], move[None, upper, 1], frame.points[line, 0], surface[None]
     )[0]
     return move
 
 
-def shape(points, up, x, surface) -> np.ndarray:
+def surface_shape_motion(points, up, x, surface) -> np.ndarray:
     """Return what the shape of its surface adds to the motion (f, n) [m] of an upper piece.
 
     Parameters
@@ -266,7 +268,7 @@ def shape(points, up, x, surface) -> np.ndarray:
     return np.array(added) * (1 - points[:, 1] / height)
 
 
-def rounded(factor: float, least: float = 1.0) -> float:
+def round_factor(factor: float, least: float = 1.0) -> float:
     """Return a factor > 0 rounded down to 1, 2 or 5 times a power of ten, but at least `least`."""
     if factor < least:
         return least
@@ -274,7 +276,7 @@ def rounded(factor: float, least: float = 1.0) -> float:
     return float(power * max(step for step in (1, 2, 5) if step * power <= factor * (1 + 1e-9)))
 
 
-def near(frame: Frame) -> tuple:
+def contact_window(frame: Frame) -> tuple:
     """Return a window [mm] around the contact; for a long contact, around its largest pressure."""
     line = frame.interface()
     x, sigma = frame.points[line, 0] * 1e3, frame.point_data["normal_stress"][line]
@@ -291,7 +293,7 @@ def near(frame: Frame) -> tuple:
     return (left, right, -0.3 * (right - left), 0.3 * (right - left))
 
 
-def middles(frame: Frame) -> np.ndarray:
+def cell_centres(frame: Frame) -> np.ndarray:
     """Return the centres (cells, 2) [mm] of the cells of a frame, and of the interface segments."""
     sums = np.add.reduceat(frame.points[frame.connectivity, :2], frame.offsets[:-1])
     return sums / np.diff(frame.offsets)[:, None] * 1e3

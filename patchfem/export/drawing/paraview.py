@@ -15,8 +15,8 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_text
 from ..fields.series import Frame, Series
 from ..fields.vtu import frames_beside, write_pvd
-from .film import Film, film_of
-from .panels import moved, slide_of, upper_points
+from .film import Film, make_film
+from .panels import drawn_displacement, slide_of, upper_points
 
 MPA = 1e-6
 # Fraction of the cells whose stress the colours of a component cover; the others are peaks in
@@ -168,7 +168,7 @@ def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
     out = Path(out)
     fields = out.with_suffix(".pvd")
     with Series(folder) as series:
-        film = film_of(series)
+        film = make_film(series)
         text = script(out, film, of, _ends(series, film, of), status)
         write_pvd(fields, series, film.numbers, lambda frame: with_motion(frame, of))
         write_text(out, text)
@@ -233,7 +233,7 @@ def with_motion(frame: Frame, of: str = "von_mises") -> Frame:
     """
     slide = np.zeros((len(frame.points), 3))
     slide[upper_points(frame), 0] = slide_of(frame)
-    motion = np.column_stack([moved(frame), np.zeros(len(slide))]) - slide
+    motion = np.column_stack([drawn_displacement(frame), np.zeros(len(slide))]) - slide
     blocks, first = {}, 0
     for name, block in frame.blocks.items():
         mine = slice(first, first + len(block.points))

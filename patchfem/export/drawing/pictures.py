@@ -27,12 +27,12 @@ STYLE = {
 }
 COLOURS = {"accent": BLUE, "warm": ORANGE, "soft": GREY}  # colours of a chart by name
 SHAPES = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^"}
-TALL = 3.6  # height of a chart [inch]
+HEIGHT = 3.6  # height of a chart [inch]
 # Ratio of the ends of a logarithmic axis up to which three numbers per decade fit.
 MAX_PLAIN_RATIO = 1e3
 
 
-def drawing(columns: int = 1, height: float = 3.2, onto=None, **layout):
+def make_figure(columns: int = 1, height: float = 3.2, onto=None, **layout):
     """Return a figure of the width of the page, and its axes side by side.
 
     Parameters
@@ -79,7 +79,7 @@ def _svg(figure) -> str:
     return re.sub(r"\s*<metadata>.*?</metadata>", "", body[body.index("<svg") :], flags=re.DOTALL)
 
 
-def styled(draw):
+def returns_svg(draw):
     """Turn a function that draws a Figure into one that returns its SVG text.
 
     The attribute `figure` of the result returns the Figure itself, which a notebook shows as the
@@ -107,8 +107,8 @@ def styled(draw):
     return svg
 
 
-@styled
-def draw(made: list, onto=None, height: float = TALL):
+@returns_svg
+def draw_charts(made: list, onto=None, height: float = HEIGHT):
     """Draw charts, as `charts` describes them, side by side.
 
     Parameters
@@ -119,7 +119,7 @@ def draw(made: list, onto=None, height: float = TALL):
     height : float
         [inch]
     """
-    figure, axes = drawing(len(made), height, onto)
+    figure, axes = make_figure(len(made), height, onto)
     for axis, one in zip(axes, made):
         for mark in one["marks"]:
             MARKS[mark["kind"]](axis, mark)

@@ -5,7 +5,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import UNIT_LADDERS, choose_axis_unit, format_number, format_quantity
 from ...runs.results.patch_rows import minimum_of
-from ..tolerance_misses import over
+from ..tolerance_misses import is_over_tolerance
 from ..written import label
 from . import charts
 
@@ -46,7 +46,7 @@ def sweep_chart(dataset, measure: str) -> dict:
         .values.reshape(-1, along.size)
         for part, name in names.items()
     }
-    hollow = over(table, dataset.attrs.get("tolerance", np.nan))
+    hollow = is_over_tolerance(table, dataset.attrs.get("tolerance", np.nan))
     values, errors = table["values"], np.nan_to_num(table["errors"])
     unit, scale = _axis_unit(values, dataset[measure].attrs.get("units", "1"))
     below = np.fmin(errors, np.fmax(values - minimum_of(measure), 0.0))

@@ -89,7 +89,7 @@ def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> 
     film.check_ffmpeg(out)
     with Series(folder) as series:
         with write_atomically(out) as partial:
-            said = film.shoot(series, series.path.parent.resolve().name, magnify, partial)
+            said = film.write_film(series, series.path.parent.resolve().name, magnify, partial)
     print(f"{out}: {said}")
 
 

@@ -22,7 +22,7 @@ from ...elasticity.recovery import (
 )
 from ...runs.results.result import surface_of
 from .blocks import blocks_of
-from .strength import beyond_yield
+from .strength import find_yielding
 from .vtkhdf import write_series
 
 UNITS = {
@@ -43,12 +43,14 @@ UNITS = {
 
 # Error that rounding may add, as a fraction of the estimated error of the stress: sqrt(1 + 1/16) is
 # 3 % more.
-SHARE = 0.25
-TOGETHER = 8  # frames that are processed together
-FINEST = 2.0**-10  # rounding step / largest value; such a step is invisible in any colour scale
+ROUNDING_FRACTION = 0.25
+FRAMES_PER_PASS = 8  # frames that are processed together
+MIN_STEP_FRACTION = (
+    2.0**-10
+)  # rounding step / largest value; such a step is invisible in any colour scale
 # Rounding step / largest displacement of a piece in its holder, whose discretisation error is about
 # 1e-4.
-DEFORMED = 2.0**-14
+DISPLACEMENT_STEP_FRACTION = 2.0**-14
 
 
 def write_fields(result, path: Path) -> dict:
@@ -73,7 +75,7 @@ def write_fields(result, path: Path) -> dict:
     for one, other in ((low, high), (high, low)):
         one["stress_error"] = one["error"].relative_error(other["error"])[0]
     notes = result.extra.setdefault("notes", [])
-    inside = beyond_yield(result.plan.model.patch, {"lower": low, "upper": high})
+    inside = find_yielding(result.plan.model.patch, {"lower": low, "upper": high})
     faces = result.extra.get("yielding_faces", {})
     notes[:] = [text for text in notes if text not in faces.values()]
     notes += [text for text in (faces | inside).values() if text not in notes]
@@ -135,7 +137,7 @@ def _motions(patch, loads: list) -> list:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Inside:
+class _PieceFields:
     """Mesh of a piece and what computes its fields; equal pieces share it.
 
     Attributes
@@ -161,7 +163,7 @@ class _Inside:
     found: Recovery
 
 
-def _inside(piece, grid) -> _Inside:
+def _inside(piece, grid) -> _PieceFields:
     """Return mesh, stress and recovery of a piece."""
     cells = get_cells(piece)
     if isinstance(piece, Piece):
@@ -172,7 +174,7 @@ def _inside(piece, grid) -> _Inside:
         )
     else:
         points, blocks, interface = grid.points, list(cells.blocks), grid.interface
-    return _Inside(
+    return _PieceFields(
         points,
         blocks,
         interface,
@@ -183,7 +185,7 @@ def _inside(piece, grid) -> _Inside:
     )
 
 
-def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
+def _body(patch, fields: dict, x, side: str, inside: _PieceFields, u) -> dict:
     """Return the fields of a piece for the file: mesh, displacement and stress in all frames.
 
     y points away from the interface.
@@ -210,8 +212,8 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
         }.items()
     }
     errors, largest = [], 0.0
-    for first in range(0, frames, TOGETHER):
-        some = slice(first, first + TOGETHER)
+    for first in range(0, frames, FRAMES_PER_PASS):
+        some = slice(first, first + FRAMES_PER_PASS)
         motion = u[:1] + u[1:][some]
         stress = inside.stress(motion)
         errors.append(estimate_error(inside.found, motion, stress, inside.rules))
@@ -219,7 +221,9 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
         out["stress"][some] = stress * [1.0, 1.0, 1.0, sign]
         largest = max(largest, float(np.abs(motion).max()))
         out["displacement"][some] = (
-            motion * [1.0, sign] if lower else motion + _rigid(patch, fields, inside.points, some)
+            motion * [1.0, sign]
+            if lower
+            else motion + _holder_motion(patch, fields, inside.points, some)
         )
     error = StressError(
         *(np.concatenate([getattr(one, name) for one in errors]) for name in ("error", "energy"))
@@ -233,8 +237,8 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
         bond["shear_bond"] *= -sign
     blocks = [block if not lower else block[:, ::-1] for block in inside.blocks]
     finest = min(
-        choose_rounding_step(inside.found, error, inside.rules, SHARE),
-        FINEST * float(out["mises"].max(initial=0.0)),
+        choose_rounding_step(inside.found, error, inside.rules, ROUNDING_FRACTION),
+        MIN_STEP_FRACTION * float(out["mises"].max(initial=0.0)),
     )
     return out | {
         "points": inside.points * [1.0, sign],
@@ -243,11 +247,15 @@ def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
         "material": cells.is_coating,
         "error": error,
         "bond": bond,
-        "steps": {"stress": finest, "von_mises": finest, "displacement": DEFORMED * largest},
+        "steps": {
+            "stress": finest,
+            "von_mises": finest,
+            "displacement": DISPLACEMENT_STEP_FRACTION * largest,
+        },
     }
 
 
-def _rigid(patch, fields: dict, points, some: slice) -> np.ndarray:
+def _holder_motion(patch, fields: dict, points, some: slice) -> np.ndarray:
     """Return the motion (f, n, 2) [m] of the upper holder at points (n, 2) [m] in some frames."""
     same = np.ones((len(fields["time"][some]), 1))
     rotation, closing, slide = (

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ..read_results import HUGE, numeric, readable, wanted
+from ..read_results import MAX_NUMBER, is_real, reading_errors, require
 from .blocks import NAMES, PARTS, Block, joined
 from .vtkhdf import NAME
 
@@ -15,26 +15,26 @@ TAILS = {"displacement": (3,), "stress": (6,)}  # shape of arrays with several v
 BODY = {"PointData": ("displacement",), "CellData": ("material", "stress", "von_mises")}
 LINE = {"PointData": ("displacement", "gap", "normal_stress"), "CellData": ()}
 # Arrays that a reader needs.
-LEAST = {
+REQUIRED_ARRAYS = {
     "lower": BODY,
     "upper": BODY,
     "interface": LINE,
     "strips": {"PointData": (), "CellData": ()},
 }
-MOST = 4  # largest number of nodes of a cell
+MAX_CELL_NODES = 4  # largest number of nodes of a cell
 # Ratio to the usual step between frames; a longer step separates the pressed state from the last
 # cycle.
-APART = 3.0
+MIN_STEP_RATIO = 3.0
 
 
-def moving(times) -> tuple:
+def last_consecutive_frames(times) -> tuple:
     """Return the numbers of consecutive frames up to the last of the times (f,) [s].
 
     For a rig they are the frames of its last cycle, without the pressed state long before it; for a
     bench all frames of its slide.
     """
     steps = np.diff(times)
-    apart = np.flatnonzero(steps > APART * np.median(steps)) if steps.size else steps
+    apart = np.flatnonzero(steps > MIN_STEP_RATIO * np.median(steps)) if steps.size else steps
     return tuple(range(int(apart[-1]) + 1 if apart.size else 0, len(times)))
 
 
@@ -108,7 +108,7 @@ class Series:
         except OSError as error:
             raise PatchfemError(f"{path}: not a readable HDF5 file ({error})") from None
         try:
-            with readable(path, "fields of a patchfem run, frame by frame"):
+            with reading_errors(path, "fields of a patchfem run, frame by frame"):
                 self._open()
         except PatchfemError:
             self.file.close()
@@ -122,10 +122,10 @@ class Series:
                 f"{self.path}: written by an older version of patchfem; run the scene again"
             )
         self.times = self.root["Steps/Values"][:]
-        wanted(
+        require(
             self.times.ndim == 1
             and self.times.size
-            and numeric(self.times)
+            and is_real(self.times)
             and np.isfinite(self.times).all(),
             "Steps/Values are not valid times",
         )
@@ -141,15 +141,15 @@ class Series:
             group[one][:] for one in ("Points", "Connectivity", "Offsets", "Types")
         )
         # the comparison is False for NaN
-        wanted(
+        require(
             points.ndim == 2
             and points.shape[1] == 3
             and len(points)
-            and numeric(points)
-            and np.abs(points).max() < HUGE,
+            and is_real(points)
+            and np.abs(points).max() < MAX_NUMBER,
             f"{name}/Points are not valid positions",
         )
-        wanted(
+        require(
             all(
                 one.ndim == 1 and one.size and one.dtype.kind in "iu"
                 for one in (nodes, ends, types)
@@ -157,26 +157,26 @@ class Series:
             f"{name}: the numbers that define the cells are not whole",
         )
         sizes = np.diff(ends.astype(np.int64))
-        wanted(
+        require(
             len(sizes) == len(types)
             and ends[0] == 0
             and ends[-1] == len(nodes)
             and sizes.min() >= 2
-            and sizes.max() <= MOST
+            and sizes.max() <= MAX_CELL_NODES
             and nodes.min() >= 0
             and nodes.max() < len(points),
             f"{name}: the cells refer to points that are not in the file",
         )
         for kind, size in ("PointData", len(points)), ("CellData", len(types)):
-            lacks = sorted(set(LEAST[name][kind]) - set(group[kind]))
-            wanted(not lacks, f"{name}/{kind} lacks {', '.join(lacks)}")
+            lacks = sorted(set(REQUIRED_ARRAYS[name][kind]) - set(group[kind]))
+            require(not lacks, f"{name}/{kind} lacks {', '.join(lacks)}")
             for one, rows in group[kind].items():
                 first = group[f"Steps/{kind}Offsets/{one}"][:]
-                wanted(
+                require(
                     rows.dtype.kind in "iuf" and rows.shape[1:] == TAILS.get(one, ()),
                     f"{name}/{kind}/{one} contains {rows.ndim}-dimensional {rows.dtype}",
                 )
-                wanted(
+                require(
                     first.shape == self.times.shape
                     and first.dtype.kind in "iu"
                     and first.min() >= 0
@@ -204,7 +204,7 @@ class Series:
                 f"--frame: there is no frame {number}; {self.path} has frames 0 to {count - 1}"
             )
         number %= count
-        with readable(self.path, f"frame {number}"):
+        with reading_errors(self.path, f"frame {number}"):
             blocks = {name: self._block(self.root[name], number) for name in self.parts}
         one = joined(blocks)
         return Frame(

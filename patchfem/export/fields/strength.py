@@ -10,10 +10,10 @@ from ...runs.patch.strength import NEGLECTED, Strength, strength_of
 
 # Fraction of the height of a piece near its fixed far face, where stress increases as elements
 # shrink (test_strength).
-HELD = 0.2
+FIXED_REGION_FRACTION = 0.2
 
 
-def beyond_yield(asked, bodies: dict) -> dict:
+def find_yielding(asked, bodies: dict) -> dict:
     """Find the materials whose von Mises stress exceeds their yield strength anywhere.
 
     The region near the fixed far face is left out, because the stress in its corners is unbounded
@@ -35,7 +35,9 @@ def beyond_yield(asked, bodies: dict) -> dict:
     for side, body in bodies.items():
         piece = getattr(asked.pieces, side)
         middle = np.concatenate([body["points"][block].mean(axis=1) for block in body["blocks"]])
-        free = np.abs(middle[:, 1]) < (1 - HELD) * np.abs(body["points"][:, 1]).max()
+        free = (
+            np.abs(middle[:, 1]) < (1 - FIXED_REGION_FRACTION) * np.abs(body["points"][:, 1]).max()
+        )
         for coated, kind in (
             (False, piece.substrate),
             (True, piece.coating.material if piece.coating else None),

@@ -8,10 +8,10 @@ VTK 9.6 and 9.7 stay at the first time unless there is a group `Steps` next to t
 takes any such group for a block. Therefore `Steps` is also a complete but empty mesh that is not
 part of the assembly.
 
-The varying arrays of a series with more than PACKED bytes are compressed, component by component.
+The varying arrays of a series with more than MIN_COMPRESSED_BYTES bytes are compressed, component by component.
 Their numbers are rounded, to a multiple of a step or to a number of bits, and every array states
 the effect: at most `rounding_error` in its unit, or the fraction 2^-(significant_bits + 1) of each
-value. A series of more than LARGE bytes is written frame after frame: what a killed process leaves
+value. A series of more than MIN_FRAMEWISE_BYTES bytes is written frame after frame: what a killed process leaves
 (`.fields.*.vtkhdf`) contains every frame that `NSteps` counts.
 """
 
@@ -29,8 +29,12 @@ from .blocks import CODES, MEANINGS, Block
 NAME = "fields.vtkhdf"
 # version of the format; later versions add nothing that is used here
 VERSION = np.array([2, 2], np.int64)
-PACKED = 1 << 22  # bytes of all arrays: the shipped rig keeps 2.8 of 9.6 MB, which takes .06 s more
-LARGE = 1 << 28  # bytes of all arrays above which frames are written one after the other
+MIN_COMPRESSED_BYTES = (
+    1 << 22
+)  # bytes of all arrays: the shipped rig keeps 2.8 of 9.6 MB, which takes .06 s more
+MIN_FRAMEWISE_BYTES = (
+    1 << 28
+)  # bytes of all arrays above which frames are written one after the other
 # Bits of 23 after the leading one that are kept; the estimated error is accurate to some 10 %.
 BITS = {"stress_error": 5}
 # Bits of every other array without a step: 3e-5 of a value, far below the discretisation error.
@@ -65,8 +69,8 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
         for data in (one.point_data, one.cell_data)
         for values in data.values()
     )
-    large, later = size > LARGE, []
-    packed = large or size > PACKED
+    large, later = size > MIN_FRAMEWISE_BYTES, []
+    packed = large or size > MIN_COMPRESSED_BYTES
     with (
         write_atomically(path, None if large else size) as partial,
         open_lossy(partial) as kept,
@@ -107,11 +111,11 @@ def _frames(file, steps: list, later: list, count: int) -> None:
     """
     times = [one["Values"][:] for one in steps]
     for number in range(count):
-        _counted(steps, times, number)
+        _set_frame_count(steps, times, number)
         for one in later:
             _frame(*one, number)
         file.flush()
-    _counted(steps, times, count)
+    _set_frame_count(steps, times, count)
 
 
 def _frame(dataset, values, nearest, number: int) -> None:
@@ -140,7 +144,7 @@ def _frame(dataset, values, nearest, number: int) -> None:
             )
 
 
-def _counted(steps: list, times: list, count: int) -> None:
+def _set_frame_count(steps: list, times: list, count: int) -> None:
     """Set the number of frames that count."""
     for one, all_times in zip(steps, times):
         one.attrs["NSteps"] = np.int64(count)
@@ -148,7 +152,7 @@ def _counted(steps: list, times: list, count: int) -> None:
         one["Values"][...] = all_times[:count]
 
 
-def rounded(values, bits: int) -> np.ndarray:
+def round_to_bits(values, bits: int) -> np.ndarray:
     """Return float32 values rounded to a number of bits after the leading one.
 
     The other bits are zeros, which compress well.
@@ -165,7 +169,7 @@ def rounded(values, bits: int) -> np.ndarray:
     return np.where(np.isfinite(values), near.view(np.float32), values)
 
 
-def stepped(values, step: float) -> np.ndarray:
+def round_to_step(values, step: float) -> np.ndarray:
     """Return float32 values rounded to the nearest multiple of `step`, a power of two.
 
     The error is at most half a step. Infinities, NaN and values too large to have fractions of a
@@ -190,10 +194,10 @@ def _nearest(dataset, step: float, bits: int):
     """
     if not 1e-30 < step < 1e30:
         dataset.attrs["significant_bits"] = bits
-        return partial(rounded, bits=bits)
+        return partial(round_to_bits, bits=bits)
     step = 2.0 ** math.floor(math.log2(step))
     dataset.attrs["rounding_error"] = step / 2
-    return partial(stepped, step=step)
+    return partial(round_to_step, step=step)
 
 
 def _group(parent, name: str):

@@ -59,7 +59,7 @@ def write_fit(files: FitFiles, folder: Folder) -> None:
         write_rows(folder.path / "fit.csv", files.rows)
     picture = ""
     if files.charts:
-        picture = pictures.draw(files.charts)
+        picture = pictures.draw_charts(files.charts)
         write_text(folder.path / "fit.svg", picture)
     text = page(
         files.answer,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from ..pages.document import Section, document, figure, prose, table, warned
+from ..pages.document import Section, document, figure, sentence_html, table, warning_box
 from .text import format_fitted, named_values
 
 FILES = {
@@ -64,8 +64,8 @@ def _verdict(answer: dict, values: dict, summary: Sequence) -> str:
     has_intervals = any(value.get("interval") for value in values.values())
     brackets = " Brackets enclose 95 % intervals." if has_intervals else ""
     return (
-        f"<div class=verdict><b>{law}{short}</b><p>{prose(sentence)}.{brackets}</p></div>"
-        f"{warned(answer['warnings'])}"
+        f"<div class=verdict><b>{law}{short}</b><p>{sentence_html(sentence)}.{brackets}</p></div>"
+        f"{warning_box(answer['warnings'])}"
     )
 
 

@@ -10,9 +10,9 @@ from ...campaigns.fits.loop_path import LoopOptions
 from ...campaigns.fits.patch import fit_patch, read_slides
 from ...campaigns.fits.problem import parse_ranges
 from ...campaigns.fits.wear import fit_wear
-from ...campaigns.rows.asked import Question
+from ...campaigns.rows.asked import FitRequest
 from ...campaigns.rows.fit import RowsOptions, fit_rows
-from ...campaigns.rows.search import UNSTABLE, Search
+from ...campaigns.rows.search import UNSTABLE, SearchSettings
 from ...core import PatchfemError
 from ...model.model import build
 from ...scene import axes
@@ -204,7 +204,7 @@ def _fit_rows(
     )
     kept = Starts(folder.path / STARTS, question, options.resume)
     starts = options.starts or DEFAULT_ROW_STARTS
-    how = Search(starts, options.seed, options.unstable, kept)
+    how = SearchSettings(starts, options.seed, options.unstable, kept)
     asked = RowsOptions(options.hold, options.leave_out, options.placebo, how)
-    fitted = fit_rows(Question(scene, wanted, path), asked, listener.say, listener.progress)
+    fitted = fit_rows(FitRequest(scene, wanted, path), asked, listener.say, listener.progress)
     return describe_rows_fit(fitted, folder.target)

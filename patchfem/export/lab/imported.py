@@ -44,7 +44,7 @@ class Estimate(NamedTuple):
     begin: str = ""
 
 
-def imported(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estimate) -> dict:
+def convert_file(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estimate) -> dict:
     """Write the records (.csv), modes (.toml) or response (.uff) of a file.
 
     Parameters

@@ -11,7 +11,7 @@ from ...core import Missing, PatchfemError
 from ...inputs.cells import TableFormat
 from ...inputs.columns import read_columns
 from ...inputs.units import FORCE_UNITS, SLIDE_UNITS
-from ..read_results import numeric, variables
+from ..read_results import is_real, variables
 
 # Names of slide and resistance; the first pair that a folder has counts.
 LOOPS = (
@@ -95,10 +95,10 @@ def _of_run(path: Path) -> Histories:
     """Read the histories of a run."""
     about, found = variables(path)
     title = str(about.get("title", ""))
-    arrays = {name: (one.values, one.unit) for name, one in found.items() if numeric(one.values)}
+    arrays = {name: (one.values, one.unit) for name, one in found.items() if is_real(one.values)}
     columns = []
     for name, (dims, values, unit) in found.items():
-        if "time" not in dims or name == "time" or not numeric(values):
+        if "time" not in dims or name == "time" or not is_real(values):
             continue
         if len(dims) == 1:
             columns.append(Column(name, unit, values.astype(float), 0))

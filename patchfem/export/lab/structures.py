@@ -27,9 +27,9 @@ from ...scene.rules import methods
 
 ENDINGS = (".mat", ".npz")
 # Smallest / largest singular value of the slides, below which they depend on one another.
-DEPEND = 1e-6
+DEPENDENCE_TOL = 1e-6
 # Features that matrices can describe if friction is a function of the speed only.
-OF_SPEED = methods.EngineSupport("", "no-law faces levels")
+SPEED_LAW_SUPPORT = methods.EngineSupport("", "no-law faces levels")
 NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 
 
@@ -127,7 +127,9 @@ def matrices_of(model: Model) -> dict:
     """
     rig, modes = model.rig, model.rig.modes
     turn, mass = (
-        _motions(modes.interfaces if rig.friction.interfaces else np.zeros((0, modes.omega.size))),
+        _coordinate_basis(
+            modes.interfaces if rig.friction.interfaces else np.zeros((0, modes.omega.size))
+        ),
         modes.mass,
     )
     sine = isinstance(rig.drive.signal, SineDrive)
@@ -157,7 +159,7 @@ def matrices_of(model: Model) -> dict:
     }
 
 
-def _motions(slides) -> np.ndarray:
+def _coordinate_basis(slides) -> np.ndarray:
     """Return the modal coordinates (n, n) of the written coordinates, for slides (i, n)."""
     i, n = slides.shape
     if not i or i > n:
@@ -165,12 +167,12 @@ def _motions(slides) -> np.ndarray:
     left, size, right = np.linalg.svd(slides)
     return (
         np.hstack([right[:i].T / size @ left.T, right[i:].T])
-        if size[-1] > DEPEND * size[0]
+        if size[-1] > DEPENDENCE_TOL * size[0]
         else np.eye(n)
     )
 
 
-def _speeds(rig) -> bool:
+def _is_speed_only(rig) -> bool:
     """Return whether the friction depends only on the speed."""
     return all(one.numbers.law == "tanh" for one in rig.friction.interfaces)
 
@@ -179,8 +181,8 @@ def _refuse(model: Model) -> None:
     """Raise PatchfemError for features that neither matrices nor friction elements have."""
     rig = model.rig
     motion = engines.motion_of(model, steady=True)
-    if _speeds(rig):
-        why = methods.find_first_unsupported(OF_SPEED, motion)
+    if _is_speed_only(rig):
+        why = methods.find_first_unsupported(SPEED_LAW_SUPPORT, motion)
     else:
         why = engines.PIECES.lacks(model, steady=True)
     if why.startswith("for law"):
@@ -204,10 +206,10 @@ def elements_of(model: Model) -> Elements:
     if not rig.friction.interfaces:
         return Elements("elements", np.zeros((0, n)), none, none, none)
     rows, laws = (
-        rig.modes.interfaces @ _motions(rig.modes.interfaces),
+        rig.modes.interfaces @ _coordinate_basis(rig.modes.interfaces),
         [one.numbers for one in rig.friction.interfaces],
     )
-    if _speeds(rig):
+    if _is_speed_only(rig):
         limit = np.array(
             [
                 law.static * (model.nominal_load if one.load is None else one.load)

@@ -13,7 +13,7 @@ from . import library
 
 DIGITS = 9  # digits of the numbers in a page: a figure shows four, a value under the pointer seven
 NUMBER = f"%.{DIGITS}g,"
-OLD = (
+OLD_BROWSER_NOTE = (
     "The pictures of this page are packed, and this browser cannot unpack them: it has no DecompressionStream, "
     "which browsers have had since 2023. Texts and tables are complete."
 )
@@ -22,7 +22,7 @@ NOT_FINITE = re.compile("nan|-?inf")
 QUOTED = re.compile(r"`([^`\s](?:[^`\n]*[^`\s])?)`")
 # Colours of `drawing.pictures`, and the colours of the page that replace them in the light and the
 # dark theme.
-INKS = {
+PAGE_COLOURS = {
     "#ffffff": "paper",
     "#000000": "ink",
     "#4d4d4d": "ink",
@@ -73,21 +73,21 @@ def document(
     )
     drawn = ""
     if scripts:
-        lead = f"<p id=old class='verdict warn' hidden>{OLD}</p>{lead}"
+        lead = f"<p id=old class='verdict warn' hidden>{OLD_BROWSER_NOTE}</p>{lead}"
         drawn = (
-            f"<script type=text/plain id=library>{library.bokeh()}</script>\n<script type=text/plain id=data>"
-            f"{library.packed(encoded(data or {}))}</script>\n"
+            f"<script type=text/plain id=library>{library.packed_bokeh()}</script>\n<script type=text/plain id=data>"
+            f"{library.pack_text(to_json(data or {}))}</script>\n"
             + "".join(
-                f"<script type=text/plain class=own>{library.inert(library.own(name))}</script>\n"
+                f"<script type=text/plain class=own>{library.escape_script(library.read_file(name))}</script>\n"
                 for name in scripts
             )
-            + f"<script>{library.own('unpack.js')}</script>\n"
+            + f"<script>{library.read_file('unpack.js')}</script>\n"
         )
     return (
         f"<!doctype html><html lang=en><head><meta charset=utf-8>"
         f"<meta name=viewport content='width=device-width, initial-scale=1'><title>{escape(title)}</title>"
-        f"<style>{library.own('page.css')}</style></head><body>\n"
-        f"<header><h1>{breakable(title)}</h1>{lead}</header>\n{contents}<main>\n{body}\n</main>\n{drawn}</body></html>\n"
+        f"<style>{library.read_file('page.css')}</style></head><body>\n"
+        f"<header><h1>{with_line_breaks(title)}</h1>{lead}</header>\n{contents}<main>\n{body}\n</main>\n{drawn}</body></html>\n"
     )
 
 
@@ -135,19 +135,19 @@ def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = ""
     )
 
 
-def prose(text: str) -> str:
+def sentence_html(text: str) -> str:
     """Return a sentence as HTML, in which text between two backquotes is marked as code."""
     return QUOTED.sub(r"<code>\1</code>", escape(text))
 
 
-def breakable(text: str) -> str:
+def with_line_breaks(text: str) -> str:
     """Return a text as HTML in which the names of keys may break after a dot."""
     return re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z])", ".<wbr>", escape(text))
 
 
-def warned(texts: Sequence, heading: str = "") -> str:
+def warning_box(texts: Sequence, heading: str = "") -> str:
     """Return warnings as an HTML box under a heading; "" if there are none."""
-    told = "".join(f"<p>{prose(text)}</p>" for text in texts)
+    told = "".join(f"<p>{sentence_html(text)}</p>" for text in texts)
     return told and f"<div class='verdict warn'>{heading and f'<b>{heading}</b>'}{told}</div>"
 
 
@@ -172,13 +172,13 @@ def figure(number: int | str, svg: str, caption: str, alternative: str) -> str:
     svg = re.sub(r'(url\(|href=")#', rf"\1#f{number}", svg)
     svg = re.sub(
         r"(?<=: )#[0-9a-f]{6}\b",
-        lambda one: f"var(--{INKS[one[0]]})" if one[0] in INKS else one[0],
+        lambda one: f"var(--{PAGE_COLOURS[one[0]]})" if one[0] in PAGE_COLOURS else one[0],
         svg,
     )
-    return f"<figure>{svg}<figcaption>{prose(caption)}</figcaption></figure>"
+    return f"<figure>{svg}<figcaption>{sentence_html(caption)}</figcaption></figure>"
 
 
-def encoded(value) -> str:
+def to_json(value) -> str:
     """Return JSON of arrays, numbers, strings and containers of them.
 
     Numbers have DIGITS digits, and null stands for those that are not finite.
@@ -186,7 +186,7 @@ def encoded(value) -> str:
     if isinstance(value, dict):
         return (
             "{"
-            + ",".join(f"{json.dumps(str(key))}:{encoded(one)}" for key, one in value.items())
+            + ",".join(f"{json.dumps(str(key))}:{to_json(one)}" for key, one in value.items())
             + "}"
         )
     if isinstance(value, np.ndarray):
@@ -199,7 +199,7 @@ def encoded(value) -> str:
             return f"[{(text if all(map(math.isfinite, value)) else NOT_FINITE.sub('null', text))[:-1]}]"
         if kinds <= {str, bool, int}:
             return json.dumps(value, separators=(",", ":"))
-        return "[" + ",".join(map(encoded, value)) + "]"
+        return "[" + ",".join(map(to_json, value)) + "]"
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float):

@@ -8,20 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .document import encoded
+from .document import to_json
 
 # Bytes of the data that are drawn; packed with the library, a page then stays below 1.5 MB.
-ROOM = 1_200_000
+MAX_BYTES = 1_200_000
 # cases that are always drawn; cases from which the bytes per case are measured
-FEWEST, LOOKED = 64, 32
+MIN_CASES, N_SAMPLED = 64, 32
 # Digits of a value and of an error in a page that does not draw all cases.
-SHORT, BAR = (
+VALUE_DIGITS, ERROR_DIGITS = (
     7,
     3,
 )
 
 
-class Drawn(NamedTuple):
+class DrawnCases(NamedTuple):
     """Cases that a page draws.
 
     cases: their numbers; said: a sentence that says which they are, "" for all.
@@ -31,7 +31,7 @@ class Drawn(NamedTuple):
     said: str = ""
 
 
-def drawn(table: dict, data) -> Drawn:
+def select_cases(table: dict, data) -> DrawnCases:
     """Choose the cases of a sweep that its page draws.
 
     Parameters
@@ -42,27 +42,27 @@ def drawn(table: dict, data) -> Drawn:
         data(cases, whole) returns what the scripts would draw of some cases, with all digits or not.
     """
     number = len(table["outcome"])
-    some = _evenly(number, LOOKED)
-    if number * len(encoded(data(some, True))) <= ROOM * some.size:
-        return Drawn(np.arange(number))
-    most = max(FEWEST, int(ROOM * some.size / len(encoded(data(some, False)))))
+    some = _evenly_spaced(number, N_SAMPLED)
+    if number * len(to_json(data(some, True))) <= MAX_BYTES * some.size:
+        return DrawnCases(np.arange(number))
+    most = max(MIN_CASES, int(MAX_BYTES * some.size / len(to_json(data(some, False)))))
     if most >= number:
-        return Drawn(np.arange(number))
-    return _of_rows(table, most)
+        return DrawnCases(np.arange(number))
+    return _select_rows(table, most)
 
 
-def _of_rows(table: dict, most: int) -> Drawn:
+def _select_rows(table: dict, most: int) -> DrawnCases:
     """Select evenly spaced cases, the extremes of measures and keys, and one of each outcome."""
     number = len(table["outcome"])
     ends = {
         case
         for one in (*table["measures"].values(), *table["keys"])
-        for case in _ends(one["values"])
+        for case in _extreme_cases(one["values"])
     }
     kinds = np.unique(np.asarray(table["outcome"], str), return_index=True)[1]
     ends = np.array(sorted({*ends, *kinds.tolist()}), int)
-    cases = np.union1d(_evenly(number, max(most - ends.size, FEWEST)), ends)
-    return Drawn(
+    cases = np.union1d(_evenly_spaced(number, max(most - ends.size, MIN_CASES)), ends)
+    return DrawnCases(
         cases,
         f"{cases.size} of {number} cases are drawn: evenly spaced cases, and the cases with the "
         "largest or "
@@ -70,7 +70,7 @@ def _of_rows(table: dict, most: int) -> Drawn:
     )
 
 
-def _evenly(number: int, most: int) -> np.ndarray:
+def _evenly_spaced(number: int, most: int) -> np.ndarray:
     """Return at most `most` of `number` indices, evenly spaced and including both ends."""
     return (
         np.arange(number)
@@ -79,7 +79,7 @@ def _evenly(number: int, most: int) -> np.ndarray:
     )
 
 
-def _ends(values) -> list:
+def _extreme_cases(values) -> list:
     """Return the indices of the smallest and largest of values (n,); [] if none is finite."""
     values = np.asarray(values, float)
     return (

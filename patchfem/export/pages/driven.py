@@ -16,7 +16,7 @@ PLAIN = {
 }
 
 
-def size(text) -> str:
+def format_resolved(text) -> str:
     """Write a quantity of a resolved scene, such as `49.03325 m/s^2`, in a usual unit: `5 g`."""
     value, _, unit = str(text).partition(" ")
     name, scale = (
@@ -29,7 +29,7 @@ def size(text) -> str:
     return f"{float(value) * scale:.4g} {name}".strip()
 
 
-def driven(resolved: dict) -> str:
+def describe_drive(resolved: dict) -> str:
     """Describe the drive of a run in a phrase; "" without a drive.
 
     resolved: the scene with all defaults, as nested tables.
@@ -43,15 +43,17 @@ def _drive(keys: dict) -> str:
     """Describe the drive by the phrase of its waveform."""
     if keys["kind"] == "free":
         start = (
-            f" released {size(keys['displacement'])} from rest" if "displacement" in keys else ""
+            f" released {format_resolved(keys['displacement'])} from rest"
+            if "displacement" in keys
+            else ""
         )
         return f"free motion{start}"
     waveform = WAVEFORMS[keys.get("waveform", SINE_WAVEFORM.name)]
     values = _drive_values(keys)
     try:
-        return waveform.phrase.format_map(values) or _in_general(waveform.name, values)
+        return waveform.phrase.format_map(values) or _describe_by_level(waveform.name, values)
     except KeyError:  # the scene does not set a key that the phrase needs
-        return _in_general(waveform.name, values)
+        return _describe_by_level(waveform.name, values)
 
 
 def _drive_values(keys: dict) -> dict:
@@ -67,8 +69,8 @@ def _drive_values(keys: dict) -> dict:
     if "levels" in keys:
         values |= {
             "count": len(keys["levels"]),
-            "first": size(keys["levels"][0]),
-            "last": size(keys["levels"][-1]),
+            "first": format_resolved(keys["levels"][0]),
+            "last": format_resolved(keys["levels"][-1]),
         }
     if "file" in keys or "spectrum" in keys:
         density = (
@@ -87,11 +89,15 @@ def _text_of(key: str, value) -> str:
     if key == "file":
         return Path(value).name
     if isinstance(value, (list, tuple)):
-        return " and ".join(size(part) for part in value)
-    return size(value) if isinstance(value, str) and value[:1] in "+-.0123456789" else str(value)
+        return " and ".join(format_resolved(part) for part in value)
+    return (
+        format_resolved(value)
+        if isinstance(value, str) and value[:1] in "+-.0123456789"
+        else str(value)
+    )
 
 
-def _in_general(name: str, values: dict) -> str:
+def _describe_by_level(name: str, values: dict) -> str:
     """Describe a drive by its size and frequency, if the scene sets them, and by its waveform."""
     level = f" of {values['level']}" if "level" in values else ""
     frequency = f" at {values['frequency']}" if "frequency" in values else ""
@@ -104,21 +110,25 @@ def _slide(keys: dict) -> str:
     if kind == "file":
         return f"the slide of {Path(keys['file']).name}"
     if kind == "sine":
-        return f"a sine slide of ±{size(keys['amplitude'])} at {size(keys['frequency'])}"
+        return f"a sine slide of ±{format_resolved(keys['amplitude'])} at {format_resolved(keys['frequency'])}"
     if kind == "triangle":
-        return f"a triangle slide of ±{size(keys['amplitude'])} at {size(keys['speed'])}"
-    held = f", held for {size(keys['hold'])}" if kind == "dwell" and "hold" in keys else ""
-    return f"a slide of {size(keys['distance'])} at {size(keys['speed'])}{held}"
+        return f"a triangle slide of ±{format_resolved(keys['amplitude'])} at {format_resolved(keys['speed'])}"
+    held = (
+        f", held for {format_resolved(keys['hold'])}" if kind == "dwell" and "hold" in keys else ""
+    )
+    return (
+        f"a slide of {format_resolved(keys['distance'])} at {format_resolved(keys['speed'])}{held}"
+    )
 
 
-def changed(sets: tuple) -> str:
+def list_changed_keys(sets: tuple) -> str:
     """List the keys that were changed with --set; sets: `key=value` strings as given."""
     return shorten(
         ", ".join(f"{key} = {value}" for key, _, value in (one.partition("=") for one in sets)), 160
     )
 
 
-def command(path: Path, sets: tuple) -> str:
+def run_command(path: Path, sets: tuple) -> str:
     """Return the command that repeats a run in the folder of its scene.
 
     sets: `key=value` strings as given; files are named without their folder.

@@ -10,23 +10,23 @@ from ...core import Outcome
 from ...formatting import format_number
 from ...runs.batch.case_results import FAILED
 from .. import tolerance_misses
-from ..written import NUMBER, brief, label
+from ..written import NUMBER, label, shorten
 from . import limits, peaks, ranked
 from .key_lines import varies
 from .limits import Limits
-from .sentences import both, joined, zero_below
+from .sentences import format_pair, join_sentences, zero_below
 
 # relative error up to which no error is stated, because values are shown with four digits
-EXACT = 1e-6
-AT = 1e-9  # relative difference up to which two frequencies are equal
-NONE = MappingProxyType({})
-SETTLED = ranked.SETTLES
+MIN_STATED_ERROR = 1e-6
+EQUAL_FREQUENCY_TOL = 1e-9  # relative difference up to which two frequencies are equal
+EMPTY = MappingProxyType({})
+SETTLED = ranked.FINAL_OUTCOMES
 # Outcomes of cases that still change when their run ends.
-MOVING = (
+CHANGING_OUTCOMES = (
     Outcome.TRANSIENT.value,
     Outcome.GROWS.value,
 )
-FIRST = (
+MAIN_MEASURES = (
     "relative_displacement_amplitude",
     "loop_area",
     "friction_ratio_peak",
@@ -78,13 +78,13 @@ class SweepHeadline(NamedTuple):
     ----------
     said : Sentences
     missed : dict
-        Cases over the tolerance, from `tolerance_misses.counted`.
+        Cases over the tolerance, from `tolerance_misses.count_over_tolerance`.
     limits : limits.Limits
         Limits of the key.
     ranks, spread : dict
         From `ranked.ranks_of` and `ranked.quantiles`.
     peaks : Sequence
-        From `peaks.found`.
+        From `peaks.find_peaks`.
     asked : str
         Measure of `--of`.
     """
@@ -123,9 +123,9 @@ class SweepHeadline(NamedTuple):
         results scatter, or the range of the main measure. Brackets contain what qualifies it: cases
         without a result, unsettled or over the tolerance.
         """
-        text = joined(self._answer_parts())
+        text = join_sentences(self._answer_parts())
         misses = self.said.misses if self.missed else ""
-        notes = joined([note for note in (self.said.left, misses, self.said.ends) if note])
+        notes = join_sentences([note for note in (self.said.left, misses, self.said.ends) if note])
         if not text or not notes:
             return text or notes or self.said.misses
         first = notes[0].lower() if notes[1].islower() else notes[0]
@@ -147,7 +147,7 @@ class SweepHeadline(NamedTuple):
         return [one for one in (said.unsettled, *first) if one]
 
 
-def lead_of(table: dict) -> SweepHeadline:
+def summarise_sweep(table: dict) -> SweepHeadline:
     """Summarise a sweep; table: as for `sweep.page`."""
     measures, tolerance = table["measures"], table.get("tolerance", np.nan)
     values = columns(table)
@@ -169,15 +169,19 @@ def lead_of(table: dict) -> SweepHeadline:
     def where(case: int) -> str:
         """Return the values of the keys in a case as text."""
         return ", ".join(
-            f"{key['name']} {brief(str(key['texts'][case]))}"
+            f"{key['name']} {shorten(str(key['texts'][case]))}"
             for key in keys
             if varies(key) or len(keys) == 1
         )
 
-    found_peaks = peaks.found(keys, values, trusted, table["grid"])
+    found_peaks = peaks.find_peaks(keys, values, trusted, table["grid"])
     keys_ranked = ranked.rank_keys(table, trusted, settled)
     span_of_measure = span(
-        values, trusted, settled, ranked.asked_first(FIRST, table), _floors(measures, tolerance)
+        values,
+        trusted,
+        settled,
+        ranked.asked_first(MAIN_MEASURES, table),
+        _floors(measures, tolerance),
     )
     unsettled = _unsettled(values, outcome)
     asked = table.get("first", "")
@@ -188,15 +192,15 @@ def lead_of(table: dict) -> SweepHeadline:
         scatter=keys_ranked.scatter,
         span=span_of_measure,
         misses=tolerance_misses.sentence(measures, tolerance, where, asked),
-        left=_left(table, outcome, keys_ranked.rank == ranked.too_few(table, settled)),
+        left=_qualifications(table, outcome, keys_ranked.rank == ranked.too_few(table, settled)),
         ends=_peaks_at_ends(table),
         unsettled=unsettled,
     )
     if table.get("drawn"):
         said = said._replace(
-            span=joined([one for one in (unsettled, span_of_measure) if one]), unsettled=""
+            span=join_sentences([one for one in (unsettled, span_of_measure) if one]), unsettled=""
         )
-    over = tolerance_misses.counted(measures, tolerance)
+    over = tolerance_misses.count_over_tolerance(measures, tolerance)
     return SweepHeadline(
         said, over, key_limits, keys_ranked.shares, keys_ranked.quantiles, found_peaks, asked
     )
@@ -211,7 +215,7 @@ def _trusted(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.nda
     needs_no_settling = (
         name.endswith("_steady") or not np.isfinite(measure["values"])[settled].any()
     )
-    return ~tolerance_misses.over(measure, tolerance) & (settled | needs_no_settling)
+    return ~tolerance_misses.is_over_tolerance(measure, tolerance) & (settled | needs_no_settling)
 
 
 def _floors(measures: dict, tolerance) -> dict:
@@ -219,7 +223,9 @@ def _floors(measures: dict, tolerance) -> dict:
 
     The floor is given as text.
     """
-    by_floor = {name: tolerance_misses.by_floor(one, tolerance) for name, one in measures.items()}
+    by_floor = {
+        name: tolerance_misses.is_within_by_floor(one, tolerance) for name, one in measures.items()
+    }
     return {
         name: (cases, tolerance_misses.floor_of(measures[name], cases))
         for name, cases in by_floor.items()
@@ -236,18 +242,18 @@ def _unsettled(measures: dict, outcome: np.ndarray) -> str:
         {name: (values (n,), errors (n,), SI unit)}, NaN if a case has no value.
     outcome : (n,) ndarray
     """
-    name = FIRST[0]
+    name = MAIN_MEASURES[0]
     if name not in measures:
         return ""
     values, unit = np.asarray(measures[name][0], float), measures[name][2]
     known = np.isfinite(values)
-    late = values[known & np.isin(outcome, MOVING)]
+    late = values[known & np.isin(outcome, CHANGING_OUTCOMES)]
     settled = values[known & np.isin(outcome, SETTLED)]
     if not late.size or not settled.size or late.max() <= settled.max():
         return ""
-    low, high = both(name, late.min(), late.max(), unit, 4)
+    low, high = format_pair(name, late.min(), late.max(), unit, 4)
     extent = high if low == high else f"{low} to {high}"
-    count = int(np.isin(outcome, MOVING).sum())
+    count = int(np.isin(outcome, CHANGING_OUTCOMES).sum())
     return (
         f"{count} of {outcome.size} cases did not settle; their {label(name)} at the end of "
         f"the run is {extent}."
@@ -261,8 +267,10 @@ def _peaks_at_ends(table: dict) -> str:
         return ""
     values = np.asarray(measures[name][0], float)
     ends = table.get("ends", ())
-    at_end = np.any([np.isclose(values, end, rtol=AT, atol=0) for end in ends], axis=0)
-    at_end &= np.asarray(measures[FIRST[0]][0], float) > zero_below(FIRST[0])
+    at_end = np.any(
+        [np.isclose(values, end, rtol=EQUAL_FREQUENCY_TOL, atol=0) for end in ends], axis=0
+    )
+    at_end &= np.asarray(measures[MAIN_MEASURES[0]][0], float) > zero_below(MAIN_MEASURES[0])
     count, total = int(at_end.sum()), int(np.isfinite(values).sum())
     where = f"In {count} of {total} cases" if total > 1 else "In this case"
     return (
@@ -272,7 +280,7 @@ def _peaks_at_ends(table: dict) -> str:
     )
 
 
-def _left(table: dict, outcome: np.ndarray, known: bool) -> str:
+def _qualifications(table: dict, outcome: np.ndarray, known: bool) -> str:
     """State what qualifies the whole summary; "" if nothing does.
 
     This is how many cases of an interrupted sweep have no result, that no case has settled, and
@@ -303,15 +311,15 @@ def _left(table: dict, outcome: np.ndarray, known: bool) -> str:
         said.append(
             f"No case has a value of {label(first)}, so this answer describes other measures."
         )
-    return joined(said)
+    return join_sentences(said)
 
 
 def span(
     measures: dict,
     trusted: dict,
     settled: np.ndarray,
-    names: Sequence = FIRST,
-    least: Mapping = NONE,
+    names: Sequence = MAIN_MEASURES,
+    least: Mapping = EMPTY,
 ) -> str:
     """State the range of the first measure that any case has, and the errors of its values.
 
@@ -325,7 +333,7 @@ def span(
     names : sequence of str
         Measures, the most important first.
     least : mapping
-        {name: (`tolerance_misses.by_floor`, the floor as text)} of measures that meet the tolerance
+        {name: (`tolerance_misses.is_within_by_floor`, the floor as text)} of measures that meet the tolerance
         by their floor.
 
     Returns
@@ -344,7 +352,7 @@ def span(
             part if isinstance(part, str) else np.asarray(part, float)[there]
             for part in measures[name]
         )
-        low, high = both(name, values.min(), values.max(), unit, 4)
+        low, high = format_pair(name, values.min(), values.max(), unit, 4)
         alike = there.sum() > 1  # a single case has no range
         ran = (
             f"ranges from {low} to {high}"
@@ -357,7 +365,7 @@ def span(
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))
         known &= ~least[name][0][there] if name in least else True
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
-        bands = [f"{format_number(100 * share, 1)} %"] * (share > EXACT)
+        bands = [f"{format_number(100 * share, 1)} %"] * (share > MIN_STATED_ERROR)
         if name in least and least[name][0][there].any():
             bands.append(f"{least[name][1]}, the floor of this measure")
         band = f", with errors of at most {' or '.join(bands)}" if bands else ""
@@ -369,7 +377,7 @@ def span(
             if counts == ended
             else f" in the {'only case that meets' if counts == 1 else 'cases that meet'} the tolerance in this measure"
         )
-        return f"{ranked.called(name).capitalize()}{whose} {ran}{band}."
+        return f"{ranked.measure_name(name).capitalize()}{whose} {ran}{band}."
     return ""
 
 

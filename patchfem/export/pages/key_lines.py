@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..written import resolved
+from ..written import shorten_to_spacing
 
 
 def varies(key: dict) -> bool:
@@ -13,7 +13,7 @@ def varies(key: dict) -> bool:
     return any(text != texts[0] for text in texts)
 
 
-def shown_of(key: dict) -> Callable[[int], str]:
+def key_formatter(key: dict) -> Callable[[int], str]:
     """Return a function that formats the value of a key in a case.
 
     It shows enough digits to distinguish neighbouring values.
@@ -25,12 +25,12 @@ def shown_of(key: dict) -> Callable[[int], str]:
     def shown(case: int) -> str:
         """Return the value of the key in a case."""
         spacing = apart[np.searchsorted(sizes, values[case])]
-        return resolved(str(key["texts"][case]), values[case], spacing)
+        return shorten_to_spacing(str(key["texts"][case]), values[case], spacing)
 
     return shown
 
 
-def lines_of(key: dict, others: list) -> list:
+def group_cases_along_key(key: dict, others: list) -> list:
     """Return the cases of each combination of the other keys, ordered by the value of the key."""
     lines = {}
     for case in np.argsort(np.asarray(key["values"], float), kind="stable").tolist():

@@ -11,23 +11,23 @@ HERE = Path(__file__).parent
 
 
 @cache
-def bokeh() -> str:
+def packed_bokeh() -> str:
     """Return BokehJS as one packed text of JavaScript."""
-    return packed("\n".join(own(f"bokehjs/{name}") for name in FILES))
+    return pack_text("\n".join(read_file(f"bokehjs/{name}") for name in FILES))
 
 
-def packed(text: str) -> str:
+def pack_text(text: str) -> str:
     """Return a string as gzip in base64 for `unpack.js`; equal strings have equal results."""
     return b64encode(compress(text.encode(), 6, mtime=0)).decode()
 
 
 @cache
-def own(name: str) -> str:
+def read_file(name: str) -> str:
     """Return a file of this folder as text."""
     return (HERE / name).read_text(encoding="utf-8")
 
 
-def inert(text: str) -> str:
+def escape_script(text: str) -> str:
     """Return JavaScript in which no text ends the script element around it or hides its end.
 
     `</script` and `<!--` occur only in strings and regular expressions, in which a backslash has no

@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...formatting import UNIT_LADDERS, choose_unit, format_number
-from ..written import NUMBER, bare, label
+from ..written import NUMBER, label, without_unit
 from . import document
-from .key_lines import lines_of, shown_of
-from .sentences import linked, short, zero_below
+from .key_lines import group_cases_along_key, key_formatter
+from .sentences import format_measure, measure_link, zero_below
 
 # Relative change at which a measure reaches its limit; engineers call a change of 5 % negligible.
 LARGEST_CHANGE = 0.05
@@ -155,7 +155,7 @@ def limits_of_sweep(
     key = max(numbers, key=lambda key: np.unique(key["values"]).size)
     if key["name"].startswith(KEYS_WITHOUT_LIMIT):
         return Limits()
-    lines = lines_of(key, [other for other in keys if other is not key])
+    lines = group_cases_along_key(key, [other for other in keys if other is not key])
     found, lost = [], []
     for name in CHANGE_AT_LIMIT:
         values, errors = (
@@ -169,7 +169,7 @@ def limits_of_sweep(
             for line in lines
         ]
         if None not in along:
-            found.append(min(along, key=_reach))
+            found.append(min(along, key=_sort_key))
         elif name in MOTION_MEASURES:
             lost.append(name)
     limits = Limits(key, found, lost, patch=patch)
@@ -246,7 +246,7 @@ def _interpolate(low: float, high: float, part: float, by_factors: bool) -> floa
     return low + part * (high - low)
 
 
-def _reach(limit: KeyLimit) -> tuple:
+def _sort_key(limit: KeyLimit) -> tuple:
     """Return the sort key of a limit: the smallest value first.
 
     At equal values a limit between two cases comes before an open one.
@@ -285,12 +285,12 @@ def sentence(limits: Limits) -> str:
     ]
     parts = [motion] if motion else []
     parts += [
-        f"the {label(limit.name)} doubles {_place(limits, limit)}"
+        f"the {label(limit.name)} doubles {_format_position(limits, limit)}"
         for limit in reached
         if limit.change >= DOUBLING
     ]
     stiffness = [
-        _place(limits, limit, limit.name.partition("_")[0])
+        _format_position(limits, limit, limit.name.partition("_")[0])
         for limit in reached
         if limit.name in STIFFNESS_MEASURES
     ]
@@ -315,7 +315,8 @@ def _motion_sentence(limits: Limits) -> str:
     percent = f"{100 * LARGEST_CHANGE:g} %"
     *first_names, last_name = (label(limit.name) for limit in moving)
     ends = sorted(
-        (limit for limit in moving if limit.beyond is not None or not limit.covers_line), key=_reach
+        (limit for limit in moving if limit.beyond is not None or not limit.covers_line),
+        key=_sort_key,
     )
     if not ends:
         if limits.lost:
@@ -347,7 +348,7 @@ def _reached(limits: Limits, ends: list) -> str:
     soonest = min(beyond, key=lambda limit: limits.sizes()[limit.beyond])
     return (
         f"{label(soonest.name)} has changed by more than {100 * LARGEST_CHANGE:g} % at "
-        f"{shown_of(limits.key)(soonest.beyond)}"
+        f"{key_formatter(limits.key)(soonest.beyond)}"
     )
 
 
@@ -363,7 +364,7 @@ def _first_to_change(limits: Limits, ends: list) -> str:
     last = ends[-1]
     later = ""
     if last.beyond is not None and label(last.name) not in early:
-        later = f"; {label(last.name)} {_place(limits, last)}"
+        later = f"; {label(last.name)} {_format_position(limits, last)}"
     return f"first to change: {' or '.join(early)}{later}"
 
 
@@ -407,16 +408,16 @@ def _gap(limits: Limits, limit: KeyLimit) -> str:
     return f"{format_number(gap * scale, 2)} {unit} over the patch"
 
 
-def _place(limits: Limits, limit: KeyLimit, *notes: str) -> str:
+def _format_position(limits: Limits, limit: KeyLimit, *notes: str) -> str:
     """Write the position of a limit, and between which cases it lies."""
     return f"at about {_value(limits, limit)} ({'; '.join([*notes, f'between {_cases(limits, limit)}'])})"
 
 
 def _cases(limits: Limits, limit: KeyLimit) -> str:
     """Write the values of the key in the two cases around a limit: `0.1 and 0.32 mrad`."""
-    shown = shown_of(limits.key)
+    shown = key_formatter(limits.key)
     inside, beyond = shown(limit.inside), shown(limit.beyond)
-    return f"{bare(inside, beyond)} and {beyond}"
+    return f"{without_unit(inside, beyond)} and {beyond}"
 
 
 def _unit(limits: Limits) -> tuple:
@@ -430,7 +431,7 @@ def _unit(limits: Limits) -> tuple:
     resolved = [limit for limit in limits.found if limits.is_resolved(limit)]
     first = min(
         [limit for limit in resolved if limit.name in MOTION_MEASURES] or resolved,
-        key=_reach,
+        key=_sort_key,
         default=None,
     )
     value, case = (float(limits.sizes().max()), 0) if first is None else (first.value, first.inside)
@@ -472,7 +473,7 @@ def table(limits: Limits, measures: dict) -> str:
     """
     if not limits.found:
         return ""
-    shown, sizes = shown_of(limits.key), limits.sizes()
+    shown, sizes = key_formatter(limits.key), limits.sizes()
     rows = []
     for limit in limits.found:
         if limit.beyond is not None:
@@ -484,10 +485,10 @@ def table(limits: Limits, measures: dict) -> str:
                 f"not up to {shown(limit.inside)}; the cases with larger values do not show where this change is "
                 "reached"
             )
-        reference = short(limit.name, limit.reference, measures[limit.name][2], 4)
+        reference = format_measure(limit.name, limit.reference, measures[limit.name][2], 4)
         rows.append(
             [
-                linked(label(limit.name), limit.name),
+                measure_link(label(limit.name), limit.name),
                 escape(reference),
                 _percent(limit.last_change),
                 "double" if abs(limit.change) >= DOUBLING else f"{100 * LARGEST_CHANGE:g} %",

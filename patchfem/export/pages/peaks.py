@@ -11,17 +11,19 @@ import numpy as np
 from ...formatting import format_number, format_value
 from ..written import label
 from . import document
-from .key_lines import lines_of, shown_of, varies
-from .sentences import linked, zero_below
+from .key_lines import group_cases_along_key, key_formatter, varies
+from .sentences import measure_link, zero_below
 
 KEYS = ("drive.frequency",)
 HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")
-LEAST = 5  # smallest number of frequencies that show a peak
-SURE = 3.0  # error / difference between the polynomials, a safety factor
-NEWTON = 30  # Newton steps from the vertex of a parabola, or from the crossing of a straight line
+MIN_FREQUENCIES = 5  # smallest number of frequencies that show a peak
+ERROR_FACTOR = 3.0  # error / difference between the polynomials, a safety factor
+N_NEWTON_STEPS = (
+    30  # Newton steps from the vertex of a parabola, or from the crossing of a straight line
+)
 OPEN = "not resolved by these cases"
 # Error / value of a steady estimate, up to which the estimate is used as the height in a case.
-KNOWN = 0.01
+MAX_STEADY_ERROR = 0.01
 
 
 class Estimate(NamedTuple):
@@ -73,7 +75,7 @@ class Peak(NamedTuple):
     swept: SweptPeak
 
 
-def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
+def find_peaks(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
     """Find the peak of each line of cases over a swept frequency.
 
     Parameters
@@ -93,10 +95,10 @@ def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
     if key is None or name is None or (len(keys) > 1 and not grid):
         return []
     others = [one for one in keys if one is not key and varies(one)]
-    shown = {one["name"]: str if one["words"] else shown_of(one) for one in others}
+    shown = {one["name"]: str if one["words"] else key_formatter(one) for one in others}
     height, error = _heights(name, measures, trusted)
     out = []
-    for line in lines_of(key, others):
+    for line in group_cases_along_key(key, others):
         swept = _swept_peak(np.asarray(key["values"], float)[line], height[line], error[line])
         if swept is not None:
             held = ", ".join(
@@ -111,13 +113,13 @@ def _heights(name: str, measures: dict, trusted: dict) -> tuple:
     """Return the heights (n,) of a measure in the cases and their errors.
 
     For a case that did not settle it is the steady estimate, if its relative error is at most
-    KNOWN; else NaN.
+    MAX_STEADY_ERROR; else NaN.
     """
     (value, error, _), steady = measures[name], measures.get(f"{name}_steady")
     value, error = np.asarray(value, float), np.nan_to_num(np.asarray(error, float))
     if steady is None:
         return np.where(trusted[name], value, np.nan), error
-    known = np.asarray(steady[1], float) <= KNOWN * np.abs(steady[0])
+    known = np.asarray(steady[1], float) <= MAX_STEADY_ERROR * np.abs(steady[0])
     return (
         np.where(trusted[name], value, np.where(known, steady[0], np.nan)),
         np.where(trusted[name], error, np.asarray(steady[1], float)),
@@ -140,7 +142,7 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     """
     known = np.isfinite(height) & (height > 0)
     x, y = frequency[known], height[known]
-    top = int(np.argmax(y)) if y.size >= LEAST else 0
+    top = int(np.argmax(y)) if y.size >= MIN_FREQUENCIES else 0
     if not 0 < top < y.size - 1:
         return None
     if not known[np.flatnonzero(known)[top] + np.array([-1, 1])].all():
@@ -160,8 +162,8 @@ def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) ->
     # A polynomial through more cases has no peak here.
     unchecked = len(agreeing) < len(others) or not others
     peak = float(heights[0])
-    height_error = SURE * float(np.ptp(heights))
-    frequency_error = SURE * float(np.ptp(places))
+    height_error = ERROR_FACTOR * float(np.ptp(heights))
+    frequency_error = ERROR_FACTOR * float(np.ptp(places))
     if unchecked:
         height_error += peak * (1 - (y[top - 1 : top + 2] / peak).min())
         frequency_error += spacing
@@ -205,7 +207,7 @@ def _lowest(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) ->
     """
     line = np.polynomial.Polynomial.fit(square[low:high], g[low:high], high - low - 1)
     slope, bend, at = line.deriv(), line.deriv(2), 0.0
-    for _ in range(NEWTON):
+    for _ in range(N_NEWTON_STEPS):
         at = (
             float(np.clip(at - slope(at) / bend(at), square[top - 1], square[top + 1]))
             if bend(at) > 0
@@ -240,11 +242,11 @@ def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> Es
     for part in (slice(max(k - 2, 0), k + 1), slice(k - 1, k + 2)):
         if square[part].size == 3:
             curve, at = np.polynomial.Polynomial.fit(square[part], g[part], 2) - level, line
-            for _ in range(NEWTON):
+            for _ in range(N_NEWTON_STEPS):
                 at -= curve(at) / curve.deriv()(at)
             found += [at] if (at - square[k - 1]) * (at - square[k]) <= 0 else []
     at = np.sqrt(np.array([*found, line] if len(found) < 2 else found) + top**2)
-    return Estimate(float(at[0]), SURE * float(np.ptp(at)))
+    return Estimate(float(at[0]), ERROR_FACTOR * float(np.ptp(at)))
 
 
 def sentence(peaks: list) -> str:
@@ -254,12 +256,12 @@ def sentence(peaks: list) -> str:
     )
     return "; ".join(
         said
-        for said in (_known(known).rstrip("." if lost else ""), _lost(lost, bool(known)))
+        for said in (_known(known).rstrip("." if lost else ""), _unknown_peaks(lost, bool(known)))
         if said
     )
 
 
-def _lost(peaks: list, others: bool) -> str:
+def _unknown_peaks(peaks: list, others: bool) -> str:
     """State for which lines of cases the peak is not known.
 
     others: whether it is known for some.
@@ -280,21 +282,22 @@ def _known(peaks: list) -> str:
     if not peaks:
         return ""
     first, last = peaks[0], peaks[-1]
-    head = f"{label(first.name).capitalize()} peaks at {_at(first)}"
+    head = f"{label(first.name).capitalize()} peaks at {_format_frequency(first)}"
     if len(peaks) == 1:
-        return f"{head}, {_high(first)}{_width(first)}."
+        return f"{head}, {_format_height(first)}{_width(first)}."
     return (
-        f"{head} with {first.held} ({_high(first)}{_width(first)}) and at {_at(last)} with {last.held} "
-        f"({_high(last)}{_width(last)})."
+        f"{head} with {first.held} ({_format_height(first)}{_width(first)}) "
+        f"and at {_format_frequency(last)} with {last.held} "
+        f"({_format_height(last)}{_width(last)})."
     )
 
 
-def _at(one: Peak) -> str:
+def _format_frequency(one: Peak) -> str:
     """Write the frequency of a peak."""
     return f"{format_value(*one.swept.frequency, unit='Hz')} (cases lie {format_number(one.swept.case_spacing, 2)} Hz apart)"
 
 
-def _high(one: Peak) -> str:
+def _format_height(one: Peak) -> str:
     """Write the height of a peak."""
     return format_value(*one.swept.height, zero_below(one.name), one.unit)
 
@@ -312,7 +315,7 @@ def table(peaks: list) -> str:
         return ""
     rows = [[escape(one.held), *_cells(one)] for one in peaks]
     return (
-        f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve is found from a "
+        f"<p class=soft>The largest {measure_link(label(peaks[0].name), peaks[0].name)} of each curve is found from a "
         "parabola of 1/y&sup2; against f&sup2; through the case with the largest value and its two neighbours in "
         "frequency. The stated errors combine the errors of these cases with the differences between this parabola "
         "and polynomials through more cases. For an unsettled case the "
@@ -334,4 +337,4 @@ def _cells(peak: Peak) -> list:
         width = f"{OPEN}; add cases near {format_number(swept.frequency.value, 4)} Hz"
     else:
         width = "reaches beyond the swept frequencies"
-    return [format_value(*swept.frequency, unit="Hz"), _high(peak), width]
+    return [format_value(*swept.frequency, unit="Hz"), _format_height(peak), width]

@@ -12,12 +12,12 @@ import numpy as np
 
 from ...disk.atomic_write import write_text
 from ...formatting import choose_axis_unit
-from ..drawing.panels import corners, shape, slides
-from ..fields.series import Series, moving
+from ..drawing.panels import corners, slides, surface_shape_motion
+from ..fields.series import Series, last_consecutive_frames
 from ..fields.vtkhdf import NAME
 from .document import Section, document
-from .library import own
-from .thinned import spread, thinned
+from .library import read_file
+from .thinned import reduce_mesh, select_lines
 
 # Largest numbers of frames, of cells of a piece, and of positions along the interface.
 FRAMES, CELLS, PLACES = (
@@ -27,7 +27,7 @@ FRAMES, CELLS, PLACES = (
 )
 BYTES = 520_000  # bytes of all frames before they are encoded as text
 # Quantities of a cell, and whether they have a sign.
-COLOURS = (
+STRESS_COMPONENTS = (
     ("von Mises stress", False),
     ("stress along x", True),
     ("stress across the interface", True),
@@ -39,11 +39,13 @@ CURVES = (
     ("gap", "gap"),
     ("slip", "slide"),
 )
-NARROW = 0.25  # fraction of the length below which the contact fills half of what is shown
-MM = 1e3
+MAX_CONTACT_FRACTION = (
+    0.25  # fraction of the length below which the contact fills half of what is shown
+)
+MM_PER_M = 1e3
 
 
-def packed(values) -> dict:
+def pack_array(values) -> dict:
     """Return an array as {low, step, shape, data}: value = low + step * number.
 
     The numbers have 16 bits and are written in base64; 65535 stands for a value that is not finite.
@@ -66,7 +68,7 @@ def packed(values) -> dict:
     }
 
 
-def reel(folder: Path) -> dict | None:
+def player_data(folder: Path) -> dict | None:
     """Return what the player shows of the results in a folder; None if they have no fields.
 
     Returns
@@ -74,10 +76,10 @@ def reel(folder: Path) -> dict | None:
     dict or None
         Lengths in mm. times: (f,) [s]; of: number of frames in the file; pieces: lower and upper
         piece, each with points (p, 2), cells (c, 4), coated (c,), moves (f, p, 2) and colours, (f,
-        c) for each of COLOURS; slide: (f,); x: (n,); curves: of the interface, (f, n) at the
+        c) for each of STRESS_COMPONENTS; slide: (f,); x: (n,); curves: of the interface, (f, n) at the
         positions x; status: (f, n), 0 open, 1 sticks, 2 slips, if it is known.
     """
-    return _reel(folder) if (Path(folder) / NAME).is_file() else None
+    return _read_frames(folder) if (Path(folder) / NAME).is_file() else None
 
 
 def write_page(folder: Path, out: Path) -> str:
@@ -85,7 +87,7 @@ def write_page(folder: Path, out: Path) -> str:
 
     Missing if the results have no fields.
     """
-    film = _reel(folder)
+    film = _read_frames(folder)
     write_text(
         out,
         document(
@@ -99,10 +101,10 @@ def write_page(folder: Path, out: Path) -> str:
     return f"{out}: {len(film['times'])} frames"
 
 
-def _reel(folder: Path) -> dict:
+def _read_frames(folder: Path) -> dict:
     """Read the sampled frames of a results folder."""
     with Series(folder) as series:
-        cycle = np.array(moving(series.times))
+        cycle = np.array(last_consecutive_frames(series.times))
         numbers = cycle[
             np.linspace(0, cycle.size - 1, min(FRAMES, cycle.size)).round().astype(int)
         ].tolist()
@@ -114,10 +116,10 @@ def _reel(folder: Path) -> dict:
             if name in series.names("interface", "PointData")
         }
         near = _contact(x, line["normal_stress"])
-        places = spread(x, min(PLACES, x.size) - 1, near)
+        places = select_lines(x, min(PLACES, x.size) - 1, near)
         lower = _piece(series, "lower", numbers, most, near)
         upper = _piece(series, "upper", numbers, most, near)
-        slide = _open(upper, x, line)
+        slide = _separate_slide(upper, x, line)
         times = series.times[numbers]
     unit, scale = choose_axis_unit(
         np.concatenate([piece["colours"].ravel() for piece in (lower, upper)]), "Pa"
@@ -133,28 +135,30 @@ def _reel(folder: Path) -> dict:
         "times": times,
         "of": cycle.size,
         "first": int(np.argmax(force)) if np.any(force) else len(numbers) - 1,
-        "pieces": [_told(piece, scale) for piece in (lower, upper)],
-        "slide": slide * MM,
+        "pieces": [_pack_piece(piece, scale) for piece in (lower, upper)],
+        "slide": slide * MM_PER_M,
         "cells": [
             sum(sizes)
             for sizes in zip(
                 *((len(mesh.cells), len(mesh.order)) for mesh in (lower["mesh"], upper["mesh"]))
             )
         ],
-        "colours": [{"label": label, "signed": signed, "unit": unit} for label, signed in COLOURS],
-        "x": packed(x[places] * MM),
+        "colours": [
+            {"label": label, "signed": signed, "unit": unit} for label, signed in STRESS_COMPONENTS
+        ],
+        "x": pack_array(x[places] * MM_PER_M),
         "curves": curves,
-    } | ({"status": packed(line["status"][:, places])} if "status" in line and shear else {})
+    } | ({"status": pack_array(line["status"][:, places])} if "status" in line and shear else {})
 
 
 def _contact(x, sigma) -> tuple | None:
     """Return the range of x (n,) [m] in which some frame of sigma (f, n) has contact, widened.
 
-    The range is twice as long as the contact. None if the contact is longer than NARROW times the
+    The range is twice as long as the contact. None if the contact is longer than MAX_CONTACT_FRACTION times the
     length.
     """
     touching = x[np.any(sigma > 0, axis=0)]
-    if not touching.size or np.ptp(touching) > NARROW * np.ptp(x):
+    if not touching.size or np.ptp(touching) > MAX_CONTACT_FRACTION * np.ptp(x):
         return None
     more = np.ptp(touching) / 2 + 4 * np.ptp(x) / x.size
     return touching[0] - more, touching[-1] + more
@@ -182,7 +186,7 @@ def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | No
     points = series.points(side)[:, :2]
     cells = corners(*series.cells(side))
     coated = series.stack(side, "CellData", "material", [0])[0] > 0
-    mesh = thinned(points, cells, coated, most, near)
+    mesh = reduce_mesh(points, cells, coated, most, near)
     moves = series.stack(side, "PointData", "displacement", numbers)[..., :2].astype(float)
     stress = series.stack(side, "CellData", "stress", numbers)
     rows = np.stack(
@@ -199,31 +203,33 @@ def _piece(series: Series, side: str, numbers: list, most: int, near: tuple | No
     }
 
 
-def _open(upper: dict, x, line: dict) -> np.ndarray:
+def _separate_slide(upper: dict, x, line: dict) -> np.ndarray:
     """Separate the slide (f,) [m] of the upper piece from its moves, and add the gap to them."""
     points, moves = upper["points"], upper["moves"]
     slide = slides(points, moves)
     moves[:, :, 0] -= slide[:, None]
-    moves[:, :, 1] += shape(points, moves[:, :, 1], x, line["displacement"][..., 1] + line["gap"])
+    moves[:, :, 1] += surface_shape_motion(
+        points, moves[:, :, 1], x, line["displacement"][..., 1] + line["gap"]
+    )
     return slide
 
 
-def _told(piece: dict, scale: float) -> dict:
+def _pack_piece(piece: dict, scale: float) -> dict:
     """Return a piece as packed data, with lengths in mm and stresses times `scale`."""
     mesh = piece["mesh"]
     return {
-        "points": packed(piece["points"][mesh.nodes] * MM),
-        "cells": packed(mesh.cells),
-        "coated": packed(piece["coated"]),
-        "moves": packed(piece["moves"][:, mesh.nodes] * MM),
-        "colours": [packed(one * scale) for one in piece["colours"]],
+        "points": pack_array(piece["points"][mesh.nodes] * MM_PER_M),
+        "cells": pack_array(mesh.cells),
+        "coated": pack_array(piece["coated"]),
+        "moves": pack_array(piece["moves"][:, mesh.nodes] * MM_PER_M),
+        "colours": [pack_array(one * scale) for one in piece["colours"]],
     }
 
 
 def _curve(values, label: str, unit: str) -> dict:
     """Return a curve as packed data in a suitable unit."""
     name, scale = choose_axis_unit(values, unit)
-    return {"label": label, "unit": name, "values": packed(values * scale)}
+    return {"label": label, "unit": name, "values": pack_array(values * scale)}
 
 
 def section(film: dict) -> Section:
@@ -256,5 +262,5 @@ def section(film: dict) -> Section:
         else "."
     )
     return Section(
-        "player", "The pieces, frame by frame", own("player.html").replace("CAPTION", text)
+        "player", "The pieces, frame by frame", read_file("player.html").replace("CAPTION", text)
     )

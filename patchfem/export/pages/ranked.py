@@ -5,15 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...campaigns.sweeps.ranking import ranking
+from ...campaigns.sweeps.ranking import compute_sobol_indices
 from ...core import Outcome
 from ...formatting import choose_display_unit, format_number
 from ..written import NUMBER, label
 from . import document
-from .key_lines import shown_of, varies
-from .sentences import both, is_share, joined, linked, short
+from .key_lines import key_formatter, varies
+from .sentences import format_measure, format_pair, is_share, join_sentences, measure_link
 
-RANKED = (
+RANKED_MEASURES = (
     "relative_displacement_amplitude",
     "loop_area",
     "equivalent_damping",
@@ -26,18 +26,25 @@ RANKED = (
     "tangential_stiffness",
     "stick_fraction",
 )
-SPREAD = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "pressure_peak")
-ENDS = 0.05, 0.5, 0.95
-FEW = 20  # random cases, below which a statement on 90 % of them is not possible
+SCATTER_MEASURES = (
+    "relative_displacement_amplitude",
+    "loop_area",
+    "equivalent_damping",
+    "pressure_peak",
+)
+QUANTILE_LEVELS = 0.05, 0.5, 0.95
+MIN_RANDOM_CASES = 20  # random cases, below which a statement on 90 % of them is not possible
 # Fraction of the random cases; with fewer values, those that are missing may be the largest.
-SETTLED = 0.95
-SETTLES = "steady", "stuck", "done", "no_contact"  # outcomes of cases whose result is final
-NAMED = 3  # number of keys in the sentence
+MIN_SETTLED_FRACTION = 0.95
+FINAL_OUTCOMES = "steady", "stuck", "done", "no_contact"  # outcomes of cases whose result is final
+MAX_NAMED_KEYS = 3  # number of keys in the sentence
 # Text for a measure whose label does not say that it is a ratio.
 CALLED = {"equivalent_damping": "equivalent damping ratio"}
-PARTS = 5  # groups of the random cases by the value of a key, between which a trend is determined
+N_TREND_GROUPS = (
+    5  # groups of the random cases by the value of a key, between which a trend is determined
+)
 # Number of standard errors of a median (1.25 times that of a mean) by which two groups must differ.
-SURE = 2.5
+TREND_ERROR_FACTOR = 2.5
 
 
 class RankedKeys(NamedTuple):
@@ -84,12 +91,12 @@ def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
             f"These {count} cases do not show on which key the {label(asked)} depends most; more cases may show "
             "this."
         )
-    rank = joined([one for one in (rank, trend(table, shares, settled)) if one])
+    rank = join_sentences([one for one in (rank, describe_trend(table, shares, settled)) if one])
     few = "" if rank else too_few(table, settled)
     spread_text = ""
     if not few:
-        spread_text = scatter(
-            found, count, settled.any() and ends_unsettled, asked_first(SPREAD, table)
+        spread_text = describe_scatter(
+            found, count, settled.any() and ends_unsettled, asked_first(SCATTER_MEASURES, table)
         )
     return RankedKeys(shares, rank or few, found, spread_text)
 
@@ -100,9 +107,13 @@ def too_few(table: dict, settled: np.ndarray) -> str:
     The consequence is that no ranking is possible, or that the scatter is not known.
     """
     outcome, count = [str(one) for one in table["outcome"]], int(settled.sum())
-    if not table.get("drawn") or len(outcome) < FEW or count >= min(FEW, 0.9 * len(outcome)):
+    if (
+        not table.get("drawn")
+        or len(outcome) < MIN_RANDOM_CASES
+        or count >= min(MIN_RANDOM_CASES, 0.9 * len(outcome))
+    ):
         return ""
-    ended = {name: outcome.count(name) for name in sorted(set(outcome) - {*SETTLES, ""})}
+    ended = {name: outcome.count(name) for name in sorted(set(outcome) - {*FINAL_OUTCOMES, ""})}
     helps = [f"raise drive.cycles so that the {Outcome.TRANSIENT.value} cases settle"] * (
         "transient" in ended
     ) + ["correct what the messages of the failed cases name"] * ("failed" in ended)
@@ -127,12 +138,12 @@ def too_few(table: dict, settled: np.ndarray) -> str:
     return f"{said}{others}, so {lost}{'; ' * bool(helps)}{' and '.join(helps)}."
 
 
-def called(name: str) -> str:
+def measure_name(name: str) -> str:
     """Return the name of a measure in a sentence."""
     return CALLED.get(name, label(name))
 
 
-def trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
+def describe_trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
     """State how the first measure of random cases depends on the strongest key.
 
     It states the direction, or where along this key the largest or smallest value lies; "" if the
@@ -147,23 +158,30 @@ def trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
     settled : (n,) ndarray of bool
     """
     moving, first = [one for one in table["keys"] if varies(one)], table.get("first", "")
-    name = first if first in table["measures"] else next(iter(ranks), SPREAD[0])
+    name = first if first in table["measures"] else next(iter(ranks), SCATTER_MEASURES[0])
     strongest = ranks[name][0].key if name in ranks else ""
     key = next((one for one in moving if len(moving) == 1 or one["name"] == strongest), None)
-    if not table.get("drawn") or key is None or name not in table["measures"] or one_word(key):
+    if (
+        not table.get("drawn")
+        or key is None
+        or name not in table["measures"]
+        or has_word_values(key)
+    ):
         return ""
     values, size = (
         np.asarray(one, float) for one in (table["measures"][name]["values"], key["values"])
     )
     cases = np.flatnonzero(np.isfinite(values) & (settled | ~settled.any()))
     cases = cases[np.argsort(size[cases], kind="stable")]
-    parts = np.array_split(cases, PARTS)
-    if cases.size < FEW:
+    parts = np.array_split(cases, N_TREND_GROUPS)
+    if cases.size < MIN_RANDOM_CASES:
         return ""
     middle = np.array([np.median(values[part]) for part in parts])
     off = np.array(
         [
-            0.0 if len(moving) == 1 else SURE * 1.25 * np.std(values[part]) / np.sqrt(part.size)
+            0.0
+            if len(moving) == 1
+            else TREND_ERROR_FACTOR * 1.25 * np.std(values[part]) / np.sqrt(part.size)
             for part in parts
         ]
     )
@@ -179,7 +197,7 @@ def trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
     )
 
 
-def one_word(key: dict) -> bool:
+def has_word_values(key: dict) -> bool:
     """Return whether the values of a key are words."""
     return not any(NUMBER.match(str(text)) for text in key["texts"])
 
@@ -194,14 +212,14 @@ def _trend(
     values: np.ndarray,
     unit: str,
 ) -> str:
-    """Return the sentence of `trend`.
+    """Return the sentence of `describe_trend`.
 
     Parameters
     ----------
     name : str
         The measure.
     key : dict
-    middle, off : (PARTS,) array
+    middle, off : (N_TREND_GROUPS,) array
         Medians of the measure in groups of the cases by the value of the key, and their
         uncertainties.
     parts : list or None
@@ -213,16 +231,16 @@ def _trend(
     unit : str
         SI unit.
     """
-    shown, what = shown_of(key), called(name).capitalize()
+    shown, what = key_formatter(key), measure_name(name).capitalize()
     for word, sign in (("largest", 1), ("least", -1)):
         top = int(np.argmax(sign * middle))
         ends = [sign * (middle[top] - middle[end]) > off[top] + off[end] for end in (0, -1)]
-        if 0 < top < PARTS - 1 and all(ends):
+        if 0 < top < N_TREND_GROUPS - 1 and all(ends):
             if parts is not None:
                 part = parts[top]
                 return f"{what} is {word} between {key['name']} {shown(int(part[0]))} and {shown(int(part[-1]))}."
             best = int(cases[np.argmax(sign * values[cases])])
-            value = short(name, values[best], unit, 3)
+            value = format_measure(name, values[best], unit, 3)
             return f"{what} is {word}, {value}, at {key['name']} {shown(best)}."
     rise = middle[-1] - middle[0]
     if abs(rise) <= off[0] + off[-1] or rise == 0:
@@ -247,10 +265,10 @@ def ranks_of(table: dict) -> dict:
         fits = table.get("drawn") or (table["grid"] and np.prod(shape) == len(table["outcome"]))
         measures = {
             name: (table["measures"][name]["values"], table["measures"][name]["errors"])
-            for name in asked_first(RANKED, table)
+            for name in asked_first(RANKED_MEASURES, table)
             if name in table["measures"]
         }
-        table["ranks"] = ranking(keys, measures, shape) if fits else {}
+        table["ranks"] = compute_sobol_indices(keys, measures, shape) if fits else {}
     return table["ranks"]
 
 
@@ -290,15 +308,15 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str
         said[0] += (
             f"{' about equally' * _equal(first)} ({_shares(first)} of the variance; their intervals overlap)"
         )
-    said += [f"then on {_listed(one)} ({_shares(one)})" for one in others[: NAMED - 1]]
-    if len(others) >= NAMED:
+    said += [f"then on {_listed(one)} ({_shares(one)})" for one in others[: MAX_NAMED_KEYS - 1]]
+    if len(others) >= MAX_NAMED_KEYS:
         said.append(f"least on {_listed(others[-1])} ({_shares(others[-1])})")
     if sum(round(100 * each.total) for each in ranks[name]) > 100:
         said.append(
             "where each share includes interactions between keys, so that the shares can sum to more than "
             "100 %"
         )
-    what, said = called(name), ", ".join(said)
+    what, said = measure_name(name), ", ".join(said)
     has, is_, its = ("has", "is", "its") if left == 1 else ("have", "are", "their")
     last = f"last value{'s' * (left != 1)}"
     ended = f"{has} not settled" if moves else f"miss{'es' * (left == 1)} the tolerance"
@@ -330,8 +348,8 @@ def _equal(group: list) -> bool:
 def _listed(group: list) -> str:
     """List the keys of a group; of many keys only the first."""
     names = [one.key for one in group]
-    if len(names) > NAMED + 1:
-        names[NAMED:] = [f"{len(names) - NAMED} other keys"]
+    if len(names) > MAX_NAMED_KEYS + 1:
+        names[MAX_NAMED_KEYS:] = [f"{len(names) - MAX_NAMED_KEYS} other keys"]
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
@@ -342,7 +360,7 @@ def _shares(group: list) -> str:
     if all(map(_small, group)):
         most = max(map(_most, group))
         return f"at most {most} % each" if most else "below 1 % each"
-    if len(group) > NAMED + 1:
+    if len(group) > MAX_NAMED_KEYS + 1:
         ends = dict.fromkeys(f"{100 * one.total:.0f}" for one in (group[-1], group[0]))
         return f"{' to '.join(ends)} % each"
     *before, end = (percent(one) for one in group)
@@ -391,12 +409,14 @@ def quantiles(table: dict, trusted: dict) -> dict:
     Returns
     -------
     dict
-        By measure: unit, quantiles of ENDS [SI], number of cases, and how many of these miss the
+        By measure: unit, quantiles of QUANTILE_LEVELS [SI], number of cases, and how many of these miss the
         tolerance.
     """
-    out, settled = {}, np.isin(np.asarray(table["outcome"], str), SETTLES)
+    out, settled = {}, np.isin(np.asarray(table["outcome"], str), FINAL_OUTCOMES)
     for name in (
-        asked_first(RANKED, table) if table.get("drawn") and len(table["outcome"]) >= FEW else ()
+        asked_first(RANKED_MEASURES, table)
+        if table.get("drawn") and len(table["outcome"]) >= MIN_RANDOM_CASES
+        else ()
     ):
         one = table["measures"].get(name)
         if one is None:
@@ -406,12 +426,14 @@ def quantiles(table: dict, trusted: dict) -> dict:
             settled | trusted[name] | ~np.isfinite(values)[settled].any()
         )
         misses, values = int(np.sum(there & ~trusted[name])), values[there]
-        if values.size >= FEW and np.ptp(values) > 1e-9 * np.abs(values).max():
-            out[name] = one["unit"], np.quantile(values, ENDS), values.size, misses
+        if values.size >= MIN_RANDOM_CASES and np.ptp(values) > 1e-9 * np.abs(values).max():
+            out[name] = one["unit"], np.quantile(values, QUANTILE_LEVELS), values.size, misses
     return out
 
 
-def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -> str:
+def describe_scatter(
+    found: dict, of: int, settled: bool = True, names: tuple = SCATTER_MEASURES
+) -> str:
     """State the range in which 90 % of the random cases lie, and how many miss the tolerance.
 
     Parameters
@@ -431,7 +453,7 @@ def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -
         "" if there are no such measures.
     """
     said, most = [], max((found[name][2] for name in names if name in found), default=0)
-    if most and most < SETTLED * of:
+    if most and most < MIN_SETTLED_FRACTION * of:
         why = "not settled within the tolerance" if settled else "no value"
         missed = f"{'has' if of - most == 1 else 'have'} {why}"
         return (
@@ -440,14 +462,14 @@ def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -
         )
     for name in [name for name in names if name in found]:
         unit, (low, _, high), count, misses = found[name]
-        low, high = both(name, low, high, unit, 3)
+        low, high = format_pair(name, low, high, unit, 3)
         some = [f"in the {count} that have one"] * (count < most) + [
             f"{misses} of {count} miss the tolerance and are included with their values"
             if misses > 1
             else f"1 of {count} misses the tolerance and is included with its value"
         ] * (misses > 0)
         said.append(
-            f"{'an' if name[0] in 'aeio' else 'a'} {called(name)} from {low} to {high}"
+            f"{'an' if name[0] in 'aeio' else 'a'} {measure_name(name)} from {low} to {high}"
             + (f" ({'; '.join(some)})" if some else "")
         )
     count = "settled" if settled else "have a value"
@@ -455,7 +477,7 @@ def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -
     return f"90 % of the {whose} have {', '.join(said)}." if said else ""
 
 
-def picture(ranks: dict) -> str:
+def share_bars(ranks: dict) -> str:
     """Return bars of the shares of the keys for each measure as HTML; "" if there are none."""
     if not ranks:
         return ""
@@ -472,7 +494,7 @@ def picture(ranks: dict) -> str:
             for one in shares
         ]
         parts.append(
-            f"<h3>{linked(label(name), name)}</h3>"
+            f"<h3>{measure_link(label(name), name)}</h3>"
             + document.table(
                 ("key", ">alone", ">total", ">from, to", "share"), rows, "wide", "shares"
             )
@@ -499,7 +521,7 @@ def _range(one) -> str:
     return "&ndash;" if one.low == one.high else f"{100 * one.low:.0f} to {100 * one.high:.0f} %"
 
 
-def spread(found: dict, of: int) -> str:
+def quantile_table(found: dict, of: int) -> str:
     """Return the quantiles of random cases as an HTML table; "" if there are none.
 
     If the cases that are left out may be the extreme ones, no quantiles are given. For a measure
@@ -524,16 +546,18 @@ def spread(found: dict, of: int) -> str:
             else choose_display_unit(float(np.abs(values).max()), unit)
         )
         known = (
-            ["not known"] * len(ENDS)
-            if most < SETTLED * of
+            ["not known"] * len(QUANTILE_LEVELS)
+            if most < MIN_SETTLED_FRACTION * of
             else [format_number(one * scale, 4) for one in values.tolist()]
         )
-        rows.append([linked(label(name), name), *known, escape(in_unit), str(count), str(misses)])
+        rows.append(
+            [measure_link(label(name), name), *known, escape(in_unit), str(count), str(misses)]
+        )
     if not rows:
         return ""
     left = (
         ""
-        if most >= SETTLED * of
+        if most >= MIN_SETTLED_FRACTION * of
         else (
             f" {of - most} of {of} cases do not count, perhaps those with the largest motion, so that these values are not "
             "known; with more cycles (drive.cycles) more cases may settle."

@@ -7,14 +7,18 @@ from ...runs.results.result import Result
 
 # Fraction of the final position, which is printed with three digits; an output that moves by less
 # is at rest.
-RESTS = 5e-3
-FEWEST = 5  # smallest number of amplitudes of a decay for which frequency and damping are printed
-ROUND = 1e-13  # fraction of the largest output; a smaller change between samples is round-off
+REST_FRACTION = 5e-3
+MIN_AMPLITUDES = (
+    5  # smallest number of amplitudes of a decay for which frequency and damping are printed
+)
+ROUND_OFF_FRACTION = (
+    1e-13  # fraction of the largest output; a smaller change between samples is round-off
+)
 # Fraction of the largest output; a final position closer to 0 is the remainder of a decay to 0.
-NOTHING = 1e-9
+ZERO_FRACTION = 1e-9
 
 
-def released(result: Result) -> str:
+def describe_release(result: Result) -> str:
     """Describe the motion of a run with drive.kind = "free"; "" for any other run.
 
     The text has no full stop at the end.
@@ -24,17 +28,19 @@ def released(result: Result) -> str:
         return ""
     amplitude = result.measures.get("relative_displacement_amplitude")
     error, last = (getattr(amplitude, name, None) for name in ("error", "value"))
-    return swung(r.time, r.output, error or 0.0, last) + _told(result.extra.get("decay"))
+    return describe_swing(r.time, r.output, error or 0.0, last) + _describe_decay(
+        result.extra.get("decay")
+    )
 
 
-def _told(decay) -> str:
+def _describe_decay(decay) -> str:
     """Return a clause on frequency and damping of the second and the last known swing."""
     known = (
         []
         if decay is None
         else np.flatnonzero(np.isfinite(decay.damping_error + decay.frequency_error)).tolist()
     )
-    if len(known) < FEWEST:
+    if len(known) < MIN_AMPLITUDES:
         return ""
     parts = [
         f"{format_value(decay.frequency[k], decay.frequency_error[k], unit='Hz')}, damping ratio "
@@ -44,7 +50,7 @@ def _told(decay) -> str:
     return f"; it decays at {', and at '.join(parts)}"
 
 
-def swung(time, output, error: float = 0.0, amplitude: float | None = None) -> str:
+def describe_swing(time, output, error: float = 0.0, amplitude: float | None = None) -> str:
     """Describe a released motion from its stored samples, which include the reversals.
 
     Parameters
@@ -64,13 +70,13 @@ def swung(time, output, error: float = 0.0, amplitude: float | None = None) -> s
     str
     """
     end, begin = float(output[-1]), float(output[0])
-    end = 0.0 if abs(end) < NOTHING * np.abs(output).max() else end
+    end = 0.0 if abs(end) < ZERO_FRACTION * np.abs(output).max() else end
     far = np.abs(output - end)
     if not np.isfinite(far).all() or not far.max() > 0:
         return f"released at {format_length(begin, 3)}, the output does not move"
-    moves = np.flatnonzero(np.abs(np.diff(output)) > ROUND * np.abs(output).max())
+    moves = np.flatnonzero(np.abs(np.diff(output)) > ROUND_OFF_FRACTION * np.abs(output).max())
     turns = 1 + moves[:-1][np.diff(np.sign(np.diff(output)[moves])) != 0]
-    still = max(error, RESTS * abs(end), NOTHING * np.abs(output).max())
+    still = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * np.abs(output).max())
     turns = turns[far[turns] > still]
     way = (
         f"first swings to {format_length(float(output[turns[0]]), 3)}"

@@ -20,11 +20,11 @@ from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.patch_rows import minimum_of, unknown_measures
 from ...runs.results.result import Result
 from ..summary import measure_object
-from .document import prose
+from .document import sentence_html
 
 G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
 DEG = ("deg", 180 / pi)
-WORKSHOP = {  # imperial units in the form of formatting.UNIT_LADDERS
+IMPERIAL_UNITS = {  # imperial units in the form of formatting.UNIT_LADDERS
     "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)),
     "m3": (("in^3", INCH**-3),),
     "rad": (DEG,),
@@ -37,14 +37,14 @@ WORKSHOP = {  # imperial units in the form of formatting.UNIT_LADDERS
 GROUPS = ("motion", "friction", "energy", "patch", "wear")
 # Relative difference of the fraction in contact and the positions of the contact up to which they
 # agree.
-SAME = 2e-3
-FEW = 3  # number of interfaces or stretches up to which each is listed
+EQUAL_FRACTION_TOL = 2e-3
+MAX_LISTED = 3  # number of interfaces or stretches up to which each is listed
 NO_SLIP = 1e-15  # [m], the last digits of a slide
 WHOLE_RUN = "over the whole run"
 LOOPS = "over the two stored cycles of the steady motion"
-OVER = {"harmonic": LOOPS}  # period to which energies refer, by engine
+PERIOD_BY_ENGINE = {"harmonic": LOOPS}  # period to which energies refer, by engine
 MARCHED = "over the cycles of the motion, not those of wear"
-OF_WHAT = {  # Added to a value that would otherwise be mistaken for another quantity.
+QUALIFIERS = {  # Added to a value that would otherwise be mistaken for another quantity.
     "loop_area": "per cycle",
     "friction_work": WHOLE_RUN,
     "energy_dissipated": WHOLE_RUN,
@@ -54,7 +54,7 @@ OF_WHAT = {  # Added to a value that would otherwise be mistaken for another qua
 }
 # Suffix of the measure that states how much a result of a random drive differs between records.
 SCATTER = "_scatter"
-SHAKEN = {
+RANDOM_MEASURES = {
     "relative_displacement_rms": "the displacement of the output is {} rms",
     "absolute_acceleration_rms": "the acceleration of the output is {} rms",
     "response_frequency": "the frequency response H1 peaks at {}",
@@ -68,14 +68,16 @@ GROWN = (
     "The motion still grows at the end of the run, after {}: the measures describe its last cycles and have no "
     "error estimate."
 )
-CHANGES = ("transient", "grows")  # outcomes of a motion whose last cycles differ
-STEPPED = ("jump_level",)  # lies between two drive levels of the scene, whatever the tolerance
+CHANGING_OUTCOMES = ("transient", "grows")  # outcomes of a motion whose last cycles differ
+LEVEL_MEASURES = (
+    "jump_level",
+)  # lies between two drive levels of the scene, whatever the tolerance
 RANGES = {"fraction": 1.0, "phase": pi}  # range of a measure [SI], by the end of its name
 ROUND = 1e-12  # Fraction of the friction force times the motion; a smaller work is round-off.
 NONE = MappingProxyType({})
 UNKNOWN = " (error unknown)"
-SHARP = "values without ± are exact to the last digit shown"
-SHARP_BUT_UNKNOWN = f"{SHARP}, except where the error is unknown"
+EXACT_NOTE = "values without ± are exact to the last digit shown"
+SHARP_BUT_UNKNOWN = f"{EXACT_NOTE}, except where the error is unknown"
 
 
 def units(name: str, value: float, unit: str, error: float | None = None) -> list:
@@ -108,11 +110,11 @@ def units(name: str, value: float, unit: str, error: float | None = None) -> lis
     size = max(abs(value), error or 0.0) if isfinite(error or 0.0) else value
     return [
         formatting.choose_display_unit(value, unit, error),
-        *([formatting.choose_unit(WORKSHOP[unit], size)] if unit in WORKSHOP else []),
+        *([formatting.choose_unit(IMPERIAL_UNITS[unit], size)] if unit in IMPERIAL_UNITS else []),
     ]
 
 
-def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
+def format_value_and_error(name: str, measure: dict, scale: float | None = None) -> tuple:
     """Return value and error of a measure as strings.
 
     They are in the first unit of the measure, or in SI times `scale`.
@@ -134,7 +136,7 @@ def is_share(name: str) -> bool:
     return re.sub(r"_\d+$", "", name).endswith("fraction")
 
 
-def short(name: str, value: float, unit: str, digits: int) -> str:
+def format_measure(name: str, value: float, unit: str, digits: int) -> str:
     """Write the value of a measure with a number of digits in a suitable unit: `46.68 mJ`.
 
     Parameters
@@ -155,7 +157,7 @@ def short(name: str, value: float, unit: str, digits: int) -> str:
     return formatting.format_quantity(value, unit, digits, zero_below(name))
 
 
-def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
+def format_pair(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
     """Write two values of a measure in one unit, or in two if their ratio exceeds 1000.
 
     Parameters
@@ -172,7 +174,7 @@ def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
     -------
     tuple of str
     """
-    texts = tuple(short(name, one, unit, digits) for one in (low, high))
+    texts = tuple(format_measure(name, one, unit, digits) for one in (low, high))
     if (
         is_share(name)
         or unit not in formatting.UNIT_LADDERS
@@ -185,9 +187,9 @@ def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
     return tuple(f"{formatting.format_number(one * scale, digits)} {own}" for one in (low, high))
 
 
-def pair(name: str, measure: dict) -> str:
+def format_with_error(name: str, measure: dict) -> str:
     """Write a measure with its error in its first unit, `14.808 ± 0.041 um`; "-" if unknown."""
-    value, error = texts(name, measure)
+    value, error = format_value_and_error(name, measure)
     if value == "-":
         return value
     unit, scale = units(name, measure["value"], measure["unit"], measure["error"])[0]
@@ -208,11 +210,11 @@ def zero_below(name: str, measure: dict = NONE) -> float:
     It is the floor of its definition, or the floor in the run if this is smaller: a floor that the
     run has raised to the tolerance times larger terms is what is required of it, not what is known.
     """
-    row, own = row_of(name), measure.get("floor") or inf
+    row, own = find_definition(name), measure.get("floor") or inf
     return 0.0 if row is None else min(row.floor, own)
 
 
-def others(name: str, measure: dict) -> str:
+def format_imperial(name: str, measure: dict) -> str:
     """Write the value in imperial units with the digits that its error allows; "" if it is 0.
 
     A value within its error counts as 0.
@@ -221,13 +223,13 @@ def others(name: str, measure: dict) -> str:
     if (
         value is None
         or not isfinite(value)
-        or texts(name, measure)[0] == "0"
+        or format_value_and_error(name, measure)[0] == "0"
         or abs(value) <= (error or 0.0)
     ):
         return ""
     found = units(name, value, measure["unit"], error)[1:]
     return " = ".join(
-        f"{texts(name, measure, scale)[0]} {unit}"
+        f"{format_value_and_error(name, measure, scale)[0]} {unit}"
         for unit, scale in found
         if abs(value) * scale >= 1e-3
     )
@@ -255,13 +257,15 @@ def verdict(summary: dict) -> str:
         return f"The numerical error of {unknown} is as large as the value, so it is not known; {known}."
     if summary["kind"] == "bench" and outcome is Outcome.DONE:
         found = (
-            _looped(summary["loop"], measures["equivalent_stiffness"])
+            _bench_loop_sentence(summary["loop"], measures["equivalent_stiffness"])
             if "loop" in summary
             else outcome.sentence
         )
-        return _slid(measures.get("slip_amplitude"), found, "contact_fraction" in measures)
+        return _bench_slip_sentence(
+            measures.get("slip_amplitude"), found, "contact_fraction" in measures
+        )
     if away := summary.get("run_away"):
-        drive, knee = (short("", away[name], "m s-2", 4) for name in ("drive", "knee"))
+        drive, knee = (format_measure("", away[name], "m s-2", 4) for name in ("drive", "knee"))
         return (
             f"{outcome.sentence} The drive, {drive}, is larger than {knee}, above which friction alone does not "
             "limit the amplitude at resonance."
@@ -290,12 +294,13 @@ def verdict(summary: dict) -> str:
             if re.sub(r"_\d+$", "", name) == first and one["value"]
         }
         name = max(found, key=lambda each: found[each]["value"], default="")
-        if name and found[name]["value"] > max(_open(found[name]), least):
-            return f"The interface as a whole sticks, but {part} ({form.format(pair(name, found[name]))}).{rings}"
-    return _holds("contact_fraction" in measures, "cycles") + rings
+        if name and found[name]["value"] > max(_error_or_floor(found[name]), least):
+            size = form.format(format_with_error(name, found[name]))
+            return f"The interface as a whole sticks, but {part} ({size}).{rings}"
+    return _no_slip_sentence("contact_fraction" in measures, "cycles") + rings
 
 
-def _holds(patch: bool, cycles: str) -> str:
+def _no_slip_sentence(patch: bool, cycles: str) -> str:
     """Return the sentence for an interface on which no slip is found.
 
     On a patch, an edge at which the pressure ends slips under any force; if a mesh does not show
@@ -308,7 +313,7 @@ def _holds(patch: bool, cycles: str) -> str:
     )
 
 
-def _slid(slip: dict | None, done: str, patch: bool) -> str:
+def _bench_slip_sentence(slip: dict | None, done: str, patch: bool) -> str:
     """Return the sentence of a bench with its slip, if it exceeds its error.
 
     Parameters
@@ -322,15 +327,15 @@ def _slid(slip: dict | None, done: str, patch: bool) -> str:
     """
     if slip is None or slip["value"] is None:
         return done
-    if slip["value"] <= max(_open(slip), NO_SLIP):
-        return f"{done} {_holds(patch, 'cycle')}"
+    if slip["value"] <= max(_error_or_floor(slip), NO_SLIP):
+        return f"{done} {_no_slip_sentence(patch, 'cycle')}"
     return (
         f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
-        f"{pair('slip_amplitude', slip)}."
+        f"{format_with_error('slip_amplitude', slip)}."
     )
 
 
-def _looped(loop: dict, stiffness: dict) -> str:
+def _bench_loop_sentence(loop: dict, stiffness: dict) -> str:
     """Return the sentence on stiffness and damping of a bench; loop: from `summary.loop_of`."""
     factor, error = loop["loss_factor"], loop["error"]
 
@@ -345,13 +350,13 @@ def _looped(loop: dict, stiffness: dict) -> str:
 
     return (
         f"At a slide amplitude of {formatting.format_quantity(loop['slide_amplitude'], 'm', 4)} the "
-        "interface has an equivalent "
-        f"stiffness of {pair('equivalent_stiffness', stiffness)} and a loss factor of {number(1.0)} (equivalent "
-        f"damping ratio {number(0.5)})."
+        "interface has an equivalent stiffness of "
+        f"{format_with_error('equivalent_stiffness', stiffness)} and a loss factor of "
+        f"{number(1.0)} (equivalent damping ratio {number(0.5)})."
     )
 
 
-def _open(one: dict) -> float:
+def _error_or_floor(one: dict) -> float:
     """Return the error of a measure in its unit, or its floor if no error was estimated."""
     return one["floor"] if one["error"] is None else one["error"]
 
@@ -409,8 +414,8 @@ def _filled(statement: Statement, measures: dict, number: Callable[[str, str], s
     measure = measures.get(name)
     if not measure or measure["value"] is None:
         return ""
-    value, interval = of_records(name, measures)
-    value = value or pair(name, measure)
+    value, interval = record_interval(name, measures)
+    value = value or format_with_error(name, measure)
     text = text.format(value if number is None else number(value, name))
     return f"{text} ({interval})" if interval else text
 
@@ -436,7 +441,7 @@ def _motion_statements(measures: dict, released: str) -> list:
             else "displacement amplitude at the output {} (half peak-to-peak)"
         )
         rows = [
-            *SHAKEN.items(),
+            *RANDOM_MEASURES.items(),
             ("relative_displacement_amplitude", amplitude),
             ("relative_displacement_amplitude_steady", "this amplitude would settle at {}"),
             ("absolute_acceleration_peak", "peak acceleration {}"),
@@ -456,7 +461,7 @@ def _energy_statements(summary: dict) -> list:
     text = "{} dissipated per cycle"
     if any(warning.startswith(OPEN_LOOP) for warning in summary.get("warnings", ())):
         text = "friction work of the last cycle {}"
-    elif summary["outcome"] in CHANGES and summary["kind"] in ("rig", "linear"):
+    elif summary["outcome"] in CHANGING_OUTCOMES and summary["kind"] in ("rig", "linear"):
         text += " (mean of the last cycles)"
     return _at_each_interface(summary, "loop_area", text)
 
@@ -464,7 +469,7 @@ def _energy_statements(summary: dict) -> list:
 def _patch_statements(summary: dict) -> list:
     """Return the statements on the pressed patch."""
     fraction = summary["measures"].get("contact_fraction", {}).get("value")
-    where = placed(summary.get("contact"), fraction)
+    where = describe_contact(summary.get("contact"), fraction)
     statements = _at_each_interface(
         summary, "contact_fraction", "{} of the length in contact" + where
     )
@@ -474,14 +479,14 @@ def _patch_statements(summary: dict) -> list:
 
 
 def _at_each_interface(summary: dict, name: str, text: str) -> list:
-    """Return the statement of each interface, or only of the first if there are more than FEW.
+    """Return the statement of each interface, or only of the first if there are more than MAX_LISTED.
 
     Strips do not count as interfaces.
     """
     count = sum(remove_interface_number(measure) == name for measure in summary["measures"])
     if count < 2 or any(effect["effect"] == "contact.strips" for effect in summary["effects"]):
         return [Statement(name, text)]
-    if count > FEW:
+    if count > MAX_LISTED:
         return [Statement(name, f"{text} at interface 1 of {count}")]
     return [
         Statement(add_interface_number(name, k), f"{text} at interface {k + 1}")
@@ -489,7 +494,7 @@ def _at_each_interface(summary: dict, name: str, text: str) -> list:
     ]
 
 
-def placed(contact: dict | None, fraction: float | None = None) -> str:
+def describe_contact(contact: dict | None, fraction: float | None = None) -> str:
     """Describe where the contact is along x, such as `, from x = -6.35 to -3.56 mm (left end)`.
 
     Parameters
@@ -527,13 +532,13 @@ def placed(contact: dict | None, fraction: float | None = None) -> str:
         )
 
     count = len(stretches)
-    parts = stretches if count <= FEW else [[stretches[0][0], stretches[-1][1]]]
+    parts = stretches if count <= MAX_LISTED else [[stretches[0][0], stretches[-1][1]]]
     if count == 1 and parts[0][0] == parts[0][1]:
         return f", at x = {number(parts[0][0])} {unit}"
     share = sum(end - begin for begin, end in stretches) / (last - first)
     alike = (
         fraction is None
-        or abs(share - fraction) <= SAME * fraction
+        or abs(share - fraction) <= EQUAL_FRACTION_TOL * fraction
         or f"{share:.3g}" == f"{fraction:.3g}"
     )
     here = (
@@ -547,7 +552,7 @@ def placed(contact: dict | None, fraction: float | None = None) -> str:
     )
     return (
         f", from x = {told}{here}"
-        if count <= FEW
+        if count <= MAX_LISTED
         else f", in {count} stretches from x = {told}{here}"
     )
 
@@ -574,7 +579,7 @@ def tolerance_sentence(result: Result) -> str:
         return GROWN.format(formatting.format_quantity(float(result.response.time[-1]), "s", 3))
     if not known or max(one.error_ratio(tolerance) for one in known.values()) > 1:
         return ""
-    texts_of = {name: pair(name, measure_object(one)) for name, one in known.items()}
+    texts_of = {name: format_with_error(name, measure_object(one)) for name, one in known.items()}
     visible = {
         name: known[name]
         for name, text in texts_of.items()
@@ -596,7 +601,7 @@ def tolerance_sentence(result: Result) -> str:
         unknown = any(
             one.value is not None and one.error is None for one in result.measures.values()
         )
-        sentence += f"; {SHARP_BUT_UNKNOWN if unknown else SHARP}"
+        sentence += f"; {SHARP_BUT_UNKNOWN if unknown else EXACT_NOTE}"
     return f"{sentence}."
 
 
@@ -610,7 +615,7 @@ def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
             0.0,
         )
         limit = compute_allowed_error(tolerance, one.value, one.floor)
-        if name in STEPPED:
+        if name in LEVEL_MEASURES:
             parts.append(f"{name}: one step between the drive levels of the scene")
         elif one.error <= tolerance * full:
             parts.append(
@@ -627,12 +632,12 @@ def _plain_value(name: str, value: float, unit: str) -> str:
     return f"{formatting.format_number(value * scale, 3)} {shown}".rstrip()
 
 
-def linked(text: str, name: str, more: str = "") -> str:
+def measure_link(text: str, name: str, more: str = "") -> str:
     """Return a text as a link to the definition of a measure on the same page."""
     return f"<a{more} href='#measure-{escape(name)}'>{escape(text)}</a>"
 
 
-def row_of(name: str, pressed: bool = False):
+def find_definition(name: str, pressed: bool = False):
     """Return the definition of a measure, also of one that ends in the number of an interface.
 
     None if there is none. pressed: whether a patch was pressed, which has a load of its own.
@@ -646,17 +651,17 @@ def row_of(name: str, pressed: bool = False):
 
 def meaning(name: str) -> str:
     """Return the definition of a measure as a sentence; "" if no table has it."""
-    row = row_of(name)
+    row = find_definition(name)
     return "" if row is None else row.text
 
 
 def group_of(name: str, pressed: bool = True) -> str:
-    """Return the group of a measure, one of GROUPS; pressed: as for `row_of`."""
-    row = row_of(name, pressed)
+    """Return the group of a measure, one of GROUPS; pressed: as for `find_definition`."""
+    row = find_definition(name, pressed)
     return GROUPS[0] if row is None else row.group
 
 
-def in_order(measures: dict) -> dict:
+def order_measures(measures: dict) -> dict:
     """Return the measures in the order in which they are shown.
 
     Under a random drive those that a record determines come first; their scatter is shown with them
@@ -670,7 +675,7 @@ def in_order(measures: dict) -> dict:
     }
 
 
-def of_records(name: str, measures: dict) -> tuple:
+def record_interval(name: str, measures: dict) -> tuple:
     """Return a measure of a random drive and its 95 % interval over records, as strings.
 
     They have the digits that the scatter of records allows; ("", "") for any other measure.
@@ -704,10 +709,10 @@ def table_of(measures: dict, engine: str = "") -> list[str]:
     -------
     list of str
     """
-    every, measures = measures, in_order(measures)
+    every, measures = measures, order_measures(measures)
     width = max(map(len, measures), default=0)
     out, pressed = [], "contact_fraction" in measures
-    over = MARCHED if "worn_volume" in measures else OVER.get(engine, WHOLE_RUN)
+    over = MARCHED if "worn_volume" in measures else PERIOD_BY_ENGINE.get(engine, WHOLE_RUN)
     for group in GROUPS:
         lines = [
             f"  {name:<{width}}  {_value(name, one, over, POWER in every)}{_records(name, every)}"
@@ -718,7 +723,7 @@ def table_of(measures: dict, engine: str = "") -> list[str]:
     return out
 
 
-def fragment(summary: dict, sentence: str, cycles: float | None, released: str = "") -> str:
+def notebook_html(summary: dict, sentence: str, cycles: float | None, released: str = "") -> str:
     """Return the results as HTML without styles, for a notebook.
 
     Parameters
@@ -740,7 +745,7 @@ def fragment(summary: dict, sentence: str, cycles: float | None, released: str =
         cells = f"<td>{escape(name)}</td><td style='text-align:right'>{escape(value.strip())}</td>"
         rows.append(f"<tr>{cells if value else f'<th colspan=2>{escape(name)}</th>'}</tr>")
     title = f"<b>{escape(summary['title'])}</b><br>" if summary["title"] else ""
-    warnings = "".join(f"<p>&#9888; {prose(text)}</p>" for text in summary["warnings"])
+    warnings = "".join(f"<p>&#9888; {sentence_html(text)}</p>" for text in summary["warnings"])
     answer = escape(
         f"{summary['outcome']}: {sentence} {headline(summary, cycles, released=released)}"
     )
@@ -749,8 +754,10 @@ def fragment(summary: dict, sentence: str, cycles: float | None, released: str =
 
 def _records(name: str, measures: dict) -> str:
     """Write the interval over other records in brackets, and state that ± is the numerical error."""
-    text = of_records(name, measures)[1]
-    numerics = "± is the numerical error; " if "±" in pair(name, measures[name]) else ""
+    text = record_interval(name, measures)[1]
+    numerics = (
+        "± is the numerical error; " if "±" in format_with_error(name, measures[name]) else ""
+    )
     return f" ({numerics}{text} for other records)" if text else ""
 
 
@@ -758,14 +765,14 @@ def _value(name: str, one: dict, over: str, shaken: bool) -> str:
     """Write a measure with its error and what it refers to, or the reason why it has no value."""
     if one.get("reason"):
         return f"- ({one['reason']})"
-    of_what = OF_WHAT.get(re.sub(r"_\d+$", "", name))
+    of_what = QUALIFIERS.get(re.sub(r"_\d+$", "", name))
     of_what = over if of_what == WHOLE_RUN else of_what
     of_what = f"{of_what} of the first mode" if shaken and of_what == "per cycle" else of_what
     unknown = UNKNOWN if one["error"] is None and one["value"] is not None else ""
-    return f"{pair(name, one)}{unknown}{f', {of_what}' if of_what else ''}"
+    return f"{format_with_error(name, one)}{unknown}{f', {of_what}' if of_what else ''}"
 
 
-def joined(sentences: Sequence) -> str:
+def join_sentences(sentences: Sequence) -> str:
     """Join sentences with semicolons; "" if there are none."""
     first, *others = sentences or [""]
     said = [

@@ -11,17 +11,17 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import UNIT_LADDERS, choose_axis_unit
 from ..drawing.charts import COLOURS, mark
-from ..read_results import numeric, readable, variables, wanted
+from ..read_results import is_real, reading_errors, require, variables
 from ..summary import read_summary
 from ..written import NUMBER
-from .document import Section, document, prose, table
-from .sentences import linked, meaning, pair
+from .document import Section, document, sentence_html, table
+from .sentences import format_with_error, meaning, measure_link
 from .sweep import label
 
-TALL = 410  # height of a figure [px]
+HEIGHT = 410  # height of a figure [px]
 POINTS = 4000  # points of a line in a figure
-MANY = 10.0  # ratio to the first value; a larger change is written as a factor
-CYCLES = 2.0  # last cycles that are shown; result.nc stores this many completely
+MIN_FACTOR = 10.0  # ratio to the first value; a larger change is written as a factor
+N_SHOWN_CYCLES = 2.0  # last cycles that are shown; result.nc stores this many completely
 # title, x: (variable, label), y: (variable, label); of variables over time only the last cycles
 CHARTS = (
     ("Pressure", ("x", "place"), ("normal_stress", "normal stress")),
@@ -66,7 +66,7 @@ class FinishedRun(NamedTuple):
     arrays: dict
 
 
-def read(folder: Path) -> FinishedRun:
+def read_run(folder: Path) -> FinishedRun:
     """Read the run in a results folder; PatchfemError if there is none."""
     folder = Path(folder)
     try:
@@ -89,9 +89,9 @@ def _arrays(path: Path) -> dict:
         return {}
     shown, out = {name for _, *axes in CHARTS for name, _ in axes}, {}
     for name, one in variables(path, shown)[1].items():
-        with readable(path, "results of a run"):
-            wanted(
-                numeric(one.values) and one.values.ndim in (1, 2) and one.values.size > 0,
+        with reading_errors(path, "results of a run"):
+            require(
+                is_real(one.values) and one.values.ndim in (1, 2) and one.values.size > 0,
                 f"{name} contains {one.values.ndim}-dimensional {one.values.dtype}",
             )
         values = one.values[0] if one.values.ndim == 2 else one.values
@@ -102,7 +102,7 @@ def _arrays(path: Path) -> dict:
 
 def page(runs: list) -> str:
     """Return the HTML page of several `FinishedRun`s; differences are relative to the first."""
-    names = distinct([run.name for run in runs])
+    names = number_duplicates([run.name for run in runs])
     charts = []
     for title, x, y in CHARTS:
         for units, lines in _lines_by_units(x[0], y[0], runs, names).items():
@@ -119,13 +119,13 @@ def page(runs: list) -> str:
             one["anchor"] + "-part",
             one["title"],
             f'<div id="{one["anchor"]}" class=chart role=img '
-            f'aria-label="{escape(one["told"])}"></div><p class=soft>{prose(one["told"])}</p>',
+            f'aria-label="{escape(one["told"])}"></div><p class=soft>{sentence_html(one["told"])}</p>',
         )
         for one in charts
     ]
     known = dict.fromkeys(name for run in runs for name in run.summary["measures"])
     means = [
-        (f" id='measure-{escape(name)}'", [escape(label(name)), prose(meaning(name))])
+        (f" id='measure-{escape(name)}'", [escape(label(name)), sentence_html(meaning(name))])
         for name in known
     ]
     sections.append(Section("means", "What the measures are", table(("", ""), means)))
@@ -139,7 +139,7 @@ def page(runs: list) -> str:
     )
 
 
-def distinct(names: list) -> list:
+def number_duplicates(names: list) -> list:
     """Return the names, with a number added to those that occur more than once."""
     return [
         name if names.count(name) == 1 else f"{name} ({number})"
@@ -182,7 +182,7 @@ def _lines_by_units(x: str, y: str, runs: list, names: list) -> dict:
         if a.shape != b.shape or not a.size:
             continue
         if "time" in run.arrays and run.arrays["time"][0].shape == a.shape:
-            late = _late(run)
+            late = _last_cycles(run)
             a, b = a[late], b[late]
             a = a - a[-1] if x == "time" else a
         step = -(-a.size // POINTS)
@@ -214,7 +214,7 @@ def _chart(number: int, title: str, axes: tuple, units: tuple, lines: list) -> d
     return {
         "anchor": f"chart{number}",
         "title": title,
-        "height": TALL,
+        "height": HEIGHT,
         "x": {"label": x[1], "unit": unit_a, "log": False},
         "y": {"label": y[1], "unit": unit_b, "log": False},
         "told": f"{y[1].capitalize()} [{unit_b}] over {x[1]}: {peaks}.",
@@ -244,19 +244,19 @@ def period_of(run: FinishedRun) -> float | None:
     return 1 / float(written[1]) if written and float(written[1]) > 0 else None
 
 
-def _late(run: FinishedRun) -> np.ndarray:
-    """Return which samples lie in the last CYCLES cycles of a sine.
+def _last_cycles(run: FinishedRun) -> np.ndarray:
+    """Return which samples lie in the last N_SHOWN_CYCLES cycles of a sine.
 
     Without a sine it is the last tenth of the run; on a bench all samples.
     """
     time, period = run.arrays["time"][0], period_of(run)
-    span = CYCLES * period if period else np.ptp(time) / 10
+    span = N_SHOWN_CYCLES * period if period else np.ptp(time) / 10
     if run.summary["kind"] == "bench":
         span = np.ptp(time)
     return time >= time[-1] - span * (1 + 1e-9)
 
 
-def _flat(table, at: str = "") -> dict:
+def _flatten(table, at: str = "") -> dict:
     """Flatten nested tables: "contact.tilt.angle" -> value.
 
     Entries of lists are named by their name or number.
@@ -270,13 +270,13 @@ def _flat(table, at: str = "") -> dict:
     return {
         key: value
         for name, one in pairs
-        for key, value in _flat(one, f"{at}.{name}" if at else str(name)).items()
+        for key, value in _flatten(one, f"{at}.{name}" if at else str(name)).items()
     }
 
 
 def _differences(runs: list, names: list) -> str:
     """Return a table of the keys whose values differ between the resolved scenes."""
-    flat = [_flat(run.resolved) for run in runs]
+    flat = [_flatten(run.resolved) for run in runs]
     keys = [
         key
         for key in dict.fromkeys(key for one in flat for key in one)
@@ -313,7 +313,7 @@ def _measures(runs: list, names: list) -> str:
         found = [run.summary["measures"].get(name) for run in runs]
         rows.append(
             [
-                linked(label(name), name),
+                measure_link(label(name), name),
                 *(
                     _cell(name, one, found[0] if number else None)
                     for number, one in enumerate(found)
@@ -333,16 +333,16 @@ def _cell(name: str, one: dict | None, first: dict | None) -> str:
     """Write a measure as a cell, with its change from the first run."""
     if one is None or one["value"] is None or not math.isfinite(one["value"]):
         return "&ndash;"
-    text = escape(pair(name, one))
+    text = escape(format_with_error(name, one))
     alone = first is None or first["value"] is None
     if alone or abs(one["value"] - first["value"]) <= (one["error"] or 0.0) + (
         first["error"] or 0.0
     ):
         return f"<span class=v>{text}</span>"
-    return f"<b class=v>{text}</b> <span class=v>({_share(one['value'], first)})</span>"
+    return f"<b class=v>{text}</b> <span class=v>({_format_change(one['value'], first)})</span>"
 
 
-def _share(value: float, first: dict) -> str:
+def _format_change(value: float, first: dict) -> str:
     """Write the change from the first value in per cent, or as a factor if it is large.
 
     It is a dash if the first value is 0 within its error, because any ratio would then only depend
@@ -351,6 +351,6 @@ def _share(value: float, first: dict) -> str:
     if abs(first["value"]) <= (first["error"] or 0.0):
         return "&ndash;"
     factor = value / first["value"]
-    if abs(factor) < MANY:
+    if abs(factor) < MIN_FACTOR:
         return f"{(value - first['value']) / abs(first['value']):+.2%}"
     return f"&times; {float(f'{factor:.2g}'):.7g}"  # two digits, and without an exponent: 150

@@ -9,24 +9,24 @@ import numpy as np
 from ...core import Outcome
 from ...formatting import UNIT_LADDERS, choose_axis_unit, round_to_error
 from ...runs.results.patch_rows import minimum_of
-from ..tolerance_misses import over
-from ..written import NUMBER, brief, label
+from ..tolerance_misses import is_over_tolerance
+from ..written import NUMBER, label, shorten
 from . import document, limits, peaks, ranked
-from .document import Section, breakable, prose
-from .drawn import BAR, SHORT, digits, drawn
-from .headline import FIRST, SETTLED, SweepHeadline, columns, lead_of
-from .sentences import is_share, linked, zero_below
+from .document import Section, sentence_html, with_line_breaks
+from .drawn import ERROR_DIGITS, VALUE_DIGITS, digits, select_cases
+from .headline import MAIN_MEASURES, SETTLED, SweepHeadline, columns, summarise_sweep
+from .sentences import is_share, measure_link, zero_below
 
 # Numbers of measures, and of keys and measures together, in the table of cases: more do not fit a
 # wide screen.
-MOST, COLUMNS = (
+MAX_MEASURES, MAX_COLUMNS = (
     6,
     8,
 )
 PAGE, SUMMARY = "report.html", "summary.json"  # files of a case
 # Cases in the table, whereas sweep.csv has all of them; rows above which the table scrolls in its
 # frame.
-LISTED, TALL = (
+MAX_LISTED_CASES, MIN_SCROLLED_ROWS = (
     400,
     24,
 )
@@ -47,7 +47,7 @@ def page(table: dict, told: SweepHeadline | None = None) -> str:
         (n,): paths of the cases relative to the page, or None; `own`: False if the folder of the
         page has no sweep.csv.
     told : SweepHeadline, optional
-        The `lead_of` the table, if it is known.
+        The `summarise_sweep` of the table, if it is known.
 
     Returns
     -------
@@ -56,14 +56,14 @@ def page(table: dict, told: SweepHeadline | None = None) -> str:
     first = next(
         (
             name
-            for name in ranked.asked_first(FIRST, table)
+            for name in ranked.asked_first(MAIN_MEASURES, table)
             if name in table["measures"] and np.isfinite(table["measures"][name]["values"]).any()
         ),
         None,
     )
     told, part = (
-        told or lead_of(table),
-        drawn(table, lambda cases, whole: _data(table, first, cases, whole)),
+        told or summarise_sweep(table),
+        select_cases(table, lambda cases, whole: _data(table, first, cases, whole)),
     )
     data = _data(table, first, part.cases, not part.said)
     sections = [
@@ -79,18 +79,18 @@ def page(table: dict, told: SweepHeadline | None = None) -> str:
             Section(*one)
             for one in (
                 ("peaks", "Peaks", peaks.table(told.peaks)),
-                ("ranking", "Keys that matter most", ranked.picture(told.ranks)),
+                ("ranking", "Keys that matter most", ranked.share_bars(told.ranks)),
                 (
                     "scatter",
                     "Scatter of the answers",
-                    ranked.spread(told.spread, len(table["outcome"])),
+                    ranked.quantile_table(told.spread, len(table["outcome"])),
                 ),
             )
             if one[2]
         ),
         Section("cases", "Cases", _cases(table)),
         Section("measures", "What the measures mean", _meanings(table)),
-        Section("again", "How to repeat the sweep", _again(table)),
+        Section("again", "How to repeat the sweep", _repeat_section(table)),
     ]
     return document.document(
         table["title"] or "patchfem sweep",
@@ -109,7 +109,10 @@ def _data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dic
         if np.isfinite(one["values"]).any()
     ]
     for one in measures if not whole else ():
-        one |= {"values": digits(one["values"], SHORT), "errors": digits(one["errors"], BAR)}
+        one |= {
+            "values": digits(one["values"], VALUE_DIGITS),
+            "errors": digits(one["errors"], ERROR_DIGITS),
+        }
     links = table["folders"]
     return {
         "keys": keys,
@@ -118,7 +121,7 @@ def _data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dic
         "settled": SETTLED,
         "grid": bool(table["grid"] and whole),
         "first": first,
-        "along": _along(keys),
+        "along": _axis_key(keys),
         "whole": whole,
         "links": None if links is None else [links[i] for i in cases.tolist()],
     }
@@ -136,13 +139,13 @@ def _key(one: dict, cases) -> dict:
         unit, values = units.pop(), [float(match[1]) for match in written]
     else:
         unit, values = one["unit"], np.asarray(one["values"], float)[cases]
-    words = None if any(written) else list(dict(zip(values, map(brief, texts))).items())
+    words = None if any(written) else list(dict(zip(values, map(shorten, texts))).items())
     return {
         "name": one["name"],
         "label": one["name"],
         "unit": "" if unit == "1" else unit,
         "values": values,
-        "texts": [brief(text) for text in texts],
+        "texts": [shorten(text) for text in texts],
         "log": bool(one["log"]),
         "words": words,
     }
@@ -173,7 +176,7 @@ def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
         for part in ("values", "errors", "floors")
         if part in one
     }
-    missed = over(some, tolerance[cases] if np.ndim(tolerance) else tolerance)
+    missed = is_over_tolerance(some, tolerance[cases] if np.ndim(tolerance) else tolerance)
     return {
         "name": name,
         "label": label(name),
@@ -187,7 +190,7 @@ def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     }
 
 
-def _along(keys: list) -> str:
+def _axis_key(keys: list) -> str:
     """Return the name of the key with the most values, which is along the axis."""
     return max(keys, key=lambda one: np.unique(one["values"]).size)["name"] if keys else ""
 
@@ -211,7 +214,7 @@ def _explorer(said: str, folders: list | None) -> str:
         if kept
         else ""
     )
-    thinned = said and f"<p class=soft>{prose(said)}</p>"
+    thinned = said and f"<p class=soft>{sentence_html(said)}</p>"
     return (
         "<div class=choices><label>Measure<select id=measure></select></label>"
         "<label>Key on the axis<select id=along></select></label>"
@@ -245,17 +248,17 @@ def _lead(table: dict, said: SweepHeadline) -> str:
     )
     first, others = said.sentences()[:1], said.sentences()[1:]
     lines = [
-        *map(prose, first),
+        *map(sentence_html, first),
         f"<b>{number} case{'s' * (number != 1)}</b> over {escape(over)}: {escape(ended)}.",
         *map(escape, others),
     ]
     lines += [
-        f"<i>{escape(label(one))}</i>: {prose(one.sentence)}"
+        f"<i>{escape(label(one))}</i>: {sentence_html(one.sentence)}"
         for one in Outcome
         if one.value in table["outcome"] and one.value not in SETTLED
     ]
     text = "".join(f"<p>{line}</p>" for line in lines)
-    fault = document.warned(
+    fault = document.warning_box(
         [
             f"{count} case{'s' if count > 1 else ''} failed: {why}"
             for why, count in Counter(table["messages"].values()).most_common(5)
@@ -272,7 +275,9 @@ def _cases(table: dict) -> str:
     """Return the first cases as a table with keys, outcome and the measures that vary."""
     shown = [
         name
-        for name in ranked.asked_first((FIRST[0], "peak_frequency", *FIRST[1:]), table)
+        for name in ranked.asked_first(
+            (MAIN_MEASURES[0], "peak_frequency", *MAIN_MEASURES[1:]), table
+        )
         if name in table["measures"]
     ]
     shown += [
@@ -282,22 +287,22 @@ def _cases(table: dict) -> str:
         and _changes(one["values"])
         and np.nanmax(np.abs(one["values"])) > zero_below(name)
     ]
-    shown = shown[: min(MOST, max(2, COLUMNS - len(table["keys"])))]
-    few = slice(LISTED)
+    shown = shown[: min(MAX_MEASURES, max(2, MAX_COLUMNS - len(table["keys"])))]
+    few = slice(MAX_LISTED_CASES)
     columns = [
         _measure(name, table["measures"][name], few, table.get("tolerance", np.nan))
         for name in shown
     ]
     heads = [
-        *(breakable(one["name"]) for one in table["keys"]),
+        *(with_line_breaks(one["name"]) for one in table["keys"]),
         "outcome",
         *(
-            f">{linked(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}"
+            f">{measure_link(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}"
             for one in columns
         ),
     ]
     rows = []
-    for i, outcome in enumerate(table["outcome"][:LISTED]):
+    for i, outcome in enumerate(table["outcome"][:MAX_LISTED_CASES]):
         said = escape(label(outcome))
         if table["folders"] is not None:
             said = f'<a href="{escape(table["folders"][i])}">{said}</a>'
@@ -310,7 +315,7 @@ def _cases(table: dict) -> str:
             (
                 "" if outcome in SETTLED else " class=bad",
                 [
-                    *(_unbroken(brief(str(one["texts"][i]))) for one in table["keys"]),
+                    *(_unbroken(shorten(str(one["texts"][i]))) for one in table["keys"]),
                     said,
                     *numbers,
                 ],
@@ -318,8 +323,8 @@ def _cases(table: dict) -> str:
         )
     number = len(table["outcome"])
     more = (
-        f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv contains all cases.</p>"
-        if number > LISTED
+        f"<p class=soft>The first {MAX_LISTED_CASES} of {number} cases; sweep.csv contains all cases.</p>"
+        if number > MAX_LISTED_CASES
         else ""
     )
     named = (
@@ -332,9 +337,7 @@ def _cases(table: dict) -> str:
         if table.get("own", True)
         else ""
     )
-    return (
-        f"{files}{document.table(heads, rows, 'wide long' if len(rows) > TALL else 'wide')}{more}"
-    )
+    return f"{files}{document.table(heads, rows, 'wide long' if len(rows) > MIN_SCROLLED_ROWS else 'wide')}{more}"
 
 
 def _unbroken(text: str) -> str:
@@ -363,14 +366,14 @@ def _meanings(table: dict) -> str:
     rows = [
         (
             f" id='measure-{escape(name)}'",
-            [escape(label(name)), escape(one["unit"]), prose(one.get("means", ""))],
+            [escape(label(name)), escape(one["unit"]), sentence_html(one.get("means", ""))],
         )
         for name, one in table["measures"].items()
     ]
     return document.table(("measure", "unit", "meaning"), rows)
 
 
-def _again(table: dict) -> str:
+def _repeat_section(table: dict) -> str:
     """Return the command and the scene of the sweep as HTML."""
     return (
         "<p>The sweep was run with this command in the folder of its scene:</p>"

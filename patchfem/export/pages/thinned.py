@@ -6,11 +6,11 @@ import numpy as np
 
 from ..drawing.panels import sizes
 
-WIDE = 3.0  # ratio of columns to rows, if there are enough lines of both
+COLUMNS_PER_ROW = 3.0  # ratio of columns to rows, if there are enough lines of both
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Thinned:
+class ReducedMesh:
     """A coarser mesh, and how it derives from the finer one.
 
     Attributes
@@ -42,7 +42,7 @@ class Thinned:
         return (sums / np.add.reduceat(self.areas, self.starts)[:, None])[self.groups]
 
 
-def thinned(points, cells, material, most: int, near: tuple | None = None) -> Thinned:
+def reduce_mesh(points, cells, material, most: int, near: tuple | None = None) -> ReducedMesh:
     """Reduce a mesh to about `most` cells.
 
     In a grid, every so many lines are kept, including the outer lines and those between two
@@ -62,12 +62,12 @@ def thinned(points, cells, material, most: int, near: tuple | None = None) -> Th
 
     Returns
     -------
-    Thinned
+    ReducedMesh
     """
     count, size = len(cells), sizes(points, cells)
     if count <= most:
         every = np.arange(count)
-        return Thinned(np.arange(len(points)), cells, every, every, every, size)
+        return ReducedMesh(np.arange(len(points)), cells, every, every, every, size)
     bins, heights = _bins(points, cells, material, most, near)
     key = bins[0] * heights + bins[1]
     away = np.abs(points[:, 0] - points[:, 0].min()) + np.abs(points[:, 1])
@@ -85,7 +85,7 @@ def thinned(points, cells, material, most: int, near: tuple | None = None) -> Th
     _, starts, group = np.unique(box[order], return_index=True, return_inverse=True)
     of_cell = np.empty(count, int)
     of_cell[order] = group
-    return Thinned(by_key[first], moved[whole], order, starts, of_cell[whole], size[order])
+    return ReducedMesh(by_key[first], moved[whole], order, starts, of_cell[whole], size[order])
 
 
 def _bins(points, cells, material, most: int, near: tuple | None) -> tuple:
@@ -98,20 +98,22 @@ def _bins(points, cells, material, most: int, near: tuple | None) -> tuple:
     # not a grid: a box between lines needs two triangles
     if columns.size * rows.size > len(points):
         most //= 2
-    down = min(rows.size - 1, max(int((most / WIDE) ** 0.5), most // (columns.size - 1)))
+    down = min(rows.size - 1, max(int((most / COLUMNS_PER_ROW) ** 0.5), most // (columns.size - 1)))
     coat = np.zeros((2, len(points)), bool)
     for kind in (0, 1):
         coat[kind][cells[(material > 0) == kind]] = True
     border = np.unique(depth[coat.all(axis=0)])
-    kept = np.union1d(rows[spread(rows, down)], border if border.size < down / 2 else [])
-    across = columns[spread(columns, min(columns.size - 1, max(most // (kept.size - 1), 2)), near)]
+    kept = np.union1d(rows[select_lines(rows, down)], border if border.size < down / 2 else [])
+    across = columns[
+        select_lines(columns, min(columns.size - 1, max(most // (kept.size - 1), 2)), near)
+    ]
     return [
         np.searchsorted(lines, values, "right") - 1
         for lines, values in ((across, x), (kept, depth))
     ], kept.size
 
 
-def spread(lines, count: int, near: tuple | None = None) -> np.ndarray:
+def select_lines(lines, count: int, near: tuple | None = None) -> np.ndarray:
     """Return the indices of at most `count` + 1 sorted lines (n,), evenly spaced.
 
     The first and the last line are included. near: (left, right) between which half of the lines

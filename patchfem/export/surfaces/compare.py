@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import __version__
-from ...campaigns.compare import Pressed
+from ...campaigns.compare import SurfaceRuns
 from ...campaigns.compare import data_of as pressed_data
 from ...disk.atomic_write import write_text
 from ...surface.areal import level_plane
@@ -17,8 +17,8 @@ from ...surface.profile import Profile, level, resample_evenly
 from ...surface.quantity import LEVEL
 from ...surface.roughness.spectrum import BAND
 from ...surface.scans.change import Change, refuse_hidden_wear
-from ..pages.document import Section, document, figure, prose, table, warned
-from ..pages.sentences import pair
+from ..pages.document import Section, document, figure, sentence_html, table, warning_box
+from ..pages.sentences import format_with_error
 from . import pictures
 from .areal import write_columns, write_x3p
 from .pictures import Picture
@@ -99,7 +99,7 @@ def _table(comparison: Comparison) -> QuantityTable:
     return QuantityTable(TABLE_HEADS, rows)
 
 
-def lines_of(parts: list, verdict: tuple, pressed: Pressed | None = None) -> list:
+def lines_of(parts: list, verdict: tuple, pressed: SurfaceRuns | None = None) -> list:
     """Return the comparison as lines of text.
 
     Parameters
@@ -108,7 +108,7 @@ def lines_of(parts: list, verdict: tuple, pressed: Pressed | None = None) -> lis
         One for each direction.
     verdict : tuple
         Headline and sentences.
-    pressed : Pressed, optional
+    pressed : SurfaceRuns, optional
         A scene with each of the two surfaces.
 
     Returns
@@ -143,10 +143,14 @@ def _format_measure(name: str, measure) -> str:
     """Format a measure with its error."""
     if measure is None or measure.value is None:
         return MISSING
-    return pair(name, {"value": measure.value, "error": measure.error, "unit": measure.unit})
+    return format_with_error(
+        name, {"value": measure.value, "error": measure.error, "unit": measure.unit}
+    )
 
 
-def data_of(parts: list, verdict: tuple, directions: list, pressed: Pressed | None = None) -> dict:
+def data_of(
+    parts: list, verdict: tuple, directions: list, pressed: SurfaceRuns | None = None
+) -> dict:
     """Return the comparison as plain data in SI; the first direction is at the top level.
 
     Parameters
@@ -156,7 +160,7 @@ def data_of(parts: list, verdict: tuple, directions: list, pressed: Pressed | No
         Headline and sentences.
     directions : list
         (when, amplitude ratio, slope ratio) of x over y.
-    pressed : Pressed, optional
+    pressed : SurfaceRuns, optional
         A scene with each of the two surfaces.
 
     Returns
@@ -286,14 +290,18 @@ class Article(NamedTuple):
         """Return the self-contained page with these sections."""
         headline, sentences = self.verdict
         lead = f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict>"
-        lead += f"<b>{prose(headline[0].upper() + headline[1:])}.</b>"
-        lead += "".join(f"<p>{prose(text)}</p>" for text in sentences)
-        lead += f"</div>{warned(self.notes)}"
+        lead += f"<b>{sentence_html(headline[0].upper() + headline[1:])}.</b>"
+        lead += "".join(f"<p>{sentence_html(text)}</p>" for text in sentences)
+        lead += f"</div>{warning_box(self.notes)}"
         return document(f"{self.title}: before and after", lead, sections)
 
 
 def write_page(
-    path: Path, parts: list, verdict: tuple, directions: list = (), pressed: Pressed | None = None
+    path: Path,
+    parts: list,
+    verdict: tuple,
+    directions: list = (),
+    pressed: SurfaceRuns | None = None,
 ) -> None:
     """Write the page of a comparison.
 
@@ -306,7 +314,9 @@ def write_page(
     write_text(path, page(parts, verdict, directions, pressed))
 
 
-def page(parts: list, verdict: tuple, directions: list = (), pressed: Pressed | None = None) -> str:
+def page(
+    parts: list, verdict: tuple, directions: list = (), pressed: SurfaceRuns | None = None
+) -> str:
     """Return the page of a comparison, the verdict first.
 
     Parameters
@@ -344,7 +354,7 @@ def page(parts: list, verdict: tuple, directions: list = (), pressed: Pressed | 
         body = [
             figure(f"{number}{place}", *picture) for place, picture in enumerate(_pictures(part))
         ]
-        body += [_table(part).html(), f"<p class=soft>{prose(NOTE)}</p>"]
+        body += [_table(part).html(), f"<p class=soft>{sentence_html(NOTE)}</p>"]
         sections.append(Section(f"changes{number}", heading, "\n".join(body)))
     if pressed is not None:
         sections.append(
@@ -480,12 +490,12 @@ def _levelled_heights(surface) -> np.ndarray:
     return z[~np.isnan(z)]
 
 
-def _pressed_html(pressed: Pressed) -> str:
+def _pressed_html(pressed: SurfaceRuns) -> str:
     """Return the measures and pressures of a scene with each surface as HTML."""
     runs = zip(SIDES, (pressed.before, pressed.after))
     runs = [(name, run) for name, run in runs if run is not None]
     warnings = [f"{name}: {text}" for name, run in runs for text in run.warnings]
-    parts = [warned([*pressed.failed, *warnings])]
+    parts = [warning_box([*pressed.failed, *warnings])]
     if runs:
         peaks = []
         for name, run in runs:
@@ -511,7 +521,7 @@ def _pressed_html(pressed: Pressed) -> str:
             )
             rows.append([escape(text) for text in texts])
         parts.append(table(("measure", ">before", ">after", ">after / before"), rows))
-    parts += [f"<p class=soft>{prose(text)}.</p>" for text in pressed.lacking]
+    parts += [f"<p class=soft>{sentence_html(text)}.</p>" for text in pressed.lacking]
     return "\n".join(parts)
 
 

@@ -9,7 +9,7 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_rows, write_text
 from ...formatting import format_number
 from ...surface.compare import pairs, verdict
-from ..pages.document import Section, document, figure, prose, table, warned
+from ..pages.document import Section, document, figure, sentence_html, table, warning_box
 from . import compare, worn
 from .pictures import PairsPanel, draw_pairs
 from .quantities import UNITS, QuantityTable, Row, csv_columns, format_quantity
@@ -33,7 +33,7 @@ def answers(
 
     Parameters
     ----------
-    asked : list of pairs.Asked
+    asked : list of TableLine
     direction : str
         Axis of the traces whose line in the table states none.
     done : callable, optional
@@ -201,7 +201,7 @@ def _table(averages: dict) -> QuantityTable:
 def page(rows: list, name: str) -> str:
     """Return the self-contained page of a table of pairs."""
     lead = f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict><b>{_headline(rows)}.</b></div>"
-    lead += warned([f"{text}." for text in notes(rows)])
+    lead += warning_box([f"{text}." for text in notes(rows)])
     sections = []
     for number, (group, count, averages) in enumerate(pairs.average_pairs(rows)):
         if averages:
@@ -216,7 +216,7 @@ def page(rows: list, name: str) -> str:
     lines = []
     for row in rows:
         names = (row["before"], row["after"] + _direction(row), *row["labels"].values())
-        outcome = prose(row["message"] or row["verdict"])
+        outcome = sentence_html(row["message"] or row["verdict"])
         lines.append(
             [str(row["line"]), *map(escape, names), outcome, escape("; ".join(_main_texts(row)))]
         )
@@ -253,7 +253,9 @@ def _means_html(number: int, rows: list, averages: dict) -> str:
         )
         texts = [f"{panel.title}: mean {format_quantity(panel.mean).short}" for panel in panels]
         parts.append(figure(f"m{number}", draw_pairs(panels), caption, "; ".join(texts)))
-    return "\n".join([*parts, _table(averages).html(), f"<p class=soft>{prose(MEANING)}</p>"])
+    return "\n".join(
+        [*parts, _table(averages).html(), f"<p class=soft>{sentence_html(MEANING)}</p>"]
+    )
 
 
 def write_page(path: Path, rows: list, name: str) -> None:

@@ -10,7 +10,7 @@ from ...surface.quantity import Quantity
 from ...surface.roughness.parameters import Heights, abbott
 from ...surface.roughness.spectrum import Spectrum
 from ..drawing.charts import axis, chart, line, mark
-from ..drawing.pictures import BLUE, draw, drawing, styled
+from ..drawing.pictures import BLUE, draw_charts, make_figure, returns_svg
 
 MAX_POINTS = 2400  # points of a drawn line, eight for each pixel column of the page
 MAX_SPECTRUM_POINTS = 400  # points of a drawn spectrum, evenly spaced on the logarithmic axis
@@ -45,7 +45,7 @@ def draw_trace(primary, waviness) -> str:
             ),
             line(waviness.x * mm, waviness.z * um, "warm", "waviness", most=MAX_POINTS, width=1.6),
         ]
-    return draw(
+    return draw_charts(
         [chart("", _full_axis("x", along, primary.x * mm), axis("height", up), marks)], height=2.7
     )
 
@@ -73,7 +73,7 @@ def draw_roughness(roughness, ends: tuple, cutoff: float) -> str:
     if count < MAX_SECTION_RULES:
         places = roughness.x[0] + cutoff * np.arange(int(count + 1e-6) + 1)
         marks += [mark("rule", "soft", x=place * mm, dash="dotted") for place in places]
-    return draw(
+    return draw_charts(
         [chart("", _full_axis("x", along, np.array(ends) * mm), axis("roughness", up), marks)],
         height=2.4,
     )
@@ -122,7 +122,7 @@ def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: f
     left = abbott_core_chart(heights)
     title = "Power spectral density"
     if not spectrum.density.any():
-        return draw(
+        return draw_charts(
             [left, chart(f"{title}: the trace is flat", axis("wavelength"), axis("density"), [])]
         )
     name, scale = _wavelength_unit(spectrum)
@@ -145,7 +145,7 @@ def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: f
     if cutoff is not None:
         marks.append(mark("rule", GREY, "cut-off", x=cutoff * scale, dash="dotted"))
     wavelength = axis("wavelength", name, True) | {"range": [waves.min(), waves.max()]}
-    return draw([left, chart(title, wavelength, axis("density", "um$^3$", True), marks)])
+    return draw_charts([left, chart(title, wavelength, axis("density", "um$^3$", True), marks)])
 
 
 def _full_axis(label: str, unit: str, x) -> dict:
@@ -183,7 +183,7 @@ def _density_marks(
     ]
 
 
-@styled
+@returns_svg
 def draw_scan(x, y, z):
     """Draw the heights of a levelled scan and their distribution.
 
@@ -196,7 +196,7 @@ def draw_scan(x, y, z):
     -------
     matplotlib.figure.Figure
     """
-    figure, (left, right) = drawing(2, 3.8, width_ratios=(1.2, 1))
+    figure, (left, right) = make_figure(2, 3.8, width_ratios=(1.2, 1))
     known = z[~np.isnan(z)]
     _draw_map(figure, left, (x, y, z), np.quantile(known, COLOUR_QUANTILES), "viridis")
     left.set(title="Heights")
@@ -210,7 +210,7 @@ def draw_scan(x, y, z):
     return figure
 
 
-@styled
+@returns_svg
 def draw_maps(x, y, heights: tuple):
     """Draw the scan before, the scan after and the worn depth side by side.
 
@@ -223,7 +223,7 @@ def draw_maps(x, y, heights: tuple):
     -------
     matplotlib.figure.Figure
     """
-    figure, panels = drawing(3, float(np.clip(0.8 + 2.6 * np.ptp(y) / np.ptp(x), 1.6, 6.0)))
+    figure, panels = make_figure(3, float(np.clip(0.8 + 2.6 * np.ptp(y) / np.ptp(x), 1.6, 6.0)))
     before, after, depth = heights
     ends = np.quantile(before[~np.isnan(before)], COLOUR_QUANTILES)
     _draw_map(figure, panels[0], (x, y, before), ends, "viridis")
@@ -266,7 +266,7 @@ def draw_both_heights(heights: tuple) -> str:
     for z, (colour, name) in zip(heights, SIDES):
         percent = np.histogram(z, edges)[0] * 100 / z.size
         bars.append(line(middles, percent, colour, name, width=1.2))
-    return draw(
+    return draw_charts(
         [
             chart("Heights", axis("height", up), axis("share of the points", "%"), bars),
             _abbott_chart(heights),
@@ -316,7 +316,9 @@ def draw_mean_section(track, start: float, end: float) -> str:
     ]
     marks += [mark("rule", GREY, x=place * mm, dash="dotted") for place in (start, end)]
     down = depth_axis(up, [low.min(), high.max()], um)
-    return draw([chart("", _full_axis("across the track", along, x * mm), down, marks)], height=2.7)
+    return draw_charts(
+        [chart("", _full_axis("across the track", along, x * mm), down, marks)], height=2.7
+    )
 
 
 def draw_aligned(x, first, second, worn) -> str:
@@ -351,7 +353,7 @@ def draw_aligned(x, first, second, worn) -> str:
     detail_height = height | {"range": [detail.min() - 0.1 * room, detail.max() + 0.15 * room]}
     whole = chart("Both traces", _full_axis(label, along, x * mm), height, marks)
     part = chart("A part of them", _full_axis(label, along, ends * mm), detail_height, marks)
-    return draw([whole, part], height=3.4)
+    return draw_charts([whole, part], height=3.4)
 
 
 def _detail_ends(x, worn) -> np.ndarray:
@@ -374,7 +376,7 @@ def draw_separate(before, after) -> str:
     for profile, shift, (colour, name) in zip(flat, (lift, 0.0), SIDES):
         x = (profile.x - profile.x[0]) * mm
         marks.append(line(x, (profile.z + shift) * um, colour, name, most=MAX_POINTS, width=0.8))
-    return draw(
+    return draw_charts(
         [chart("", axis("along the trace", along), axis("height, shifted", up), marks)], height=3.4
     )
 
@@ -407,7 +409,7 @@ def draw_depth(x, depth, used=None, ends: tuple | None = None) -> str:
     if ends is not None:
         marks.append(mark("span", "soft", "track", left=ends[0] * mm, right=ends[1] * mm))
     place = _full_axis("x of the second trace", along, x * mm)
-    return draw([chart("", place, depth_axis(up, depth, um), marks)], height=2.5)
+    return draw_charts([chart("", place, depth_axis(up, depth, um), marks)], height=2.5)
 
 
 def draw_both_statistics(heights: tuple, spectra: tuple, band: tuple) -> str:
@@ -442,7 +444,7 @@ def draw_both_statistics(heights: tuple, spectra: tuple, band: tuple) -> str:
     right = chart(
         "Power spectral density, 95 % bands", axis("wavelength", unit, True), density, marks
     )
-    return draw([_abbott_chart(heights), right])
+    return draw_charts([_abbott_chart(heights), right])
 
 
 def draw_directions(parts: list, directions: list) -> str:
@@ -467,7 +469,7 @@ def draw_directions(parts: list, directions: list) -> str:
     places = axis("") | {"range": [0.5, len(bars) + 0.5], "ticks": ticks}
     density = axis("density", "um$^3$", True)
     left = chart("Power spectral density", axis("wavelength", unit, True), density, curves)
-    return draw([left, chart("x over y", places, axis("ratio"), marks)])
+    return draw_charts([left, chart("x over y", places, axis("ratio"), marks)])
 
 
 class PairsPanel(NamedTuple):
@@ -506,7 +508,7 @@ def draw_pairs(panels: list) -> str:
         )
         place = axis("line number in the table") | {"range": ends}
         charts.append(chart(panel.title, place, axis("", unit), marks))
-    return draw(charts, height=2.7)
+    return draw_charts(charts, height=2.7)
 
 
 class PressedSide(NamedTuple):
@@ -536,4 +538,4 @@ def draw_pressures(sides: list) -> str:
         charts.append(
             chart(f"Pressure with the surface {side.name}", _full_axis("x", along, x), up, marks)
         )
-    return draw(charts, height=2.9)
+    return draw_charts(charts, height=2.9)

@@ -13,7 +13,7 @@ from ...surface.roughness.means import KINDS, Means, average_reports
 from ...surface.roughness.peaks import TraceMoments, trace_moments
 from ...surface.roughness.report import RoughnessReport, fitting_cutoff
 from ...surface.roughness.spectrum import BAND
-from ..pages.document import Section, document, figure, prose, table, warned
+from ..pages.document import Section, document, figure, sentence_html, table, warning_box
 from . import asperities, pictures
 from .areal import write_columns, write_profile, write_x3p
 from .pictures import Picture
@@ -309,8 +309,10 @@ def write_page(path: Path, reports: list) -> None:
 
 def _means_section(means: Means) -> Section:
     """Return the section of a mean."""
-    caution = warned([f"{means.caution[0].upper()}{means.caution[1:]}."]) if means.caution else ""
-    body = f"{caution}{_means_table(means).html()}<p class=soft>{prose(MEANS)}</p>"
+    caution = (
+        warning_box([f"{means.caution[0].upper()}{means.caution[1:]}."]) if means.caution else ""
+    )
+    body = f"{caution}{_means_table(means).html()}<p class=soft>{sentence_html(MEANS)}</p>"
     return Section(f"mean-{means.kind}", _means_heading(means), body)
 
 
@@ -319,7 +321,7 @@ def _section(number: int, report: RoughnessReport) -> Section:
     parts = [
         f"<p class=verdict>{_verdict(report)}</p>",
         f"<p class=soft>{escape(heading(report))}.</p>",
-        warned([f"{text}." for text in report.notes]),
+        warning_box([f"{text}." for text in report.notes]),
     ]
     drawn = _scan_pictures(report) if report.kind == "areal" else _trace_pictures(report)
     parts += [figure(f"{number}{place}", *picture) for place, picture in enumerate(drawn)]
@@ -330,9 +332,9 @@ def _section(number: int, report: RoughnessReport) -> Section:
         )
     for reason, names in _names_by_reason(report).items():
         parts.append(
-            f"<p class=soft>No interval of {escape(', '.join(names))}: {prose(reason)}.</p>"
+            f"<p class=soft>No interval of {escape(', '.join(names))}: {sentence_html(reason)}.</p>"
         )
-    definitions = [[escape(value.name), prose(value.text)] for value in report.values]
+    definitions = [[escape(value.name), sentence_html(value.text)] for value in report.values]
     parts.append(f"<h3>Definitions</h3>{table(('', ''), definitions)}")
     if report.kind == "profile":
         parts.append(f"<pre>{escape(chr(10).join(_asperity_lines(report)))}</pre>")
@@ -371,7 +373,7 @@ def _scan_pictures(report: RoughnessReport) -> list:
         "square",
     )
     bearing = Picture(
-        pictures.draw([pictures.abbott_core_chart(report.heights, ("Smr1", "Smr2"))]),
+        pictures.draw_charts([pictures.abbott_core_chart(report.heights, ("Smr1", "Smr2"))]),
         "Abbott curve of these heights; dashed: the straight line of its core.",
         f"Abbott curve of {report.source}: core height {_text(report, 'Sk')}",
     )

@@ -10,9 +10,9 @@ from ...disk.atomic_write import write_text
 from ...formatting import choose_axis_unit, format_length
 from ...surface.quantity import LEVEL, Quantity
 from ..drawing.charts import axis, chart, line, loop, mark
-from ..drawing.pictures import draw
+from ..drawing.pictures import draw_charts
 from ..pages.document import Section, figure, table
-from ..pages.sentences import pair
+from ..pages.sentences import format_with_error
 from ..pages.sweep import label
 from .compare import SIDES, TABLE_HEADS, WORDS, Article, sides_lines
 from .pictures import GREY, Picture, PressedSide, depth_axis, draw_maps, draw_pressures
@@ -88,7 +88,7 @@ def verdict(wear: Wear) -> tuple:
     for name in HEADLINE_MEASURES:
         measures = [run.measure(name) for run in (wear.before, after)]
         if None not in measures:
-            first, second = (pair(name, measure) for measure in measures)
+            first, second = (format_with_error(name, measure) for measure in measures)
             sentences.append(f"{label(name)}: {first} before, {second} after.")
     return headline, sentences
 
@@ -168,7 +168,10 @@ def _measure_rows(wear: Wear) -> list:
             rows.append(
                 (
                     label(name),
-                    *(MISSING if measure is None else pair(name, measure) for measure in measures),
+                    *(
+                        MISSING if measure is None else format_with_error(name, measure)
+                        for measure in measures
+                    ),
                 )
             )
     return rows
@@ -215,7 +218,7 @@ def write_page(path: Path, wear: Wear, found: tuple) -> None:
             loops += loop(*run.loop, f"Friction loop {name}")
         caption = "Friction force over the slide in the last cycle."
         runs.append(
-            figure("l", draw(loops, height=2.9), caption, "Friction loops before and after")
+            figure("l", draw_charts(loops, height=2.9), caption, "Friction loops before and after")
         )
     rows = [[escape(text) for text in row] for row in _measure_rows(wear)]
     runs.append(table(("measure", ">before", ">after"), rows))
@@ -269,7 +272,9 @@ def _draw_gaps(x, gaps: tuple) -> str:
         line(x * mm, gap * um, colour, name) for gap, (colour, name) in zip(gaps, SIDE_COLOURS)
     ]
     marks.append(mark("band", "warm", "worn off", x=x * mm, low=gaps[0] * um, high=gaps[1] * um))
-    return draw([chart("", place, axis("gap of the unloaded surfaces", up), marks)], height=2.9)
+    return draw_charts(
+        [chart("", place, axis("gap of the unloaded surfaces", up), marks)], height=2.9
+    )
 
 
 def _draw_worn_depth(x, depth) -> str:
@@ -289,4 +294,4 @@ def _draw_worn_depth(x, depth) -> str:
         ),
     ]
     down = depth_axis(unit, [*hidden, 0.0, float(depth.max()), float(depth.min())], scale)
-    return draw([chart("", place, down, marks)], height=2.5)
+    return draw_charts([chart("", place, down, marks)], height=2.5)

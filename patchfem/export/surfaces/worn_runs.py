@@ -13,7 +13,7 @@ from ...surface.compare.compare import AMPLITUDE, SLOPE
 from ...surface.profile import Profile, level
 from ...surface.quantity import Quantity, make_unknown
 from ..pages import several_runs
-from ..read_results import numeric, readable, variables, wanted
+from ..read_results import is_real, reading_errors, require, variables
 
 REQUIRED = {  # possible numbers of dimensions by variable
     "x": (1,),
@@ -171,7 +171,7 @@ def compare_runs(before: Path, after: Path) -> Wear:
 
 def read_run(path: Path) -> PatchRun:
     """Read the run of a patch from a results folder; raises PatchfemError if there is none."""
-    run = several_runs.read(path)
+    run = several_runs.read_run(path)
     if "contact" not in run.resolved:
         raise PatchfemError(f"{path}: a run without [contact] has no surfaces to compare")
     file = path / "result.nc"
@@ -181,7 +181,7 @@ def read_run(path: Path) -> PatchRun:
         name: variable.values
         for name, variable in variables(file, {*REQUIRED, *OPTIONAL})[1].items()
     }
-    with readable(file, "results of a patch"):
+    with reading_errors(file, "results of a patch"):
         surface = _check_fields(fields)
     cycles = float(fields["wear_cycle"][-1]) if "wear_cycle" in fields else 0.0
     return PatchRun(
@@ -195,19 +195,19 @@ def _check_fields(fields: dict) -> PatchSurface:
     Raises ValueError if they do not match.
     """
     for name, dimensions in REQUIRED.items():
-        wanted(name in fields, f"it contains no {name}; run the scene again")
+        require(name in fields, f"it contains no {name}; run the scene again")
         values = fields[name]
-        is_field = numeric(values) and values.ndim in dimensions and np.isfinite(values).all()
-        wanted(is_field, f"{name} is not a field along the patch")
+        is_field = is_real(values) and values.ndim in dimensions and np.isfinite(values).all()
+        require(is_field, f"{name} is not a field along the patch")
     x = fields["x"]
     lengths = {fields[name].shape[-1] for name in (*REQUIRED, "worn_depth") if name in fields}
-    wanted(x.size > 1 and lengths == {x.size}, "its fields differ in length")
-    wanted((np.diff(x) > 0).all() and fields["weight"].sum() > 0, "x is not a list of positions")
+    require(x.size > 1 and lengths == {x.size}, "its fields differ in length")
+    require((np.diff(x) > 0).all() and fields["weight"].sum() > 0, "x is not a list of positions")
     y = fields.get("strip_offset")
     shape = x.shape if y is None else (y.size, x.size)
     depth = fields["worn_depth"][-1] if "worn_depth" in fields else np.zeros(x.size)
     shapes = {depth.shape, fields["unloaded_gap"].shape}
-    wanted(shapes <= {x.shape, shape}, "the fields do not match the strips")
+    require(shapes <= {x.shape, shape}, "the fields do not match the strips")
     area, gap, depth = (
         np.broadcast_to(field, shape) for field in (fields["weight"], fields["unloaded_gap"], depth)
     )

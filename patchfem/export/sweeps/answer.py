@@ -34,7 +34,7 @@ def answer_of(lead: SweepHeadline, outcome: Sequence, sign: str = "", of: Mappin
     sign : str
         Hash of what the tables were written for (`run.sign_of`).
     of : mapping
-        Scene and keys of the sweep (`run.signed_of`).
+        Scene and keys of the sweep (`run.sweep_identity`).
 
     Returns
     -------

@@ -77,12 +77,12 @@ def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseRe
             )
         file.flush()
         image = file.id.get_file_image()
-    name = f"{min(numbers)}-{max(numbers)}-{_sign(image)}{ENDING}"
+    name = f"{min(numbers)}-{max(numbers)}-{_hash(image)}{ENDING}"
     write_bytes(folder / name, image)
     return name
 
 
-def _sign(image: bytes) -> str:
+def _hash(image: bytes) -> str:
     """Return the hash of the bytes of a file."""
     return sha256(image).hexdigest()[:16]
 
@@ -90,7 +90,7 @@ def _sign(image: bytes) -> str:
 def _opened(path: Path) -> h5py.File:
     """Open a file of results; ValueError if its bytes do not match its name."""
     image = path.read_bytes()
-    if not path.stem.endswith(f"-{_sign(image)}"):
+    if not path.stem.endswith(f"-{_hash(image)}"):
         raise ValueError(f"{path.name}: damaged")
     return h5py.File(BytesIO(image), "r")
 
@@ -119,7 +119,7 @@ def read(path: Path) -> tuple[np.ndarray, CaseResults]:
     return names, found
 
 
-def names_in(path: Path) -> np.ndarray:
+def read_names(path: Path) -> np.ndarray:
     """Return the names (n,) uint64 of the cases of a file; an empty array if it is damaged."""
     try:
         with _opened(path) as file:
@@ -187,7 +187,7 @@ class Chunks:
         there.sort(key=lambda one: (one.stat().st_mtime_ns, one.name))
         self.files, others = [Path(one.path) for one in there], [self.names[:0]]
         for place, path in enumerate(self.files):
-            names = names_in(path)
+            names = read_names(path)
             at = np.minimum(np.searchsorted(known, names), known.size - 1)
             wanted = known[at] == names if known.size else np.zeros(names.size, bool)
             held[at[wanted]] = place
@@ -233,7 +233,7 @@ class Chunks:
         gone += [path for place, path in enumerate(self.files) if place not in used]
         known = np.sort(self.names) if gone and not others else self.names[:0]
         for path in gone:
-            names = names_in(path)
+            names = read_names(path)
             if (
                 others
                 or (known[np.searchsorted(known, names).clip(max=known.size - 1)] == names).all()

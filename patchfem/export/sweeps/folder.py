@@ -47,7 +47,7 @@ CASES, SUMMARY, TABLES = (
 
 
 @dataclass(frozen=True, slots=True)
-class Summaries:
+class SummaryWriter:
     """Writer of summary.json of a case, called in the process that ran the case."""
 
     cases: Cases
@@ -109,7 +109,7 @@ def _measures(found: CaseResults, case: int) -> dict:
 
 
 @dataclass(frozen=True, slots=True)
-class Whole:
+class ResultsWriter:
     """Writer of the results folder of each case.
 
     page: whether it contains report.html, which takes more space and time than all other files of a
@@ -282,7 +282,7 @@ class Folder:
     def refuse_another(self, of: dict) -> None:
         """Raise PatchfemError if the tables in the folder are of another scene or of other keys.
 
-        A resumed sweep would replace them. of: from `run.signed_of`.
+        A resumed sweep would replace them. of: from `run.sweep_identity`.
         """
         held = read_answer(self.target / "sweep.json").get("of", of)
         if held == of:

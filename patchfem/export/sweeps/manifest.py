@@ -20,7 +20,7 @@ NAME = "chunks/whole.json"
 TABLES = "sweep.csv", "sweep.nc", "sweep.json", "report.html"
 
 
-def sign(path: Path, words: Sequence[str], cases: Path | None = None) -> str:
+def hash_request(path: Path, words: Sequence[str], cases: Path | None = None) -> str:
     """Return a hash of all that a sweep depends on; "" if it cannot be computed.
 
     It covers the scene, the words of the command, the table of cases, the files that these name,
@@ -43,7 +43,7 @@ def sign(path: Path, words: Sequence[str], cases: Path | None = None) -> str:
         files = hash_named_files(
             [*iterate_texts(tomllib.loads(text)), *words, *cells], path.parent, Path()
         )
-        program = sorted(_marks(Path(__file__).parents[2].rglob("*.py")))
+        program = sorted(_file_stamps(Path(__file__).parents[2].rglob("*.py")))
     except (OSError, ValueError):
         return ""
     return sha256(
@@ -73,10 +73,10 @@ def _files(folder: Path) -> list:
     """Return the files of a sweep with size and time; OSError if there is no folder."""
     chunks = [Path(one.path) for one in os.scandir(folder / "chunks") if one.name != "whole.json"]
     return sorted(
-        _marks([*chunks, *(folder / name for name in TABLES if (folder / name).is_file())])
+        _file_stamps([*chunks, *(folder / name for name in TABLES if (folder / name).is_file())])
     )
 
 
-def _marks(paths) -> list:
+def _file_stamps(paths) -> list:
     """Return [path, bytes, time of the last change in ns] of each file."""
     return [[str(path), (at := path.stat()).st_size, at.st_mtime_ns] for path in paths]

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ... import __version__
-from ...campaigns.sweeps.case_models import Asked
+from ...campaigns.sweeps.case_models import SweepScene
 from ...campaigns.sweeps.cases import Cases
 from ...core import PatchfemError
 from ...disk.atomic_write import write_text
@@ -22,11 +22,11 @@ from ...runs.batch.case_results import CaseResults
 from ...runs.results.result import meaning
 from ..pages import sweep
 from ..pages.headline import SweepHeadline
-from ..read_results import HUGE, wanted
+from ..read_results import MAX_NUMBER, require
 from ..written import NUMBER
 from .tables import FACTS, facts, names_of
 
-AGAIN = "--cases", "sweep.csv"  # arguments for cases in rows whose command is not known
+REPEAT_WORDS = "--cases", "sweep.csv"  # arguments for cases in rows whose command is not known
 # Files that a click on a case opens: its page if there is one, else its summary.
 WHOLE, SHORT = (
     "report.html",
@@ -39,12 +39,12 @@ def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:
     write_text(folder / WHOLE, sweep.page(table, lead))
 
 
-def table_of(asked: Asked, cases: Cases, found: CaseResults, keys: list, folder: Path) -> dict:
+def table_of(asked: SweepScene, cases: Cases, found: CaseResults, keys: list, folder: Path) -> dict:
     """Return the table for `pages.sweep.page` from the results of the cases.
 
     Parameters
     ----------
-    asked : Asked
+    asked : SweepScene
     cases : Cases
     found : CaseResults
     keys : list of str
@@ -69,7 +69,7 @@ def table_of(asked: Asked, cases: Cases, found: CaseResults, keys: list, folder:
         if name not in [axis.name for axis in cases.axes]
     }
     return {
-        **titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem),
+        **page_titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem),
         "version": __version__,
         **_shared(facts(asked, cases), columns),
         "command": command(asked, cases),
@@ -81,7 +81,7 @@ def table_of(asked: Asked, cases: Cases, found: CaseResults, keys: list, folder:
         "measures": measures,
         "outcome": [str(one) for one in found.outcome],
         "messages": found.messages,
-        "folders": [opened(folder, key) for key in keys] if len(keys) else None,
+        "folders": [case_link(folder, key) for key in keys] if len(keys) else None,
     }
 
 
@@ -95,7 +95,7 @@ def columns_of(cases: Cases) -> list:
             "unit": axis.unit or "1",
             "texts": axis.texts if cases.rows else [axis.texts[k] for k in place],
             "values": numbers(axis.values)[place],
-            "log": wide(axis.values),
+            "log": suits_log_axis(axis.values),
         }
         for axis, place in zip(cases.axes, places)
     ]
@@ -120,7 +120,7 @@ def _shared(held: dict, columns: list) -> dict:
     }
 
 
-def titles(columns: list, of: str) -> dict:
+def page_titles(columns: list, of: str) -> dict:
     """Return the title of the page, made of the swept keys, and the title of the scene.
 
     The title of the scene refers to the values before the keys were changed.
@@ -128,7 +128,7 @@ def titles(columns: list, of: str) -> dict:
     return {"title": f"Sweep of {' × '.join(one['name'] for one in columns)}", "of": of}
 
 
-def opened(folder: Path, key: str) -> str:
+def case_link(folder: Path, key: str) -> str:
     """Return the file that a click on a case opens, relative to the page."""
     return f"cases/{key}/{WHOLE if (folder / 'cases' / key / WHOLE).is_file() else SHORT}"
 
@@ -141,7 +141,7 @@ def numbers(values) -> np.ndarray:
     return np.array([order[one] for one in values], float)
 
 
-def wide(values) -> bool:
+def suits_log_axis(values) -> bool:
     """Return whether a logarithmic axis suits these values.
 
     It does if none is negative and the largest is at least ten times the smallest positive one. A
@@ -161,7 +161,7 @@ def wide(values) -> bool:
     return bool(above[-1] >= 10 * above[0])
 
 
-def command(asked: Asked, cases: Cases) -> str:
+def command(asked: SweepScene, cases: Cases) -> str:
     """Return the command line that computes the same cases."""
     words = [
         "patchfem",
@@ -171,7 +171,7 @@ def command(asked: Asked, cases: Cases) -> str:
         *(("--of", asked.of) if asked.of else ()),
     ]
     if cases.rows:
-        return shlex.join([*words, *(cases.words or AGAIN)])
+        return shlex.join([*words, *(cases.words or REPEAT_WORDS)])
     return shlex.join(
         [
             *words,
@@ -195,9 +195,9 @@ def read_table(folder: Path) -> dict:
     try:
         with open(folder / "sweep.csv", newline="", encoding="utf-8") as file:
             head, *rows = csv.reader(file)
-        wanted(rows and "outcome" in head and "message" in head, "sweep.csv contains no case")
+        require(rows and "outcome" in head and "message" in head, "sweep.csv contains no case")
         lengths = {number for number, row in enumerate(rows, 2) if len(row) != len(head)}
-        wanted(
+        require(
             not lengths,
             f"sweep.csv: a row of {len(head)} fields is needed in line {min(lengths, default=0)}",
         )
@@ -230,12 +230,12 @@ def _whole(table: dict) -> dict:
         for part in ("values", "errors", "floors")
     ]
     for name, values in parts:
-        wanted(
+        require(
             np.shape(values) == (count,), f"{name} has {np.size(values)} values for {count} cases"
         )
-        wanted(
-            np.abs(values[np.isfinite(values)]).max(initial=0.0) < HUGE,
-            f"{name} contains a number beyond {HUGE:g}",
+        require(
+            np.abs(values[np.isfinite(values)]).max(initial=0.0) < MAX_NUMBER,
+            f"{name} contains a number beyond {MAX_NUMBER:g}",
         )
     return table
 
@@ -260,7 +260,7 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
                 "unit": str(held.attrs.get("units", "1")),
                 "texts": texts,
                 "values": values,
-                "log": wide(values.tolist()),
+                "log": suits_log_axis(values.tolist()),
             }
         )
     measures = {
@@ -277,7 +277,7 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
         if f"{name}_error" in file.variables
     }
     text, sets = str(file.attrs["scene"]), json.loads(str(file.attrs["sets"]))
-    words = json.loads(str(file.attrs.get("words", "[]"))) or AGAIN
+    words = json.loads(str(file.attrs.get("words", "[]"))) or REPEAT_WORDS
     overs = (
         words
         if "case" in file.dimensions
@@ -289,12 +289,12 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
     )
     held = {name: float(file.attrs[name]) for name in FACTS if name in file.attrs}
     title = tomllib.loads(text).get("title") or folder.resolve().name
-    wanted(
+    require(
         isinstance(title, str) and all(isinstance(one, list | tuple) for one in (sets, words)),
         "sweep.nc: the scene, the --set or the cases stored in this file cannot be read",
     )
     return {
-        **titles(columns, title),
+        **page_titles(columns, title),
         **_shared(held, columns),
         "version": str(file.attrs["source"]).removeprefix("patchfem "),
         "scene": text,
@@ -313,13 +313,13 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
         "measures": measures,
         "outcome": [row["outcome"] for row in rows],
         "messages": {number: row["message"] for number, row in enumerate(rows) if row["message"]},
-        "folders": [opened(folder, row["case"]) for row in rows]
+        "folders": [case_link(folder, row["case"]) for row in rows]
         if rows and "case" in rows[0]
         else None,
     }
 
 
-def joined(tables: list, names: list) -> dict:
+def join_tables(tables: list, names: list) -> dict:
     """Return one table of several sweeps, with a key `sweep` whose values are their names.
 
     PatchfemError if they do not have the same keys.
@@ -404,7 +404,7 @@ def joined(tables: list, names: list) -> dict:
     }
 
 
-def seen_from(table: dict, folder: Path, page: Path) -> dict:
+def relink_cases(table: dict, folder: Path, page: Path) -> dict:
     """Return the table with links of its cases that are relative to another page."""
     if table["folders"] is None:
         return table

@@ -12,24 +12,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...campaigns.sweeps.case_models import Asked
+from ...campaigns.sweeps.case_models import SweepScene
 from ...campaigns.sweeps.cases import Cases
-from ...campaigns.sweeps.estimate import FEW, TABLED
-from ...campaigns.sweeps.executors.cluster import own_of
-from ...campaigns.sweeps.sweep import Clock, Work, solved
+from ...campaigns.sweeps.estimate import MAX_CASES_WITH_SUMMARY, MAX_CASES_WITH_TABLES
+from ...campaigns.sweeps.executors.cluster import environment_versions
+from ...campaigns.sweeps.sweep import RemainingTime, Work, iterate_chunks
 from ...core import Missing, PatchfemError
 from ...runs.batch.case_results import CaseResults
 from ...scene.axes import Axis, FormattedNumbers
 from .. import netcdf
-from ..pages.headline import lead_of
+from ..pages.headline import summarise_sweep
 from .answer import answer_of, read_answer, write_answer
-from .folder import TABLES, Folder, Summaries, Whole, Writer
-from .page import WHOLE, command, opened, table_of, write_page
+from .folder import TABLES, Folder, ResultsWriter, SummaryWriter, Writer
+from .page import WHOLE, case_link, command, table_of, write_page
 from .tables import contents, write_csv
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class SweepTarget:
     """Where and how a sweep is stored.
 
     Attributes
@@ -55,13 +55,13 @@ class Place:
 
     def kept(self, count: int) -> str:
         """Return what is stored of each case of a sweep with `count` cases."""
-        return self.keep or ("summaries" if count <= FEW else "none")
+        return self.keep or ("summaries" if count <= MAX_CASES_WITH_SUMMARY else "none")
 
 
 def sweep_into(
-    asked: Asked,
+    asked: SweepScene,
     cases: Cases,
-    place: Place,
+    place: SweepTarget,
     executor,
     say: Callable | None = None,
     told: Callable | None = None,
@@ -73,9 +73,9 @@ def sweep_into(
 
     Parameters
     ----------
-    asked : Asked
+    asked : SweepScene
     cases : Cases
-    place : Place
+    place : SweepTarget
     executor : object
         From `campaigns.sweeps.executors`.
     say : callable, optional
@@ -91,7 +91,7 @@ def sweep_into(
     shared, keep = place.shard is not None, place.kept(len(cases))
     with Folder(place.target, cases.names(asked), shared) as folder:
         if place.resume:
-            folder.refuse_another(signed_of(asked, cases))
+            folder.refuse_another(sweep_identity(asked, cases))
             if folder.chunks.others and folder.whole() and say is not None:
                 say(_left_out(folder.chunks.others))
         wanted = _part(len(cases), place.shard)
@@ -120,7 +120,7 @@ def sweep_into(
         except (KeyboardInterrupt, PatchfemError):
             if not shared:
                 with suppress(PatchfemError):
-                    _so_far(asked, cases, folder, folder.answers(total), place.page)
+                    _write_partial_tables(asked, cases, folder, folder.answers(total), place.page)
             raise
         if shared:
             return total
@@ -128,13 +128,13 @@ def sweep_into(
         for numbers, found in died:
             total.place(numbers, found)
         sign = sign_of(asked, cases, folder, place.page)
-        if left.size or not _written(sign, folder, place.page):
+        if left.size or not _tables_are_current(sign, folder, place.page):
             write_tables(asked, cases, total, folder, place.page, sign="" if died else sign)
         folder.tidy(not place.resume, keep)
     return total
 
 
-def signed_of(asked: Asked, cases: Cases) -> dict:
+def sweep_identity(asked: SweepScene, cases: Cases) -> dict:
     """Return scene (as a hash) and keys of a sweep, by which `--resume` recognises it."""
     return {"scene": asked.digest(), "keys": [axis.key for axis in cases.axes]}
 
@@ -149,7 +149,9 @@ def _left_out(count: int) -> str:
     )
 
 
-def _so_far(asked: Asked, cases: Cases, folder: Folder, found: CaseResults, page: bool) -> None:
+def _write_partial_tables(
+    asked: SweepScene, cases: Cases, folder: Folder, found: CaseResults, page: bool
+) -> None:
     """Write the tables of an interrupted sweep, if it has any results."""
     if any(found.outcome):
         write_tables(asked, cases, found, folder, page)
@@ -159,7 +161,7 @@ def _so_far(asked: Asked, cases: Cases, folder: Folder, found: CaseResults, page
 class Jobs(NamedTuple):
     """The cases of a sweep, the folder for them, and what is stored of each case."""
 
-    asked: Asked
+    asked: SweepScene
     cases: Cases
     folder: Folder
     keep: str
@@ -183,13 +185,17 @@ def _solve(
         told(done, seconds left or None) is called as cases are done.
     """
     keep, folder, names, died = jobs.keep, jobs.folder, jobs.folder.chunks.names, []
-    clock = Clock(numbers.size, executor.workers)
+    clock = RemainingTime(numbers.size, executor.workers)
     writer = Writer(folder.target, folder.shown, names, keep, folder.token)
-    whole = Whole(folder.target, names, keep == "pages") if keep in ("results", "pages") else None
-    work = Work(
-        jobs.asked, jobs.cases, None if keep == "none" else Summaries(jobs.cases), whole, writer
+    whole = (
+        ResultsWriter(folder.target, names, keep == "pages")
+        if keep in ("results", "pages")
+        else None
     )
-    for chunk, found, texts, seconds in solved(work, numbers.tolist(), executor, say):
+    work = Work(
+        jobs.asked, jobs.cases, None if keep == "none" else SummaryWriter(jobs.cases), whole, writer
+    )
+    for chunk, found, texts, seconds in iterate_chunks(work, numbers.tolist(), executor, say):
         if texts is None:
             died.append((chunk, found))
         elif found is not None:  # The worker has no access to the folder, or found it full.
@@ -200,15 +206,15 @@ def _solve(
     return died
 
 
-def swept(
-    asked: Asked, cases: Cases, executor, say: Callable | None = None, estimate: bool = True
+def compute_in_memory(
+    asked: SweepScene, cases: Cases, executor, say: Callable | None = None, estimate: bool = True
 ) -> CaseResults:
     """Compute the cases in memory only.
 
     estimate: whether errors are computed for cases that run one by one.
     """
     total = CaseResults.blank(len(cases))
-    for numbers, found, *_ in solved(
+    for numbers, found, *_ in iterate_chunks(
         Work(asked, cases, estimate=estimate), range(len(cases)), executor, say
     ):
         for part in (found.warnings, found.notes, found.numerics):  # no table contains these
@@ -217,7 +223,7 @@ def swept(
     return total
 
 
-def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> CaseResults:
+def collect(asked: SweepScene, cases: Cases, target: Path, page: bool = True) -> CaseResults:
     """Write all tables of a sweep whose shards are complete, from its folder.
 
     Missing if cases have no result yet.
@@ -235,18 +241,18 @@ def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Case
     return found
 
 
-def sign_of(asked: Asked, cases: Cases, folder: Folder, page: bool) -> str:
+def sign_of(asked: SweepScene, cases: Cases, folder: Folder, page: bool) -> str:
     """Return a hash of all that the tables of a complete sweep depend on.
 
     If sweep.json contains this hash, the tables exist.
     """
     made = [
-        own_of()["patchfem"],
+        environment_versions()["patchfem"],
         asked.text,
         [(axis.key, *_shown(axis)) for axis in cases.axes],
         command(asked, cases),
         page,
-        [opened(folder.target, key) for key in folder.keys()],
+        [case_link(folder.target, key) for key in folder.keys()],
     ]
     return sha256(json.dumps(made).encode() + folder.chunks.names.tobytes()).hexdigest()
 
@@ -261,16 +267,16 @@ def _shown(axis: Axis) -> tuple:
     )
 
 
-def _written(sign: str, folder: Folder, page: bool) -> bool:
+def _tables_are_current(sign: str, folder: Folder, page: bool) -> bool:
     """Return whether all tables of a sweep with this hash exist and are up to date."""
-    names = TABLES if len(folder.chunks.names) <= TABLED else ("sweep.json", WHOLE)
+    names = TABLES if len(folder.chunks.names) <= MAX_CASES_WITH_TABLES else ("sweep.json", WHOLE)
     return read_answer(folder.target / "sweep.json").get("sign") == sign and all(
         (folder.target / name).is_file() for name in names if page or name != WHOLE
     )
 
 
 def write_tables(
-    asked: Asked,
+    asked: SweepScene,
     cases: Cases,
     found: CaseResults,
     folder: Folder,
@@ -284,7 +290,7 @@ def write_tables(
 
     Parameters
     ----------
-    asked : Asked
+    asked : SweepScene
     cases : Cases
     found : CaseResults
     folder : Folder
@@ -295,9 +301,9 @@ def write_tables(
     sign : str
         From `sign_of` if every case has a result that is stored; else "".
     """
-    keys, tabled = folder.keys(), every or len(cases) <= TABLED
+    keys, tabled = folder.keys(), every or len(cases) <= MAX_CASES_WITH_TABLES
     table = table_of(asked, cases, found, keys, folder.target) | {"tabled": tabled}
-    lead = lead_of(table)
+    lead = summarise_sweep(table)
     for name in () if tabled else ("sweep.csv", "sweep.nc"):
         (folder.target / name).unlink(missing_ok=True)
     if tabled:
@@ -309,7 +315,7 @@ def write_tables(
         (folder.target / WHOLE).unlink(missing_ok=True)
     # This file comes last, because it contains the hash of the others.
     write_answer(
-        answer_of(lead, table["outcome"], sign, signed_of(asked, cases)),
+        answer_of(lead, table["outcome"], sign, sweep_identity(asked, cases)),
         folder.target / "sweep.json",
     )
 

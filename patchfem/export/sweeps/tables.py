@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import __version__
-from ...campaigns.sweeps.case_models import Asked
+from ...campaigns.sweeps.case_models import SweepScene
 from ...campaigns.sweeps.cases import Cases
 from ...core import PatchfemError
 from ...disk.atomic_write import write_rows
@@ -112,7 +112,7 @@ def write_csv(cases: Cases, found: CaseResults, keys: Sequence[str], path: Path)
 
 
 def contents(
-    asked: Asked, cases: Cases, found: CaseResults, keys: Sequence[str] = (), answer: str = ""
+    asked: SweepScene, cases: Cases, found: CaseResults, keys: Sequence[str] = (), answer: str = ""
 ) -> netcdf.Contents:
     """Return the content of sweep.nc in SI.
 
@@ -122,7 +122,7 @@ def contents(
 
     Parameters
     ----------
-    asked : Asked
+    asked : SweepScene
     cases : Cases
     found : CaseResults
     keys : sequence of str
@@ -172,7 +172,7 @@ def contents(
     return netcdf.Contents(data, coordinates, _attributes(asked, cases, answer))
 
 
-def _attributes(asked: Asked, cases: Cases, answer: str) -> dict:
+def _attributes(asked: SweepScene, cases: Cases, answer: str) -> dict:
     """Return the attributes of sweep.nc: its scene, its command and the versions."""
     return {
         "Conventions": "CF-1.11",
@@ -190,7 +190,7 @@ def _attributes(asked: Asked, cases: Cases, answer: str) -> dict:
     }
 
 
-def facts(asked: Asked, cases: Cases) -> dict:
+def facts(asked: SweepScene, cases: Cases) -> dict:
     """Collect the FACTS that all cases share and that are not swept.
 
     These are the tolerance, the size of the patch [m] and the ends of the swept frequencies [Hz].

@@ -9,11 +9,11 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem import SceneError, build, run
-from patchfem.campaigns.rows.asked import Asked, Question
-from patchfem.campaigns.rows.cells import cells_of
-from patchfem.campaigns.rows.computed import Computed
-from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
-from patchfem.campaigns.rows.search import residual_of
+from patchfem.campaigns.rows.asked import ConditionModels, FitRequest
+from patchfem.campaigns.rows.cells import read_readings
+from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
+from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits.rows import Starts, describe_answer
 from patchfem.runs.batch.watched import MotionObserver
@@ -95,8 +95,10 @@ def free(*texts):
 
 
 def fitted(scene, path, wanted, **beside):
-    how = Search(beside.pop("starts", 2), beside.pop("seed", 0), beside.pop("unstable", "bound"))
-    return fit_rows(Question(scene, wanted, path), RowsOptions(how=how, **beside))
+    how = SearchSettings(
+        beside.pop("starts", 2), beside.pop("seed", 0), beside.pop("unstable", "bound")
+    )
+    return fit_rows(FitRequest(scene, wanted, path), RowsOptions(how=how, **beside))
 
 
 LINEAR_FREE = (
@@ -215,9 +217,9 @@ def test_always_rows_held_out_or_left_out_do_not_change_the_fit(tmp_path, rubbed
 
 def test_exact_a_watched_motion_is_that_of_a_run(tmp_path, rubbed):
     path = table(tmp_path, rubbed)
-    cells = cells_of(path)
-    asked = Asked(scene_of(tmp_path, RUBS), cells.conditions, free(*RUBS_FREE), path)
-    computed = Computed(asked)
+    cells = read_readings(path)
+    asked = ConditionModels(scene_of(tmp_path, RUBS), cells.conditions, free(*RUBS_FREE), path)
+    computed = ModelReadings(asked)
     cold = np.array(computed([0.45, 2.4e6], range(6)))
     assert np.abs(cells.logs(*cold)).max() < 1e-6  # marched rows: 400 cycles leave that much
     computed([0.46, 2.5e6], range(6))
@@ -240,13 +242,13 @@ def test_exact_a_marched_motion_is_watched_as_it_runs():
 def test_rows_flagged_u_are_lower_bounds(tmp_path):
     """A computed response above a bound counts nothing, below it as any other; a row left out counts nothing."""
     path = table(tmp_path, [(*row[:4], "U" if row[0] == 143 else "") for row in linear_rows()])
-    cells, scene = cells_of(path), scene_of(tmp_path, LINEAR)
-    computed = Computed(Asked(scene, cells.conditions, free(*LINEAR_FREE), path))
+    cells, scene = read_readings(path), scene_of(tmp_path, LINEAR)
+    computed = ModelReadings(ConditionModels(scene, cells.conditions, free(*LINEAR_FREE), path))
     every = np.ones(cells.row.size, bool)
     for damping, is_above in ((0.01, True), (0.1, False)):
         logs = cells.logs(*computed([141.0, damping], range(5)))
         found = {
-            what: residual_of(cells, computed, every, what)([141.0, damping])
+            what: make_residual(cells, computed, every, what)([141.0, damping])
             for what in ("bound", "out", "read")
         }
         assert np.array_equal(found["read"], logs) and np.array_equal(
@@ -367,8 +369,8 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     file = tmp_path / "starts.json"
 
     def go(question, resume):
-        how = Search(2, 0, "bound", Starts(file, question, resume))
-        return fit_rows(Question(scene, wanted, path), RowsOptions(how=how))
+        how = SearchSettings(2, 0, "bound", Starts(file, question, resume))
+        return fit_rows(FitRequest(scene, wanted, path), RowsOptions(how=how))
 
     first = go("one", False)
     again = go("one", True)

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchfem.campaigns.rows.cells import FLOOR, MOST, cells_of, scores
-from patchfem.campaigns.rows.null_models import NULLS, predicted
+from patchfem.campaigns.rows.cells import MAX_LOG, MIN_DISPLACEMENT, read_readings, scores
+from patchfem.campaigns.rows.null_models import NULLS, fit_null_model
 from patchfem.core import G_N, PatchfemError
 
 TABLE_1 = Path(__file__).parents[3] / "studies" / "rig" / "table1.csv"
@@ -21,7 +21,7 @@ def table(tmp_path, *rows):
 
 
 def test_table_1_has_the_readings_of_the_report():
-    cells = cells_of(TABLE_1)
+    cells = read_readings(TABLE_1)
     assert (np.count_nonzero(cells.felt), np.count_nonzero(~cells.felt)) == (27, 8)
     assert len(cells.conditions) == 20 and cells.empty == [8]  # 143 Hz, 8 g: unstable, nothing read
     assert np.count_nonzero(cells.unstable) == 4
@@ -29,21 +29,23 @@ def test_table_1_has_the_readings_of_the_report():
 
 
 def test_exact_repeats_of_a_condition_are_readings_of_their_own(tmp_path):
-    cells = cells_of(table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "150,4,,,U", "143,5,6,,"))
+    cells = read_readings(
+        table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "150,4,,,U", "143,5,6,,")
+    )
     assert cells.condition.tolist() == [0, 0, 0, 1] and cells.row.tolist() == [0, 0, 1, 3]
     assert cells.conditions.tolist() == [[143.0, 4 * G_N], [143.0, 5 * G_N]]
     logs = cells.logs([4.5 * G_N, np.inf], [0.2 * MIL, 1.0])
-    assert logs == pytest.approx([np.log(0.9), np.log(2), np.log(4.5 / 4), MOST], rel=1e-14)
+    assert logs == pytest.approx([np.log(0.9), np.log(2), np.log(4.5 / 4), MAX_LOG], rel=1e-14)
 
 
 def test_exact_displacements_below_the_floor_count_as_the_floor(tmp_path):
-    cells = cells_of(table(tmp_path, "143,4,,0.001,", "143,5,,0.02,"))
-    logs = cells.logs([1.0, 1.0], [FLOOR / 10, FLOOR / 10])
+    cells = read_readings(table(tmp_path, "143,4,,0.001,", "143,5,,0.02,"))
+    logs = cells.logs([1.0, 1.0], [MIN_DISPLACEMENT / 10, MIN_DISPLACEMENT / 10])
     assert logs == pytest.approx([0.0, np.log(0.5)], abs=1e-14)
 
 
 def test_exact_scores_are_root_mean_squares_by_kind(tmp_path):
-    cells = cells_of(table(tmp_path, "143,4,5.0,0.1,", "143,5,6,,"))
+    cells = read_readings(table(tmp_path, "143,4,5.0,0.1,", "143,5,6,,"))
     found = scores(cells, [0.3, 0.4, -0.5], np.array([True, True, True]))
     assert found == pytest.approx(
         {"acceleration": np.sqrt(0.17), "displacement": 0.4, "all": np.sqrt(0.5 / 3)}
@@ -53,7 +55,7 @@ def test_exact_scores_are_root_mean_squares_by_kind(tmp_path):
 
 
 def test_held_rows_are_named_by_frequency_input_flag_or_run(tmp_path):
-    cells = cells_of(table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "0150,4,5,,U"))
+    cells = read_readings(table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "0150,4,5,,U"))
     assert cells.chosen("frequency=150 Hz").tolist() == [False, False, False, True]
     assert cells.chosen("frequency=0.143 kHz,150 Hz").all()
     assert cells.chosen("input=4 g").all()
@@ -79,7 +81,7 @@ def test_held_rows_are_named_by_frequency_input_flag_or_run(tmp_path):
 )
 def test_refuses_rows_to_hold_that_are_not_there(tmp_path, text, wanted):
     with pytest.raises(PatchfemError, match=wanted):
-        cells_of(table(tmp_path, "143,4,5.0,0.1,")).chosen(text)
+        read_readings(table(tmp_path, "143,4,5.0,0.1,")).chosen(text)
 
 
 @pytest.mark.parametrize(
@@ -92,25 +94,25 @@ def test_refuses_rows_to_hold_that_are_not_there(tmp_path, text, wanted):
 )
 def test_refuses_rows_that_have_no_ratio(tmp_path, row, wanted):
     with pytest.raises(PatchfemError, match=wanted):
-        cells_of(table(tmp_path, row))
+        read_readings(table(tmp_path, row))
 
 
 def test_table_1_null_scores_are_those_of_the_closed_forms():
     """By hand: a mean of logarithms, and normal equations solved as they stand."""
-    cells = cells_of(TABLE_1)
+    cells = read_readings(TABLE_1)
     f, a = cells.conditions[cells.condition].T
     train = ~cells.chosen("frequency=135 Hz,150 Hz,155 Hz")
     every = np.ones(train.size, bool)
     for kind in (cells.felt, ~cells.felt):
         ratio = np.log(cells.measured / a)
-        logs, _ = predicted(cells, "constant", train)
+        logs, _ = fit_null_model(cells, "constant", train)
         assert np.abs(logs - (ratio[kind & train].mean() - ratio))[kind].max() < 1e-12
     table, y = (
         np.stack([0 * f + 1, np.log(a), np.log(f)], axis=1)[cells.felt],
         np.log(cells.measured)[cells.felt],
     )
     factor = np.linalg.solve(table.T @ table, table.T @ y)
-    logs, numbers = predicted(cells, "power_input_frequency", every)
+    logs, numbers = fit_null_model(cells, "power_input_frequency", every)
     assert np.abs(logs[cells.felt] - (table @ factor - y)).max() < 1e-8
     assert numbers["acceleration"] == pytest.approx(
         {"factor": np.exp(factor[0]), "input": factor[1], "frequency": factor[2]}, rel=1e-6
@@ -119,12 +121,12 @@ def test_table_1_null_scores_are_those_of_the_closed_forms():
 
 def test_table_1_null_scores_leave_one_frequency_out():
     """The constant and the strong null, as an independent program found them: .125 and .090 of the accelerations."""
-    cells = cells_of(TABLE_1)
+    cells = read_readings(TABLE_1)
     every, found = np.ones(cells.row.size, bool), {}
     for name in NULLS:
         left = np.full(cells.row.size, np.nan)
         for _, part in cells.parts("frequency", every):
-            left[part] = predicted(cells, name, ~part)[0][part]
+            left[part] = fit_null_model(cells, name, ~part)[0][part]
         found[name] = scores(cells, left, every)
     assert found["constant"] == pytest.approx(
         {"acceleration": 0.125, "displacement": 0.580, "all": 0.298}, abs=6e-4
@@ -134,13 +136,13 @@ def test_table_1_null_scores_leave_one_frequency_out():
 
 def test_exact_a_null_keeps_what_its_rows_do_not_determine(tmp_path):
     """At one frequency its power stays 0, at one input the power of the input 1."""
-    cells = cells_of(table(tmp_path, "143,4,5,,", "143,5,7,,", "150,4,9,,"))
-    one = predicted(cells, "power_input_frequency", np.array([True, True, False]))[1][
+    cells = read_readings(table(tmp_path, "143,4,5,,", "143,5,7,,", "150,4,9,,"))
+    one = fit_null_model(cells, "power_input_frequency", np.array([True, True, False]))[1][
         "acceleration"
     ]
     assert one["frequency"] == pytest.approx(0.0, abs=1e-12)
     assert one["input"] == pytest.approx(np.log(7 / 5) / np.log(5 / 4), rel=1e-12)
-    two = predicted(cells, "power_input_frequency", np.array([True, False, True]))[1][
+    two = fit_null_model(cells, "power_input_frequency", np.array([True, False, True]))[1][
         "acceleration"
     ]
     assert two["input"] == pytest.approx(1.0, abs=1e-12)

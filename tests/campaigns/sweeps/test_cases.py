@@ -8,9 +8,9 @@ import pytest
 from scene_texts import BENCH, PATCH, SMALL_PATCH
 
 from patchfem import SceneError
-from patchfem.campaigns.sweeps.case_models import Asked
+from patchfem.campaigns.sweeps.case_models import SweepScene
 from patchfem.campaigns.sweeps.cases import Cases, product
-from patchfem.campaigns.sweeps.parse_request import Request, cases_of
+from patchfem.campaigns.sweeps.parse_request import Request, read_cases
 from patchfem.scene.axes import read_axes
 from patchfem.scene.scene import loads
 
@@ -52,7 +52,7 @@ def test_exact_rows_beside_lists():
 
 
 def test_exact_a_name_says_what_is_computed():
-    asked = Asked(Path("a.toml"), BENCH)
+    asked = SweepScene(Path("a.toml"), BENCH)
     one = cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").names(asked).tolist()
     assert len(set(one)) == 4
     other = cases("friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN").names(asked)
@@ -63,7 +63,7 @@ def test_exact_a_name_says_what_is_computed():
     swept = BENCH + '[sweep]\n"normal.load" = "1 N"\n'
     assert (
         cases("normal.load=1 N,2 N", "friction.static=0.1,0.2")
-        .names(Asked(Path("a.toml"), swept))
+        .names(SweepScene(Path("a.toml"), swept))
         .tolist()
         == one
     )
@@ -89,7 +89,7 @@ def test_exact_cases_of_the_same_pieces_follow_each_other():
 
 
 def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
-    pinned, chosen = Asked(Path("a.toml"), SMALL_PATCH), Asked(Path("a.toml"), PATCH)
+    pinned, chosen = SweepScene(Path("a.toml"), SMALL_PATCH), SweepScene(Path("a.toml"), PATCH)
     one, two = cases("contact.load=1 N,2 N"), cases("contact.load=1 N,3 N")
     assert (
         one.names(pinned)[0] == two.names(pinned)[0]
@@ -98,7 +98,7 @@ def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
     assert (
         one.names(chosen).tolist() == cases("contact.load=2 N,1e-3 kN").names(chosen)[::-1].tolist()
     )
-    sets = Asked(Path("a.toml"), PATCH, ("contact.element_size=1 mm",))
+    sets = SweepScene(Path("a.toml"), PATCH, ("contact.element_size=1 mm",))
     assert one.names(sets)[0] == two.names(sets)[0]
     sizes = [cases(f"contact.element_size=1 mm,{other} mm").names(chosen)[0] for other in (2, 3)]
     assert sizes[0] == sizes[1]  # each case pins its own
@@ -108,8 +108,8 @@ def test_exact_the_content_of_a_file_is_part_of_the_name(tmp_path):
     path = tmp_path / "path.csv"
     path.write_text("time [s],displacement [m]\n0,0\n1,1e-6\n")
     text = BENCH[: BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
-    asked, found = Asked(tmp_path / "a.toml", text), cases("normal.load=1 N")
-    asked_beside, beside = Asked(tmp_path / "a.toml", BENCH), cases("slide.file=path.csv")
+    asked, found = SweepScene(tmp_path / "a.toml", text), cases("normal.load=1 N")
+    asked_beside, beside = SweepScene(tmp_path / "a.toml", BENCH), cases("slide.file=path.csv")
     before = found.names(asked), beside.names(asked_beside)
     path.write_text("time [s],displacement [m]\n0,0\n1,2e-6\n")
     assert found.names(asked)[0] != before[0][0] and beside.names(asked_beside)[0] != before[1][0]
@@ -123,7 +123,7 @@ def test_exact_a_case_is_the_scene_with_its_values_set():
         BENCH + '[sweep]\n"friction.static" = "0.1, 0.2"\n',
     ):
         for sets in (("friction.static=0.1",), ("friction.static=0.2", "normal.load=1 N")):
-            found, want = Asked(Path("a.toml"), text).scene(sets), loads(BENCH, "a.toml", sets)
+            found, want = SweepScene(Path("a.toml"), text).scene(sets), loads(BENCH, "a.toml", sets)
             assert found.tables() == want.tables() and found.sweep == () and found.kind == want.kind
 
 
@@ -145,7 +145,9 @@ def test_always_spread_cases_hold_the_ends_of_every_axis():
 def test_exact_a_mistake_of_all_drawn_cases_is_reported_once():
     text = BENCH.replace("static = 0.3", "static = 0.3\nkinetic = 0.3")
     with pytest.raises(SceneError) as refused:
-        cases_of(Asked(Path("a.toml"), text), Request(("friction.static=0.2..0.25",), None, 100))
+        read_cases(
+            SweepScene(Path("a.toml"), text), Request(("friction.static=0.2..0.25",), None, 100)
+        )
     assert str(refused.value).count("is larger than static") == 1 and "more" not in str(
         refused.value
     )

@@ -11,11 +11,11 @@ import pytest
 from command_line import cli
 from scene_texts import BENCH
 
-from patchfem.campaigns.sweeps.case_models import Asked
+from patchfem.campaigns.sweeps.case_models import SweepScene
 from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import cluster
-from patchfem.campaigns.sweeps.executors.cluster import Cluster, _answer, own_of
-from patchfem.campaigns.sweeps.sweep import Work, answer
+from patchfem.campaigns.sweeps.executors.cluster import Cluster, _answer, environment_versions
+from patchfem.campaigns.sweeps.sweep import Work, compute_chunk
 from patchfem.core import Missing
 from patchfem.scene.axes import read_axes
 
@@ -32,7 +32,7 @@ time.sleep(100)
 
 
 def work(place: Path, text=BENCH, values="0.2,0.3,-1") -> Work:
-    return Work(Asked(place, text), Cases(tuple(read_axes([f"friction.static={values}"])[0])))
+    return Work(SweepScene(place, text), Cases(tuple(read_axes([f"friction.static={values}"])[0])))
 
 
 @pytest.fixture
@@ -47,8 +47,8 @@ def test_exact_a_worker_in_another_folder_answers_from_the_files_of_the_scene(sc
     """Messages name the scene as it was named where the sweep runs; the worker's folder stays as it is."""
     monkeypatch.chdir(scene.parent)
     asked = work(Path("bench.toml"), BY_FILE)
-    want, _ = answer(asked, [0, 1, 2])
-    there, mine = work(scene, BY_FILE), own_of(asked)
+    want, _ = compute_chunk(asked, [0, 1, 2])
+    there, mine = work(scene, BY_FILE), environment_versions(asked)
     monkeypatch.chdir(scene.parents[1] / "there")
     _, (found, _) = _answer(there, [0, 1, 2], (mine, Path("bench.toml")))
     assert found.messages == want.messages and len(want.messages) == 1
@@ -70,7 +70,7 @@ class Worn:
 
 def test_always_the_differences_of_a_worker_are_named():
     here = Cluster.__new__(Cluster)
-    here.name, mine = "--executor dask:tcp://x:1", own_of(work(Path("a.toml")))
+    here.name, mine = "--executor dask:tcp://x:1", environment_versions(work(Path("a.toml")))
     said = str(here._other(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine))
     assert (
         "a worker has patchfem 0.3.0 (sources 12345678), but this machine has patchfem "
@@ -92,7 +92,7 @@ SEEN = []
 def changing(asked=None) -> dict:
     """`own_of` with another version every time: by reference, as what travels to a worker by value is a copy."""
     SEEN.append(asked)
-    return own_of(asked) | {"patchfem": f"0.{len(SEEN)}"}
+    return environment_versions(asked) | {"patchfem": f"0.{len(SEEN)}"}
 
 
 def test_refuses_a_worker_of_another_version(monkeypatch):
@@ -109,7 +109,7 @@ def test_refuses_a_worker_of_another_version(monkeypatch):
         silence_logs="CRITICAL",
     ) as one:
         ready, left = Cluster(one.scheduler.address), [[0], [1]]
-        monkeypatch.setattr(cluster, "own_of", changing)
+        monkeypatch.setattr(cluster, "environment_versions", changing)
         with pytest.raises(Missing, match=said):
             Cluster(one.scheduler.address)
         with pytest.raises(Missing, match=said):

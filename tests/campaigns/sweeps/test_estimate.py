@@ -6,11 +6,11 @@ import pytest
 from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
 
 from patchfem import plan
-from patchfem.campaigns.sweeps.case_models import Asked
-from patchfem.campaigns.sweeps.estimate import ONCE, estimate
+from patchfem.campaigns.sweeps.case_models import SweepScene
+from patchfem.campaigns.sweeps.estimate import SWEEP_SECONDS, estimate
 from patchfem.campaigns.sweeps.executors import LocalExecutor
-from patchfem.campaigns.sweeps.parse_request import Request, cases_of, contradictions
-from patchfem.export.sweeps.run import Place, sweep_into
+from patchfem.campaigns.sweeps.parse_request import Request, contradictions, read_cases
+from patchfem.export.sweeps.run import SweepTarget, sweep_into
 
 
 @pytest.mark.parametrize(
@@ -18,22 +18,22 @@ from patchfem.export.sweeps.run import Place, sweep_into
     [(SMALL_PATCH, "contact.element_size=0.3 mm,1 mm,0.5 mm"), (BENCH, "slide.cycles=1,400,20")],
 )
 def test_exact_a_sweep_takes_what_its_cases_take_but_for_what_is_done_once(text, over):
-    asked = Asked(Path("a.toml"), text)
-    cases = cases_of(asked, Request([over]))
+    asked = SweepScene(Path("a.toml"), text)
+    cases = read_cases(asked, Request([over]))
     told, plans = (
         estimate(asked, cases),
         [plan(asked.model(cases.sets(number))) for number in range(3)],
     )
     seconds, least = [one.seconds for one in plans], 0.05  # of the work that is in no plan
     assert max(seconds) <= told["seconds"] + least and told["seconds"] <= sum(seconds) + least
-    assert sum(seconds) - 3 * ONCE <= told["seconds"] + least
+    assert sum(seconds) - 3 * SWEEP_SECONDS <= told["seconds"] + least
     assert told["bytes"] == max(one.bytes for one in plans) > min(one.bytes for one in plans)
 
 
 def test_always_a_sweep_leaves_on_disk_about_what_it_says(tmp_path):
-    asked = Asked(Path("a.toml"), POINT + COULOMB + SHORT)
-    cases = cases_of(asked, Request(["friction.static=0.05..0.6:40lin"]))
-    sweep_into(asked, cases, Place(tmp_path / "a"), LocalExecutor())
+    asked = SweepScene(Path("a.toml"), POINT + COULOMB + SHORT)
+    cases = read_cases(asked, Request(["friction.static=0.05..0.6:40lin"]))
+    sweep_into(asked, cases, SweepTarget(tmp_path / "a"), LocalExecutor())
     files = [
         one.stat().st_size
         for one in (tmp_path / "a").rglob("*")
@@ -46,10 +46,10 @@ def test_always_cases_that_march_alone_are_counted_so():
     """64 random cases of the shipped rig with other dampings each were foreseen to take 0.069 s a case, as if they
     marched side by side; they took 0.5 s. A case of a grid was foreseen to take the frames that only a run makes."""
     path = Path(__file__).parents[3] / "studies/rig/rig.toml"
-    asked = Asked(path, path.read_text("utf-8"))
+    asked = SweepScene(path, path.read_text("utf-8"))
 
     def each(*over, count=64):
-        return estimate(asked, cases_of(asked, Request(over, None, count, count > 0)))[
+        return estimate(asked, read_cases(asked, Request(over, None, count, count > 0)))[
             "seconds_per_case"
         ]
 
@@ -87,8 +87,8 @@ def test_exact_a_contradiction_in_half_of_a_range_is_reported_and_leaves_a_plan(
 ):
     """static is drawn from 0.2 to 0.4 beside kinetic = 0.3. Every 8th point of Sobol's sequence is in one half: the
     plan once refused the whole sweep."""
-    asked = Asked(Path("a.toml"), POINT + COULOMB + more + SHORT)
-    cases = cases_of(
+    asked = SweepScene(Path("a.toml"), POINT + COULOMB + more + SHORT)
+    cases = read_cases(
         asked,
         Request(["friction.static=0.2..0.4", "drive.acceleration=8 g..9 g"], None, count, True),
     )

@@ -14,15 +14,15 @@ from deadly_cases import Deadly
 from scene_texts import BENCH, COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps import executors
-from patchfem.campaigns.sweeps.case_models import Asked
+from patchfem.campaigns.sweeps.case_models import SweepScene
 from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.parse_request import Request, asked_of
-from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Clock, Work, solved
+from patchfem.campaigns.sweeps.parse_request import Request, read_sweep
+from patchfem.campaigns.sweeps.sweep import MAX_DEATHS, Chunks, RemainingTime, Work, iterate_chunks
 from patchfem.core import Missing, PatchfemError
-from patchfem.export.sweeps.run import Place, sweep_into
+from patchfem.export.sweeps.run import SweepTarget, sweep_into
 from patchfem.runs.batch.case_results import FAILED, CaseResults, join_case_results
 from patchfem.scene.axes import read_axes
 
@@ -32,13 +32,13 @@ RIG = POINT + COULOMB + SHORT
 
 def work(text=BENCH, count=8, tell=None) -> Work:
     axes, _ = read_axes([f"friction.static=0.05..0.6:{count}lin"])
-    return Work(Asked(Path("a.toml"), text), Cases(tuple(axes)), tell)
+    return Work(SweepScene(Path("a.toml"), text), Cases(tuple(axes)), tell)
 
 
 def all_of(asked: Work, executor) -> tuple:
     """(Answers in the order of the cases, what was told in that order)."""
     count = len(asked.cases)
-    parts = list(solved(asked, range(count), executor))
+    parts = list(iterate_chunks(asked, range(count), executor))
     assert sorted(number for numbers, *_ in parts for number in numbers) == list(range(count))
     pairs = dict(pair for one in parts for pair in zip(one[0], one[2] or ()))
     return join_case_results(count, [part[:2] for part in parts]), pairs
@@ -79,7 +79,9 @@ def one_case_only(tmp_path: Path, once: bool, executor) -> None:
     assert told == {number: number for number in rest}
     for number in deadly:
         # halves of a chunk
-        assert len((tmp_path / str(number)).read_text()) in ([1] if once else [TRIES, TRIES + 1])
+        assert len((tmp_path / str(number)).read_text()) in (
+            [1] if once else [MAX_DEATHS, MAX_DEATHS + 1]
+        )
     for number in lost:
         assert found.outcome[number] == FAILED and "died" in found.messages[number]
 
@@ -105,7 +107,8 @@ def test_exact_cases_of_lanes_are_handed_out_as_many_as_march_together():
     """A few tell nothing of how long many take: a sweep of 10 000 said "53 min left" after its first four cases."""
     few, many, kept = work(RIG, 40), work(RIG, 300), replace(work(RIG, 300), keep=print)
     assert [
-        len(next(solved(one, range(len(one.cases)), Counting()))[0]) for one in (few, many, kept)
+        len(next(iterate_chunks(one, range(len(one.cases)), Counting()))[0])
+        for one in (few, many, kept)
     ] == [1, 300, 1]
     chunks = Chunks(range(200), 1, 64)
     chunks.take()
@@ -152,7 +155,7 @@ def test_exact_a_chunk_that_died_is_halved_until_the_case_that_kills_is_alone():
 
 def test_exact_the_remaining_time_is_known_after_the_first_chunks():
     """By the work of all workers but of their first chunks, the last chunk counting most."""
-    clock = Clock(4000, 2)
+    clock = RemainingTime(4000, 2)
     assert clock(1, 7.0) is None and clock(1, 9.0) is None  # each brings what its cases run by
     assert clock(998, 9.98) == pytest.approx(15.0)  # 3000 cases of 10 ms on two workers
     assert clock(1000, 2.0) < 2000 * 0.01 / 2 and clock.left == 2000
@@ -167,12 +170,12 @@ def test_exact_a_cluster_answers_as_this_process_does():
 
 def test_refuses_executors_that_are_not_there(monkeypatch):
     with pytest.raises(PatchfemError, match="--executor slurm: not possible; use --executor dask"):
-        executors.of("slurm")
+        executors.make_executor("slurm")
     with pytest.raises(PatchfemError, match="-j 0: the number of processes must be"):
-        executors.of("", 0)
+        executors.make_executor("", 0)
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(Missing, match=r'pip install "patchfem\[cluster\]"'):
-        executors.of("dask")
+        executors.make_executor("dask")
 
 
 KILLED = """\
@@ -198,8 +201,8 @@ def test_exact_progress_begins_with_the_cases_that_are_there(tmp_path):
     progress = []
 
     def sweep(values: str, resume: bool):
-        asked, cases = asked_of(tmp_path / "rig.toml", (), Request([f"friction.static={values}"]))
-        place = Place(tmp_path / "out", resume=resume)
+        asked, cases = read_sweep(tmp_path / "rig.toml", (), Request([f"friction.static={values}"]))
+        place = SweepTarget(tmp_path / "out", resume=resume)
         progress.clear()
         sweep_into(asked, cases, place, LocalExecutor(), told=lambda *now: progress.append(now[:2]))
 

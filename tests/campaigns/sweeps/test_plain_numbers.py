@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, SECOND, SHEAR, friction_of
 
-from patchfem.campaigns.sweeps.case_models import Asked
+from patchfem.campaigns.sweeps.case_models import SweepScene
 from patchfem.core import PatchfemError
 from patchfem.model.similar_models import collect_columns
 from patchfem.runs.batch.lumped import columns, lanes
@@ -75,7 +75,7 @@ def same(a, b) -> bool:
     return a == b and repr(a) == repr(b)
 
 
-def told(asked: Asked, sets: tuple, values: tuple):
+def told(asked: SweepScene, sets: tuple, values: tuple):
     """The model of a case, or the sentence why there is none."""
     try:
         return asked.model(sets, values)
@@ -116,7 +116,7 @@ def cases_of(seed: int, count: int):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_models_made_from_the_first_are_those_built_from_text(name):
-    asked, alike = Asked(Path("a.toml"), SCENES[name], ("normal.load=20 N",)), 0
+    asked, alike = SweepScene(Path("a.toml"), SCENES[name], ("normal.load=20 N",)), 0
     for sets, values in cases_of(len(name), 150):
         found, built = told(asked, sets, values), told(asked, sets, ())
         assert same(found, built), sets
@@ -126,7 +126,7 @@ def test_exact_models_made_from_the_first_are_those_built_from_text(name):
 
 @pytest.mark.parametrize("name", PATCHES)
 def test_exact_patches_made_from_the_first_are_those_built_from_text(name):
-    asked, r = Asked(Path("a.toml"), PATCHES[name]), np.random.default_rng(len(name))
+    asked, r = SweepScene(Path("a.toml"), PATCHES[name]), np.random.default_rng(len(name))
     keys = ["contact.load", "contact.tilt.angle"]
     keys += ["friction.static", "drive.acceleration"] if "friction" in PATCHES[name] else []
     for _ in range(20):
@@ -144,7 +144,7 @@ def test_exact_patches_made_from_the_first_are_those_built_from_text(name):
             told(asked, sets, values), told(asked, sets, ())
         )
     for text in (HELD, PATCHES["rigid"] + '[structure.bonded]\nstiffness = "1e5 N/m"\n'):
-        assert Asked(Path("b.toml"), text)._like(("contact.load=3 N",), (3.0,)) is None
+        assert SweepScene(Path("b.toml"), text)._like(("contact.load=3 N",), (3.0,)) is None
 
 
 ONE = POINT + "{}" + MODE + DRIVE
@@ -201,7 +201,7 @@ def numbers_of_contact(model) -> tuple:
 @pytest.mark.parametrize("name", LUMPED)
 def test_exact_columns_of_models_are_the_numbers_of_each(name):
     """Of models as one, with an array in place of each number that differs: what lanes and measures take of them."""
-    r, asked = np.random.default_rng(len(name)), Asked(Path("a.toml"), LUMPED[name])
+    r, asked = np.random.default_rng(len(name)), SweepScene(Path("a.toml"), LUMPED[name])
     for _ in range(20):
         keys = list(
             r.choice([key for key in KEYS if ".1." not in key], r.integers(1, 5), replace=False)
@@ -225,7 +225,7 @@ def test_exact_models_made_from_the_first_see_what_a_new_key_does_to_the_load(mo
 
     point = load.PointLoad
     monkeypatch.setattr(load, "PointLoad", lambda force, *others: point(2 * force, *others))
-    asked = Asked(Path("a.toml"), SCENES["coulomb"])
+    asked = SweepScene(Path("a.toml"), SCENES["coulomb"])
     sets, values = ("normal.load=3 N",), (3.0,)
     assert asked._like(sets, values) is not None
     assert asked.model(sets, values).point.load == 6.0

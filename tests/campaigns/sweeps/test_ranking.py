@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from patchfem.campaigns.sweeps.ranking import ranking
+from patchfem.campaigns.sweeps.ranking import compute_sobol_indices
 
 # Ishigami and Homma 1990, a = 7, b = 0.1: closed forms
 WHOLE = 0.1 * np.pi**4 / 5 + 0.01 * np.pi**8 / 18 + 0.5 + 49 / 8
@@ -28,9 +28,9 @@ def drawn(count, keys, seed):
 
 def ranks(x, values, errors=0.0, shape=None):
     keys = [(f"k{k}", column) for k, column in enumerate(x.T)]
-    return ranking(keys, {"loop_area": (values, np.broadcast_to(errors, values.shape))}, shape).get(
-        "loop_area"
-    )
+    return compute_sobol_indices(
+        keys, {"loop_area": (values, np.broadcast_to(errors, values.shape))}, shape
+    ).get("loop_area")
 
 
 def of(found):

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scene_texts import PATCH
 
-from patchfem.campaigns.sweeps.case_models import Asked
+from patchfem.campaigns.sweeps.case_models import SweepScene
 from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import Work, solved, with_meshes
+from patchfem.campaigns.sweeps.sweep import Work, iterate_chunks, with_meshes
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene.axes import read_axes
 
 WORK = Work(
-    Asked(Path("a.toml"), PATCH),
+    SweepScene(Path("a.toml"), PATCH),
     Cases(tuple(read_axes(["contact.tilt.angle=2e-5 rad,2e-4 rad", "contact.load=50 N,100 N"])[0])),
 )
 
@@ -27,9 +27,11 @@ def test_exact_meshes_are_made_once_and_travel_with_the_work():
 
 @pytest.mark.slow
 def test_exact_processes_that_begin_before_the_meshes_are_chosen_take_them():
-    here = join_case_results(4, [part[:2] for part in solved(WORK, range(4), LocalExecutor())])
+    here = join_case_results(
+        4, [part[:2] for part in iterate_chunks(WORK, range(4), LocalExecutor())]
+    )
     pool = Pool(2)
-    found = join_case_results(4, [part[:2] for part in solved(WORK, range(4), pool)])
+    found = join_case_results(4, [part[:2] for part in iterate_chunks(WORK, range(4), pool)])
     assert pool.ready == [] and found.numerics == here.numerics
     for name, values in here.values.items():
         np.testing.assert_allclose(found.values[name], values, rtol=1e-9)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from patchfem.campaigns.sweeps.table import read
+from patchfem.campaigns.sweeps.table import read_case_table
 
 
 def written(tmp_path, text):
@@ -12,7 +12,7 @@ def written(tmp_path, text):
 
 
 def test_exact_units_stand_in_the_header_or_in_the_cells(tmp_path):
-    cases, wrong = read(
+    cases, wrong = read_case_table(
         written(
             tmp_path,
             "contact.load [lbf], contact.tilt.angle,friction.static,friction.law\n"
@@ -32,7 +32,7 @@ def test_exact_units_stand_in_the_header_or_in_the_cells(tmp_path):
 
 def test_exact_items_stand_in_the_header_as_they_are_printed(tmp_path):
     for key in ("structure.interface[1].load", "structure.interface.0.load"):
-        cases, wrong = read(
+        cases, wrong = read_case_table(
             written(tmp_path, f"{key} [N],{key.replace('load', 'bond_length')}[um]\n2,0.3\n5,0.7\n")
         )
         assert wrong == [] and cases.axes[0].key == key and cases.texts(1) == ("5 N", "0.7 um")
@@ -40,7 +40,7 @@ def test_exact_items_stand_in_the_header_as_they_are_printed(tmp_path):
 
 
 def test_exact_the_answers_of_another_sweep_are_left_out(tmp_path):
-    cases, wrong = read(
+    cases, wrong = read_case_table(
         written(
             tmp_path,
             "contact.load,friction.law,outcome,loop_area,message,case\n"
@@ -86,7 +86,7 @@ def test_exact_the_answers_of_another_sweep_are_left_out(tmp_path):
     ],
 )
 def test_refuses_each_mistake_with_its_line(tmp_path, text, says):
-    cases, wrong = read(written(tmp_path, text))
+    cases, wrong = read_case_table(written(tmp_path, text))
     assert cases is None and len(wrong) == len(says)
     for line, want in zip(wrong, says):
         assert want in line

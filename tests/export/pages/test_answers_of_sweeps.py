@@ -7,9 +7,9 @@ import pytest
 from command_line import cli
 from scene_texts import COULOMB, POINT, SHORT
 
-from patchfem.campaigns.sweeps.ranking import Share
+from patchfem.campaigns.sweeps.ranking import SobolIndex
 from patchfem.export.pages import limits, peaks, ranked
-from patchfem.export.pages.headline import lead_of
+from patchfem.export.pages.headline import summarise_sweep
 from patchfem.export.pages.sweep import page
 from patchfem.export.sweeps.page import read_table
 from patchfem.scene.starting import read_template
@@ -42,7 +42,7 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
         key("drive.acceleration", np.repeat([1.0, 2.0], 161), ["1 g"] * 161 + ["2 g"] * 161),
     ]
     name = "relative_displacement_amplitude"
-    found = peaks.found(keys, {name: (both, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
+    found = peaks.find_peaks(keys, {name: (both, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
     for one, centre in zip(found, (100, 95)):
         # of f over the centre
         square = 1 - 2 * damping**2 + 2 * damping * np.sqrt(1 - damping**2) * np.array([1, -1])
@@ -59,7 +59,7 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
     assert "with drive.acceleration 1 g" in said and "with drive.acceleration 2 g" in said
     assert "(cases lie 0.25 Hz apart)" in said
     some = np.where(np.abs(np.tile(x, 2) - 99.6) < 0.4, np.nan, both)  # beside the first peak alone
-    found = peaks.found(keys, {name: (some, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
+    found = peaks.find_peaks(keys, {name: (some, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
     assert np.isnan(found[0].swept.height.value)
     assert found[1].swept.frequency.value == pytest.approx(
         95 * np.sqrt(1 - 2 * damping**2), abs=1e-3
@@ -74,7 +74,7 @@ def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width()
     name, x = "relative_displacement_amplitude", np.linspace(80, 120, 41)
     for values in (x, -x + 200, np.where(x < 99, np.nan, curve(x, 98, 0.05))):
         assert (
-            peaks.found(
+            peaks.find_peaks(
                 [key("drive.frequency", x)],
                 {name: (values, 0 * x, "m")},
                 {name: np.ones(41, bool)},
@@ -83,20 +83,20 @@ def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width()
             == []
         )
     narrow = x[(x > 97) & (x < 130)]
-    (found,) = peaks.found(
+    (found,) = peaks.find_peaks(
         [key("drive.frequency", narrow)],
         {name: (curve(narrow, 100, 0.05), 0 * narrow, "m")},
         {name: np.ones(narrow.size, bool)},
         True,
     )
     assert np.isnan(found.swept.half_power_width.value) and "width" not in peaks.sentence([found])
-    assert peaks.found([key("drive.frequency", x)], {}, {}, True) == []
+    assert peaks.find_peaks([key("drive.frequency", x)], {}, {}, True) == []
     unsettled = {name: x < 90, f"{name}_steady": np.ones(41, bool)}  # by its steady estimate
     steady = {
         name: (np.where(x < 90, curve(x, 100, 0.05), 1.0), 0 * x, "m"),
         f"{name}_steady": (np.where(x < 90, np.nan, curve(x, 100, 0.05)), 0 * x, "m"),
     }
-    (found,) = peaks.found([key("drive.frequency", x)], steady, unsettled, True)
+    (found,) = peaks.find_peaks([key("drive.frequency", x)], steady, unsettled, True)
     assert found.swept.frequency.value == pytest.approx(99.75, abs=0.02)
 
 
@@ -150,14 +150,14 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
     )
     from patchfem.export.sweeps.page import read_table
 
-    again = lead_of(read_table(out)).said  # what `patchfem report` draws from the files
+    again = summarise_sweep(read_table(out)).said  # what `patchfem report` draws from the files
     head, count, *_ = answer.out.splitlines()
     assert (
         head == f"{again.rank.rstrip('.')}; {again.scatter}" == told["answer"]
         and count == "128 cases: 128 steady"
     )
     loops = read_table(out)["measures"]["loop_area"]["values"]
-    low, _, high = lead_of(read_table(out)).spread["loop_area"][1]
+    low, _, high = summarise_sweep(read_table(out)).spread["loop_area"][1]
     assert np.mean((loops >= low) & (loops <= high)) == pytest.approx(0.9, abs=0.02)
 
 
@@ -170,10 +170,11 @@ def test_exact_quantiles_are_those_of_all_cases_that_have_a_value():
     unit, ends, count, misses = found["loop_area"]
     assert (unit, count, misses) == ("J", 40, 12)
     assert ends == pytest.approx(np.quantile(np.arange(1.0, 41), (0.05, 0.5, 0.95)))
-    assert "(12 of 40 miss the tolerance and are included with their values)" in ranked.scatter(
-        found, 41
+    assert (
+        "(12 of 40 miss the tolerance and are included with their values)"
+        in ranked.describe_scatter(found, 41)
     )
-    assert "40 of 41 random cases that have a value" in ranked.scatter(found, 41, False)
+    assert "40 of 41 random cases that have a value" in ranked.describe_scatter(found, 41, False)
 
 
 def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
@@ -181,20 +182,20 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
     table = read_table(drawn[0])
     count = len(table["outcome"])
     said = "o case has settled, so this answer describes the end of each run"
-    assert said not in "".join(lead_of(table).sentences())
-    lead = lead_of(table | {"outcome": ["transient"] * (count - 2) + ["failed", ""]})
+    assert said not in "".join(summarise_sweep(table).sentences())
+    lead = summarise_sweep(table | {"outcome": ["transient"] * (count - 2) + ["failed", ""]})
     assert lead.sentences()[0] == lead.answer() and lead.answer().endswith(
         f" (1 of {count} cases has no result yet and is left out; n{said})."
     )
     assert "settled" not in lead.said.scatter and not any(
         said in one for one in lead.sentences()[1:]
     )
-    assert lead_of(table | {"outcome": ["failed"] * count}).said.left == ""
+    assert summarise_sweep(table | {"outcome": ["failed"] * count}).said.left == ""
 
 
 def test_static_cases_are_not_said_to_move():
     """Of patches that only miss the tolerance nothing has to settle."""
-    ranks = {"pressure_peak": [Share("contact.load", 0.8, 0.9, 0.8, 1.0)]}
+    ranks = {"pressure_peak": [SobolIndex("contact.load", 0.8, 0.9, 0.8, 1.0)]}
     assert ranked.sentence(ranks, 3, False).endswith(
         "; 3 cases that miss the tolerance are included."
     )
@@ -239,7 +240,7 @@ def test_exact_of_drawn_cases_the_answer_is_the_measure_that_is_asked_for_and_wh
         columns,
         first="equivalent_damping",
     )
-    lead = lead_of(table)
+    lead = summarise_sweep(table)
     low, high = np.quantile(damping, [0.05, 0.95])
     assert lead.limits == limits.Limits() and not any(
         "may reach" in said for said in lead.sentences()
@@ -251,12 +252,12 @@ def test_exact_of_drawn_cases_the_answer_is_the_measure_that_is_asked_for_and_wh
     for slope, says in ((1, "grows with"), (-1, "falls with growing")):
         columns["equivalent_damping"] = one(2 + slope * mu)
         assert (
-            lead_of(table)
+            summarise_sweep(table)
             .answer()
             .startswith(f"Equivalent damping ratio {says} friction.static; 90 % of")
         )
     columns["equivalent_damping"] = one(np.abs(mu - 0.3) + 1)
-    assert "is least, 1" in lead_of(table).answer()
+    assert "is least, 1" in summarise_sweep(table).answer()
 
 
 def test_exact_of_several_keys_the_strongest_has_a_direction_that_chance_does_not_make():
@@ -268,18 +269,20 @@ def test_exact_of_several_keys_the_strongest_has_a_direction_that_chance_does_no
         for name, values in (("a.a", a), ("b.b", b))
     ]
     settled = np.ones(200, bool)
-    shares = {"loop_area": [Share("a.a", 0.9, 0.9, 0.9, 0.9), Share("b.b", 0.1, 0.1, 0.1, 0.1)]}
+    shares = {
+        "loop_area": [SobolIndex("a.a", 0.9, 0.9, 0.9, 0.9), SobolIndex("b.b", 0.1, 0.1, 0.1, 0.1)]
+    }
     for values, says in (
         (4 * a + b, "Loop area grows with a.a."),
         (b - 4 * a, "Loop area falls with growing a.a."),
         (noise, ""),
     ):
         table = drawn_table(keys, {"loop_area": one(values, unit="J")})
-        assert ranked.trend(table, shares, settled) == says
+        assert ranked.describe_trend(table, shares, settled) == says
     table = drawn_table(keys, {"loop_area": one(b - 9 * (a - 0.5) ** 2, unit="J")})
     low, high = map(
         float,
-        ranked.trend(table, shares, settled)
+        ranked.describe_trend(table, shares, settled)
         .removeprefix("Loop area is largest between a.a ")
         .removesuffix(".")
         .split(" and "),
@@ -298,7 +301,7 @@ def test_exact_too_few_settled_cases_are_no_ranking():
         outcome=["failed"] * 32 + ["transient"] * 31 + ["steady"],
         messages={},
     )
-    lead = lead_of(table)
+    lead = summarise_sweep(table)
     assert lead.answer() == (
         "Only 1 of 64 cases settled (32 failed, 31 transient), so no ranking is possible; raise drive.cycles so that "
         "the transient cases settle and correct what the messages of the failed cases name."
@@ -310,12 +313,12 @@ def test_exact_too_few_settled_cases_are_no_ranking():
     assert "throughout" not in lead.said.span and lead.said.span in lead.sentences()
     table = table | {"outcome": ["failed"] * 32 + ["transient"] * 32}
     assert (
-        lead_of(table)
+        summarise_sweep(table)
         .answer()
         .startswith("None of 64 cases settled (32 failed, 32 transient), so no ranking")
     )
     table = table | {"outcome": ["failed"] * 40 + ["done"] * 24}
-    assert "so no ranking is possible" not in "".join(lead_of(table).sentences())
+    assert "so no ranking is possible" not in "".join(summarise_sweep(table).sentences())
 
 
 def test_exact_curves_that_are_largest_at_an_end_are_counted():
@@ -349,10 +352,12 @@ def test_exact_curves_that_are_largest_at_an_end_are_counted():
         "grid": True,
     }
     said = "n 3 of 5 cases the largest response lies at an end of the swept frequencies, so that it may be no resonance"
-    assert said in lead_of(table | {"ends": (300.0, 372.0)}).answer()
-    assert said in lead_of(table | {"ends": (np.full(5, 372.0), np.full(5, 300.0))}).answer()
+    assert said in summarise_sweep(table | {"ends": (300.0, 372.0)}).answer()
+    assert (
+        said in summarise_sweep(table | {"ends": (np.full(5, 372.0), np.full(5, 300.0))}).answer()
+    )
     for ends in ({}, {"ends": (200.0, 500.0)}, {"ends": (np.nan, np.nan)}):
-        assert "end of the swept" not in lead_of(table | ends).answer()
+        assert "end of the swept" not in summarise_sweep(table | ends).answer()
 
 
 def test_exact_the_ends_of_swept_frequencies_are_read_back(tmp_path):
@@ -370,7 +375,7 @@ def test_exact_the_ends_of_swept_frequencies_are_read_back(tmp_path):
     )
     said = "n 1 of 2 cases the largest response lies at an end of the swept frequencies"
     assert said in answer.out
-    assert said in lead_of(read_table(tmp_path / "out")).answer()
+    assert said in summarise_sweep(read_table(tmp_path / "out")).answer()
 
 
 def test_always_motions_that_run_away_are_told_before_those_that_settle(tmp_path):
@@ -387,7 +392,7 @@ def test_always_motions_that_run_away_are_told_before_those_that_settle(tmp_path
         "is 0.8564 mm to 1.845 mm; relative displacement amplitude of the settled cases ranges "
         "from 0 to"
     )
-    assert lead_of(read_table(tmp_path / "out")).answer() == first
+    assert summarise_sweep(read_table(tmp_path / "out")).answer() == first
     said = cli("run", scene, "--set", "drive.acceleration=6 g", "-o", tmp_path / "run").out
     assert (
         "The drive, 6 g, is larger than 5.067 g, above which friction alone does not limit the amplitude"
@@ -412,7 +417,7 @@ def test_exact_unsettled_cases_that_are_no_end_of_the_key_are_counted():
                 name: {"unit": "m", "means": "", "values": np.array(values), "errors": np.zeros(4)}
             },
         }
-        return lead_of(table).answer()
+        return summarise_sweep(table).answer()
 
     assert said(
         ["transient", "steady", "transient", "steady"], [2e-3, 1e-6, 3e-3, 2e-6]
@@ -431,7 +436,7 @@ def test_exact_a_width_that_the_cases_do_not_tell_has_its_reason():
 
     def table(at, centre, damping):
         keys = [key("drive.frequency", at)]
-        found = peaks.found(
+        found = peaks.find_peaks(
             keys, {name: (curve(at, centre, damping), 0 * at, "m")}, {name: np.ones(9, bool)}, True
         )
         return peaks.sentence(found), peaks.table(found)
@@ -469,7 +474,7 @@ def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have
         )
         text = page(table)
         part = text[text.index("Scatter of the answers</h2>") :]
-        return lead_of(table), part[: part.index("</section>")]
+        return summarise_sweep(table), part[: part.index("</section>")]
 
     lead, text = scatter(outcome)
     assert (
@@ -486,11 +491,11 @@ def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have
 
 
 def test_exact_keys_whose_intervals_overlap_stand_in_no_order():
-    name, load = "loop_area", Share("contact.load", 0.5, 0.58, 0.46, 0.66)
+    name, load = "loop_area", SobolIndex("contact.load", 0.5, 0.58, 0.46, 0.66)
     friction, damping, tilt = (
-        Share("friction.static", 0.5, 0.56, 0.44, 0.6),
-        Share("damping", 0.01, 0.02, 0.0, 0.06),
-        Share("tilt", 0.0, 0.001, 0.0, 0.04),
+        SobolIndex("friction.static", 0.5, 0.56, 0.44, 0.6),
+        SobolIndex("damping", 0.01, 0.02, 0.0, 0.06),
+        SobolIndex("tilt", 0.0, 0.001, 0.0, 0.04),
     )
     said = ranked.sentence({name: [load, friction, damping, tilt]}, 56, True, 64)
     assert said.startswith(
@@ -504,14 +509,14 @@ def test_exact_keys_whose_intervals_overlap_stand_in_no_order():
         "then on damping (at most 6 %); 3 cases that have not settled are included with their last "
         "values."
     )
-    far = Share("far", 0.3, 0.3, 0.25, 0.47)
+    far = SobolIndex("far", 0.3, 0.3, 0.25, 0.47)
     assert "depends on contact.load and far (58 and 30 % of the variance; their" in ranked.sentence(
         {name: [load, far]}
     )
     grid = [
-        Share("a", 0.6, 0.6, 0.6, 0.6),
-        Share("b", 0.4, 0.4, 0.4, 0.4),
-        Share("c", 0.005, 0.005, 0.005, 0.005),
+        SobolIndex("a", 0.6, 0.6, 0.6, 0.6),
+        SobolIndex("b", 0.4, 0.4, 0.4, 0.4),
+        SobolIndex("c", 0.005, 0.005, 0.005, 0.005),
     ]
     assert ranked.sentence({name: grid}) == (
         "Loop area depends most on a, which contributes to 60 % of the variance, "

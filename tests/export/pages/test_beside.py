@@ -8,8 +8,8 @@ from page_data import charts_of, data_of
 
 import patchfem as pf
 from patchfem.core import Measure, PatchfemError
-from patchfem.export.netcdf import of_run, write
-from patchfem.export.pages.several_runs import page, read
+from patchfem.export.netcdf import run_contents, write
+from patchfem.export.pages.several_runs import page, read_run
 from patchfem.export.summary import summary, write_json
 
 SCENE = """[normal]
@@ -56,7 +56,7 @@ def made(folder, load: float, amplitude: float, error: float):
     time = np.linspace(0.0, 0.2, 1001)
     motion = amplitude * np.sin(2 * np.pi * 100 * time)
     write(
-        of_run(
+        run_contents(
             {
                 "time": time,
                 "relative_displacement": motion,
@@ -74,8 +74,8 @@ def made(folder, load: float, amplitude: float, error: float):
 
 def test_exact_differences_and_the_last_two_cycles(tmp_path):
     runs = [
-        read(made(tmp_path / "light", 10.0, 2e-6, 1e-9)),
-        read(made(tmp_path / "<b>heavy", 20.0, 1e-6, 1e-9)),
+        read_run(made(tmp_path / "light", 10.0, 2e-6, 1e-9)),
+        read_run(made(tmp_path / "<b>heavy", 20.0, 1e-6, 1e-9)),
     ]
     text = page(runs)
     assert "<b>heavy" not in text and "&lt;b&gt;heavy" in text
@@ -95,8 +95,8 @@ def test_exact_differences_and_the_last_two_cycles(tmp_path):
 def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
     text = page(
         [
-            read(made(tmp_path / "a", 10.0, 2e-6, 3e-8)),
-            read(made(tmp_path / "b", 10.0, 2.05e-6, 3e-8)),
+            read_run(made(tmp_path / "a", 10.0, 2e-6, 3e-8)),
+            read_run(made(tmp_path / "b", 10.0, 2.05e-6, 3e-8)),
         ]
     )
     assert (
@@ -123,8 +123,8 @@ def test_exact_a_change_is_told_by_what_the_first_value_bears(tmp_path, value, f
     """In per cent, as a factor from ten times on, and not at all from a value that is 0 within its error."""
     text = page(
         [
-            read(made(tmp_path / "a", 10.0, first, error)),
-            read(made(tmp_path / "b", 10.0, value, 1e-10)),
+            read_run(made(tmp_path / "a", 10.0, first, error)),
+            read_run(made(tmp_path / "b", 10.0, value, 1e-10)),
         ]
     )
     assert f"</b> <span class=v>({told})</span>" in text
@@ -133,7 +133,7 @@ def test_exact_a_change_is_told_by_what_the_first_value_bears(tmp_path, value, f
 def test_always_runs_of_the_same_name_are_told_apart(tmp_path):
     (tmp_path / "x").mkdir()
     (tmp_path / "y").mkdir()
-    text = page([read(made(tmp_path / name / "out", 10.0, 2e-6, 1e-9)) for name in "xy"])
+    text = page([read_run(made(tmp_path / name / "out", 10.0, 2e-6, 1e-9)) for name in "xy"])
     assert "out (1)" in text and "out (2)" in text
 
 
@@ -144,7 +144,7 @@ def test_always_levels_in_different_units_have_different_figures(tmp_path):
     for number, (kind, first, last, unit) in enumerate(drives):
         scene = LEVELS.format(kind=kind, first=first, last=last, unit=unit)
         pf.run(scene).save(tmp_path / f"run{number}")
-        runs.append(read(tmp_path / f"run{number}"))
+        runs.append(read_run(tmp_path / f"run{number}"))
     charts = data_of(page(runs))["charts"]
     assert len({one["anchor"] for one in charts}) == len(charts)
     levels = [one for one in charts if one["title"] == "Levels"]
@@ -159,18 +159,18 @@ def test_always_levels_in_different_units_have_different_figures(tmp_path):
 
 def test_refuses_a_folder_without_results(tmp_path):
     with pytest.raises(PatchfemError, match=r"not a results folder: it has no summary\.json"):
-        read(tmp_path)
+        read_run(tmp_path)
     (tmp_path / "summary.json").write_text("{")
     with pytest.raises(PatchfemError, match="cannot be read"):
-        read(tmp_path)
+        read_run(tmp_path)
     folder = made(tmp_path / "good", 1.0, 1e-6, 0.0)
     (folder / "scene.resolved.toml").write_text("drive = 3")
     with pytest.raises(PatchfemError, match=r"scene\.resolved\.toml: drive is not a table"):
-        read(folder)
+        read_run(folder)
     (folder / "scene.resolved.toml").write_text(SCENE.format(load=1.0))
     (folder / "result.nc").write_bytes(b"nothing")
     with pytest.raises(PatchfemError, match=r"result\.nc: cannot be read as netCDF"):
-        read(folder)
+        read_run(folder)
 
 
 @pytest.mark.parametrize(
@@ -197,4 +197,4 @@ def test_refuses_a_summary_of_another_shape(tmp_path, text, why):
     with pytest.raises(
         PatchfemError, match=f"cannot be read: summary.json is not a summary of a run: .*{why}"
     ):
-        read(tmp_path)
+        read_run(tmp_path)

@@ -8,7 +8,7 @@ import pytest
 from page_data import charts_of
 
 import patchfem as pf
-from patchfem.export.pages.driven import command, driven
+from patchfem.export.pages.driven import describe_drive, run_command
 
 MODES = (
     '[structure]\nmoving_mass = "2 kg"\n[[structure.mode]]\nname = "a"\nfrequency = "100 Hz"\ndamping = 0.01\n'
@@ -53,20 +53,20 @@ def test_exact_under_a_force_the_base_rests_in_every_engine(friction, method):
     + [(f"{BENCH}[slide]\n{keys}", words) for keys, words in SLIDES.items()],
 )
 def test_exact_every_drive_and_slide_has_its_own_words(text, words):
-    assert driven(tomllib.loads(pf.build(pf.load(text)).source.resolved)) == words
+    assert describe_drive(tomllib.loads(pf.build(pf.load(text)).source.resolved)) == words
 
 
 def test_exact_nothing_moves_a_patch_and_a_record_is_named():
-    assert driven({"contact": {}}) == ""
-    assert driven({"slide": {"kind": "file", "file": "in/a.csv"}}) == "the slide of a.csv"
+    assert describe_drive({"contact": {}}) == ""
+    assert describe_drive({"slide": {"kind": "file", "file": "in/a.csv"}}) == "the slide of a.csv"
     assert (
-        driven({"drive": {"kind": "base", "waveform": "file", "file": "b.csv"}})
+        describe_drive({"drive": {"kind": "base", "waveform": "file", "file": "b.csv"}})
         == "recorded base acceleration of b.csv"
     )
 
 
 def test_exact_the_command_quotes_and_names_no_place():
-    found = command(
+    found = run_command(
         Path("/home/one/rig.toml"), ("drive.acceleration=6 g", "slide.file=/home/one/a.csv")
     )
     assert found == "patchfem run rig.toml --set 'drive.acceleration=6 g' --set slide.file=a.csv"

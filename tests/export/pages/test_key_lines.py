@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from patchfem.export.pages.key_lines import lines_of, shown_of, varies
+from patchfem.export.pages.key_lines import group_cases_along_key, key_formatter, varies
 
 
 def key(values, texts) -> dict:
@@ -20,11 +20,11 @@ def test_exact_values_have_the_digits_that_their_spacing_resolves():
         (as_written, "9.87654 urad"),
     ):
         texts = [f"{value!r} urad" for value in values.tolist()]
-        assert shown_of(key(values * 1e-6, texts))(2) == third
+        assert key_formatter(key(values * 1e-6, texts))(2) == third
 
 
 def test_exact_lines_are_ordered_by_the_key_and_hold_the_others_fixed():
     tilt = key([3, 1, 2, 1, 3, 2], ["3", "1", "2", "1", "3", "2"])
     load = {"name": "normal.load", "texts": ["10 N"] * 3 + ["20 N"] * 3}
-    assert [line.tolist() for line in lines_of(tilt, [load])] == [[1, 2, 0], [3, 5, 4]]
+    assert [line.tolist() for line in group_cases_along_key(tilt, [load])] == [[1, 2, 0], [3, 5, 4]]
     assert varies(load) and not varies({"texts": ["10 N", "10 N"]})

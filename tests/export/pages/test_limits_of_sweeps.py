@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from page_data import own_part
 
-from patchfem.export.pages.headline import lead_of
+from patchfem.export.pages.headline import summarise_sweep
 from patchfem.export.pages.limits import as_json, limits_of_sweep, sentence, table
 from patchfem.export.pages.sweep import page
 from patchfem.export.sweeps.answer import answer_of
@@ -257,7 +257,7 @@ def swept() -> dict:
 
 def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
     """(1 + s)^0.5 is 1.05 at s = 0.1025, a tilt of 0.46 mrad; 2 MPa are doubled at 0.15 mrad; 1 - 0.1 t at 0.5475."""
-    text, found = own_part(page(swept())), answer_of(lead_of(swept()), swept()["outcome"])
+    text, found = own_part(page(swept())), answer_of(summarise_sweep(swept()), swept()["outcome"])
     want = (
         "Tilt may reach 0.25 mrad (3.2 um over the patch; interpolated between the cases at 0.2 and 0.5 mrad) "
         "before relative displacement amplitude or loop area changes by 5 % (first to change: loop area or "
@@ -305,7 +305,7 @@ def test_always_the_sentence_of_a_sweep_without_numbers_is_empty():
     table = swept() | {
         "keys": [key(words=True) | {"unit": "1", "log": False, "texts": list("abcde")}]
     }
-    found = answer_of(lead_of(table), table["outcome"])
+    found = answer_of(summarise_sweep(table), table["outcome"])
     assert (
         found["limits"] == []
         and "moment; the largest error, at contact.tilt.angle e" in found["answer"]
@@ -386,7 +386,7 @@ def test_exact_one_sentence_has_one_unit():
         for name, values in lines.items()
     }
     table["measures"]["moment"]["errors"] = np.array([0, 0, 0, 0, 0, 0.4, 0.2])
-    said = lead_of(table).sentences()
+    said = summarise_sweep(table).sentences()
     assert "0.316228 mrad, is 40 %" in said[0] and all(
         ("mrad" in one) + ("urad" in one) < 2 for one in said
     )

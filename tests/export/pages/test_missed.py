@@ -5,8 +5,13 @@ import pytest
 from scene_texts import PIECE
 
 import patchfem as pf
-from patchfem.export.pages.headline import lead_of
-from patchfem.export.tolerance_misses import by_floor, counted, over, sentence
+from patchfem.export.pages.headline import summarise_sweep
+from patchfem.export.tolerance_misses import (
+    count_over_tolerance,
+    is_over_tolerance,
+    is_within_by_floor,
+    sentence,
+)
 
 NAN = np.nan
 
@@ -21,15 +26,18 @@ def test_exact_an_error_is_over_where_it_is_more_than_tolerance_and_floor():
         [0.011, 0.009, 1e-9, 1e-3, 0.1, NAN],
         np.array([0, 0, 1e-6, 1e-6, 0, NAN]),
     )
-    assert over(found, 0.01).tolist() == [True, False, False, True, False, False]
+    assert is_over_tolerance(found, 0.01).tolist() == [True, False, False, True, False, False]
     assert (
-        over(found, NAN).sum() == 0
-        and over(found, np.full(6, 0.02)).tolist() == [False] * 3 + [True] + [False] * 2
+        is_over_tolerance(found, NAN).sum() == 0
+        and is_over_tolerance(found, np.full(6, 0.02)).tolist()
+        == [False] * 3 + [True] + [False] * 2
     )
-    assert counted({"a": found, "b": one([1], [0])}, 0.01) == {
+    assert count_over_tolerance({"a": found, "b": one([1], [0])}, 0.01) == {
         "a": {"count": 2, "worst": pytest.approx(0.011)}
     }
-    assert counted({"a": one([0, 0], [1, 0])}, 0.01) == {"a": {"count": 1, "worst": None}}
+    assert count_over_tolerance({"a": one([0, 0], [1, 0])}, 0.01) == {
+        "a": {"count": 1, "worst": None}
+    }
 
 
 def test_exact_the_worst_is_relative_and_named_with_its_case():
@@ -111,7 +119,7 @@ tolerance = 1e-2
     for name, missed in lost.items():
         floors = swept[f"{name}_floor"].values if f"{name}_floor" in swept else 0.0
         found = one(swept[name].values, swept[f"{name}_error"].values, floors)
-        assert over(found, swept.attrs["tolerance"]).tolist() == missed, name
+        assert is_over_tolerance(found, swept.attrs["tolerance"]).tolist() == missed, name
     assert 0 < sum(lost["loop_area"]) < 5 and sum(
         map(any, zip(*lost.values(), strict=True))
     ) in range(1, 6)
@@ -129,7 +137,7 @@ def _misses(measure) -> bool:
 def test_exact_a_tolerance_that_only_the_floor_meets_is_told_with_the_floor():
     """A loop of 0.16 nJ, known to 60 %, "met the tolerance of 0.1 %" by a floor of 0.1 nJ, and nothing said so."""
     loop = one([1.6e-10, 1e-3], [0.96e-10, 1e-7], 1e-10) | {"unit": "J"}
-    assert by_floor(loop, 1e-3).tolist() == [True, False]
+    assert is_within_by_floor(loop, 1e-3).tolist() == [True, False]
     assert sentence({"loop_area": loop}, 1e-3, str) == (
         "All 2 cases meet the tolerance of 0.1 % or the floor of their "
         "measure, such as 0.1 nJ of loop area."
@@ -151,7 +159,7 @@ def test_exact_a_tolerance_that_only_the_floor_meets_is_told_with_the_floor():
         "tolerance": 1e-3,
         "measures": {"loop_area": loop | {"means": ""}},
     }
-    assert lead_of(table).said.span == (
+    assert summarise_sweep(table).said.span == (
         "Loop area ranges from 0.16 nJ to 1 mJ, with errors of at most 0.01 % or 0.1 nJ, the floor of this measure."
     )
 

@@ -40,7 +40,7 @@ def test_always_charts_of_any_size_leave_room_for_the_rest_of_the_page():
         )
     ]
     for room in (700_000, 200_000):
-        found = charts.within(many, room)
+        found = charts.limit_characters(many, room)
         text = document("", "", [], {"charts": found}, ("figures.js",))
         bare = document("", "", [], {"charts": []}, ("figures.js",))
         assert len(text) - len(bare) < 1.1 * room
@@ -48,4 +48,4 @@ def test_always_charts_of_any_size_leave_room_for_the_rest_of_the_page():
             max(one["y"]) == max(full["y"])
             for one, full in zip(found[0]["marks"], many[0]["marks"])
         )
-    assert charts.within(many[:0], 10) == []
+    assert charts.limit_characters(many[:0], 10) == []

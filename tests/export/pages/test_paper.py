@@ -8,7 +8,7 @@ import pytest
 from chromium import LATER, Chromium
 
 from patchfem.export.drawing import charts, pictures
-from patchfem.export.pages.document import INKS, Section, document, figure
+from patchfem.export.pages.document import PAGE_COLOURS, Section, document, figure
 from patchfem.export.pages.sweep import page
 
 TURN = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
@@ -84,7 +84,7 @@ def test_exact_a_map_on_paper_has_the_colours_of_its_scale(chromium, table, kind
 @pytest.mark.parametrize("dark, ink", [(False, "rgb(28, 36, 48)"), (True, "rgb(228, 233, 239)")])
 def test_exact_a_picture_drawn_beforehand_has_the_colours_of_the_page(chromium, dark, ink):
     """Pages of surfaces stood dark on white in the dark."""
-    svg = pictures.draw(
+    svg = pictures.draw_charts(
         [
             charts.chart(
                 "Trace",
@@ -95,9 +95,9 @@ def test_exact_a_picture_drawn_beforehand_has_the_colours_of_the_page(chromium, 
         ]
     )
     text = document("Traces", "", [Section("a", "Traces", figure(0, svg, "Two", "a line"))])
-    assert not re.search("|".join(INKS), text[text.index("<svg") :]) and set(
+    assert not re.search("|".join(PAGE_COLOURS), text[text.index("<svg") :]) and set(
         pictures.COLOURS.values()
-    ) < set(INKS)
+    ) < set(PAGE_COLOURS)
     seen = chromium.opened(text, dark=dark)
     assert seen.js("getComputedStyle(document.querySelector('figure text')).fill") == ink
     assert seen.js("getComputedStyle(document.body).color") == ink

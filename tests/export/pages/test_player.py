@@ -13,10 +13,10 @@ from page_data import data_of
 
 from patchfem.export import report
 from patchfem.export.drawing.panels import panels, sizes
-from patchfem.export.fields.series import Series, moving
+from patchfem.export.fields.series import Series, last_consecutive_frames
 from patchfem.export.page_data import PressedPatch, RunData, SceneText, Verdict
 from patchfem.export.pages import player
-from patchfem.export.pages.thinned import thinned
+from patchfem.export.pages.thinned import reduce_mesh
 
 SIDES = ("lower", "upper")
 
@@ -48,7 +48,7 @@ def graded() -> tuple:
 
 def test_exact_means_keep_the_integral_and_a_linear_field_its_middle_value(graded):
     points, cells, coated = graded
-    mesh = thinned(points, cells, coated, 300)
+    mesh = reduce_mesh(points, cells, coated, 300)
     middle = points[cells].mean(axis=1)
     field = np.stack([3 + 2 * middle[:, 0] - middle[:, 1], np.sin(9 * middle[:, 0])], axis=1)
     means, size = mesh.means(field), sizes(points[mesh.nodes], mesh.cells)
@@ -63,7 +63,7 @@ def test_always_any_mesh_is_thinned_to_whole_cells_of_the_same_outline():
     inner = (np.abs(points[:, 0]) < 1) & (points[:, 1] > 0) & (points[:, 1] < 1)
     points = points + inner[:, None] * rng.uniform(-0.3, 0.3, points.shape) * [1 / 30, 1 / 40]
     triangles = np.concatenate([cells[:, [0, 1, 2, 2]], cells[:, [0, 2, 3, 3]]])
-    mesh = thinned(points, triangles, np.zeros(len(triangles), bool), 600)
+    mesh = reduce_mesh(points, triangles, np.zeros(len(triangles), bool), 600)
     assert 100 < len(mesh.cells) <= 660
     size = sizes(points[mesh.nodes], mesh.cells)
     assert size.min() > 0 and size.sum() == pytest.approx(2.0, rel=0.05)
@@ -77,17 +77,17 @@ def test_always_any_mesh_is_thinned_to_whole_cells_of_the_same_outline():
 def test_exact_packed_numbers_are_within_half_a_step():
     values = np.random.default_rng(1).normal(size=(3, 50)) * 1e7
     values[1, 3] = np.nan
-    found = unpacked(player.packed(values))
+    found = unpacked(player.pack_array(values))
     np.testing.assert_allclose(
         found, values, atol=0.51 * np.ptp(values[np.isfinite(values)]) / 65534
     )
-    assert np.array_equal(unpacked(player.packed(np.arange(5000))).round(), np.arange(5000))
-    assert np.array_equal(unpacked(player.packed(np.full(3, 2.5))), np.full(3, 2.5))
+    assert np.array_equal(unpacked(player.pack_array(np.arange(5000))).round(), np.arange(5000))
+    assert np.array_equal(unpacked(player.pack_array(np.full(3, 2.5))), np.full(3, 2.5))
 
 
 @pytest.fixture(scope="module")
 def film(bench):
-    return player.reel(bench)
+    return player.player_data(bench)
 
 
 @pytest.fixture(scope="module")
@@ -103,10 +103,10 @@ def coarse(tmp_path_factory):
 
 def test_exact_numbers_and_places_are_those_of_the_fields(coarse):
     """What the player draws at some factors is what the pictures of `view` draw at the same ones."""
-    film = player.reel(coarse)
+    film = player.player_data(coarse)
     assert film["cells"][0] == film["cells"][1]
     with Series(coarse) as series:
-        numbers = moving(series.times)
+        numbers = last_consecutive_frames(series.times)
         assert film["of"] == len(numbers)
         gap, aside = 200.0, 50.0
         for at, time in list(enumerate(film["times"]))[::5]:
@@ -146,7 +146,7 @@ def test_always_a_page_holds_what_it_can(film):
 
 
 def test_exact_results_without_fields_have_no_player(tmp_path):
-    assert player.reel(tmp_path) is None
+    assert player.player_data(tmp_path) is None
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem.export.drawing.charts import histories
-from patchfem.export.drawing.pictures import draw
+from patchfem.export.drawing.pictures import draw_charts
 from patchfem.export.page_data import Motion, RunData, SceneText, Verdict
-from patchfem.export.pages.released import released, swung
+from patchfem.export.pages.released import describe_release, describe_swing
 from patchfem.export.pages.sentences import headline
 from patchfem.export.report import picture
 from patchfem.scene.starting import read_template
@@ -84,13 +84,15 @@ def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_
 
 def test_exact_a_motion_that_has_not_come_to_rest():
     time = np.linspace(0, 1, 2001)
-    said = swung(time, 1e-3 * np.cos(2 * pi * 20 * time) * np.exp(-time))
+    said = describe_swing(time, 1e-3 * np.cos(2 * pi * 20 * time) * np.exp(-time))
     assert said.startswith(
         "released at 1 mm, the output first swings to -975 um and at the end, after 1 s, still "
         "moves with an amplitude (half peak-to-peak of its last whole cycle) of "
     )
-    assert swung(time, np.full(2001, 5e-4)) == "released at 500 um, the output does not move"
-    assert swung(time, 1e-3 * np.exp(-50 * time)).startswith(
+    assert (
+        describe_swing(time, np.full(2001, 5e-4)) == "released at 500 um, the output does not move"
+    )
+    assert describe_swing(time, 1e-3 * np.exp(-50 * time)).startswith(
         "released at 1 mm, the output goes to "
     )
 
@@ -139,7 +141,7 @@ def test_exact_the_picture_of_the_whole_run_shows_every_turn():
         np.allclose(early["y"][:6], 1e6 * swing)
         and "turning points and stops were kept" in found.caption
     )
-    whole = draw.figure(found.charts(*found.values)).axes[0].lines[0].get_ydata()
+    whole = draw_charts.figure(found.charts(*found.values)).axes[0].lines[0].get_ydata()
     assert np.allclose(whole[:6], 1e6 * swing)
 
 
@@ -147,7 +149,7 @@ def test_exact_the_picture_of_the_whole_run_shows_every_turn():
 def test_always_a_joint_that_still_swings_is_not_said_to_rest(cycles):
     """Sliders of law 'iwan' always slip a little, so that the swing becomes smaller, but never ends."""
     found = pf.run(re.sub(r"cycles = \d+", f"cycles = {cycles}", IWAN))
-    said, last = released(found), found.measures["relative_displacement_amplitude"].value
+    said, last = describe_release(found), found.measures["relative_displacement_amplitude"].value
     assert last > 50e-9 and "comes to rest" not in said
     told = re.search(
         r"at the end, after \S+ \S+, still moves with an amplitude \(half peak-to-peak of its last whole "
@@ -161,8 +163,8 @@ def test_exact_an_output_rests_where_it_moves_by_less_than_its_error():
     time = np.linspace(0, 1, 4001)
     # at the end 0.1 to 0.05 um
     output = 1e-4 + 1e-3 * np.exp(-10 * time) * np.cos(2 * pi * 20 * time)
-    assert "comes to rest at 100 um after" in swung(time, output)
-    assert "still moves" in swung(time, output - 1e-4)
-    assert "comes to rest" in swung(time, output - 1e-4, 2e-7) and "still moves" in swung(
-        time, output - 1e-4, 1e-8
-    )
+    assert "comes to rest at 100 um after" in describe_swing(time, output)
+    assert "still moves" in describe_swing(time, output - 1e-4)
+    assert "comes to rest" in describe_swing(
+        time, output - 1e-4, 2e-7
+    ) and "still moves" in describe_swing(time, output - 1e-4, 1e-8)

@@ -9,11 +9,11 @@ from chromium import LATER
 from page_data import data_of, own_part, unheard
 
 from patchfem.export.pages import library
-from patchfem.export.pages.document import Section, document, encoded, figure
+from patchfem.export.pages.document import Section, document, figure, to_json
 from patchfem.export.pages.document import table as sheet
 from patchfem.export.pages.headline import span
-from patchfem.export.pages.sweep import brief, page
-from patchfem.export.sweeps.page import joined, wide
+from patchfem.export.pages.sweep import page, shorten
+from patchfem.export.sweeps.page import join_tables, suits_log_axis
 
 
 def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table):
@@ -205,7 +205,7 @@ def test_exact_a_key_written_in_several_units_is_shown_in_that_of_its_numbers(ta
     ],
 )
 def test_exact_long_numbers_are_shown_short(text, shown):
-    assert brief(text) == shown
+    assert shorten(text) == shown
 
 
 def test_exact_numbers_that_are_not_finite_are_null():
@@ -215,7 +215,7 @@ def test_exact_numbers_that_are_not_finite_are_null():
         "c": (np.int64(3), "x", None),
         4: True,
     }
-    assert json.loads(encoded(given)) == {
+    assert json.loads(to_json(given)) == {
         "a": [None, None, 0.333333333],
         "b": 2.0,
         "c": [3, "x", None],
@@ -224,7 +224,10 @@ def test_exact_numbers_that_are_not_finite_are_null():
 
 
 def test_exact_a_script_cannot_end_its_element():
-    assert library.inert("a</script>b<!--c</SCRIPT x</p") == "a<\\/script>b<\\!--c<\\/SCRIPT x</p"
+    assert (
+        library.escape_script("a</script>b<!--c</SCRIPT x</p")
+        == "a<\\/script>b<\\!--c<\\/SCRIPT x</p"
+    )
     hostile = document("t", "", [], {"x": "</script><!--"}, ("figures.js",))
     assert data_of(hostile) == {"x": "</script><!--"}
 
@@ -365,7 +368,7 @@ def test_exact_sweeps_side_by_side_keep_the_numbers_of_their_cases(table):
         "messages": {0: "another"},
         "keys": table["keys"][::-1],
     }
-    found = joined([table, other], ["one", "other"])
+    found = join_tables([table, other], ["one", "other"])
     assert found["messages"] == {7: "normal.load: <refused>", 12: "another"}
     assert found["outcome"] == table["outcome"] + other["outcome"]
     amplitude = table["measures"]["relative_displacement_amplitude"]["values"]
@@ -393,7 +396,7 @@ def test_exact_a_word_has_one_number_on_the_page_of_several_sweeps(table):
         }
         for words in (("coulomb", "tanh") * 6, ("tanh", "iwan") * 6)
     ]
-    found = joined([table | {"keys": [one]} for one in laws], ["one", "other"])
+    found = join_tables([table | {"keys": [one]} for one in laws], ["one", "other"])
     values = dict(zip(found["keys"][1]["texts"], found["keys"][1]["values"]))
     assert values == {"coulomb": 0, "tanh": 1, "iwan": 2}
     assert [values[text] for text in found["keys"][1]["texts"]] == list(found["keys"][1]["values"])
@@ -416,7 +419,7 @@ def test_exact_a_word_has_one_number_on_the_page_of_several_sweeps(table):
     ],
 )
 def test_exact_an_axis_of_a_decade_or_more_is_logarithmic(values, log):
-    assert wide(values) is log
+    assert suits_log_axis(values) is log
 
 
 def test_exact_round_off_is_zero_in_the_span_and_known_absolutely():
@@ -442,7 +445,7 @@ def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
 def test_always_a_page_can_be_heard(table):
     """The sliders of the player had no name once: their labels named the value that stood before them."""
     assert unheard(page(table)) == []
-    assert unheard(library.own("player.html")) == []
+    assert unheard(library.read_file("player.html")) == []
     assert (
         unheard(document("Ways", "", [Section("a", "Ways", sheet(("", ""), [["held", "1"]]))]))
         == []

@@ -57,7 +57,7 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
     scene, out, _ = swept
     assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 0
     over = OVER[1]
-    assert manifest.read(out, manifest.sign(scene, words(over)))["cases"]["count"] == 3
+    assert manifest.read(out, manifest.hash_request(scene, words(over)))["cases"]["count"] == 3
     file = next((out / "chunks").glob("*.h5")) if change == "chunk" else out / "sweep.csv"
     text, stamp = scene.read_text("utf-8"), file.stat()
     if change in ("chunk", "table"):
@@ -73,11 +73,11 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
         if change == "page"
         else words(over)
     )
-    assert manifest.read(out, manifest.sign(scene, asked)) == {}
+    assert manifest.read(out, manifest.hash_request(scene, asked)) == {}
     scene.write_text(text, encoding="utf-8")
     # it is whole again, and has its receipt
     again = cli("sweep", scene, *OVER, "-o", out, "--resume")
-    assert again.code == 0 and manifest.read(out, manifest.sign(scene, words(over)))
+    assert again.code == 0 and manifest.read(out, manifest.hash_request(scene, words(over)))
 
 
 def test_exact_a_sweep_with_a_failed_case_has_no_receipt(swept, tmp_path):
@@ -147,10 +147,10 @@ def test_always_the_content_of_a_file_that_a_word_names_counts(swept):
     scene, *_ = swept
     other = scene.parent / "push.csv"
     other.write_text("1", encoding="utf-8")
-    before = manifest.sign(scene, words('drive.file="push.csv"'))
+    before = manifest.hash_request(scene, words('drive.file="push.csv"'))
     other.write_text("2", encoding="utf-8")
-    assert before != manifest.sign(scene, words('drive.file="push.csv"'))
+    assert before != manifest.hash_request(scene, words('drive.file="push.csv"'))
     assert (
-        manifest.sign(scene.parent / "none.toml", words()) == ""
+        manifest.hash_request(scene.parent / "none.toml", words()) == ""
         and manifest.read(scene.parent, "") == {}
     )

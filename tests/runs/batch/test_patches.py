@@ -7,10 +7,10 @@ import pytest
 from scene_texts import COATING, PIECE
 
 from patchfem import build
-from patchfem.campaigns.sweeps.case_models import Asked
+from patchfem.campaigns.sweeps.case_models import SweepScene
 from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import LocalExecutor
-from patchfem.export.sweeps.run import swept
+from patchfem.export.sweeps.run import compute_in_memory
 from patchfem.runs.batch import batches, one_by_one, patches
 from patchfem.runs.batch.meshes import with_shared_meshes
 from patchfem.runs.patch.grids import contact_extent
@@ -164,7 +164,7 @@ def test_exact_a_sweep_in_columns_is_that_of_its_models():
         "contact.load": [f"{load!r} N" for _, _, load in values],
     }
     cases = Cases(tuple(make_axis(key, texts, distinct=False) for key, texts in keys.items()), True)
-    found = swept(Asked(Path("patch.toml"), text), cases, LocalExecutor())
+    found = compute_in_memory(SweepScene(Path("patch.toml"), text), cases, LocalExecutor())
     models = with_shared_meshes(
         [
             build(scene.loads(text, sets=[f"{key}={texts[k]}" for key, texts in keys.items()]))

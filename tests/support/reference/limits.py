@@ -25,7 +25,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "scene.keys.tables.MAX_MASS_NUMBER": "number of masses in structure.masses",
     "effects.MAX_COORDINATES": "number of masses or modes of a rig",
     "scene.axes.MAX_RANGE_VALUES": "number of values in one range of a sweep",
-    "campaigns.sweeps.parse_request.MOST": "number of cases of a sweep",
+    "campaigns.sweeps.parse_request.MAX_CASES": "number of cases of a sweep",
     "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
     "inputs.records.MAX_BYTES": "bytes of a laboratory file",
     "inputs.matlab.MAX_BYTES": "bytes of a .mat file",

@@ -1,7 +1,7 @@
 """Executors, which compute the chunks of a sweep: in this process, in several, or with Dask.
 
 Each has `workers` and `run(work, take, say)`, which yields (chunk, seconds, answer or Died) of
-every chunk that `take` returns. `of` returns an executor by its name.
+every chunk that `take` returns. `make_executor` returns an executor by its name.
 
 Read `LocalExecutor` first.
 """
@@ -9,7 +9,7 @@ Read `LocalExecutor` first.
 from collections.abc import Callable, Iterator
 
 from ....core import PatchfemError
-from ..sweep import Work, timed
+from ..sweep import Work, compute_timed
 from . import cluster, pool
 
 
@@ -21,10 +21,10 @@ class LocalExecutor:
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
         """Yield (chunk, seconds, result of `answer`) of each chunk that `take` returns."""
         while (chunk := take()) is not None:
-            yield chunk, *timed(work, chunk, say)
+            yield chunk, *compute_timed(work, chunk, say)
 
 
-def of(name: str = "", jobs: int = 1):
+def make_executor(name: str = "", jobs: int = 1):
     """Return the executor of a name.
 
     Parameters

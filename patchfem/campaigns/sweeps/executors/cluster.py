@@ -18,12 +18,14 @@ import numpy as np
 
 from .... import __version__
 from ....core import Missing, PatchfemError
-from ..sweep import Died, Work, handed, timed
+from ..sweep import Died, Work, compute_timed, write_or_return
 
 _TLS = "DASK_DISTRIBUTED__COMM__TLS__"
 CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
-AHEAD = 2  # chunks that each worker holds beyond the present one, so it never waits for the next
-PATIENCE = "10s"  # maximum time to wait for the scheduler
+CHUNKS_PER_WORKER = (
+    2  # chunks that each worker holds beyond the present one, so it never waits for the next
+)
+CONNECT_TIMEOUT = "10s"  # maximum time to wait for the scheduler
 
 
 class Cluster:
@@ -90,34 +92,34 @@ class Cluster:
             )
         try:
             self.client = distributed.Client(
-                self.own or address, timeout=PATIENCE, set_as_default=False
+                self.own or address, timeout=CONNECT_TIMEOUT, set_as_default=False
             )
         except (OSError, TimeoutError, ValueError) as error:
             raise Missing(f"{self.name}: no scheduler answers at this address ({error})") from None
-        found = self.client.run(own_of, on_error="return")
+        found = self.client.run(environment_versions, on_error="return")
         self.workers = max(len(found), 1)
         for own in found.values():
-            if own != own_of():
+            if own != environment_versions():
                 self.client.close()
-                raise self._other(own, own_of())
+                raise self._other(own, environment_versions())
 
     def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
         """Yield (chunk, seconds, answer or Died) of each chunk that `take` returns, as they come in."""
         from distributed import as_completed
         from distributed.client import ClosedClientError
 
-        path, want = work.asked.path, own_of(work)
+        path, want = work.asked.path, environment_versions(work)
         there = replace(work, asked=replace(work.asked, path=Path(os.path.abspath(path))))
         try:
             # Dask repeats this task if all workers that store its result have died.
-            shared = self.client.submit(_as_it_is, there, pure=False)
+            shared = self.client.submit(_identity, there, pure=False)
             ready, on_the_way = (
                 as_completed(loop=self.client.loop, with_results=True, raise_errors=False),
                 {},
             )
             while True:
                 while (
-                    len(on_the_way) < AHEAD * self.workers
+                    len(on_the_way) < CHUNKS_PER_WORKER * self.workers
                     and (chunk := take(not on_the_way)) is not None
                 ):
                     future = self.client.submit(_answer, shared, chunk, (want, path), pure=False)
@@ -190,7 +192,7 @@ def _source() -> str:
     return sha256(repr(texts).encode()).hexdigest()[:8]
 
 
-def own_of(work: Work | None = None) -> dict:
+def environment_versions(work: Work | None = None) -> dict:
     """Return what a worker must have in common with the process that sends it work.
 
     These are versions by name and, as `files`, the hash of the scene with the files that it names.
@@ -203,7 +205,7 @@ def own_of(work: Work | None = None) -> dict:
     return own if work is None else own | {"files": work.asked.digest()}
 
 
-def _as_it_is(work: Work) -> Work:
+def _identity(work: Work) -> Work:
     """Return the work unchanged; a call of this function stores the work on the cluster."""
     return work
 
@@ -211,7 +213,7 @@ def _as_it_is(work: Work) -> Work:
 def _answer(work: Work, chunk: list, asked: tuple) -> tuple | dict:
     """Compute a chunk in a worker; return (seconds, answer).
 
-    If the worker has another version or other files, return what it has (`own_of`) instead.
+    If the worker has another version or other files, return what it has (`environment_versions`) instead.
 
     Parameters
     ----------
@@ -219,15 +221,15 @@ def _answer(work: Work, chunk: list, asked: tuple) -> tuple | dict:
     chunk : list
         Numbers of cases.
     asked : tuple
-        `own_of` of the process that runs the sweep, and the path of the scene there, which messages
+        `environment_versions` of the process that runs the sweep, and the path of the scene there, which messages
         must name.
     """
     want, path = asked
-    if (own := own_of(work)) != want:
+    if (own := environment_versions(work)) != want:
         return own
-    seconds, (found, told) = timed(replace(work, write=None), chunk)
+    seconds, (found, told) = compute_timed(replace(work, write=None), chunk)
     folder, named = f"{work.asked.path.parent}{os.sep}", str(path.parent / "_")[:-1]
     found.messages.update(
         {case: text.replace(folder, named) for case, text in found.messages.items()}
     )
-    return seconds, handed(work, chunk, found, told)
+    return seconds, write_or_return(work, chunk, found, told)

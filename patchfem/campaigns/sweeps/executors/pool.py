@@ -83,7 +83,9 @@ class Worker:
         except (EOFError, OSError):
             seconds, found = (
                 0.0,
-                Died(f"the process that ran this case died ({_how(self.process.wait())})"),
+                Died(
+                    f"the process that ran this case died ({_describe_status(self.process.wait())})"
+                ),
             )
         chunk, self.chunk = self.chunk, None
         return chunk, seconds, found
@@ -115,7 +117,7 @@ class Pool:
         """
         self.end()
         for _ in range(min(self.workers, count)):
-            self.ready.append(_started(work, say is None))
+            self.ready.append(_start_worker(work, say is None))
 
     def end(self) -> None:
         """Kill the processes that wait for the meshes."""
@@ -129,7 +131,7 @@ class Pool:
             for one in workers:
                 one.tell(work)
             while True:
-                self._hand_out(workers, lambda: _started(work, say is None), take)
+                self._hand_out(workers, lambda: _start_worker(work, say is None), take)
                 busy = {one.pipe: one for one in workers if one.chunk is not None}
                 if not busy:
                     return
@@ -161,7 +163,7 @@ class Pool:
             one.give(chunk)
 
 
-def _started(work: Work, silent: bool) -> Worker:
+def _start_worker(work: Work, silent: bool) -> Worker:
     """Start a process; Missing if the system refuses."""
     try:
         return Worker(work, silent)
@@ -171,7 +173,7 @@ def _started(work: Work, silent: bool) -> Worker:
         ) from None
 
 
-def _how(status: int) -> str:
+def _describe_status(status: int) -> str:
     """Describe the exit status of a process."""
     if status == -9:
         return "killed by a user, or for lack of memory"

@@ -21,13 +21,13 @@ def main() -> None:
     try:
         work = pipe.recv()
 
-        sweep.warmed(work)
+        sweep.warm_up(work)
         while True:
             asked = pipe.recv()
             if isinstance(asked, sweep.Work):  # the same work with the meshes that all cases share
                 work = asked
             else:
-                pipe.send(sweep.timed(work, asked, None if sys.argv[2] else _say))
+                pipe.send(sweep.compute_timed(work, asked, None if sys.argv[2] else _say))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         # the process that started the sweep has ended
         return
