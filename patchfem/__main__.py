@@ -4,9 +4,8 @@
 import sys
 
 if __name__ == "__main__" and not sys.flags.safe_path:
-    del sys.path[
-        0
-    ]  # the current folder, in which a file of the user may have the name of any module
+    # the current folder, in which a file of the user may have the name of any module
+    del sys.path[0]
 
 import gc
 import importlib
@@ -16,36 +15,37 @@ import signal
 from types import ModuleType
 
 # Signals that end the process: from a user, a batch queue or a closed terminal, unless nohup ignores the last.
-ENDINGS = [
-    one
-    for one in (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP"))
-    if one is not None and signal.getsignal(one) is not signal.SIG_IGN
+END_SIGNALS = [
+    number
+    for number in (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP"))
+    if number is not None and signal.getsignal(number) is not signal.SIG_IGN
 ]
-for one in ENDINGS:
-    signal.signal(one, lambda *_: os._exit(130))  # the process ends at once until main() runs
+for end_signal in END_SIGNALS:
+    signal.signal(end_signal, lambda *_: os._exit(130))  # ends the process until main() runs
 
 os.environ["PYTHONSAFEPATH"] = "1"  # child processes do not import from the current folder either
 # The search for plugins costs every command 30 ms.
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 # All large computations limit BLAS to one thread; more threads would only cost a small run 0.1 CPU seconds.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# Number of new objects before the first garbage collection and before later ones, because collections take a tenth of
-# the time of a short command. A run of the rig ends with 110,000 objects, nearly all from imports.
-FIRST, LATER = 200_000, 50_000
+# Garbage collections take a tenth of the time of a short command. A run of the rig ends with 110,000 objects, nearly
+# all from imports.
+FIRST_GC_THRESHOLD = 200_000  # new objects before the first garbage collection
+LATER_GC_THRESHOLD = 50_000  # new objects before each later collection
 
 
-def _searched(phase: str, _) -> None:
+def _lower_gc_threshold(phase: str, _) -> None:
     """Lower the threshold of the garbage collector once its first collection starts."""
-    gc.set_threshold(LATER, *gc.get_threshold()[1:])
+    gc.set_threshold(LATER_GC_THRESHOLD, *gc.get_threshold()[1:])
     if phase == "stop":
-        gc.callbacks.remove(_searched)
+        gc.callbacks.remove(_lower_gc_threshold)
 
 
-gc.set_threshold(FIRST, *gc.get_threshold()[1:])
-gc.callbacks.append(_searched)
+gc.set_threshold(FIRST_GC_THRESHOLD, *gc.get_threshold()[1:])
+gc.callbacks.append(_lower_gc_threshold)
 
 
-class _Later(ModuleType):
+class _LazyMetadata(ModuleType):
     """Stand-in for importlib.metadata that imports it when an attribute is used.
 
     pydantic only uses its `entry_points` to search for plugins, and its imports of `email`, `socket` and `calendar`
@@ -59,9 +59,12 @@ class _Later(ModuleType):
 
 
 if "importlib.metadata" not in sys.modules:
-    later = sys.modules["importlib.metadata"] = importlib.metadata = _Later("importlib.metadata")
-    later.__path__ = [os.path.join(one, "metadata") for one in importlib.__path__]
-    later.entry_points = lambda **of: later.__getattr__("entry_points")(**of)
+    lazy_metadata = _LazyMetadata("importlib.metadata")
+    lazy_metadata.__path__ = [os.path.join(folder, "metadata") for folder in importlib.__path__]
+    lazy_metadata.entry_points = lambda **options: lazy_metadata.__getattr__("entry_points")(
+        **options
+    )
+    sys.modules["importlib.metadata"] = importlib.metadata = lazy_metadata
 
 import _thread
 import atexit
@@ -80,8 +83,8 @@ from .commands.shared import Ended, Refused, say
 from .commands.streams import plain, ready
 from .formatting import rewrite_powers_of_ten
 
-# group -> verb -> (the module of its function, loaded where the verb is asked for; what it does; words of an example)
-SCREEN = {
+# group -> verb -> (module of its function, which is loaded when the verb is used; what it does; arguments of an example)
+VERB_GROUPS = {
     "Start": {
         "demo": (start, "run the bundled example rig", ""),
         "new": (start, "write a scene to start from", "joint -o joint.toml"),
@@ -116,7 +119,9 @@ SCREEN = {
         "cite": (start, "BibTeX of a scene's sources", "joint.toml"),
     },
 }
-VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
+# verb -> module of its function
+VERBS = {verb: row[0] for verbs in VERB_GROUPS.values() for verb, row in verbs.items()}
+MAX_EXAMPLE_WIDTH = 45  # characters of an example on the line of its description
 
 OUT_OF_MEMORY = (
     "out of memory; if a key of the scene sets the size of the largest part of the "
@@ -132,61 +137,68 @@ app = App(
 )
 
 
-def first_screen() -> str:
+def format_first_screen() -> str:
     """Return the list of verbs in groups, each with an example and a description."""
     lines = [f"patchfem {__version__}: {app.help}"]
-    for group, verbs in SCREEN.items():
+    for group, verbs in VERB_GROUPS.items():
         lines += ["", group]
-        for verb, (_, what, example) in verbs.items():
-            shown = f"  patchfem {verb} {example}"
-            lines += [f"{shown:<45}  {what}"] if len(shown) <= 45 else [shown, f"{'':47}{what}"]
-    return "\n".join(
-        [
-            *lines,
-            "",
-            "`patchfem run --help` explains a verb; `--install-completion` adds completion.",
-        ]
-    )
+        for verb, (_, description, arguments) in verbs.items():
+            example = f"  patchfem {verb} {arguments}"
+            if len(example) > MAX_EXAMPLE_WIDTH:
+                lines.append(example)
+                example = ""
+            lines.append(f"{example:<{MAX_EXAMPLE_WIDTH}}  {description}")
+    lines += [
+        "",
+        "`patchfem run --help` explains a verb; `--install-completion` adds completion.",
+    ]
+    return "\n".join(lines)
 
 
-def _unexpected(verb: str, left: list) -> str:
+def _describe_unexpected_arguments(verb: str, unused: list) -> str:
     """Return the message on arguments that a verb does not take, or on an unknown verb."""
     if verb in VERBS or verb in app:
-        return f"unexpected '{' '.join(left)}'; see `patchfem {verb} --help`"
-    near, what = get_close_matches(verb, VERBS, 1), "option" if verb.startswith("-") else "verb"
-    return f"unknown {what} '{verb}'; {f'did you mean `{near[0]}`? ' if near else ''}see `patchfem --help`"
+        return f"unexpected '{' '.join(unused)}'; see `patchfem {verb} --help`"
+    similar = get_close_matches(verb, VERBS, 1)
+    kind = "option" if verb.startswith("-") else "verb"
+    advice = f"did you mean `{similar[0]}`? " if similar else ""
+    return f"unknown {kind} '{verb}'; {advice}see `patchfem --help`"
 
 
-def _removed_option(words: list) -> str:
+def _describe_removed_option(arguments: list) -> str:
     """Return what replaces the first removed option among the arguments; "" if there is none."""
     from .scene.keys.removed import describe_removed_option
 
-    for word in words[1:]:
-        option = word.partition("=")[0]
-        sentence = describe_removed_option(words[0], option, f"{words[0]} {option}")
-        if word.startswith("--") and sentence:
+    for argument in arguments[1:]:
+        option = argument.partition("=")[0]
+        sentence = describe_removed_option(arguments[0], option, f"{arguments[0]} {option}")
+        if argument.startswith("--") and sentence:
             return sentence
     return ""
 
 
-def known(words: list) -> None:
+def register_verbs(arguments: list) -> None:
     """Register the requested verb with the command line, or all verbs if it names none."""
-    for verb in words[:1] if words[:1] and words[0] in VERBS else VERBS:
+    names_verb = bool(arguments) and arguments[0] in VERBS
+    for verb in arguments[:1] if names_verb else VERBS:
         if verb not in app:
             app.command(getattr(VERBS[verb], "import_" if verb == "import" else verb), name=verb)
 
 
 @app.command(name="--install-completion")
-def completion(
+def install_completion(
     *,
     shell: Literal["zsh", "bash", "fish", "powershell"] | None = None,
     output: Annotated[Path | None, Parameter(name=["-o", "--output"])] = None,
 ):
     """Install completion of commands and options for this shell (bash, zsh, fish).
 
-    Parameters ---------- shell : Literal["zsh", "bash", "fish", "powershell"] | None Shell for which completion is
-    installed; default: the present shell. output : Path | None File for the completions; default: the usual file of the
-    shell.
+    Parameters
+    ----------
+    shell : str, optional
+        Shell for which completion is installed; default: the present shell.
+    output : Path, optional
+        File for the completions; default: the usual file of the shell.
     """
     from cyclopts.completion.install import (
         create_install_completion_command,  # 10 ms of every command otherwise
@@ -203,24 +215,24 @@ def main(argv: list | None = None) -> None:
     if argv is not None:
         sys.exit(run_command(argv))
     code = run_command(sys.argv[1:], ready)
-    _leave(code)
+    _exit_quickly(code)
     sys.exit(code)
 
 
-def _leave(code: int) -> None:
+def _exit_quickly(code: int) -> None:
     """End the process without the clean-up of its modules, which takes 50 ms.
 
     The function returns, so the process ends as usual, if other threads run, if a profiler or a debugger is active, or
     if the output cannot be flushed.
     """
     gc.freeze()
-    if threading.active_count() > 1 or _watched() or sys.flags.inspect:
+    if threading.active_count() > 1 or _is_watched() or sys.flags.inspect:
         return
     try:
         sys.stdout.flush()
         sys.stderr.flush()
-        for one in ENDINGS:
-            signal.signal(one, signal.SIG_IGN)  # a signal must not change the exit code now
+        for end_signal in END_SIGNALS:
+            signal.signal(end_signal, signal.SIG_IGN)  # a signal must not change the exit code now
     except (OSError, ValueError, AttributeError):
         return
     except KeyboardInterrupt:
@@ -229,28 +241,29 @@ def _leave(code: int) -> None:
     os._exit(code)
 
 
-def _watched() -> bool:
+def _is_watched() -> bool:
     """Return whether a profiler, a debugger or a coverage tool watches this process.
 
     From Python 3.12 on, most of them use sys.monitoring, which has six tool numbers.
     """
-    seen = getattr(sys, "monitoring", None)
-    return bool(sys.getprofile() or sys.gettrace() or (seen and any(map(seen.get_tool, range(6)))))
+    monitoring = getattr(sys, "monitoring", None)
+    has_tool = monitoring is not None and any(map(monitoring.get_tool, range(6)))
+    return bool(sys.getprofile() or sys.gettrace() or has_tool)
 
 
-def run_command(words: list, before=lambda: None) -> int:
+def run_command(arguments: list, before=lambda: None) -> int:
     """Run a command and return its exit code; errors are printed to stderr.
 
     Parameters
     ----------
-    words : list
-        Words of the command line after `patchfem`.
+    arguments : list
+        Arguments of the command line after `patchfem`.
     before : callable
         Called first; its errors are printed in the same way.
     """
-    if there := sys.modules.get(f"{__package__}.disk.atomic_write"):
-        there.forget_placed_paths()
-    if words[:1] == ["help"]:
+    if atomic_write := sys.modules.get(f"{__package__}.disk.atomic_write"):
+        atomic_write.forget_placed_paths()
+    if arguments[:1] == ["help"]:
         say(
             "patchfem: `help` is not a verb; `patchfem --help` lists the verbs, `patchfem run --help` explains the "
             "verb `run`"
@@ -258,28 +271,30 @@ def run_command(words: list, before=lambda: None) -> int:
         return 2
     try:
         before()
-        if words in ([], ["--help"], ["-h"]):
-            print(first_screen(), flush=True)
+        if arguments in ([], ["--help"], ["-h"]):
+            print(format_first_screen(), flush=True)
             return 0
-        if removed := _removed_option(words):
+        if removed := _describe_removed_option(arguments):
             raise Refused(removed)
-        known(words)
+        register_verbs(arguments)
         try:
-            app(words, exit_on_error=False, print_error=False)
+            app(arguments, exit_on_error=False, print_error=False)
         except SystemExit as end:  # cyclopts ends a verb and its help by SystemExit
             if end.code or isinstance(end.__context__, BrokenPipeError):
                 raise
         sys.stdout.flush()
         return 0
     except (Refused, CycloptsError) as error:
-        left = getattr(error, "unused_tokens", None)
-        said = _unexpected(words[0], left) if left else str(error)
-        say(plain(f"patchfem: {' '.join(said.split())}"))
+        unused = getattr(error, "unused_tokens", None)
+        message = str(error)
+        if unused:
+            message = _describe_unexpected_arguments(arguments[0], unused)
+        say(plain(f"patchfem: {' '.join(message.split())}"))
         return 2
     except Ended as end:
         return end.code
     except KeyboardInterrupt:
-        say(_interrupted())
+        say(_describe_interrupt())
         return 130
     except MemoryError:
         say(OUT_OF_MEMORY)
@@ -292,48 +307,55 @@ def run_command(words: list, before=lambda: None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except OSError as error:
-        # the error comes from a query of the working folder, which names no file
-        gone = isinstance(error, FileNotFoundError) and not error.filename
-        say(
-            plain(
-                "patchfem: the working folder no longer exists; change to an existing one"
-                if gone
-                else f"{error.filename or 'patchfem'}: {error.strerror or error}"
-                f"{'; use a shorter name' * (error.errno == ENAMETOOLONG)}"
-            )
-        )
+        say(plain(_describe_os_error(error)))
         return 4
     except Exception as error:
-        # a shared library does not fit into memory
-        if isinstance(error, ImportError) and "failed to map" in str(error):
-            say(OUT_OF_MEMORY)
-            return 4
-        # this is a SceneError; importing the class would import pydantic, which takes 20 ms
-        if hasattr(error, "mistakes"):
-            for line in error.mistakes:
-                say(plain(rewrite_powers_of_ten(line)))
-            return 2
-        code = getattr(error, "code", None)
-        if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
-            say(plain(rewrite_powers_of_ten(str(error))))
-            return code
-        said = " ".join(f"{type(error).__name__}: {error}".split())
-        say(plain(f"patchfem: internal fault{_place_of_fault(error)}: {said}"))
-        say(
-            "patchfem: please report it: send these lines, the command, the scene with its files and what `patchfem "
-            "doctor` says to the project's issue tracker; PATCHFEM_DEBUG=1 before the command shows the traceback"
-        )
-        if os.environ.get("PATCHFEM_DEBUG"):
+        code = _report_error(error)
+        if code == 1 and os.environ.get("PATCHFEM_DEBUG"):
             raise
-        return 1
+        return code
 
 
-def _place_of_fault(error: Exception) -> str:
-    """Return " in FILE:LINE (FUNCTION)" of the innermost frame of this package, or "".
+def _describe_os_error(error: OSError) -> str:
+    """Return the message on an error of the operating system."""
+    # the error comes from a query of the working folder, which names no file
+    if isinstance(error, FileNotFoundError) and not error.filename:
+        return "patchfem: the working folder no longer exists; change to an existing one"
+    advice = "; use a shorter name" if error.errno == ENAMETOOLONG else ""
+    return f"{error.filename or 'patchfem'}: {error.strerror or error}{advice}"
+
+
+def _report_error(error: Exception) -> int:
+    """Print the message of an error to stderr and return the exit code; 1 for an internal fault."""
+    # a shared library does not fit into memory
+    if isinstance(error, ImportError) and "failed to map" in str(error):
+        say(OUT_OF_MEMORY)
+        return 4
+    # this is a SceneError; importing the class would import pydantic, which takes 20 ms
+    if hasattr(error, "mistakes"):
+        for line in error.mistakes:
+            say(plain(rewrite_powers_of_ten(line)))
+        return 2
+    code = getattr(error, "code", None)
+    if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
+        say(plain(rewrite_powers_of_ten(str(error))))
+        return code
+    message = " ".join(f"{type(error).__name__}: {error}".split())
+    say(plain(f"patchfem: internal fault{_locate_fault(error)}: {message}"))
+    say(
+        "patchfem: please report it: send these lines, the command, the scene with its files and what `patchfem "
+        "doctor` says to the project's issue tracker; PATCHFEM_DEBUG=1 before the command shows the traceback"
+    )
+    return 1
+
+
+def _locate_fault(error: Exception) -> str:
+    """Return " in FILE:LINE (FUNCTION)" of the innermost frame of this package; "" if there is none.
 
     An error of another process carries the frames of that process as the string of its cause.
     """
-    root, place = Path(__file__).resolve().parent, ""
+    root = Path(__file__).resolve().parent
+    location = ""
     frames = [
         (frame.f_code.co_filename, line, frame.f_code.co_name)
         for frame, line in walk_tb(error.__traceback__)
@@ -342,47 +364,50 @@ def _place_of_fault(error: Exception) -> str:
     for file, line, function in frames:
         path = Path(file).resolve()
         if root in path.parents:
-            place = f" in {root.name}/{path.relative_to(root).as_posix()}:{line} ({function})"
-    return place
+            location = f" in {root.name}/{path.relative_to(root).as_posix()}:{line} ({function})"
+    return location
 
 
-def _interrupted() -> str:
+def _describe_interrupt() -> str:
     """Return the message on an interrupt, with the files that are complete."""
-    there = sys.modules.get(f"{__package__}.disk.atomic_write")
-    placed = there.list_placed_paths() if there else []
-    kept = [one for one in dict.fromkeys(there.RESUMABLE_FOLDERS) if one.is_dir()] if there else []
+    atomic_write = sys.modules.get(f"{__package__}.disk.atomic_write")
+    placed = atomic_write.list_placed_paths() if atomic_write else []
     text = "interrupted; no file was replaced"
     if placed:
-        text = f"interrupted; already complete: {', '.join(placed[-3:])}" + " and more" * (
-            len(placed) > 3
-        )
-    return text + "".join(
-        f"; to continue {there.format_path(one)}, add --resume to the command" for one in kept
-    )
+        text = f"interrupted; already complete: {', '.join(placed[-3:])}"
+        text += " and more" if len(placed) > 3 else ""
+    if atomic_write:
+        for folder in dict.fromkeys(atomic_write.RESUMABLE_FOLDERS):
+            if folder.is_dir():
+                path = atomic_write.format_path(folder)
+                text += f"; to continue {path}, add --resume to the command"
+    return text
 
 
-def _once_more(lost) -> None:
+def _repeat_interrupt(unraisable) -> None:
     """Repeat an interrupt that was lost where Python drops exceptions.
 
     An example is a callback that LLVM calls during a compilation.
     """
-    if lost.exc_type is not KeyboardInterrupt:
-        sys.__unraisablehook__(lost)
+    if unraisable.exc_type is not KeyboardInterrupt:
+        sys.__unraisablehook__(unraisable)
         return
     while True:
         # on a busy machine the interrupt may come before the timer thread has started, and would be lost again
         try:
-            again = threading.Timer(0.05, _thread.interrupt_main, ENDINGS[:1])
-            again.daemon = True
-            again.start()
+            timer = threading.Timer(0.05, _thread.interrupt_main, END_SIGNALS[:1])
+            timer.daemon = True
+            timer.start()
             return
         except KeyboardInterrupt:
             continue
 
 
-sys.unraisablehook = _once_more
-for one in ENDINGS:  # the last statement before main(), whose `try` handles the interrupt
-    signal.signal(one, signal.default_int_handler)
+sys.unraisablehook = _repeat_interrupt
+for (
+    end_signal
+) in END_SIGNALS:  # the last statement before main(), whose `try` handles the interrupt
+    signal.signal(end_signal, signal.default_int_handler)
 
 if __name__ == "__main__":
     main()

@@ -222,7 +222,7 @@ class ModalBasis:
         """Damping matrix D (n, n) [1/s], also if it is diagonal."""
         return np.diag(2 * self.zeta * self.omega) if self.damping is None else self.damping
 
-    def stuck_mode(self, rows, stiffness, number: int) -> tuple:
+    def compute_stuck_mode(self, rows, stiffness, number: int) -> tuple:
         """Return the mode that a coordinate becomes if the interfaces stick.
 
         The modes with springs are assigned to the coordinates one to one, so that their shapes overlap most and none is

@@ -139,12 +139,12 @@ GROOVE_EQUATION = (
 _DRIVE_SIZE_KEYS = "acceleration displacement force"
 
 
-def _law(module: str, equations: str, keys: tuple, supports: str, traits: str = "") -> Effect:
+def _make_law(module: str, equations: str, keys: tuple, supports: str, traits: str = "") -> Effect:
     """Return the effect of a friction law; its module is below patchfem.friction."""
     return Effect(f"patchfem.friction.{module}", equations, keys, supports, traits)
 
 
-def _waveform(
+def _make_waveform(
     equations: str,
     keys: tuple,
     traits: str = "",
@@ -196,28 +196,28 @@ EFFECTS = {
     "contact.grooves": Effect("patchfem.friction.grooves", GROOVE_EQUATION),
     "normal": Effect("", "sigma_n A = N at one point"),
     "normal.grooves": Effect("patchfem.friction.grooves", GROOVE_EQUATION),
-    "friction.law=coulomb": _law(
+    "friction.law=coulomb": _make_law(
         "laws.coulomb",
         "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
         ("", "kinetic"),
         "shear joints varying-load exact pieces grooves",
         "set-valued timeless memoryless",
     ),
-    "friction.law=tanh": _law(
+    "friction.law=tanh": _make_law(
         "laws.tanh",
         "F = mu N tanh(v/v_0) (2.4)",
         ("reference_speed", ""),
         "joints varying-load harmonic grooves",
         "memoryless creeps",
     ),
-    "friction.law=elastic-plastic": _law(
+    "friction.law=elastic-plastic": _make_law(
         "laws.elastic_plastic",
         "F' = k v, |F| <= mu N (3.12, corrected for reversals), k = stiffness or mu N/bond_length",
         ("bond_length|stiffness", ""),
         "shear joints varying-load harmonic pieces grooves plane",
         "timeless",
     ),
-    "friction.law=nonlocal": _law(
+    "friction.law=nonlocal": _make_law(
         "bonds.quadrature",
         "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
         (
@@ -228,28 +228,28 @@ EFFECTS = {
         "shear joints varying-load harmonic two-directions grooves",
         "bonds",
     ),
-    "friction.law=convolution": _law(
+    "friction.law=convolution": _make_law(
         "laws.convolution",
         "tau = mu_s sgn(v) int phi(s/eps)/eps sigma_n(x - s sgn v) ds (Oden, Pires)",
         ("bond_length", "order spread"),
         "exact",
         "averaged set-valued timeless memoryless",
     ),
-    "friction.law=iwan": _law(
+    "friction.law=iwan": _make_law(
         "laws.iwan",
         "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max) (Segalman)",
         ("stiffness chi beta", ""),
         "joints harmonic pieces",
         "timeless cells",
     ),
-    "friction.law=bouc-wen": _law(
+    "friction.law=bouc-wen": _make_law(
         "laws.bouc_wen",
         "F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen)",
         ("stiffness", "exponent shape"),
         "joints harmonic",
         "timeless",
     ),
-    "friction.law=lugre": _law(
+    "friction.law=lugre": _make_law(
         "laws.lugre",
         "F = k z + s_1 z' + s_2 v, z' = v - k |v| z/g(v), g = mu_k N + "
         "(mu_s - mu_k) N exp(-(v/v_s)^2) (Canudas de Wit; Dahl: mu_k = mu_s, no damping)",
@@ -291,45 +291,45 @@ EFFECTS = {
     "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)"),
     "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)"),
     "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0"),
-    "drive.waveform=sine": _waveform(
+    "drive.waveform=sine": _make_waveform(
         "a(t) = a sin(2 pi f t)",
         ("frequency", _DRIVE_SIZE_KEYS),
         "sine endless",
         "{what} of {level} at {frequency}{place}",
         "patchfem.structure.drive_sizes",
     ),
-    "drive.waveform=step": _waveform(
+    "drive.waveform=step": _make_waveform(
         "a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X",
         ("", _DRIVE_SIZE_KEYS),
         "step endless",
         "a step of {level} in {what}{place}",
     ),
-    "drive.waveform=sweep": _waveform(
+    "drive.waveform=sweep": _make_waveform(
         "a(t) = a sin(2 pi int f dt), f' or f'/f constant",
         ("from to", f"rate log_rate {_DRIVE_SIZE_KEYS}"),
         "swept",
         "{what} of {level} swept from {from} to {to}{place}",
     ),
-    "drive.waveform=levels": _waveform(
+    "drive.waveform=levels": _make_waveform(
         "a(t) = a_k sin(2 pi f t), level after level",
         ("frequency levels", "onset onset_length"),
         "levels endless",
         "{count} levels of {what} from {first} to {last} at {frequency}{place}",
     ),
-    "drive.waveform=file": _waveform(
+    "drive.waveform=file": _make_waveform(
         "a(t) is linear between the rows of a table",
         ("file", ""),
         "",
         "recorded {what} of {file}{place}",
     ),
-    "drive.waveform=tones": _waveform(
+    "drive.waveform=tones": _make_waveform(
         "a(t) = sum_k a_k sin(2 pi f_k t + phi_k)",
         ("frequencies accelerations", "phases"),
         "base-only endless",
         "base acceleration of {accelerations} at {frequencies}",
         "patchfem.structure.tones",
     ),
-    "drive.waveform=random": _waveform(
+    "drive.waveform=random": _make_waveform(
         "a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, A_k, B_k normal of variance "
         "G(f_k)/T",
         ("", "spectrum file from to seed"),

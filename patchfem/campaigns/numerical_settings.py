@@ -131,7 +131,7 @@ def _by_tolerance(model: Model) -> list:
 def _uniform_meshes(model: Model) -> list:
     """Return uniform meshes, and for a static patch also the mesh that its tolerance chooses."""
     length, out = model.patch.pieces.length, []
-    middle = round(length / model.patch.even_element_size)
+    middle = round(length / model.patch.uniform_element_size)
     for power in range(-3, N_VALUES - 3):
         cells = round(middle * 2.0**power)
         if 8 <= cells <= MAX_CELLS or not power:

@@ -327,7 +327,7 @@ def _find_mode_cycles(modes: ModalBasis, group: Group, mode: int, size: float) -
     paths = (
         (
             size * np.geomspace(MIN_AMPLITUDE_RATIO, MAX_AMPLITUDE_RATIO, N_AMPLITUDES),
-            modes.stuck_mode(group.rows, group.stiffness(), mode),
+            modes.compute_stuck_mode(group.rows, group.stiffness(), mode),
             0.0,
         ),
         (

@@ -76,13 +76,13 @@ class Descent(NamedTuple):
 
     - u: point (n,) of the unit cube.
     - cost: sum of squares, infinite if the start failed.
-    - done: whether the descent converged.
+    - is_converged: whether the descent converged.
     - rows: number of rows of the residual.
     """
 
     u: np.ndarray
     cost: float
-    done: bool
+    is_converged: bool
     rows: int
 
     @property
@@ -92,7 +92,13 @@ class Descent(NamedTuple):
 
 
 def fit(
-    residual: Callable, low, high, log=None, start=None, starts: int = 3, bars: str = "rows"
+    residual: Callable,
+    low,
+    high,
+    log=None,
+    start=None,
+    max_descents: int = 3,
+    interval_kind: str = "rows",
 ) -> Fit:
     """Minimize the sum of squares of a residual within bounds.
 
@@ -107,9 +113,9 @@ def fit(
         Whether each value is searched in logarithms (see `space.make_space`).
     start : (n,) array_like, optional
         Values from which the first descent starts.
-    starts : int
+    max_descents : int
         Largest number of descents; with 1 only that from `start`, if it works.
-    bars : str
+    interval_kind : str
         ``"rows"`` takes rows as independent, ``"series"`` counts correlated neighbours as fewer. ``""``
         leaves the intervals NaN, and tries no value on its bound; ``"bounds"`` only leaves the intervals.
 
@@ -127,19 +133,23 @@ def fit(
     box = make_space(low, high, log)
     model = CubeResidual(residual, box)
     n = box.low.size
-    begins = choose_starting_points(model, None if start is None else box.unit(start), starts)
+    starting_points = choose_starting_points(
+        model, None if start is None else box.unit(start), max_descents
+    )
     if model.rows < n:
         raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
-    return assemble_fit(model, run_descents(model, begins, stops_when_exact=True), bars)
+    return assemble_fit(
+        model, run_descents(model, starting_points, stops_when_exact=True), interval_kind
+    )
 
 
 def run_descents(
     model: CubeResidual,
-    begins,
+    starting_points,
     *,
     stops_when_exact: bool = False,
-    stored: Callable = lambda *arguments: None,
-    before: Callable | None = None,
+    saved: Callable = lambda *arguments: None,
+    before_descent: Callable | None = None,
     report: Callable | None = None,
 ) -> list:
     """Descend from several points of the unit cube.
@@ -147,15 +157,15 @@ def run_descents(
     Parameters
     ----------
     model : CubeResidual
-    begins : sequence of (n,) ndarray
+    starting_points : sequence of (n,) ndarray
         Points from which the descents start.
     stops_when_exact : bool
         Whether a result to round-off ends the search.
-    stored : callable
-        ``stored(k)`` returns the descent from point k of an earlier search, or None; ``stored(k,
+    saved : callable
+        ``saved(k)`` returns the descent from point k of an earlier search, or None; ``saved(k,
         descent)`` stores it.
-    before : callable, optional
-        Is called before each descent.
+    before_descent : callable, optional
+        Is called before_descent each descent.
     report : callable, optional
         Is called with 1 after each descent.
 
@@ -164,13 +174,13 @@ def run_descents(
     list of Descent
     """
     ends = []
-    for k, begin in enumerate(begins):
-        end = stored(k)
+    for k, begin in enumerate(starting_points):
+        end = saved(k)
         if end is None:
-            if before is not None:
-                before()
+            if before_descent is not None:
+                before_descent()
             end = descend(model, begin, range(len(begin)))
-            stored(k, end)
+            saved(k, end)
         ends.append(end)
         if report is not None:
             report(1)
@@ -179,16 +189,18 @@ def run_descents(
     return ends
 
 
-def assemble_fit(model: CubeResidual, ends: list, bars: str = "rows", starts=None) -> Fit:
+def assemble_fit(
+    model: CubeResidual, ends: list, interval_kind: str = "rows", first_descents=None
+) -> Fit:
     """Assemble the fit of the best of some descents.
 
     Parameters
     ----------
     model : CubeResidual
     ends : list of Descent
-    bars : str
+    interval_kind : str
         As in `fit`.
-    starts : list of Descent, optional
+    first_descents : list of Descent, optional
         Descents that show whether several found the same valley, if `ends` continues the best of them.
 
     Returns
@@ -200,13 +212,13 @@ def assemble_fit(model: CubeResidual, ends: list, bars: str = "rows", starts=Non
     agreed = sum(abs(end.cost - best.cost) <= max_difference for end in ends)
     u = best.u
     cost = best.cost
-    if bars:
+    if interval_kind:
         u, cost = _move_onto_bounds(model, u, cost)
     intervals = make_unknown_intervals(u.size)
-    if bars not in ("", "bounds"):
-        intervals = compute_intervals(model, u, cost, descend, is_series=bars == "series")
-    n_same_valley = sum(end.cost <= SAME_MINIMUM_RATIO * cost for end in starts or ends)
-    is_converged = best.done or n_same_valley > 1
+    if interval_kind not in ("", "bounds"):
+        intervals = compute_intervals(model, u, cost, descend, is_series=interval_kind == "series")
+    n_same_valley = sum(end.cost <= SAME_MINIMUM_RATIO * cost for end in first_descents or ends)
+    is_converged = best.is_converged or n_same_valley > 1
     return _make_fit(
         model,
         u,
@@ -306,17 +318,17 @@ def descend(model: CubeResidual, u, free) -> Descent:
         return start
 
     def point(part) -> np.ndarray:
-        whole = u.copy()
-        whole[free] = part
-        return whole
+        moved = u.copy()
+        moved[free] = part
+        return moved
 
-    # the trust region begins inside the bounds
+    # the trust region starting_points inside the bounds
     for margin in (1e-3, 1e-9):
         begin = np.clip(u[free], margin, 1 - margin)
         if model(point(begin)) is not None:
             break
     else:
-        return start._replace(done=False)
+        return start._replace(is_converged=False)
     size = max(float(np.abs(model.with_penalty(point(begin))).max()), 1e-300)
     ftol = QUICK_COST_TOL if model.quick else COST_TOL
     result = least_squares(
@@ -334,7 +346,7 @@ def descend(model: CubeResidual, u, free) -> Descent:
     residual = model(end)
     is_converged = result.status > 0
     if residual is None or residual @ residual > start.cost:
-        return start._replace(done=is_converged)
+        return start._replace(is_converged=is_converged)
     return Descent(end, float(residual @ residual), is_converged, model.rows)
 
 

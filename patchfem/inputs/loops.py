@@ -42,8 +42,8 @@ class Loop:
         one of the values.
         """
         name, equals, text = (part.strip() for part in condition.partition("="))
-        wanted = [value.strip() for value in text.split(",")]
-        if not equals or not all(wanted):
+        texts = [value.strip() for value in text.split(",")]
+        if not equals or not all(texts):
             raise PatchfemError(
                 f"--hold {condition}: column=value,value is needed, such as cycle=1,2"
             )
@@ -55,14 +55,14 @@ class Loop:
                 "displacement or force"
             )
         values = [_parse_label(cell) for cell in self.labels[name]]
-        absent = [text for text in wanted if _parse_label(text) not in values]
+        absent = [text for text in texts if _parse_label(text) not in values]
         if absent:
             known = ", ".join(dict.fromkeys(self.labels[name]))
             raise PatchfemError(
                 f"--hold {name}={','.join(absent)}: no row of {self.path} has this value (it has: "
                 f"{known[:200]})"
             )
-        selected = set(map(_parse_label, wanted))
+        selected = set(map(_parse_label, texts))
         return np.array([value in selected for value in values])
 
 

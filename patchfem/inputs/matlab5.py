@@ -137,11 +137,11 @@ def read_variables(path, data: bytes) -> dict:
         body = memoryview(data)[at + 8 : at + 8 + size]
         at += 8 + size
         if kind == DataType.COMPRESSED:
-            arrays |= file.list_arrays(file.unpack_head(body))
+            arrays |= file.list_arrays(file.unpack_header(body))
             continue
         at += -size % 8
         if kind == DataType.MATRIX:
-            arrays |= file.list_arrays(file.read_head(body))
+            arrays |= file.list_arrays(file.read_header(body))
     return arrays
 
 
@@ -151,22 +151,22 @@ class _MatFile(NamedTuple):
     path: str
     order: str
 
-    def unpack_head(self, body) -> _Variable | None:
+    def unpack_header(self, body) -> _Variable | None:
         """Read the header of a compressed variable."""
         with refuse_damage(f"{self.path}: {VARIABLE_DAMAGE}", DAMAGE_REMEDY):
             head = zlib.decompressobj().decompress(body, HEADER_BYTES)
             kind, size = struct.unpack_from(self.order + "II", head)
             if kind != DataType.MATRIX:
                 return None
-            variable = self.parse_head(head[8:])._replace(body=body, is_packed=True, size=size)
-            return self.check_head(variable)
+            variable = self.parse_header(head[8:])._replace(body=body, is_packed=True, size=size)
+            return self.check_header(variable)
 
-    def read_head(self, body) -> _Variable | None:
+    def read_header(self, body) -> _Variable | None:
         """Read the header of a variable that is not compressed."""
         with refuse_damage(f"{self.path}: {VARIABLE_DAMAGE}", DAMAGE_REMEDY):
-            return self.check_head(self.parse_head(body))
+            return self.check_header(self.parse_header(body))
 
-    def parse_head(self, body) -> _Variable:
+    def parse_header(self, body) -> _Variable:
         """Parse the header of a variable: its flags, its shape and its name."""
         _, flags, at = self.read_element(body, 0)
         _, dimensions, at = self.read_element(body, at)
@@ -176,7 +176,7 @@ class _MatFile(NamedTuple):
         kind = flag & (0xFF | COMPLEX_FLAG)
         return _Variable(body, False, kind, shape, name.decode("latin-1"), at, len(body))
 
-    def check_head(self, variable: _Variable) -> _Variable | None:
+    def check_header(self, variable: _Variable) -> _Variable | None:
         """Check the shape and size of a variable; return None if its class cannot be read.
 
         Real, sparse, character, cell and structure arrays can be read. A variable that is too large raises
@@ -207,7 +207,7 @@ class _MatFile(NamedTuple):
         arrays = {}
         with refuse_damage(f"{self.path}: a structure is damaged", DAMAGE_REMEDY):
             for name, body in self.list_fields(self.unpack(variable), variable.start):
-                field = self.check_head(self.parse_head(body))
+                field = self.check_header(self.parse_header(body))
                 if field is not None and len(arrays) < MAX_VARIABLES:
                     field = field._replace(name=f"{variable.name}.{name}")
                     arrays |= self.list_arrays(field, depth + 1)
@@ -296,7 +296,7 @@ class _MatFile(NamedTuple):
         at = variable.start
         while len(texts) < max(variable.shape, default=0):
             kind, stored, at = self.read_element(data, at)
-            cell = self.parse_head(stored)
+            cell = self.parse_header(stored)
             if kind != DataType.MATRIX or cell.kind != ArrayClass.CHAR:
                 raise ValueError("a cell does not contain text")
             texts.append(self.read_texts(stored, cell)[0])

@@ -51,7 +51,7 @@ class Matrix(NamedTuple):
     has_size: bool = True
 
 
-def read_matrix(path, wanted: str) -> Matrix:
+def read_matrix(path, matrix_name: str) -> Matrix:
     """Read the "stiffness", "mass" or "damping" of a file, and make it exactly symmetric.
 
     Raises PatchfemError if the file cannot be read, if the matrix has none of its `MATRIX_NAMES`, or if it is not
@@ -59,8 +59,8 @@ def read_matrix(path, wanted: str) -> Matrix:
     """
     path = Path(path)
     with refuse_damage(f"{path} cannot be read"):
-        matrix = READERS_BY_EXTENSION[path.suffix.lower()](path, wanted)
-    return matrix._replace(values=_symmetrize(path, matrix.values, wanted))
+        matrix = READERS_BY_EXTENSION[path.suffix.lower()](path, matrix_name)
+    return matrix._replace(values=_symmetrize(path, matrix.values, matrix_name))
 
 
 class MatrixRounding(NamedTuple):
@@ -170,54 +170,56 @@ def _insert_empty_rows(values, rows: np.ndarray, n: int) -> sparse.csr_array:
     return sparse.coo_array((matrix.data, (rows[i], rows[j])), (n, n)).tocsr()
 
 
-def _symmetrize(path, values, wanted: str) -> sparse.csr_array:
+def _symmetrize(path, values, matrix_name: str) -> sparse.csr_array:
     """Check that a matrix is square, real, finite and nearly symmetric; make it symmetric."""
     values = sparse.csr_array(values)
     if values.ndim != 2 or values.shape[0] != values.shape[1] or not values.shape[0]:
-        raise PatchfemError(f"{path}: the {wanted} must be square, not of shape {values.shape}")
+        raise PatchfemError(
+            f"{path}: the {matrix_name} must be square, not of shape {values.shape}"
+        )
     if np.iscomplexobj(values.data):
         if np.any(values.data.imag):
             raise PatchfemError(
-                f"{path}: the {wanted} is complex; motion in time needs real matrices: give hysteretic "
+                f"{path}: the {matrix_name} is complex; motion in time needs real matrices: give hysteretic "
                 "damping as a damping ratio, which is half the loss factor"
             )
         values = values.real
     if not np.isfinite(values.data).all():
-        raise PatchfemError(f"{path}: the {wanted} contains values that are not finite")
+        raise PatchfemError(f"{path}: the {matrix_name} contains values that are not finite")
     values = values.astype(float)
     skew = abs(values - values.T).max()
     largest = abs(values).max()
     if skew > MAX_SKEW * largest:
         raise PatchfemError(
-            f"{path}: the {wanted} is not symmetric: entries differ from the transpose by {skew:.3g}, "
+            f"{path}: the {matrix_name} is not symmetric: entries differ from the transpose by {skew:.3g}, "
             f"which is {skew / largest:.2g} of the largest entry; {SKEW_REFUSAL}"
         )
     return ((values + values.T) / 2).tocsr()
 
 
-def _find_matrix_name(path, names, wanted: str) -> str:
+def _find_matrix_name(path, names, matrix_name: str) -> str:
     """Return the name of the requested matrix: one of `MATRIX_NAMES`, or the only one."""
     short_names = {name.rpartition(".")[2].lower(): name for name in reversed(list(names))}
-    for known in MATRIX_NAMES[wanted]:
+    for known in MATRIX_NAMES[matrix_name]:
         if known in short_names:
             return short_names[known]
     names = list(names)
     if len(names) != 1:
         contents = ", ".join(names[:MAX_LISTED_ARRAYS]) or "none"
         raise PatchfemError(
-            f"{path}: contains no {wanted} under a known name ({', '.join(MATRIX_NAMES[wanted])}); its arrays: "
+            f"{path}: contains no {matrix_name} under a known name ({', '.join(MATRIX_NAMES[matrix_name])}); its arrays: "
             f"{contents}"
         )
     for other, known_names in MATRIX_NAMES.items():
         if not short_names.keys().isdisjoint(known_names):
             raise PatchfemError(
                 f"{path}: the only array of the file, {names[0]}, has the name of a {other}, but the "
-                f"{wanted} is needed; give the file of the {wanted}"
+                f"{matrix_name} is needed; give the file of the {matrix_name}"
             )
     return names[0]
 
 
-def _read_market(path: Path, wanted: str) -> Matrix:
+def _read_market(path: Path, matrix_name: str) -> Matrix:
     """Read a Matrix Market file of numbers; a file without its header is read as Abaqus text.
 
     `scipy.io.mmread` of SciPy 1.17 is not used: it reads the damaged number "1E-" as 1 and missing
@@ -233,7 +235,7 @@ def _read_market(path: Path, wanted: str) -> Matrix:
                 f"{path}: a Matrix Market pattern without numbers; write the matrix with its values"
             )
         if symmetry == "skew-symmetric":
-            raise PatchfemError(f"{path}: the {wanted} is not symmetric; {SKEW_REFUSAL}")
+            raise PatchfemError(f"{path}: the {matrix_name} is not symmetric; {SKEW_REFUSAL}")
         lines = (line for line in file if line.strip() and line[0] != "%")
         n_rows, n_columns, *count = map(int, next(lines, "").split())
         n_numbers = count[0] if count else n_rows * n_columns
@@ -303,31 +305,31 @@ def _to_integers(path, numbers: np.ndarray) -> np.ndarray:
     return numbers.astype(int)
 
 
-def _read_matlab(path: Path, wanted: str) -> Matrix:
+def _read_matlab(path: Path, matrix_name: str) -> Matrix:
     arrays = {
         name: array for name, array in matlab.read_variables(path).items() if array.kind != "text"
     }
-    array = arrays[_find_matrix_name(path, arrays, wanted)]
+    array = arrays[_find_matrix_name(path, arrays, matrix_name)]
     return Matrix(sparse.csr_array(array.values() if array.sparse is None else array.sparse()))
 
 
-def _read_numpy(path: Path, wanted: str) -> Matrix:
+def _read_numpy(path: Path, matrix_name: str) -> Matrix:
     if not zipfile.is_zipfile(path):
         raise PatchfemError(f"{path}: is not an archive of NumPy arrays")
     with np.load(path, allow_pickle=False) as file:
         if {"format", "shape", "data"} <= set(file.files):
             return Matrix(sparse.csr_array(sparse.load_npz(path)))
-        return Matrix(sparse.csr_array(file[_find_matrix_name(path, file.files, wanted)]))
+        return Matrix(sparse.csr_array(file[_find_matrix_name(path, file.files, matrix_name)]))
 
 
-def _read_output4(path: Path, wanted: str) -> Matrix:
+def _read_output4(path: Path, matrix_name: str) -> Matrix:
     matrices = nastran.read_output4(path)
-    return Matrix(matrices[_find_matrix_name(path, matrices, wanted)].assemble())
+    return Matrix(matrices[_find_matrix_name(path, matrices, matrix_name)].assemble())
 
 
-def _read_dmig(path: Path, wanted: str) -> Matrix:
+def _read_dmig(path: Path, matrix_name: str) -> Matrix:
     matrices = nastran.read_dmig(path)
-    values, places = matrices[_find_matrix_name(path, matrices, wanted)].assemble()
+    values, places = matrices[_find_matrix_name(path, matrices, matrix_name)].assemble()
     return Matrix(values, places, has_size=False)
 
 

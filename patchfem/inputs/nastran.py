@@ -102,7 +102,7 @@ def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
         raise ValueError("it does not begin with the header of a matrix")
     word = size // 6
     integer = "q" if word == 8 else "i"
-    record_head = struct.Struct(f"{order}3{integer}")
+    record_header = struct.Struct(f"{order}3{integer}")
     matrices = {}
     matrix = None
     at = 0
@@ -118,12 +118,12 @@ def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
             number = np.dtype(f"{order}f{8 if is_double else 4}")
             name = record[4 * word :].decode("ascii").strip()
             matrix = matrices.setdefault(name, StringMatrix(path, (rows, columns), number))
-            has_long_heads = rows < 0
-            string_head = struct.Struct(f"{order}{2 if has_long_heads else 1}{integer}")
+            has_long_headers = rows < 0
+            string_header = struct.Struct(f"{order}{2 if has_long_headers else 1}{integer}")
             places = matrix.places
             strings = matrix.strings
             continue
-        column, row, count = record_head.unpack_from(record)
+        column, row, count = record_header.unpack_from(record)
         if column > matrix.shape[1]:
             matrix = None
             continue
@@ -135,11 +135,11 @@ def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
             continue
         end = min(end, size)
         while start < end:
-            if has_long_heads:
-                length, first_row = string_head.unpack_from(record, start)
+            if has_long_headers:
+                length, first_row = string_header.unpack_from(record, start)
             else:
-                length, first_row = divmod(string_head.unpack_from(record, start)[0], ROW_FACTOR)
-            start += string_head.size
+                length, first_row = divmod(string_header.unpack_from(record, start)[0], ROW_FACTOR)
+            start += string_header.size
             stop = start + (length - 1) * word
             if stop < start:
                 raise ValueError("a string of the matrix has no rows")

@@ -36,7 +36,9 @@ MESH_STARTS = {
 }
 
 
-def find_file_faults(tables, folder: Path, whole: bool = True, notes: list | None = None) -> list:
+def find_file_faults(
+    tables, folder: Path, is_valid: bool = True, notes: list | None = None
+) -> list:
     """Return the faults of the files that the tables of a scene name.
 
     Parameters
@@ -44,7 +46,7 @@ def find_file_faults(tables, folder: Path, whole: bool = True, notes: list | Non
     tables : Tables
     folder : Path
         Folder of the scene; files that do not exist are left out.
-    whole : bool
+    is_valid : bool
         Whether the tables are free of mistakes, so that a file may be compared with them. A value
         at fault is None, and then the files are only read.
     notes : list, optional
@@ -62,14 +64,14 @@ def find_file_faults(tables, folder: Path, whole: bool = True, notes: list | Non
             continue
         prefix, own_key, own_tables = _select_interface(key, tables)
         try:
-            sentences = FILE_CHECKS[own_key](path, own_tables, whole) or ()
+            sentences = FILE_CHECKS[own_key](path, own_tables, is_valid) or ()
         except PatchfemError as error:
             fault_key = prefix + (error.key or own_key)
             found.append((fault_key, str(error).removeprefix(f"{own_key}: ")))
             continue
         if notes is not None:
             notes += [sentence.replace(str(path), path.name) for sentence in sentences]
-    if found or not whole:
+    if found or not is_valid:
         return found
     return _check_reduction(tables, folder)
 
@@ -101,7 +103,7 @@ def _check_reduction(tables, folder: Path) -> list:
     return []
 
 
-def _check_mesh(path: Path, tables, whole: bool) -> None:
+def _check_mesh(path: Path, tables, is_valid: bool) -> None:
     """Read a mesh, or the start of a large one."""
     starts = MESH_STARTS.get(path.suffix)
     if starts is None or path.stat().st_size <= MAX_FULLY_READ_MESH_BYTES:
@@ -115,13 +117,13 @@ def _check_mesh(path: Path, tables, whole: bool) -> None:
             )
 
 
-def _check_profile(path: Path, tables, whole: bool) -> tuple:
+def _check_profile(path: Path, tables, is_valid: bool) -> tuple:
     """Check that a trace covers the interface and is not too fine; return notes on it."""
     import numpy as np
 
     profile.read_trace(path)
     contact = tables.contact
-    if not whole or contact.mesh is not None:
+    if not is_valid or contact.mesh is not None:
         return ()
     pieces = patch.build_pieces(contact)
     even_cell = pieces.length / gap.DEFAULT_CELLS
@@ -138,24 +140,24 @@ def _check_profile(path: Path, tables, whole: bool) -> tuple:
     return notes
 
 
-def _check_slide(path: Path, tables, whole: bool) -> None:
+def _check_slide(path: Path, tables, is_valid: bool) -> None:
     """Check that the law and the contact can follow a path, including lateral motion."""
     has_lateral = len(slide.read_path_file(path)) == 3
-    if whole and has_lateral and (reason := limits.find_lateral_slide_obstacle(tables)):
+    if is_valid and has_lateral and (reason := limits.find_lateral_slide_obstacle(tables)):
         raise PatchfemError(reason)
 
 
-def _check_drive(path: Path, tables, whole: bool) -> None:
+def _check_drive(path: Path, tables, is_valid: bool) -> None:
     """Check the file of a recorded drive or of its spectrum by reading it."""
     if find_waveform(tables.drive).is_random:
         drive.signals.read_spectrum(path)
-    elif whole or tables.drive.kind is not None:
+    elif is_valid or tables.drive.kind is not None:
         drive.read_drive_file(path, tables.drive.kind)
 
 
-def _check_structure(path: Path, tables, whole: bool) -> None:
+def _check_structure(path: Path, tables, is_valid: bool) -> None:
     """Check structure.file: build the modes of arrays, but do not fit those of responses."""
-    if structure_files.is_universal_file(path) or not whole:
+    if structure_files.is_universal_file(path) or not is_valid:
         structure_files.read_content(path)
         return
     rubs = tables.friction is not None or bool(tables.structure.interface)
@@ -164,27 +166,31 @@ def _check_structure(path: Path, tables, whole: bool) -> None:
 
 def _make_matrix_check(key: str):
     """Return the function that checks the file of one matrix of [structure.reduced]."""
-    return lambda path, tables, whole: structure_reduced.check_matrix(path, key)
+    return lambda path, tables, is_valid: structure_reduced.check_matrix(path, key)
 
 
-def _check_measured(path: Path, tables, whole: bool) -> None:
+def _check_measured(path: Path, tables, is_valid: bool) -> None:
     """Check a table of measured responses by reading it."""
     measured.read_table(path)
 
 
-def _check_wear_start(path: Path, tables, whole: bool) -> tuple:
+def _check_wear_start(path: Path, tables, is_valid: bool) -> tuple:
     """Check that the pieces are those of the earlier run; return a note on the worn depth."""
     start = (
-        earlier_wear.read_earlier_wear(path, tables) if whole else earlier_wear.read_end_state(path)
+        earlier_wear.read_earlier_wear(path, tables)
+        if is_valid
+        else earlier_wear.read_end_state(path)
     )
     return (start.sentence,)
 
 
-def _check_asperities(path: Path, tables, whole: bool) -> None:
+def _check_asperities(path: Path, tables, is_valid: bool) -> None:
     """Check that a rough surface can have the peaks of a trace."""
     cutoff = None
-    if whole:
-        cutoff = patch.find_shortest_wave(tables.contact, patch.build_pieces(tables.contact).length)
+    if is_valid:
+        cutoff = patch.find_shortest_wavelength(
+            tables.contact, patch.build_pieces(tables.contact).length
+        )
     peaks.read_spectral_moments(path, cutoff)
 
 

@@ -252,7 +252,7 @@ class PatchModel:
         return self.mesh.file is None and "radius" not in corners and corners != {"sharp"}
 
     @property
-    def even_element_size(self) -> float:
+    def uniform_element_size(self) -> float:
         """Element size [m] of an even interface.
 
         The automatic size resolves the waves that a cut-off leaves to the mesh.
@@ -390,7 +390,9 @@ def _build_interface(contact: Contact, length: float, resolve_path: Callable) ->
     """Build the interface of a table [contact] over a length [m]."""
     skin = contact.asperities
     if skin is not None and skin.law == "hertz":
-        skin = peaks.complete_asperities(skin, resolve_path, find_shortest_wave(contact, length))
+        skin = peaks.complete_asperities(
+            skin, resolve_path, find_shortest_wavelength(contact, length)
+        )
     strips = contact.strips
     if strips is not None:
         strips = PatchStrips(strips.count, strips.roll, strips.offset)
@@ -404,7 +406,7 @@ def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLength
     (strips, pieces that reach beyond the interface), its cells are those of an even mesh at most.
     """
     if contact.asperities is not None:
-        cutoff = find_shortest_wave(contact, pieces.length)
+        cutoff = find_shortest_wavelength(contact, pieces.length)
         average = cutoff and cutoff / profile.ELEMENTS_PER_WAVE
         return ProfileLengths(average, None)
     if contact.mesh is not None:
@@ -416,7 +418,7 @@ def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLength
     return ProfileLengths(None, pieces.length / DEFAULT_CELLS)
 
 
-def find_shortest_wave(contact: Contact, length: float) -> float | None:
+def find_shortest_wavelength(contact: Contact, length: float) -> float | None:
     """Return the shortest wavelength [m] of a profile that belongs to the gap.
 
     Shorter waves belong to [contact.asperities]; None if all waves do. `length` [m] is that of the

@@ -35,7 +35,9 @@ def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
 
 def _make_flat_grid(patch: PatchModel, piece: PatchPiece):
     """Generate the grid of a piece with a flat interface."""
-    grid = graded_grid(patch.pieces.length, piece.height, patch.even_element_size, piece.thickness)
+    grid = graded_grid(
+        patch.pieces.length, piece.height, patch.uniform_element_size, piece.thickness
+    )
     return extend_grid(patch, piece, grid)
 
 

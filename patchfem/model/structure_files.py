@@ -104,9 +104,9 @@ def _build_modes_from_arrays(
 ) -> FileModes:
     """Build the modes of matrices or modal data."""
     pairs = [interface.between for interface in structure.interface]
-    pushed = mass if is_forced else None
+    driven_mass = mass if is_forced else None
     modes = arrays.build_basis(
-        content, pairs, pushed, is_forced=is_forced, mass=structure.moving_mass
+        content, pairs, driven_mass, is_forced=is_forced, mass=structure.moving_mass
     )
     if needs_interface and not len(modes.interfaces):
         raise PatchfemError(

@@ -70,14 +70,14 @@ def build_reduced_modes(scene) -> ReducedModes:
             is_base_driven,
         )
         pairs, laterals = list_slide_pairs(structure)
-        pushed = None if is_base_driven else scene.drive.mass or output
+        driven_mass = None if is_base_driven else scene.drive.mass or output
         ratio = 0.0
         if table.damping is not None and not isinstance(table.damping, str):
             ratio = table.damping
         names = [str(coordinate) for coordinate in table.boundary]
 
         def build(count: int) -> ModalBasis:
-            modes = reduced.build_basis(reduction, count, pairs, output, pushed, ratio, names)
+            modes = reduced.build_basis(reduction, count, pairs, output, driven_mass, ratio, names)
             return masses.set_lateral_displacements(modes, laterals)
 
         modes = build(table.modes)

@@ -27,7 +27,7 @@ class WornFriction:
     coefficient: tuple | None
     bond_length: tuple | None
 
-    def worn_law(self, law: Friction, depth: float) -> Friction:
+    def compute_worn_law(self, law: Friction, depth: float) -> Friction:
         """Return a friction law with its values at a mean worn depth [m]."""
         # with a given stiffness, the bond length follows the coefficient
         bond_length = self.bond_length if law.stiffness is None else self.coefficient
@@ -65,7 +65,7 @@ class WearModel:
     friction: WornFriction | None = None
     start: earlier_wear.EarlierWear | None = None
 
-    def depth_before(self, x, area) -> np.ndarray:
+    def compute_earlier_depth(self, x, area) -> np.ndarray:
         """Return the depth [m] worn before the first cycle at x (m,) [m], in the shape of `area`."""
         return np.zeros(np.shape(area)) if self.start is None else self.start.depth_at(x)
 

@@ -124,7 +124,7 @@ def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
     cure = {"accuracy.tolerance": SAFE_TOLERANCE}
     if (
         model.patch is not None
-        and model.patch.even_element_size is not None
+        and model.patch.uniform_element_size is not None
         and not model.patch.mesh.is_automatic
     ):
         cure["contact.element_size"] = None
@@ -142,7 +142,7 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
         return None
     if not patch.nominal_load > 0:
         return None
-    size = patch.even_element_size
+    size = patch.uniform_element_size
     share = size / patch_grids.base_grids(patch).contact.wide
     if tolerance > OF_ELEMENT * share:
         return None

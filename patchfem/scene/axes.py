@@ -374,7 +374,7 @@ def _refuse_table(key: str, texts: tuple) -> None:
 
 
 def _find_si_unit(key: str) -> str:
-    return quantities.si_unit(find_quantity_kind(*find_key(key)))
+    return quantities.find_si_unit(find_quantity_kind(*find_key(key)))
 
 
 def _holds_number(key: str) -> bool:

@@ -43,7 +43,7 @@ _MATRIX_KEYS = ("stiffness", "mass", "damping")
 
 
 def _list_patch_files(at: str, contact: Any) -> list[tuple[str, Any]]:
-    """Return the keys of the files of the patch at `at`, each with its file or UNKNOWN."""
+    """Return the keys of the files of the patch at `at`, each with its file or UNKNOWN_VALUE."""
     asperities = contact.asperities
     return [
         (f"{at}.mesh", contact.mesh),

@@ -16,7 +16,7 @@ from .lines import find_key_lines, split_key
 from .reader import apply_set, read_tables
 from .rules.scene_draft import SceneDraft, find_item_or_value
 from .rules.structure import MAX_USUAL_DAMPING
-from .rules.view import View
+from .rules.view import TableView
 from .scene import Scene, finish_scene
 
 # Tables that a BaseScene keeps, which saves the cases of a sweep from reading them again.
@@ -224,7 +224,7 @@ def _is_plain_patch(scene: Scene) -> bool:
 
     In such a scene, without a load line, strips, grooves and files but [measured], PLAIN_KEYS holds.
     """
-    contact = View(scene.contact)
+    contact = TableView(scene.contact)
     if scene.kind not in ("patch", "rig") or not contact.load or scene.normal or scene.wear:
         return False
     if contact.load_line or contact.strips or contact.grooves or contact.holder:
@@ -236,7 +236,7 @@ def _is_plain_patch(scene: Scene) -> bool:
 
 def _is_plain_motion(scene: Scene) -> bool:
     """Return whether a rig of modes has sinusoidal base motion and a law without temperature."""
-    law = View(scene.friction)
+    law = TableView(scene.friction)
     structure = scene.structure
     drive = scene.drive
     has_modes = structure.mode and not structure.interface and structure.measured == "free"

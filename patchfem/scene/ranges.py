@@ -25,7 +25,7 @@ class Range:
     @property
     def unit(self) -> str:
         """SI unit of the key; "1" for a plain number."""
-        return quantities.si_unit(self.kind)
+        return quantities.find_si_unit(self.kind)
 
     def format_assignment(self, value: float) -> str:
         """Return the ``table.key=value`` that sets the key to exactly this value in SI."""

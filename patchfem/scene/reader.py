@@ -233,22 +233,22 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written: str) -> 
     written : str
         The whole key as it was written: a number in brackets counts from 1, a number behind a dot from 0.
     """
-    above, _, wanted = path.rpartition(".")
+    above, _, item_name = path.rpartition(".")
     names = [item.get("name") if isinstance(item, dict) else None for item in items]
-    if wanted in names:
-        return names.index(wanted)
-    is_number = wanted.isdecimal()
-    if is_number and int(wanted) < len(items):
-        return int(wanted)
+    if item_name in names:
+        return names.index(item_name)
+    is_number = item_name.isdecimal()
+    if is_number and int(item_name) < len(items):
+        return int(item_name)
     table = number_items_from_one(above)
     shown = number_items_from_one(path)
-    what = "such item" if is_number else f"'{wanted}'"
+    what = "such item" if is_number else f"'{item_name}'"
     known = [name for name in names if isinstance(name, str)]
     advice = f"{table} has {len(items)}, numbered from 1 as in {table}[1]"
     if known:
-        advice = advise_on_name(wanted, known)
-    if is_number and f"[{int(wanted) + 1}]" not in written:
-        shown = f"{table}.{wanted}"
+        advice = advise_on_name(item_name, known)
+    if is_number and f"[{int(item_name) + 1}]" not in written:
+        shown = f"{table}.{item_name}"
         advice += f"; {table}.0, with a dot, means {table}[1]"
     draft.add_set_mistake(f"{shown}: no {what} here; {advice}")
     return None

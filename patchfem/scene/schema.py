@@ -7,7 +7,7 @@ import re
 
 from .keys.contact import Material
 from .keys.materials import MATERIALS
-from .keys.quantities import NUMBER_PATTERN, UNIT_FACTORS, si_unit
+from .keys.quantities import NUMBER_PATTERN, UNIT_FACTORS, find_si_unit
 from .keys.tables import Tables
 from .keys.types import (
     Table,
@@ -113,7 +113,7 @@ def _describe_selection(model: type[Table], key: str) -> str:
 def _add_units(schema: dict, kind: str) -> None:
     """Add the pattern of a quantity to every text of a schema, and the unit to its default."""
     if isinstance(schema.get("default"), int | float):
-        schema["default"] = f"{schema['default']:g} {si_unit(kind)}"
+        schema["default"] = f"{schema['default']:g} {find_si_unit(kind)}"
     for part in (schema, *schema.get("anyOf", ()), schema.get("items", {})):
         if part.get("type") == "string":
             part["pattern"] = make_quantity_pattern(kind)

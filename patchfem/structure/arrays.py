@@ -124,7 +124,7 @@ def _drop_dimensions(values) -> np.ndarray:
 def build_basis(
     data: dict,
     pairs=(),
-    pushed: int | None = None,
+    driven_mass: int | None = None,
     *,
     is_forced: bool = False,
     mass: float | None = None,
@@ -138,7 +138,7 @@ def build_basis(
     pairs : sequence of (i, j)
         Interfaces between coordinates of the matrices, from 1 on and 0 for the base, in place of
         `slide`.
-    pushed : int, optional
+    driven_mass : int, optional
         Coordinate that a force drives, in place of `force`.
     is_forced : bool
         Whether a force drives the rig, and not its base.
@@ -156,8 +156,8 @@ def build_basis(
     """
     try:
         if "M" in data or "K" in data:
-            return _build_basis_from_matrices(data, pairs, pushed, is_forced)
-        return _build_basis_from_modes(data, pairs, pushed, is_forced, mass)
+            return _build_basis_from_matrices(data, pairs, driven_mass, is_forced)
+        return _build_basis_from_modes(data, pairs, driven_mass, is_forced, mass)
     except PatchfemError as error:
         message = str(error).removeprefix("structure: ")
         raise PatchfemError(f"structure.file: {message}") from None
@@ -170,7 +170,7 @@ def _refuse_missing(data: dict, what: str) -> None:
 
 
 def _build_basis_from_matrices(
-    data: dict, pairs, pushed: int | None, is_forced: bool
+    data: dict, pairs, driven_mass: int | None, is_forced: bool
 ) -> ModalBasis:
     """Build the modal basis of matrices."""
     for name in ("M", "K"):
@@ -188,7 +188,7 @@ def _build_basis_from_matrices(
             "contains `slide`, but [[structure.interface]] also defines where sliding "
             "occurs: keep only one of these two descriptions"
         )
-    named = [coordinate for pair in pairs for coordinate in pair] + [pushed or 0]
+    named = [coordinate for pair in pairs for coordinate in pair] + [driven_mass or 0]
     missing = [coordinate for coordinate in named if coordinate > n]
     if missing:
         raise PatchfemError(f"there is no coordinate {missing[0]}: M has {n}, numbered from 1")
@@ -207,7 +207,7 @@ def _build_basis_from_matrices(
         output = faces[0]
     force = None
     if is_forced:
-        force = np.eye(n)[pushed - 1] if pushed else data.get("force", output)
+        force = np.eye(n)[driven_mass - 1] if driven_mass else data.get("force", output)
     return matrices.build_basis(
         M,
         K,
@@ -231,10 +231,10 @@ def _to_matrix(values, name: str):
 
 
 def _build_basis_from_modes(
-    data: dict, pairs, pushed: int | None, is_forced: bool, mass: float | None
+    data: dict, pairs, driven_mass: int | None, is_forced: bool, mass: float | None
 ) -> ModalBasis:
     """Build the modal basis of modal data."""
-    if pairs or pushed:
+    if pairs or driven_mass:
         raise PatchfemError(
             "modal data have no numbered masses, which [[structure.interface]] and "
             "drive.mass need; give `slide` and `force` in the file"

@@ -150,7 +150,7 @@ def is_release(drive) -> bool:
     return len(drive.segments) == 1 and find_max_acceleration(drive) == 0
 
 
-def choose_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> int:
+def choose_samples_per_cycle(drive, cycles: float, *, needs_history: bool = False) -> int:
     """Return the number of equally spaced samples per cycle that a whole run stores.
 
     They are `SAMPLES_PER_CYCLE`, or fewer so that the run has at most `MAX_STORED_SAMPLES`. They are 0, so that
@@ -161,10 +161,10 @@ def choose_samples_per_cycle(drive, cycles: float, *, wanted: bool = False) -> i
     drive
     cycles : float
         Drive cycles of the run.
-    wanted : bool
+    needs_history : bool
         Whether a measure needs the history of the whole run, so that it is stored under a drive too.
     """
-    if not (wanted or is_release(drive)):
+    if not (needs_history or is_release(drive)):
         return 0
     count = int(min(SAMPLES_PER_CYCLE, MAX_STORED_SAMPLES / max(cycles, 1e-300)))
     return count if count >= MIN_SAMPLES_PER_CYCLE else 0

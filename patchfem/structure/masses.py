@@ -23,7 +23,7 @@ def make_slide_rows(pairs, n: int) -> np.ndarray:
 
 
 def build_basis(
-    masses, springs, dampers, interfaces, output: int, pushed: int | None = None
+    masses, springs, dampers, interfaces, output: int, driven_mass: int | None = None
 ) -> ModalBasis:
     """Compute the modal basis (mass 1 kg) of masses joined by springs and dampers.
 
@@ -40,7 +40,7 @@ def build_basis(
         Pairs that slide on each other; the slide is x_i - x_j.
     output : int
         Mass that carries the accelerometer.
-    pushed : int, optional
+    driven_mass : int, optional
         Mass that a force drives; by default the base moves.
 
     Returns
@@ -54,7 +54,7 @@ def build_basis(
         np.diag(np.asarray(masses, float)),
         faces=make_slide_rows(interfaces, n) if interfaces else None,
         output=unit[output - 1],
-        force=None if pushed is None else unit[pushed - 1],
+        force=None if driven_mass is None else unit[driven_mass - 1],
         spring_rows=_make_weighted_rows(springs, n),
         damper_rows=damper_rows if len(damper_rows) else None,
     )

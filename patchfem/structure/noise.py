@@ -18,7 +18,7 @@ from .drives import RecordedDrive
 ROWS_PER_PERIOD = 8  # rows of the record per period of the highest frequency
 MIN_SPECTRAL_LINES = 8  # spectral lines of a record; fewer do not make its values Gaussian
 # line spacings; tolerance on the number of the spectral line at each end of the band
-LINE_NUMBER_TOL = 1e-9
+SPECTRAL_LINE_TOL = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -64,8 +64,8 @@ def draw_random_record(
     high = float(frequency[-1])
     n_rows = int(np.ceil(duration * ROWS_PER_PERIOD * high))
     step = duration / n_rows
-    first_line = int(np.ceil(low * duration - LINE_NUMBER_TOL))
-    lines = np.arange(first_line, int(high * duration + LINE_NUMBER_TOL) + 1)
+    first_line = int(np.ceil(low * duration - SPECTRAL_LINE_TOL))
+    lines = np.arange(first_line, int(high * duration + SPECTRAL_LINE_TOL) + 1)
     if lines.size < MIN_SPECTRAL_LINES:
         raise PatchfemError(
             f"{duration:g} s are too short for a band of {high - low:g} Hz, which then has only "

@@ -334,7 +334,7 @@ def build_basis(
     modes: int,
     pairs=(),
     output: int = 1,
-    pushed: int | None = None,
+    driven_mass: int | None = None,
     ratio: float = 0.0,
     names=None,
 ) -> ModalBasis:
@@ -352,7 +352,7 @@ def build_basis(
         Interfaces between boundary coordinates, from 1 on and 0 for the base; the slide is x_i - x_j.
     output : int
         Boundary coordinate of the output, from 1 on.
-    pushed : int, optional
+    driven_mass : int, optional
         Boundary coordinate that a force drives; by default the base moves.
     ratio : float
         Damping ratio of every elastic mode, for a structure without a damping matrix.
@@ -378,7 +378,7 @@ def build_basis(
     if reduction.damping is not None:
         damping = selection.T @ reduction.damping @ selection
     motion = reduction.boundary @ selection
-    force = -selection.T @ reduction.base_load if pushed is None else motion[pushed - 1]
+    force = -selection.T @ reduction.base_load if driven_mass is None else motion[driven_mass - 1]
     boundary_names = names or [str(k + 1) for k in range(n_boundary)]
     mode_names = [f"mode {k + 1}" for k in range(len(mass) - n_boundary)]
     basis = matrices.build_basis(

@@ -156,13 +156,13 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
     wanted, residual = computed.asked.wanted, make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
     quick, drawn, random = CubeResidual(residual, box, quick=True), np.random.default_rng(SEED), 0
-    ends = run_descents(quick, [box.unit(one) for one in begins], before=computed.forget)
+    ends = run_descents(quick, [box.unit(one) for one in begins], before_descent=computed.forget)
     while True:
         points = drawn.random((starts - random, SCREEN, len(wanted)))
         ends += run_descents(
             quick,
             [screened(quick, some, computed.forget) for some in points],
-            before=computed.forget,
+            before_descent=computed.forget,
         )
         top = min(ends, key=lambda one: one.cost).u
         zeros = [
@@ -170,11 +170,11 @@ def best_of(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
             for k, one in enumerate(wanted)
             if one.low == 0 and top[k] > NEAR_BOUND_FRACTION
         ]
-        ends += run_descents(quick, zeros, before=computed.forget)
+        ends += run_descents(quick, zeros, before_descent=computed.forget)
         last = run_descents(
             CubeResidual(residual, box),
             [min(ends, key=lambda one: one.cost).u],
-            before=computed.forget,
+            before_descent=computed.forget,
         )[0]
         best, others = valleys_of(
             cells, computed, seen, last, [(box.values(one.u), one.rms) for one in ends]

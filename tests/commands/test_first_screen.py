@@ -11,7 +11,7 @@ from command_line import cli
 from scene_texts import BENCH, JOINT_SHAKEN, POINT
 
 import patchfem as pf
-from patchfem.__main__ import SCREEN, app, known
+from patchfem.__main__ import VERB_GROUPS, app, register_verbs
 from patchfem.commands import shared
 from patchfem.core import Measure, Outcome
 from patchfem.export.pages.sentences import (
@@ -139,7 +139,7 @@ def test_exact_progress_as_lines(capsys):
 def test_always_the_first_screen_has_an_example_of_every_verb_that_is_read():
     screen = cli().out
     assert screen == cli("--help").out and max(map(len, screen.splitlines())) <= 80
-    assert [line for line in screen.splitlines() if line in SCREEN] == [
+    assert [line for line in screen.splitlines() if line in VERB_GROUPS] == [
         "Start",
         "Study",
         "Surfaces",
@@ -147,9 +147,9 @@ def test_always_the_first_screen_has_an_example_of_every_verb_that_is_read():
         "About",
     ]
     for verb, (_, what, example) in (
-        (verb, row) for verbs in SCREEN.values() for verb, row in verbs.items()
+        (verb, row) for verbs in VERB_GROUPS.values() for verb, row in verbs.items()
     ):
-        known([verb])
+        register_verbs([verb])
         assert f"  patchfem {verb} {example}".rstrip() in screen and what in screen
         read = app.parse_args(
             [verb, *shlex.split(example)], exit_on_error=False, print_error=False

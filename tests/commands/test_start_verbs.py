@@ -14,7 +14,7 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem import load
-from patchfem.__main__ import VERBS, app, known
+from patchfem.__main__ import VERBS, app, register_verbs
 from patchfem.commands import examine
 from patchfem.commands.sources import SOURCES, bibtex
 from patchfem.effects import EFFECTS
@@ -25,7 +25,7 @@ from patchfem.scene.starting import (
     read_template,
 )
 
-known([])  # all verbs
+register_verbs([])  # all verbs
 
 
 def test_exact_new_writes_what_it_prints(tmp_path):
@@ -199,7 +199,7 @@ def test_always_every_verb_completes(shell):
 def test_always_help_imports_nothing_of_them():
     """`patchfem --help` names the verbs without the modules behind them; of a verb its own module is loaded alone."""
     code = (
-        "import sys; from patchfem.__main__ import known; known([{}]); "
+        "import sys; from patchfem.__main__ import register_verbs; register_verbs([{}]); "
         "print([m for m in sys.modules if m.startswith('patchfem.')])"
     )
     all_, run = (

@@ -11,7 +11,7 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem.export.fields.strength import find_yielding
-from patchfem.scene.keys.materials import MATERIALS, YIELD
+from patchfem.scene.keys.materials import MATERIALS, YIELD_STRENGTHS
 
 RADIUS, WIDTH = 14.5e-3, 10e-3
 MODULUS = MATERIALS["steel"].young / (2 * (1 - MATERIALS["steel"].poisson ** 2))
@@ -59,7 +59,7 @@ def noted(tmp_path, peak: float, substrate: str = '"steel"') -> list:
 
 
 def test_exact_the_note_begins_where_hertz_reaches_the_strength(tmp_path):
-    limit = YIELD["steel"].strength / 0.558
+    limit = YIELD_STRENGTHS["steel"].strength / 0.558
     assert noted(tmp_path, 0.9 * limit) == []
     (told,) = noted(tmp_path, 1.1 * limit)
     stress, depth = (
@@ -81,7 +81,7 @@ def test_exact_the_note_begins_where_hertz_reaches_the_strength(tmp_path):
 
 
 def test_exact_a_material_of_one_s_own_has_no_strength(tmp_path):
-    assert noted(tmp_path, 2 * YIELD["steel"].strength / 0.558, OWN) == []
+    assert noted(tmp_path, 2 * YIELD_STRENGTHS["steel"].strength / 0.558, OWN) == []
 
 
 def test_exact_the_strength_of_the_scene_counts_for_a_material_of_its_own(tmp_path):
@@ -99,7 +99,7 @@ def test_exact_a_run_without_files_knows_a_lower_bound_from_the_peak(tmp_path, p
     across = MATERIALS["steel"].poisson * (along - 1) if plane == "strain" else 0.0
     least = np.sqrt(((along + 1) ** 2 + (along - across) ** 2 + (across + 1) ** 2) / 2).min()
     for share, count in ((0.98, 0), (1.04, 1)):
-        peak = share * YIELD["steel"].strength / least
+        peak = share * YIELD_STRENGTHS["steel"].strength / least
         modulus = MODULUS if plane == "strain" else MATERIALS["steel"].young / 2
         load = float(peak**2 * pi * RADIUS / modulus * WIDTH)
         text = SCENE.format(load=load, substrate='"steel"')
@@ -147,13 +147,13 @@ def test_exact_a_coating_of_the_same_metal_is_not_the_other_piece():
 
 
 def test_always_strengths_belong_to_materials_and_name_their_source():
-    for name, one in YIELD.items():
+    for name, one in YIELD_STRENGTHS.items():
         assert (
             name in MATERIALS
             and 1e-4 < one.strength / MATERIALS[name].young < 1e-2
             and one.source.endswith(".")
         )
-    assert not {"WC-Co", "WC-Co sintered", "alumina"} & YIELD.keys()  # they break before they flow
+    assert not {"WC-Co", "WC-Co sintered", "alumina"} & YIELD_STRENGTHS.keys()  # they break before they flow
 
 
 @pytest.mark.slow

@@ -51,8 +51,8 @@ def covered(bars, seeds, tie):
             [0.0, -1.0],
             [1.0, 1.0],
             start=[0.5, 0.0],
-            starts=1,
-            bars=bars,
+            max_descents=1,
+            interval_kind=bars,
         )
         inside.append(
             (found.intervals[:, 0] <= [0.35, 0.2]) & ([0.35, 0.2] <= found.intervals[:, 1])

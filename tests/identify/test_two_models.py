@@ -30,7 +30,9 @@ def off(one) -> np.ndarray:
 
 def test_exact_the_least_squares_are_those_of_the_expensive_model():
     """With much left over; the share alone, without slopes, ends 1 % above."""
-    best = fit(lambda values: off(dear(values)), BOX.low, BOX.high, starts=4, bars="")
+    best = fit(
+        lambda values: off(dear(values)), BOX.low, BOX.high, max_descents=4, interval_kind=""
+    )
     models = TwoModels(cheap, dear, off, BOX)
     model, values = models.search([4.0, 0.2], 4)
     assert np.square(off(dear(values))).sum() == pytest.approx(best.rms**2 * DATA.size, rel=2e-4)

@@ -4,9 +4,9 @@ import pytest
 
 from patchfem.scene.keys.tables import Normal
 from patchfem.scene.keys.types import build_table
-from patchfem.scene.rules.view import View
+from patchfem.scene.rules.view import TableView
 
-NORMAL = View(build_table(Normal, {"load": 10.0}))
+NORMAL = TableView(build_table(Normal, {"load": 10.0}))
 
 
 def test_compares_missing_values_as_false():
@@ -14,7 +14,7 @@ def test_compares_missing_values_as_false():
     assert not NORMAL.amplitude > 5
     assert not NORMAL.amplitude <= 5
     assert not NORMAL.grooves.amplitude >= 0
-    assert not View(None).load > 5
+    assert not TableView(None).load > 5
 
 
 def test_refuses_a_name_that_no_key_has():

@@ -76,7 +76,7 @@ def test_exact_force_of_a_file():
         arrays.build_basis(FULL, is_forced=True).base, -forced.shapes[1], rtol=1e-14
     )
     np.testing.assert_allclose(
-        arrays.build_basis(FULL, is_forced=True, pushed=1).base, -forced.shapes[0], rtol=1e-14
+        arrays.build_basis(FULL, is_forced=True, driven_mass=1).base, -forced.shapes[0], rtol=1e-14
     )
 
 

@@ -50,7 +50,7 @@ def test_exact_free_chain_has_one_rigid_mode(n):
 
 def test_exact_figure_16():
     """Two masses, one spring: a rigid mode and sqrt(2); a force on mass 1, friction on mass 2."""
-    found = masses.build_basis([1.0, 1.0], [((1, 2), 1.0)], [], [(2, 0)], 2, pushed=1)
+    found = masses.build_basis([1.0, 1.0], [((1, 2), 1.0)], [], [(2, 0)], 2, driven_mass=1)
     np.testing.assert_allclose(found.omega, [0.0, np.sqrt(2)], rtol=1e-14)
     np.testing.assert_allclose(found.shapes, np.array([[1, -1], [1, 1]]) / np.sqrt(2), rtol=1e-14)
     np.testing.assert_allclose(found.base, -found.shapes[0], rtol=1e-14)

@@ -61,7 +61,7 @@ def test_exact_statics_of_the_boundary_however_few_the_modes(method):
     inverse = np.linalg.inv(K)
     for modes in (0, 1, 3):
         for out, at in ((1, 1), (1, 2), (2, 2)):
-            one = reduced.build_basis(found, modes, output=out, pushed=at)
+            one = reduced.build_basis(found, modes, output=out, driven_mass=at)
             static = -(one.output * one.base / one.omega**2).sum() / one.mass
             np.testing.assert_allclose(
                 static, inverse[BOUNDARY[out - 1], BOUNDARY[at - 1]], rtol=1e-9
@@ -106,7 +106,7 @@ def test_exact_frequencies_of_a_slender_beam_keep_their_digits(method, links):
         root = mpmath.diag([1 / mpmath.sqrt(one) for one in np.diag(M)])
         square = mpmath.eigsy(root * mpmath.matrix(K.tolist()) * root, eigvals_only=True)
         true = np.array([float(mpmath.sqrt(one)) for one in square])
-    small = reduced.build_basis(made(K, M, None, n, method, np.array([n - 1, 4])), n, pushed=1)
+    small = reduced.build_basis(made(K, M, None, n, method, np.array([n - 1, 4])), n, driven_mass=1)
     np.testing.assert_allclose(small.omega, true, rtol=2e-16 * (true[-1] / true[0]) ** 1.5)
 
 
@@ -128,7 +128,8 @@ def test_order_of_a_free_interface_reduction_is_that_of_its_residuals():
     for method in METHODS:
         found = reduced.reduce_matrices(K, M, None, np.array([150]), 20, method)
         errors[method] = [
-            reduced.build_basis(found, modes, pushed=1).omega[0] / true - 1 for modes in (5, 10, 20)
+            reduced.build_basis(found, modes, driven_mass=1).omega[0] / true - 1
+            for modes in (5, 10, 20)
         ]
     slope = np.log2(errors["craig-bampton"][0] / errors["craig-bampton"][2]) / 2
     assert 2.5 < slope < 3.5 and max(errors["free-interface"]) < 1e-3 * max(errors["craig-bampton"])
@@ -185,7 +186,7 @@ def test_refuses_matrices_that_are_not_positive(says, method):
     REFUSED[says](K, M)
     with pytest.raises(PatchfemError) as caught:
         found = made(K, M, None, 3, method)
-        reduced.build_basis(found, 3, pushed=1)
+        reduced.build_basis(found, 3, driven_mass=1)
     wanted = (
         says
         if "negative energy" not in says or "energy" in str(caught.value)
@@ -204,5 +205,7 @@ def test_refuses_a_part_that_moves_beside_a_held_boundary():
     K[6, 7] = K[7, 6] = 0
     with pytest.raises(PatchfemError, match="add a coordinate of each loose part"):
         made(K, M, boundary=np.array([4]))
-    one = reduced.build_basis(made(K, M, None, 4, "free-interface", np.array([4])), 4, pushed=1)
+    one = reduced.build_basis(
+        made(K, M, None, 4, "free-interface", np.array([4])), 4, driven_mass=1
+    )
     assert (one.omega == 0).sum() == 1

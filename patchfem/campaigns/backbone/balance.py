@@ -158,7 +158,7 @@ class _FreeMotionSearch:
 
     def __init__(self, group: Group, joint: Joint, amplitudes, harmonics: int):
         modes = joint.modes
-        omega, shape = modes.stuck_mode(group.rows, group.stiffness(), joint.mode)
+        omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), joint.mode)
         self.joint = joint
         self.reach = abs(float(modes.output @ shape))
         widest = np.abs(group.rows @ shape) * amplitudes[-1] / self.reach

@@ -196,7 +196,7 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
     spring = model.rig.springs.interlock
     free = float(modes.omega[joint.mode])
     if spring is not None:
-        free = modes.stuck_mode(modes.interfaces[:1], np.array([spring[0]]), joint.mode)[0]
+        free = modes.compute_stuck_mode(modes.interfaces[:1], np.array([spring[0]]), joint.mode)[0]
     free = free / (2 * np.pi)
     if joint.held[0] is None:
         return ModeFrequencies(free, None)
@@ -209,7 +209,8 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
     ):
         return ModeFrequencies(free, joint.held[0] / (2 * np.pi))
     stuck, high = (
-        modes.stuck_mode(modes.interfaces, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
+        modes.compute_stuck_mode(modes.interfaces, np.array([stiffness]), joint.mode)[0]
+        / (2 * np.pi)
         for stiffness in (measure.value, measure.value + measure.error)
     )
     return ModeFrequencies(free, stuck, high - stuck)

@@ -286,7 +286,7 @@ def build_joint(model: Model, name: str) -> Joint:
     if not joint.is_linear:
         planned = joint._replace(stiffness=stuck_stiffness(model.rig, plan(model).chain))
         stiffness = _stuck_stiffness(planned)
-        held = modes.stuck_mode(modes.interfaces, stiffness, number)
+        held = modes.compute_stuck_mode(modes.interfaces, stiffness, number)
         joint = joint._replace(held=held, stiffness=stiffness)
     _refuse_mode(joint)
     return joint

@@ -323,7 +323,7 @@ def fit_law(
     low = (1 / STIFFNESS_RANGE, *asked.low)
     high = (STIFFNESS_RANGE, *asked.high)
     middle = [(a + b) / 2 for a, b in zip(asked.low, asked.high)]
-    found = fit(residual, low, high, start=(1.0, *middle), starts=2, bars="bounds")
+    found = fit(residual, low, high, start=(1.0, *middle), max_descents=2, interval_kind="bounds")
     curves = curves_at(found.values)
     keys = keys_at(found.values.tolist())
     return FittedLaw(keys, curves, curves.deviate_from(own, slides), found)

@@ -112,7 +112,9 @@ class Problem:
             Kind of intervals, as in `identify.least_squares.fit`.
         """
         box = self.box
-        return fit(self.residual, box.low, box.high, start=start, starts=starts, bars=bars)
+        return fit(
+            self.residual, box.low, box.high, start=start, max_descents=starts, interval_kind=bars
+        )
 
     def assign(self, values: Sequence) -> list:
         """Return the strings that set the free keys to values (n,), after those of `sets`."""

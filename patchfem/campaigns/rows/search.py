@@ -148,14 +148,16 @@ def fit_readings(
             known[n + 1],
         )
 
-    ends = run_descents(quick, begins, stored=kept, before=computed.forget, report=tell)
+    ends = run_descents(quick, begins, saved=kept, before_descent=computed.forget, report=tell)
     rms = np.array([one.rms for one in ends])
     if np.isnan(rms).all():
         raise NotConverged(
             f"fit: all {how.starts} searches failed; the first failed for this reason: {quick.reason}"
         )
     best = run_descents(
-        CubeResidual(residual, box), [ends[int(np.nanargmin(rms))].u], before=computed.forget
+        CubeResidual(residual, box),
+        [ends[int(np.nanargmin(rms))].u],
+        before_descent=computed.forget,
     )
     found = assemble_fit(quick, best, bars, ends)
     values = np.array(

@@ -641,7 +641,7 @@ class _Run:
         end = self.cycles
         wide = []
         late = []
-        even = choose_samples_per_cycle(self.drive, self.cycles, wanted=even)
+        even = choose_samples_per_cycle(self.drive, self.cycles, needs_history=even)
         first = max(0.0, end - self.n_window)
         last = max(0.0, end - 1)
         begin = max(0.0, min(first, end - 2))

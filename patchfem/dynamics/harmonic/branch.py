@@ -385,7 +385,7 @@ def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Bac
         )
     samples = group.samples or group.samples_for(harmonics, np.full(len(group.rows), wanted[-1]))
     balance = balance_of(modes, group, samples)
-    omega, shape = modes.stuck_mode(group.rows, group.stiffness(), mode)
+    omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
     found = trace(FreeBalance(balance, mode, harmonics, omega), wanted, omega, shape)
     k = np.arange(harmonics + 1)
     loss = [np.pi * float(np.sum(k * (np.conj(f.slides) * f.forces).imag)) for f in found]

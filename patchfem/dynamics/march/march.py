@@ -254,7 +254,7 @@ def march(
         Whether extremes and phasors of all cycles are kept for bonds behind shear modes although `whole` is false,
         and the sample of the largest slide.
     even : bool
-        The argument `wanted` of `choose_samples_per_cycle`.
+        The argument `needs_history` of `choose_samples_per_cycle`.
 
     Returns
     -------
@@ -292,7 +292,7 @@ def march(
         if not run.passed(before_last, lambda: checkpoint.write_if_due(run, samples)):
             run = restart()
             samples.is_restarted = True
-    n_even = choose_samples_per_cycle(drive, cycles, wanted=even)
+    n_even = choose_samples_per_cycle(drive, cycles, needs_history=even)
     recorder = _Recorder(
         samples,
         n_even,

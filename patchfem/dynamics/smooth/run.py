@@ -560,7 +560,7 @@ def simulate(
     shots = []
     run.progress = progress
     whole = min(2.0, cycles) * period
-    even = choose_samples_per_cycle(drive, cycles, wanted=even)
+    even = choose_samples_per_cycle(drive, cycles, needs_history=even)
     if even:
         begin = end - max(whole, window * period)
         kept.append(run.run_to(begin, np.arange(0, begin, period / even)))

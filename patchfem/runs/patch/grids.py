@@ -193,7 +193,7 @@ def _longest(asked) -> float:
     """Return the longest cell [m] that resolves the waves of profile and shapes; else inf."""
     return min(
         asked.gap.wave / WAVE_CELLS,
-        np.inf if asked.gap.profile is None else asked.even_element_size,
+        np.inf if asked.gap.profile is None else asked.uniform_element_size,
     )
 
 

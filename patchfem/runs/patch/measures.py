@@ -15,7 +15,7 @@ from ...contact import edges
 from ...core import Measure, PatchfemError, compute_allowed_error
 from ...formatting import format_length
 from ...response import errors
-from ...scene.keys.contact import outermost_strip_distance
+from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results import patch_rows
 from ..results.patch_rows import DECISIVE, TABLE
 from .condensed import pair_on_same_meshes
@@ -143,7 +143,7 @@ def other_strips(asked) -> tuple:
     if strips is None or strips.count < 2:
         return asked, 2.0
     count, ratio = strips.count // 2, 2.0
-    if strips.offset is not None and abs(strips.offset) >= outermost_strip_distance(
+    if strips.offset is not None and abs(strips.offset) >= compute_outermost_strip_distance(
         asked.pieces.width, count
     ):
         count, ratio = 2 * strips.count, 0.5

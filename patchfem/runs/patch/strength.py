@@ -6,7 +6,7 @@ In: a `PatchModel` and a pressure. Out: notes on the faces that yield.
 from math import sqrt
 from typing import NamedTuple
 
-from ...scene.keys.materials import MATERIALS, YIELD
+from ...scene.keys.materials import MATERIALS, YIELD_STRENGTHS
 
 NEGLECTED = "the run is elastic and neglects yielding"
 
@@ -39,11 +39,11 @@ def strength_of(material) -> Strength | None:
     if material.yield_ is not None:
         return Strength(material.name or "material", material.yield_, "given in the scene")
     if (
-        material.name not in YIELD
+        material.name not in YIELD_STRENGTHS
         or (material.young, material.poisson) != MATERIALS[material.name][:2]
     ):
         return None  # a known name with other elastic constants is a different material
-    known = YIELD[material.name]
+    known = YIELD_STRENGTHS[material.name]
     return Strength(material.name, known.strength, known.source[:-1])
 
 

@@ -209,11 +209,13 @@ def heating_sentences(model, patch, work: float, duration: float) -> list:
             "the warming by friction is not estimated, because a contact given by [normal] has no area"
         ]
     kind = model.patch.pieces.substrate
-    known = materials.THERMAL.get(kind.name) if kind.name in materials.MATERIALS else None
+    known = (
+        materials.THERMAL_PROPERTIES.get(kind.name) if kind.name in materials.MATERIALS else None
+    )
     if known is None:
         return [
             "the warming by friction is not estimated, because the conductivity of contact.substrate is not "
-            f"known; choose one of the materials {', '.join(materials.THERMAL)}"
+            f"known; choose one of the materials {', '.join(materials.THERMAL_PROPERTIES)}"
         ]
 
     area = float(patch.pieces.interface.weight[patch.active].sum())

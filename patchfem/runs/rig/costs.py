@@ -160,7 +160,7 @@ def expected_elements(model: Model) -> tuple:
             most = 1 / (1 / most + 1 / patch.pieces.shear_stiffness)
             mine = patch_model.TYPICAL_N_NODES
             if not patch.mesh.is_automatic:
-                mine = round(patch.pieces.length / patch.even_element_size) + 1
+                mine = round(patch.pieces.length / patch.uniform_element_size) + 1
         count, stiff = count + mine, max(stiff, most if most < inf else 0.0)
     return count, stiff
 

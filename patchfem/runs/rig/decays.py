@@ -153,7 +153,7 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
     (4, k) array
         Amplitude [m], frequency [Hz], damping ratio [1], and loss per cycle [J].
     """
-    held = modes.stuck_mode(laws.rows, laws.stiffness(), number)
+    held = modes.compute_stuck_mode(laws.rows, laws.stiffness(), number)
     moved = float(modes.output @ held[1])
     return rows_of(
         modes,
@@ -293,7 +293,9 @@ def without_slip_between_nodes(whys: dict, ways) -> list:
 
 def _mode(modes, laws, frequency: float) -> int:
     """Return the index of the stuck mode that moves the output and is nearest to a frequency."""
-    held = [modes.stuck_mode(laws.rows, laws.stiffness(), k) for k in range(modes.omega.size)]
+    held = [
+        modes.compute_stuck_mode(laws.rows, laws.stiffness(), k) for k in range(modes.omega.size)
+    ]
     return int(
         np.argmin(
             [

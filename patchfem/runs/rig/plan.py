@@ -133,7 +133,7 @@ def modes_of(rig, chain: dict) -> list:
     named = rig.structure.lists_modes and modes.shapes is None
     out = []
     for k, omega in enumerate(modes.omega):
-        held = modes.stuck_mode(rows, stiffness, k)[0]
+        held = modes.compute_stuck_mode(rows, stiffness, k)[0]
         out.append(
             {
                 "name": modes.names[k] if named else f"mode {k + 1}",

@@ -147,7 +147,7 @@ class Reader:
         kept = (
             NEEDS_RUN
             and histories is not None
-            and choose_samples_per_cycle(drive, self.numerics.cycles, wanted=True)
+            and choose_samples_per_cycle(drive, self.numerics.cycles, needs_history=True)
         )
         return histories if kept and histories.time.size and histories.time[0] == 0 else None
 

@@ -138,7 +138,9 @@ def worn_model(model, patch, depth):
     if model.grooves is not None:
         new["grooves"] = model.grooves.after_wear(mean_depth(patch, depth), wear.upper_share)
     if wear.friction is not None:
-        law = new["friction"] = wear.friction.worn_law(model.friction, mean_depth(patch, depth))
+        law = new["friction"] = wear.friction.compute_worn_law(
+            model.friction, mean_depth(patch, depth)
+        )
         if model.rig is not None:
             friction = model.rig.friction
             interfaces = tuple(replace(one, numbers=law) for one in friction.interfaces)
@@ -353,7 +355,7 @@ def _with_earlier_wear(model, patch, area):
     if begun is None:
         return patch
     begun.require_same_surfaces(patch.x, patch.gap)
-    depth = frozen_array(model.wear.depth_before(patch.x, area))
+    depth = frozen_array(model.wear.compute_earlier_depth(patch.x, area))
     if (gone := worn_through(model, depth)) is not None:
         raise PatchfemError(
             f"{begun.path}: in that run the coating of the {gone[0]} piece was worn through; choose a "
@@ -365,7 +367,7 @@ def _with_earlier_wear(model, patch, area):
 
 def _first(model, patch, asked: WearProblem, motion: _Motion) -> tuple:
     """Return (state, moments) before any wear except that of `_with_earlier_wear`."""
-    state = start_wear(asked, model.wear.depth_before(patch.x, asked.area))
+    state = start_wear(asked, model.wear.compute_earlier_depth(patch.x, asked.area))
     return state, (_moment(patch, state, motion),)
 
 
@@ -417,7 +419,7 @@ def _replay_on(asked, model, patch, other, moments) -> tuple:
         area,
         model.wear.coefficient,
         legs,
-        model.wear.depth_before(other.x, area),
+        model.wear.compute_earlier_depth(other.x, area),
     )
     return press_patch(asked, other.pair, frozen_array(depth)), depth
 

@@ -266,10 +266,11 @@ def friction_of(model, found, motion: dict, error: float | None) -> dict:
         ()
         if off is None
         else tuple(
-            change.worn_law(model.friction, max(deep[-1] + sign * off, 0.0)) for sign in (-1, 1)
+            change.compute_worn_law(model.friction, max(deep[-1] + sign * off, 0.0))
+            for sign in (-1, 1)
         )
     )
-    law, out = change.worn_law(model.friction, deep[-1]), {}
+    law, out = change.compute_worn_law(model.friction, deep[-1]), {}
     for name, key in (("static_coefficient", "static"), ("bond_length", "bond_length")):
         value, row = getattr(law, key), TABLE[name]
         if value is not None:

@@ -60,14 +60,16 @@ def jumps_about(model) -> int:
         """Return the slip path with the friction coefficient at the mean worn depth."""
         mean = float(worn @ area / area.sum())
         return (
-            path * (wear.friction.worn_law(law, mean).static / law.static) if law.static else path
+            path * (wear.friction.compute_worn_law(law, mean).static / law.static)
+            if law.static
+            else path
         )
 
     slides = (
         changing if wear.uses_friction_work and wear.friction is not None else lambda worn: path
     )
     row = WearProblem(press, slides, area, wear.coefficient, wear.cycles)
-    state, count = start_wear(row, wear.depth_before(x, area)), 0
+    state, count = start_wear(row, wear.compute_earlier_depth(x, area)), 0
     while state.cycle < wear.cycles and count < MOST:
         state, count = (
             take_jump(row, state, model.accuracy.tolerance, until=next_row(wear, row, state)),

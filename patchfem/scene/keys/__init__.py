@@ -20,19 +20,19 @@ How to add a key
    [slide] and [measured] stand in `rules.check`, those of the other tables in the module of their name. The condition
    reads the values of the table in SI and the sentence names them in braces::
 
-       Mistake(lambda p: p.spacing < p.length, "contact.spacing", "{spacing:g} m is less than contact.length")
+       MistakeRule(lambda p: p.spacing < p.length, "contact.spacing", "{spacing:g} m is less than contact.length")
 
    If only some values of a selector such as `slide.kind` use the key, add it to these values in
    `scene.rules.selectors`; the keys of friction laws and waveforms stand in `effects`. These lists, and
    `KEYS_UNUSED_BY_KIND` in `rules.drive`, only cause a remark that the key is not used; a key that must be refused needs
-   a `Mistake` as well. A key whose default is not None must stand in one of these lists for every kind and waveform
+   a `MistakeRule` as well. A key whose default is not None must stand in one of these lists for every kind and waveform
    that does not use it. Otherwise `scene.resolved.toml` contains its default and is refused when it is read again.
 3. Read the value where the model is built (folder `model`). No other code reads keys of a scene. In a sweep over a key
    of `overrides.PLAIN_KEYS`, such as normal.load, these functions get arrays in place of the swept numbers
    (`model.similar_models`), so their formulas must take arrays as well.
 4. Run `python tests/support/reference`, which writes the key into the pages of the reference, and add a test that the
    key changes an answer and that a wrong value is refused (`tests/scene`). `tests/scene/test_every_key.py` fails for a
-   key that changes no result and causes no sentence; such a key needs a `Remark` in its rules. `patchfem run` prints
+   key that changes no result and causes no sentence; such a key needs a `RemarkRule` in its rules. `patchfem run` prints
    remarks, `patchfem plan` does not.
 
 A key that is removed gets a row in `removed.REMOVED_KEYS` with the sentence that the user reads.

@@ -299,7 +299,7 @@ class Grooves(Table):
     ) = 0.0
 
 
-def outermost_strip_distance(width: float, count: int) -> float:
+def compute_outermost_strip_distance(width: float, count: int) -> float:
     """Return the distance [m] from the middle of the patch to the middle of its outermost strip.
 
     `count` equal strips lie side by side over the width [m]. A load line must lie within this distance.

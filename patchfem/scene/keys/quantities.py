@@ -179,14 +179,14 @@ def split_quantity(text: str) -> tuple[str, str]:
     return _QUANTITY_PATTERN.fullmatch(text).groups()
 
 
-def si_unit(kind: str | None) -> str:
+def find_si_unit(kind: str | None) -> str:
     """Return the SI unit of a kind; "1" for None, the kind of a plain number."""
     return next(iter(UNIT_FACTORS[kind])) if kind else "1"
 
 
 def format_si(value: float, kind: str) -> str:
     """Return a value with its SI unit, as ``"0.0127 m"``; `parse_quantity` gives back the same float."""
-    return f"{float(value)!r} {si_unit(kind)}"
+    return f"{float(value)!r} {find_si_unit(kind)}"
 
 
 def describe_requirement(kind: str) -> str:

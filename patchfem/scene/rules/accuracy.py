@@ -8,7 +8,7 @@ from ...effects import LAWS, is_bond_list, law_has_trait
 from ..keys.accuracy import Accuracy
 from ..keys.tables import Tables
 from .methods import MotionFeatures, find_motion_features
-from .rule_table import Facts, Mistake, Remark, apply_rules
+from .rule_table import MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
 
 
@@ -56,7 +56,7 @@ def list_fixed_settings(accuracy: Accuracy) -> list[str]:
     return [setting for setting in SETTING_SCOPES if getattr(accuracy, setting) is not None]
 
 
-class QuadratureFacts(Facts):
+class QuadratureFacts(TableFacts):
     """Facts for the rules of accuracy.quadrature, and of the sum over bonds."""
 
     def __init__(self, draft: SceneDraft, kind: str) -> None:
@@ -85,17 +85,17 @@ class QuadratureFacts(Facts):
 
 
 QUADRATURE_RULES = (
-    Remark(
+    RemarkRule(
         lambda q: q.is_named and not q.has_sum,
         "accuracy.quadrature",
         "= '{quadrature}' has no meaning without law 'nonlocal' and is not used",
     ),
-    Mistake(
+    MistakeRule(
         lambda q: q.has_sum and q.quadrature == "recursion" and not q.has_recursion,
         "accuracy.quadrature",
         "'recursion' can be used only with reading = 'stretch' and order = 1; use 'auto' or 'merged'",
     ),
-    Mistake(
+    MistakeRule(
         lambda q: (
             q.is_named
             and q.has_sum

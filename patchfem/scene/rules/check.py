@@ -12,7 +12,7 @@ from .contact import check_patches
 from .drive import check_drive, check_length
 from .friction import check_laws
 from .grooves import check_grooves
-from .rule_table import Facts, Missing, Mistake, Remark, Rule, apply_rules
+from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, Rule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
 from .selectors import SLIDE_KIND_SELECTOR, check_selector
 from .structure import advise_modes, check_energy_gain, check_structure
@@ -21,7 +21,7 @@ from .wear import check_wear
 RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "wear")
 
 
-class SimpleFacts(Facts):
+class SimpleFacts(TableFacts):
     """Facts of a table that has few rules."""
 
     @property
@@ -37,49 +37,49 @@ class SimpleFacts(Facts):
 
 
 NORMAL_RULES = (
-    Missing(
+    MissingKeyRule(
         lambda n: n.has("amplitude") and not n.has("frequency"),
         "normal.frequency",
         "normal.amplitude needs this key",
     ),
     *(
-        Missing(
+        MissingKeyRule(
             lambda n, key=key: n.has(key) and not n.has("amplitude"),
             "normal.amplitude",
             f"{key} needs this key",
         )
         for key in ("frequency", "phase")
     ),
-    Remark(
+    RemarkRule(
         lambda n: n.has("width") and not n.draft.has("friction.spread"),
         "normal.width",
         "has no meaning without friction.spread and is not used",
     ),
 )
 MEASURED_RULES = (
-    Missing(
+    MissingKeyRule(
         lambda m: m.reading == "lowpass" and not m.has("reading_cutoff"),
         "measured.reading_cutoff",
         "reading 'lowpass' needs this key, such as '600 Hz'",
     ),
-    Remark(
+    RemarkRule(
         lambda m: m.reading in ("fundamental", "rms", "lowpass") and not m.is_sine,
         "measured.reading",
         "has a meaning only under a sine drive and is not used",
     ),
-    Remark(
+    RemarkRule(
         lambda m: m.has("reading_cutoff") and m.reading in ("peak", "fundamental", "rms"),
         "measured.reading_cutoff",
         "has no meaning for reading '{reading}' and is not used",
     ),
 )
 SLIDE_RULES = (
-    Mistake(
+    MistakeRule(
         lambda s: s.kind in ("constant", "dwell") and s.distance == 0.0,
         "slide.distance",
         "must be > 0 m for kind '{kind}'",
     ),
-    Remark(
+    RemarkRule(
         lambda s: s.kind == "dwell" and s.hold and s.is_law_independent_of_rest_time,
         "slide.hold",
         "has no effect, because no bond grows at rest; add friction.rest_growth and slip_growth to law 'nonlocal'",

@@ -5,12 +5,12 @@ from functools import cached_property
 from typing import Any
 
 from ...effects import GAP_SHAPES
-from ..keys.contact import Contact, outermost_strip_distance
+from ..keys.contact import Contact, compute_outermost_strip_distance
 from .outlines import PIECE_NAMES, check_outlines, find_flat_length
-from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
+from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
 from .selectors import ASPERITY_LAW_SELECTOR, HERTZ_PEAK_DESCRIPTIONS, check_selector
-from .view import View
+from .view import TableView
 
 # Height of a piece over its length. From 80 000 on, the stiffness of the piece is lost to round-off.
 MAX_SLENDERNESS = 10_000
@@ -18,12 +18,12 @@ MAX_SLENDERNESS = 10_000
 MAX_ELEMENTS = 100_000
 
 
-class PatchFacts(Facts):
+class PatchFacts(TableFacts):
     """Facts for the rules of a patch: that of [contact] or that of an interface."""
 
     @cached_property
     def flat_length(self) -> float:
-        """Length [m] over which both faces are flat and opposite; UNKNOWN if there is none."""
+        """Length [m] over which both faces are flat and opposite; UNKNOWN_VALUE if there is none."""
         return find_flat_length(self)
 
     @property
@@ -49,7 +49,7 @@ class PatchFacts(Facts):
     @property
     def max_roll_offset(self) -> float:
         """Distance [m] from the middle of the patch to the middle of the outermost strip."""
-        return outermost_strip_distance(self.width, self.strips.count)
+        return compute_outermost_strip_distance(self.width, self.strips.count)
 
     @property
     def has_free_roll(self) -> bool:
@@ -58,68 +58,68 @@ class PatchFacts(Facts):
 
 
 PATCH_RULES = (
-    Mistake(
+    MistakeRule(
         lambda p: p.has("load", "approach"),
         "{at}.approach",
         "[contact.approach] and contact.load exclude each other: keep one",
     ),
-    Missing(
+    MissingKeyRule(
         lambda p: not p.has_any("load", "approach"),
         "{at}.load",
         "or [contact.approach] instead",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: p.height > p.max_height,
         "{at}.height",
         f"{{height:g}} m is more than {MAX_SLENDERNESS} times contact.length, but the stress is noticeable only to a "
         "depth of a few times contact.length; use at most {max_height:.3g} m, and represent the rest of the height by "
         "a spring of the structure",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: p.element_size > p.flat_length,
         "{at}.element_size",
         "{element_size} m is longer than {flat_length_name} {flat_length} m",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: p.length > MAX_ELEMENTS * p.element_size,
         "{at}.element_size",
         f"elements of {{element_size:g}} m on a length of {{length:g}} m are more than {MAX_ELEMENTS}; use at least "
         "{min_element_size:.3g} m, or leave this key out",
     ),
-    Remark(
+    RemarkRule(
         lambda p: p.element_size and p.mesh,
         "{at}.element_size",
         "is not used, because the file of contact.mesh gives the elements",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: (
             p.holder and not p.has_any("holder.rotational_stiffness", "holder.tangential_stiffness")
         ),
         "{at}.holder",
         "rotational_stiffness, tangential_stiffness or both are needed",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: abs(p.step.at) >= p.half_length,
         "{at}.step.at",
         "{step.at} m lies outside the patch: |`at`| < length/2 is needed",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: p.has_free_roll and p.has("strips.roll"),
         "{at}.strips.offset",
         "`offset` leaves the rotation about x free, but contact.strips.roll prescribes this rotation: keep only one of "
         "these two keys",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: p.has_free_roll and p.has("approach"),
         "{at}.strips.offset",
         "a load line needs a load: use contact.load in place of [contact.approach]",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: p.has_free_roll and p.strips.count < 2,
         "{at}.strips.offset",
         "{strips.count} strip cannot resist a rotation about x: raise contact.strips.count",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: (
             p.has_free_roll and p.strips.count >= 2 and abs(p.strips.offset) >= p.max_roll_offset
         ),
@@ -127,7 +127,7 @@ PATCH_RULES = (
         "{strips.offset} m lies beyond the middle of the outermost strip: |offset| < {max_roll_offset:.6g} m is "
         "needed; raise contact.strips.count or lower the offset",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: (
             p.asperities
             and p.has("asperities.cutoff")
@@ -137,7 +137,7 @@ PATCH_RULES = (
         "separates the long waves of a trace from the short ones, but the scene has no trace: add [contact.profile] or "
         "`from`, or leave this key out",
     ),
-    Missing(
+    MissingKeyRule(
         lambda p: (
             p.approach and p.asperities.law == "exponential" and not p.asperities.normal_stiffness
         ),
@@ -147,28 +147,28 @@ PATCH_RULES = (
     ),
 )
 LOAD_LINE_RULES = (
-    Mistake(
+    MistakeRule(
         lambda p: p.has("load_line.offset", "load_line.moment"),
         "{at}.load_line.moment",
         "offset and moment exclude each other: keep one",
     ),
-    Missing(
+    MissingKeyRule(
         lambda p: not p.has_any("load_line.offset", "load_line.moment"),
         "{at}.load_line.offset",
         "or load_line.moment instead",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: p.has("tilt.angle") and not p.has("holder"),
         "{at}.load_line",
         "cannot be used with contact.tilt.angle unless [contact.holder] is given: a piece that is free to rotate has "
         "no prescribed angle; leave out one of these two keys, or add the spring of [contact.holder]",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: abs(p.load_line.offset) >= p.half_length,
         "{at}.load_line.offset",
         "{load_line.offset} m lies outside the patch: |offset| < length/2 = {half_length} m is needed",
     ),
-    Mistake(
+    MistakeRule(
         lambda p: p.load_line.moment and abs(p.load_line.moment) >= p.half_length * p.load,
         "{at}.load_line.moment",
         "{load_line.moment} N m divided by the load {load} N puts the load line outside the patch: |moment|/load < "
@@ -196,7 +196,7 @@ def check_patches(draft: SceneDraft) -> None:
         _check_coatings(facts)
         if contact.asperities is not None:
             check_selector(
-                Facts(draft, f"{at}.asperities", contact.asperities), ASPERITY_LAW_SELECTOR
+                TableFacts(draft, f"{at}.asperities", contact.asperities), ASPERITY_LAW_SELECTOR
             )
         if facts.asperities.law == "hertz":
             _check_peaks(facts)
@@ -229,7 +229,7 @@ def _check_coatings(patch: PatchFacts) -> None:
         if piece:
             pieces.append((key, piece.coating or patch.coating, piece.height or patch.height))
     for key, coating, height in pieces:
-        if isinstance(coating, View) and coating.thickness >= height:
+        if isinstance(coating, TableView) and coating.thickness >= height:
             patch.draft.add_mistake(
                 key,
                 f"the coating of {coating.thickness} m must be thinner than its piece, which is {height} m high",

@@ -6,7 +6,7 @@ from functools import cached_property
 
 from ...effects import Waveform, find_waveform
 from ..keys.tables import Drive
-from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
+from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
 from .selectors import WAVEFORM_SELECTOR, check_selector, list_dependent_keys, list_unused_keys
 from .structure import check_driven_mass
@@ -20,7 +20,7 @@ KEYS_UNUSED_BY_KIND = {  # drive.kind -> keys that have no meaning, whatever the
 }
 
 
-class DriveFacts(Facts):
+class DriveFacts(TableFacts):
     """Facts of the drive; `wave` is the record of its waveform."""
 
     @cached_property
@@ -65,118 +65,118 @@ class DriveFacts(Facts):
 
 
 SIZE_RULES = (
-    Mistake(
+    MistakeRule(
         lambda d: d.has("cycles", "duration"),
         "drive.duration",
         "`cycles` and `duration` exclude each other: keep one",
     ),
-    Missing(
+    MissingKeyRule(
         lambda d: not d.has_length and (d.kind == "free" or d.wave.needs_length),
         "drive.cycles",
         "or drive.duration instead",
     ),
-    Mistake(
+    MistakeRule(
         lambda d: d.can_be_given_as_displacement and d.has("acceleration", "displacement"),
         "drive.displacement",
         "`acceleration` and `displacement` exclude each other: keep one",
     ),
-    Missing(
+    MissingKeyRule(
         lambda d: d.can_be_given_as_displacement and not d.has_any("acceleration", "displacement"),
         "drive.acceleration",
         "or drive.displacement instead",
     ),
-    Missing(
+    MissingKeyRule(
         lambda d: (
             d.is_accelerated and not d.can_be_given_as_displacement and not d.has("acceleration")
         ),
         "drive.acceleration",
         "waveform '{waveform}' needs this key",
     ),
-    Missing(
+    MissingKeyRule(
         lambda d: d.kind == "force" and d.wave.takes("force") and not d.has("force"),
         "drive.force",
         "kind 'force' needs this key",
     ),
-    Missing(
+    MissingKeyRule(
         lambda d: d.kind == "free" and not d.has("displacement") and not d.has_start,
         "drive.displacement",
         "kind 'free' needs this key, the displacement from which the structure is released; instead you can give "
         "[structure.start]",
     ),
-    Mistake(
+    MistakeRule(
         lambda d: d.kind == "free" and d.has("displacement") and d.has_start,
         "structure.start",
         "[structure.start] and drive.displacement exclude each other: keep one",
     ),
 )
 WAVEFORM_RULES = (
-    Mistake(
+    MistakeRule(
         lambda d: d.kind == "force" and d.wave.is_for_base_only,
         "drive.kind",
         "waveform '{waveform}' can only shake the base; set drive.kind = 'base', or give a record of the force with "
         "drive.waveform = 'file'",
     ),
-    Mistake(
+    MistakeRule(
         lambda d: d.wave.is_swept and d.has("rate", "log_rate"),
         "drive.log_rate",
         "`rate` (Hz/s) and `log_rate` (oct/min) exclude each other: keep one",
     ),
-    Missing(
+    MissingKeyRule(
         lambda d: d.wave.is_swept and not d.has_any("rate", "log_rate"),
         "drive.rate",
         "or drive.log_rate instead, such as '1 oct/min'",
     ),
-    Mistake(
+    MistakeRule(
         lambda d: d.wave.is_swept and d.from_ == d.to,
         "drive.to",
         "{to:g} Hz is also the frequency at which the sweep starts; give a different frequency",
     ),
-    Missing(
+    MissingKeyRule(
         lambda d: d.wave.has_levels and d.onset == "gauge" and not d.has("onset_length"),
         "drive.onset_length",
         "onset 'gauge' needs this key, such as '0.01 mil'",
     ),
-    Remark(
+    RemarkRule(
         lambda d: d.wave.has_levels and d.has("onset_length") and d.onset != "gauge",
         "drive.onset_length",
         "has no meaning for onset '{onset}' and is not used",
     ),
-    Mistake(
+    MistakeRule(
         lambda d: d.wave.takes("accelerations") and d.accelerations and not any(d.accelerations),
         "drive.accelerations",
         "all accelerations are 0, so nothing moves",
     ),
-    Mistake(
+    MistakeRule(
         lambda d: d.is_random and d.has("spectrum", "file"),
         "drive.file",
         "`spectrum` and `file` exclude each other: keep one",
     ),
-    Missing(
+    MissingKeyRule(
         lambda d: d.is_random and not d.has_any("spectrum", "file"),
         "drive.spectrum",
         "or drive.file, a table with the header frequency [Hz],level [g^2/Hz]",
     ),
     *(
-        Missing(
+        MissingKeyRule(
             lambda d, key=key: d.is_random and d.has("spectrum") and not d.has(key),
             f"drive.{key}",
             "drive.spectrum needs a lowest frequency (`from`) and a highest frequency (`to`)",
         )
         for key in ("from", "to")
     ),
-    Mistake(
+    MistakeRule(
         lambda d: d.is_random and d.to <= d.from_,
         "drive.to",
         "{to:g} Hz is not above drive.from, {from_:g} Hz",
     ),
 )
 LENGTH_RULES = (
-    Mistake(
+    MistakeRule(
         lambda d: d.cycles < MIN_CYCLES,
         "drive.cycles",
         f"the run must last at least a quarter of a cycle: cycles >= {MIN_CYCLES} is needed, not {{cycles:g}}",
     ),
-    Mistake(
+    MistakeRule(
         lambda d: not d.cycles < MIN_CYCLES and d.duration * d.frequency < MIN_CYCLES,
         "drive.duration",
         "the run must last at least a quarter of a cycle: duration >= {min_duration:g} s is needed, not {duration:g} s",

@@ -6,18 +6,18 @@ from ...effects import law_has_trait, law_takes_key, name_laws_with_key, takes_s
 from ..keys.contact import Contact
 from ..keys.tables import Friction
 from .methods import find_climbed_grooves
-from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
+from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
 from .selectors import LAW_SELECTOR, check_selector
-from .view import View
+from .view import TableView
 
 
-class LawFacts(Facts):
+class LawFacts(TableFacts):
     """Facts of a friction law, and of the patch on which it acts."""
 
     def __init__(self, draft: SceneDraft, at: str, law: Friction, contact: Contact | None) -> None:
         super().__init__(draft, at, law)
-        self.contact = View(contact)
+        self.contact = TableView(contact)
 
     def has_key(self, key: str) -> bool:
         """Return whether the law has a key; True if the law is not known."""
@@ -71,18 +71,18 @@ class LawFacts(Facts):
 
 
 LAW_RULES = (
-    Mistake(
+    MistakeRule(
         lambda law: law.has_unsupported_kinetic,
         "{at}.kinetic",
         f"law '{{law}}' has only one coefficient of friction; laws with a kinetic coefficient are "
         f"{name_laws_with_key('kinetic')}",
     ),
-    Mistake(
+    MistakeRule(
         lambda law: law.is_kinetic_larger,
         "{at}.kinetic",
         "{kinetic} is larger than static = {static}; kinetic <= static is needed",
     ),
-    Remark(
+    RemarkRule(
         lambda law: (
             not law.has_unsupported_kinetic
             and not law.is_kinetic_larger
@@ -91,17 +91,17 @@ LAW_RULES = (
         "{at}.kinetic",
         "has no effect while the bond length is constant; add rest_growth and slip_growth",
     ),
-    Remark(
+    RemarkRule(
         lambda law: is_rest_speed_unused(law.table),
         "{at}.rest_speed",
         "has no effect while the bond length is constant; add rest_growth and slip_growth",
     ),
-    Mistake(
+    MistakeRule(
         lambda law: law.spread and not law.has_key("spread"),
         "{at}.spread",
         f"law '{{law}}' has no spread; laws with a spread are {name_laws_with_key('spread')}",
     ),
-    Missing(
+    MissingKeyRule(
         lambda law: (
             law.spread
             and law.has_key("spread")
@@ -112,34 +112,34 @@ LAW_RULES = (
         "normal.width",
         "friction.spread needs this key",
     ),
-    Remark(
+    RemarkRule(
         lambda law: is_temperature_unused(law.table),
         "{at}.temperature",
         "has no effect without {missing_temperature_keys}",
     ),
     *(
-        Missing(
+        MissingKeyRule(
             lambda law, key=key, other=other: law.has(key) and not law.has(other),
             f"{{at}}.{other}",
             f"{key} needs this key; for a constant bond length leave out both keys",
         )
         for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth"))
     ),
-    Mistake(
+    MistakeRule(
         lambda law: law.is_order_wrong, "{at}.order", "must be {order_requirement}, not {order}"
     ),
-    Mistake(
+    MistakeRule(
         lambda law: law.breakaway and law.reading == "report",
         "{at}.breakaway",
         "reading 'report' has no breakaway; use reading = 'stretch' or leave `breakaway` out",
     ),
-    Mistake(
+    MistakeRule(
         lambda law: law.has_unknown_springs and law.load_change_description,
         "{at}.stiffness",
         "{load_change_description} changes the load, and the number of springs in contact changes "
         "with the load; give bond_length in place of stiffness",
     ),
-    Mistake(
+    MistakeRule(
         lambda law: (
             law.has_unknown_springs
             and not law.load_change_description
@@ -150,12 +150,12 @@ LAW_RULES = (
         "needs a known load, but [contact.approach] prescribes a distance; give bond_length in place of stiffness, or "
         "contact.load in place of [contact.approach]",
     ),
-    Mistake(
+    MistakeRule(
         lambda law: law.static == 0 and law.stiffness and law.has_key("stiffness"),
         "{at}.static",
         "must be > 0 with law '{law}', whose springs need a slip force",
     ),
-    Mistake(
+    MistakeRule(
         lambda law: law.static == 0 and law.compliance,
         "{at}.static",
         "must be > 0 with {compliance}, because at static = 0 no point carries friction; raise static or leave out "
@@ -190,7 +190,7 @@ def is_temperature_unused(law: Friction) -> bool:
 
 def is_kinetic_unused(law: Friction) -> bool:
     """Return whether a smaller kinetic coefficient is given for bonds of constant length."""
-    bond = View(law)
+    bond = TableView(law)
     return (
         law_has_trait(law.law, "bonds")
         and bond.kinetic < bond.static

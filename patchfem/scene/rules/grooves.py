@@ -8,11 +8,11 @@ from typing import Any
 from ...effects import describe_law, is_bond_list, law_has_trait, law_supports, suggest_laws
 from ..keys import removed
 from .methods import find_yaw_key, list_lower_shapes
-from .rule_table import Facts, Mistake, apply_rules, unsupported_rule
+from .rule_table import MistakeRule, TableFacts, apply_rules, make_unsupported_rule
 from .scene_draft import SceneDraft
 
 
-class GrooveFacts(Facts):
+class GrooveFacts(TableFacts):
     """Facts for the rules of the grooves at the key `at`, and of the tables used with them."""
 
     @property
@@ -36,7 +36,7 @@ class GrooveFacts(Facts):
         return law_has_trait(self.law_table.law, "bonds")
 
     @property
-    def key_against_recursion(self) -> str:
+    def key_preventing_recursion(self) -> str:
         """Key of [friction] that rules out the recursion over bonds; "" if none does."""
         law = self.scene.friction
         if not self.has_bonds or not (is_bond_list(self.law_table) or law.breakaway):
@@ -49,7 +49,7 @@ class GrooveFacts(Facts):
     def is_removed_law(self) -> bool:
         """Whether an earlier version computed the law over grooves."""
         return (
-            not self.key_against_recursion
+            not self.key_preventing_recursion
             and self.law_table.law in removed.LAWS_REMOVED_OVER_GROOVES
         )
 
@@ -75,7 +75,7 @@ class GrooveFacts(Facts):
 
 
 LOCKING_RULES = (
-    Mistake(
+    MistakeRule(
         lambda g: g.static * g.slope >= 1,
         "{at}.amplitude",
         "{amplitude:.6g} m gives flanks of slope {slope:.6g}, on which the pieces lock with static = {static:g}: no "
@@ -84,20 +84,20 @@ LOCKING_RULES = (
     ),
 )
 COMBINATION_RULES = (
-    unsupported_rule(
-        lambda g: g.key_against_recursion,
-        "friction.{key_against_recursion}",
+    make_unsupported_rule(
+        lambda g: g.key_preventing_recursion,
+        "friction.{key_preventing_recursion}",
         "with [{at}]",
         "recursion",
     ),
-    Mistake(
+    MistakeRule(
         lambda g: g.is_removed_law,
         "friction.law",
         "{law} with [{at}] was removed in patchfem 1.0; " + suggest_laws("grooves"),
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda g: (
-            not g.key_against_recursion
+            not g.key_preventing_recursion
             and not g.is_removed_law
             and not law_supports(g.law_table, "grooves")
         ),
@@ -105,46 +105,48 @@ COMBINATION_RULES = (
         "{law} with [{at}]",
         "{law_advice}",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda g: g.has_bonds and g.scene.accuracy.quadrature in ("direct", "truncated", "merged"),
         "accuracy.quadrature",
         "'{scene.accuracy.quadrature}' with [{at}]",
         "use 'recursion' or 'auto'",
     ),
-    Mistake(
+    MistakeRule(
         lambda g: g.scene.accuracy.method == "harmonic" and g.scene.accuracy.harmonics,
         "accuracy.harmonics",
         "harmonic balance with [{at}] was removed in patchfem 1.0; leave `harmonics` out: method 'harmonic' then "
         "integrates in time until the motion repeats",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda g: g.scene.contact.holder.tangential_stiffness,
         "contact.holder.tangential_stiffness",
         "with [{at}]",
         "out",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda g: g.scene.contact.strips and (find_yaw_key(g.draft.tables) or g.compliance),
         "{at}",
         "with strips that yaw or are elastic",
         "either",
     ),
-    Mistake(
+    MistakeRule(
         lambda g: g.load_change == "normal.amplitude",
         "normal.amplitude",
         "a normal load that oscillates over grooves was removed in patchfem 1.0; leave one of the two out",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda g: g.load_change and g.load_change != "normal.amplitude",
         "{load_change}",
         "with [{at}]",
         "either",
     ),
-    unsupported_rule(lambda g: g.lower_shape, "{lower_shape}", "'lower' with [{at}]", "shapes"),
-    unsupported_rule(
+    make_unsupported_rule(
+        lambda g: g.lower_shape, "{lower_shape}", "'lower' with [{at}]", "shapes"
+    ),
+    make_unsupported_rule(
         lambda g: g.scene.structure.stiffening, "structure.stiffening", "with [{at}]", "either"
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda g: g.scene.structure.bonded.wavelength,
         "structure.bonded.wavelength",
         "with [{at}]",
@@ -187,5 +189,5 @@ def find_groove_key(draft: SceneDraft) -> str:
 
 
 def find_groove_table(draft: SceneDraft) -> Any:
-    """Return the view of the grooves of a scene; UNKNOWN without grooves."""
+    """Return the view of the grooves of a scene; UNKNOWN_VALUE without grooves."""
     return draft.values.contact.grooves or draft.values.normal.grooves

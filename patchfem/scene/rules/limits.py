@@ -28,14 +28,14 @@ from .methods import (
     find_yaw_key,
     list_lower_shapes,
 )
-from .rule_table import Facts, Missing, Mistake, apply_rules, unsupported_rule
+from .rule_table import MissingKeyRule, MistakeRule, TableFacts, apply_rules, make_unsupported_rule
 from .scene_draft import SceneDraft
-from .view import View, wrap_value
+from .view import TableView, wrap_value
 
 UNSUPPORTED_KEY = "structure.mode.lateral"  # no run supports this key yet
 
 
-class JointFacts(Facts):
+class JointFacts(TableFacts):
     """Facts of a joint: its friction law, its patch, and the other tables of the scene.
 
     Parameters
@@ -87,7 +87,7 @@ class JointFacts(Facts):
         return find_yaw_key(self.draft.tables)
 
     @property
-    def key_against_recursion(self) -> str:
+    def key_preventing_recursion(self) -> str:
         """Key of the law that prevents the recursion over bonds."""
         if self.reading == "report":
             return "reading"
@@ -123,7 +123,7 @@ class JointFacts(Facts):
         return bool(self.contact and list_lower_shapes(self.contact.table))
 
     @property
-    def feature_of_recursion(self) -> str:
+    def recursion_feature(self) -> str:
         """Feature that only the recursion over bonds can compute, in words; "" if there is none."""
         if self.has_lower_shape:
             return "a shape on the lower piece"
@@ -160,31 +160,29 @@ class JointFacts(Facts):
 
 
 MOTION_RULES = (
-    unsupported_rule(
-        lambda j: (
-            j.kind == "rig" and j.quadrature and j.feature_of_recursion and not j.is_bond_list
-        ),
+    make_unsupported_rule(
+        lambda j: j.kind == "rig" and j.quadrature and j.recursion_feature and not j.is_bond_list,
         "accuracy.quadrature",
-        "'{quadrature}' with {feature_of_recursion} in a rig",
+        "'{quadrature}' with {recursion_feature} in a rig",
         "use 'recursion' or 'auto'",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: (
             j.kind == "bench"
             and j.quadrature == "merged"
-            and (j.feature_of_recursion or j.scene.normal.amplitude)
+            and (j.recursion_feature or j.scene.normal.amplitude)
         ),
         "accuracy.quadrature",
         "'merged' with friction.breakaway, or with a pressure that changes at a point during the slide,",
         "use 'auto', 'direct' or 'truncated'",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.kind == "bench" and j.has_constant_pressure and j.scene.normal.amplitude,
         "normal.amplitude",
         "with law '{law}'",
         suggest_laws("varying-load"),
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: (
             j.has_trait("bonds")
             and j.breakaway
@@ -195,18 +193,18 @@ MOTION_RULES = (
         "with order = {order:g} {breakaway_circumstance}",
         "order",
     ),
-    Mistake(
+    MistakeRule(
         lambda j: j.kind == "rig" and j.yaw and not j.contact.strips,
         "{yaw}",
         "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide independently",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.kind == "rig" and j.yaw and j.contact.strips and not j.supports("joints"),
         "{yaw}",
         "in strips with {law_description}",
         "{joints_advice}",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: (
             j.contact.strips and not j.lacks_partial_slip_of_strips and j.has_trait("averaged")
         ),
@@ -216,47 +214,47 @@ MOTION_RULES = (
     ),
 )
 CHANGING_LOAD_RULES = (
-    Mistake(
+    MistakeRule(
         lambda j: not j.contact and j.load_change != "normal.amplitude",
         "{load_change}",
         "a single contact point cannot heave or pitch: use [contact] in place of [normal]",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: not j.has_trait("bonds") and not j.supports("varying-load"),
         "friction.law",
         "'{law}' with {load_change_description}",
         suggest_laws("varying-load"),
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: (
             j.has_trait("bonds") and (j.breakaway or (j.is_bond_list and j.reading != "report"))
         ),
-        "friction.{key_against_recursion}",
+        "friction.{key_preventing_recursion}",
         "with {load_change_description}",
         "recursion",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.compliance and j.has_trait("set-valued") and j.supports("shear"),
         "friction.law",
         "'{law}' with {load_change_description} and {compliance}",
         "stiff",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.scene.structure.stiffening,
         "structure.stiffening",
         "with {load_change_description}",
         "either",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.scene.structure.bonded.wavelength,
         "structure.bonded.wavelength",
         "with {load_change_description}",
         "either",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.contact.strips, "contact.strips", "with {load_change_description}", "either"
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.contact.asperities.law in ("exponential", "hertz"),
         "contact.asperities.law",
         "'{contact.asperities.law}' with {load_change_description}",
@@ -264,7 +262,7 @@ CHANGING_LOAD_RULES = (
     ),
 )
 COMPLIANCE_RULES = (
-    Mistake(
+    MistakeRule(
         lambda j: (
             j.has_trait("bonds") and j.reading == "report" and -1 < j.order < 0 and j.initial_bonds
         ),
@@ -272,13 +270,13 @@ COMPLIANCE_RULES = (
         "{initial_bonds:g} with order = {order:g} and {compliance} gives points that no force can move: in the law as "
         "printed in the report, (R/eps)^order is unbounded for bonds at rest; set initial_bonds = 0 or use order >= 0",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: not j.has_trait("bonds") and not j.supports("shear"),
         "{at}.law",
         "'{law}' with {compliance}",
         f"leave out {{compliance}}, or {suggest_laws('shear')}",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.has_trait("set-valued") and j.supports("shear") and -1 < j.kinetic < j.static,
         "{at}.kinetic",
         "{kinetic:g} below static = {static:g} with {compliance}",
@@ -286,17 +284,17 @@ COMPLIANCE_RULES = (
     ),
 )
 STRIPS_RULES = (
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.lacks_partial_slip_of_strips, "{patch_at}.strips", "with {compliance}", "either"
     ),
 )
 INTERFACE_RULES = (
-    Missing(
+    MissingKeyRule(
         lambda j: not j.contact and not j.has("load"),
         "{at}.load",
         "or give this interface a patch with [structure.interface.contact]",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.spread and law_takes_key(j.table.law, "spread"),
         "{at}.spread",
         "with masses, where an interface has no width",
@@ -304,13 +302,13 @@ INTERFACE_RULES = (
     ),
 )
 INTERFACE_LAW_RULES = (
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.has_others and not j.supports("joints"),
         "{at}.law",
         "{law_description} with other interfaces",
         "{joints_advice}",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.lateral and not j.supports("plane"),
         "{at}.lateral",
         "with {law_description}",
@@ -318,24 +316,24 @@ INTERFACE_LAW_RULES = (
     ),
 )
 INTERFACE_PATCH_RULES = (
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.lateral,
         "{at}.lateral",
         "with [structure.interface.contact]",
         "give the interface a load, or leave lateral out",
     ),
-    Mistake(
+    MistakeRule(
         lambda j: j.has("load"),
         "{at}.load",
         "[structure.interface.contact] has its own load; leave this key out",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.has("contact.approach"),
         "{patch_at}.approach",
         "with [[structure.interface]]",
         "give contact.load instead",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.has("contact.grooves"),
         "{patch_at}.grooves",
         "with [[structure.interface]]",
@@ -343,13 +341,13 @@ INTERFACE_PATCH_RULES = (
     ),
 )
 PATCH_LAW_RULES = (
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: not j.has_others and not j.compliance and not j.supports("joints"),
         "{at}.law",
         "{law_description} with [structure.interface.contact]",
         "{joints_advice}",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda j: j.compliance and not j.supports("pieces", "shear"),
         "{at}.law",
         "{law_description} with {compliance}",
@@ -444,7 +442,7 @@ def _check_shape_sides(joint: JointFacts, only_upper: str) -> None:
 def find_lateral_slide_obstacle(tables: Tables) -> str:
     """Return why a bench cannot follow a path file with lateral motion; "" if it can."""
     law = tables.friction
-    scene = View(tables)
+    scene = TableView(tables)
     compliance = find_compliance_key(law, tables)
     either = REMEDIES["either"]
     obstacles = (

@@ -15,7 +15,7 @@ from ...effects import (
 )
 from ..keys.tables import Interface, Tables
 from .scene_draft import SceneDraft
-from .view import View
+from .view import TableView
 
 
 class Joint(NamedTuple):
@@ -163,7 +163,7 @@ def list_unused_methods(kind: str) -> tuple[str, ...]:
 
 def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
     """Return the features of a scene, as far as its tables could be read."""
-    scene = View(tables)
+    scene = TableView(tables)
     if kind != "rig":
         return MotionFeatures(
             [], "", False, find_nonlinear_spring(tables), find_waveform(tables.drive), tables.drive
@@ -198,7 +198,7 @@ def list_lower_shapes(contact: Any, at: str = "contact") -> list[str]:
 
 def find_nonlinear_spring(tables: Tables) -> str:
     """Return the key of the nonlinear spring of the rig; "" without one."""
-    structure = View(tables).structure
+    structure = TableView(tables).structure
     if structure.stiffening:
         return "[structure.stiffening]"
     return "structure.bonded.wavelength" if structure.bonded.wavelength else ""
@@ -207,14 +207,14 @@ def find_nonlinear_spring(tables: Tables) -> str:
 def find_climbed_grooves(tables: Tables) -> str:
     """Return the key of the grooves that the upper piece climbs; "" without or with flat ones."""
     for name in ("contact", "normal"):
-        if View(tables)[name].grooves.amplitude:
+        if TableView(tables)[name].grooves.amplitude:
             return f"[{name}.grooves]"
     return ""
 
 
 def find_yaw_key(tables: Tables) -> str:
     """Return the key of the first mode that yaws the patch; "" if none does."""
-    for index, mode in enumerate(View(tables).structure.mode):
+    for index, mode in enumerate(TableView(tables).structure.mode):
         if mode.yaw:
             return f"structure.mode.{index}.yaw"
     return ""
@@ -222,7 +222,7 @@ def find_yaw_key(tables: Tables) -> str:
 
 def find_load_change_key(tables: Tables) -> str:
     """Return the key by which the load of a rig changes; "" if the load is constant."""
-    scene = View(tables)
+    scene = TableView(tables)
     if scene.normal.amplitude:
         return "normal.amplitude"
     for index, mode in enumerate(scene.structure.mode):

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from .rule_table import Facts
-from .view import UNKNOWN, View
+from .rule_table import TableFacts
+from .view import UNKNOWN_VALUE, TableView
 
 PIECE_NAMES = ("upper", "lower")
 END_KEYS = ("chamfer", "end_radius")
@@ -11,24 +11,24 @@ END_KEYS = ("chamfer", "end_radius")
 MIN_END_FRACTION = 1e-5
 
 
-def find_piece_length(contact: View, name: str) -> float:
+def find_piece_length(contact: TableView, name: str) -> float:
     """Return the length [m] of the piece "upper" or "lower"."""
     return contact[name].length or contact.length
 
 
-def find_flat_length(patch: View) -> float:
-    """Return the length [m] over which both faces are flat and opposite; UNKNOWN without one."""
+def find_flat_length(patch: TableView) -> float:
+    """Return the length [m] over which both faces are flat and opposite; UNKNOWN_VALUE without one."""
     lengths = []
     for name in PIECE_NAMES:
         end = max(patch[name][key] or 0.0 for key in END_KEYS) if patch[name] else 0.0
         length = find_piece_length(patch, name) - 2 * end
         if not length > 0:
-            return UNKNOWN
+            return UNKNOWN_VALUE
         lengths.append(length)
     return min(lengths)
 
 
-def check_outlines(patch: Facts) -> None:
+def check_outlines(patch: TableFacts) -> None:
     """Report mistakes in the lengths and the ends of the two pieces of a patch."""
     draft = patch.draft
     at = patch.at
@@ -52,7 +52,7 @@ def check_outlines(patch: Facts) -> None:
         )
 
 
-def _check_outline_keys_with_mesh(patch: Facts, name: str) -> None:
+def _check_outline_keys_with_mesh(patch: TableFacts, name: str) -> None:
     """Report keys for the outline of a piece that are given together with a mesh file."""
     for key in ("length", *END_KEYS):
         if patch.mesh and patch.has(f"{name}.{key}"):
@@ -63,7 +63,7 @@ def _check_outline_keys_with_mesh(patch: Facts, name: str) -> None:
             )
 
 
-def _check_ends(patch: Facts, name: str) -> None:
+def _check_ends(patch: TableFacts, name: str) -> None:
     """Report ends of a piece that exclude each other, or do not fit into its length and height."""
     draft = patch.draft
     at = f"{patch.at}.{name}"

@@ -14,10 +14,10 @@ from ...effects import describe_unsupported
 from ..keys.types import Table
 from .methods import find_compliance_key, find_load_change_key
 from .scene_draft import SceneDraft, find_value
-from .view import View
+from .view import TableView
 
 
-class Facts(View):
+class TableFacts(TableView):
     """Facts on which the rules of one table depend: the values, and which keys are written.
 
     Subclasses add what follows from the values as properties. The tables do not change while rules are applied, so that
@@ -39,7 +39,7 @@ class Facts(View):
         self._written = draft.written_value(at)
 
     @property
-    def scene(self) -> View:
+    def scene(self) -> TableView:
         """All tables of the scene."""
         return self.draft.values
 
@@ -66,7 +66,7 @@ class Facts(View):
 
 
 class Rule(NamedTuple):
-    """One row of a table of rules; `Mistake`, `Missing` and `Remark` make them.
+    """One row of a table of rules; `MistakeRule`, `MissingKeyRule` and `RemarkRule` make them.
 
     - report: method of `SceneDraft` that takes the key and the sentence.
     - condition: function of the facts that is true where the sentence applies.
@@ -80,12 +80,12 @@ class Rule(NamedTuple):
     sentence: str
 
 
-Mistake = partial(Rule, SceneDraft.add_mistake)
-Missing = partial(Rule, SceneDraft.add_missing)
-Remark = partial(Rule, SceneDraft.add_remark)
+MistakeRule = partial(Rule, SceneDraft.add_mistake)
+MissingKeyRule = partial(Rule, SceneDraft.add_missing)
+RemarkRule = partial(Rule, SceneDraft.add_remark)
 
 
-def unsupported_rule(condition: Callable, key: str, feature: str, instead: str) -> Rule:
+def make_unsupported_rule(condition: Callable, key: str, feature: str, instead: str) -> Rule:
     """Return the rule for a combination that is not supported yet.
 
     Parameters
@@ -95,7 +95,7 @@ def unsupported_rule(condition: Callable, key: str, feature: str, instead: str) 
     feature, instead : str
         As in `effects.describe_unsupported`, with facts in braces.
     """
-    return Mistake(condition, key, describe_unsupported(feature, instead))
+    return MistakeRule(condition, key, describe_unsupported(feature, instead))
 
 
 def apply_rules(draft: SceneDraft, rules: Iterable[Rule], facts: Any) -> None:

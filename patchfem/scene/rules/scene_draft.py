@@ -12,7 +12,7 @@ from ..keys.lookup import describe_requirement, find_key
 from ..keys.tables import Tables
 from ..keys.types import build_table
 from ..lines import number_items_from_one, split_key
-from .view import View
+from .view import TableView
 
 # sort order of the mistakes of --set, which are listed after those of all lines of a file
 SET_MISTAKE_ORDER = 10**9
@@ -58,7 +58,7 @@ class SceneDraft:
         self.raw = raw
         self.sets: set[str] = set()
         self.tables = build_table(Tables, {})
-        self._values = View(self.tables)
+        self._values = TableView(self.tables)
         self.remarks: list[str] = []
         self.read_before: dict[int, tuple[dict, Any]] = {}
         self.read_now: dict[int, tuple[dict, Any]] = {}
@@ -66,10 +66,10 @@ class SceneDraft:
         self._mistakes: dict[tuple[int, str], None] = {}
 
     @property
-    def values(self) -> View:
-        """View of the tables read so far; a missing or refused value is UNKNOWN."""
+    def values(self) -> TableView:
+        """View of the tables read so far; a missing or refused value is UNKNOWN_VALUE."""
         if self._values.table is not self.tables:
-            self._values = View(self.tables)
+            self._values = TableView(self.tables)
         return self._values
 
     @property

@@ -11,7 +11,7 @@ from ... import effects
 from ..keys.contact import Asperities
 from ..keys.tables import Drive, Friction, Slide
 from ..keys.types import attributes_by_key
-from .rule_table import Facts
+from .rule_table import TableFacts
 
 HERTZ_PEAK_DESCRIPTIONS = (  # alternative descriptions of the peaks of law 'hertz'
     ("radius", "density", "height_deviation"),
@@ -97,12 +97,12 @@ def list_dependent_keys(selector: Selector) -> frozenset[str]:
     return frozenset(split_keys(" ".join(map(" ".join, selector.choices.values()))))
 
 
-def check_selector(facts: Facts, selector: Selector) -> None:
+def check_selector(facts: TableFacts, selector: Selector) -> None:
     """Report keys that the value of a selector requires or excludes; remark on unused ones.
 
     Parameters
     ----------
-    facts : Facts
+    facts : TableFacts
         Facts of the table of the selector.
     selector : Selector
     """

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from ...effects import describe_unsupported, find_waveform
 from ..keys.tables import Tables
 from ..keys.types import advise_on_name
-from .rule_table import Facts, Missing, Mistake, Remark, apply_rules
+from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
 
 ARRAY_EXTENSIONS = (".npz", ".mat")
@@ -57,7 +57,7 @@ class CoordinateNumbers(NamedTuple):
         return cls(number, "mass", "structure.masses")
 
 
-class StructureFacts(Facts):
+class StructureFacts(TableFacts):
     """Facts for the rules of [structure]: how the rig is described, and the other tables."""
 
     @cached_property
@@ -134,23 +134,23 @@ class StructureFacts(Facts):
 
 
 DESCRIPTION_RULES = (
-    Mistake(
+    MistakeRule(
         lambda s: s.second_description,
         "structure.{second_description}",
         "{joined_descriptions} exclude each other: keep one description of the rig",
     ),
-    Missing(
+    MissingKeyRule(
         lambda s: not s.descriptions,
         "structure.mode",
         "at least one [[structure.mode]] is needed; a mass on a spring is a mode with the frequency sqrt(k/m)/(2 pi)",
     ),
-    Missing(
+    MissingKeyRule(
         lambda s: not s.has("moving_mass") and s.descriptions in ([], ["mode"]),
         "structure.moving_mass",
         "",
     ),
     *(
-        Mistake(
+        MistakeRule(
             lambda s, key=key: s.has(key) and not s.has("masses") and s.draft.has("contact"),
             f"structure.{key}",
             "joins masses, which cannot be used with [contact]; {modes_advice}",
@@ -158,69 +158,69 @@ DESCRIPTION_RULES = (
         for key in ("spring", "damper")
     ),
     *(
-        Missing(
+        MissingKeyRule(
             lambda s, key=key: s.has(key) and not s.has("masses") and not s.draft.has("contact"),
             "structure.masses",
             f"structure.{key} needs this key",
         )
         for key in ("spring", "damper")
     ),
-    Missing(
+    MissingKeyRule(
         lambda s: s.has("output_mass") and not s.has_any("masses", "reduced"),
         "structure.masses",
         "structure.output_mass needs this key",
     ),
-    Missing(
+    MissingKeyRule(
         lambda s: s.has("interface") and not s.has_any("masses", "file", "reduced"),
         "structure.masses",
         "structure.interface needs this key, or structure.file or [structure.reduced]",
     ),
     *(
-        Mistake(
+        MistakeRule(
             lambda s, key=key: s.has(key) and not s.has("file"),
             f"structure.{key}",
             "names a place in a file of modes or responses, but the scene has no such file; give structure.file",
         )
         for key in LOCATION_KEYS
     ),
-    Remark(
+    RemarkRule(
         lambda s: s.descriptions in (["masses"], ["reduced"]) and s.has("moving_mass"),
         "structure.moving_mass",
         "has no meaning with structure.{description} and is not used",
     ),
 )
 FILE_RULES = (
-    Mistake(
+    MistakeRule(
         lambda s: s.file and s.extension not in (*ARRAY_EXTENSIONS, *UNIVERSAL_EXTENSIONS),
         "structure.file",
         "the name ends in '{extension}'; {extension_advice}: matrices or modes as arrays, or universal files",
     ),
     *(
-        Mistake(
+        MistakeRule(
             lambda s, key=key: s.file and not s.is_universal and s.has(key),
             f"structure.{key}",
             f"names a place in a universal file; a {{extension}} file contains the array {key.removesuffix('_at')}",
         )
         for key in LOCATION_KEYS
     ),
-    Missing(
+    MissingKeyRule(
         lambda s: s.is_universal and not s.has("moving_mass"),
         "structure.moving_mass",
         "the modes of a universal file are scaled to this mass",
     ),
-    Missing(
+    MissingKeyRule(
         lambda s: s.is_universal and not s.has("slide_at"),
         "structure.slide_at",
         'the node and direction that slide, such as slide_at = "12:+x"',
     ),
-    Mistake(
+    MistakeRule(
         lambda s: s.is_universal and s.has("interface"),
         "structure.interface",
         "a universal file has nodes, not masses; use slide_at with [friction]",
     ),
 )
 BONDED_RULES = (
-    Mistake(
+    MistakeRule(
         lambda s: s.bonded and s.has_masses and s.n_interfaces != 1,
         "structure.bonded",
         "applies only to a single contact, but there are {n_interfaces} interfaces; instead write a "
@@ -228,14 +228,14 @@ BONDED_RULES = (
     ),
 )
 STUCK_RULES = (
-    Mistake(
+    MistakeRule(
         lambda s: s.is_stuck and not s.has_joint,
         "structure.measured",
         "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add [friction] and "
         "its load, or leave `measured` out",
     ),
     *(
-        Mistake(
+        MistakeRule(
             lambda s, is_there=is_there: s.is_stuck and is_there(s),
             "structure.measured",
             f"'stuck' cannot be used with {description}, because only modes can be measured with the joint; leave "
@@ -247,7 +247,7 @@ STUCK_RULES = (
         )
     ),
     *(
-        Mistake(
+        MistakeRule(
             lambda s, is_there=is_there: s.is_stuck and is_there(s),
             "structure.measured",
             f"'stuck' cannot be used with {cause}, because the joint then has no single stiffness to subtract from the "
@@ -266,23 +266,23 @@ STUCK_RULES = (
     ),
 )
 REDUCED_RULES = (
-    Mistake(
+    MistakeRule(
         lambda s: s.repeated_coordinate,
         "structure.reduced.boundary",
         "names {repeated_coordinate} twice; name each coordinate once",
     ),
-    Remark(
+    RemarkRule(
         lambda s: s.reduced.moved and s.scene.drive.kind in ("force", "free"),
         "structure.reduced.moved",
         "is not used, because it applies only to a base drive",
     ),
-    Mistake(
+    MistakeRule(
         lambda s: s.has("interface") and s.reduced.slide,
         "structure.reduced.slide",
         "applies only to [friction]; a [[structure.interface]] names its two sides with the key `between`: leave "
         "structure.reduced.slide out",
     ),
-    Missing(
+    MissingKeyRule(
         lambda s: not s.has("interface") and s.draft.has("friction") and not s.reduced.slide,
         "structure.reduced.slide",
         "which two boundary coordinates rub against each other, such as slide = [1, 0] for coordinate 1 against the "

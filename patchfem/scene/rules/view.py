@@ -22,11 +22,11 @@ class _Unknown(float):
 
 
 # As with every NaN, no comparison with this value holds except `!=`.
-UNKNOWN = _Unknown("nan")
+UNKNOWN_VALUE = _Unknown("nan")
 
 
-class View:
-    """Wrapper of a table that returns UNKNOWN for missing values and a View for inner tables.
+class TableView:
+    """Wrapper of a table that returns UNKNOWN_VALUE for missing values and a TableView for inner tables.
 
     A rule compares the values of a view without asking first whether they are there. A field of a sentence, such as
     `{length:g}`, names an attribute of the view. AttributeError for a name that the table does not have.
@@ -36,7 +36,7 @@ class View:
         self.table = table
 
     def __getattr__(self, name: str) -> Any:
-        value = UNKNOWN if self.table is None else wrap_value(getattr(self.table, name))
+        value = UNKNOWN_VALUE if self.table is None else wrap_value(getattr(self.table, name))
         self.__dict__[name] = value  # the next access finds it without this method
         return value
 
@@ -45,11 +45,11 @@ class View:
 
 
 def wrap_value(value: Any) -> Any:
-    """Wrap a value for the rules: a table becomes a View, and None becomes UNKNOWN."""
+    """Wrap a value for the rules: a table becomes a TableView, and None becomes UNKNOWN_VALUE."""
     if value is None:
-        return UNKNOWN
+        return UNKNOWN_VALUE
     if isinstance(value, Table):
-        return View(value)
+        return TableView(value)
     if isinstance(value, tuple):
         return tuple(map(wrap_value, value))
     return value

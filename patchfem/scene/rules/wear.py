@@ -5,14 +5,21 @@ from math import pi
 
 from ...effects import Waveform, find_waveform, law_has_trait, law_takes_key, name_laws_with_key
 from .grooves import find_groove_key, find_groove_table
-from .rule_table import Facts, Missing, Mistake, Remark, apply_rules, unsupported_rule
+from .rule_table import (
+    MissingKeyRule,
+    MistakeRule,
+    RemarkRule,
+    TableFacts,
+    apply_rules,
+    make_unsupported_rule,
+)
 from .scene_draft import SceneDraft
-from .view import UNKNOWN, View
+from .view import UNKNOWN_VALUE, TableView
 
 FACTOR_KEYS = ("coefficient_factor", "bond_length_factor")
 
 
-class WearFacts(Facts):
+class WearFacts(TableFacts):
     """Facts for the rules of [wear]; `friction` is its table of friction over the worn depth."""
 
     def __init__(self, draft: SceneDraft, kind: str) -> None:
@@ -20,7 +27,7 @@ class WearFacts(Facts):
         self.kind = kind
 
     @property
-    def law(self) -> View:
+    def law(self) -> TableView:
         """The friction law of the scene."""
         return self.scene.friction
 
@@ -65,7 +72,7 @@ class WearFacts(Facts):
     @property
     def max_factor(self) -> float:
         """Largest factor on the coefficients of friction."""
-        return max(self.friction.coefficient_factor, default=UNKNOWN)
+        return max(self.friction.coefficient_factor, default=UNKNOWN_VALUE)
 
     @property
     def max_static(self) -> float:
@@ -79,72 +86,72 @@ class WearFacts(Facts):
 
 
 COMBINATION_RULES = (
-    Mistake(
+    MistakeRule(
         lambda w: w.kind == "patch",
         "wear",
         "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: w.groove_key and w.scene.normal and find_groove_table(w.draft).amplitude,
         "wear",
         "with [{groove_key}]",
         "a [normal] contact has no area, so its wear has no depth: use [contact]",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: w.strip_compliance,
         "wear",
         "with contact.strips with {strip_compliance}",
         "leave out [wear] or {strip_compliance}",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: w.has_lower_shape,
         "wear",
         "with contact.strips with a shape on the lower piece",
         "leave out [wear] or put all shapes on the upper piece",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: w.scene.contact.strips and w.has("start"),
         "wear",
         "with contact.strips with wear.start",
         "leave out [wear] or leave out wear.start",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: w.kind == "rig" and w.scene.normal.amplitude,
         "wear",
         "with normal.amplitude",
         "leave out [wear] or the amplitude",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: w.scene.structure.interface,
         "wear",
         "with [[structure.interface]]",
         "leave out [wear] or describe a single interface by [friction] and [normal]",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: any(mode.normal or mode.pitch for mode in w.scene.structure.mode),
         "wear",
         "with modes with `normal` or `pitch`",
         "leave out [wear] or these keys",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: w.kind == "rig" and w.scene.drive.kind == "free",
         "wear",
         "with drive.kind = 'free'",
         "wear is computed from the last cycle of a steady motion: use kind 'base' or 'force'",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: w.kind == "rig" and w.wave.name and not w.wave.is_sine,
         "wear",
         "with drive.waveform = '{scene.drive.waveform}'",
         "wear is computed from the last cycle of a steady motion: use waveform 'sine'",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: w.kind == "rig" and w.scene.accuracy.method == "harmonic",
         "wear",
         "with accuracy.method 'harmonic'",
         "use 'auto', 'exact' or 'march'",
     ),
-    unsupported_rule(
+    make_unsupported_rule(
         lambda w: law_has_trait(w.scene.friction.law, "averaged"),
         "wear",
         "with law '{law.law}'",
@@ -152,29 +159,29 @@ COMBINATION_RULES = (
     ),
 )
 FRICTION_RULES = (
-    Mistake(
+    MistakeRule(
         lambda w: w.scene.normal,
         "wear.friction",
         "a [normal] contact has no area, so its wear has no depth: use [contact]",
     ),
-    Mistake(
+    MistakeRule(
         lambda w: w.depths and not _increases_from_zero(w.depths),
         "wear.friction.depth",
         'depths that rise from 0 are needed, such as ["0 um", "1 um", "5 um"]',
     ),
-    Missing(
+    MissingKeyRule(
         lambda w: not w.has_any(*(f"friction.{key}" for key in FACTOR_KEYS)),
         "wear.friction.coefficient_factor",
         "the table needs a factor: coefficient_factor, bond_length_factor or both",
     ),
 )
 LAW_RULES = (
-    Mistake(
+    MistakeRule(
         lambda w: w.friction.bond_length_factor and not law_takes_key(w.law.law, "bond_length"),
         "wear.friction.bond_length_factor",
         f"law '{{law.law}}' has no bond_length; leave this key out, or use {name_laws_with_key('bond_length')}",
     ),
-    Mistake(
+    MistakeRule(
         lambda w: (
             w.friction.bond_length_factor
             and law_takes_key(w.law.law, "bond_length")
@@ -183,12 +190,12 @@ LAW_RULES = (
         "wear.friction.bond_length_factor",
         "has no meaning with friction.stiffness; give friction.bond_length in place of friction.stiffness",
     ),
-    Remark(
+    RemarkRule(
         lambda w: w.friction.coefficient_factor and w.law.static == 0,
         "wear.friction.coefficient_factor",
         "has no effect, because static = 0",
     ),
-    Mistake(
+    MistakeRule(
         lambda w: w.max_static * w.slope >= 1 > w.law.static * w.slope,
         "wear.friction.coefficient_factor",
         "{max_factor:g} raises static to {max_static:g}, at which the pieces lock on the flanks of the unworn grooves "
@@ -196,21 +203,21 @@ LAW_RULES = (
     ),
 )
 START_RULES = (
-    Mistake(
+    MistakeRule(
         lambda w: w.scene.normal and w.has("start"),
         "wear.start",
         "[normal] is a point and has no worn depth to start from: use [contact], or leave wear.start out and add the "
         "worn volumes of both runs",
     ),
     *(
-        Remark(
+        RemarkRule(
             lambda w, key=key: w.scene.normal and w.has(key),
             f"wear.{key}",
             "has no meaning without [contact] and is not used",
         )
         for key in ("jumps", "upper_share")
     ),
-    Remark(
+    RemarkRule(
         lambda w: (
             not w.scene.normal and w.has("upper_share") and not w.groove_key and not w.has_coating
         ),

@@ -243,7 +243,7 @@ def test_exact_the_free_motion_balances_every_mode():
     """Coupled damping: the modal equations with the balancing negative damping, harmonic by harmonic."""
     modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
     group = Group(modes, Jenkins(*many(20)), 512)
-    omega, shape = modes.stuck_mode(group.rows, group.stiffness(), 1)
+    omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), 1)
     for free in trace(
         FreeBalance(Balance(modes, group.rows, group), 1, 5, omega), [0.05, 0.3], omega, shape
     ):

@@ -23,7 +23,7 @@ STIFF, LIMIT = np.array([2e4, 1e4, 3e4]), np.array([1e-4, 2e-4, 4e-4])
 
 
 def held(modes, group):
-    return modes.stuck_mode(group.rows, group.stiffness(), 0)
+    return modes.compute_stuck_mode(group.rows, group.stiffness(), 0)
 
 
 def test_exact_one_mode_on_elastic_plastic_elements():

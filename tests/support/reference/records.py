@@ -2,7 +2,7 @@
 
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
-from patchfem.scene.keys.materials import MATERIALS, THERMAL, YIELD
+from patchfem.scene.keys.materials import MATERIALS, THERMAL_PROPERTIES, YIELD_STRENGTHS
 
 from .keys import FOLDER, grid
 
@@ -92,9 +92,12 @@ constants, measure it on your material.
         ]
         warm = [
             (f"`{name}`", f"{t.conductivity:g}", f"{t.heat_capacity:g}", t.source)
-            for name, t in THERMAL.items()
+            for name, t in THERMAL_PROPERTIES.items()
         ]
-        firm = [(f"`{name}`", f"{one.strength / 1e6:g}", one.source) for name, one in YIELD.items()]
+        firm = [
+            (f"`{name}`", f"{one.strength / 1e6:g}", one.source)
+            for name, one in YIELD_STRENGTHS.items()
+        ]
         heads = (
             ("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"),
             ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"),
