@@ -16,7 +16,7 @@ MAX_OTHER_FOLDERS = 8
 MIN_UNUSED_TIME = 3600.0  # s; a folder used more recently may belong to a running process
 MARK_INTERVAL = 60.0  # s; a mark that is younger is not renewed
 STATE_NAME = re.compile(r"[0-9a-f]{16}")
-REMOVED_NAME = re.compile(r"\.[0-9a-f]{16}\.\d+\.gone")  # a folder that is being removed
+REMOVED_NAME = re.compile(r"\.[0-9a-f]{16}\.\d+\.gone")  # name of a folder that is being removed
 
 
 def mark_used(folder: Path) -> None:

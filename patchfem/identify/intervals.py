@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import t as student
 
+from ..core import frozen_array
 from .correlation import estimate_effective_rows
 from .space import CubeResidual
 
@@ -31,15 +32,16 @@ QUICK_PROFILE_TOL = 1e-2
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FitIntervals:
-    """Intervals of a fit of n values.
+    """95 % intervals of a fit of n values, read-only.
 
-    - ends: ends (n, 2) of the intervals.
+    - ends: ends (n, 2) of the intervals, NaN for a value that the rows do not determine.
     - methods: "linear", "profile" or "none" for each value.
     - open_ends: whether each end (n, 2) is only the bound.
-    - correlation: correlation matrix (n, n).
+    - correlation: correlation matrix (n, n), NaN for a value that the rows do not determine.
     - sensitivity: root mean square change (n,) of the residual per range of a value.
-    - unknown: directions (d, n) of relative change that leave the residual as it is.
-    - rows: number of independent rows.
+    - unknown: directions (d, n) of relative change, or of change over the range if a value is 0, that
+      leave the residual as it is.
+    - rows: number of independent rows, NaN without intervals.
     """
 
     ends: np.ndarray
@@ -78,12 +80,12 @@ class _IntervalEnd(NamedTuple):
 def make_unknown_intervals(n: int) -> FitIntervals:
     """Return NaN intervals for a fit of n values whose intervals were not requested."""
     return FitIntervals(
-        ends=np.full((n, 2), np.nan),
+        ends=frozen_array(np.full((n, 2), np.nan)),
         methods=("none",) * n,
-        open_ends=np.zeros((n, 2), bool),
-        correlation=np.full((n, n), np.nan),
-        sensitivity=np.full(n, np.nan),
-        unknown=np.zeros((0, n)),
+        open_ends=frozen_array(np.zeros((n, 2)), bool),
+        correlation=frozen_array(np.full((n, n), np.nan)),
+        sensitivity=frozen_array(np.full(n, np.nan)),
+        unknown=frozen_array(np.zeros((0, n))),
         rows=np.nan,
     )
 
@@ -144,12 +146,12 @@ def compute_intervals(
             methods[i] = "profile"
             ends[i] = [profile.end for profile in profiles]
     return FitIntervals(
-        ends=_convert_ends(model, u, ends),
+        ends=frozen_array(_convert_ends(model, u, ends)),
         methods=tuple(methods),
-        open_ends=open_ends,
-        correlation=_compute_correlation(covariance, unknown),
-        sensitivity=size / np.sqrt(model.rows),
-        unknown=_list_unknown_directions(model, u, inner, null, size),
+        open_ends=frozen_array(open_ends, bool),
+        correlation=frozen_array(_compute_correlation(covariance, unknown)),
+        sensitivity=frozen_array(size / np.sqrt(model.rows)),
+        unknown=frozen_array(_list_unknown_directions(model, u, inner, null, size)),
         rows=float(rows),
     )
 

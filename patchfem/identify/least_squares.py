@@ -32,42 +32,39 @@ NEAR_BOUND_FRACTION = 1e-3
 N_TRIALS_PER_VALUE = 8
 
 
+class SearchCounts(NamedTuple):
+    """Evaluations of the residual by a search.
+
+    - evaluations: number of evaluations.
+    - failures: number of those that failed.
+    - reason: reason of the first failure; "" if none failed.
+    """
+
+    evaluations: int
+    failures: int
+    reason: str
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Fit:
     """Result of a least-squares fit of n values.
 
     - values: best values (n,).
-    - intervals: 95 % intervals (n, 2), NaN for a value that the rows do not determine.
-    - methods: "linear", "profile" or "none" for each value.
-    - open_ends: whether each end (n, 2) is only the bound.
-    - correlation: correlation matrix (n, n), NaN for a value that the rows do not determine.
-    - rms: root mean square of the residual.
-    - sensitivity: root mean square change (n,) of the residual per range of a value.
     - at_bound: "low", "high" or "" for each value.
-    - unknown: directions (d, n) of relative change, or of change over the range if a value is 0, that
-      leave the residual as it is.
-    - rows: number of independent rows, NaN without intervals.
-    - evaluations, failures: number of evaluations, and of those that failed.
-    - reason: reason of the first failure.
+    - intervals: 95 % intervals, and what the rows do not determine.
+    - rms: root mean square of the residual.
     - agreed: number of descents that ended at the same sum of squares.
+    - counts: evaluations of the residual.
     - outcome: done if the best descent converged, or if another one ended in the same valley; a
       residual with noise in its last digits never lets a descent converge.
     """
 
     values: np.ndarray
-    intervals: np.ndarray
-    methods: tuple
-    open_ends: np.ndarray
-    correlation: np.ndarray
-    rms: float
-    sensitivity: np.ndarray
     at_bound: tuple
-    unknown: np.ndarray
-    rows: float
-    evaluations: int
-    failures: int
-    reason: str
+    intervals: FitIntervals
+    rms: float
     agreed: int
+    counts: SearchCounts
     outcome: Outcome
 
 
@@ -219,33 +216,15 @@ def assemble_fit(
         intervals = compute_intervals(model, u, cost, descend, is_series=interval_kind == "series")
     n_same_valley = sum(end.cost <= SAME_MINIMUM_RATIO * cost for end in first_descents or ends)
     is_converged = best.is_converged or n_same_valley > 1
-    return _make_fit(
-        model,
-        u,
-        intervals,
-        rms=float(np.sqrt(cost / model.rows)),
-        agreed=agreed,
-        outcome=Outcome.DONE if is_converged else Outcome.NOT_CONVERGED,
-    )
-
-
-def _make_fit(model: CubeResidual, u, intervals: FitIntervals, **results) -> Fit:
-    """Make the record of a fit with the values at u, with read-only arrays."""
     at_bound = np.where(u <= 0, "low", np.where(u >= 1, "high", ""))
     return Fit(
         values=frozen_array(model.space.values(u)),
-        intervals=frozen_array(intervals.ends),
-        methods=intervals.methods,
-        open_ends=frozen_array(intervals.open_ends, bool),
-        correlation=frozen_array(intervals.correlation),
-        sensitivity=frozen_array(intervals.sensitivity),
         at_bound=tuple(at_bound.tolist()),
-        unknown=frozen_array(intervals.unknown),
-        rows=intervals.rows,
-        evaluations=model.evaluations,
-        failures=model.failures,
-        reason=model.reason,
-        **results,
+        intervals=intervals,
+        rms=float(np.sqrt(cost / model.rows)),
+        agreed=agreed,
+        counts=SearchCounts(model.evaluations, model.failures, model.reason),
+        outcome=Outcome.DONE if is_converged else Outcome.NOT_CONVERGED,
     )
 
 

@@ -29,15 +29,16 @@ def describe_fit(fit: Fit, names) -> list:
         for i, side in enumerate(fit.at_bound)
         if side
     ]
-    sentences += [_describe_combination(row, names) for row in fit.unknown]
-    in_combination = {i for row in fit.unknown for i in np.flatnonzero(row)}
-    min_sensitivity = MIN_SENSITIVITY * max(float(np.max(fit.sensitivity)), fit.rms)
+    intervals = fit.intervals
+    sentences += [_describe_combination(row, names) for row in intervals.unknown]
+    in_combination = {i for row in intervals.unknown for i in np.flatnonzero(row)}
+    min_sensitivity = MIN_SENSITIVITY * max(float(np.max(intervals.sensitivity)), fit.rms)
     for i, name in enumerate(names):
-        if np.isfinite(fit.intervals[i]).all():
-            if fit.open_ends[i].any() and not fit.at_bound[i]:
-                side = "low" if fit.open_ends[i, 0] else "high"
+        if np.isfinite(intervals.ends[i]).all():
+            if intervals.open_ends[i].any() and not fit.at_bound[i]:
+                side = "low" if intervals.open_ends[i, 0] else "high"
                 sentences.append(f"{name}: the data do not exclude its {side} bound")
-        elif fit.sensitivity[i] <= min_sensitivity:
+        elif intervals.sensitivity[i] <= min_sensitivity:
             sentences.append(
                 f"{name} has no effect on the computed data, so its value is not determined"
             )
@@ -45,10 +46,10 @@ def describe_fit(fit: Fit, names) -> list:
             sentences.append(
                 f"{name} is not determined: its interval of 95 % reaches both ends of its range"
             )
-    if fit.failures:
+    if fit.counts.failures:
         sentences.append(
-            f"{fit.failures} of {fit.evaluations} evaluations failed and were skipped; the first failed "
-            f"because: {fit.reason}"
+            f"{fit.counts.failures} of {fit.counts.evaluations} evaluations failed and were skipped; the first "
+            f"failed because: {fit.counts.reason}"
         )
     if fit.outcome is Outcome.NOT_CONVERGED:
         sentences.append(

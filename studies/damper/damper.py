@@ -173,7 +173,7 @@ if __name__ == "__main__":
         keys = row.fitted.keys
         print(
             f"{row.law:20s} rms {row.rms:6.0f} N, plateau {row.plateau:5.0f} N, work {row.work:5.1f} J of "
-            f"{row.measured:5.1f} J, counted rows {keys.fit.rows:.0f}, {keys.seconds:.0f} s: {values}"
+            f"{row.measured:5.1f} J, counted rows {keys.fit.intervals.rows:.0f}, {keys.seconds:.0f} s: {values}"
         )
     if len(sys.argv) > 2:
         draw([row for row in table if row.law in ("coulomb", "stretch", "iwan")], Path(sys.argv[2]))

@@ -207,7 +207,9 @@ def main(path: Path | None = HERE / "steps.svg", fits: bool = True) -> tuple:
         names = [free.key.rpartition(".")[2] for free in one.asked.wanted]
         values = ", ".join(
             f"{name} {value:.4g} [{low:.4g}, {high:.4g}]"
-            for name, value, (low, high) in zip(names, one.keys.fit.values, one.keys.fit.intervals)
+            for name, value, (low, high) in zip(
+                names, one.keys.fit.values, one.keys.fit.intervals.ends
+            )
         )
         best = int((one.found.rms < 1.01 * np.nanmin(one.found.rms)).sum())
         scored = one.scored(one.logs, one.left)

@@ -158,9 +158,9 @@ def test_exact_known_values_are_recovered(tmp_path, law):
     assert found.keys.fit.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
     assert found.rms < 1e-7 * LOAD and found.held_rms is None and found.step_error == 0
     assert (
-        found.keys.fit.intervals[:, 0] <= found.keys.fit.values
+        found.keys.fit.intervals.ends[:, 0] <= found.keys.fit.values
     ).all() and found.keys.warnings == []
-    assert np.ptp(found.keys.fit.intervals, axis=1) == pytest.approx(0, abs=1e-6)
+    assert np.ptp(found.keys.fit.intervals.ends, axis=1) == pytest.approx(0, abs=1e-6)
 
 
 def test_exact_growth_of_bonds_is_recovered(tmp_path):
@@ -289,8 +289,8 @@ def test_exact_intervals_of_a_noisy_loop_are_those_of_its_normal_equations(tmp_p
     ends = np.stack([best * (1 - half), best * (1 + half)], axis=1)
     if law == "elastic-plastic":  # the bond length is searched in logarithms
         ends[1] = best[1] * np.exp([-half[1], half[1]])
-    assert found.keys.fit.methods == ("linear",) * best.size
-    assert found.keys.fit.intervals == pytest.approx(ends, rel=2e-4)
+    assert found.keys.fit.intervals.methods == ("linear",) * best.size
+    assert found.keys.fit.intervals.ends == pytest.approx(ends, rel=2e-4)
 
 
 # ---- what the rows do not say
@@ -305,8 +305,8 @@ def test_exact_static_and_load_are_known_by_their_product(tmp_path):
     static, _, load_ = found.keys.fit.values
     assert static * load_ == pytest.approx(31, rel=5e-3)
     assert (
-        np.isnan(found.keys.fit.intervals[[0, 2]]).all()
-        and np.isfinite(found.keys.fit.intervals[1]).all()
+        np.isnan(found.keys.fit.intervals.ends[[0, 2]]).all()
+        and np.isfinite(found.keys.fit.intervals.ends[1]).all()
     )
     assert any(
         "friction.static and normal.load cannot be determined separately" in text

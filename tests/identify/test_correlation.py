@@ -55,7 +55,8 @@ def covered(bars, seeds, tie):
             interval_kind=bars,
         )
         inside.append(
-            (found.intervals[:, 0] <= [0.35, 0.2]) & ([0.35, 0.2] <= found.intervals[:, 1])
+            (found.intervals.ends[:, 0] <= [0.35, 0.2])
+            & ([0.35, 0.2] <= found.intervals.ends[:, 1])
         )
     return np.mean(inside)
 

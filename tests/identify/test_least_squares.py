@@ -31,17 +31,21 @@ def test_exact_a_linear_problem_has_the_closed_form_intervals():
     values, half, covariance, rest = linear(DESIGN, NOISY)
     found = fit(lambda v: DESIGN @ v - NOISY, [-5, -5, -5], [5, 5, 5])
     assert found.values == pytest.approx(values, abs=1e-9)
-    assert found.intervals == pytest.approx(
+    assert found.intervals.ends == pytest.approx(
         np.stack([values - half, values + half], axis=1), abs=1e-9
     )
     scale = np.sqrt(np.diag(covariance))
-    assert found.correlation == pytest.approx(covariance / np.outer(scale, scale), abs=1e-8)
+    assert found.intervals.correlation == pytest.approx(
+        covariance / np.outer(scale, scale), abs=1e-8
+    )
     assert found.rms == pytest.approx(np.sqrt(rest / 30), rel=1e-12)
-    assert found.sensitivity == pytest.approx(10 * np.sqrt((DESIGN**2).mean(axis=0)), rel=1e-8)
+    assert found.intervals.sensitivity == pytest.approx(
+        10 * np.sqrt((DESIGN**2).mean(axis=0)), rel=1e-8
+    )
     assert (
-        found.methods == ("linear",) * 3
+        found.intervals.methods == ("linear",) * 3
         and found.at_bound == ("",) * 3
-        and found.unknown.shape == (0, 3)
+        and found.intervals.unknown.shape == (0, 3)
     )
     assert found.outcome is Outcome.DONE and found.agreed == 3 and describe_fit(found, "abc") == []
 
@@ -59,7 +63,7 @@ def test_always_scaling_rows_and_values_changes_nothing(seed, shift, power):
         log=[False, False],
     )
     assert found.values / scale == pytest.approx(values, abs=1e-6 * half.max())
-    assert np.ptp(found.intervals, axis=1) / scale == pytest.approx(2 * half, rel=1e-4)
+    assert np.ptp(found.intervals.ends, axis=1) / scale == pytest.approx(2 * half, rel=1e-4)
 
 
 def test_exact_a_value_pressed_on_its_bound_has_the_profile_of_the_plane():
@@ -72,12 +76,14 @@ def test_exact_a_value_pressed_on_its_bound_has_the_profile_of_the_plane():
     end = values[1] + np.sqrt(free * (pressed * (1 + student.ppf(0.975, 38) ** 2 / 38) - rest))
     found = fit(lambda v: design @ v - data, [0, 0.3], [3, 5])
     assert (
-        found.values[1] == 0.3 and found.at_bound == ("", "low") and found.methods[1] == "profile"
+        found.values[1] == 0.3
+        and found.at_bound == ("", "low")
+        and found.intervals.methods[1] == "profile"
     )
     assert found.values[0] == pytest.approx((data - 0.3 * LINE).mean(), abs=1e-7)
-    assert found.intervals[1] == pytest.approx([0.3, end], rel=2e-3) and found.open_ends[
-        1
-    ].tolist() == [True, False]
+    assert found.intervals.ends[1] == pytest.approx(
+        [0.3, end], rel=2e-3
+    ) and found.intervals.open_ends[1].tolist() == [True, False]
     assert describe_fit(found, ["a", "b"]) == [
         "b is at its low bound 0.3: widen the range, or try another law"
     ]
@@ -89,9 +95,9 @@ def test_exact_the_profile_of_a_bent_value_is_that_of_what_it_stands_for():
     half = student.ppf(0.975, 11) * data.std(ddof=1) / np.sqrt(12)
     low, high = data.mean() - half, data.mean() + half
     found = fit(lambda v: v[0] ** 3 - data, [-4], [4])
-    assert found.methods == ("profile",)
+    assert found.intervals.methods == ("profile",)
     assert found.values[0] == pytest.approx(np.cbrt(data.mean()), rel=1e-6)
-    assert found.intervals[0] == pytest.approx(np.cbrt([low, high]), rel=2e-3)
+    assert found.intervals.ends[0] == pytest.approx(np.cbrt([low, high]), rel=2e-3)
 
 
 def test_exact_two_values_known_by_their_product_are_named():
@@ -104,11 +110,13 @@ def test_exact_two_values_known_by_their_product_are_named():
     assert found.values[0] * found.values[1] == pytest.approx(2, rel=1e-8) and found.values[
         2
     ] == pytest.approx(1)
-    assert np.isnan(found.intervals[[0, 1, 3]]).all() and found.intervals[2] == pytest.approx(
-        [1, 1]
+    assert np.isnan(found.intervals.ends[[0, 1, 3]]).all() and found.intervals.ends[
+        2
+    ] == pytest.approx([1, 1])
+    assert np.abs(found.intervals.unknown) == pytest.approx(np.array([[1, 1, 0, 0]]), abs=1e-6)
+    assert found.intervals.unknown[0, 0] * found.intervals.unknown[0, 1] == pytest.approx(
+        -1, abs=1e-6
     )
-    assert np.abs(found.unknown) == pytest.approx(np.array([[1, 1, 0, 0]]), abs=1e-6)
-    assert found.unknown[0, 0] * found.unknown[0, 1] == pytest.approx(-1, abs=1e-6)
     product, flat = describe_fit(found, "abcd")
     assert "a and b cannot be determined separately" in product and product.endswith(
         "only their product is known"
@@ -120,7 +128,7 @@ def test_exact_a_ratio_is_named_and_the_rest_keeps_its_interval():
     noise = 0.01 * RNG.normal(size=40)
     found = fit(lambda v: v[0] / v[1] * LINE + v[2] - 2 * LINE - 1 - noise, [1, 1, -3], [9, 9, 3])
     alone = fit(lambda v: v[0] * LINE + v[1] - 2 * LINE - 1 - noise, [1, -3], [9, 3])
-    assert found.intervals[2] == pytest.approx(alone.intervals[1], rel=2e-2)
+    assert found.intervals.ends[2] == pytest.approx(alone.intervals.ends[1], rel=2e-2)
     assert "only their ratio is known" in describe_fit(found, "abc")[0]
 
 
@@ -129,7 +137,7 @@ def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
     found = fit(lambda v: v[0] - data + 1e-3 * v[1], [-5, 0], [5, 1])
     alone = fit(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1])
     assert "cannot be determined separately" in describe_fit(found, "ab")[0]
-    assert np.isnan(alone.intervals[1]).all() and alone.methods[1] == "none"
+    assert np.isnan(alone.intervals.ends[1]).all() and alone.intervals.methods[1] == "none"
     assert (
         "b is not determined: its interval of 95 % reaches both ends of its range"
         in describe_fit(alone, "ab")
@@ -156,7 +164,7 @@ def test_exact_a_wide_positive_range_is_searched_in_logarithms():
     spread = np.log([2.9e-6, 3e-6, 3.1e-6, 3e-6, 3e-6])
     half = student.ppf(0.975, 4) * spread.std(ddof=1) / np.sqrt(5)
     assert np.log(found.values[0]) == pytest.approx(spread.mean(), abs=1e-9)
-    assert np.log(found.intervals[0]) == pytest.approx(
+    assert np.log(found.intervals.ends[0]) == pytest.approx(
         [spread.mean() - half, spread.mean() + half], abs=1e-6
     )
     assert make_space([1.0, 1.0, -1.0], [10.0, 11.0, 1e3]).log.tolist() == [False, True, False]
@@ -169,10 +177,10 @@ def test_always_failures_are_counted_and_passed_over():
         return np.full(5, np.nan) if v[0] < 0.5 else v[0] - np.array([1.0, 1.1, 0.9, 1.0, 1.0])
 
     found = fit(residual, [0.0], [6.0], start=[5.0])
-    assert found.values[0] == pytest.approx(1, abs=1e-9) and found.failures >= 5
-    assert found.reason in ("too long", "the residual is not finite")
+    assert found.values[0] == pytest.approx(1, abs=1e-9) and found.counts.failures >= 5
+    assert found.counts.reason in ("too long", "the residual is not finite")
     assert (
-        f"{found.failures} of {found.evaluations} evaluations failed"
+        f"{found.counts.failures} of {found.counts.evaluations} evaluations failed"
         in describe_fit(found, "a")[-1]
     )
 
@@ -215,5 +223,5 @@ def test_exact_intervals_of_a_decay_cover_its_truth_in_19_of_20():
     for seed in range(1000):
         data = np.exp(-3 * LINE) + 0.15 * np.random.default_rng(seed).normal(size=40)
         found = fit(lambda v, data=data: v[0] * np.exp(-v[1] * LINE) - data, [0.01, 0.01], [30, 50])
-        inside += sum(a <= x <= b for (a, b), x in zip(found.intervals, (1.0, 3.0)))
+        inside += sum(a <= x <= b for (a, b), x in zip(found.intervals.ends, (1.0, 3.0)))
     assert 0.935 < inside / 2000 < 0.965

@@ -39,7 +39,7 @@ def test_one_length_describes_the_plateaus_and_no_law_the_backlash():
     assert rows["coulomb"].work < 0.9 * stretch.measured
     limit = stretch.fitted.keys.fit.values[0] * damper.LOAD
     assert np.abs(loop.reading).max() > 2 * limit
-    assert 40 < stretch.fitted.keys.fit.rows < 90
+    assert 40 < stretch.fitted.keys.fit.intervals.rows < 90
 
 
 @pytest.mark.share(0)

@@ -120,7 +120,7 @@ def test_steps_the_sentence(tmp_path, capsys):
     every = [one for row in found.values() for one in row]
     stable = [np.log(one.read[1] / one.gauge) for one in every if one.read[1] and not one.unstable]
     inside(steps.ANSWER, f"are {np.exp(np.mean(stable)):.2f} times")
-    gain, (low, high) = fits[True].fit.values[3], fits[True].fit.intervals[3]
+    gain, (low, high) = fits[True].fit.values[3], fits[True].fit.intervals.ends[3]
     inside(steps.ANSWER, f"{gain:.2f} ({low:.2f} to {high:.2f})")
     for part, words in (
         ("fitted", "143 Hz ({:.3f} instead of {:.3f})"),

@@ -191,7 +191,7 @@ def compare_fit(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     chi = chi_square(fitted)
     return {
         "seconds": process_time() - begin,
-        "steps": fitted.keys.fit.evaluations,
+        "steps": fitted.keys.fit.counts.evaluations,
         "least": best,
         "rows": [Row("chi_square", max(chi, best), NEAR * best, 0.0, best, 0.0)],
     }

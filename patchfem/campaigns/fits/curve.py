@@ -390,7 +390,7 @@ def _include_missing_modes(
     change = np.nan_to_num(richer - own)
     moved = refit(error_of_change(change, ratio=0.5, order=2.0))
     box = problem.box
-    ends = found.intervals + moved[:, None] * [-1, 1]
+    ends = found.intervals.ends + moved[:, None] * [-1, 1]
     ends = frozen_array(np.clip(ends, box.low[:, None], box.high[:, None]))
     parts = [
         f"{bound.key} by {_format_fraction(part, value)}"
@@ -402,7 +402,8 @@ def _include_missing_modes(
         f"with more modes changes frequencies by up to {frequency:.2g} % and damping ratios by up "
         f"to {damping:.2g} %, and moves {', '.join(parts)}"
     )
-    return WidenedFit(replace(found, intervals=ends), (note,))
+    intervals = replace(found.intervals, ends=ends)
+    return WidenedFit(replace(found, intervals=intervals), (note,))
 
 
 def _format_fraction(part: float, value: float) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core import NotConverged, PatchfemError
 from ...effects import law_has_trait
-from ...identify.least_squares import Fit
+from ...identify.least_squares import Fit, SearchCounts
 from ...inputs.loops import Loop, read_loop
 from ...scene.keys.quantities import UNIT_FACTORS
 from ...scene.scene import Scene, SceneError
@@ -192,12 +192,12 @@ def _solve_with_refined_steps(problem: Problem, bench: BenchModel, say) -> Refin
 
 def _add_counts(found: Fit, before: Fit) -> Fit:
     """Add the evaluations and failures of an earlier fit."""
-    return replace(
-        found,
-        evaluations=found.evaluations + before.evaluations,
-        failures=found.failures + before.failures,
-        reason=before.reason or found.reason,
+    counts = SearchCounts(
+        found.counts.evaluations + before.counts.evaluations,
+        found.counts.failures + before.counts.failures,
+        before.counts.reason or found.counts.reason,
     )
+    return replace(found, counts=counts)
 
 
 def _doubts(fitted: FittedLoop, scene: Scene, has_lead_in: bool) -> list:
@@ -208,7 +208,7 @@ def _doubts(fitted: FittedLoop, scene: Scene, has_lead_in: bool) -> list:
     loop = fitted.loop
     peak = float(np.abs(loop.reading).max())
     used = np.count_nonzero(~fitted.held)
-    rows = fitted.keys.fit.rows
+    rows = fitted.keys.fit.intervals.rows
     out = []
     if fitted.rms > MIN_RMS * peak and rows < MIN_INDEPENDENT * used:
         out.append(

@@ -90,7 +90,7 @@ def describe_values(keys: FittedKeys) -> dict:
 
 def describe_value(bound: Range, fit: Fit, k: int) -> dict:
     """Return value number k of a fit as written in fit.json."""
-    ends = fit.intervals[k].tolist()
+    ends = fit.intervals.ends[k].tolist()
     low, high = ends if np.isfinite(ends).all() else (None, None)
     return {
         "value": float(fit.values[k]),
@@ -98,10 +98,10 @@ def describe_value(bound: Range, fit: Fit, k: int) -> dict:
         "low": low,
         "high": high,
         "interval": None if low is None else ends,
-        "method": fit.methods[k],
+        "method": fit.intervals.methods[k],
         "bounds": [bound.low, bound.high],
         "at_bound": fit.at_bound[k] or None,
-        "sensitivity": float(fit.sensitivity[k]),
+        "sensitivity": float(fit.intervals.sensitivity[k]),
     }
 
 
@@ -109,14 +109,15 @@ def describe_unknown(bounds: list, fit: Fit) -> list:
     """Return the directions in which the residual does not change, as written in fit.json."""
     return [
         {bound.key: part for bound, part in zip(bounds, row) if part}
-        for row in fit.unknown.tolist()
+        for row in fit.intervals.unknown.tolist()
     ]
 
 
 def describe_correlation(fit: Fit) -> list:
     """Return the correlation of the values as written in fit.json."""
     return [
-        [part if np.isfinite(part) else None for part in row] for row in fit.correlation.tolist()
+        [part if np.isfinite(part) else None for part in row]
+        for row in fit.intervals.correlation.tolist()
     ]
 
 
@@ -134,7 +135,7 @@ def fitted_scene_text(keys: FittedKeys, measured: str, folder: Path) -> str:
     scene = keys.fitted_scene()
     comments = []
     for bound, value, ends in zip(
-        keys.ranges, keys.fit.values.tolist(), keys.fit.intervals.tolist()
+        keys.ranges, keys.fit.values.tolist(), keys.fit.intervals.ends.tolist()
     ):
         interval = ", not determined"
         if np.isfinite(ends).all():

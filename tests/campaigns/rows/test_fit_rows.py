@@ -142,7 +142,7 @@ def test_intervals_of_a_linear_rig_hold_the_truth(tmp_path):
     for seed in range(10):
         path = table(tmp_path, linear_rows(0.05, seed=seed))
         found = fitted(scene_of(tmp_path, LINEAR), path, free(*LINEAR_FREE), starts=1)
-        ends = found.keys.fit.intervals
+        ends = found.keys.fit.intervals.ends
         held += sum(low <= value <= high for (low, high), value in zip(ends, (141.0, 0.03)))
     assert held >= 16
 
@@ -283,7 +283,7 @@ def test_a_motion_without_a_bound_counts_as_a_thousand(tmp_path, wanted):
         tmp_path, [(143.0, 8 * G_N, 9 * G_N, 2e-5, ""), (150.0, 4 * G_N, 5 * G_N, 1e-5, "")]
     )
     found = fitted(scene_of(tmp_path, text, "friction.static=0.2"), path, free(wanted), starts=1)
-    assert found.keys.fit.failures == 0
+    assert found.keys.fit.counts.failures == 0
     assert any("no bounded motion is found at 143 Hz" in text for text in found.keys.warnings)
     assert np.abs(found.logs).max() == pytest.approx(np.log(1e3))
 
