@@ -8,7 +8,7 @@ exponential: 0.35 to 12.5 um over the width.
 
 Errors: the mesh 1 % (K_t 3 %); 8 and 16 strips differ by 2 % in the moment until a quarter of the patch is left, then
 by half a strip (0.8 and 0.4 mm of the lever: 193 and 207 N mm stand for 220). Strips do not feel each other, as springs
-do not: they follow `wedge_linear` with the pieces' own K_n/A. The pieces are square, so `fixtures.py`
+do not: they follow `wedge_on_linear_foundation` with the pieces' own K_n/A. The pieces are square, so `fixtures.py`
 holds the bare roll with that shear kept, in plane strain: centre 2.07 mm at 1e-5 rad (strips 3 % more), 5.32 mm at 1e-4
 (6 % less), 6.24 mm at 1e-3.
 

@@ -103,5 +103,5 @@ if __name__ == "__main__":
     )
     print(f"bare pieces open at {opening(None):.3e} rad")
     for k in STIFFNESSES:
-        rigid = exact.wedge_opening(MEAN * 12.7e-3**2, 12.7e-3, 12.7e-3, k)
+        rigid = exact.wedge_opening_tilt(MEAN * 12.7e-3**2, 12.7e-3, 12.7e-3, k)
         print(f"k_n {k:.1e} Pa/m: {opening(k):.3e} rad; rigid pieces {rigid:.3e} rad")

@@ -140,7 +140,7 @@ def test_exact_rounded_punch_follows_its_shape(load, share):
 @pytest.mark.parametrize("load, radius", [(1e4, 2e-4), (1e3, 1e-5)])
 def test_order_a_rounded_corner_is_the_limit_of_the_rounded_punch(load, radius):
     flat, modulus = 4e-3, 1e11
-    reach, peak = exact.rounded_corner(load / np.pi / np.sqrt(2 * flat), radius, modulus)
+    reach, peak = exact.rounded_corner_contact(load / np.pi / np.sqrt(2 * flat), radius, modulus)
     x = flat + np.linspace(-2, 1, 3001) * reach
     assert exact.rounded_punch_half_width(load, flat, radius, modulus) - flat == pytest.approx(
         reach, rel=1e-4
@@ -358,7 +358,7 @@ def test_exact_wedge_by_sinking_a_pad(tilt):
         )
 
     sink = brentq(lambda d: total(d) - PAD["load"], -abs(tilt) * length / 2, 1e-3, xtol=1e-18)
-    fraction, centre, least, largest = exact.wedge_linear(tilt, **PAD)
+    fraction, centre, least, largest = exact.wedge_on_linear_foundation(tilt, **PAD)
     edge = np.clip(sink / abs(tilt), -length / 2, length / 2)
     assert fraction == pytest.approx((edge + length / 2) / length, rel=1e-8)
     assert centre == pytest.approx(total(sink, 1) / PAD["load"], rel=1e-8)
@@ -367,21 +367,28 @@ def test_exact_wedge_by_sinking_a_pad(tilt):
 
 
 def test_exact_wedge_begins_to_open():
-    opening = exact.wedge_opening(**PAD)
+    opening = exact.wedge_opening_tilt(**PAD)
     below, above = (
-        exact.wedge_linear(opening * (1 - 1e-9), **PAD),
-        exact.wedge_linear(opening * (1 + 1e-9), **PAD),
+        exact.wedge_on_linear_foundation(opening * (1 - 1e-9), **PAD),
+        exact.wedge_on_linear_foundation(opening * (1 + 1e-9), **PAD),
     )
     assert opening == pytest.approx(2.32e-5, rel=1e-12)
     assert below[0] == 1 and above[0] < 1 and np.allclose(below, above, rtol=1e-8, atol=1)
-    assert exact.wedge_linear(-2e-4, **PAD)[1] == -exact.wedge_linear(2e-4, **PAD)[1]
+    assert (
+        exact.wedge_on_linear_foundation(-2e-4, **PAD)[1]
+        == -exact.wedge_on_linear_foundation(2e-4, **PAD)[1]
+    )
 
 
 def test_exact_kern_and_wedge_agree_on_the_load_line():
     for tilt in (1e-5, 1e-4, 1e-3):
-        fraction, centre, *_ = exact.wedge_linear(tilt, **PAD)
-        assert exact.kern_fraction(centre, PAD["length"]) == pytest.approx(fraction, rel=1e-12)
-    assert exact.kern_fraction(PAD["length"] / 6, PAD["length"]) == pytest.approx(1.0, rel=1e-12)
+        fraction, centre, *_ = exact.wedge_on_linear_foundation(tilt, **PAD)
+        assert exact.kern_contact_fraction(centre, PAD["length"]) == pytest.approx(
+            fraction, rel=1e-12
+        )
+    assert exact.kern_contact_fraction(PAD["length"] / 6, PAD["length"]) == pytest.approx(
+        1.0, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("tilt", [0.0, 1e-9, 1.2e-5, 1.26e-5, 1e-4, -1e-3, 3e-3, 3e-2])
@@ -398,7 +405,7 @@ def test_exact_skin_by_quadrature(tilt):
             points,
         )
 
-    fraction, centre = exact.wedge_skin(tilt, length, DECAY)
+    fraction, centre = exact.wedge_on_asperities(tilt, length, DECAY)
     assert fraction == pytest.approx(total(lambda x: 1) / length, rel=1e-9)
     from_edge = total(lambda x: x - edge) / total(lambda x: 1)
     assert centre - edge == pytest.approx(from_edge, rel=1e-9, abs=1e-11 * length)
@@ -408,7 +415,7 @@ def test_exact_skin_by_quadrature(tilt):
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 3.0, 30.0])
 def test_exact_wedge_loop_is_the_sum_of_its_strips(tilt, ratio):
     mu, kt, area = 0.4, 8e12, 1e-4
-    fraction, _, least, largest = exact.wedge_linear(tilt, **PAD)
+    fraction, _, least, largest = exact.wedge_on_linear_foundation(tilt, **PAD)
     amplitude = ratio * mu * PAD["load"] / (kt * area)
 
     def strip(p):
@@ -417,20 +424,20 @@ def test_exact_wedge_loop_is_the_sum_of_its_strips(tilt, ratio):
     kink = min(max(amplitude * kt / mu, least), largest)
     want = sum(quad(strip, a, b, epsabs=0)[0] for a, b in ((least, kink), (kink, largest)) if b > a)
     want *= fraction * area / (largest - least)
-    found = exact.wedge_loop(amplitude, mu, kt, fraction * area, least, largest)
+    found = exact.wedge_loop_area(amplitude, mu, kt, fraction * area, least, largest)
     assert found == pytest.approx(want, rel=1e-10, abs=1e-18)
 
 
 def test_exact_wedge_loop_closed_form_above_and_below_its_last_slip():
     mu, kt, area = 0.4, 8e12, 1e-4
-    fraction, _, least, largest = exact.wedge_linear(1e-3, **PAD)
+    fraction, _, least, largest = exact.wedge_on_linear_foundation(1e-3, **PAD)
     last = mu * largest / kt
-    above, below = exact.wedge_loop(
+    above, below = exact.wedge_loop_area(
         np.array([2 * last, last / 2]), mu, kt, fraction * area, least, largest
     )
     assert above == pytest.approx(4 * mu * PAD["load"] * (2 - 2 / 3) * last, rel=1e-12)
     assert below == pytest.approx(4 * kt * fraction * area * last**2 / 48, rel=1e-12)
-    level = exact.wedge_loop(np.array([0.5, 3]) * 1e-6, mu, kt, area, 1e6, 1e6)
+    level = exact.wedge_loop_area(np.array([0.5, 3]) * 1e-6, mu, kt, area, 1e6, 1e6)
     assert np.allclose(
         level,
         area * friction_forms.jenkins_loop(np.array([0.5, 3]) * 1e-6, mu * 1e6 / kt, mu * 1e6)[0],
@@ -450,29 +457,29 @@ def test_exact_wedge_loop_closed_form_above_and_below_its_last_slip():
 def test_exact_tilt_of_the_assumed_pad(tilt, linear, at3, at30, skin, centre):
     """10 x 10 mm, 116 N, k_n 1e13 Pa/m, k_t 0.8 k_n, mu 0.4, u_0 2.5 um; the truths are a count of strips:
     fractions in contact and loops at 3 and 30 times the slip of the level pad, over its own."""
-    fraction, _, least, largest = exact.wedge_linear(tilt, **PAD)
+    fraction, _, least, largest = exact.wedge_on_linear_foundation(tilt, **PAD)
     mu, kt = 0.4, 8e12
     slip = mu * PAD["load"] / (kt * 1e-4)
     loops = [
-        exact.wedge_loop(n * slip, mu, kt, fraction * 1e-4, least, largest)
+        exact.wedge_loop_area(n * slip, mu, kt, fraction * 1e-4, least, largest)
         / friction_forms.jenkins_loop(n * slip, slip, mu * PAD["load"])[0]
         for n in (3, 30)
     ]
     assert (fraction, *loops) == pytest.approx((linear, at3, at30), abs=3e-3)
-    share, shift = exact.wedge_skin(tilt, PAD["length"], DECAY)
+    share, shift = exact.wedge_on_asperities(tilt, PAD["length"], DECAY)
     assert (share, -shift / PAD["length"]) == pytest.approx((skin, centre), abs=3e-3)
 
 
 @given(st.floats(1e-6, 1e-2), st.floats(1e-6, 1e-2))
 def test_always_more_tilt_touches_less_and_rubs_less(one, two):
     less, more = sorted((one, two))
-    first, second = (exact.wedge_linear(t, **PAD) for t in (less, more))
+    first, second = (exact.wedge_on_linear_foundation(t, **PAD) for t in (less, more))
     assert second[0] <= first[0] and abs(second[1]) >= abs(first[1]) * (1 - 1e-12)
-    loops = [exact.wedge_loop(1e-6, 0.4, 8e12, w[0] * 1e-4, *w[2:]) for w in (first, second)]
+    loops = [exact.wedge_loop_area(1e-6, 0.4, 8e12, w[0] * 1e-4, *w[2:]) for w in (first, second)]
     assert loops[1] <= loops[0] * (1 + 1e-9)
-    assert exact.wedge_skin(more, 1e-2, DECAY)[0] <= exact.wedge_skin(less, 1e-2, DECAY)[0] * (
-        1 + 1e-12
-    )
+    assert exact.wedge_on_asperities(more, 1e-2, DECAY)[0] <= exact.wedge_on_asperities(
+        less, 1e-2, DECAY
+    )[0] * (1 + 1e-12)
 
 
 # ---- refusals
@@ -493,12 +500,12 @@ def test_always_more_tilt_touches_less_and_rubs_less(one, two):
         lambda: exact.layered_compliance(1.0, TITANIUM, TITANIUM, -1.0),
         lambda: exact.cattaneo_shear(0.0, 1.1, 1.0, 1.0, 1.0, 1.0),
         lambda: exact.cattaneo_stick_half_width(0.1, 1.0, 1.0, 1.0, 0.0),
-        lambda: exact.wedge_opening(1.0, 1.0, 0.0, 1.0),
-        lambda: exact.wedge_linear(1.0, 1.0, -1.0, -1.0, 1.0),
-        lambda: exact.wedge_skin(1.0, 1.0, 0.0),
-        lambda: exact.wedge_loop(1.0, 1.0, 1.0, 1.0, 2.0, 1.0),
-        lambda: exact.wedge_loop(1.0, 1.0, 1.0, 1.0, 0.0, 0.0),
-        lambda: exact.kern_fraction(0.5, 1.0),
+        lambda: exact.wedge_opening_tilt(1.0, 1.0, 0.0, 1.0),
+        lambda: exact.wedge_on_linear_foundation(1.0, 1.0, -1.0, -1.0, 1.0),
+        lambda: exact.wedge_on_asperities(1.0, 1.0, 0.0),
+        lambda: exact.wedge_loop_area(1.0, 1.0, 1.0, 1.0, 2.0, 1.0),
+        lambda: exact.wedge_loop_area(1.0, 1.0, 1.0, 1.0, 0.0, 0.0),
+        lambda: exact.kern_contact_fraction(0.5, 1.0),
     ],
 )
 def test_refuses_contact_arguments_without_a_meaning(call):

@@ -11,7 +11,11 @@ from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 from skins import solve, tangent
 
-from patchfem.closed_forms.contact import wedge_linear, wedge_opening, wedge_skin
+from patchfem.closed_forms.contact import (
+    wedge_on_asperities,
+    wedge_on_linear_foundation,
+    wedge_opening_tilt,
+)
 from patchfem.contact.asperity_laws import ExponentialAsperities, HertzAsperities, LinearAsperities
 from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.strip_compliance import StripCompliance
@@ -190,23 +194,25 @@ def test_exact_rigid_pad_in_full_contact_has_the_centre_of_the_wedge_less_one_ov
     count,
 ):
     c, x, weight, y = rigid(count)
-    roll = 0.7 * wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
+    roll = 0.7 * wedge_opening_tilt(LOAD, WIDTH, LENGTH, 1e13)
     state = press_strips(
         c, x, weight, y, np.zeros(1), roll, load=LOAD, asperities=LinearAsperities(1e13)
     )
-    _, centre, _, _ = wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)
+    _, centre, _, _ = wedge_on_linear_foundation(roll, LOAD, WIDTH, LENGTH, 1e13)
     assert state.centre_y == pytest.approx(centre * (1 - 1 / count**2), rel=1e-12) and centre < 0
 
 
 def test_order_two_rigid_pad_of_any_opening():
     """The edge lies a third into a strip at every count: one strip more than a multiple of three, f = 1/3."""
-    roll = 9 * wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
+    roll = 9 * wedge_opening_tilt(LOAD, WIDTH, LENGTH, 1e13)
     off = []
     for count in (4, 16, 64, 256):
         state = press_strips(
             *rigid(count), np.zeros(1), roll, load=LOAD, asperities=LinearAsperities(1e13)
         )
-        off.append(abs(state.centre_y / wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)[1] - 1))
+        off.append(
+            abs(state.centre_y / wedge_on_linear_foundation(roll, LOAD, WIDTH, LENGTH, 1e13)[1] - 1)
+        )
     assert off[-1] < 2e-5
     assert all(np.log(a / b) / np.log(4) == pytest.approx(2, abs=0.1) for a, b in pairwise(off[1:]))
 
@@ -223,14 +229,14 @@ def test_exact_rolled_pad_on_the_exponential_skin(ratio):
     finite = -WIDTH * (0.5 - 1 / np.tanh(half) / 2 / count + 1 / np.expm1(ratio))
     assert state.centre_y == pytest.approx(finite, rel=1e-9)
     assert state.centre_y == pytest.approx(
-        wedge_skin(roll, WIDTH, u0)[1], abs=1.01 * WIDTH * ratio / 12 / count**2
+        wedge_on_asperities(roll, WIDTH, u0)[1], abs=1.01 * WIDTH * ratio / 12 / count**2
     )
 
 
 @pytest.mark.parametrize(("roll", "yaw"), [(1e-5, 33.3), (1e-4, 157.5), (1e-3, 208.4)])
 def test_figure_yaw_moment_of_a_rolled_pad_on_a_linear_skin(roll, yaw):
     """10 x 10 mm, 116 N, 1e13 Pa/m, mu 0.4 [N mm]: the closed forms, and 4000 strips."""
-    centre = wedge_linear(roll, 116.0, 0.01, 0.01, 1e13)[1]
+    centre = wedge_on_linear_foundation(roll, 116.0, 0.01, 0.01, 1e13)[1]
     assert -0.4 * 116 * centre * 1e3 == pytest.approx(yaw, abs=0.05)
     c, x, weight, y = rigid(4000, length=0.01, width=0.01)
     state = press_strips(

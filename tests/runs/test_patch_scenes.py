@@ -66,7 +66,7 @@ def solved(*args, **kwargs) -> tuple:
 @pytest.mark.parametrize("angle", [1e-5, 1e-4, 1e-3])
 def test_exact_rigid_pieces_on_skins_are_the_wedges_in_closed_form(angle):
     _, found = solved(TILT.format(angle) + SKINS["exponential"], material=RIGID)
-    fraction, centre = exact.wedge_skin(angle, LENGTH, 2.5e-6)
+    fraction, centre = exact.wedge_on_asperities(angle, LENGTH, 2.5e-6)
     assert found["loaded_fraction"] == pytest.approx(
         fraction, rel=1e-8 + (angle * 0.127e-3 / 2.5e-6) ** 2 / 11
     )
@@ -75,7 +75,7 @@ def test_exact_rigid_pieces_on_skins_are_the_wedges_in_closed_form(angle):
     assert found["tangential_stiffness"] == pytest.approx(0.8 * LOAD / 2.5e-6, rel=1e-5)
     assert found["normal_stiffness"] == pytest.approx(LOAD / 2.5e-6, rel=1e-5)
     _, found = solved(TILT.format(angle) + SKINS["linear"], material=RIGID)
-    fraction, centre, _, most = exact.wedge_linear(angle, LOAD, LENGTH, WIDTH, 1e13)
+    fraction, centre, _, most = exact.wedge_on_linear_foundation(angle, LOAD, LENGTH, WIDTH, 1e13)
     cell = 0.127e-3 / LENGTH
     assert found["contact_fraction"] == pytest.approx(fraction, abs=0.55 * cell)
     assert found["pressure_centre"] == pytest.approx(centre, rel=6e-4)
@@ -123,10 +123,10 @@ def test_exact_asperities_deform_in_shear_also_under_rigid_pieces(law):
 @pytest.mark.parametrize("count", [2, 8])
 def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
     """Below the opening roll the pressure is linear over the width: the wedge's centre times 1 - 1/count^2."""
-    roll = 0.5 * exact.wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
+    roll = 0.5 * exact.wedge_opening_tilt(LOAD, WIDTH, LENGTH, 1e13)
     tables = SKINS["linear"] + f'[contact.strips]\ncount = {count}\nroll = "{roll!r} rad"\n'
     patch, found = solved(tables, material=RIGID)
-    centre = exact.wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)[1]
+    centre = exact.wedge_on_linear_foundation(roll, LOAD, WIDTH, LENGTH, 1e13)[1]
     assert found["pressure_centre_lateral"] == pytest.approx(centre * (1 - 1 / count**2), rel=1e-5)
     assert found["roll_moment"] == pytest.approx(LOAD * found["pressure_centre_lateral"], rel=1e-12)
     assert found["contact_fraction"] == pytest.approx(1.0, rel=1e-12)

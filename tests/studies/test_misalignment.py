@@ -128,7 +128,7 @@ def test_always_a_free_piece_keeps_less_than_the_kern(tilted, fixtures):
     assert (
         coarse(tilted, fixtures.free(0.16))["contact_fraction"]
         < 1
-        == exact.kern_fraction(0.16, 1.0)
+        == exact.kern_contact_fraction(0.16, 1.0)
     )
 
 
@@ -144,11 +144,13 @@ def test_always_the_soft_skin_keeps_its_stiffness(tilted, fixtures):
 
 def test_exact_skin_far_softer_than_the_pieces_is_a_rigid_wedge(tilted):
     found = coarse(tilted, tilted.case(5e-2, "exponential", "asperities.decay_length=500 um"))
-    fraction, centre = exact.wedge_skin(5e-2, LENGTH, 500e-6)
+    fraction, centre = exact.wedge_on_asperities(5e-2, LENGTH, 500e-6)
     assert found["loaded_fraction"] == pytest.approx(fraction, rel=3e-4)
     assert found["pressure_centre"] == pytest.approx(centre, rel=3e-4)
     stiffer = coarse(tilted, tilted.case(1e-3, "exponential"))["loaded_fraction"]
-    assert stiffer / exact.wedge_skin(1e-3, LENGTH, 2.5e-6)[0] == pytest.approx(1.04, abs=0.005)
+    assert stiffer / exact.wedge_on_asperities(1e-3, LENGTH, 2.5e-6)[0] == pytest.approx(
+        1.04, abs=0.005
+    )
 
 
 # ---- conclusion 5
@@ -197,7 +199,7 @@ def test_exact_strips_are_a_wedge_on_springs(tilted, roll):
     pair = tilted.pair(0)
     k = values(press_patch(tilted.case(0.0), pair))["normal_stiffness"] / LENGTH**2
     for angle in (5e-6, 1e-4):
-        fraction, centre, _, _ = exact.wedge_linear(angle, LOAD, LENGTH, LENGTH, k)
+        fraction, centre, _, _ = exact.wedge_on_linear_foundation(angle, LOAD, LENGTH, LENGTH, k)
         found = values(press_patch(roll.rolled(angle, 128, "bare"), pair))
         assert found["pressure_centre_lateral"] == pytest.approx(centre, rel=2e-4)
         assert found["contact_fraction"] == pytest.approx(fraction, abs=1 / 128)
@@ -296,7 +298,7 @@ def test_always_opening_tilt_is_that_of_the_pieces_and_of_the_skin(rough):
     own = rough.opening(None, 1)
     assert own == pytest.approx(9.28e-6, rel=3e-3)
     for k in (1e15, 1e13, 5e11):
-        rigid = exact.wedge_opening(LOAD, LENGTH, LENGTH, k)
+        rigid = exact.wedge_opening_tilt(LOAD, LENGTH, LENGTH, k)
         assert own < rough.opening(k, 1) == pytest.approx(own + rigid, rel=0.01)
 
 

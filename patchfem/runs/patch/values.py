@@ -257,7 +257,7 @@ def unresolved_rounding(patch: Patch) -> float:
     """Return the largest pressure [Pa] of rounded ends that the mesh does not resolve; else 0.
 
     The cells where the contact ends carry the pressure of a sharp end, K = sigma_n sqrt(cell); a
-    rounding smaller than these cells has the peak of `rounded_corner`.
+    rounding smaller than these cells has the peak of `rounded_corner_contact`.
     """
     pair, x, sigma = patch.pair, patch.x, patch.pressure.sigma_n
     rounded = _rounded_bodies(pair)
@@ -278,7 +278,7 @@ def unresolved_rounding(patch: Patch) -> float:
         cell = np.diff(x)[max(at - 1, 0) : at + 1].max()
         if abs(abs(x[at]) - flat) > 2 * cell:  # the contact does not end at the rounding
             continue
-        reach, peak = contact.rounded_corner(
+        reach, peak = contact.rounded_corner_contact(
             sigma[max(at - 2, 0) : at + 3].max() * np.sqrt(cell), radius, modulus
         )
         found = max(found, peak if ROUNDING_CELLS * cell > reach else 0.0)
