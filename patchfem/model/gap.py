@@ -129,7 +129,7 @@ class Gap:
             heights += np.where(x == edge, abs(height) / 2, 0.0)
         return heights
 
-    def at(self, x) -> ShapedGap:
+    def evaluate(self, x) -> ShapedGap:
         """Return the gap of the unloaded pieces.
 
         `x` [m] is (m,), or (m, 1) if numbers of the shapes are arrays (n,); then the gap is (m, n).

@@ -34,7 +34,7 @@ class PointLoad:
     phase: float = 0.0
     width: float | None = None
 
-    def at(self, time) -> np.ndarray:
+    def evaluate(self, time) -> np.ndarray:
         """Evaluate the load (k,) [N] at times (k,) [s]; it is never negative."""
         load = self.load + self.amplitude * np.cos(
             2 * np.pi * self.frequency * np.asarray(time) + self.phase

@@ -170,9 +170,9 @@ def _reduce(
     is_base_driven: bool,
 ) -> tuple:
     """Reduce the matrices of files; return the Reduction and notes."""
-    read = [_read_matrix(file) for file in files]
-    coordinates = _locate_coordinates(read, boundary, moved, is_base_driven)
-    aligned = matrices.align_rows(*read)
+    matrix_list = [_read_matrix(file) for file in files]
+    coordinates = _locate_coordinates(matrix_list, boundary, moved, is_base_driven)
+    aligned = matrices.align_rows(*matrix_list)
     values = {file.key: matrix.values / unit for file, matrix in zip(files, aligned)}
     reduction = reduced.reduce_matrices(
         values["stiffness"],
@@ -216,8 +216,8 @@ def check_reduction(folder: Path, table, *, is_base_driven: bool) -> None:
     Nothing is reduced.
     """
     files = _find_files(table, folder.__truediv__)
-    read = [_read_matrix(file) for file in files]
-    _locate_coordinates(read, table.boundary, table.moved, is_base_driven)
+    matrix_list = [_read_matrix(file) for file in files]
+    _locate_coordinates(matrix_list, table.boundary, table.moved, is_base_driven)
 
 
 def check_matrix(path: Path, key: str) -> None:
@@ -226,14 +226,14 @@ def check_matrix(path: Path, key: str) -> None:
 
 
 def _locate_coordinates(
-    read: list, boundary: tuple, moved: tuple | None, is_base_driven: bool
+    matrix_list: list, boundary: tuple, moved: tuple | None, is_base_driven: bool
 ) -> _Coordinates:
     """Find the rows of the boundary, and of the coordinates that move with the base."""
     try:
-        stiffness = matrices.align_rows(*read)[0]
+        stiffness = matrices.align_rows(*matrix_list)[0]
     except PatchfemError as error:
         raise PatchfemError(str(error), "structure.reduced.mass") from None
-    if len(read) > 1 and not abs(read[0].values - read[1].values).nnz:
+    if len(matrix_list) > 1 and not abs(matrix_list[0].values - matrix_list[1].values).nnz:
         raise PatchfemError(
             "contains the same numbers as the stiffness; give the file of the mass",
             "structure.reduced.mass",

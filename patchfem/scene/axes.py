@@ -143,6 +143,11 @@ class _WrittenRange(NamedTuple):
     count: str | None
     spacing: str | None
 
+    @property
+    def ends_text(self) -> str:
+        """Both ends as they are written."""
+        return f"{self.low}..{self.high}"
+
 
 def read_axes(
     texts: Iterable[str], *, sampled: bool = False
@@ -282,13 +287,13 @@ def _read_axis(key: str, text: str, *, sampled: bool = False) -> Axis | SampledR
     mistakes = []
     for piece in pieces:
         try:
-            written = _find_range(key, piece, is_sampled=can_be_span)
-            if written is None:
+            written_range = _find_range(key, piece, is_sampled=can_be_span)
+            if written_range is None:
                 texts.append(piece)
             elif can_be_span:
-                return _make_span(key, written)
+                return _make_span(key, written_range)
             else:
-                texts += _list_range_values(key, written)
+                texts += _list_range_values(key, written_range)
         except ValueError as error:
             mistakes.append(str(error))
     if mistakes:
@@ -312,12 +317,12 @@ def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | No
     if match is None:
         return None
     # A bare number before the dots has the unit of the number after them, as in 1..9 mm.
-    written = _WrittenRange(*match.groups())
-    low = _QUANTITY_PATTERN.fullmatch(written.low)
-    high = _QUANTITY_PATTERN.fullmatch(written.high)
+    written_range = _WrittenRange(*match.groups())
+    low = _QUANTITY_PATTERN.fullmatch(written_range.low)
+    high = _QUANTITY_PATTERN.fullmatch(written_range.high)
     if low and high and high[1] and not low[1]:
-        return written._replace(low=f"{written.low} {high[1]}")
-    return written
+        return written_range._replace(low=f"{written_range.low} {high[1]}")
+    return written_range
 
 
 def _range_about(text: str) -> str:
@@ -344,11 +349,11 @@ def _range_about(text: str) -> str:
     return "..".join(_format_with_unit(float(end), unit) for end in (middle - half, middle + half))
 
 
-def _flatten_table(table: dict, at: str = "") -> list[tuple[str, Any]]:
+def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
     """Return (dotted key, value) of a table whose keys may be dotted, in quotes or not."""
     pairs = []
     for key, value in table.items():
-        path = f"{at}.{key}" if at else key
+        path = f"{table_key}.{key}" if table_key else key
         pairs += _flatten_table(value, path) if isinstance(value, dict) else [(path, value)]
     return pairs
 
@@ -439,14 +444,14 @@ def _make_value_reader(key: str) -> Callable[[str], float | str]:
     return read_value
 
 
-def _read_ends(key: str, written: _WrittenRange) -> _RangeEnds:
+def _read_ends(key: str, written_range: _WrittenRange) -> _RangeEnds:
     """Return the ends of a range as exact fractions in the unit of the first."""
     kind = find_quantity_kind(*find_key(key))
-    texts = written[:2]
+    texts = written_range[:2]
     if kind is None:
         if any(re.fullmatch(quantities.NUMBER_PATTERN, text) is None for text in texts):
             raise ValueError(
-                f"{written.low}..{written.high}: both ends of this range must be plain numbers"
+                f"{written_range.ends_text}: both ends of this range must be plain numbers"
             )
         return _RangeEnds(*map(Fraction, texts), "")
     for text in texts:
@@ -458,9 +463,9 @@ def _read_ends(key: str, written: _WrittenRange) -> _RangeEnds:
     return _RangeEnds(Fraction(low), Fraction(high) * high_factor / low_factor, unit)
 
 
-def _require_range_ends(ends: _RangeEnds, written: _WrittenRange) -> None:
+def _require_range_ends(ends: _RangeEnds, written_range: _WrittenRange) -> None:
     if ends.low == ends.high:
-        raise ValueError(f"{written.low}..{written.high}: both ends are the same value")
+        raise ValueError(f"{written_range.ends_text}: both ends are the same value")
 
 
 def _is_log(ends: _RangeEnds, spacing: str | None) -> bool:
@@ -473,36 +478,36 @@ def _is_log(ends: _RangeEnds, spacing: str | None) -> bool:
     return spacing == "log"
 
 
-def _list_range_values(key: str, written: _WrittenRange) -> list[str]:
+def _list_range_values(key: str, written_range: _WrittenRange) -> list[str]:
     """Return the values of a range as strings in the unit of its first end."""
-    ends = _read_ends(key, written)
-    count = int(written.count) if written.count else 0
+    ends = _read_ends(key, written_range)
+    count = int(written_range.count) if written_range.count else 0
     if not 2 <= count <= MAX_RANGE_VALUES:
         raise ValueError(
-            f"{written.low}..{written.high}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as "
+            f"{written_range.ends_text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as "
             ":9"
         )
-    _require_range_ends(ends, written)
-    is_log = _is_log(ends, written.spacing)
+    _require_range_ends(ends, written_range)
+    is_log = _is_log(ends, written_range.spacing)
     values = (_interpolate(ends, Fraction(k, count - 1), is_log) for k in range(count))
     return [_format_with_unit(value, ends.unit) for value in values]
 
 
-def _make_span(key: str, written: _WrittenRange) -> SampledRange:
+def _make_span(key: str, written_range: _WrittenRange) -> SampledRange:
     """Return the range from which values are drawn."""
-    ends = _read_ends(key, written)
+    ends = _read_ends(key, written_range)
     if float not in list_key_types(*find_key(key)):
         raise ValueError(
-            f"{written.low}..{written.high}: a key that takes whole numbers takes no range; list the values, such as "
+            f"{written_range.ends_text}: a key that takes whole numbers takes no range; list the values, such as "
             "1,2,3"
         )
-    if written.count:
+    if written_range.count:
         raise ValueError(
-            f"{written.low}..{written.high}:{written.count}: random values are drawn between the ends; leave out "
-            f":{written.count}"
+            f"{written_range.ends_text}:{written_range.count}: random values are drawn between the ends; leave out "
+            f":{written_range.count}"
         )
-    _require_range_ends(ends, written)
-    log = _is_log(ends, written.spacing)
+    _require_range_ends(ends, written_range)
+    log = _is_log(ends, written_range.spacing)
     return SampledRange(key, float(ends.low), float(ends.high), ends.unit, log)
 
 

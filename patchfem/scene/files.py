@@ -42,13 +42,13 @@ _TABLES_WITH_FILES = ("contact", "slide", "structure", "drive", "measured", "wea
 _MATRIX_KEYS = ("stiffness", "mass", "damping")
 
 
-def _list_patch_files(at: str, contact: Any) -> list[tuple[str, Any]]:
+def _list_patch_files(table_key: str, contact: Any) -> list[tuple[str, Any]]:
     """Return the keys of the files of the patch at `at`, each with its file or UNKNOWN_VALUE."""
     asperities = contact.asperities
     return [
-        (f"{at}.mesh", contact.mesh),
-        (f"{at}.profile.file", contact.profile.file),
-        (f"{at}.asperities.from", asperities.law == "hertz" and asperities.from_),
+        (f"{table_key}.mesh", contact.mesh),
+        (f"{table_key}.profile.file", contact.profile.file),
+        (f"{table_key}.asperities.from", asperities.law == "hertz" and asperities.from_),
     ]
 
 

@@ -95,7 +95,7 @@ class _Scanner:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.at = 0
+        self.position = 0
         self.lines: dict[str, int] = {}
         self._line = 1
         self._counted = 0  # position up to which `_line` counts the line ends
@@ -112,8 +112,8 @@ class _Scanner:
 
     def scan_header(self) -> str:
         """Read the header of a table and return its dotted key."""
-        is_array = self.text.startswith("[", self.at)
-        self.at += is_array
+        is_array = self.text.startswith("[", self.position)
+        self.position += is_array
         line = self.current_line()
         *outer, name = self.scan_key()
         path = ""
@@ -163,7 +163,7 @@ class _Scanner:
 
     def scan_items(self, end: str, scan_one: Callable) -> None:
         """Read the items between brackets, separated by commas."""
-        self.at += 1
+        self.position += 1
         index = 0
         while not (self.peek() and self.take(end)):
             scan_one(index)
@@ -190,29 +190,29 @@ class _Scanner:
     def scan_string(self) -> str:
         """Read a string and return it with its quotes."""
         for pattern in _STRING_PATTERNS:
-            if match := pattern.match(self.text, self.at):
-                self.at = match.end()
+            if match := pattern.match(self.text, self.position):
+                self.position = match.end()
                 return match[0]
         raise _SyntaxError
 
     def match(self, pattern: re.Pattern[str]) -> str:
         """Read what a pattern matches, at least one character."""
-        match = pattern.match(self.text, self.at)
+        match = pattern.match(self.text, self.position)
         if not match or not match[0]:
             raise _SyntaxError
-        self.at = match.end()
+        self.position = match.end()
         return match[0]
 
     def peek(self) -> str:
         """Skip blanks and comments and return the next character; "" at the end."""
-        self.at = _BLANK_PATTERN.match(self.text, self.at).end()
-        return self.text[self.at : self.at + 1]
+        self.position = _BLANK_PATTERN.match(self.text, self.position).end()
+        return self.text[self.position : self.position + 1]
 
     def take(self, mark: str) -> bool:
         """Skip a token such as "=" if it is at the cursor; return whether it was there."""
-        if not self.text.startswith(mark, self.at):
+        if not self.text.startswith(mark, self.position):
             return False
-        self.at += len(mark)
+        self.position += len(mark)
         return True
 
     def expect(self, mark: str) -> None:
@@ -223,8 +223,8 @@ class _Scanner:
 
     def current_line(self) -> int:
         """Return the number of the line at the cursor, counted from 1."""
-        self._line += self.text.count("\n", self._counted, self.at)
-        self._counted = self.at
+        self._line += self.text.count("\n", self._counted, self.position)
+        self._counted = self.position
         return self._line
 
 

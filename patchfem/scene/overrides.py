@@ -46,7 +46,7 @@ class _ReadTable(NamedTuple):
 
     name: str
     raw: Any
-    read: tuple[dict, Any]
+    read_values: tuple[dict, Any]
     keys: set[str]
 
 
@@ -99,7 +99,7 @@ class BaseScene:
         if known is None:
             return False
         draft.raw[known.name] = known.raw
-        draft.read_before[id(known.raw)] = known.read
+        draft.read_before[id(known.raw)] = known.read_values
         draft.sets |= known.keys
         return True
 

@@ -65,33 +65,33 @@ def _read_range(text: str) -> Range:
             f"{text}: table.key=low..high is needed, such as friction.bond_length=0.2 um..20 um"
         )
     try:
-        place = _require_number_key(key)
-        low_value = _read_number(place, key, low)
-        high_value = _read_number(place, key, high)
+        definition = _require_number_key(key)
+        low_value = _read_number(definition, key, low)
+        high_value = _read_number(definition, key, high)
         if not low_value < high_value:
             raise ValueError(f"the low bound {low} must lie below the high bound {high}")
     except ValueError as error:
         raise ValueError(f"{key}: {error}") from None
-    return Range(key, low_value, high_value, find_quantity_kind(*place))
+    return Range(key, low_value, high_value, find_quantity_kind(*definition))
 
 
 def _require_number_key(key: str) -> KeyDefinition:
     """Find a key that holds one number; ValueError for any other."""
-    place = require_key(key)
-    types = list_key_types(*place)
-    if find_inner_table(*place) is not None or tuple in types or float not in types:
+    definition = require_key(key)
+    types = list_key_types(*definition)
+    if find_inner_table(*definition) is not None or tuple in types or float not in types:
         raise ValueError(
             "is not a number that can vary; only quantities and plain numbers can be free"
         )
-    return place
+    return definition
 
 
-def _read_number(place: KeyDefinition, key: str, text: str) -> float:
+def _read_number(definition: KeyDefinition, key: str, text: str) -> float:
     """Convert the string of a value to SI units; ValueError if the key does not accept it."""
     written = read_set_value(key, text)
     if isinstance(written, int) and not isinstance(written, bool):
         written = float(written)
-    value = validate_value(key, written).get(place.name)
+    value = validate_value(key, written).get(definition.name)
     if not isinstance(value, float) or not math.isfinite(value):
         raise ValueError(f"'{text}' is not a finite number")
     return value

@@ -43,16 +43,16 @@ def read_tables(draft: SceneDraft) -> None:
     draft.tables = _read_table(draft, Tables, draft.raw, "")
 
 
-def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], at: str) -> Any:
+def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], table_key: str) -> Any:
     """Read the table at the dotted key `at`; report missing or wrong values, which become None."""
     if id(raw) in draft.read_before:
         return draft.read_before[id(raw)][1]
     names = attributes_by_key(model)
     values = {}
     for key, value in raw.items():
-        path = f"{at}.{key}" if at else key
+        path = f"{table_key}.{key}" if table_key else key
         if key not in names:
-            _report_unknown(draft, model, raw, key, at)
+            _report_unknown(draft, model, raw, key, table_key)
             continue
         inner = find_inner_table(model, names[key])
         is_value = not isinstance(value, dict) and is_table_or_value(model, names[key])
@@ -60,20 +60,20 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], at: 
             value = _read_inner(draft, KeyDefinition(model, names[key]), value, path)
         if value is not None:
             values[key] = value
-    valid = _validate_values(draft, model, values, at)
+    valid = _validate_values(draft, model, values, table_key)
     for key in list_required_keys(model):
         if key not in raw:
-            draft.add_missing(f"{at}.{key}", "")
+            draft.add_missing(f"{table_key}.{key}", "")
     unknown = {names[key]: None for key in (*raw, *list_required_keys(model)) if key in names}
     table = build_table(model, unknown | valid)
     draft.read_now[id(raw)] = raw, table
     return table
 
 
-def _read_inner(draft: SceneDraft, place: KeyDefinition, value: Any, path: str) -> Any:
+def _read_inner(draft: SceneDraft, definition: KeyDefinition, value: Any, path: str) -> Any:
     """Read an inner table or array of tables; report anything else and return None."""
-    inner = find_inner_table(*place)
-    if not is_array_attribute(*place):
+    inner = find_inner_table(*definition)
+    if not is_array_attribute(*definition):
         if isinstance(value, dict):
             return _read_table(draft, inner, value, path)
         draft.add_mistake(path, f"a table [{path}] is needed, not {format_for_message(value)}")
@@ -87,7 +87,7 @@ def _read_inner(draft: SceneDraft, place: KeyDefinition, value: Any, path: str) 
 
 
 def _validate_values(
-    draft: SceneDraft, model: type[Table], values: dict[str, Any], at: str
+    draft: SceneDraft, model: type[Table], values: dict[str, Any], table_key: str
 ) -> dict[str, Any]:
     """Return attribute -> valid value; the first mistake of every other key is reported."""
     valid: dict[str, Any] = {}
@@ -105,7 +105,7 @@ def _validate_values(
             if key in reported or (error["type"] == "missing" and not inside):
                 continue
             reported.add(key)
-            path = f"{at}.{key}" if at else str(key)
+            path = f"{table_key}.{key}" if table_key else str(key)
             value = values.get(key)
             index = next((part for part in inside if isinstance(part, int)), None)
             if index is not None and isinstance(value, list) and index < len(value):
@@ -119,10 +119,10 @@ def _validate_values(
 
 
 def _report_unknown(
-    draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, at: str
+    draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, table_key: str
 ) -> None:
     """Report a key that the table at `at` does not have, with the key that was probably meant."""
-    path = f"{at}.{key}" if at else key
+    path = f"{table_key}.{key}" if table_key else key
     if path in removed.REMOVED_KEYS:
         draft.add_mistake(path, removed.REMOVED_KEYS[path])
         return
@@ -131,8 +131,8 @@ def _report_unknown(
     if is_table:
         known = _list_inner_tables(model) or known
     advice = f"known here: {', '.join(known)}" if known else "this table has no keys"
-    if meant := _suggest_name(draft, model, raw, key, at):
-        advice = f"did you mean '{meant}'?"
+    if suggestion := _suggest_name(draft, model, raw, key, table_key):
+        advice = f"did you mean '{suggestion}'?"
     draft.add_mistake(path, f"unknown {'table' if is_table else 'key'}; {advice}")
 
 
@@ -144,26 +144,26 @@ def _list_inner_tables(model: type[Table]) -> list[str]:
 
 
 def _suggest_name(
-    draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, at: str
+    draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, table_key: str
 ) -> str:
     """Return the key or table that was probably meant by an unknown one; "" if none is similar."""
     is_table = _is_table(raw[key])
-    if not at and not is_table:
+    if not table_key and not is_table:
         # --set may be given a key without its table; the key then belongs to a table that has a key of this name.
         owners = _list_tables_with_key(model, key)
         present = [name for name in owners if name in raw]
         if owners:
             return "' or '".join(f"{name}.{key}" for name in present[:1] or owners)
     # A file that contains both keys did not misspell one for the other; a key of --set may be meant for one of the file.
-    is_set = (f"{at}.{key}" if at else key) in draft.sets
-    written = {
+    is_set = (f"{table_key}.{key}" if table_key else key) in draft.sets
+    written_table = {
         name: raw[name]
         for name in (*attributes_by_key(model), key)
-        if name in raw and (not is_set or f"{at}.{name}".strip(".") in draft.sets)
+        if name in raw and (not is_set or f"{table_key}.{name}".strip(".") in draft.sets)
     }
     if is_table:
-        return suggestions.suggest_table(model, written, key)
-    return suggestions.suggest_key(model, at, written, key, is_set=is_set)
+        return suggestions.suggest_table(model, written_table, key)
+    return suggestions.suggest_key(model, table_key, written_table, key, is_set=is_set)
 
 
 def _list_tables_with_key(model: type[Table], key: str) -> list[str]:
@@ -220,7 +220,7 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
     draft.sets.add(path)
 
 
-def _find_item(draft: SceneDraft, items: list[Any], path: str, written: str) -> int | None:
+def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str) -> int | None:
     """Return the index of the item that a key of --set names; report a missing one as None.
 
     Parameters
@@ -230,7 +230,7 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written: str) -> 
         The array.
     path : str
         Dotted key that ends in the name or the number of the item.
-    written : str
+    written_key : str
         The whole key as it was written: a number in brackets counts from 1, a number behind a dot from 0.
     """
     above, _, item_name = path.rpartition(".")
@@ -247,7 +247,7 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written: str) -> 
     advice = f"{table} has {len(items)}, numbered from 1 as in {table}[1]"
     if known:
         advice = advise_on_name(item_name, known)
-    if is_number and f"[{int(item_name) + 1}]" not in written:
+    if is_number and f"[{int(item_name) + 1}]" not in written_key:
         shown = f"{table}.{item_name}"
         advice += f"; {table}.0, with a dot, means {table}[1]"
     draft.add_set_mistake(f"{shown}: no {what} here; {advice}")

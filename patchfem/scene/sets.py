@@ -61,7 +61,7 @@ def require_units(scene: Any, values: dict[str, Any]) -> Any:
 
 
 def find_oversized_lengths(
-    values: dict[str, Any], patch_length: float | None = None, at: str = ""
+    values: dict[str, Any], patch_length: float | None = None, key_prefix: str = ""
 ) -> list[str]:
     """Return a sentence on each bare number that would be a length longer than any joint.
 
@@ -71,7 +71,7 @@ def find_oversized_lengths(
         Values by key, or tables of values.
     patch_length : float, optional
         Length of the patch [m]. No slide, bond or other motion is longer.
-    at : str
+    key_prefix : str
         Beginning of the dotted keys.
 
     Returns
@@ -81,7 +81,7 @@ def find_oversized_lengths(
     """
     mistakes = []
     for name, value in values.items():
-        key = f"{at}{name}"
+        key = f"{key_prefix}{name}"
         value = _to_plain_value(value)
         if isinstance(value, list | tuple):
             value = dict(enumerate(value))

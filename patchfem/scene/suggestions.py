@@ -17,7 +17,7 @@ from .rules.selectors import SELECTORS, split_keys
 
 
 def suggest_key(
-    model: type[Table], at: str, written: dict, key: str, *, is_set: bool = False
+    model: type[Table], table_key: str, written_table: dict, key: str, *, is_set: bool = False
 ) -> str:
     """Return the key of a table that is most similar to an unknown key; "" if none is similar.
 
@@ -28,19 +28,19 @@ def suggest_key(
     ----------
     model : type
         The table.
-    at : str
+    table_key : str
         Its dotted key.
-    written : dict
+    written_table : dict
         What is written in the table. A key that is there already is hardly meant.
     key : str
         The unknown key.
     is_set : bool
         Whether --set wrote the unknown key: the keys of the file are not in `written`, and one of them may be meant.
     """
-    free = [name for name in attributes_by_key(model) if name not in written]
-    fitting = [name for name in free if _accepts_value(model, name, written[key])]
+    free = [name for name in attributes_by_key(model) if name not in written_table]
+    fitting = [name for name in free if _accepts_value(model, name, written_table[key])]
     words = set(key.lower().split("_"))
-    needed = _list_missing_keys(model, at, written)
+    needed = _list_missing_keys(model, table_key, written_table)
     lacking = [name for name in fitting if name in needed]
     if is_set:
         required = [name for name in list_required_keys(model) if name in fitting]
@@ -56,7 +56,7 @@ def suggest_key(
     return next((names[0] for names in candidates if names), "")
 
 
-def suggest_table(model: type[Table], written: dict, key: str) -> str:
+def suggest_table(model: type[Table], written_table: dict, key: str) -> str:
     """Return the table that is most similar to an unknown table; "" if none is similar.
 
     A table with a similar name is taken unless another has more of the keys inside.
@@ -65,12 +65,12 @@ def suggest_table(model: type[Table], written: dict, key: str) -> str:
     ----------
     model : type
         The table that contains the unknown one.
-    written : dict
+    written_table : dict
         What is written in it.
     key : str
         Name of the unknown table.
     """
-    inside = written[key][0] if isinstance(written[key], list) else written[key]
+    inside = written_table[key][0] if isinstance(written_table[key], list) else written_table[key]
     n_shared = {}  # dotted name of a table -> number of keys that it shares with the unknown one
     for name, inner in _list_inner_tables(model):
         n_shared[name] = len(set(inside) & attributes_by_key(inner).keys())
@@ -105,16 +105,16 @@ def _accepts_value(model: type[Table], key: str, value: object) -> bool:
     return True
 
 
-def _list_missing_keys(model: type[Table], at: str, written: dict) -> list[str]:
+def _list_missing_keys(model: type[Table], table_key: str, written_table: dict) -> list[str]:
     """Return keys that a table lacks: always required, by a selector, or under a condition."""
     needed = list(list_required_keys(model))
-    if at in SELECTORS:
-        selector = SELECTORS[at]
-        value = written.get(selector.key)
+    if table_key in SELECTORS:
+        selector = SELECTORS[table_key]
+        value = written_table.get(selector.key)
         if isinstance(value, str) and value in selector.choices:
             needed += split_keys(selector.choices[value][0])
     for key in attributes_by_key(model):
         record = find_key_record(model, key)
         if record is not None and record.required:
             needed.append(key)
-    return [key for key in needed if key not in written]
+    return [key for key in needed if key not in written_table]

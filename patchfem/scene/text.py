@@ -34,38 +34,38 @@ def list_named_effects(tables: Any) -> list[str]:
 
 
 @memoize
-def _list_table_effects(table: Any, at: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(_iterate_effects(table, at)))
+def _list_table_effects(table: Any, table_key: str) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(_iterate_effects(table, table_key)))
 
 
-def _iterate_effects(table: Any, at: str) -> Iterator[str]:
+def _iterate_effects(table: Any, table_key: str) -> Iterator[str]:
     """Yield the effects of a table, an array of tables or a plain value."""
     if isinstance(table, Accuracy):
         if table.method != "auto":
-            yield f"{at}.method={table.method}"
+            yield f"{table_key}.method={table.method}"
     elif isinstance(table, Measured):
-        yield at
+        yield table_key
         if table.reading != "peak":
-            yield f"{at}.reading={table.reading}"
+            yield f"{table_key}.reading={table.reading}"
     elif isinstance(table, tuple):
-        yield from _iterate_effects_of_items(table, at)
+        yield from _iterate_effects_of_items(table, table_key)
     elif isinstance(table, Table) and not isinstance(table, Material):
         sources = _find_effect_sources(type(table))
         unused = _list_unused_keys(table) if sources.selectors else ()
         selectors = [key for key in sources.selectors if key not in unused]
-        yield from (f"{at}.{key}={getattr(table, key)}" for key in selectors)
+        yield from (f"{table_key}.{key}={getattr(table, key)}" for key in selectors)
         if not selectors:
-            yield at
+            yield table_key
         for name in sources.tables:
             inner = getattr(table, name)
             if inner is not None:
-                yield from _iterate_effects(inner, f"{at}.{name}")
+                yield from _iterate_effects(inner, f"{table_key}.{name}")
 
 
-def _iterate_effects_of_items(items: tuple, at: str) -> Iterator[str]:
+def _iterate_effects_of_items(items: tuple, table_key: str) -> Iterator[str]:
     """Yield the effects of an array of tables; patches have the effects of [contact]."""
     for item in items:
-        for effect in _iterate_effects(item, at):
+        for effect in _iterate_effects(item, table_key):
             if "=" in effect and ".contact" not in effect:
                 yield effect
     for item in items:
@@ -101,7 +101,7 @@ def _list_unused_keys(table: Table) -> Collection[str]:
     return ()
 
 
-def _format_lines(table: Table, at: str) -> Iterator[str]:
+def _format_lines(table: Table, table_key: str) -> Iterator[str]:
     """Yield the lines of a table: its values, then the tables inside it."""
     unused = _list_unused_keys(table)
     inner = []
@@ -109,7 +109,7 @@ def _format_lines(table: Table, at: str) -> Iterator[str]:
         value = getattr(table, name)
         if value in (None, ()) or key in unused:
             continue
-        path = f"{at}.{key}" if at else key
+        path = f"{table_key}.{key}" if table_key else key
         if isinstance(value, tuple) and isinstance(value[0], Table):
             inner += [(f"[[{path}]]", path, item) for item in value]
         elif isinstance(value, Table) and not isinstance(value, Material):

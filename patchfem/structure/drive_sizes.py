@@ -19,13 +19,13 @@ class DriveKeys(NamedTuple):
     - keys: keys of [drive] in SI units.
     - mass: modal mass [kg].
     - period: period [s] of the first elastic mode.
-    - read: function without arguments that reads the two columns of drive.file.
+    - read_file: function without arguments that reads the two columns of drive.file.
     """
 
     keys: object
     mass: float
     period: float
-    read: Callable
+    read_file: Callable
 
     @property
     def moving(self) -> bool:

@@ -281,7 +281,7 @@ def _build_sweep(drive: DriveKeys) -> SweepDrive:
 
 def _build_recorded(drive: DriveKeys) -> RecordedDrive:
     """Build the drive with waveform "file"."""
-    time, value = drive.read()
+    time, value = drive.read_file()
     scale = 1.0 if drive.moving else 1 / drive.mass
     return RecordedDrive(time, scale * value, drive.period, drive.moving)
 

@@ -88,7 +88,7 @@ def _build_random(drive: DriveKeys) -> RandomRecord:
     """Build the drive with waveform "random"."""
     keys = drive.keys
     if keys.file is not None:
-        frequency, density = drive.read()
+        frequency, density = drive.read_file()
     else:
         frequency = (keys.from_, keys.to)
         density = (keys.spectrum, keys.spectrum)

@@ -57,7 +57,7 @@ def rigid(
         one_point(model, load, engine, watch.springs), time, slide, frames, watch, paced
     )
     tau = np.outer(done.force[done.at] / load if load > 0 else np.zeros(done.at.size), sigma)
-    loads = model.point.at(time) if model.load_varies else np.full(time.size, load)
+    loads = model.point.evaluate(time) if model.load_varies else np.full(time.size, load)
     if engine.kind == ELEMENTS or model.grooves is not None:
         slip, local = done.slip, np.where(sigma > 0, done.slip[done.at, None], slide[done.at, None])
     else:

@@ -231,7 +231,7 @@ def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
 def _pressures(model, patch, time, slide) -> tuple:
     """Return weights (m,) [m2], and a function from a sample index to the pressure (m,) [Pa]."""
     if model.load_varies:
-        loads = model.point.at(time)
+        loads = model.point.evaluate(time)
         return np.ones(1), lambda k: loads[k : k + 1]
     sigma, weight = pressure_of(model, patch)
     if patch is None or model.side != "lower":

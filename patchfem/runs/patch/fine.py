@@ -243,7 +243,7 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
         normal.x,
         np.linspace(-asked.pieces.length / 2, asked.pieces.length / 2, 2 * count + 1),
     )
-    gap = asked.gap.at(between).heights[1::2]
+    gap = asked.gap.evaluate(between).heights[1::2]
     force, closing, theta, work = _solve_forces(asked, normal, gap, start)
     moved = normal.product(force)
     opening, touches = gap + theta * x - closing + moved, force > 0

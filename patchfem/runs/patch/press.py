@@ -155,7 +155,7 @@ def press_patch(asked, pair: Pair, worn=None) -> Patch:
         If a profile does not fit the mesh.
     """
     x = pair.compliance.interface.x
-    gap, notes, seconds = asked.gap.at(x)
+    gap, notes, seconds = asked.gap.evaluate(x)
     gap = gap + pair.rise if worn is None else gap + pair.rise + worn
     rim, out = asked.gap.half_step_heights(x), _on(asked, pair, gap, notes, seconds)
     if (
@@ -286,7 +286,7 @@ def presser(asked, pair: Pair):
     PatchfemError
         If a profile does not fit the mesh.
     """
-    gap = asked.gap.at(pair.compliance.interface.x).heights
+    gap = asked.gap.evaluate(pair.compliance.interface.x).heights
     gap, bare = gap + pair.rise, pair.compliance
     how = _choose_solver(asked)
     if asked.interface.strips is not None:

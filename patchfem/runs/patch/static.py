@@ -61,7 +61,7 @@ class PatchLoads(NamedTuple):
     def gaps(self, x) -> np.ndarray:
         """Return the gaps (q, m) [m] at x (m,) [m]."""
         if len(self.shapes) == self.load.size:
-            return np.array([gap.at(x).heights for gap in self.shapes])
+            return np.array([gap.evaluate(x).heights for gap in self.shapes])
         return np.broadcast_to(self.shapes[0].at(x[:, None])[0].T, (self.load.size, x.size))
 
 
@@ -333,7 +333,7 @@ def pressed_together(
 
 def _patch_of(asked, pair: Pair, level: Level, k: int):
     """Return the k-th patch of a level, of PatchModel `asked`, as `press.press_patch` returns it."""
-    gap, notes, seconds = asked.gap.at(level.x)
+    gap, notes, seconds = asked.gap.evaluate(level.x)
     rows = level.pressure
     pressure = ContactState(
         frozen_array(rows.sigma_n[k]),

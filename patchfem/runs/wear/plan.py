@@ -96,7 +96,7 @@ def _springs(asked, x, area):
     They are a function of worn depth and softening; x: positions (m,) [m], area: (m,) [m2].
     """
     try:
-        gap = asked.gap.at(x).heights
+        gap = asked.gap.evaluate(x).heights
     except PatchfemError:  # the profile is too fine for the row
         gap = np.zeros_like(x)
     gap = gap - np.polyval(np.polyfit(x, gap, 1), x) if asked.loading.can_rotate else gap

@@ -72,9 +72,9 @@ def find_key(key: str) -> KeyDefinition:
 
 def require_key(key: str) -> KeyDefinition:
     """Find a key as `find_key` does; ValueError, with the nearest known key, if no scene has it."""
-    place = find_key(key)
-    if place.model is not None:
-        return place
+    definition = find_key(key)
+    if definition.model is not None:
+        return definition
     table, _, last = key.rpartition(".")
     owner = find_key(table) if table else KeyDefinition(None, "")
     inner = find_inner_table(*owner) if owner.model is not None else None
@@ -158,18 +158,18 @@ def _describe_array_requirement(types: tuple) -> str:
     return f"{'' if is_open else 'two '}whole numbers are needed, such as [1, 2]"
 
 
-def describe_error(place: KeyDefinition, error: Any, value: Any) -> str:
+def describe_error(definition: KeyDefinition, error: Any, value: Any) -> str:
     """Return the sentence for an error of pydantic.
 
     Parameters
     ----------
-    place : KeyDefinition
+    definition : KeyDefinition
     error : dict
         One of `ValidationError.errors()`.
     value
         The wrong value as it is written.
     """
-    needed = describe_requirement(*place)
+    needed = describe_requirement(*definition)
     if error["type"] in LIMITS_BY_ERROR_TYPE:
         limit = LIMITS_BY_ERROR_TYPE[error["type"]]
         bound = error["ctx"][limit.name]
@@ -179,7 +179,7 @@ def describe_error(place: KeyDefinition, error: Any, value: Any) -> str:
         return f"at least {error['ctx']['min_length']} values are needed, not {len(value)}"
     if error["type"] == "value_error":
         return str(error["ctx"]["error"])
-    allowed = list_allowed_values(*place)
+    allowed = list_allowed_values(*definition)
     if allowed and isinstance(value, str):
         return f"unknown value {format_for_message(value)}; {advise_on_name(value, allowed)}"
     return f"{needed or 'another value is needed'}, not {format_for_message(value)}"

@@ -274,18 +274,18 @@ def list_key_types(model: type[BaseModel], name: str) -> tuple[Any, ...]:
     return (annotation, *iterate_annotation_parts(annotation))
 
 
-def find_key_record(model: type[BaseModel], written: str) -> KeyRecord | None:
+def find_key_record(model: type[BaseModel], written_name: str) -> KeyRecord | None:
     """Return the documentation of a key of a scene; None for a table, which has none."""
-    marks = model.model_fields[attributes_by_key(model)[written]].metadata
+    marks = model.model_fields[attributes_by_key(model)[written_name]].metadata
     return next((mark for mark in marks if isinstance(mark, KeyRecord)), None)
 
 
-def find_meaning(model: type[BaseModel], written: str) -> str:
+def find_meaning(model: type[BaseModel], written_name: str) -> str:
     """Return the meaning of a key of a table; KeyError if the key is not documented."""
-    record = find_key_record(model, written)
+    record = find_key_record(model, written_name)
     if record is None:
         raise KeyError(
-            f"no record of {model.__name__}.{written}: write its type as key(type, meaning)"
+            f"no record of {model.__name__}.{written_name}: write its type as key(type, meaning)"
         )
     return record.meaning
 

@@ -60,70 +60,70 @@ class PatchFacts(TableFacts):
 PATCH_RULES = (
     MistakeRule(
         lambda p: p.has("load", "approach"),
-        "{at}.approach",
+        "{table_key}.approach",
         "[contact.approach] and contact.load exclude each other: keep one",
     ),
     MissingKeyRule(
         lambda p: not p.has_any("load", "approach"),
-        "{at}.load",
+        "{table_key}.load",
         "or [contact.approach] instead",
     ),
     MistakeRule(
         lambda p: p.height > p.max_height,
-        "{at}.height",
+        "{table_key}.height",
         f"{{height:g}} m is more than {MAX_SLENDERNESS} times contact.length, but the stress is noticeable only to a "
         "depth of a few times contact.length; use at most {max_height:.3g} m, and represent the rest of the height by "
         "a spring of the structure",
     ),
     MistakeRule(
         lambda p: p.element_size > p.flat_length,
-        "{at}.element_size",
+        "{table_key}.element_size",
         "{element_size} m is longer than {flat_length_name} {flat_length} m",
     ),
     MistakeRule(
         lambda p: p.length > MAX_ELEMENTS * p.element_size,
-        "{at}.element_size",
+        "{table_key}.element_size",
         f"elements of {{element_size:g}} m on a length of {{length:g}} m are more than {MAX_ELEMENTS}; use at least "
         "{min_element_size:.3g} m, or leave this key out",
     ),
     RemarkRule(
         lambda p: p.element_size and p.mesh,
-        "{at}.element_size",
+        "{table_key}.element_size",
         "is not used, because the file of contact.mesh gives the elements",
     ),
     MistakeRule(
         lambda p: (
             p.holder and not p.has_any("holder.rotational_stiffness", "holder.tangential_stiffness")
         ),
-        "{at}.holder",
+        "{table_key}.holder",
         "rotational_stiffness, tangential_stiffness or both are needed",
     ),
     MistakeRule(
         lambda p: abs(p.step.at) >= p.half_length,
-        "{at}.step.at",
+        "{table_key}.step.at",
         "{step.at} m lies outside the patch: |`at`| < length/2 is needed",
     ),
     MistakeRule(
         lambda p: p.has_free_roll and p.has("strips.roll"),
-        "{at}.strips.offset",
+        "{table_key}.strips.offset",
         "`offset` leaves the rotation about x free, but contact.strips.roll prescribes this rotation: keep only one of "
         "these two keys",
     ),
     MistakeRule(
         lambda p: p.has_free_roll and p.has("approach"),
-        "{at}.strips.offset",
+        "{table_key}.strips.offset",
         "a load line needs a load: use contact.load in place of [contact.approach]",
     ),
     MistakeRule(
         lambda p: p.has_free_roll and p.strips.count < 2,
-        "{at}.strips.offset",
+        "{table_key}.strips.offset",
         "{strips.count} strip cannot resist a rotation about x: raise contact.strips.count",
     ),
     MistakeRule(
         lambda p: (
             p.has_free_roll and p.strips.count >= 2 and abs(p.strips.offset) >= p.max_roll_offset
         ),
-        "{at}.strips.offset",
+        "{table_key}.strips.offset",
         "{strips.offset} m lies beyond the middle of the outermost strip: |offset| < {max_roll_offset:.6g} m is "
         "needed; raise contact.strips.count or lower the offset",
     ),
@@ -133,7 +133,7 @@ PATCH_RULES = (
             and p.has("asperities.cutoff")
             and not p.has_any("profile", "asperities.from", "asperities.rms_height")
         ),
-        "{at}.asperities.cutoff",
+        "{table_key}.asperities.cutoff",
         "separates the long waves of a trace from the short ones, but the scene has no trace: add [contact.profile] or "
         "`from`, or leave this key out",
     ),
@@ -141,7 +141,7 @@ PATCH_RULES = (
         lambda p: (
             p.approach and p.asperities.law == "exponential" and not p.asperities.normal_stiffness
         ),
-        "{at}.asperities.normal_stiffness",
+        "{table_key}.asperities.normal_stiffness",
         "law 'exponential' with [contact.approach] needs this stiffness at first touch, because the approach is "
         "measured from first touch",
     ),
@@ -149,28 +149,28 @@ PATCH_RULES = (
 LOAD_LINE_RULES = (
     MistakeRule(
         lambda p: p.has("load_line.offset", "load_line.moment"),
-        "{at}.load_line.moment",
+        "{table_key}.load_line.moment",
         "offset and moment exclude each other: keep one",
     ),
     MissingKeyRule(
         lambda p: not p.has_any("load_line.offset", "load_line.moment"),
-        "{at}.load_line.offset",
+        "{table_key}.load_line.offset",
         "or load_line.moment instead",
     ),
     MistakeRule(
         lambda p: p.has("tilt.angle") and not p.has("holder"),
-        "{at}.load_line",
+        "{table_key}.load_line",
         "cannot be used with contact.tilt.angle unless [contact.holder] is given: a piece that is free to rotate has "
         "no prescribed angle; leave out one of these two keys, or add the spring of [contact.holder]",
     ),
     MistakeRule(
         lambda p: abs(p.load_line.offset) >= p.half_length,
-        "{at}.load_line.offset",
+        "{table_key}.load_line.offset",
         "{load_line.offset} m lies outside the patch: |offset| < length/2 = {half_length} m is needed",
     ),
     MistakeRule(
         lambda p: p.load_line.moment and abs(p.load_line.moment) >= p.half_length * p.load,
-        "{at}.load_line.moment",
+        "{table_key}.load_line.moment",
         "{load_line.moment} N m divided by the load {load} N puts the load line outside the patch: |moment|/load < "
         "length/2 = {half_length} m is needed",
     ),
@@ -188,15 +188,16 @@ def iterate_patches(draft: SceneDraft) -> Iterator[tuple[str, Contact]]:
 
 def check_patches(draft: SceneDraft) -> None:
     """Report mistakes inside [contact] and inside the patches of interfaces."""
-    for at, contact in iterate_patches(draft):
-        facts = PatchFacts(draft, at, contact)
+    for table_key, contact in iterate_patches(draft):
+        facts = PatchFacts(draft, table_key, contact)
         check_outlines(facts)
         apply_rules(draft, PATCH_RULES, facts)
-        _check_shapes_have_a_piece(draft, at, contact)
+        _check_shapes_have_a_piece(draft, table_key, contact)
         _check_coatings(facts)
         if contact.asperities is not None:
             check_selector(
-                TableFacts(draft, f"{at}.asperities", contact.asperities), ASPERITY_LAW_SELECTOR
+                TableFacts(draft, f"{table_key}.asperities", contact.asperities),
+                ASPERITY_LAW_SELECTOR,
             )
         if facts.asperities.law == "hertz":
             _check_peaks(facts)
@@ -204,7 +205,7 @@ def check_patches(draft: SceneDraft) -> None:
             apply_rules(draft, LOAD_LINE_RULES, facts)
 
 
-def _check_shapes_have_a_piece(draft: SceneDraft, at: str, contact: Contact) -> None:
+def _check_shapes_have_a_piece(draft: SceneDraft, table_key: str, contact: Contact) -> None:
     """Report gap shapes whose table lacks the key `on`, which `Contact.shapes` would leave out.
 
     Only a shape that somebody adds to the package can lack this key.
@@ -212,7 +213,7 @@ def _check_shapes_have_a_piece(draft: SceneDraft, at: str, contact: Contact) -> 
     for name in GAP_SHAPES:
         if getattr(contact, name, None) is not None and name not in contact.shapes:
             draft.add_mistake(
-                f"{at}.{name}",
+                f"{table_key}.{name}",
                 f"[contact.{name}] is a gap shape, but its table has no key `on`, which names the piece with the "
                 "shape; add the key to the class of the table in scene/keys/contact.py",
             )
@@ -221,11 +222,11 @@ def _check_shapes_have_a_piece(draft: SceneDraft, at: str, contact: Contact) -> 
 def _check_coatings(patch: PatchFacts) -> None:
     """Report coatings that are not thinner than their piece."""
     pieces: list[tuple[str, Any, float]] = [
-        (f"{patch.at}.coating.thickness", patch.coating, patch.height)
+        (f"{patch.table_key}.coating.thickness", patch.coating, patch.height)
     ]
     for name in PIECE_NAMES:
         piece = patch[name]
-        key = f"{patch.at}.{name}." + ("coating.thickness" if piece.coating else "height")
+        key = f"{patch.table_key}.{name}." + ("coating.thickness" if piece.coating else "height")
         if piece:
             pieces.append((key, piece.coating or patch.coating, piece.height or patch.height))
     for key, coating, height in pieces:
@@ -238,7 +239,7 @@ def _check_coatings(patch: PatchFacts) -> None:
 
 def _check_peaks(patch: PatchFacts) -> None:
     """Report peaks of law 'hertz' that are not described, described in part or described twice."""
-    at = f"{patch.at}.asperities"
+    table_key = f"{patch.table_key}.asperities"
     used = [
         keys
         for keys in HERTZ_PEAK_DESCRIPTIONS
@@ -247,7 +248,7 @@ def _check_peaks(patch: PatchFacts) -> None:
     if len(used) > 1:
         second = next(key for key in used[1] if patch.has(f"asperities.{key}"))
         patch.draft.add_mistake(
-            f"{at}.{second}",
+            f"{table_key}.{second}",
             f"describes the same peaks as {', '.join(used[0])}; keep only one description of the peaks",
         )
         return
@@ -256,4 +257,4 @@ def _check_peaks(patch: PatchFacts) -> None:
     )
     for key in used[0] if used else HERTZ_PEAK_DESCRIPTIONS[0]:
         if not patch.has(f"asperities.{key}"):
-            patch.draft.add_missing(f"{at}.{key}", f"law 'hertz' needs this key{others}")
+            patch.draft.add_missing(f"{table_key}.{key}", f"law 'hertz' needs this key{others}")

@@ -15,8 +15,10 @@ from .view import TableView
 class LawFacts(TableFacts):
     """Facts of a friction law, and of the patch on which it acts."""
 
-    def __init__(self, draft: SceneDraft, at: str, law: Friction, contact: Contact | None) -> None:
-        super().__init__(draft, at, law)
+    def __init__(
+        self, draft: SceneDraft, table_key: str, law: Friction, contact: Contact | None
+    ) -> None:
+        super().__init__(draft, table_key, law)
         self.contact = TableView(contact)
 
     def has_key(self, key: str) -> bool:
@@ -73,13 +75,13 @@ class LawFacts(TableFacts):
 LAW_RULES = (
     MistakeRule(
         lambda law: law.has_unsupported_kinetic,
-        "{at}.kinetic",
+        "{table_key}.kinetic",
         f"law '{{law}}' has only one coefficient of friction; laws with a kinetic coefficient are "
         f"{name_laws_with_key('kinetic')}",
     ),
     MistakeRule(
         lambda law: law.is_kinetic_larger,
-        "{at}.kinetic",
+        "{table_key}.kinetic",
         "{kinetic} is larger than static = {static}; kinetic <= static is needed",
     ),
     RemarkRule(
@@ -88,24 +90,24 @@ LAW_RULES = (
             and not law.is_kinetic_larger
             and is_kinetic_unused(law.table)
         ),
-        "{at}.kinetic",
+        "{table_key}.kinetic",
         "has no effect while the bond length is constant; add rest_growth and slip_growth",
     ),
     RemarkRule(
         lambda law: is_rest_speed_unused(law.table),
-        "{at}.rest_speed",
+        "{table_key}.rest_speed",
         "has no effect while the bond length is constant; add rest_growth and slip_growth",
     ),
     MistakeRule(
         lambda law: law.spread and not law.has_key("spread"),
-        "{at}.spread",
+        "{table_key}.spread",
         f"law '{{law}}' has no spread; laws with a spread are {name_laws_with_key('spread')}",
     ),
     MissingKeyRule(
         lambda law: (
             law.spread
             and law.has_key("spread")
-            and law.at == "friction"
+            and law.table_key == "friction"
             and law.draft.tables.normal is not None
             and not law.draft.has("normal.width")
         ),
@@ -114,28 +116,30 @@ LAW_RULES = (
     ),
     RemarkRule(
         lambda law: is_temperature_unused(law.table),
-        "{at}.temperature",
+        "{table_key}.temperature",
         "has no effect without {missing_temperature_keys}",
     ),
     *(
         MissingKeyRule(
             lambda law, key=key, other=other: law.has(key) and not law.has(other),
-            f"{{at}}.{other}",
+            f"{{table_key}}.{other}",
             f"{key} needs this key; for a constant bond length leave out both keys",
         )
         for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth"))
     ),
     MistakeRule(
-        lambda law: law.is_order_wrong, "{at}.order", "must be {order_requirement}, not {order}"
+        lambda law: law.is_order_wrong,
+        "{table_key}.order",
+        "must be {order_requirement}, not {order}",
     ),
     MistakeRule(
         lambda law: law.breakaway and law.reading == "report",
-        "{at}.breakaway",
+        "{table_key}.breakaway",
         "reading 'report' has no breakaway; use reading = 'stretch' or leave `breakaway` out",
     ),
     MistakeRule(
         lambda law: law.has_unknown_springs and law.load_change_description,
-        "{at}.stiffness",
+        "{table_key}.stiffness",
         "{load_change_description} changes the load, and the number of springs in contact changes "
         "with the load; give bond_length in place of stiffness",
     ),
@@ -146,18 +150,18 @@ LAW_RULES = (
             and law.contact.approach
             and not law.contact.load
         ),
-        "{at}.stiffness",
+        "{table_key}.stiffness",
         "needs a known load, but [contact.approach] prescribes a distance; give bond_length in place of stiffness, or "
         "contact.load in place of [contact.approach]",
     ),
     MistakeRule(
         lambda law: law.static == 0 and law.stiffness and law.has_key("stiffness"),
-        "{at}.static",
+        "{table_key}.static",
         "must be > 0 with law '{law}', whose springs need a slip force",
     ),
     MistakeRule(
         lambda law: law.static == 0 and law.compliance,
-        "{at}.static",
+        "{table_key}.static",
         "must be > 0 with {compliance}, because at static = 0 no point carries friction; raise static or leave out "
         "{compliance}",
     ),
@@ -173,8 +177,8 @@ def check_laws(draft: SceneDraft) -> None:
         _check_law(draft, f"structure.interface.{index}", law, law.contact)
 
 
-def _check_law(draft: SceneDraft, at: str, law: Friction, contact: Contact | None) -> None:
-    facts = LawFacts(draft, at, law, contact)
+def _check_law(draft: SceneDraft, table_key: str, law: Friction, contact: Contact | None) -> None:
+    facts = LawFacts(draft, table_key, law, contact)
     check_selector(facts, LAW_SELECTOR)
     apply_rules(draft, LAW_RULES, facts)
 

@@ -77,7 +77,7 @@ class GrooveFacts(TableFacts):
 LOCKING_RULES = (
     MistakeRule(
         lambda g: g.static * g.slope >= 1,
-        "{at}.amplitude",
+        "{table_key}.amplitude",
         "{amplitude:.6g} m gives flanks of slope {slope:.6g}, on which the pieces lock with static = {static:g}: no "
         "force can move one piece over the flanks of the other; an amplitude below wavelength/(2 pi static) = "
         "{max_amplitude:.6g} m is needed, or a smaller `static`",
@@ -87,13 +87,13 @@ COMBINATION_RULES = (
     make_unsupported_rule(
         lambda g: g.key_preventing_recursion,
         "friction.{key_preventing_recursion}",
-        "with [{at}]",
+        "with [{table_key}]",
         "recursion",
     ),
     MistakeRule(
         lambda g: g.is_removed_law,
         "friction.law",
-        "{law} with [{at}] was removed in patchfem 1.0; " + suggest_laws("grooves"),
+        "{law} with [{table_key}] was removed in patchfem 1.0; " + suggest_laws("grooves"),
     ),
     make_unsupported_rule(
         lambda g: (
@@ -102,30 +102,30 @@ COMBINATION_RULES = (
             and not law_supports(g.law_table, "grooves")
         ),
         "friction.law",
-        "{law} with [{at}]",
+        "{law} with [{table_key}]",
         "{law_advice}",
     ),
     make_unsupported_rule(
         lambda g: g.has_bonds and g.scene.accuracy.quadrature in ("direct", "truncated", "merged"),
         "accuracy.quadrature",
-        "'{scene.accuracy.quadrature}' with [{at}]",
+        "'{scene.accuracy.quadrature}' with [{table_key}]",
         "use 'recursion' or 'auto'",
     ),
     MistakeRule(
         lambda g: g.scene.accuracy.method == "harmonic" and g.scene.accuracy.harmonics,
         "accuracy.harmonics",
-        "harmonic balance with [{at}] was removed in patchfem 1.0; leave `harmonics` out: method 'harmonic' then "
+        "harmonic balance with [{table_key}] was removed in patchfem 1.0; leave `harmonics` out: method 'harmonic' then "
         "integrates in time until the motion repeats",
     ),
     make_unsupported_rule(
         lambda g: g.scene.contact.holder.tangential_stiffness,
         "contact.holder.tangential_stiffness",
-        "with [{at}]",
+        "with [{table_key}]",
         "out",
     ),
     make_unsupported_rule(
         lambda g: g.scene.contact.strips and (find_yaw_key(g.draft.tables) or g.compliance),
-        "{at}",
+        "{table_key}",
         "with strips that yaw or are elastic",
         "either",
     ),
@@ -137,19 +137,22 @@ COMBINATION_RULES = (
     make_unsupported_rule(
         lambda g: g.load_change and g.load_change != "normal.amplitude",
         "{load_change}",
-        "with [{at}]",
+        "with [{table_key}]",
         "either",
     ),
     make_unsupported_rule(
-        lambda g: g.lower_shape, "{lower_shape}", "'lower' with [{at}]", "shapes"
+        lambda g: g.lower_shape, "{lower_shape}", "'lower' with [{table_key}]", "shapes"
     ),
     make_unsupported_rule(
-        lambda g: g.scene.structure.stiffening, "structure.stiffening", "with [{at}]", "either"
+        lambda g: g.scene.structure.stiffening,
+        "structure.stiffening",
+        "with [{table_key}]",
+        "either",
     ),
     make_unsupported_rule(
         lambda g: g.scene.structure.bonded.wavelength,
         "structure.bonded.wavelength",
-        "with [{at}]",
+        "with [{table_key}]",
         "either",
     ),
 )
@@ -157,23 +160,23 @@ COMBINATION_RULES = (
 
 def check_grooves(draft: SceneDraft, kind: str) -> None:
     """Report mistakes of the grooves of a scene."""
-    at = find_groove_key(draft)
-    if not at or not kind:
+    table_key = find_groove_key(draft)
+    if not table_key or not kind:
         return
     if kind not in ("bench", "rig"):
         draft.add_mistake(
-            at,
-            f"[{at}] needs a sliding motion: add [friction] and [slide], or [structure] with [drive]",
+            table_key,
+            f"[{table_key}] needs a sliding motion: add [friction] and [slide], or [structure] with [drive]",
         )
         return
     law = draft.tables.friction
     if law is None or law.law is None:
         return
-    grooves = GrooveFacts(draft, at, find_groove_table(draft).table)
+    grooves = GrooveFacts(draft, table_key, find_groove_table(draft).table)
     apply_rules(draft, LOCKING_RULES, grooves)
     if kind == "bench" and grooves.lifted_mass:
         draft.add_remark(
-            f"{at}.lifted_mass",
+            f"{table_key}.lifted_mass",
             "has no meaning with [slide], because a prescribed slide has no inertia, and is not used",
         )
     if grooves.amplitude:

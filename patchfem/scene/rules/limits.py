@@ -41,7 +41,7 @@ class JointFacts(TableFacts):
     Parameters
     ----------
     draft : SceneDraft
-    at : str
+    table_key : str
         Dotted key of the law: "friction", or that of an interface.
     law : Friction
     contact : Contact or None
@@ -51,12 +51,12 @@ class JointFacts(TableFacts):
     """
 
     def __init__(
-        self, draft: SceneDraft, at: str, law: Friction, contact: Contact | None, kind: str
+        self, draft: SceneDraft, table_key: str, law: Friction, contact: Contact | None, kind: str
     ) -> None:
-        super().__init__(draft, at, law)
+        super().__init__(draft, table_key, law)
         self.kind = kind
         self.contact = wrap_value(contact)
-        self.patch_at = "contact" if at == "friction" else f"{at}.contact"
+        self.patch_key = "contact" if table_key == "friction" else f"{table_key}.contact"
 
     def has_trait(self, trait: str) -> bool:
         """Return whether the law has a trait of `effects.LAWS[...].traits`."""
@@ -266,37 +266,40 @@ COMPLIANCE_RULES = (
         lambda j: (
             j.has_trait("bonds") and j.reading == "report" and -1 < j.order < 0 and j.initial_bonds
         ),
-        "{at}.initial_bonds",
+        "{table_key}.initial_bonds",
         "{initial_bonds:g} with order = {order:g} and {compliance} gives points that no force can move: in the law as "
         "printed in the report, (R/eps)^order is unbounded for bonds at rest; set initial_bonds = 0 or use order >= 0",
     ),
     make_unsupported_rule(
         lambda j: not j.has_trait("bonds") and not j.supports("shear"),
-        "{at}.law",
+        "{table_key}.law",
         "'{law}' with {compliance}",
         f"leave out {{compliance}}, or {suggest_laws('shear')}",
     ),
     make_unsupported_rule(
         lambda j: j.has_trait("set-valued") and j.supports("shear") and -1 < j.kinetic < j.static,
-        "{at}.kinetic",
+        "{table_key}.kinetic",
         "{kinetic:g} below static = {static:g} with {compliance}",
         "kinetic",
     ),
 )
 STRIPS_RULES = (
     make_unsupported_rule(
-        lambda j: j.lacks_partial_slip_of_strips, "{patch_at}.strips", "with {compliance}", "either"
+        lambda j: j.lacks_partial_slip_of_strips,
+        "{patch_key}.strips",
+        "with {compliance}",
+        "either",
     ),
 )
 INTERFACE_RULES = (
     MissingKeyRule(
         lambda j: not j.contact and not j.has("load"),
-        "{at}.load",
+        "{table_key}.load",
         "or give this interface a patch with [structure.interface.contact]",
     ),
     make_unsupported_rule(
         lambda j: j.spread and law_takes_key(j.table.law, "spread"),
-        "{at}.spread",
+        "{table_key}.spread",
         "with masses, where an interface has no width",
         "out",
     ),
@@ -304,13 +307,13 @@ INTERFACE_RULES = (
 INTERFACE_LAW_RULES = (
     make_unsupported_rule(
         lambda j: j.has_others and not j.supports("joints"),
-        "{at}.law",
+        "{table_key}.law",
         "{law_description} with other interfaces",
         "{joints_advice}",
     ),
     make_unsupported_rule(
         lambda j: j.lateral and not j.supports("plane"),
-        "{at}.lateral",
+        "{table_key}.lateral",
         "with {law_description}",
         "{plane_advice}",
     ),
@@ -318,24 +321,24 @@ INTERFACE_LAW_RULES = (
 INTERFACE_PATCH_RULES = (
     make_unsupported_rule(
         lambda j: j.lateral,
-        "{at}.lateral",
+        "{table_key}.lateral",
         "with [structure.interface.contact]",
         "give the interface a load, or leave lateral out",
     ),
     MistakeRule(
         lambda j: j.has("load"),
-        "{at}.load",
+        "{table_key}.load",
         "[structure.interface.contact] has its own load; leave this key out",
     ),
     make_unsupported_rule(
         lambda j: j.has("contact.approach"),
-        "{patch_at}.approach",
+        "{patch_key}.approach",
         "with [[structure.interface]]",
         "give contact.load instead",
     ),
     make_unsupported_rule(
         lambda j: j.has("contact.grooves"),
-        "{patch_at}.grooves",
+        "{patch_key}.grooves",
         "with [[structure.interface]]",
         "out",
     ),
@@ -343,13 +346,13 @@ INTERFACE_PATCH_RULES = (
 PATCH_LAW_RULES = (
     make_unsupported_rule(
         lambda j: not j.has_others and not j.compliance and not j.supports("joints"),
-        "{at}.law",
+        "{table_key}.law",
         "{law_description} with [structure.interface.contact]",
         "{joints_advice}",
     ),
     make_unsupported_rule(
         lambda j: j.compliance and not j.supports("pieces", "shear"),
-        "{at}.law",
+        "{table_key}.law",
         "{law_description} with {compliance}",
         f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}",
     ),
@@ -387,9 +390,9 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
         apply_rules(draft, STRIPS_RULES, joint)
 
 
-def _check_interface(draft: SceneDraft, at: str, interface: Any) -> None:
+def _check_interface(draft: SceneDraft, table_key: str, interface: Any) -> None:
     """Report features that an interface between two masses does not support yet."""
-    joint = JointFacts(draft, at, interface, interface.contact, "rig")
+    joint = JointFacts(draft, table_key, interface, interface.contact, "rig")
     apply_rules(draft, INTERFACE_RULES, joint)
     if interface.law is not None:
         apply_rules(draft, INTERFACE_LAW_RULES, joint)
@@ -423,7 +426,7 @@ def _check_shape_sides(joint: JointFacts, only_upper: str) -> None:
     """
     draft = joint.draft
     sides = {
-        f"{joint.patch_at}.{name}.on": shape.on
+        f"{joint.patch_key}.{name}.on": shape.on
         for name, shape in joint.contact.table.shapes.items()
         if shape.on is not None
     }
@@ -434,7 +437,7 @@ def _check_shape_sides(joint: JointFacts, only_upper: str) -> None:
         message = describe_unsupported(f"{names} on different pieces", f"put all shapes on {piece}")
         draft.add_mistake(key, message)
         return
-    lower = list_lower_shapes(joint.contact.table, joint.patch_at)
+    lower = list_lower_shapes(joint.contact.table, joint.patch_key)
     if lower and only_upper:
         draft.add_mistake(lower[0], describe_unsupported(f"'lower' {only_upper}", "shapes"))
 

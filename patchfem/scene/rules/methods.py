@@ -190,10 +190,10 @@ def find_compliance_key(law: Any, tables: Tables) -> str:
     return owner.compliance_key if owner is not None else ""
 
 
-def list_lower_shapes(contact: Any, at: str = "contact") -> list[str]:
+def list_lower_shapes(contact: Any, table_key: str = "contact") -> list[str]:
     """List the keys that place a gap shape on the lower piece, such as `contact.crown.on`."""
     shapes = contact.shapes if contact is not None else {}
-    return [f"{at}.{name}.on" for name, shape in shapes.items() if shape.on == "lower"]
+    return [f"{table_key}.{name}.on" for name, shape in shapes.items() if shape.on == "lower"]
 
 
 def find_nonlinear_spring(tables: Tables) -> str:

@@ -31,7 +31,7 @@ def find_flat_length(patch: TableView) -> float:
 def check_outlines(patch: TableFacts) -> None:
     """Report mistakes in the lengths and the ends of the two pieces of a patch."""
     draft = patch.draft
-    at = patch.at
+    table_key = patch.table_key
     for name in PIECE_NAMES:
         if patch[name]:
             _check_ends(patch, name)
@@ -41,13 +41,13 @@ def check_outlines(patch: TableFacts) -> None:
     difference = abs(lengths[0] - lengths[1])
     if written and 0 < difference < MIN_END_FRACTION * max(lengths):
         draft.add_mistake(
-            f"{at}.{written[-1]}.length",
+            f"{table_key}.{written[-1]}.length",
             f"the pieces are {lengths[0]} and {lengths[1]} m long; the difference is less than 1e-5 of the length: "
             "write the same length for both pieces",
         )
     if len(written) == 2 and patch.has("length"):
         draft.add_remark(
-            f"{at}.length",
+            f"{table_key}.length",
             "is not used: [contact.upper] and [contact.lower] set their own lengths",
         )
 
@@ -57,7 +57,7 @@ def _check_outline_keys_with_mesh(patch: TableFacts, name: str) -> None:
     for key in ("length", *END_KEYS):
         if patch.mesh and patch.has(f"{name}.{key}"):
             patch.draft.add_mistake(
-                f"{patch.at}.{name}.{key}",
+                f"{patch.table_key}.{name}.{key}",
                 "cannot be used with contact.mesh, because the mesh file gives the shape of the pieces: leave one of "
                 "the two keys out",
             )
@@ -66,7 +66,7 @@ def _check_outline_keys_with_mesh(patch: TableFacts, name: str) -> None:
 def _check_ends(patch: TableFacts, name: str) -> None:
     """Report ends of a piece that exclude each other, or do not fit into its length and height."""
     draft = patch.draft
-    at = f"{patch.at}.{name}"
+    table_key = f"{patch.table_key}.{name}"
     piece: Any = patch[name]
     length = find_piece_length(patch, name)
     height = piece.height or patch.height
@@ -75,7 +75,7 @@ def _check_ends(patch: TableFacts, name: str) -> None:
     written = [key for key in END_KEYS if patch.has(f"{name}.{key}")]
     if len(written) == 2:
         draft.add_mistake(
-            f"{at}.end_radius", "`chamfer` and `end_radius` exclude each other: keep one"
+            f"{table_key}.end_radius", "`chamfer` and `end_radius` exclude each other: keep one"
         )
     for key in written:
         end = piece[key]
@@ -90,4 +90,4 @@ def _check_ends(patch: TableFacts, name: str) -> None:
             message = f"{end} m and a coating of {thickness} m do not fit into the height {height} m of the piece"
         else:
             continue
-        draft.add_mistake(f"{at}.{key}", message)
+        draft.add_mistake(f"{table_key}.{key}", message)

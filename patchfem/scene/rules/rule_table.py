@@ -26,17 +26,17 @@ class TableFacts(TableView):
     Parameters
     ----------
     draft : SceneDraft
-    at : str
+    table_key : str
         Dotted key of the table, such as "contact" or "structure.interface.0.contact".
     table : Table or None
         The table as far as it could be read.
     """
 
-    def __init__(self, draft: SceneDraft, at: str, table: Table | None) -> None:
+    def __init__(self, draft: SceneDraft, table_key: str, table: Table | None) -> None:
         super().__init__(table)
         self.draft = draft
-        self.at = at
-        self._written = draft.written_value(at)
+        self.table_key = table_key
+        self._written = draft.written_value(table_key)
 
     @property
     def scene(self) -> TableView:

@@ -94,8 +94,8 @@ class SceneDraft:
 
     def add_mistake(self, key: str, message: str) -> None:
         """Add a mistake at the line of a key, or at that of the nearest table above it."""
-        order, place = self._locate(key)
-        self._add(order, place, number_items_from_one(f"{self.display_key(key)}: {message}"))
+        order, location = self._locate(key)
+        self._add(order, location, number_items_from_one(f"{self.display_key(key)}: {message}"))
 
     def add_missing(self, key: str, reason: str) -> None:
         """Add a missing key as a mistake at the line of its table."""
@@ -145,10 +145,10 @@ class SceneDraft:
         line = next((self.lines[path] for path in paths if path in self.lines), 0)
         return line, f"{self.path}:{line}" if line else self.path
 
-    def _add(self, order: int, place: str, text: str) -> None:
+    def _add(self, order: int, location: str, text: str) -> None:
         text = _LONG_WORD_PATTERN.sub(lambda word: f"{word[0][:N_SHOWN_CHARACTERS]}...", text)
         printable = "".join(sign if sign.isprintable() else " " for sign in text)
-        self._mistakes.setdefault((order, f"{place}: {printable}"))
+        self._mistakes.setdefault((order, f"{location}: {printable}"))
 
 
 def find_value(value: Any, key: str) -> Any:

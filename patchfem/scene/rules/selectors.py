@@ -117,12 +117,14 @@ def check_selector(facts: TableFacts, selector: Selector) -> None:
         if not written:
             first, *others = alternatives
             needs = " or ".join((f"{reason} needs this key", *others))
-            draft.add_missing(f"{facts.at}.{first}", needs)
+            draft.add_missing(f"{facts.table_key}.{first}", needs)
         elif len(written) > 1:
             draft.add_mistake(
-                f"{facts.at}.{written[-1]}",
+                f"{facts.table_key}.{written[-1]}",
                 f"{reason} takes either this key or {written[0]}, not both; leave one of the two keys out",
             )
     for key in list_unused_keys(facts.table, selector):
         if facts.has(key) and key not in KEYS_WITH_OWN_RULE:
-            draft.add_remark(f"{facts.at}.{key}", f"has no meaning for {reason} and is not used")
+            draft.add_remark(
+                f"{facts.table_key}.{key}", f"has no meaning for {reason} and is not used"
+            )

@@ -368,10 +368,10 @@ def _check_base(draft: SceneDraft, modes: tuple) -> None:
         base = mode.base if draft.has(f"structure.mode.{index}.base") else default
         squares.append((base or 0.0) ** 2)
     if sum(squares) > 1 + BASE_PARTICIPATION_TOL:
-        at = f"structure.mode.{squares.index(max(squares))}"
-        key = "base" if draft.has(f"{at}.base") else "slide"
+        table_key = f"structure.mode.{squares.index(max(squares))}"
+        key = "base" if draft.has(f"{table_key}.base") else "slide"
         draft.add_mistake(
-            f"{at}.{key}",
+            f"{table_key}.{key}",
             f"the sum of `base`^2 over the modes is {sum(squares):.6g}, but at most 1 is possible (`base` is the "
             "participation of a mode in the base motion; for the first mode, `base` = `slide` unless given)",
         )

@@ -296,7 +296,7 @@ def split(folder, waves) -> tuple:
     )
     found = build(loads(text, folder / "scene.toml")).patch
     nodes = np.linspace(-6.35e-3, 6.35e-3, 501)
-    return nodes, found.gap.at(nodes).heights, found.interface.skin, text
+    return nodes, found.gap.evaluate(nodes).heights, found.interface.skin, text
 
 
 def test_exact_one_cutoff_splits_a_trace_between_the_gap_and_its_asperities(tmp_path):
