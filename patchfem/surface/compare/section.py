@@ -17,11 +17,10 @@ from .robust import MAX_NOISE, MAX_OUTLIER, MAX_UNWORN
 # fraction of unworn traces in which noise alone is reported as wear
 FALSE_POSITIVE_RATE = 1e-3
 N_TESTS = 4  # number of tests of each height: by itself, and by means of 4, 16 and 64 samples
-# deviance (twice the fall of the log-likelihood) at the bounds of the interval of an end; SIDE^2
-# holds for smooth models, and a change point needs more
-MAX_DEVIANCE = 1.5 * SIDE**2
-# standard deviations of the depth at which a flank ends, or which a steep edge reaches
-MIN_DEEP = 10.0
+# standard deviations of the depth to which a flank is fitted; up to 10 of them, a straight flank
+# cannot be told from one that runs out flat
+FLANK_HEIGHT = 25.0
+MIN_CLIFF = 10.0  # standard deviations of the depth that a cliff reaches at least
 MIN_FLANK_SAMPLES = 12  # samples of a flank, and of the unworn heights beside it
 # largest number of samples that are tried as the first worn one, which limits the time
 MAX_CANDIDATES = 160
@@ -185,9 +184,9 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     Outside, depths are noise about zero, or pile-up. Inside they follow b t + c t^2, or a + b t + c t^2
     with a step a if that fits clearly better, with a scatter of their own. The interval holds all ends
     whose likelihood is high enough, with the best of these flanks or of one that runs out flat as
-    b t^2 + c t^3 (profile likelihood). At a cliff, where the depth falls between two samples from a
-    value that noise explains to more than ten standard deviations, the end is half-way between them,
-    with an interval of one sample to each side.
+    b t^2 + c t^3 (profile likelihood). It has no part for an error of the level outside. At a cliff,
+    where the depth falls between two samples from a value that noise explains to more than ten standard
+    deviations, the end is half-way between them, with an interval of one sample to each side.
 
     Parameters
     ----------
@@ -199,9 +198,8 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
         First sample that is known as worn.
     """
     relative = depth / noise
-    deep = np.flatnonzero(relative[worn:] > MIN_DEEP)
+    deep = np.flatnonzero(relative[worn:] > FLANK_HEIGHT)
     reach = max(int(deep[0]) if deep.size else depth.size - worn, MIN_FLANK_SAMPLES)
-    low = max(worn - 2 * reach, 0)
     high = min(worn + reach, depth.size)
     is_certain = relative > noise_threshold(depth.size)
     inside = is_certain[worn:high]
@@ -210,8 +208,9 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     if inside.any() and uncertain.size:
         last_uncertain = int(uncertain[-1])
         first_deep = last_uncertain + 1
-        if relative[last_uncertain] <= MAX_UNWORN and relative[first_deep] > MIN_DEEP:
+        if relative[last_uncertain] <= MAX_UNWORN and relative[first_deep] > MIN_CLIFF:
             return FlankEnd(first_deep, last_uncertain, min(first_deep + 1, depth.size - 1), 0.5)
+    low = max(worn - 2 * reach, 0)
     part = depth[low:high]
     sigma = noise[low:high]
     last = max(min(part.size - 4, first_certain - low), 0)
@@ -236,16 +235,53 @@ def _select_end(deviances, candidates, low: int, count: int) -> FlankEnd:
     """
     smooth, step = deviances[:-1], deviances[-1]
     shape = int(np.argmin(smooth[: len(OFFSETS)].min(axis=1)))
-    is_step = bool(step.min() < smooth[shape].min() - MIN_STEP_DEVIANCE)
+    is_step = bool(step.min() < smooth.min() - MIN_STEP_DEVIANCE)
     best = int(candidates[int(np.argmin(step if is_step else smooth[shape]))])
     profile = step if is_step else smooth.min(axis=0)
-    likely = np.append(candidates[profile <= profile.min() + MAX_DEVIANCE], best)
+    likely = np.append(candidates[profile <= profile.min() + SIDE**2], best)
     gap = int(candidates[1] - candidates[0]) if candidates.size > 1 else 1
     return FlankEnd(
         first=low + best,
         low=max(low + int(likely.min()) - gap, 0),
         high=min(low + int(likely.max()) + gap, count - 1),
         offset=0.5 if is_step else OFFSETS[shape],
+    )
+
+
+def _widen_by_level_error(flank: FlankEnd, depth, noise, draws, correlation, worn) -> FlankEnd:
+    """Widen the interval of the end of a flank by the error of the level that the depth leaves.
+
+    The ends are found again with the depths raised and lowered by this error. A flank of slope s moves
+    by error / s, and one of curvature c that runs out flat by the square root of 2 error / c. The error
+    is that of the mean depth over the samples in which the end may lie, less the part of the noise,
+    which the likelihood contains.
+
+    Parameters
+    ----------
+    flank : FlankEnd
+        Result of `find_end` for the other arguments.
+    depth, noise : (n,) array [m]
+        Depth and its standard deviation.
+    draws : (draws, n) array [m]
+        Bootstrap errors of the depth.
+    correlation : float
+        Number of neighbouring depths whose errors are fully correlated.
+    worn : int
+        First sample that is known as worn.
+    """
+    near = slice(max(min(flank.low, worn - MIN_FLANK_SAMPLES), 0), max(worn, 1))
+    noise_variance = float(np.mean(noise[near] ** 2)) * correlation / noise[near].size
+    level_variance = float(np.var(draws[:, near].mean(axis=1))) - noise_variance
+    level_error = SIDE * np.sqrt(max(level_variance, 0.0))
+    first = flank.first
+    moved = [
+        find_end(depth + by, noise, correlation, worn).first for by in (level_error, -level_error)
+    ]
+    outward = np.hypot(first - flank.low, first - min(first, *moved))
+    inward = np.hypot(flank.high - first, max(first, *moved) - first)
+    return flank._replace(
+        low=max(first - int(np.ceil(outward)), 0),
+        high=min(first + int(np.ceil(inward)), depth.size - 1),
     )
 
 
@@ -352,7 +388,12 @@ def find_ends(section: Section, span: tuple, free: tuple) -> TrackEnds:
     first = max(span[0], low) - low
     last = min(span[1], high - 1) - low
     flanks = find_flank_ends(
-        section.depth[part], section.noise[part], section.correlation, first, last
+        section.depth[part],
+        section.noise[part],
+        section.correlation,
+        first,
+        last,
+        draws=section.draws[:, part],
     )
     x = section.x[part]
     is_at_border = (low == 0, high == section.x.size)
@@ -365,7 +406,7 @@ def find_ends(section: Section, span: tuple, free: tuple) -> TrackEnds:
     )
 
 
-def find_flank_ends(depth, noise, correlation: float, first: int, last: int) -> tuple:
+def find_flank_ends(depth, noise, correlation: float, first: int, last: int, draws=None) -> tuple:
     """Find where both flanks of a track begin, as the `FlankEnd` of each, measured from outside.
 
     Parameters
@@ -376,11 +417,26 @@ def find_flank_ends(depth, noise, correlation: float, first: int, last: int) -> 
         Number of neighbouring depths whose errors are fully correlated.
     first, last : int
         Samples between which the track is known as worn.
+    draws : (draws, n) array [m], optional
+        Bootstrap errors of the depth; without them the intervals have no error of the level.
     """
     centre = (first + last) // 2
-    start = find_end(depth[: centre + 1], noise[: centre + 1], correlation, first)
-    end = find_end(depth[centre:][::-1], noise[centre:][::-1], correlation, depth.size - 1 - last)
-    return start, end
+    sides = (
+        (slice(0, centre + 1), 1, first),
+        (slice(centre, None), -1, depth.size - 1 - last),
+    )
+    flanks = []
+    for half, direction, worn in sides:
+        outer_depth = depth[half][::direction]
+        outer_noise = noise[half][::direction]
+        flank = find_end(outer_depth, outer_noise, correlation, worn)
+        if draws is not None:
+            outer_draws = draws[:, half][:, ::direction]
+            flank = _widen_by_level_error(
+                flank, outer_depth, outer_noise, outer_draws, correlation, worn
+            )
+        flanks.append(flank)
+    return tuple(flanks)
 
 
 def _locate_end(x, flank: FlankEnd, name: str) -> Quantity:
