@@ -47,9 +47,8 @@ __all__ = [
 # slip speed over its peak in the cycle; below it a law with memory counts as sticking
 STICK_SPEED_RATIO = 1e-2
 G_N = 9.80665  # standard gravity [m s-2]
-_STIFFENING_ROUND_OFF = (
-    1e-9  # relative round-off of squared frequencies that a spring must not lower
-)
+# relative round-off of squared frequencies that a spring must not lower
+_STIFFENING_ROUND_OFF = 1e-9
 _ZERO_OVERLAP = 1e-30  # overlap of two shapes that counts as 0, so that its logarithm is finite
 _FORBIDDEN_PAIR_COST = 1e6  # larger than the cost of any allowed pairing of modes
 

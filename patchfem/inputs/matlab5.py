@@ -129,17 +129,17 @@ def read_variables(path, data: bytes) -> dict:
         raise PatchfemError(f"{path}: {FILE_HEADER_DAMAGE}")
     file = _MatFile(path, order)
     arrays = {}
-    at = 128
-    while at + 8 <= len(data):
-        kind, size = struct.unpack_from(order + "II", data, at)
-        if at + 8 + size > len(data) or len(arrays) > MAX_VARIABLES:
+    offset = 128
+    while offset + 8 <= len(data):
+        kind, size = struct.unpack_from(order + "II", data, offset)
+        if offset + 8 + size > len(data) or len(arrays) > MAX_VARIABLES:
             raise PatchfemError(f"{path}: the MATLAB file is cut off or damaged; save it anew")
-        body = memoryview(data)[at + 8 : at + 8 + size]
-        at += 8 + size
+        body = memoryview(data)[offset + 8 : offset + 8 + size]
+        offset += 8 + size
         if kind == DataType.COMPRESSED:
             arrays |= file.list_arrays(file.unpack_header(body))
             continue
-        at += -size % 8
+        offset += -size % 8
         if kind == DataType.MATRIX:
             arrays |= file.list_arrays(file.read_header(body))
     return arrays
@@ -168,13 +168,13 @@ class _MatFile(NamedTuple):
 
     def parse_header(self, body) -> _Variable:
         """Parse the header of a variable: its flags, its shape and its name."""
-        _, flags, at = self.read_element(body, 0)
-        _, dimensions, at = self.read_element(body, at)
-        _, name, at = self.read_element(body, at)
+        _, flags, offset = self.read_element(body, 0)
+        _, dimensions, offset = self.read_element(body, offset)
+        _, name, offset = self.read_element(body, offset)
         (flag,) = struct.unpack_from(self.order + "I", flags)
         shape = struct.unpack(f"{self.order}{len(dimensions) // 4}i", dimensions)
         kind = flag & (0xFF | COMPLEX_FLAG)
-        return _Variable(body, False, kind, shape, name.decode("latin-1"), at, len(body))
+        return _Variable(body, False, kind, shape, name.decode("latin-1"), offset, len(body))
 
     def check_header(self, variable: _Variable) -> _Variable | None:
         """Check the shape and size of a variable; return None if its class cannot be read.
@@ -182,7 +182,8 @@ class _MatFile(NamedTuple):
         Real, sparse, character, cell and structure arrays can be read. A variable that is too large raises
         PatchfemError.
         """
-        kind, shape = variable.kind, variable.shape
+        kind = variable.kind
+        shape = variable.shape
         if kind not in _READABLE_CLASSES:
             return None
         count = prod(shape)
@@ -213,18 +214,18 @@ class _MatFile(NamedTuple):
                     arrays |= self.list_arrays(field, depth + 1)
         return arrays
 
-    def list_fields(self, data, at: int) -> Iterator[tuple]:
+    def list_fields(self, data, offset: int) -> Iterator[tuple]:
         """Yield the name and content of each field of a structure.
 
         The structure begins with the number of bytes of each field name, then all names, then the contents.
         """
-        _, length, at = self.read_element(data, at)
-        _, names, at = self.read_element(data, at)
+        _, length, offset = self.read_element(data, offset)
+        _, names, offset = self.read_element(data, offset)
         (width,) = struct.unpack(self.order + "i", length)
         if not 0 < width <= 64 or len(names) % width:
             raise ValueError("the list of its field names has a wrong length")
         for first in range(0, len(names), width):
-            kind, body, at = self.read_element(data, at)
+            kind, body, offset = self.read_element(data, offset)
             if kind != DataType.MATRIX:
                 raise ValueError("one of its fields is not an array")
             if body:
@@ -236,6 +237,7 @@ class _MatFile(NamedTuple):
         name = variable.name[:40] if variable.name.isprintable() else "?"
 
         def read(convert: Callable):
+            """Unpack the variable and convert its data; refuse damaged ones."""
             with refuse_damage(f"{self.path}: variable {name} is damaged", DAMAGE_REMEDY):
                 return convert(self.unpack(variable), variable)
 
@@ -269,9 +271,9 @@ class _MatFile(NamedTuple):
     def read_sparse(self, data, variable: _Variable) -> sparse.csc_array:
         """Return a sparse matrix, stored as row indices, starts of the columns and values."""
         parts = []
-        at = variable.start
+        offset = variable.start
         for _ in range(3):
-            kind, values, at = self.read_element(data, at)
+            kind, values, offset = self.read_element(data, offset)
             parts.append(self.to_numbers(kind, values))
         return make_sparse(*parts, variable.shape)
 
@@ -293,24 +295,26 @@ class _MatFile(NamedTuple):
             letters = letters.reshape(variable.shape, order="F").reshape(variable.shape[0], -1)
             return make_texts("".join(row) for row in letters)
         texts = []
-        at = variable.start
+        offset = variable.start
         while len(texts) < max(variable.shape, default=0):
-            kind, stored, at = self.read_element(data, at)
+            kind, stored, offset = self.read_element(data, offset)
             cell = self.parse_header(stored)
             if kind != DataType.MATRIX or cell.kind != ArrayClass.CHAR:
                 raise ValueError("a cell does not contain text")
             texts.append(self.read_texts(stored, cell)[0])
         return make_texts(texts)
 
-    def read_element(self, data, at: int) -> _Element:
-        """Read the element at a position."""
-        kind, size = struct.unpack_from(self.order + "II", data, at)
-        start = at + 8
+    def read_element(self, data, offset: int) -> _Element:
+        """Read the element at an offset [bytes]."""
+        kind, size = struct.unpack_from(self.order + "II", data, offset)
+        start = offset + 8
         end = start + size + -size % 8
         is_small = kind >> 16 > 0  # data of up to four bytes are stored inside the tag
         if is_small:
-            kind, size = kind & 0xFFFF, kind >> 16
-            start, end = at + 4, at + 8
+            size = kind >> 16
+            kind &= 0xFFFF
+            start = offset + 4
+            end = offset + 8
         if size > len(data) - start or (is_small and size > 4):
             raise ValueError("an element ends too early")
         return _Element(kind, bytes(data[start : start + size]), end)
@@ -352,7 +356,7 @@ def make_sparse(rows, starts, values, shape: tuple) -> sparse.csc_array:
     return sparse.csc_array((values, rows.astype(np.int64), starts.astype(np.int64)), shape=shape)
 
 
-def make_sparse_array(path, shape: tuple, read: Callable) -> Array:
+def make_sparse_array(path, shape: tuple, reader: Callable) -> Array:
     """Make the array of a sparse variable.
 
     Parameters
@@ -360,8 +364,8 @@ def make_sparse_array(path, shape: tuple, read: Callable) -> Array:
     path : Path
         File, for error messages.
     shape : tuple
-    read : callable
-        Reads the sparse matrix.
+    reader : callable
+        Function that reads the sparse matrix.
 
     Returns
     -------
@@ -370,14 +374,15 @@ def make_sparse_array(path, shape: tuple, read: Callable) -> Array:
     """
 
     def read_full() -> np.ndarray:
+        """Read the matrix with all its zeros."""
         if prod(shape) > MAX_NUMBERS:
             raise PatchfemError(
                 f"{path}: a sparse variable of shape {shape}, more than {MAX_NUMBERS:.1e} numbers in "
                 "full; save a part of it"
             )
-        return read().toarray()
+        return reader().toarray()
 
-    return Array("sparse", shape, read_full, read)
+    return Array("sparse", shape, read_full, reader)
 
 
 def make_texts(texts) -> np.ndarray:

@@ -67,14 +67,15 @@ def _read_matlab_class(item) -> str:
     return name.decode("latin-1") if isinstance(name, bytes) else ""
 
 
-def _make_array(path, kind: str, shape: tuple, read: Callable) -> Array:
+def _make_array(path, kind: str, shape: tuple, reader: Callable) -> Array:
     """Make an array whose values are read when they are first requested."""
 
-    def values():
+    def read_values():
+        """Read the values; refuse damaged ones."""
         with _refuse_damage(path):
-            return read()
+            return reader()
 
-    return Array(kind, shape, values)
+    return Array(kind, shape, read_values)
 
 
 def _read_dataset(path, dataset) -> Array | None:
@@ -93,14 +94,18 @@ def _read_dataset(path, dataset) -> Array | None:
     # MATLAB always writes at least two dimensions; other programs may write only one.
     shape = dataset.shape[::-1] if len(dataset.shape) > 1 else (dataset.size, 1)
 
-    def read() -> np.ndarray:
+    def read_values() -> np.ndarray:
+        """Read the dataset with the dimensions in MATLAB's order."""
         return np.asarray(dataset[()]).T.reshape(shape)
 
     if kind == "char":
         return _make_array(
-            path, "text", shape, lambda: make_texts(map(_decode_text, read().reshape(shape[0], -1)))
+            path,
+            "text",
+            shape,
+            lambda: make_texts(map(_decode_text, read_values().reshape(shape[0], -1))),
         )
-    return _make_array(path, "number", shape, lambda: read().astype(float))
+    return _make_array(path, "number", shape, lambda: read_values().astype(float))
 
 
 def _read_empty_array(path, dataset, kind: str) -> Array | None:
@@ -150,12 +155,13 @@ def _read_sparse_array(path, group) -> Array | None:
     if "data" in group and group["data"].dtype.kind not in "iufb":
         return None
 
-    def read():
+    def read_matrix():
+        """Read the sparse matrix; refuse damaged data."""
         with _refuse_damage(path):
             rows = _read_optional_values(group, "ir").astype(np.int64)
             return make_sparse(rows, starts, _read_optional_values(group, "data"), shape)
 
-    return make_sparse_array(path, shape, read)
+    return make_sparse_array(path, shape, read_matrix)
 
 
 def _read_optional_values(group, name: str) -> np.ndarray:

@@ -42,7 +42,8 @@ class StringMatrix:
     """
 
     def __init__(self, path, shape: tuple, number: np.dtype):
-        rows, columns = abs(shape[0]), shape[1]
+        rows = abs(shape[0])
+        columns = shape[1]
         if rows > MAX_ROWS or not 0 <= columns <= MAX_ROWS:
             raise ValueError(f"the header announces {rows} rows and {columns} columns")
         self.path = path
@@ -105,11 +106,11 @@ def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
     record_header = struct.Struct(f"{order}3{integer}")
     matrices = {}
     matrix = None
-    at = 0
-    while at < len(data):
-        (size,) = struct.unpack_from(order + "i", data, at)
-        record = data[at + 4 : at + 4 + size]
-        at += 8 + size
+    offset = 0
+    while offset < len(data):
+        (size,) = struct.unpack_from(order + "i", data, offset)
+        record = data[offset + 4 : offset + 4 + size]
+        offset += 8 + size
         if size < 0 or len(record) < size or size % word:
             raise ValueError("it is cut off")
         if matrix is None:
@@ -152,34 +153,34 @@ def _read_binary(path, data: bytes) -> dict[str, StringMatrix]:
 def _read_text(path, data: bytes) -> dict[str, StringMatrix]:
     lines = [line.rstrip() for line in data.split(b"\n") if line.strip()]
     matrices = {}
-    at = 0
-    while at < len(lines):
-        columns, rows, _, number_type = _parse_integers(lines[at], 4)
+    index = 0
+    while index < len(lines):
+        columns, rows, _, number_type = _parse_integers(lines[index], 4)
         _count_words_per_number(number_type)
-        name = lines[at][32:40].decode("ascii").strip()
-        number_format = re.search(rb"[ED](\d+)\.", lines[at][40:])
+        name = lines[index][32:40].decode("ascii").strip()
+        number_format = re.search(rb"[ED](\d+)\.", lines[index][40:])
         number = np.dtype(("S", int(number_format[1]) if number_format else WIDE_FIELD_CHARACTERS))
         matrix = matrices.setdefault(name, StringMatrix(path, (rows, columns), number))
         header_words = 2 if rows < 0 else 1
-        at += 1
+        index += 1
         while True:
-            column, row, _ = _parse_integers(lines[at], 3)
-            at += 1
+            column, row, _ = _parse_integers(lines[index], 3)
+            index += 1
             if column > columns:
-                at = _find_numbers_end(lines, at)
+                index = _find_numbers_end(lines, index)
                 break
             if row:
-                end = _find_numbers_end(lines, at)
+                end = _find_numbers_end(lines, index)
                 matrix.places.append((column, row))
-                matrix.strings.append(_join_numbers(lines[at:end]))
-                at = end
+                matrix.strings.append(_join_numbers(lines[index:end]))
+                index = end
                 continue
-            while at < len(lines) and len(header := lines[at].split()) == header_words:
+            while index < len(lines) and len(header := lines[index].split()) == header_words:
                 first_row = int(header[1]) if header_words == 2 else int(header[0]) % ROW_FACTOR
-                end = _find_numbers_end(lines, at + 1)
+                end = _find_numbers_end(lines, index + 1)
                 matrix.places.append((column, first_row))
-                matrix.strings.append(_join_numbers(lines[at + 1 : end]))
-                at = end
+                matrix.strings.append(_join_numbers(lines[index + 1 : end]))
+                index = end
     return matrices
 
 
@@ -193,11 +194,11 @@ def _parse_integers(line: bytes, count: int) -> list[int]:
     return [int(line[8 * k : 8 * k + 8]) for k in range(count)]
 
 
-def _find_numbers_end(lines: list, at: int) -> int:
+def _find_numbers_end(lines: list, index: int) -> int:
     """Return the index of the first line after a block of numbers, which have decimal points."""
-    while at < len(lines) and b"." in lines[at][:16]:
-        at += 1
-    return at
+    while index < len(lines) and b"." in lines[index][:16]:
+        index += 1
+    return index
 
 
 class DmigColumn(NamedTuple):

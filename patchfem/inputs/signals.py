@@ -61,7 +61,8 @@ def read_signal(path, quantity: str) -> tuple:
             FILE_REMEDY,
         )
         values = read_columns(path, table).values
-        time, value = values["time"], values[quantity]
+        time = values["time"]
+        value = values[quantity]
         require_increasing_time(path, time)
     if not np.any(value):
         raise PatchfemError(f"{path}: {quantity} is 0 in every row, so nothing moves")

@@ -6,6 +6,7 @@ imported only if a scene names such a file, because the imports are half of the 
 """
 
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from ..effects import find_waveform
 from ..exceptions import PatchfemError
@@ -62,12 +63,12 @@ def find_file_faults(
         path = folder / file
         if not file_exists(path):
             continue
-        prefix, own_key, own_tables = _select_interface(key, tables)
+        checked = _select_interface(key, tables)
         try:
-            sentences = FILE_CHECKS[own_key](path, own_tables, is_valid) or ()
+            sentences = FILE_CHECKS[checked.key](path, checked.tables, is_valid=is_valid) or ()
         except PatchfemError as error:
-            fault_key = prefix + (error.key or own_key)
-            found.append((fault_key, str(error).removeprefix(f"{own_key}: ")))
+            fault_key = checked.prefix + (error.key or checked.key)
+            found.append((fault_key, str(error).removeprefix(f"{checked.key}: ")))
             continue
         if notes is not None:
             notes += [sentence.replace(str(path), path.name) for sentence in sentences]
@@ -76,18 +77,27 @@ def find_file_faults(
     return _check_reduction(tables, folder)
 
 
-def _select_interface(key: str, tables) -> tuple:
-    """Return the arguments with which a reader checks the file of a key.
+class _FileKey(NamedTuple):
+    """Key of a file as its check expects it.
 
-    For the patch of an interface: the prefix of its keys, its key in [contact], and tables with its
-    [contact]. For any other file: "", the key and the tables as they are.
+    - prefix: prefix of the keys of an interface, "" for any other file.
+    - key: key of the file; for the patch of an interface, its key in [contact].
+    - tables: tables of the scene; for the patch of an interface, with its [contact].
     """
+
+    prefix: str
+    key: str
+    tables: Any
+
+
+def _select_interface(key: str, tables) -> _FileKey:
+    """Return the key of a file as its check expects it, with the tables of its interface."""
     prefix, separator, name = key.partition(".contact.")
     if not separator:
-        return "", key, tables
+        return _FileKey("", key, tables)
     interface = tables.structure.interface[int(prefix.rpartition(".")[2])]
     own_tables = tables.model_copy(update={"contact": interface.contact})
-    return f"{prefix}.", f"contact.{name}", own_tables
+    return _FileKey(f"{prefix}.", f"contact.{name}", own_tables)
 
 
 def _check_reduction(tables, folder: Path) -> list:
@@ -103,7 +113,7 @@ def _check_reduction(tables, folder: Path) -> list:
     return []
 
 
-def _check_mesh(path: Path, tables, is_valid: bool) -> None:
+def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
     """Read a mesh, or the start of a large one."""
     starts = MESH_STARTS.get(path.suffix)
     if starts is None or path.stat().st_size <= MAX_FULLY_READ_MESH_BYTES:
@@ -117,7 +127,7 @@ def _check_mesh(path: Path, tables, is_valid: bool) -> None:
             )
 
 
-def _check_profile(path: Path, tables, is_valid: bool) -> tuple:
+def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple:
     """Check that a trace covers the interface and is not too fine; return notes on it."""
     import numpy as np
 
@@ -140,14 +150,14 @@ def _check_profile(path: Path, tables, is_valid: bool) -> tuple:
     return notes
 
 
-def _check_slide(path: Path, tables, is_valid: bool) -> None:
+def _check_slide(path: Path, tables, *, is_valid: bool) -> None:
     """Check that the law and the contact can follow a path, including lateral motion."""
     has_lateral = len(slide.read_path_file(path)) == 3
     if is_valid and has_lateral and (reason := limits.find_lateral_slide_obstacle(tables)):
         raise PatchfemError(reason)
 
 
-def _check_drive(path: Path, tables, is_valid: bool) -> None:
+def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
     """Check the file of a recorded drive or of its spectrum by reading it."""
     if find_waveform(tables.drive).is_random:
         drive.signals.read_spectrum(path)
@@ -155,7 +165,7 @@ def _check_drive(path: Path, tables, is_valid: bool) -> None:
         drive.read_drive_file(path, tables.drive.kind)
 
 
-def _check_structure(path: Path, tables, is_valid: bool) -> None:
+def _check_structure(path: Path, tables, *, is_valid: bool) -> None:
     """Check structure.file: build the modes of arrays, but do not fit those of responses."""
     if structure_files.is_universal_file(path) or not is_valid:
         structure_files.read_content(path)
@@ -166,25 +176,22 @@ def _check_structure(path: Path, tables, is_valid: bool) -> None:
 
 def _make_matrix_check(key: str):
     """Return the function that checks the file of one matrix of [structure.reduced]."""
-    return lambda path, tables, is_valid: structure_reduced.check_matrix(path, key)
+    return lambda path, tables, *, is_valid: structure_reduced.check_matrix(path, key)
 
 
-def _check_measured(path: Path, tables, is_valid: bool) -> None:
+def _check_measured(path: Path, tables, *, is_valid: bool) -> None:
     """Check a table of measured responses by reading it."""
     measured.read_table(path)
 
 
-def _check_wear_start(path: Path, tables, is_valid: bool) -> tuple:
+def _check_wear_start(path: Path, tables, *, is_valid: bool) -> tuple:
     """Check that the pieces are those of the earlier run; return a note on the worn depth."""
-    start = (
-        earlier_wear.read_earlier_wear(path, tables)
-        if is_valid
-        else earlier_wear.read_end_state(path)
-    )
-    return (start.sentence,)
+    if is_valid:
+        return (earlier_wear.read_earlier_wear(path, tables).sentence,)
+    return (earlier_wear.read_end_state(path).sentence,)
 
 
-def _check_asperities(path: Path, tables, is_valid: bool) -> None:
+def _check_asperities(path: Path, tables, *, is_valid: bool) -> None:
     """Check that a rough surface can have the peaks of a trace."""
     cutoff = None
     if is_valid:

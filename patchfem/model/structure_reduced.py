@@ -211,9 +211,21 @@ def _note_rounding(files: tuple, aligned: list, stiffness, unit: float, shape) -
 
 
 def check_reduction(folder: Path, table, *, is_base_driven: bool) -> None:
-    """Raise PatchfemError if matrices, boundary or moved coordinates cannot be used.
+    """Check matrices, boundary and moved coordinates; nothing is reduced.
 
-    Nothing is reduced.
+    Parameters
+    ----------
+    folder : Path
+        Folder of the scene.
+    table : Reduced
+        Table [structure.reduced].
+    is_base_driven : bool
+        Whether the base moves.
+
+    Raises
+    ------
+    PatchfemError
+        If they cannot be used.
     """
     files = _find_files(table, folder.__truediv__)
     matrix_list = [_read_matrix(file) for file in files]

@@ -33,7 +33,7 @@ from .keys.types import (
 )
 from .reader import read_set_value
 
-LENGTH_KEY = "drive.displacement"  # a key that holds a length, for `read_lengths`
+LENGTH_KEY = "drive.displacement"  # key of a length, whose values `read_lengths` reads
 # values of one range; more would fill the memory with the cases of a sweep
 MAX_RANGE_VALUES = 10_000_000
 # ratio of the ends; a range of positive numbers with at least this ratio is logarithmic by default

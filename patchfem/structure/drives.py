@@ -60,7 +60,21 @@ class PiecewiseDrive:
 
 
 def make_step(acceleration: float, period: float, *, moving: bool = True) -> PiecewiseDrive:
-    """Build a drive that is constant [m s-2] from t = 0 on; `period` [s] is that of the cycle."""
+    """Build a drive that is constant from t = 0 on.
+
+    Parameters
+    ----------
+    acceleration : float
+        Acceleration [m s-2].
+    period : float
+        Period of a cycle [s].
+    moving : bool
+        Whether the base accelerates.
+
+    Returns
+    -------
+    PiecewiseDrive
+    """
     return PiecewiseDrive((DriveSegment(0.0, acceleration),), period, moving)
 
 

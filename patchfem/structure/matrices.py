@@ -164,7 +164,20 @@ def decouple_modes(rows) -> tuple:
 
 
 def trim_round_off(matrix, scale, round_off: float = ENTRY_TOL) -> np.ndarray:
-    """Make a matrix (n, n) symmetric and zero entries that are round-off of a scale (n, n)."""
+    """Make a matrix symmetric and set entries that are round-off to zero.
+
+    Parameters
+    ----------
+    matrix : (n, n) array_like
+    scale : (n, n) array_like
+        Size of each entry.
+    round_off : float
+        Fraction of the scale up to which an entry is round-off.
+
+    Returns
+    -------
+    (n, n) ndarray
+    """
     matrix = (matrix + matrix.T) / 2
     return np.where(np.abs(matrix) <= round_off * scale, 0.0, matrix)
 

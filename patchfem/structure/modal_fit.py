@@ -84,6 +84,19 @@ class FittedPoles(NamedTuple):
         return np.log(np.concatenate([self.w, self.zeta]))
 
 
+class Residues(NamedTuple):
+    """Residues of the modes and of the modes outside the measured range.
+
+    - modes: residues A (n, p) of the modes.
+    - lower: residues L (p,) of the modes below the range.
+    - upper: residues U (p,) of the modes above the range.
+    """
+
+    modes: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+
+
 class ModalFit:
     """Separable least-squares problem of modes in frequency responses.
 
@@ -216,11 +229,11 @@ class ModalFit:
         modes = _join_complex(linear.columns.design[:, :n]) / self.weight[:, None]
         return modes[:, :, None] * linear.coefficients[None, :n]
 
-    def residues(self, theta) -> tuple:
-        """Compute the residues A (n, p), L (p,) and U (p,), in units of the receptance."""
+    def compute_residues(self, theta) -> Residues:
+        """Compute the residues in units of the receptance."""
         linear = self.solve(theta)
         unscaled = linear.coefficients / linear.columns.scale[:, None] * self.size
-        return unscaled[:-2], unscaled[-2] * self.max_omega**2, unscaled[-1]
+        return Residues(unscaled[:-2], unscaled[-2] * self.max_omega**2, unscaled[-1])
 
 
 def _stack_real(values):
@@ -235,7 +248,16 @@ def _join_complex(stacked):
 
 
 def fit_poles(omega, data, power) -> FittedPoles:
-    """Find the poles of frequency responses; the parameters are those of `ModalFit`.
+    """Find the poles of frequency responses.
+
+    Parameters
+    ----------
+    omega, data, power
+        As for `ModalFit`.
+
+    Returns
+    -------
+    FittedPoles
 
     Raises
     ------
@@ -411,7 +433,7 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
     power = np.array([measured[place, reference][1] for place in places])
     poles = fit_poles(omega, data[:, is_moving], power[is_moving])
     residues = np.zeros((poles.w.size, len(places)))
-    residues[:, is_moving] = poles.fit.residues(poles.theta)[0]
+    residues[:, is_moving] = poles.fit.compute_residues(poles.theta).modes
     is_inside = (poles.w >= omega[0]) & (poles.w <= omega[-1])
     w = poles.w[is_inside]
     zeta = poles.zeta[is_inside]
@@ -456,7 +478,7 @@ def _note_modes_below(poles: FittedPoles, first_response) -> list:
     """Return a note if modes below the band make up 20 % of the first responses (p,)."""
     fit = poles.fit
     lowest = fit.omega[0]
-    lower_residual = fit.residues(poles.theta)[1] / lowest**2 * np.abs(fit.derivative[0])
+    lower_residual = fit.compute_residues(poles.theta).lower / lowest**2 * np.abs(fit.derivative[0])
     fraction = np.linalg.norm(lower_residual) / np.linalg.norm(first_response)
     if fraction < 0.2:
         return []

@@ -39,7 +39,7 @@ def test_exact_modes_from_exact_responses(name, power):
     np.testing.assert_allclose(poles.w / (2 * np.pi), f, rtol=1e-9)
     np.testing.assert_allclose(poles.zeta, zeta, rtol=1e-6)
     fit = poles.fit
-    A, below, above = fit.residues(poles.theta)
+    A, below, above = fit.compute_residues(poles.theta)
     np.testing.assert_allclose(A, (shape * shape[0]).T, atol=1e-6 * np.abs(shape * shape[0]).max())
     assert (
         np.abs(below).max() < 1e-6 * np.abs(A).max()
@@ -59,7 +59,7 @@ def test_always_noise_of_one_per_cent_moves_them_little(name, absolute):
     assert poles.w.size == len(f)
     np.testing.assert_allclose(poles.w / (2 * np.pi), f, rtol=2e-4)
     np.testing.assert_allclose(poles.zeta, zeta, rtol=0.05)
-    residues = poles.fit.residues(poles.theta)[0]
+    residues = poles.fit.compute_residues(poles.theta).modes
     want = (shape * shape[0]).T
     assert np.all(np.abs(residues - want) < 0.07 * np.abs(want).max(axis=1, keepdims=True))
 

@@ -99,7 +99,16 @@ def make_unsupported_rule(condition: Callable, key: str, feature: str, instead: 
 
 
 def apply_rules(draft: SceneDraft, rules: Iterable[Rule], facts: Any) -> None:
-    """Report every row of a table of rules whose condition holds."""
+    """Report every row of a table of rules whose condition holds.
+
+    Parameters
+    ----------
+    draft : SceneDraft
+        Receives the reports.
+    rules : iterable of Rule
+    facts : mapping
+        Argument of the conditions, and values of the names in braces.
+    """
     for rule in rules:
         if rule.condition(facts):
             rule.report(draft, rule.key.format_map(facts), rule.sentence.format_map(facts))
