@@ -488,7 +488,7 @@ def backbone(
     >>> found["quasi_static_frequency"].size
     5
     """
-    model = joint.without_joint(build(scene, **sets))
+    model = joint.remove_joint(build(scene, **sets))
     is_all = _require_text(method, "backbone: method") == "all"
     methods = backbones.METHODS if is_all else (method,)
     if unknown := set(methods) - set(backbones.METHODS):

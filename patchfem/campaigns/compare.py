@@ -12,7 +12,7 @@ import numpy as np
 from ..core import Measure, NotConverged, PatchfemError
 from ..model.model import Model
 from ..runs.plan import plan
-from ..runs.results.result import surface_of
+from ..runs.results.result import patch_surface
 from ..runs.run import run
 
 COMPARED_MEASURES = {  # by measure: its text in a sentence, and what a scene needs for it
@@ -141,7 +141,7 @@ def run_both_surfaces(
 def _side(model: Model, say) -> SurfaceResult:
     """Run a model and return its results."""
     result = run(plan(model), say)
-    outcome, surface = result.outcome, surface_of(result.patch, result.fields)
+    outcome, surface = result.outcome, patch_surface(result.patch, result.fields)
     return SurfaceResult(
         dict(result.measures),
         str(outcome),

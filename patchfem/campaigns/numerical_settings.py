@@ -171,7 +171,7 @@ def _middle(model: Model, knob: str) -> int:
     if knob != "steps_per_cycle":
         return _scene_value(model, knob) or DEFAULT_MIDDLES[knob]
     if model.kind == "bench":
-        return engine.steps_of(model)
+        return engine.steps_per_cycle(model)
 
     return numerics.choose(model).steps
 

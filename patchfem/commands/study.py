@@ -109,7 +109,7 @@ def backbone(
 
     Example: patchfem backbone rig.toml --mode axial --amplitudes "0.1 um..1 mm:25"
     """
-    found = joint.without_joint(model_of(scene, set_))
+    found = joint.remove_joint(model_of(scene, set_))
     ways = backbones.METHODS if method == ALL else (method,)
     lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = placed(out, f"{found.source.path.stem}-backbone")

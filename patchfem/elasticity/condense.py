@@ -61,7 +61,7 @@ class CondensedGrid:
     - ``inner_factor``: factors of the inner nodes of the grid, or of its right half if `is_mirrored`
     - ``kept_factors``: factors of the kept nodes: one, or one for even and one for odd motion
     - ``is_mirrored``: whether the grid is mirror-symmetric in x
-    - ``rounding``: relative error of the compliance due to round-off. If it is not 0, solutions take
+    - ``round_off_error``: relative error of the compliance due to round-off. If it is not 0, solutions take
       one step of iterative refinement.
     """
 

@@ -29,7 +29,7 @@ class Substructure:
     A piece whose compliance is in the disk cache is never assembled.
 
     - ``mesh``, ``layers``: cells and materials
-    - ``computed``: cached results: order, factor and rounding
+    - ``computed``: cached results: order, factor and round_off_error
     """
 
     mesh: PieceMesh
@@ -52,7 +52,7 @@ class Substructure:
     @property
     def round_off_error(self) -> float:
         """Relative round-off error of the compliance [1]; 0 before the piece is factorised."""
-        return self.computed.get("rounding", 0.0)
+        return self.computed.get("round_off_error", 0.0)
 
     def solve(self, load) -> np.ndarray:
         """Return displacements (frames, N, 2) [m] under interface loads (m, 2, frames) [N/m]."""

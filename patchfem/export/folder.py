@@ -9,7 +9,7 @@ from typing import NamedTuple
 from .. import __version__
 from ..core import Missing, NotConverged, PatchfemError
 from ..disk.atomic_write import write_text
-from ..runs.results.result import Result, without_folders
+from ..runs.results.result import Result, shorten_file_names
 from ..runs.run import StateFile, marches, run
 from . import netcdf, report
 from .fields import bodies as body_fields
@@ -87,7 +87,7 @@ def _partial_result(error: NotConverged) -> Result:
     found = error.partial_result
     return replace(
         found,
-        warnings=[*without_folders([str(error)], found.plan.model.source.path), *found.warnings],
+        warnings=[*shorten_file_names([str(error)], found.plan.model.source.path), *found.warnings],
     )
 
 

@@ -6,7 +6,7 @@ from ..model import structure
 from ..response.events import KIND_NAMES
 from ..response.levels import LEVEL_MEASURES
 from ..response.rows import TABLE
-from ..runs.results.result import Result, surface_of
+from ..runs.results.result import Result, patch_surface
 from . import netcdf
 from .summary import summary_of, versions
 
@@ -20,7 +20,7 @@ def contents(result: Result) -> netcdf.Contents:
     """
     found, modal = histories(result)
     patch, extra = result.patch, result.extra
-    surface = surface_of(patch, result.fields)
+    surface = patch_surface(patch, result.fields)
     x, weight = (surface.x, surface.weight) if surface is not None else (None, None)
     fields = {k: v for k, v in result.fields.items() if not k.startswith("holder_")}
     strips = (

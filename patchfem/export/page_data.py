@@ -9,7 +9,7 @@ import numpy as np
 from ..core import PatchfemError, SineDrive
 from ..inputs import loops, measured
 from ..response import spectrum
-from ..runs.results.result import Result, surface_of
+from ..runs.results.result import Result, patch_surface
 from ..structure.drive_sizes import find_max_acceleration
 from .histories import largest_multiplier
 from .pages.driven import describe_drive, run_command
@@ -256,7 +256,7 @@ def _patch(result: Result) -> PressedPatch:
         fields = {name: rows[count:] for name, rows in fields.items()}
         fields["time"] = fields["time"] - fields["time"][0]
     return PressedPatch(
-        surface_of(result.patch, result.fields).x,
+        patch_surface(result.patch, result.fields).x,
         result.plan.model.patch.pieces.width,
         fields,
         faces,

@@ -219,7 +219,7 @@ def contact_of(result: Result) -> dict:
         return {}
     found = patch.stretches
     if found is None:
-        found = values.stretches_of(patch, values.contact_ends(patch))
+        found = values.contact_intervals(patch, values.contact_ends(patch))
     return {
         "contact": {
             "from": float(patch.x[0]),

@@ -44,7 +44,7 @@ def judge_outcome(
     """Return the outcome of a run, and its measures with the steady estimate if there is one.
 
     - Periodic drive, and the last level of a drive in levels: the amplitudes of successive windows
-      decide (`classify`), and the free motion that remains in them (`left_over`). A motion that is
+      decide (`classify_periodic`), and the free motion that remains in them (`remaining_free_motion`). A motion that is
       steady to the tolerance, but will still change by more than ESTIMATE_TOL of it, has a steady estimate
       as well. If a bounded motion is known to exist (`raw.bounded`), an increasing amplitude is not
       GROWS.
@@ -219,7 +219,7 @@ def classify_periodic(
     window : int
         Cycles of a window.
     steady : tuple
-        Values and errors (n,) [m] of `steady_amplitudes`; NaN for none.
+        Values and errors (n,) [m] of `settling.extrapolate_steady_amplitudes`; NaN for none.
     limits : tuple
         Tolerance, floor [m], and decay of the slowest mode over a window [1]; numbers or (n,).
     bounded : bool or (n,)
@@ -367,7 +367,7 @@ def warn_if_ringing(raw, measures: dict, limits: tuple, drive, cycles: float) ->
 def remaining_ringing(extremes, window: int, decay):
     """Return how much of the amplitude of stuck motions is free vibration [m], (...).
 
-    It is `left_over`, but not less than the change of the last window.
+    It is `remaining_free_motion`, but not less than the change of the last window.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ FIRST_ORDER = (
     "loaded_fraction",
 )
 # measures that come from samples, for any number of harmonics
-SAMPLED = (
+SAMPLED_MEASURES = (
     "stick_fraction",
     "slip_start_phase",
 )
@@ -107,8 +107,11 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
     moving = {name: times for name, times in excess.items() if name not in pressed}
     warnings = []
     if has_faces:
-        warnings = faces.together(
-            model, lambda face: tolerance_warnings(_finding_of(found, face), face.patches[1:])
+        warnings = faces.merge_sentences(
+            model,
+            lambda face: tolerance_warnings(
+                _select_interface_measures(found, face), face.patches[1:]
+            ),
         )
     elif static:
         at_rest, meshes = found, coarse
@@ -124,7 +127,7 @@ def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
     return warnings
 
 
-def _finding_of(found: Finding, face) -> Finding:
+def _select_interface_measures(found: Finding, face) -> Finding:
     """Return the static measures of the patch of an interface, without numbers in their names."""
     numbered = {
         name: found.measures.get(rows.add_interface_number(name, face.number))
@@ -274,8 +277,10 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
     if cause == "mesh" and found.patch is not None:
         return _mesh_remedy(model, [(found, coarse)])
     if cause == "mesh":
-        soft = [face for face in faces.faces_of(model) if face.partial_slip]
-        return _mesh_remedy(model, [(_finding_of(found, face), face.patches[1:]) for face in soft])
+        soft = [face for face in faces.press_faces(model) if face.partial_slip]
+        return _mesh_remedy(
+            model, [(_select_interface_measures(found, face), face.patches[1:]) for face in soft]
+        )
     if cause == "reduced":  # the error falls with the square of the number of modes
         ratio = min(max(2.0, excess[name] ** 0.5), 16.0)
         n_modes = ceil(model.rig.modes.omega.size * ratio)
@@ -294,7 +299,7 @@ def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
         return f"set accuracy.tolerance = {proposed:.3g} to refine the sum over bonds"
     if name == STEADY:  # the transient decays in a longer run
         return "more drive cycles make this value more accurate; raise drive.cycles"
-    if extra.get("harmonics") is None or name.startswith(SAMPLED):
+    if extra.get("harmonics") is None or name.startswith(SAMPLED_MEASURES):
         return NO_REMEDY
     return notes.more_harmonics(extra["harmonics"], _harmonics_of_friction(found))
 

@@ -17,7 +17,7 @@ from .patch import result as patch_result
 from .patch.jenkins_elements import elements, strip_elements
 
 
-def without_joint(model: Model, patch=None) -> Model:
+def remove_joint(model: Model, patch=None) -> Model:
     """Return the model with the modes without the joint; any other model unchanged.
 
     Parameters

@@ -10,9 +10,9 @@ from pathlib import Path
 from ..core import Missing
 from .cost import CODE_TO_COMPILE
 
-MAPPED = 60e6  # bytes of address space of the packages in addition to the memory in use
+MAPPED_BYTES = 60e6  # bytes of address space of the packages in addition to the memory in use
 CODE = 150e6  # bytes of address space of the compiler library
-NAMED = 0.3  # fraction of the memory from which a plan names the largest part
+MIN_NAMED_FRACTION = 0.3  # fraction of the memory from which a plan names the largest part
 CURES = {
     "contact.element_size": "make contact.element_size larger",
     "contact.mesh": "give contact.mesh fewer nodes on the interface",
@@ -29,7 +29,7 @@ def describe_largest_part(parts: tuple) -> str:
     It is "" if this part is small.
     """
     most = next((part for part in parts if part.key), None)
-    if most is None or most.bytes < NAMED * sum(part.bytes for part in parts):
+    if most is None or most.bytes < MIN_NAMED_FRACTION * sum(part.bytes for part in parts):
         return ""
     return (
         f"{most.bytes / 1e6:.0f} MB of the memory are for {most.what}; {most.key} sets their size"
@@ -43,7 +43,7 @@ def free_bytes(compiled: bool = False) -> float:
     whether the compiler library is needed as well, which counts for address space only.
     """
     used, mapped = process_bytes()
-    beside = mapped - used + MAPPED + (CODE if compiled else 0.0)
+    beside = mapped - used + MAPPED_BYTES + (CODE if compiled else 0.0)
     return min(
         _available() + used, free_in_control_group(used), *(limit - beside for limit in _limits())
     )
@@ -117,13 +117,13 @@ def free_in_control_group(
         )
         place = base / path.strip("/")
         for folder in (place, *place.parents):
-            free = min(free, _left(folder, *names) + used)
+            free = min(free, _remaining_bytes(folder, *names) + used)
             if folder == base:
                 break
     return free
 
 
-def _left(folder: Path, limit: str, usage: str) -> float:
+def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
     """Return limit minus usage of one group [bytes]; inf without a limit.
 
     Inactive cached files count as free.

@@ -29,7 +29,7 @@ from .wear import plan as of_wear
 PACKAGES = 80e6  # bytes of the packages that every run imports
 LONGEST = 1e6  # CPU seconds (twelve days) above which no run is started
 # engines that skip the cycles of a periodic motion, and number of cycles from which a plan says so
-SKIPS, MANY = (
+SKIPS, MIN_SKIPPED_CYCLES = (
     ("march", "exact", "piecewise"),
     100,
 )
@@ -131,7 +131,7 @@ class Plan:
 
     def modes(self, chain: dict) -> list:
         """Return name, free and stuck frequency [Hz] of each mode for a chain; [] without a rig."""
-        return of_rig.modes_of(self.model.rig, chain) if self.model.rig is not None else []
+        return of_rig.mode_frequencies(self.model.rig, chain) if self.model.rig is not None else []
 
     def as_json(self) -> dict:
         """Return the plan as the object that `patchfem plan --json` prints."""
@@ -191,7 +191,7 @@ def _make_plan(model: Model, per_point: bool) -> Plan:
     if model.rig is not None and model.rig.structure.without_joint is not None:
         model = replace(
             model,
-            rig=of_rig.without_expected_joint(
+            rig=of_rig.remove_expected_joint(
                 model.rig, patch_plan.chain(model.patch) | _link(model)
             ),
         )
@@ -199,7 +199,7 @@ def _make_plan(model: Model, per_point: bool) -> Plan:
     if model.rig is not None:
         chain = of_rig.chain(model.rig) | chain
         groups |= of_rig.groups(model) if model.kind == "rig" else {}
-        on_motion += engines.unused_settings(model, engines.engine_of(model, per_point).name)
+        on_motion += engines.unused_settings(model, engines.choose_engine(model, per_point).name)
     if model.patch is not None:
         chain |= patch_plan.chain(model.patch)
         groups |= patch_plan.groups(model)
@@ -225,7 +225,7 @@ def _make_plan(model: Model, per_point: bool) -> Plan:
     if (
         cost.engine in SKIPS
         and drive_sizes.is_sinusoidal(model.rig.drive.signal)
-        and model.rig.drive.cycles >= MANY
+        and model.rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
         on_law.append(UP_TO)
     foreseen = foresee_tolerance(model)

@@ -24,7 +24,7 @@ from .patch import faces, strength
 from .patch import result as patch_result
 from .plan import Plan, compiled_kind, plan, refuse_size
 from .results.patch_rows import unknown_measures
-from .results.result import Result, with_meanings, without_folders
+from .results.result import Result, shorten_file_names, with_meanings
 from .rig import engines
 from .self_checks.checks import with_self_checks
 from .wear import evolve, measures
@@ -117,7 +117,7 @@ def _run(
             )
         seconds["contact"] = perf_counter() - begin
         if model.rig is not None and model.rig.structure.without_joint is not None:
-            model = joint.without_joint(model, patch)
+            model = joint.remove_joint(model, patch)
             what = replace(what, model=model)
         warnings += patch_result.warn_of_strains(model.patch, patch)
         if estimate and coarse[0] is None:
@@ -134,8 +134,8 @@ def _run(
     if model.has_interface_patches:
         if fresh:
             faces.condense_again(model)
-        warnings += faces.warnings_of(model)
-        notes += faces.notes_of(model)
+        warnings += faces.collect_warnings(model)
+        notes += faces.collect_notes(model)
         seconds["contact"] = perf_counter() - begin
     if patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT and model.kind != "patch":
         warnings.append("no friction acts and no motion was computed")
@@ -224,7 +224,7 @@ def _complete_result(
         Finding(model, result.measures, result.patch, result.extra, climbed), coarse, still
     )
     warned, noted = result.warnings + wide, [*notes, *result.extra.get("notes", [])]
-    warned, noted = (without_folders(texts, model.source.path) for texts in (warned, noted))
+    warned, noted = (shorten_file_names(texts, model.source.path) for texts in (warned, noted))
     faces = _yielding_faces(result)
     noted += faces.values()
     outcome = result.outcome

@@ -104,7 +104,7 @@ def foresee_tolerance(model: Model) -> Forecast:
     return Forecast(tolerance, tuple(cause for cause in causes if cause is not None))
 
 
-def _without(model: Model, **keys) -> Model:
+def _replace_accuracy(model: Model, **keys) -> Model:
     """Return a model with some values of its section [accuracy] replaced."""
     return replace(model, accuracy=model.accuracy.model_copy(update=keys))
 
@@ -129,7 +129,7 @@ def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
     ):
         cure["contact.element_size"] = None
     if model.kind == "rig":
-        cure |= _steps_cure(_without(model, tolerance=SAFE_TOLERANCE))
+        cure |= _steps_cure(_replace_accuracy(model, tolerance=SAFE_TOLERANCE))
     return Cause(f"by any mesh: the finest one leaves errors of about {finest:g} or more", cure)
 
 
@@ -152,7 +152,7 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
 
 def _rig_steps_cause(model: Model) -> Cause | None:
     """Return the Cause if a rig has too few time steps."""
-    engine = engines.engine_of(model)
+    engine = engines.choose_engine(model)
     if not engine.in_time(model, numerics.choose(model), None) or engine is engines.SMOOTH:
         return None
     steps, wanted = numerics.choose(model).steps, costs.steps_wanted(model)
@@ -173,7 +173,7 @@ def _steps_cure(model: Model) -> dict:
     They select an engine without steps if there is one, else more steps; {} if there are enough.
     """
     accuracy = model.accuracy
-    free = engines.engine_of(_without(model, method="auto", steps_per_cycle=None))
+    free = engines.choose_engine(_replace_accuracy(model, method="auto", steps_per_cycle=None))
     if free.name in STEPLESS:
         dropped = {"accuracy.steps_per_cycle": None} if accuracy.steps_per_cycle is not None else {}
         return dropped | ({"accuracy.method": None} if accuracy.method != "auto" else {})
@@ -216,10 +216,10 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
         not pinned
         or model.friction is None
         or not law_has_trait(model.friction.law, "bonds")
-        or engines.engine_of(model).name != engines.MARCH.name
+        or engines.choose_engine(model).name != engines.MARCH.name
     ):
         return None
-    if lists.quadrature_of(model, numerics.choose(model)).error <= tolerance:
+    if lists.choose_quadrature(model, numerics.choose(model)).error <= tolerance:
         return None
     return Cause(f"with {' and '.join(pinned)} as given", dict.fromkeys(pinned))
 
@@ -231,8 +231,8 @@ def _bench_steps_cause(model: Model) -> Cause | None:
     ):
         return None  # a law without memory has a closed form
     steps, wanted = (
-        bench_engine.steps_of(model),
-        bench_engine.steps_of(_without(model, steps_per_cycle=None)),
+        bench_engine.steps_per_cycle(model),
+        bench_engine.steps_per_cycle(_replace_accuracy(model, steps_per_cycle=None)),
     )
     if steps > FEWER_STEPS_OF_BENCH[law_has_trait(model.friction.law, "bonds")] * wanted:
         return None

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 import patchfem as pf
 from patchfem.dynamics.march.march import march, warm_up
 from patchfem.runs.patch.ladder import solve_all
-from patchfem.runs.rig.interface import contact_of
+from patchfem.runs.rig.interface import make_contact
 from patchfem.runs.rig.numerics import choose
 from patchfem.structure.drives import RecordedDrive
 
@@ -65,7 +65,7 @@ def marched(scene, drive=None, steps: int = STEPS, seconds: float | None = None)
     patch = (
         None if model.patch is None else solve_all(model.patch, model.accuracy.tolerance, False)[0]
     )
-    contact = contact_of(model, choose(model), patch)
+    contact = make_contact(model, choose(model), patch)
     # 1e-6: a whole number stays one
     cycles = int((seconds or drive.duration) / drive.period + 1e-6)
     warm_up(modes, drive, contact)

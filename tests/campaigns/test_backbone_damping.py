@@ -27,7 +27,7 @@ AMPLITUDES = np.geomspace(1e-5, 8e-3, 5)
 def rig(law: str, damping: float, other_mode: str = "", drive: str = ""):
     """A block of 0.5 kg at 100 Hz on friction of at most 30 N, as a Model."""
     drive = drive or 'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"'
-    return joint.without_joint(
+    return joint.remove_joint(
         pf.build(f"""
 [normal]
 load = "100 N"

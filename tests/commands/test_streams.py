@@ -9,7 +9,7 @@ from command_line import cli
 from scene_texts import COULOMB, PIECE, POINT, STRUCTURE
 
 from patchfem.commands.streams import plain
-from patchfem.runs.results.result import without_folders
+from patchfem.runs.results.result import shorten_file_names
 
 PATCH = PIECE + 'load = "26 lbf"\nelement_size = "0.1 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
 SCENE = 'title = "ü ± µ"\n' + POINT + COULOMB + STRUCTURE
@@ -84,7 +84,7 @@ def test_exact_results_name_no_folder_of_this_machine(tmp_path):
     assert {
         one.name for one in out.iterdir() if str(tmp_path).encode() in one.read_bytes()
     } == set()
-    assert without_folders(
+    assert shorten_file_names(
         ["/a/b c/t.csv: x is 3 m/s", "3 m/s: as it is"], tmp_path / "a.toml"
     ) == ["t.csv: x is 3 m/s", "3 m/s: as it is"]
 

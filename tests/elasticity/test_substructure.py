@@ -18,6 +18,7 @@ from patchfem.contact.gaps import crown
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, NotConverged
 from patchfem.elasticity import elasticity
+from patchfem.elasticity.condense import MAX_REFINEMENT_CHANGE
 from patchfem.elasticity.elasticity import Layers, compute_displacement
 from patchfem.elasticity.elasticity import interface_compliance as condense
 from patchfem.elasticity.recovery import centre_stress, get_cells
@@ -54,6 +55,18 @@ def test_exact_compliance_is_the_interface_block_of_the_dense_inverse(split):
         assert np.abs(mine - theirs).max() <= 1e-10 * np.abs(wanted).max()
     assert np.array_equal(nn, nn.T) and np.array_equal(tt, tt.T)
     assert np.linalg.eigvalsh(np.block([[nn, nt], [nt.T, tt]])).min() > 0
+
+
+def test_exact_compliance_of_a_stiff_coating_is_known_to_its_round_off_error():
+    """The sweep of the grid and the factors of the mesh differ by the round-off of both."""
+    layers = Layers((TITANIUM[0] * 1e5, CARBIDE[1]), TITANIUM, "strain")
+    grid = graded_grid(LENGTH, HEIGHT, LENGTH / 40, 1e-6)
+    sweep = elasticity.make_piece(grid.x, grid.depth, grid.coating_rows, layers)
+    factors = Substructure(of_grid(grid, seed=1), layers)
+    wanted, mine = condense(sweep)[0], condense(factors)[0]
+    assert 1e-12 < factors.round_off_error <= MAX_REFINEMENT_CHANGE
+    bound = 3 * (sweep.round_off_error + factors.round_off_error) * np.abs(wanted).max()
+    assert 1e-3 * bound < np.abs(mine - wanted).max() <= bound
 
 
 @settings(settings.get_profile("costly"))

@@ -201,7 +201,7 @@ def test_exact_the_coarser_curve_is_computed_near_the_peak():
     near = curves.sweep_around_peak(sweep := SweepDrive(50.0, 250.0, 10.0), curve, 140.0)
     assert (near.low, near.high, near.duration) == pytest.approx(
         (131.0, 149.0, 10.0)
-    ) and near.starts == curves.FEW
+    ) and near.starts == curves.N_START_POINTS
     back = curves.sweep_around_peak(
         SweepDrive(250.0, 50.0, 10.0), {name: each[::-1] for name, each in curve.items()}, 140.0
     )

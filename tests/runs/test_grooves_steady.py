@@ -49,7 +49,7 @@ def scene(law, *sets):
 
 def contact_of(text):
     model = build(text)
-    return model, interface.contact_of(model, choose(model), None)
+    return model, interface.make_contact(model, choose(model), None)
 
 
 def marched(text, cycles=40, steps=400):

@@ -11,7 +11,7 @@ from patchfem import run
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.core import Outcome, PatchfemError
 from patchfem.runs.patch import ladder
-from patchfem.runs.patch.grids import seconds_of
+from patchfem.runs.patch.grids import predict_condensing_seconds
 from patchfem.scene.scene import loads
 
 SIZE, WIDTH, LOAD = 12.7e-3, 12.7e-3, 115.653761996773
@@ -273,7 +273,7 @@ def test_always_an_automatic_mesh_is_found_and_stays_small(name, cheap):
     text = BLOCKS + COATING.format(250e9, 0.24, COATED[name]) if name in COATED else BLOCKS
     found = solved(*GRADED.get(name, (TILT,)), "accuracy.tolerance=1e-2", text=text)
     grids = {id(g): g for g in (found.patch.pair.grid, found.patch.pair.upper_grid)}.values()
-    assert seconds_of(grids) <= 0.15 and np.diff(found.patch.x).min() > 0
+    assert predict_condensing_seconds(grids) <= 0.15 and np.diff(found.patch.x).min() > 0
     if name in ("corner", "billionth"):  # the contact lies at the corner that the wedge closes
         assert value(found, "pressure_centre") == pytest.approx(-SIZE / 2, rel=5e-3)
 

@@ -154,7 +154,7 @@ def integrated(model, cycles: int, steps: int) -> tuple:
     steps; its patches are nodes that slip."""
     sets = []
     for one in model.rig.friction.interfaces:
-        patch = faces.patches_of(one, model.accuracy.tolerance)[0]
+        patch = faces.press_on_meshes(one, model.accuracy.tolerance)[0]
         bears, load = patch.active, patch.pressure.sigma_n * patch.pieces.interface.weight
         sets.append(
             slipping_nodes(patch.giving[np.ix_(bears, bears)], one.numbers.static * load[bears])
@@ -251,7 +251,7 @@ def test_exact_elements_of_strips_are_those_of_one_patch():
     for slide in (2e-8, 1e-7, 1e-6):
         force = [
             float(k @ np.minimum(slide, most))
-            for k, most, _ in (faces.elements_of(one, 1e-3) for one in (wide, whole))
+            for k, most, _ in (faces.make_elements(one, 1e-3) for one in (wide, whole))
         ]
         assert force[0] == pytest.approx(force[1], rel=1e-3)
 

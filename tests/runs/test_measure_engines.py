@@ -24,7 +24,7 @@ def test_always_a_value_of_another_engine_is_not_that_of_the_mesh():
     result = run(PATCH.format(1e-3))
     on_mesh, named = values(result.patch), summary_of(result)["numerics"]["measures"]
     assert named.keys() == {name for name, one in result.measures.items() if one.value is not None}
-    assert patch_rows.EXTRAPOLATED in named.values()
+    assert patch_rows.EXTRAPOLATED_SOURCE in named.values()
     for name, words in named.items():
         is_of_mesh = result.measures[name].value == on_mesh[name]
         assert (

@@ -7,7 +7,7 @@ from scene_texts import COATED, COULOMB, MODE, PLASTIC, POINT, SECOND, SHEAR, SW
 import patchfem as pf
 from patchfem.response.levels import LEVEL_MEASURES
 from patchfem.runs.rig.steady import curves
-from patchfem.runs.rig.steady.curves import SHOWN
+from patchfem.runs.rig.steady.curves import COLUMN_MEASURES
 
 STEADY = {"accuracy.method": "harmonic"}
 HARD = SWEEP.replace('"3 g"', '"6 g"').replace('"120 Hz"', '"138 Hz"')
@@ -58,7 +58,7 @@ def test_exact_a_point_of_a_curve_is_the_run_at_its_sine(law):
     drive = '[drive]\nkind = "base"\nfrequency = "{!r} Hz"\nacceleration = "6 g"\ncycles = 10\n'
     for k in (0, len(found["level"]) // 2, -1):
         run = pf.run(POINT + law + MODE + drive.format(float(found["frequency"][k])), **STEADY)
-        for column, name in SHOWN.items():
+        for column, name in COLUMN_MEASURES.items():
             assert found[column][k] == pytest.approx(run.measures[name].value, rel=1e-9), (
                 k,
                 column,

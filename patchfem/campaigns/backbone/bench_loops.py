@@ -6,7 +6,7 @@ from typing import NamedTuple
 from ...model.model import Model
 from ...model.slide import SlidePath
 from ...runs.bench import bench
-from ...runs.bench.engine import steps_of
+from ...runs.bench.engine import steps_per_cycle
 from ...runs.rig import decays
 
 FIRST_CYCLES = 3.0  # Cycles of the first loop; the last of them is read.
@@ -55,7 +55,7 @@ def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float)
     """
     path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None, None)
     alone = replace(decays.with_automatic_method(model), kind="bench", rig=None, slide=path)
-    steps = steps_of(alone)
+    steps = steps_per_cycle(alone)
     return BenchLoop(bench.run(alone, patch, steps), alone, steps)
 
 

@@ -112,7 +112,7 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
     error = np.fmax(reading.run_error, mesh_error) + reading.reading_error
     engine = ENGINES[release.numerics.engine]
     notes = [
-        *decays.without_slip_between_nodes(
+        *decays.slip_sentences(
             {"method decay": reason},
             lambda: engine.in_space(
                 release.model, release.numerics, joint.patch, joint.coarse, release.solution

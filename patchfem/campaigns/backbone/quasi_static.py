@@ -6,7 +6,7 @@ from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import quasi_static
 from ...friction.record import steady_loop
 from ...response.errors import add_errors
-from ...runs.bench.errors import errors_of
+from ...runs.bench.errors import estimate_pass_errors
 from ...runs.rig import decays
 from .bench_loops import LOOP_MEASURES, settle_loop
 from .joint import Joint
@@ -114,7 +114,7 @@ def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
     statics = quasi_static.static_motions_from_loops(
         modes, modes.interfaces[0], joint.held, slides, loops
     )
-    return decays.rows_of(modes, statics)
+    return decays.decay_rows(modes, statics)
 
 
 def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
@@ -128,7 +128,7 @@ def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
     for slide in slides:
         frequency = joint.held[0] / (2 * np.pi)
         settled = settle_loop(joint.model, joint.patch, float(slide), frequency)
-        changes = errors_of(settled.model, patches, settled.run, settled.steps)[0]
+        changes = estimate_pass_errors(settled.model, patches, settled.run, settled.steps)[0]
         measures = add_errors(settled.run.values, *changes, least=MIN_FLOOR)
         stiffness, area = (settled.run.values[name] for name in LOOP_MEASURES)
         stiffness_error, area_error = (

@@ -166,7 +166,7 @@ def model_without_joint(base: BaseScene, sets: Iterable) -> Model:
         For values that make no scene, so that a search counts them as a failed evaluation.
     """
     try:
-        return joint.without_joint(build(base.override(sets)))
+        return joint.remove_joint(build(base.override(sets)))
     except SceneError as error:
         raise PatchfemError(error.mistakes[0]) from None
 

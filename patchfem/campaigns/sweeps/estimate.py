@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core import PatchfemError
-from ...runs.batch.batches import batch_compile_seconds, batch_of
+from ...runs.batch.batches import batch_compile_seconds, choose_batch
 from ...runs.plan import plan
 from ...scene.axes import Axis
 from .case_models import SweepScene
@@ -58,7 +58,7 @@ def estimate(asked: SweepScene, cases: Cases) -> dict:
             wrong = wrong or error
     if not plans:
         raise wrong
-    batches = [batch_of(one.model, len(cases)) for one in plans]
+    batches = [choose_batch(one.model, len(cases)) for one in plans]
     once, alone = _alone(plans)
     once += RANKING_SECONDS * (cases.drawn and len(cases.axes) > 1)
     keys = [None if batch is None else batch.group(one.model) for one, batch in zip(plans, batches)]
@@ -115,10 +115,10 @@ def _alone(plans: list) -> tuple[float, list]:
     patches = [each.model.patch for each in plans]
     if None not in patches:
         from ...runs.patch.meshes import (
-            geometry_of,  # imported here, because sweeps of a point need no mesh
+            geometry_key,  # imported here, because sweeps of a point need no mesh
         )
 
-        if len({geometry_of(patch) for patch in patches}) == 1:
+        if len({geometry_key(patch) for patch in patches}) == 1:
             left_out.add("condensing")
             shared = max(cost.times["condensing"] for cost in costs)
     own = [

@@ -81,7 +81,7 @@ def warm_up(work: Work) -> None:
     Errors are ignored, because the run of the case reports them.
     """
     try:
-        batches.batch_of(
+        batches.choose_batch(
             model := work.asked.model(work.cases.sets(0)), len(work.cases)
         ) or plan.plan(model)
     except Exception:
@@ -189,7 +189,7 @@ def _least(work: Work) -> int:
     does not predict that of many.
     """
     try:
-        batch = batches.batch_of(_model(work, 0), len(work.cases))
+        batch = batches.choose_batch(_model(work, 0), len(work.cases))
     except Exception:  # The run of the case reports its error.
         return 1
     return batch.together if work.keep is None and batch is not None else 1

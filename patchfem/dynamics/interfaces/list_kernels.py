@@ -23,7 +23,7 @@ MAX_OWED_RATIO = 1e-4
 def find_mean_and_slope(dq, c, v0, dt):
     """Return the path-mean weight of a list over dq [m] and its slope [1/m].
 
-    The slope of a form other than MOMENTS is that of a mean whose force depends on the
+    The slope of a form other than FORM_MOMENTS is that of a mean whose force depends on the
     displacement alone; it may be below 0.
     """
     if c.law[LAW.form] == FORM_MOMENTS:

@@ -127,7 +127,7 @@ def find_drag_direction(way, c):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def move_points_short(c, length):
-    """Move all points by slides below MAX_SHORT bond lengths.
+    """Move all points by slides below MAX_SHORT_PATH bond lengths.
 
     Returns twice the energy dissipated [J].
     """

@@ -36,7 +36,7 @@ SLOPE = 7
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def are_slides_short(c, length):
-    """Return whether no point slides farther than MAX_SHORT bond lengths; false for nan."""
+    """Return whether no point slides farther than MAX_SHORT_PATH bond lengths; false for nan."""
     points = c.points
     near = 0.0
     for j in range(int(c.count[0])):

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...formatting import UNIT_LADDERS, choose_axis_unit, format_number, format_quantity
-from ...runs.results.patch_rows import minimum_of
+from ...runs.results.patch_rows import minimum_value
 from ..tolerance_misses import is_over_tolerance
 from ..written import label
 from . import charts
@@ -49,7 +49,7 @@ def sweep_chart(dataset, measure: str) -> dict:
     hollow = is_over_tolerance(table, dataset.attrs.get("tolerance", np.nan))
     values, errors = table["values"], np.nan_to_num(table["errors"])
     unit, scale = _axis_unit(values, dataset[measure].attrs.get("units", "1"))
-    below = np.fmin(errors, np.fmax(values - minimum_of(measure), 0.0))
+    below = np.fmin(errors, np.fmax(values - minimum_value(measure), 0.0))
     x, x_axis = _key_axis(key, along)
     lines, rings, filled = [], [], []
     for k, place in enumerate(np.ndindex(*(dataset[name].size for name in others))):

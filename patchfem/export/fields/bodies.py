@@ -20,7 +20,7 @@ from ...elasticity.recovery import (
     get_cells,
     make_points,
 )
-from ...runs.results.result import surface_of
+from ...runs.results.result import patch_surface
 from .blocks import blocks_of
 from .strength import find_yielding
 from .vtkhdf import write_series
@@ -70,7 +70,7 @@ def write_fields(result, path: Path) -> dict:
         if patch.pair.upper is patch.pair.piece
         else [_inside(patch.pair.upper, patch.pair.upper_grid)]
     )
-    x = surface_of(patch, fields).x
+    x = patch_surface(patch, fields).x
     low, high = (_body(patch, fields, x, *of) for of in zip(("lower", "upper"), insides, motions))
     for one, other in ((low, high), (high, low)):
         one["stress_error"] = one["error"].relative_error(other["error"])[0]

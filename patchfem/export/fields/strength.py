@@ -6,7 +6,7 @@ The model does not include plastic flow.
 import numpy as np
 
 from ...formatting import format_length
-from ...runs.patch.strength import NEGLECTED, Strength, strength_of
+from ...runs.patch.strength import YIELDING_NEGLECTED, Strength, yield_strength
 
 # Fraction of the height of a piece near its fixed far face, where stress increases as elements
 # shrink (test_strength).
@@ -43,7 +43,7 @@ def find_yielding(asked, bodies: dict) -> dict:
             (True, piece.coating.material if piece.coating else None),
         ):
             mine = np.flatnonzero((np.asarray(body["material"]) == coated) & free)
-            known = strength_of(kind)
+            known = yield_strength(kind)
             if known is None or not mine.size:
                 continue
             highest = body["mises"][:, mine].max(axis=0)
@@ -64,5 +64,5 @@ def _note(known: Strength, highest: tuple, pieces: int) -> str:
     both = "; the other piece exceeds its yield strength too" * (pieces > 1)
     return (
         f"the von Mises stress reaches {stress / 1e6:.4g} MPa in the {known.material} of the {side} piece, at "
-        f"x = {format_length(x)} and {format_length(abs(y))} from the interface; {known.words}{both}; {NEGLECTED}"
+        f"x = {format_length(x)} and {format_length(abs(y))} from the interface; {known.words}{both}; {YIELDING_NEGLECTED}"
     )

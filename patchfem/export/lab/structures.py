@@ -180,7 +180,7 @@ def _is_speed_only(rig) -> bool:
 def _refuse(model: Model) -> None:
     """Raise PatchfemError for features that neither matrices nor friction elements have."""
     rig = model.rig
-    motion = engines.motion_of(model, steady=True)
+    motion = engines.motion_properties(model, steady=True)
     if _is_speed_only(rig):
         why = methods.find_first_unsupported(SPEED_LAW_SUPPORT, motion)
     else:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import Outcome
 from ...formatting import format_number
-from ...runs.batch.case_results import FAILED
+from ...runs.batch.case_results import FAILED_OUTCOME
 from .. import tolerance_misses
 from ..written import NUMBER, label, shorten
 from . import limits, peaks, ranked
@@ -296,7 +296,7 @@ def _qualifications(table: dict, outcome: np.ndarray, known: bool) -> str:
     """
     count, ran, said = (
         int(np.sum(outcome == "")),
-        outcome[(outcome != "") & (outcome != FAILED)],
+        outcome[(outcome != "") & (outcome != FAILED_OUTCOME)],
         [],
     )
     if count:

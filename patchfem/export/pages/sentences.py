@@ -17,7 +17,7 @@ from ...response.outcome import OPEN_LOOP, UNSETTLED
 from ...response.rows import TABLE as MOTION
 from ...response.rows import add_interface_number, remove_interface_number
 from ...runs.results.patch_rows import TABLE as STATIC
-from ...runs.results.patch_rows import minimum_of, unknown_measures
+from ...runs.results.patch_rows import minimum_value, unknown_measures
 from ...runs.results.result import Result
 from ..summary import measure_object
 from .document import sentence_html
@@ -201,7 +201,7 @@ def format_with_error(name: str, measure: dict) -> str:
 def below_minimum(name: str, measure: dict) -> bool:
     """Return whether value minus error is below the smallest possible value, 0."""
     value, error = measure["value"], measure["error"]
-    return minimum_of(name) == 0 and value is not None and bool(error) and error >= value > 0
+    return minimum_value(name) == 0 and value is not None and bool(error) and error >= value > 0
 
 
 def zero_below(name: str, measure: dict = NONE) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import Outcome
 from ...formatting import UNIT_LADDERS, choose_axis_unit, round_to_error
-from ...runs.results.patch_rows import minimum_of
+from ...runs.results.patch_rows import minimum_value
 from ..tolerance_misses import is_over_tolerance
 from ..written import NUMBER, label, shorten
 from . import document, limits, peaks, ranked
@@ -185,7 +185,7 @@ def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
         "values": some["values"] * scale,
         "errors": some["errors"] * scale,
         "least": zero_below(name) * scale,
-        "minimum": minimum_of(name) * scale,
+        "minimum": minimum_value(name) * scale,
         "over": missed.astype(int),
     }
 

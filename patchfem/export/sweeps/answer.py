@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ...disk.atomic_write import write_text
-from ...runs.batch.case_results import FAILED
+from ...runs.batch.case_results import FAILED_OUTCOME
 from ..pages.headline import SweepHeadline
 from ..pages.limits import as_json
 
@@ -46,7 +46,7 @@ def answer_of(lead: SweepHeadline, outcome: Sequence, sign: str = "", of: Mappin
         "sentences": lead.sentences(),
         "cases": {
             "count": len(outcome),
-            "failed": counts.get(FAILED, 0),
+            "failed": counts.get(FAILED_OUTCOME, 0),
             "unfinished": counts.get("", 0),
             "outcomes": counts,
             "over_tolerance": lead.missed,

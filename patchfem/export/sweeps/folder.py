@@ -30,7 +30,7 @@ from ...disk.exchange import replace_folder
 from ...disk.lock import FolderLock
 from ...effects import EFFECTS
 from ...model.model import Model
-from ...runs.batch.case_results import FAILED, CaseResults
+from ...runs.batch.case_results import FAILED_OUTCOME, CaseResults
 from ..folder import save
 from ..results import LOCK, PAGE, refuse_others
 from ..summary import read_summary, summary
@@ -254,7 +254,7 @@ class Folder:
                     for name, m in one["measures"].items()
                 }
                 answers.put(case, one["outcome"], measures, one["seconds"]["total"])
-                if one["outcome"] == FAILED:
+                if one["outcome"] == FAILED_OUTCOME:
                     answers.fail(case, one.get("message", ""))
             chunks.write(
                 self.chunks.folder, numbers[part], self.chunks.names[numbers[part]], answers

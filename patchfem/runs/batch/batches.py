@@ -79,14 +79,14 @@ def _batch(
     def parts(models: Sequence) -> dict:
         """Return {group: indices} of the models that the batch takes as columns."""
         some_of = [models.first] if isinstance(models, SimilarModels) else models
-        if not any(getattr(one, "kind", "") == kind for one in some_of) or _of_single_runs(kind):
+        if not any(getattr(one, "kind", "") == kind for one in some_of) or _why_run_singly(kind):
             return {}
         return module().parts(models)
 
     def refuses(model: Model) -> str:
         """Return why the batch does not take a model; "" if it does."""
         return (
-            _of_single_runs(kind) or asked(model) if model.kind == kind else f"it is a {model.kind}"
+            _why_run_singly(kind) or asked(model) if model.kind == kind else f"it is a {model.kind}"
         )
 
     asked = of("refuses")
@@ -104,7 +104,7 @@ def _batch(
 
 
 @cache
-def _of_single_runs(kind: str) -> str:
+def _why_run_singly(kind: str) -> str:
     """Return why no batch takes cases of a kind, or "".
 
     A measure that only single runs compute excludes all batches.
@@ -141,7 +141,7 @@ def _kind(batch: Batch, model: Model) -> str:
     return " ".join([batch.name, rig.drive.waveform.name, *laws, str(bool(model.partial_slip))])
 
 
-def batch_of(model: Model, study: int = 1) -> Batch | None:
+def choose_batch(model: Model, study: int = 1) -> Batch | None:
     """Return the batch of a model in a study of so many cases; None if it is run by itself."""
     return next((one for one in BATCHES if study >= one.least and not one.refuses(model)), None)
 
@@ -171,7 +171,9 @@ def solve_models(
         Number of cases of which these are a part; 0 if they are all.
     """
     models = (
-        models if isinstance(models, SimilarModels) else [_without_joint(one) for one in models]
+        models
+        if isinstance(models, SimilarModels)
+        else [_model_without_joint(one) for one in models]
     )
     found, groups, failures = CaseResults.blank(len(models)), {}, Counter()
     left, study = np.arange(len(models)), study or len(models)
@@ -201,7 +203,7 @@ def solve_models(
     return found
 
 
-def _without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
+def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
     """Return a model with the modes without the joint, or the error that there are none."""
     if (
         isinstance(model, PatchfemError)
@@ -210,7 +212,7 @@ def _without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
     ):
         return model
     try:
-        return joint.without_joint(model)
+        return joint.remove_joint(model)
     except PatchfemError as error:
         return error
 
@@ -254,7 +256,7 @@ def _place(model: Model, study: int) -> Place:
     """Return the batch and the group of a model in a study of so many cases."""
     batch = None
     try:
-        batch = batch_of(model, study)
+        batch = choose_batch(model, study)
         return ALONE if batch is None else Place(batch, batch.group(model))
     except Exception as error:  # the model is run again by itself, which reports its error
         return ALONE._replace(failure=_describe_failure(batch, error))

@@ -10,7 +10,7 @@ from ..patch import static
 from . import one_by_one, patches
 from .case_results import CaseResults
 
-TOGETHER = 256  # cases whose patches are pressed in one call
+MAX_CASES_PER_CALL = 256  # cases whose patches are pressed in one call
 
 
 def refuses(model: Model) -> str:
@@ -32,4 +32,6 @@ def group(model: Model) -> Hashable:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Return the case results of models of a group."""
-    return patches.pressed_first(models, TOGETHER, lambda part: one_by_one.solve(part, say))
+    return patches.pressed_first(
+        models, MAX_CASES_PER_CALL, lambda part: one_by_one.solve(part, say)
+    )

@@ -19,8 +19,8 @@ from ...model.model import Model
 
 # number of cases from which columns may be on disk: those of a rig have 25 kB per 1000 cases and
 # measure
-MANY = 50_000
-FAILED = "failed"  # outcome of a case that was refused or did not finish
+MIN_CASES_ON_DISK = 50_000
+FAILED_OUTCOME = "failed"  # outcome of a case that was refused or did not finish
 
 
 class OnDisk:
@@ -68,7 +68,7 @@ class OnDisk:
 class CaseResults:
     """Results of n cases, in SI units.
 
-    - outcome (n,): names of `Outcome`, or FAILED.
+    - outcome (n,): names of `Outcome`, or FAILED_OUTCOME.
     - values, errors, floors: columns (n,) by measure. NaN means that a case does not have the
       measure, and in `errors` that the error is not estimated.
     - units: unit by measure.
@@ -107,7 +107,7 @@ class CaseResults:
 
         room: folder on whose disk the columns of many cases are kept instead of in memory.
         """
-        return cls(np.full(count, "", object), room=room if count > MANY else None)
+        return cls(np.full(count, "", object), room=room if count > MIN_CASES_ON_DISK else None)
 
     def measure(self, name: str, unit: str) -> None:
         """Add the columns of a measure, with NaN in every case, if it has none yet."""
@@ -127,7 +127,7 @@ class CaseResults:
 
     def fail(self, case: int, message: str) -> None:
         """Mark a case as failed."""
-        self.outcome[case], self.messages[case] = FAILED, message
+        self.outcome[case], self.messages[case] = FAILED_OUTCOME, message
 
     def put(self, case: int, outcome: str, measures: dict, seconds: float) -> None:
         """Set the results of one case.

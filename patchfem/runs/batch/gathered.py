@@ -2,9 +2,9 @@
 
 In: models of a group, whose fields and histories nobody reads. Out: `CaseResults`.
 
-Cases with one or two modes under a sine march side by side (`dynamics.march.lanes`), with
-POINTS points and MODES modes whose error in the backbone is below SHARE of the tolerance; this
-error is part of the stated errors. Their coarse runs are those of a single run: half and a
+Cases with one or two modes under a sine march side by side (`dynamics.march.lanes`), with N_POINTS
+points and N_PIECE_MODES modes of the pieces, whose error in the backbone is below SHARE of the
+tolerance; this error is part of the stated errors. Their coarse runs are those of a single run: half and a
 quarter of the steps, and the coarser mesh. A case that sticks, may ring during stick, or needs
 more modes runs by itself, and its earlier cycles are evaluated during the run
 (`dynamics.march.passing_kernels`); there, points and modes each have an error of a thousandth
@@ -33,27 +33,29 @@ from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
 from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as of_patch
-from ..results.result import without_folders
+from ..results.result import shorten_file_names
 from ..results.travel import outcome_on_piece, warn_of_large_slide
 from ..rig.costs import MOST_STEPS
-from ..rig.engines import MARCH, engine_of, unused_settings
+from ..rig.engines import MARCH, choose_engine, unused_settings
 from ..rig.interface import few_points
-from ..rig.lists import quadrature_of
+from ..rig.lists import choose_quadrature
 from ..rig.motion_warnings import law_warnings
 from ..rig.numerics import choose
 from . import one_by_one, patches
 from .case_results import CaseResults, has_unreadable_table
-from .lumped.columns import MAIN, Runs, batch_answers, known_of
+from .lumped.columns import MAIN_MEASURE, Runs, batch_answers, known_measures
 from .lumped.lumped import take_out
 from .samples import Samples, peaks
 
-TOGETHER = 256  # cases whose patches are pressed in one call
+MAX_CASES_PER_CALL = 256  # cases whose patches are pressed in one call
 # samples of all cases that march in one call and are kept: 200 MB with the evaluation
 SAMPLES = 1_200_000
 # fraction of the tolerance by which modes, and points, may each miss the backbone of the patch
 SHARE = 3e-2
-TWICE = 2.0  # factor from the error of the backbone to that of a loop, which passes it twice
-HELD = 1e-3  # slip in bond lengths up to which a case sticks
+LOOP_ERROR_FACTOR = (
+    2.0  # factor from the error of the backbone to that of a loop, which passes it twice
+)
+MAX_STICKING_SLIP = 1e-3  # slip in bond lengths up to which a case sticks
 RINGS = "ring_frequency", "ring_damping"
 
 
@@ -94,7 +96,7 @@ def refuses(model: Model) -> str:
         or model.wear is not None
     ):
         return "the load of the case changes, or the case has strips, grooves or wear"
-    return "" if engine_of(model) is MARCH else "the case is not integrated in time"
+    return "" if choose_engine(model) is MARCH else "the case is not integrated in time"
 
 
 def group(model: Model) -> Hashable:
@@ -158,7 +160,7 @@ def no_lanes(model: Model) -> str:
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Return the case results of models of a group."""
     few = [replace(model, patch=model.patch.with_mesh(can_gather_points=True)) for model in models]
-    return patches.pressed_first(few, TOGETHER, lambda part: _solve_cases(part, say))
+    return patches.pressed_first(few, MAX_CASES_PER_CALL, lambda part: _solve_cases(part, say))
 
 
 def _solve_cases(models: list, say) -> CaseResults:
@@ -226,7 +228,7 @@ def _press_case(model: Model) -> _PressedCase | None:
                 coarse[0] is None
                 or patch.pressure.outcome is Outcome.NO_CONTACT
                 or numerics.steps % 4
-                or quadrature_of(model, numerics).engine != "recursion"
+                or choose_quadrature(model, numerics).engine != "recursion"
             ):
                 return None
             kernels, tolerance = load(lanes.KERNELS), SHARE * model.accuracy.tolerance
@@ -287,7 +289,8 @@ def _march_cases(models: list, held: list, steps: int) -> tuple:
     alone |= runs.stuck | runs.lost
     tolerance = models[0].accuracy.tolerance
     more = ~alone & (
-        found.errors[MAIN] > tolerance * np.abs(found.values[MAIN]) + found.floors[MAIN]
+        found.errors[MAIN_MEASURE]
+        > tolerance * np.abs(found.values[MAIN_MEASURE]) + found.floors[MAIN_MEASURE]
     )
     if (
         2 * steps > MOST_STEPS
@@ -342,7 +345,7 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
     load = np.array([one.patch.pressure.load for one in held])
     with np.errstate(all="ignore"):
         stiffness = np.array([model.rig.first_mode.stiffness for model in models])
-        values = seen.values(book, stiffness * ~_beside(models[0], done), load)
+        values = seen.values(book, stiffness * ~_has_other_modes(models[0], done), load)
         # the pieces are compliant, so that nothing vibrates faster than the rig on its bonds
         fastest = np.sqrt(
             (modes.omega**2).max()
@@ -365,7 +368,9 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
         rings = [
             ({}, {})
             if one is None
-            else run_events.measure_rings(one, modes, drive, held=HELD * held[case].fine.length)
+            else run_events.measure_rings(
+                one, modes, drive, held=MAX_STICKING_SLIP * held[case].fine.length
+            )
             for case, one in enumerate(rings)
         ]
         values |= {name: np.array([one[0].get(name, np.nan) for one in rings]) for name in RINGS}
@@ -378,7 +383,7 @@ def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None)
     return _Read(values, book, done.extremes, done.phasors, done.reach, own, lost)
 
 
-def _beside(model: Model, done: lanes.Marched) -> np.ndarray:
+def _has_other_modes(model: Model, done: lanes.Marched) -> np.ndarray:
     """Return whether modes other than the first contribute to the slide (n,)."""
     return np.array(
         [
@@ -395,7 +400,9 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
     for one in reads:
         last = one.extremes[:, -window:]
         amplitude = (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
-        whole.append(one.values | {MAIN: amplitude, "energy_balance": energy_balance(one.book)})
+        whole.append(
+            one.values | {MAIN_MEASURE: amplitude, "energy_balance": energy_balance(one.book)}
+        )
     errors, parts = {name: np.zeros(n) for name in whole[0]}, []
     for case in range(n):
         a, b, c, d = (
@@ -404,7 +411,7 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
         )
         few = _left_out(
             a,
-            TWICE * held[case].error,
+            LOOP_ERROR_FACTOR * held[case].error,
             models[case].friction.static,
             held[case].fine,
             fine.book["passed"][case],
@@ -416,7 +423,7 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
                 part.get(name, abs(value)) for part in parts[-1][:3]
             ) + own.get(name, 0.0)
     ends = np.arange(cycles - 1, -1, -window)[::-1]
-    least = HELD * np.array([one.fine.length for one in held])
+    least = MAX_STICKING_SLIP * np.array([one.fine.length for one in held])
     runs = Runs(
         cycles,
         window,
@@ -468,7 +475,7 @@ def _tell(
     steps: int,
 ) -> None:
     """Add measures of the patch, outcome, settings, warnings and notes, as in a single run."""
-    reach, known = reads[0].reach[case : case + 1], known_of(found, case)
+    reach, known = reads[0].reach[case : case + 1], known_measures(found, case)
     outcome = outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, reach)
     found.outcome[case] = str(outcome)
     found.fill(case, one.measures)
@@ -489,7 +496,7 @@ def _tell(
         }
         warned = tolerance_warnings(Finding(model, measures, one.patch, extra))
     drift = {name: m for name, m in known.items() if name == "drift_per_cycle"}
-    warned = without_folders(
+    warned = shorten_file_names(
         [
             *one.warnings,
             *model.rig.structure.notes,
@@ -502,5 +509,5 @@ def _tell(
     found.warnings.pop(case, None)
     if warned:
         found.warnings[case] = warned
-    if noted := without_folders([*model.source.notes, *one.notes], model.source.path):
+    if noted := shorten_file_names([*model.source.notes, *one.notes], model.source.path):
         found.notes[case] = noted

@@ -58,4 +58,4 @@ def _wants(model: Model | PatchfemError) -> bool:
 
 def _key(model: Model) -> tuple:
     """Return the key of geometry and tolerance."""
-    return patch_meshes.geometry_of(model.patch), model.accuracy.tolerance
+    return patch_meshes.geometry_key(model.patch), model.accuracy.tolerance

@@ -19,10 +19,10 @@ from ...model.similar_models import SimilarModels, select_models
 from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as of_patch
 from ..patch import static, store
-from ..patch.meshes import geometry_of
+from ..patch.meshes import geometry_key
 from ..patch.strength import yielding_faces
 from ..results.patch_rows import POSITIVE, TABLE
-from ..results.result import without_folders, without_folders_of
+from ..results.result import file_name_shortener, shorten_file_names
 from . import one_by_one
 from .case_results import CaseResults
 
@@ -45,7 +45,7 @@ def refuses(model: Model) -> str:
 
 def group(model: Model) -> Hashable:
     """Return a key that is equal for models whose patches are pressed together."""
-    return geometry_of(model.patch), static.pressing_kind(model.patch), model.accuracy.tolerance
+    return geometry_key(model.patch), static.pressing_kind(model.patch), model.accuracy.tolerance
 
 
 def parts(models: Sequence[Model]) -> dict:
@@ -145,16 +145,18 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     pieces = first.patch.pieces
     mean = found.values["normal_load"] / (pieces.length * pieces.width * pieces.pairs)
     least_peak = found.values["pressure_peak"] - found.errors["pressure_peak"]
-    always, told = bool(first.source.remarks) or not alike, without_folders_of(first.source.path)
+    always, told = bool(first.source.remarks) or not alike, file_name_shortener(first.source.path)
     for case in np.flatnonzero(good & (wide | strained | always)).tolist():
         model, measures = models[case], found.measures(case, floors)
         warned = [
             *model.source.remarks,
-            *of_patch.strained_by(model.patch, float(found.top[case]), float(found.approach[case])),
+            *of_patch.strain_warnings(
+                model.patch, float(found.top[case]), float(found.approach[case])
+            ),
             *tolerance_warnings(Finding(model, measures, _Nodes(found.levels[0].x))),
         ]
         if warned:
-            out.warnings[case] = without_folders(warned, model.source.path)
+            out.warnings[case] = shorten_file_names(warned, model.source.path)
     for case in np.flatnonzero(good).tolist():
         notes = [
             *of_patch.notes_on_tall_pieces(first.patch, mean[case]),

@@ -45,7 +45,9 @@ class Samples:
         self.found, self.modes, self.omega, self.amplitude = found, modes, omega, amplitude
         self.steps, self.window, self.period = steps, window, 2 * np.pi / omega
         self.dt, self.angle = self.period / steps, 2 * np.pi * np.arange(steps * window + 1) / steps
-        self.slide, self.speed = (_along(modes.slide, one) for one in (found.z, found.rate))
+        self.slide, self.speed = (
+            _project_motion(modes.slide, one) for one in (found.z, found.rate)
+        )
         self.span = window * self.period
 
     def acceleration(self) -> np.ndarray:
@@ -281,7 +283,7 @@ class Samples:
         return ((row - last).max(axis=0, initial=0) + 2) * self.dt
 
 
-def _along(row, motion) -> np.ndarray:
+def _project_motion(row, motion) -> np.ndarray:
     """Return row . modes (s, n) of a motion (s, m, n)."""
     out = row[0] * motion[:, 0]
     for k in range(1, len(row)):

@@ -20,13 +20,18 @@ from ...dynamics.harmonic import harmonic, point
 from ...response import measures
 from ...response.measures import measure_half_swing
 from ..rig import march, pieces
-from ..rig.engines import ENGINES, MARCH, steady_by
+from ..rig.engines import ENGINES, MARCH, choose_steady_method
 from ..rig.numerics import choose
 from ..rig.steady import balance as rig_balance
 from ..rig.steady import maps
 
 SAMPLES = 400  # samples of a cycle without friction
-UNBOUNDED = Outcome.GROWS, Outcome.NOT_CONVERGED, Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES
+UNBOUNDED_OUTCOMES = (
+    Outcome.GROWS,
+    Outcome.NOT_CONVERGED,
+    Outcome.EXCEEDS_TRAVEL,
+    Outcome.LEAVES_GROOVES,
+)
 
 
 class ObservedMotion(NamedTuple):
@@ -74,7 +79,7 @@ class MotionObserver:
         self.numerics = choose(model)
         steady = ENGINES[self.numerics.engine].steady
         line = model.kind == "linear" and not model.rig.springs.is_nonlinear
-        self.by = "" if not steady else "line" if line else steady_by(model).name
+        self.by = "" if not steady else "line" if line else choose_steady_method(model).name
         self.made, self.before = {}, before.made if before is not None else {}
 
     def __call__(self, drive, near=None) -> ObservedMotion | None:
@@ -202,7 +207,7 @@ class MotionObserver:
             )
 
         contact, done, *_ = march.march_model(model, few, self.patch, 0, self.say)
-        if done.outcome in UNBOUNDED:
+        if done.outcome in UNBOUNDED_OUTCOMES:
             return None
         values = march.MarchReader(model, few, self.patch, contact).values(done)
         return _observe(done.window, values)
@@ -210,7 +215,7 @@ class MotionObserver:
 
 def _last_cycles(raw) -> ObservedMotion | None:
     """Return the last cycles of a Solution; None if the motion is unbounded or was not found."""
-    return None if raw.outcome in UNBOUNDED else _observe(raw.window, raw.values)
+    return None if raw.outcome in UNBOUNDED_OUTCOMES else _observe(raw.window, raw.values)
 
 
 def _observe(window: Response, values: dict) -> ObservedMotion:

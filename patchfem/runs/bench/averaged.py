@@ -9,7 +9,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...effects import describe_unsupported, import_effect, law_has_trait
 
-ALIKE = 1e-9  # relative difference of the limits in both directions that counts as zero
+EQUAL_LIMITS_TOL = 1e-9  # relative difference of the limits in both directions that counts as zero
 
 
 def _law():
@@ -40,7 +40,7 @@ def limit_share(model, patch) -> float:
         return 1.0
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     forward, back = _law().sliding_limits(patch.x, sigma, weight, f.bond_length, f.order)
-    if abs(forward - back) > ALIKE * max(forward, back):
+    if abs(forward - back) > EQUAL_LIMITS_TOL * max(forward, back):
         raise PatchfemError(
             describe_unsupported(
                 f"law '{f.law}' with a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "

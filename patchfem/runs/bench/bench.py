@@ -26,7 +26,7 @@ from . import rigid, shear
 from . import stepped as stepping
 from .closed import closed_form
 from .engine import CLOSED, STEPPED, BenchEngine, bench_engine
-from .ledger import UNWATCHED, PassOptions
+from .ledger import DEFAULT_OPTIONS, PassOptions
 from .stepped import slide_step_by_step
 
 
@@ -67,7 +67,7 @@ class BenchRun:
 
 
 def run(
-    model, patch, steps: int, frames: int = 0, path=None, watch: PassOptions = UNWATCHED
+    model, patch, steps: int, frames: int = 0, path=None, watch: PassOptions = DEFAULT_OPTIONS
 ) -> BenchRun:
     """Slide the interface of a model along its path.
 

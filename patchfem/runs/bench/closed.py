@@ -1,14 +1,21 @@
 """Rigid slide of a law without memory in closed form, under a constant load.
 
-In: a model whose pressure moves with the upper piece, and a path. Out: `Slid`. In every step,
+In: a model whose pressure moves with the upper piece, and a path. Out: `SlideHistories`. In every step,
 the force of such a law is a fraction of its limit, and the limit depends only on the direction
 of the slide.
 """
 
 import numpy as np
 
-from .law import ends_of_rest, law_for, pressure_of
-from .ledger import PassOptions, SlideHistories, elastic_slip, frame_numbers, ledger_of, local_slip
+from .law import ends_of_rest, law_for, nodal_pressure
+from .ledger import (
+    PassOptions,
+    SlideHistories,
+    elastic_slip,
+    frame_numbers,
+    local_slip,
+    make_ledger,
+)
 
 GAUSS = 8  # Gauss points in a step over a flank
 
@@ -32,7 +39,7 @@ def closed_form(model, patch, path: tuple, frames: int, watch: PassOptions) -> S
     """
     if model.grooves is not None:
         return closed_form_on_grooves(model, patch, path, frames, watch)
-    (time, slide), (sigma, weight), law = path, pressure_of(model, patch), law_for(model, patch)
+    (time, slide), (sigma, weight), law = path, nodal_pressure(model, patch), law_for(model, patch)
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
     move = np.diff(slide)
     share = law.limit_fraction(move, np.diff(time))
@@ -56,7 +63,7 @@ def closed_form(model, patch, path: tuple, frames: int, watch: PassOptions) -> S
         force,
         load,
         elastic_slip(model, slide, force, load),
-        ledger_of(np.cumsum(spent), np.zeros(share.size), losses),
+        make_ledger(np.cumsum(spent), np.zeros(share.size), losses),
         at,
         tau,
         local_slip(model, slide[at], tau, sigma),
@@ -74,7 +81,7 @@ def closed_form_on_grooves(
     """
     (time, slide), (sigma, weight), law, grooves = (
         path,
-        pressure_of(model, patch),
+        nodal_pressure(model, patch),
         law_for(model, patch),
         model.grooves,
     )
@@ -108,7 +115,9 @@ def closed_form_on_grooves(
     at = frame_numbers(slide.size, frames)
     watch.tell(1.0)
     losses = np.stack([np.zeros(slide.size), np.append(0.0, own)], axis=1)
-    ledger = ledger_of(np.append(0.0, np.cumsum(rise + own)), load * grooves.height(slide), losses)
+    ledger = make_ledger(
+        np.append(0.0, np.cumsum(rise + own)), load * grooves.height(slide), losses
+    )
     return SlideHistories(
         load * ratio,
         np.full(time.size, load),

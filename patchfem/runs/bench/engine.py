@@ -114,7 +114,7 @@ def bench_engine(
     return _choose_sum_engine(model, slide, points, choice or choose_bond_sum(model, slide))
 
 
-def steps_of(model) -> int:
+def steps_per_cycle(model) -> int:
     """Return the steps per cycle of a bench: from the scene, else from tolerance and grooves."""
     slide, accuracy = model.slide, model.accuracy
     steps = slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
@@ -261,7 +261,7 @@ def cost(model, points: int) -> Cost:
     points : int
         Nodes of the interface; 1 without a patch.
     """
-    per_cycle = steps_of(model)
+    per_cycle = steps_per_cycle(model)
     time, slide = model.slide.samples(per_cycle)[:2]
     if model.load_varies:
         time, slide = model.point.refine_samples(model.slide, time, slide, per_cycle)

@@ -22,7 +22,7 @@ from ...response.errors import (
 from ...slip import shear_modes
 from . import bench, rigid, shear
 from .engine import ELEMENTS, LIST, LISTS, PLANE, STEPPED, slips_by_elements
-from .law import tail_of
+from .law import estimate_tail_loss
 from .ledger import PassOptions
 
 # tolerance that sets the steps of passes on coarser meshes; elements follow any path exactly
@@ -36,7 +36,7 @@ class Pass(NamedTuple):
     - steps: steps per cycle.
     - level: index of the coarser mesh; 0 is that of the run.
     - choice: method of the sum over bonds.
-    - springs, modes: see `Watch`.
+    - springs, modes: see `PassOptions`.
     """
 
     steps: int
@@ -46,7 +46,7 @@ class Pass(NamedTuple):
     modes: int | None = None
 
 
-def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
+def estimate_pass_errors(model, patches: list, fine, steps: int, say=None) -> tuple:
     """Return the errors of a pass on its ladder of coarse passes.
 
     Parameters
@@ -73,7 +73,7 @@ def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
         watch = PassOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
         return bench.run(model, on, variant.steps, watch=watch)
 
-    ladder, made = ladder_of(model, patches, fine, steps), {}
+    ladder, made = list_coarse_passes(model, patches, fine, steps), {}
     errors, seconds = estimate_errors(solve, fine.values, ladder, made)
     kinds = [one.of for one in ladder]
     if sum_error(model, fine.engine):
@@ -82,7 +82,7 @@ def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
     return errors, seconds, find_open_kinds(kinds, errors, runs)
 
 
-def ladder_of(model, patches: list, fine, steps: int) -> list:
+def list_coarse_passes(model, patches: list, fine, steps: int) -> list:
     """Return the coarse passes of a bench.
 
     They are half and a quarter of the steps; at a quarter of them the coarser mesh, another number
@@ -109,7 +109,7 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
         out.append(shear.coarser_elements(len(patches) - 1, few._replace(steps=same)))
     elif meshed:
         # the number of modes is fixed, so that only the mesh changes
-        count = shear.modes_of(model, patch) if model.partial_slip else None
+        count = shear.count_shear_modes(model, patch) if model.partial_slip else None
         out.append(make_coarser_space(few._replace(level=1, modes=count), few))
         if count:
             out.append(
@@ -130,7 +130,9 @@ def sum_error(model, engine) -> float:
     if engine.kind in (LIST, LISTS):
         return engine.choice.error
     return (
-        tail_of(model) if engine.kind in (STEPPED, PLANE) and is_bond_list(model.friction) else 0.0
+        estimate_tail_loss(model)
+        if engine.kind in (STEPPED, PLANE) and is_bond_list(model.friction)
+        else 0.0
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ...dynamics.march.capacity import copy_state, enlarge_list, is_full
 from ...dynamics.march.march import GOAL
 from ...dynamics.march.models import load_kernels
-from .ledger import BLOCK, PassOptions, frame_numbers, ledger_of
+from .ledger import BLOCK, PassOptions, frame_numbers, make_ledger
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,7 +45,7 @@ class Followed:
         work = np.concatenate([[0.0], np.cumsum(self.mean[:-1] * np.diff(self.slide))])
         losses = np.zeros((self.slide.size, 2))
         losses[1:, 0], losses[1:, 1] = -np.minimum(self.lost, 0.0), np.maximum(self.lost, 0.0)
-        return ledger_of(work, self.stored, losses)
+        return make_ledger(work, self.stored, losses)
 
 
 def follow_path(

@@ -25,10 +25,10 @@ def law_for(model, patch=None):
     if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):
         return recursion.FirstOrderBonds(law)
 
-    return quadrature.Quadrature(law, tail_of(model))
+    return quadrature.Quadrature(law, estimate_tail_loss(model))
 
 
-def tail_of(model) -> float:
+def estimate_tail_loss(model) -> float:
     """Return the loss by the cut-off of the NumPy sum over bonds, over the friction limit [1]."""
     accuracy = model.accuracy
     if accuracy.quadrature == "direct":
@@ -36,7 +36,7 @@ def tail_of(model) -> float:
     return accuracy.tail if accuracy.tail is not None else 1e-3 * accuracy.tolerance
 
 
-def pressure_of(model, patch) -> tuple:
+def nodal_pressure(model, patch) -> tuple:
     """Return pressure (m,) [Pa] and area (m,) [m2] of the nodes.
 
     Without a patch it is a single point that carries the load.

@@ -14,7 +14,7 @@ from ...effects import law_has_trait
 # samples between two reports of progress; with so many, the cost of a call of compiled code is
 # negligible
 BLOCK = 4096
-ROUND = 1e-13  # relative to the dissipated energy; less created energy is round-off
+ROUND_OFF_FRACTION = 1e-13  # relative to the dissipated energy; less created energy is round-off
 
 
 class SlideHistories(NamedTuple):
@@ -22,7 +22,7 @@ class SlideHistories(NamedTuple):
 
     - force, load (k,): [N].
     - slip (k,): [m].
-    - ledger (4, k): energies of `ledger_of` [J].
+    - ledger (4, k): energies of `make_ledger` [J].
     - frames (f,): samples of the frames.
     - tau, local (f, m): traction [Pa] and slip [m] of the nodes in the frames.
     """
@@ -36,7 +36,7 @@ class SlideHistories(NamedTuple):
     local: np.ndarray
 
 
-def ledger_of(work, stored, losses) -> np.ndarray:
+def make_ledger(work, stored, losses) -> np.ndarray:
     """Return work, stored, dissipated and created energy (4, k) [J] of samples.
 
     Parameters
@@ -47,7 +47,7 @@ def ledger_of(work, stored, losses) -> np.ndarray:
         Created and dissipated energy of every step [J], summed over the points.
     """
     created, dissipated = np.cumsum(losses, axis=0).T
-    created = created if created[-1] > ROUND * dissipated[-1] else 0 * created
+    created = created if created[-1] > ROUND_OFF_FRACTION * dissipated[-1] else 0 * created
     return np.stack([work, stored, dissipated, created])
 
 
@@ -132,4 +132,4 @@ class PassOptions:
             self.progress(share)
 
 
-UNWATCHED = PassOptions()
+DEFAULT_OPTIONS = PassOptions()

@@ -21,7 +21,13 @@ from ..results.notes import (
     warn_of_unformed_bonds,
     work_check_warning,
 )
-from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, without_errors
+from ..results.result import (
+    FRAMES,
+    Result,
+    interface_frames,
+    on_a_mesh_of_known_error,
+    remove_unknown_errors,
+)
 from ..results.travel import (
     MAX_SLIDE_FRACTION,
     largest_slide,
@@ -29,11 +35,11 @@ from ..results.travel import (
     warn_of_large_slide,
 )
 from . import bench, shear
-from .engine import steps_of
-from .errors import errors_of
+from .engine import steps_per_cycle
+from .errors import estimate_pass_errors
 from .ledger import PassOptions
 
-MORE = 4  # further cycles in which a steady loop is searched for
+MAX_EXTRA_CYCLES = 4  # further cycles in which a steady loop is searched for
 MOST_TRIED = 2e6  # most evaluations (points times samples) of this search
 
 
@@ -55,14 +61,14 @@ def run_prescribed(
                 "so while the load falls the friction force may exceed mu_s N; set friction.reading "
                 '= "stretch" to avoid this',
             ]
-    steps = steps_of(model)
+    steps = steps_per_cycle(model)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=PassOptions(None, say, progress))
     seconds["bench"] = fine.seconds
     others, left = [], None
     if estimate:
         patches = [patch, *(one for one in coarse if one is not None)]
-        others, seconds["error"], left = errors_of(model, patches, fine, steps, say)
+        others, seconds["error"], left = estimate_pass_errors(model, patches, fine, steps, say)
     found = add_errors(fine.values, *others, least=1e-10)
     fields, created, power = (
         {},
@@ -84,7 +90,7 @@ def run_prescribed(
     ]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
-        fields = frames_of(
+        fields = interface_frames(
             patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames]
         )
     outcome, notes = (
@@ -100,9 +106,9 @@ def run_prescribed(
         notes = growth_notes(model.bonds, peak)
     notes = [*notes, *climbing_as_one(model, patch)]
     known = estimate and on_a_mesh_of_known_error(model, patch, coarse)
-    found = without_errors(found, known)
+    found = remove_unknown_errors(found, known)
     found = set_final_floors(found, model.accuracy.tolerance)
-    count = shear.modes_of(model, patch) if model.partial_slip else None
+    count = shear.count_shear_modes(model, patch) if model.partial_slip else None
     return Result(
         what,
         outcome,
@@ -135,7 +141,7 @@ def _miss(fine) -> float:
 def _warn_if_open(model, patch, fine, steps: int) -> list:
     """Return a warning, as a list, if the last loop does not close and is not the steady one.
 
-    It names the number of cycles after which the loop is steady, if MORE cycles with at most
+    It names the number of cycles after which the loop is steady, if MAX_EXTRA_CYCLES cycles with at most
     MOST_TRIED evaluations show it.
     """
     period, tolerance, cycles = model.slide.period, model.accuracy.tolerance, model.slide.cycles
@@ -148,20 +154,23 @@ def _warn_if_open(model, patch, fine, steps: int) -> list:
         "work of the last cycle, is not the energy dissipated in a steady loop"
     )
     if (
-        fine.time.size * (1 if patch is None else patch.x.size) * (cycles + MORE) / cycles
+        fine.time.size
+        * (1 if patch is None else patch.x.size)
+        * (cycles + MAX_EXTRA_CYCLES)
+        / cycles
         > MOST_TRIED
     ):
         return [f"{text}; raise slide.cycles"]
     longer = bench.run(
-        replace(model, slide=replace(model.slide, cycles=cycles + MORE)), patch, steps
+        replace(model, slide=replace(model.slide, cycles=cycles + MAX_EXTRA_CYCLES)), patch, steps
     )
-    ends = longer.time[-1] - period * np.arange(MORE + 1, -1, -1)
+    ends = longer.time[-1] - period * np.arange(MAX_EXTRA_CYCLES + 1, -1, -1)
     loops = np.diff(np.interp(ends, longer.time, longer.ledger[0]))
     near = np.abs(loops - loops[-1]) <= tolerance * np.abs(loops[-1])
     if near[0]:
         return []
     if not near[-2]:
-        return [f"{text}; no steady loop is reached within {cycles + MORE:g} cycles"]
+        return [f"{text}; no steady loop is reached within {cycles + MAX_EXTRA_CYCLES:g} cycles"]
     count = int(np.flatnonzero(~near)[-1]) + 1
     return [
         f"{text}, which is {format_quantity(float(loops[-1]), 'J', 4)}; set slide.cycles = {cycles + count:g}"

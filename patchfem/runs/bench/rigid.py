@@ -1,6 +1,6 @@
 """Rigid slide under a pressure that moves with the upper piece, by the compiled engines.
 
-In: a model, its patch and a path. Out: `Slid`. Every point has the same slide, and the laws are
+In: a model, its patch and a path. Out: `SlideHistories`. Every point has the same slide, and the laws are
 linear in the pressure, so that the traction of a point is that of a single point with the whole
 load, times the fraction of the load at the point.
 """
@@ -21,7 +21,7 @@ from ...response.coarser import CoarserRuns
 from ...response.errors import merged_cell_errors
 from .engine import ELEMENTS, BenchEngine
 from .follow import follow_path
-from .law import pressure_of
+from .law import nodal_pressure
 from .ledger import PassOptions, SlideHistories, elastic_slip, local_slip
 
 
@@ -46,7 +46,7 @@ def rigid(
     SlideHistories
     """
     (time, slide), f = path, model.friction
-    sigma, weight = pressure_of(model, patch)
+    sigma, weight = nodal_pressure(model, patch)
     load = float(weight @ sigma)
     paced = (
         f.rest_growth is not None
@@ -109,7 +109,7 @@ def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactM
         Normal load [N].
     engine : BenchEngine
     springs : callable, optional
-        See `Watch`.
+        See `PassOptions`.
     """
     f = model.friction
     if model.grooves is not None:

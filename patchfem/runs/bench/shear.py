@@ -1,6 +1,6 @@
 """Slide of pieces that deform in shear: parallel elements, or bond points with shear modes.
 
-In: a model with [contact.shear], its pressed patch and a path. Out: `Slid`, and the coarse
+In: a model with [contact.shear], its pressed patch and a path. Out: `SlideHistories`, and the coarse
 passes that show the error of the mesh of elements.
 """
 
@@ -130,7 +130,7 @@ def _points(model, patch, time, slide, frames, watch, engine) -> SlideHistories:
         contact = (
             points_model(law, weight, sigma, shear)
             if found is None
-            else lists_of(patch, law, shear, found)
+            else sheared_lists(patch, law, shear, found)
         )
     done = follow_path(contact, time, slide, frames, watch, law.has_growth)
     refuse_missed(done)
@@ -175,7 +175,7 @@ def mean_pressure(patch) -> float:
     return patch.pressure.load / float(patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0))
 
 
-def modes_of(model, patch) -> int | None:
+def count_shear_modes(model, patch) -> int | None:
     """Return the number of shear modes of a bench with bonds; None if there are none."""
     behind = (
         model.partial_slip and law_has_trait(model.friction.law, "bonds") and model.grooves is None
@@ -207,7 +207,7 @@ def lists_on_lower_piece(model, patch, found, shear):
     )
 
 
-def lists_of(patch, law, shear, found, force=None):
+def sheared_lists(patch, law, shear, found, force=None):
     """Return lists of bonds with the ShearModes of a pressed patch.
 
     Parameters

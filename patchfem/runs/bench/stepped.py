@@ -1,6 +1,6 @@
 """Rigid slide with the NumPy laws, sample by sample, for varying pressure or two directions.
 
-In: a model, its patch and a path. Out: `Slid`. This reference implementation of the compiled
+In: a model, its patch and a path. Out: `SlideHistories`. This reference implementation of the compiled
 engines takes every law and every bench with a rigid slide.
 """
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Missing
-from .law import ends_of_rest, law_for, pressure_of
+from .law import ends_of_rest, law_for, nodal_pressure
 from .ledger import (
     BLOCK,
     PassOptions,
@@ -17,8 +17,8 @@ from .ledger import (
     elastic_slip,
     frame_numbers,
     gains_and_losses,
-    ledger_of,
     local_slip,
+    make_ledger,
 )
 
 MOST_WORK = 2e11  # most strip-point products of a direct quadrature; a bench with more is refused
@@ -55,7 +55,7 @@ def slide_step_by_step(
     refuse_long_sum(model, law, time.size, weight.size, slide)
     peaks, at = ends_of_rest(model, slide), frame_numbers(time.size, frames)
     found = _evaluate_law(
-        (law, _under_load if model.load_varies else _along),
+        (law, _step_under_changing_load if model.load_varies else _step_law),
         (time, slide[:, None]),
         (weight, pressure),
         at,
@@ -103,7 +103,7 @@ def run_plane(model, patch, time, slide, frames: int, watch: PassOptions) -> tup
     across, one = np.interp(time, model.slide.corners[0], model.slide.across), np.ones(1)
     at = frame_numbers(time.size, frames)
     found = _evaluate_law(
-        (law, _along),
+        (law, _step_law),
         (time, np.stack([slide, across], axis=1)),
         (one, lambda k: one),
         at,
@@ -196,7 +196,7 @@ def _evaluate_law(
     return _LawHistories(
         force,
         load,
-        ledger_of(work, stored, losses),
+        make_ledger(work, stored, losses),
         np.array(tau).reshape(len(tau), width, weight.size),
     )
 
@@ -233,18 +233,18 @@ def _pressures(model, patch, time, slide) -> tuple:
     if model.load_varies:
         loads = model.point.evaluate(time)
         return np.ones(1), lambda k: loads[k : k + 1]
-    sigma, weight = pressure_of(model, patch)
+    sigma, weight = nodal_pressure(model, patch)
     if patch is None or model.side != "lower":
         return weight, lambda k: sigma
     return weight, lambda k: np.interp(patch.x + slide[k], patch.x, sigma, left=0.0, right=0.0)
 
 
-def _along(law, state, dq: float, s0, s1, dt: float) -> tuple:
+def _step_law(law, state, dq: float, s0, s1, dt: float) -> tuple:
     """Take one step of a law at constant or given pressure."""
     return law.step(state, dq, s0, s1, dt)
 
 
-def _under_load(law, state, dq: float, s0, s1, dt: float) -> tuple:
+def _step_under_changing_load(law, state, dq: float, s0, s1, dt: float) -> tuple:
     """Take one step of a law while the load changes from s0 to s1.
 
     Half of the change is applied before the motion, half after it (order 1 if bonds are released,

@@ -13,7 +13,7 @@ from ...contact.unilateral import press
 from ...core import Compliance, NotConverged, PatchfemError, frozen_array
 from ...formatting import format_length
 
-MISSED = 1e-6  # largest remaining distance to the approach, over the approach
+APPROACH_TOL = 1e-6  # largest remaining distance to the approach, over the approach
 GAP_ROUND = 1e-9  # the same over the range of the gap, whose round-off limits the search
 
 
@@ -80,7 +80,7 @@ def press_to_approach_with_rotation(
         low, top = max(low - 2, bottom), low
     brentq(short, low, top, xtol=1e-13, rtol=1e-14)
     best = min(tried, key=lambda one: abs(one[1].approach - distance))
-    if abs(best[1].approach - distance) > MISSED * distance + GAP_ROUND * np.ptp(gap):
+    if abs(best[1].approach - distance) > APPROACH_TOL * distance + GAP_ROUND * np.ptp(gap):
         reached = [one[1].approach for one in tried]
         below, above = (
             max(a for a in reached if a < distance),

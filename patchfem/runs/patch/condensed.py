@@ -61,7 +61,7 @@ class Pair:
         return float(self.grid.first_row_height + self.upper_grid.first_row_height) / 2
 
     @property
-    def rounding(self) -> float:
+    def round_off_error(self) -> float:
         """Relative round-off error of the compliance [1]; 0 if it is negligible."""
         return max(self.piece.round_off_error, self.upper.round_off_error)
 
@@ -79,7 +79,7 @@ def finite_elements(body, layers: Layers):
     return substructure.Substructure(body, layers)
 
 
-def compliance_of(body, piece, fresh: bool) -> InterfaceCompliance:
+def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
     """Return the compliances (nn, tt, nt) of a piece, if possible from the cache on disk.
 
     Parameters
@@ -127,8 +127,8 @@ def condense(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
     upper = piece
     if upper_grid is not None:
         upper = finite_elements(upper_grid, make_elastic_layers(asked, asked.pieces.upper))
-    low = compliance_of(grid, piece, fresh)
-    high = low if upper is piece else compliance_of(upper_grid, upper, fresh)
+    low = load_compliance(grid, piece, fresh)
+    high = low if upper is piece else load_compliance(upper_grid, upper, fresh)
     joint, x, share = None, grid.x, grid.tributary_lengths()
     if upper_grid is not None and not _match(x, upper_grid.x):
         joint = mortar.join_pieces(
@@ -159,7 +159,7 @@ def shared_pair(asked, level: int) -> Pair:
     bodies = asked.mesh.shared.levels[level]
     return store.reuse(
         _pair_key(asked, asked.mesh.shared.name, level),
-        lambda: without_factors(condense(asked, *bodies)),
+        lambda: delete_factors(condense(asked, *bodies)),
     )
 
 
@@ -169,7 +169,7 @@ def keep_pairs(asked, meshes, pairs) -> None:
     asked: one of the patches that share the meshes.
     """
     for level, pair in enumerate(pairs):
-        store.keep(_pair_key(asked, meshes.name, level), without_factors(pair))
+        store.keep(_pair_key(asked, meshes.name, level), delete_factors(pair))
 
 
 def _pair_key(asked, name: str, level: int) -> tuple:
@@ -185,7 +185,7 @@ def _pair_key(asked, name: str, level: int) -> tuple:
     )
 
 
-def without_factors(pair: Pair) -> Pair:
+def delete_factors(pair: Pair) -> Pair:
     """Delete the factors of pieces on grids, and return the Pair.
 
     They need far more memory than the compliance, and are recomputed for fields.

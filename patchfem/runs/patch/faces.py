@@ -16,7 +16,7 @@ from ...friction import record
 from ...model.source import locate_errors
 from ...response import rows
 from ...slip import fields as slip_fields
-from ..results.result import at_rest, frames_of, surface_of
+from ..results.result import at_rest, interface_frames, patch_surface
 from . import jenkins_elements, result, store
 from .press import Patch
 from .values import values
@@ -46,7 +46,7 @@ class Face(NamedTuple):
     @property
     def surface(self):
         """`press.Surface` on whose points the fields are given."""
-        return surface_of(self.patch, self.fields or {})
+        return patch_surface(self.patch, self.fields or {})
 
     @property
     def folder(self) -> str:
@@ -64,18 +64,21 @@ class Face(NamedTuple):
         return response.slide if slides is None else slides[:, self.number]
 
 
-def faces_of(model) -> Iterator[Face]:
+def press_faces(model) -> Iterator[Face]:
     """Yield a Face for each interface of a model that has a patch, pressed."""
     rig = model.rig
     for number, one in enumerate(rig.friction.interfaces if rig is not None else ()):
         if one.patch is not None:
             own = replace(model, patch=one.patch, friction=one.numbers)
             yield Face(
-                number, rig.friction.names[number], own, patches_of(one, model.accuracy.tolerance)
+                number,
+                rig.friction.names[number],
+                own,
+                press_on_meshes(one, model.accuracy.tolerance),
             )
 
 
-def patches_of(one, tolerance: float) -> tuple:
+def press_on_meshes(one, tolerance: float) -> tuple:
     """Return the Patch of an InterfaceLaw and those on coarser meshes.
 
     They are computed once for all runs of a process with the same patch; a patch with files, which
@@ -104,7 +107,7 @@ def condense_again(model) -> None:
             result.solve_all(one.patch, model.accuracy.tolerance, fresh=True)
 
 
-def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
+def make_elements(one, tolerance: float, coarser: bool = False) -> tuple:
     """Return the parallel elements of an InterfaceLaw whose patch slips in part.
 
     A patch without load has one element that yields at once.
@@ -121,7 +124,7 @@ def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
     tuple
         Stiffness (t,) [N/m], yield slide (t,) [m], and the JenkinsSet (None for strips).
     """
-    patch, static = patches_of(one, tolerance)[int(coarser)], one.numbers.static
+    patch, static = press_on_meshes(one, tolerance)[int(coarser)], one.numbers.static
     if not patch.pressure.load > 0:
         return np.array([1 / patch.giving.mean()]), np.zeros(1), None
     length = record.make_law(one.numbers, one.load).element(one.load).length
@@ -136,7 +139,7 @@ def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
 def interfaces_with_coarse_mesh(model) -> list:
     """Return the indices of interfaces that have a coarser mesh, one tuple per distinct patch."""
     out = {}
-    for face in faces_of(model):
+    for face in press_faces(model):
         if face.partial_slip and face.patches[1] is not None:
             out.setdefault(face.patches, []).append(face.number)
     return [tuple(numbers) for numbers in out.values()]
@@ -155,14 +158,14 @@ def faces_with_frames(model, shots) -> tuple:
         interface.
     """
     out = []
-    for face in faces_of(model):
+    for face in press_faces(model):
         one, fields = model.rig.friction.interfaces[face.number], at_rest(face.patch)
-        found = elements_of(one, model.accuracy.tolerance)[2] if face.partial_slip else None
+        found = make_elements(one, model.accuracy.tolerance)[2] if face.partial_slip else None
         if found is not None and shots:
             states = [shot["faces"][face.number] for shot in shots]
             length = record.make_law(one.numbers, one.load).element(one.load).length
             tau, local = slip_fields.element_fields(face.patch, found, states, length)
-            fields = frames_of(
+            fields = interface_frames(
                 face.patch,
                 np.array([shot["time"] for shot in shots]),
                 tau,
@@ -175,7 +178,7 @@ def faces_with_frames(model, shots) -> tuple:
 
 def has_error_meshes(model) -> bool:
     """Return whether every patch that slips in part has a coarser mesh for its error."""
-    return all(face.patches[1] is not None for face in faces_of(model) if face.partial_slip)
+    return all(face.patches[1] is not None for face in press_faces(model) if face.partial_slip)
 
 
 def static_measures_without_errors(model) -> dict:
@@ -185,7 +188,7 @@ def static_measures_without_errors(model) -> dict:
     with locate_errors(model.source):
         return {
             rows.add_interface_number(name, face.number): found
-            for face in faces_of(model)
+            for face in press_faces(model)
             for name, found in values(face.patch).items()
         }
 
@@ -197,14 +200,14 @@ def static_measures(model) -> dict:
     """
     return {
         rows.add_interface_number(name, face.number): found
-        for face in faces_of(model)
+        for face in press_faces(model)
         for name, found in result.static_measures(face.model, face.patch, face.patches[1:]).items()
     }
 
 
-def warnings_of(model) -> list:
+def collect_warnings(model) -> list:
     """Return the warnings on the pressed patches."""
-    return together(
+    return merge_sentences(
         model,
         lambda face: [
             *result.warn_of_strains(face.model.patch, face.patch),
@@ -216,15 +219,15 @@ def warnings_of(model) -> list:
 UNKNOWN = "the interface has too few elements for an estimate of the error; leave out contact.element_size"
 
 
-def notes_of(model) -> list:
+def collect_notes(model) -> list:
     """Return notes on what the static model of the patches neglects."""
-    return together(
+    return merge_sentences(
         model,
         lambda face: result.notes_on_neglected_effects(face.model, face.patch, face.patches[1:]),
     )
 
 
-def together(model, told: Callable) -> list:
+def merge_sentences(model, told: Callable) -> list:
     """Return the sentences on all patches, each once with the names of its interfaces.
 
     Keys are written as they occur in the scene.
@@ -236,7 +239,7 @@ def together(model, told: Callable) -> list:
         Function of a Face that returns its sentences.
     """
     out: dict = {}
-    for face in faces_of(model):
+    for face in press_faces(model):
         for text in told(face):
             out.setdefault(in_scene(model, text), []).append(face.name)
     return [

@@ -26,7 +26,7 @@ from ...elasticity.lapack import one_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...model import profile
 from ...model.pieces import make_elastic_layers
-from .measures import OFFSET, Hidden, least_of, measures_from_series
+from .measures import OFFSET, Hidden, measures_from_series, shared_errors
 from .press import Surface
 from .values import vertex
 
@@ -119,7 +119,7 @@ def solve_on_points(asked, enough) -> PointSolution:
             cells = [_ends(asked, level) for level in range(MIN_LEVELS)]
             coarse = [_level(asked, ends, count, None) for ends in cells]
             series = coarse[-1:]
-            while len(series) < MIN_LEVELS or not (enough(found) or _dear(series[-1])):
+            while len(series) < MIN_LEVELS or not (enough(found) or _is_expensive(series[-1])):
                 series.append(_level(asked, cells[-1], 2 * series[-1].force.size, series[-1].force))
                 found = _add_series(coarse, series) if len(series) >= MIN_LEVELS else {}
         except (NotConverged, np.linalg.LinAlgError):
@@ -137,7 +137,7 @@ def _first(asked) -> int:
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 
-def _dear(last: PointLevel) -> bool:
+def _is_expensive(last: PointLevel) -> bool:
     """Return whether doubling the points of a level exceeds the limit of points or iterations."""
     return 2 * last.force.size > MAX_POINTS or 3 * last.work * last.force.size > MAX_WORK
 
@@ -150,7 +150,7 @@ def _add_series(coarse: list, series: list) -> dict:
     """
     mine = series[-1].values
     found = measures_from_series(
-        [one.values for one in series], least_of(series[-1].hidden, mine), True, 0.0
+        [one.values for one in series], shared_errors(series[-1].hidden, mine), True, 0.0
     )
     ends = measures_from_series([one.values for one in coarse], {}, True, 0.0)
     unknown = ("pressure_peak", "loaded_fraction") if series[-1].cornered else ()

@@ -4,7 +4,7 @@ In: a `PatchModel`. Out: the coarsest grids of its pieces. They follow from the 
 contact is searched on columns that are graded to the result of the previous search, in plans
 and runs alike. Every further grid splits all cells in two, so that the grids of a tighter
 tolerance contain those of a wider one. `ladder` decides how many grids a run takes, `plan`
-predicts it. Read `base_grids` first, then `layout_of`.
+predicts it. Read `base_grids` first, then `find_layout`.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import extend_grid, find_rounded_edges
 from . import slip_zones, store
-from .condensed import Pair, condense, without_factors
+from .condensed import Pair, condense, delete_factors
 from .press import Patch, press_patch
 from .values import contact_ends
 
@@ -102,7 +102,7 @@ def search_pair(asked) -> Pair:
         asked.mesh.is_static,
         asked.gap.jumps,
     )
-    return store.reuse(key, lambda: without_factors(condense(asked, *grids_of(asked, layout))))
+    return store.reuse(key, lambda: delete_factors(condense(asked, *make_grids(asked, layout))))
 
 
 class BaseGrids(NamedTuple):
@@ -139,21 +139,21 @@ def _search_grids(asked) -> BaseGrids:
     contact = None
     # without a load there is no contact to search for
     for search in range(MAX_SEARCHES if asked.nominal_load > 0 else 0):
-        pair = condense(asked, *grids_of(asked, layout)) if search else search_pair(asked)
+        pair = condense(asked, *make_grids(asked, layout)) if search else search_pair(asked)
         x = pair.grid.x
         seen = [
             contact_extent(press_patch(each, pair), asked.mesh.slip) for each in (asked, *sweep)
         ]
         contact = seen[0]
         last = layout
-        layout = layout_of(asked, seen)
+        layout = find_layout(asked, seen)
         cells = max(one.cell / one.wide for one in seen)
         shows = _shows_crests(asked, x, layout) and _shows_slip(contact.slip_zones, x, layout)
         if cells <= 1 / (EDGE_CELLS[asked.mesh.is_static] - 1) and shows:
             break
         if _is_settled(layout, last):
             break
-    return BaseGrids(grids_of(asked, layout), contact)
+    return BaseGrids(make_grids(asked, layout), contact)
 
 
 def _is_settled(layout: Layout, last: Layout) -> bool:
@@ -203,7 +203,7 @@ def search_layout(asked) -> Layout:
     return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
 
 
-def layout_of(asked, seen: list) -> Layout:
+def find_layout(asked, seen: list) -> Layout:
     """Return the layout of the coarsest columns for some contacts, finest where a contact ends.
 
     seen: ContactExtents, of one patch under several loads or of several patches.
@@ -334,19 +334,19 @@ def _crests(x, sigma) -> tuple:
     return tuple(zip(x[top + 1].tolist(), wide.tolist())) if top.size <= MAX_PLACES else ()
 
 
-def grids_of(asked, layout: Layout) -> list:
+def make_grids(asked, layout: Layout) -> list:
     """Return the grids of the pieces with the columns of a layout; one grid if they are alike."""
     pieces = (asked.pieces.lower, asked.pieces.upper)
     if asked.pieces.are_alike:
         pieces = pieces[:1]
-    x = columns_of(asked, layout)
+    x = make_columns(asked, layout)
     return [
         extend_grid(asked, piece, grid_on(asked, x, piece), 1 + SLOPE[asked.mesh.is_static])
         for piece in pieces
     ]
 
 
-def columns_of(asked, layout: Layout) -> np.ndarray:
+def make_columns(asked, layout: Layout) -> np.ndarray:
     """Return the columns (k,) [m] of a layout, at most MAX_COLUMNS."""
     x = divide_into_columns(layout, asked.gap.jumps)
     while x.size > MAX_COLUMNS + 1 and layout.bands:
@@ -389,7 +389,7 @@ def is_mirrored(body) -> bool:
     )
 
 
-def seconds_of(bodies) -> float:
+def predict_condensing_seconds(bodies) -> float:
     """Return the predicted CPU seconds of condensing the bodies of a patch.
 
     bodies: (lower, upper or None), or a single one for alike pieces.

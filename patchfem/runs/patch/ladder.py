@@ -12,7 +12,7 @@ from ...core import NotConverged, Outcome
 from ...model.pieces import make_piece_meshes
 from . import fine, slip_zones, store
 from .condensed import condense, shared_pairs
-from .grids import MAX_SECONDS, MIN_LEVELS, base_grids, seconds_of
+from .grids import MAX_SECONDS, MIN_LEVELS, base_grids, predict_condensing_seconds
 from .measures import is_within_tolerance, measures
 from .press import press_patch, solve
 
@@ -167,7 +167,7 @@ def solve_on_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool 
         nothing = out[0].pressure.outcome is Outcome.NO_CONTACT
         if not estimate or nothing:
             return tuple(out)
-        dear = seconds_of(grids)
+        dear = predict_condensing_seconds(grids)
         if on_points is not None:  # the solution on points of the profile is kept for finer meshes
             out[0] = replace(
                 out[0],
@@ -284,7 +284,7 @@ def tolerance_of_next_mesh(asked, patches, tolerance: float) -> float | None:
 
 def next_seconds(patch) -> float:
     """Return the predicted CPU seconds of condensing the pieces of a patch on its next mesh."""
-    return seconds_of([grid.refine() for grid in _grids(patch)])
+    return predict_condensing_seconds([grid.refine() for grid in _grids(patch)])
 
 
 def _grids(patch) -> tuple:

@@ -72,11 +72,11 @@ def extrapolate(values, nested: bool = True) -> Limit:
         values[-1],
         np.where(falls, STEADY_FACTOR * np.abs(rest), wild),
         np.where(falls, values[-1] + rest, values[-1]),
-        np.where(falls, _left(values, rest, ratio), wild),
+        np.where(falls, _extrapolated_half_width(values, rest, ratio), wild),
     )
 
 
-def _left(values, rest, ratio) -> np.ndarray:
+def _extrapolated_half_width(values, rest, ratio) -> np.ndarray:
     """Return the half-width around the extrapolated value.
 
     It is the change of the extrapolated value by the last mesh, and at least a quarter of the

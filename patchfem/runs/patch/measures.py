@@ -27,15 +27,15 @@ from .values import edge_cells, open_ends, unresolved_rounding, values
 CLEAR = 8.0
 FEW_NODES = 12  # the measures of a contact with fewer nodes depend on this number
 UNRESOLVED_NODES = 3  # contacts with at most this many nodes are not resolved
-ROUND = 5e-12  # relative round-off of the equations of contact
+ROUND_OFF_FRACTION = 5e-12  # relative round-off of the equations of contact
 MIN_ERROR = 1e-9  # smallest relative error that is stated, because nobody needs less
 OFFSET = 0.012  # error of the position of an edge between nodes, in cells
 RISING = 4.0  # the pressure at a corner may still increase by this many times its last change
 # fraction of the pressure at the corner of a coating that cells longer than its thickness may miss
 CORNER = 0.15
 # hidden error of an extrapolated value over that of the finest mesh: 4/3 + 1/3, rounded up
-EXTRAPOLATED = 2.0
-BANDED = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
+EXTRAPOLATED_ERROR_RATIO = 2.0
+MEASURES_WITH_BAND = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 
 
 def plane_band(asked, patch: Patch) -> list:
@@ -90,7 +90,7 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
     parts = [f"approach by {'+' * (closing > 0)}{format_length(closing, 3)}"] if closing else []
     shares = [
         (name, theirs[name] / mine[name] - 1)
-        for name in (first, *BANDED)
+        for name in (first, *MEASURES_WITH_BAND)
         if name != "approach" and mine[name]
     ]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
@@ -173,9 +173,11 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     nested = all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
     # none of several meshes that do not resolve a rounding shows its effect
     rough = 2.0 if missed_peak else 1.0
-    least = least_of(_hidden_by_mesh(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
+    least = (
+        shared_errors(_hidden_by_mesh(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
+    )
     out = measures_from_series(
-        [*found, mine], least, nested, tolerance, max(MIN_ERROR, fine.pair.rounding), rough
+        [*found, mine], least, nested, tolerance, max(MIN_ERROR, fine.pair.round_off_error), rough
     )
     if fine.averaging is not None:
         out = _with_corner_errors(out, fine, series[0])
@@ -200,7 +202,7 @@ def _with_corner_errors(found: dict, fine: Patch, coarse: Patch) -> dict:
     peak = replace(peak, error=float(lack))
     return found | {
         "pressure_peak": peak,
-        "loaded_fraction": _of_peak(found["loaded_fraction"], peak),
+        "loaded_fraction": _widen_for_peak(found["loaded_fraction"], peak),
     }
 
 
@@ -242,14 +244,16 @@ def converge(
         plain = np.maximum(rough * seen.error, hidden)
         is_extrapolated = (seen.extrapolated != seen.value) & (plain > enough)
         left = np.where(
-            is_extrapolated, np.maximum(rough * seen.left, EXTRAPOLATED * hidden), np.inf
+            is_extrapolated,
+            np.maximum(rough * seen.left, EXTRAPOLATED_ERROR_RATIO * hidden),
+            np.inf,
         )
         best = np.where(left < plain, seen.extrapolated, seen.value)
         error = np.maximum(np.minimum(left, plain), alike * np.abs(known[-1]))
         found = Converged(dict(zip(names, best)), dict(zip(names, error)))
         fraction, peak = found.values["loaded_fraction"], found.values["pressure_peak"]
         relative = np.where(peak > 0, found.errors["pressure_peak"] / peak, 0.0)
-        found.errors["loaded_fraction"] = of_peak(
+        found.errors["loaded_fraction"] = contain_peak_error(
             fraction, found.errors["loaded_fraction"], relative
         )
     return found
@@ -289,7 +293,7 @@ def measures_from_series(
 
 def mesh_engine(value: float, finest: float) -> str:
     """Return what computed a value: the finest mesh, if it gives `finest`, or extrapolation."""
-    return patch_rows.ON_FINEST_MESH if value == finest else patch_rows.EXTRAPOLATED
+    return patch_rows.ON_FINEST_MESH if value == finest else patch_rows.EXTRAPOLATED_SOURCE
 
 
 def is_within_tolerance(found: dict, tolerance: float) -> bool:
@@ -346,7 +350,7 @@ def _why_unbounded(patch: Patch) -> str:
     return ""
 
 
-def of_peak(fraction, error, share):
+def contain_peak_error(fraction, error, share):
     """Return errors of loaded fractions that contain the relative error `share` of the peak.
 
     The peak is the divisor of the fraction.
@@ -354,10 +358,11 @@ def of_peak(fraction, error, share):
     return np.maximum(error, fraction * share / (1 - np.minimum(share, 0.5)))
 
 
-def _of_peak(fraction: Measure, peak: Measure) -> Measure:
+def _widen_for_peak(fraction: Measure, peak: Measure) -> Measure:
     """Return a loaded fraction whose error contains that of the peak."""
     return replace(
-        fraction, error=float(of_peak(fraction.value, fraction.error, peak.error / peak.value))
+        fraction,
+        error=float(contain_peak_error(fraction.value, fraction.error, peak.error / peak.value)),
     )
 
 
@@ -466,7 +471,7 @@ def _hidden_by_mesh(patch: Patch, missed_peak: float) -> Hidden:
     )
 
 
-def least_of(hidden: Hidden, mine: dict) -> dict:
+def shared_errors(hidden: Hidden, mine: dict) -> dict:
     """Return the errors by name that three meshes may share.
 
     The changes from mesh to mesh do not show them. They are due to a contact of few nodes, the
@@ -492,7 +497,7 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
     peak = hidden.corner + np.where((cell > 0) & (count <= FEW_NODES), total / (4 * count**2), 0.0)
     peak = np.maximum(np.maximum(peak, hidden.wedge), hidden.missed - total)
     turned = (
-        ROUND * (np.abs(mine["approach"]) + hidden.spread)
+        ROUND_OFF_FRACTION * (np.abs(mine["approach"]) + hidden.spread)
         + np.abs(mine["rotation"]) * aside * hidden.turns
     )
     fullness = np.divide(
@@ -509,10 +514,10 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
         "contact_fraction": off / length,
         "contact_half_width": outer / 2,
         "loaded_fraction": peak * fullness,
-        "pressure_centre": ROUND * length + aside,
-        "moment": (ROUND * length + aside) * load,
+        "pressure_centre": ROUND_OFF_FRACTION * length + aside,
+        "moment": (ROUND_OFF_FRACTION * length + aside) * load,
         "rotation": turned / length,
-        "approach": ROUND * hidden.spread,
+        "approach": ROUND_OFF_FRACTION * hidden.spread,
     }
 
 

@@ -37,7 +37,7 @@ CELL_FACTORS = (4.0, 2.8, 2.0, 1.5, 1.0)
 MAX_CELL_RATIO = 2.0
 
 
-def geometry_of(asked) -> tuple:
+def geometry_key(asked) -> tuple:
     """Return the key of all that the meshes and pieces of a `PatchModel` depend on.
 
     It does not contain load and shapes, and is equal for patches that may share meshes.
@@ -100,9 +100,9 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> SharedMeshes 
         return None
     while True:
         share, shares = shares[0], shares[1:]
-        bodies = grids.grids_of(asked, layout.scale_cells(share))
+        bodies = grids.make_grids(asked, layout.scale_cells(share))
         if shares:
-            own = own or grids.grids_of(asked, layout)
+            own = own or grids.make_grids(asked, layout)
             if bodies[0].x.size >= own[0].x.size:  # both already have the largest number of columns
                 continue
         pairs, missed_by = _refine_until_met(
@@ -228,7 +228,9 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     layout = None
     for _ in range(MAX_SEARCHES):
         pair = (
-            condense(first, *grids.grids_of(first, layout)) if layout else grids.search_pair(first)
+            condense(first, *grids.make_grids(first, layout))
+            if layout
+            else grids.search_pair(first)
         )
         known = patches_on(cases, pair)
         seen = [
@@ -240,7 +242,7 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
             return None
         layout = _merge_layouts(
             [
-                grids.layout_of(one, [found]).scale_cells(0.5 ** halvings.get(_numbers(one), 0))
+                grids.find_layout(one, [found]).scale_cells(0.5 ** halvings.get(_numbers(one), 0))
                 for one, found in seen
             ],
             between,
@@ -348,9 +350,9 @@ def _refine_until_met(cases: list, bodies, tolerance: float, once: bool, least: 
                 ),
                 missed_by,
             )
-        dear = bodies[0].x.size > MAX_NODES or grids.seconds_of(bodies) > ladder.most_seconds(
-            cases[0], tolerance
-        )
+        dear = bodies[0].x.size > MAX_NODES or grids.predict_condensing_seconds(
+            bodies
+        ) > ladder.most_seconds(cases[0], tolerance)
         if missed_by <= 1 or once or dear:
             return pairs, missed_by
 

@@ -22,12 +22,12 @@ from .grids import (
     base_grids,
     is_mirrored,
     node_counts,
-    seconds_of,
+    predict_condensing_seconds,
 )
 from .ladder import comparison_meshes
 
 PACKAGES = 2e7  # bytes of the packages that elastic pieces import
-CONDENSED = 0.8  # measured bytes over the predicted bytes of condensing
+CONDENSING_BYTES_RATIO = 0.8  # measured bytes over the predicted bytes of condensing
 OUTLINED_NODE = 4.6e3  # bytes per node of pieces with cells beyond the interface
 FRAMES_NODE = 3.5e3  # bytes per node of the frames of a motion
 STRIP_NODE = 3000.0  # bytes per strip and node of the interface
@@ -75,7 +75,8 @@ def expected_grids(asked, tolerance: float) -> Sizes:
         (bodies[0].base_grid or bodies[0]).x.size,
         finest,
         len(levels),
-        sum(map(seconds_of, levels)) * (OTHER_FACTOR if asked.mesh.file is not None else 1.0),
+        sum(map(predict_condensing_seconds, levels))
+        * (OTHER_FACTOR if asked.mesh.file is not None else 1.0),
         sum(predict_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
         asked.pieces.has_overhang or asked.mesh.file is not None,
     )
@@ -93,7 +94,10 @@ def _expected_levels(asked, tolerance: float) -> list:
     levels = [bodies]
     while len(levels) < MIN_LEVELS + (has_edges and tolerance < TIGHT_TOL):
         bodies = [body.refine() for body in bodies]
-        if len(levels) >= MIN_LEVELS and seconds_of(bodies) > MAX_SECONDS[asked.mesh.is_static]:
+        if (
+            len(levels) >= MIN_LEVELS
+            and predict_condensing_seconds(bodies) > MAX_SECONDS[asked.mesh.is_static]
+        ):
             break
         levels.insert(0, bodies)
     return levels
@@ -152,7 +156,9 @@ def pressing_cost(asked, tolerance: float) -> Cost:
         "condensing": per_second * found.seconds,
         "fields": cost_model.FIELDS_SECONDS,
     }
-    size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * found.bytes)
+    size = PACKAGES + (
+        OUTLINED_NODE * found.nodes if found.outlined else CONDENSING_BYTES_RATIO * found.bytes
+    )
     if not asked.mesh.is_static:
         times["fields"] += cost_model.FRAMES_SECONDS + cost_model.FRAME_NODE_SECONDS * found.nodes
         size += FRAMES_NODE * found.nodes

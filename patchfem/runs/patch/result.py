@@ -21,10 +21,10 @@ from ..results.result import Result, at_rest
 from . import derived, skin
 from .ladder import solve_all, static_ladder
 from .measures import strip_error
-from .values import beyond_gentle, values
+from .values import reaches_steep_end, values
 
 LOCKS = 0.499  # Poisson's ratio up to which the errors of cells that lock are reliable
-SMALL = 0.02  # largest small strain; effects of its second order are neglected
+MAX_SMALL_STRAIN = 0.02  # largest small strain; effects of its second order are neglected
 
 __all__ = [
     "bodies",
@@ -36,11 +36,13 @@ __all__ = [
     "static_measures_without_errors",
     "warn_of_strains",
 ]
-COUPLED = 0.02  # closing by shear over the tangential compliance, above which a note states it
+MIN_COUPLING_RATIO = (
+    0.02  # closing by shear over the tangential compliance, above which a note states it
+)
 # load over the buckling load of a tall piece; its sideways motion lacks about this fraction
-BENT = 0.02
+MIN_BUCKLING_RATIO = 0.02
 # fraction of a far face that counts as complete, because a mesh file has few digits
-WHOLE = 1 - 1e-6
+MIN_COMPLETE_FRACTION = 1 - 1e-6
 
 
 def static_measures_without_errors(model) -> dict:
@@ -140,18 +142,18 @@ def warn_of_strains(asked, patch) -> list:
             "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
             "contact is computed; lower the tilt or the load"
         ]
-        if beyond_gentle(patch)
+        if reaches_steep_end(patch)
         else []
     )
     return [
-        *strained_by(
+        *strain_warnings(
             asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond
         ),
         *(text for text in patch.notes if not nodes.is_note(text)),
     ]
 
 
-def strained_by(asked, top: float, approach: float, beyond=()) -> list:
+def strain_warnings(asked, top: float, approach: float, beyond=()) -> list:
     """Return the warnings of `warn_of_strains` on strains and locking.
 
     Parameters
@@ -170,9 +172,10 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
         "the approach is {:.3g} of the total height of the two pieces",
     )
     for share, what in zip(_strains(asked, top, approach), words):
-        if share > SMALL:
+        if share > MAX_SMALL_STRAIN:
             out.append(
-                what.format(share) + f", beyond the small strains that are assumed ({SMALL:g})"
+                what.format(share)
+                + f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
             )
     out += beyond
     stiff = max(m.poisson for m in stuff)
@@ -191,9 +194,9 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
 
 
 def exceeds_small_strains(asked, top, approach):
-    """Return whether `strained_by` may have a warning, for one patch or arrays of many."""
+    """Return whether `strain_warnings` may have a warning, for one patch or arrays of many."""
     return (
-        np.maximum(*_strains(asked, top, approach)) > SMALL
+        np.maximum(*_strains(asked, top, approach)) > MAX_SMALL_STRAIN
         if asked.mesh.is_automatic
         else np.ones(np.shape(top), bool)
     )
@@ -248,7 +251,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
         out.append(
             f"each static measure is computed on the mesh and on points {format_length(patch.averaging, 3)} apart, and "
             "the value with the smaller error is given; on these points short waves are treated as in infinite "
-            f"layers; {_of_mesh(model, patch)}"
+            f"layers; {_mesh_clause(model, patch)}"
         )
     elif patch.averaging is not None and not asked.gap.rough:
         out.append(
@@ -260,7 +263,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
         out += skin.note_on_peak_stiffness(asked, float(patch.pressure.load / bears))
     if patch.strips is not None:
         out.append(patch.strips.note)
-    if patch.pair.coupling > COUPLED and model.kind != "patch":
+    if patch.pair.coupling > MIN_COUPLING_RATIO and model.kind != "patch":
         out.append(
             "the pieces have different elasticity, which couples shear and normal motion; this coupling is "
             f"neglected; under a shear force the largest normal displacement is {patch.pair.coupling:.2g} times "
@@ -274,7 +277,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
     return out
 
 
-def _of_mesh(model, patch) -> str:
+def _mesh_clause(model, patch) -> str:
     """Return the clause on results that are computed on the mesh, not on points of a profile."""
     peak = (
         f"whose largest pressure is {format_quantity(float(patch.pressure.sigma_n.max()), 'Pa', 3)}"
@@ -338,7 +341,7 @@ def notes_on_mesh_file(pair) -> list:
                 "all; if a hole is not intended, close it in the mesh"
             )
         fixed, whole = recognise.measure_fixed_length(body)
-        if fixed < WHOLE * whole:
+        if fixed < MIN_COMPLETE_FRACTION * whole:
             out.append(
                 f"contact.mesh: the held nodes `{side}_far` cover {fixed:.6g} m of a face of {whole:.6g} m, "
                 f"{fixed / whole:.3g} of the length of this face; the rest of the face is free"
@@ -360,10 +363,10 @@ def notes_on_tall_pieces(asked, mean: float) -> list:
         young, nu = piece.substrate.young, piece.substrate.poisson
         stiff = young / (1 - nu**2) if asked.pieces.plane == "strain" else young
         share = mean / (np.pi**2 * stiff * asked.pieces.length**2 / (48 * piece.height**2))
-        if piece.height > asked.pieces.length and share > BENT:
+        if piece.height > asked.pieces.length and share > MIN_BUCKLING_RATIO:
             out.append(
                 f"the {side} piece is {piece.height / asked.pieces.length:.3g} times as tall as it is long and carries "
-                f"{share:.2g} of the load at which it would buckle sideways (limit {BENT:g}); the computation "
+                f"{share:.2g} of the load at which it would buckle sideways (limit {MIN_BUCKLING_RATIO:g}); the computation "
                 "neglects that bending lengthens the lever arm of the load"
             )
     return out

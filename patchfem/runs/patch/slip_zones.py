@@ -42,11 +42,11 @@ def slip_zones(patch, slip, ends: list) -> tuple:
                 places, slides = [first, *places], [0.0, *slides]
             if last is not None and last > places[-1]:
                 places, slides = [*places, last], [*slides, 0.0]
-        out += _below(np.array(places), np.array(slides), slip.amplitude)
+        out += _intervals_below(np.array(places), np.array(slides), slip.amplitude)
     return tuple(out)
 
 
-def _below(x, slides, amplitude: float) -> list:
+def _intervals_below(x, slides, amplitude: float) -> list:
     """Return the intervals of x (k,) [m] in which slides (k,) [m] are below an amplitude [m]."""
     yields = slides < amplitude
     starts = np.flatnonzero(yields & ~np.append(False, yields[:-1]))

@@ -24,7 +24,7 @@ from .press import as_patch, with_linear_skin
 from .values import EdgeValues, peak_pressures, static_values
 
 # cells beyond the end of a contact on the coarser mesh within which it may end on this one
-BEYOND = 2
+MAX_END_CELLS = 2
 
 
 class SolvedPatch(NamedTuple):
@@ -234,7 +234,7 @@ def patches_on(patches, pair: Pair) -> list:
                 level.is_solved[place]
                 and level.contacts.n_nodes[place] > one_by_one.UNRESOLVED_NODES
             ):
-                out[k] = _patch_of(patches[k], pair, level, place)
+                out[k] = _make_patch(patches[k], pair, level, place)
     return out
 
 
@@ -248,7 +248,7 @@ def solved_patches(patches, tolerance: float) -> list:
         SolvedPatch(
             found.measures(k),
             found.band(one, k),
-            tuple(_patch_of(one, pair, level, k) for pair, level in zip(pairs, found.levels)),
+            tuple(_make_patch(one, pair, level, k) for pair, level in zip(pairs, found.levels)),
         )
         if found.good[k]
         else None
@@ -315,10 +315,10 @@ def pressed_together(
     )
     found = one_by_one.converge(
         [level.values for level in reversed(levels)],
-        one_by_one.least_of(hidden, fine.values),
+        one_by_one.shared_errors(hidden, fine.values),
         (first.mesh.tolerance or tolerance) if first.mesh.is_automatic else None,
         all(one_by_one.cells_halved(a, b) for a, b in pairwise(pairs)),
-        max(one_by_one.MIN_ERROR, pair.rounding),
+        max(one_by_one.MIN_ERROR, pair.round_off_error),
     )
     return BatchSolution(
         found.values,
@@ -331,7 +331,7 @@ def pressed_together(
     )
 
 
-def _patch_of(asked, pair: Pair, level: Level, k: int):
+def _make_patch(asked, pair: Pair, level: Level, k: int):
     """Return the k-th patch of a level, of PatchModel `asked`, as `press.press_patch` returns it."""
     gap, notes, seconds = asked.gap.evaluate(level.x)
     rows = level.pressure
@@ -440,7 +440,7 @@ def _about(x, coarse: Level) -> tuple:
         coarse.x[np.minimum(known.stop, coarse.x.size - 1)],
     )
     first = np.searchsorted(x, before) - np.where(known.first > 0, 0, 1)
-    stop = np.searchsorted(x, after) + 1 + BEYOND
+    stop = np.searchsorted(x, after) + 1 + MAX_END_CELLS
     return np.where(solved, np.maximum(first, 0), 0), np.where(
         solved, np.minimum(stop, x.size), x.size
     )

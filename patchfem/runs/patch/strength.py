@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from ...scene.keys.materials import MATERIALS, YIELD_STRENGTHS
 
-NEGLECTED = "the run is elastic and neglects yielding"
+YIELDING_NEGLECTED = "the run is elastic and neglects yielding"
 
 
 class Strength(NamedTuple):
@@ -29,7 +29,7 @@ class Strength(NamedTuple):
         return f"the yield strength is {self.pressure / 1e6:.4g} MPa ({self.source})"
 
 
-def strength_of(material) -> Strength | None:
+def yield_strength(material) -> Strength | None:
     """Return the yield strength of a Material, from the scene or else from the table.
 
     None if neither has it.
@@ -75,13 +75,13 @@ def yielding_faces(asked, peak: float) -> dict:
     notes = {}
     for side, piece in (("lower", asked.pieces.lower), ("upper", asked.pieces.upper)):
         face = piece.coating.material if piece.coating else piece.substrate
-        known = strength_of(face)
+        known = yield_strength(face)
         if known is None or known in notes:
             continue
         stress = min_stress_ratio(face.poisson, asked.pieces.plane) * peak
         if stress > known.pressure:
             notes[known] = (
                 f"under the largest pressure the von Mises stress is at least {stress / 1e6:.4g} MPa at the face of "
-                f"the {side} piece ({known.material}); {known.words}; {NEGLECTED}"
+                f"the {side} piece ({known.material}); {known.words}; {YIELDING_NEGLECTED}"
             )
     return notes

@@ -44,7 +44,7 @@ def press_strips_of_patch(
         pieces.interface,
         held,
     )
-    skin = skin_of(asked)
+    skin = make_asperities(asked)
     by = asked.loading.approach
     one = split_into_strips(pieces, count)
     state = press_strips(
@@ -79,7 +79,7 @@ def press_strips_of_patch(
     return pieces, answer, skin if isinstance(skin, SmoothAsperities) else None, state
 
 
-def skin_of(asked):
+def make_asperities(asked):
     """Return the asperity layer between the strips; None if they are bare."""
     if asked.interface.skin is None:
         return None

@@ -182,7 +182,7 @@ def _edge_values(patch: Patch) -> EdgeValues:
     """Return the quantities of a patch that depend on where its contact ends."""
     x, normal, active = patch.x, patch.pieces.normal, patch.active
     found = contact_ends(patch)
-    stretches = stretches_of(patch, found)
+    stretches = contact_intervals(patch, found)
     return EdgeValues(
         length=float(np.diff(stretches).sum()),
         width=float(stretches[-1, 1] - stretches[0, 0]),
@@ -192,7 +192,7 @@ def _edge_values(patch: Patch) -> EdgeValues:
     )
 
 
-def stretches_of(patch: Patch, found: list) -> np.ndarray:
+def contact_intervals(patch: Patch, found: list) -> np.ndarray:
     """Return the parts of the interface in contact (k, 2) [m], by increasing x.
 
     found: ends of the contact from `contact_ends`.
@@ -298,7 +298,7 @@ def open_ends(patch: Patch) -> float:
     )
 
 
-def beyond_gentle(patch: Patch) -> bool:
+def reaches_steep_end(patch: Patch) -> bool:
     """Return whether the contact continues where a rounded end is too steep for the model.
 
     A single loaded node whose cell is longer than the whole rounding does not count.

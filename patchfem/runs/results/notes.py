@@ -15,10 +15,10 @@ from ...scene.keys import materials
 # relative difference of the two values of the friction work, above which a warning is given
 BOOKS = 1e-3
 RIPE = 0.3  # slide during which bonds form over their length, above which a warning is given
-BOUND = 1e-3  # excess over mu_s N relative to it, above which a note is given
+MIN_EXCESS_RATIO = 1e-3  # excess over mu_s N relative to it, above which a note is given
 FARTHEST = 8  # most halvings of the steps that a warning proposes
 # proposed harmonics over those of a balance; smallest proposed number of harmonics
-MORE, LEAST = 4, 31
+HARMONICS_FACTOR, MIN_HARMONICS = 4, 31
 MOST_HARMONICS = 500  # largest number of harmonics that is proposed for a sharp friction law
 
 
@@ -134,7 +134,7 @@ def growth_notes(law, peak: float | None) -> list:
             "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
             "friction.order <= 1 to keep friction near mu_s N"
         )
-    if peak is not None and peak > 1 + BOUND:
+    if peak is not None and peak > 1 + MIN_EXCESS_RATIO:
         out.append(
             f"the friction force reaches {peak:.3g} times mu_s N: the bond length grows during the run, and "
             "bonds that formed while the bond length was small then break later; to keep the friction force at "
@@ -185,7 +185,7 @@ def more_harmonics(found: int, sharp: float = 0.0) -> str:
     A balance with few harmonics says little about its convergence. sharp: number of harmonics that
     the friction law itself needs.
     """
-    return f"set accuracy.harmonics = {max(MORE * found, LEAST, min(ceil(sharp), MOST_HARMONICS))}"
+    return f"set accuracy.harmonics = {max(HARMONICS_FACTOR * found, MIN_HARMONICS, min(ceil(sharp), MOST_HARMONICS))}"
 
 
 def heating_sentences(model, patch, work: float, duration: float) -> list:

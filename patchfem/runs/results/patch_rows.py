@@ -167,9 +167,9 @@ ROWS = (
 # what computes a static measure, as `numerics.measures` in summary.json says
 ON_FINEST_MESH = "finite elements, finest mesh"
 # or the value of a coarser mesh, whose error is smaller
-EXTRAPOLATED = "finite elements, extrapolated over nested meshes"
+EXTRAPOLATED_SOURCE = "finite elements, extrapolated over nested meshes"
 ON_POINTS = "points on layered half-spaces"
-WORN = "wear in jumps of cycles"
+WORN_SOURCE = "wear in jumps of cycles"
 # measures whose errors choose the mesh
 DECISIVE = (
     "pressure_peak",
@@ -183,7 +183,7 @@ TABLE = {row.name: row for row in ROWS}
 POSITIVE = tuple(name for name in DECISIVE if TABLE[name].minimum == 0.0)
 
 
-def minimum_of(name: str) -> float:
+def minimum_value(name: str) -> float:
     """Return the smallest value [SI] that a static measure can have; -inf without a bound.
 
     The name may have the number of an interface.

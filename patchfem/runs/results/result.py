@@ -18,7 +18,9 @@ from . import patch_rows
 
 FRAMES = 16  # number of frames of the interface in the last cycle
 COUNTS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
-_BEFORE = re.compile(r"/[^:]*/(?=[^/:]+: )")  # folder of an absolute path at the start of a remark
+_FOLDER_OF_PATH = re.compile(
+    r"/[^:]*/(?=[^/:]+: )"
+)  # folder of an absolute path at the start of a remark
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -98,7 +100,7 @@ def _pressed_frame(surface) -> dict:
     }
 
 
-def surface_of(patch, fields: dict):
+def patch_surface(patch, fields: dict):
     """Return the Surface on whose points the fields of a pressed patch are given.
 
     A motion moves the nodes of the mesh; without one the fields are those of `at_rest`. None
@@ -109,7 +111,7 @@ def surface_of(patch, fields: dict):
     return patch.fine
 
 
-def frames_of(patch, time, tau, local, slide) -> dict:
+def interface_frames(patch, time, tau, local, slide) -> dict:
     """Return the frames of the interface by name: the pressed state, then the given ones.
 
     Parameters
@@ -162,7 +164,7 @@ def on_a_mesh_of_known_error(model, patch, coarse) -> bool:
     )
 
 
-def without_errors(found: dict, estimate: bool) -> dict:
+def remove_unknown_errors(found: dict, estimate: bool) -> dict:
     """Return the measures, without their errors if none were estimated."""
     return found if estimate else {k: replace(m, error=None) for k, m in found.items()}
 
@@ -215,16 +217,16 @@ def measure_engines(result) -> dict:
     return {name: engine for name, engine in engines.items() if engine}
 
 
-def without_folders(texts, path: Path) -> list:
+def shorten_file_names(texts, path: Path) -> list:
     """Return remarks with absolute file names reduced to the file, and readable numbers.
 
     path: of the scene, in whose folder the files are.
     """
-    return without_folders_of(path)(texts)
+    return file_name_shortener(path)(texts)
 
 
-def without_folders_of(path: Path) -> Callable[[Iterable[str]], list]:
-    """Return `without_folders` for many remarks on scenes at one path."""
+def file_name_shortener(path: Path) -> Callable[[Iterable[str]], list]:
+    """Return `shorten_file_names` for many remarks on scenes at one path."""
     folders = [
         f"{folder}/" for folder in (path.parent, path.parent.absolute()) if folder.is_absolute()
     ]
@@ -237,7 +239,7 @@ def without_folders_of(path: Path) -> Callable[[Iterable[str]], list]:
                 text = text.replace(folder, "")
             out.append(
                 rewrite_powers_of_ten(
-                    _BEFORE.sub("", text, count=1) if text.startswith("/") else text
+                    _FOLDER_OF_PATH.sub("", text, count=1) if text.startswith("/") else text
                 )
             )
         return out

@@ -45,9 +45,9 @@ MAX_EXACT_SECONDS_UNRESOLVED = (
 )
 MAX_EXACT_SECONDS = 600.0  # CPU seconds of an exact solution above which it is refused
 MOST_STEPS = 6400  # steps per cycle of the finest automatic march
-# an element sticks for the fraction (friction limit / force of the drive)**HELD of the time
+# an element sticks for the fraction (friction limit / force of the drive)**STICKING_EXPONENT of the time
 # (measured: .01)
-HELD = 6
+STICKING_EXPONENT = 6
 # Cells are merged in pairs at most this many times, at this tolerance and above: 49 of 769 cells
 # remain, with an error of 2e-4 of the motion of a slipping joint.
 MOST_PAIRS, AT = (
@@ -57,18 +57,23 @@ MOST_PAIRS, AT = (
 REACH = 2.0  # phase of the fastest rate in a piece [rad], as in `dynamics.events.series_kernels`
 # decay times until the ringing after an event is round-off, as in `dynamics.events.slow_kernels`
 DYING = 33.0
-PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # numerical settings of the march
+MARCH_SETTINGS = (
+    "steps_per_cycle",
+    "tail",
+    "merge",
+    "shear_modes",
+)  # numerical settings of the march
 # decay times of the slowest mode after which a motion repeats to round-off
 REPEATS = 30.0
 # largest number of smooth steps over those of a march; with more, the march is preferred although
 # its steps cost more
-MORE = 3.5
+MAX_STEP_RATIO = 3.5
 # a law of the speed is stiff for the fraction exp(EASES (1 - r)) of the time: .5 at r = 1.07, .1 at
 # 1.26
 EASES = 9.0
 STABLE = 3.0  # relaxation lengths of a state of the law that a stable step may cover
 # engines that keep SAMPLES samples of each of the last cycles instead of their steps
-RESAMPLED = (
+RESAMPLING_ENGINES = (
     "exact",
     "piecewise",
     "smooth",
@@ -240,7 +245,7 @@ def expected_seconds(model: Model) -> float:
     )
     push = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
     ringing, events = ringing_and_events(model)
-    share = min(1.0, limit / push) ** HELD if stiff and push else 1.0
+    share = min(1.0, limit / push) ** STICKING_EXPONENT if stiff and push else 1.0
     return (
         (cost_model.PIECE_SECONDS + _size_seconds(model) + cost_model.PIECE_ELEMENT_SECONDS * count)
         * (ringing * share + events)
@@ -350,7 +355,7 @@ def _is_loop_kept(model: Model) -> bool:
 
 def kept_samples(numerics) -> float:
     """Return how many samples of the last cycles a run keeps."""
-    each = SAMPLES if numerics.engine in RESAMPLED else numerics.steps
+    each = SAMPLES if numerics.engine in RESAMPLING_ENGINES else numerics.steps
     return float(max(2, numerics.window) * each)
 
 
@@ -393,7 +398,9 @@ def exact_words(model: Model, engine: str) -> list:
 def reason_to_march_smooth_law(model: Model) -> str:
     """Return the reason to march a rig instead of integrating it at high order, or ""."""
     rig, accuracy = model.rig, model.accuracy
-    pinned = next((f"accuracy.{key}" for key in PINNED if getattr(accuracy, key) is not None), "")
+    pinned = next(
+        (f"accuracy.{key}" for key in MARCH_SETTINGS if getattr(accuracy, key) is not None), ""
+    )
     if pinned or accuracy.quadrature not in ("auto", "recursion"):
         return f"with {pinned or 'accuracy.quadrature'}"
     if len(rig.modes.interfaces) > 1:
@@ -405,7 +412,7 @@ def reason_to_march_smooth_law(model: Model) -> str:
         return f"for law '{model.friction.law}'"
     return (
         "in so many steps"
-        if smooth_steps(model, element) > MORE * max(steps_per_cycle(model), 400)
+        if smooth_steps(model, element) > MAX_STEP_RATIO * max(steps_per_cycle(model), 400)
         else ""
     )
 

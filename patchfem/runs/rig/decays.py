@@ -35,14 +35,14 @@ MOVING = (
 )
 NO_LOOP = "the hysteresis loop of this friction law is not known without a computation in time"
 NOT_STATIC = "no static curve of the mode was found at these amplitudes"
-MOST = 0.5  # largest relative error of a point of the curve
-APART = 16  # amplitudes per decade at which the error of the mesh is computed
+MAX_POINT_ERROR = 0.5  # largest relative error of a point of the curve
+AMPLITUDES_PER_DECADE = 16  # amplitudes per decade at which the error of the mesh is computed
 
 
-def decay_of(raw: Solution) -> DecayCurve | None:
+def compute_decay(raw: Solution) -> DecayCurve | None:
     """Return the decay curve of the output of a release, with errors; None if it has no points.
 
-    Points whose error exceeds MOST of their value are left out. The errors are those of the
+    Points whose error exceeds MAX_POINT_ERROR of their value are left out. The errors are those of the
     evaluation plus the changes by the coarse runs at the same amplitudes; they are infinite outside
     the range of a coarse run.
     """
@@ -50,8 +50,8 @@ def decay_of(raw: Solution) -> DecayCurve | None:
     if not found.time.size:
         return None
     found = _add_coarse_changes(found, raw)
-    known = (found.frequency_error <= MOST * found.frequency) & (
-        found.damping_error <= MOST * np.abs(found.damping)
+    known = (found.frequency_error <= MAX_POINT_ERROR * found.frequency) & (
+        found.damping_error <= MAX_POINT_ERROR * np.abs(found.damping)
     )
     return found.at(known) if known.any() else None
 
@@ -155,7 +155,7 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
     """
     held = modes.compute_stuck_mode(laws.rows, laws.stiffness(), number)
     moved = float(modes.output @ held[1])
-    return rows_of(
+    return decay_rows(
         modes,
         quasi_static.static_motions(
             modes, laws, amplitudes / abs(moved), held, samples, modes.output / moved
@@ -163,7 +163,7 @@ def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarra
     )
 
 
-def rows_of(modes, found: list) -> np.ndarray:
+def decay_rows(modes, found: list) -> np.ndarray:
     """Return output amplitude [m], frequency [Hz], damping and loss [J] (4, k) of `StaticMotion`s."""
     return np.array(
         [
@@ -261,14 +261,14 @@ def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
         See `mesh_errors_of_decay`.
     """
     low, high = np.log10([amplitude.min(), amplitude.max()])
-    at = np.logspace(low, high, 2 + int(APART * (high - low)))
+    at = np.logspace(low, high, 2 + int(AMPLITUDES_PER_DECADE * (high - low)))
     wide, why = mesh_errors_of_decay(
         model, patch, coarse, at, lambda laws: _mode(model.rig.modes, laws, frequency)
     )
     return np.array([np.interp(np.log(amplitude), np.log(at), one) for one in wide]), why
 
 
-def without_slip_between_nodes(whys: dict, ways) -> list:
+def slip_sentences(whys: dict, ways) -> list:
     """Return sentences on errors to which `mesh_errors_of_decay` could not be added.
 
     Parameters

@@ -1,6 +1,6 @@
 """Engines of a rig as records: what each can compute, how it solves, coarse runs and cost.
 
-In: a Model. Out: its Engine (`engine_of`): the one that the scene names, or the first one that
+In: a Model. Out: its Engine (`choose_engine`): the one that the scene names, or the first one that
 can compute it. `scene.rules.methods.ENGINE_SUPPORT` has one table of what each engine can compute, for
 the rules of the scene and for this choice. The memory and the compile time of each engine are
 in `runs.memory`.
@@ -55,10 +55,10 @@ class Variant(NamedTuple):
 
 
 # largest error of an energy balance that is accurate to round-off: a billion steps have less
-CLOSED = 1e-8
+BALANCE_ROUND_OFF = 1e-8
 
 
-def function_of(where: str) -> Callable:
+def import_function(where: str) -> Callable:
     """Import and return the function that "module function" of this folder names."""
     module, function = where.split()
     return getattr(import_module(f"patchfem.runs.rig.{module}"), function)
@@ -100,7 +100,7 @@ class Engine(NamedTuple):
     words: str = "plan bond_sum_sentences"
     notes: str = ""
     least: float = 1e-9
-    closes: float | None = CLOSED
+    closes: float | None = BALANCE_ROUND_OFF
     tells: tuple = ()
     resumes: bool = False
     steady: bool = False
@@ -123,7 +123,7 @@ class Engine(NamedTuple):
     @property
     def run(self) -> Callable:
         """Function that solves, imported on first use."""
-        solve = function_of(self.solve)
+        solve = import_function(self.solve)
         return lambda model, *given: seen_by_gauge(model, solve(model, *given))
 
     def lacks(self, model: Model, steady: bool = False) -> str:
@@ -131,12 +131,12 @@ class Engine(NamedTuple):
 
         steady: whether the drive is the sine of a curve instead of its own waveform.
         """
-        return methods.find_unsupported_feature(self.name, motion_of(model, steady))
+        return methods.find_unsupported_feature(self.name, motion_properties(model, steady))
 
     def call(self, hook: str, *given) -> Any:
         """Call the function that a field names; None if it names none."""
         where = getattr(self, hook)
-        return function_of(where)(*given) if where else None
+        return import_function(where)(*given) if where else None
 
 
 def reason_not_exact(model: Model, steady: bool = False) -> str:
@@ -148,7 +148,7 @@ def reason_not_exact(model: Model, steady: bool = False) -> str:
     return reasons[-1] if all(reasons) else ""
 
 
-def motion_of(model: Model, steady: bool = False) -> methods.MotionFeatures:
+def motion_properties(model: Model, steady: bool = False) -> methods.MotionFeatures:
     """Return the properties of a model that decide which engines can compute it."""
     rig = model.rig
     spring = (
@@ -210,7 +210,7 @@ FINDERS = {
 }
 
 
-def steady_by(model: Model) -> Finder:
+def choose_steady_method(model: Model) -> Finder:
     """Choose the method that finds the steady motion of a model.
 
     Maps of events or of yields are exact. For grooves, the initial state of a march is corrected
@@ -384,7 +384,7 @@ def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the coarse runs of a steady motion: its own errors, and coarser meshes."""
     meshed = (
         _pieces_in_space(model, numerics, patch, coarse, solution)
-        if steady_by(model).like == PIECES.name
+        if choose_steady_method(model).like == PIECES.name
         else []
     )
     return [*_own_errors(model, numerics, patch, coarse, solution), *meshed]
@@ -474,7 +474,7 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
     found = measures.get("energy_balance")
     if found is None or found.value is None:
         return ""
-    bar = max(CLOSED, found.error or 0.0) if engine.closes is None else engine.closes
+    bar = max(BALANCE_ROUND_OFF, found.error or 0.0) if engine.closes is None else engine.closes
     if not found.value > bar:  # a motion that is not finite was detected before
         return ""
     return (
@@ -484,7 +484,7 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
 
 
 @lru_cache(8)
-def engine_of(model: Model, per_point: bool = False) -> Engine:
+def choose_engine(model: Model, per_point: bool = False) -> Engine:
     """Return the engine of a model.
 
     It is the one that the scene names (of several with this name the first that can compute the
@@ -505,7 +505,7 @@ def engine_of(model: Model, per_point: bool = False) -> Engine:
 
 def unused_settings(model: Model, engine: str) -> list:
     """Return sentences on the settings in [accuracy] of a rig that its engine does not use."""
-    by = steady_by(model).like if ENGINES[engine].steady else engine
+    by = choose_steady_method(model).like if ENGINES[engine].steady else engine
     where = {
         "steps_per_cycle": f"for engine '{engine}', which has no steps,",
         "harmonics": "if the steady motion is found by the exact solution from event to event",

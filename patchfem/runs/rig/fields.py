@@ -12,10 +12,10 @@ from ...friction import record
 from ...slip import fields
 from ..bench import averaged
 from ..bench import shear as bench_shear
-from ..results.result import FRAMES, at_rest, frames_of
+from ..results.result import FRAMES, at_rest, interface_frames
 
 
-def fields_of(model, numerics, patch, raw) -> dict:
+def collect_frames(model, numerics, patch, raw) -> dict:
     """Return the frames of the interface in the last cycle by name.
 
     Parameters
@@ -30,7 +30,7 @@ def fields_of(model, numerics, patch, raw) -> dict:
     if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
         return at_rest(patch)
     if model.rig.friction.load_varies:
-        return _under_changing_load(patch, raw)
+        return _frames_under_changing_load(patch, raw)
     if not raw.snapshots:
         at = (
             np.linspace(
@@ -45,14 +45,14 @@ def fields_of(model, numerics, patch, raw) -> dict:
         if f is not None and law_has_trait(f.law, "averaged"):
             tau = averaged.limit_tractions(model, patch, raw.window.force[at])
         slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
-        return frames_of(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
+        return interface_frames(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
 
     shots = raw.snapshots
     if model.partial_slip and model.grooves is not None:
         tau, local = bench_shear.climbed_fields(
             patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots]
         )
-        return frames_of(
+        return interface_frames(
             patch,
             np.array([s["time"] for s in shots]),
             tau,
@@ -72,10 +72,10 @@ def fields_of(model, numerics, patch, raw) -> dict:
     else:
         tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
         local = np.array([np.full(sigma.size, s["slip"]) for s in shots])
-    return frames_of(patch, time, tau, local, np.array([s["slide"] for s in shots]))
+    return interface_frames(patch, time, tau, local, np.array([s["slide"] for s in shots]))
 
 
-def _under_changing_load(patch, raw) -> dict:
+def _frames_under_changing_load(patch, raw) -> dict:
     """Return interface frames (f, x) of a run with a varying load, the pressed state first.
 
     Its status is 0 for open, 1 for stick and 2 for slip.

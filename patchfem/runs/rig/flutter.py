@@ -15,7 +15,10 @@ from .interface import contact_model
 from .steady.balance import BalanceFinder
 
 NAME = "flutter_amplitude"
-ALONE = "no mode with negative damping moves an interface, so friction cannot dissipate the energy of such a mode"
+NO_INTERFACE_NOTE = (
+    "no mode with negative damping moves an interface, so friction cannot dissipate the energy "
+    "of such a mode"
+)
 NONE = (
     f"no unstable limit cycle was found at amplitudes between {limit_cycles.MIN_AMPLITUDE_RATIO:g} and "
     f"{limit_cycles.MAX_AMPLITUDE_RATIO:g} times 4 F/(pi |c| omega), where F is the friction force and c is the "
@@ -35,7 +38,7 @@ SLIDES = (
 )
 
 
-def flutter_of(run) -> tuple:
+def find_limit_cycles(run) -> tuple:
     """Return the measures by name and the notes on unstable limit cycles of a `rig.Coupled`.
 
     The measure is the amplitude of the largest unstable limit cycle with its error, or the reason
@@ -93,7 +96,7 @@ def _cycles(model, numerics, patch) -> tuple:
         return [], "limit cycles can be computed for one interface only", 0.0
     modes, row = rig.modes, rig.modes.interfaces[0]
     if not row[limit_cycles.find_unstable_modes(modes)].any():
-        return [], ALONE, 0.0
+        return [], NO_INTERFACE_NOTE, 0.0
     load = patch.pressure.load if patch is not None else model.point.load
     if reason := ENGINES["harmonic"].lacks(model, steady=True):
         return [], f"limit cycles cannot be computed {reason}", 0.0

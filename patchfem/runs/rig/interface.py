@@ -22,7 +22,7 @@ from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged, rigid, shear
 from ..patch import faces, jenkins_elements
 from . import strips, varying_load
-from .lists import quadrature_of
+from .lists import choose_quadrature
 from .numerics import Numerics
 
 # fraction of the tolerance by which a small number of modes, and of points, may each miss the
@@ -30,7 +30,7 @@ from .numerics import Numerics
 FEWER = 1e-3
 
 
-def contact_of(model: Model, numerics: Numerics, patch):
+def make_contact(model: Model, numerics: Numerics, patch):
     """Return the contact that a march moves.
 
     It is a ContactModel, a JointsModel if there are several interfaces or nonlinear springs, or a
@@ -86,7 +86,7 @@ def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
             for one in jenkins_elements.strip_elements(patch, f.static, length)
         ]
     return [
-        element_of(model.rig.friction.interfaces[0], load, model.rig.speed_scale)
+        make_element(model.rig.friction.interfaces[0], load, model.rig.speed_scale)
         for load in strips.strip_loads(patch)
     ]
 
@@ -97,9 +97,9 @@ def own_elements(model: Model, meshed: tuple) -> list:
     meshed: indices of interfaces whose patches are those on the coarser mesh.
     """
     return [
-        parallel_element(*faces.elements_of(one, model.accuracy.tolerance, k in meshed)[:2])
+        parallel_element(*faces.make_elements(one, model.accuracy.tolerance, k in meshed)[:2])
         if one.partial_slip
-        else element_of(one, one.load, model.rig.speed_scale)
+        else make_element(one, one.load, model.rig.speed_scale)
         for k, one in enumerate(model.rig.friction.interfaces)
     ]
 
@@ -115,7 +115,7 @@ def _climbing(model: Model, patch, count: int | None = None):
     return run.make_model(model.grooves, load, f.static, kinetic, speed, model.rig.modes)
 
 
-def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:
+def make_element(one: InterfaceLaw, load: float, speed: float) -> Element:
     """Return the friction law of an interface under a load as an Element.
 
     Parameters
@@ -149,7 +149,7 @@ def contact_model(model: Model, numerics: Numerics, patch):
         return varying_load.varying_load_model(model, numerics, patch)
     if model.rig.friction.has_partial_slip:
         return models.jenkins_model(
-            *faces.elements_of(
+            *faces.make_elements(
                 model.rig.friction.interfaces[0], model.accuracy.tolerance, 0 in numerics.meshed
             )
         )
@@ -174,7 +174,11 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
 
     It is a list of bonds, points with shear modes, points of a field, or a single point.
     """
-    law, found, limit = model.bonds, quadrature_of(model, numerics), model.friction.static * load
+    law, found, limit = (
+        model.bonds,
+        choose_quadrature(model, numerics),
+        model.friction.static * load,
+    )
     if model.side == "lower" and (model.partial_slip or found.engine != "recursion"):
         return shear.lists_on_lower_piece(
             model,
@@ -189,7 +193,7 @@ def _bonds(model: Model, numerics: Numerics, patch, load: float):
     if model.partial_slip:
         reduced, force = _shear_modes(patch, law, numerics.shear_modes, model)
         if found.engine != "recursion":
-            return shear.lists_of(patch, law, reduced, found, force)
+            return shear.sheared_lists(patch, law, reduced, found, force)
         pressed = (
             (patch.pieces.interface.weight, patch.pressure.sigma_n)
             if force is None
@@ -210,7 +214,7 @@ def _shear_modes(patch, law, count: int | None, model) -> tuple:
     The forces are None for all points. They are computed once for all marches of a pressed patch.
     """
     made, tolerance, few = (
-        _MADE.setdefault(patch, {}),
+        _SHEAR_MODES.setdefault(patch, {}),
         model.accuracy.tolerance,
         model.patch.mesh.can_gather_points,
     )
@@ -247,7 +251,7 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
         the friction limit; None if more modes are needed.
     """
     made, key = (
-        _MADE.setdefault(patch, {}),
+        _SHEAR_MODES.setdefault(patch, {}),
         (law.static, law.length, law.ratio, tolerance, points, modes),
     )
     if key not in made:
@@ -263,4 +267,4 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
 
 
 # shear modes of each Patch by their parameters, kept as long as the Patch lives
-_MADE = WeakKeyDictionary()
+_SHEAR_MODES = WeakKeyDictionary()

@@ -23,7 +23,7 @@ from ...response.rows import TABLE
 from ...structure.drive_sizes import find_drive_omega
 
 EXACT = 1e-9  # relative error of measures of a motion in closed form
-MOST = 40  # most bisections of the bracket of an onset
+MAX_BISECTIONS = 40  # most bisections of the bracket of an onset
 
 
 def level_ends(rig) -> tuple:
@@ -84,7 +84,7 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
         the end of the previous one.
     tolerance : float
     past : callable, optional
-        Function of a Level from `past_onset`; by default that of slip.
+        Function of a Level from `make_onset_test`; by default that of slip.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def onset(levels, probe, tolerance: float, past=None) -> tuple | None:
     before, first = found
     first = levels[first]
     low, high = levels[before].drive if before >= 0 else 0.0, first.drive
-    for _ in range(MOST):
+    for _ in range(MAX_BISECTIONS):
         if high - low <= tolerance * (high if low else first.drive):
             break
         middle = (low + high) / 2
@@ -231,7 +231,7 @@ def run_levels(reader, go, state, end, progress=None) -> tuple:
     }
 
 
-def without_part_of_cycle(done):
+def remove_incomplete_cycle(done):
     """Return the run without the extremes and the phasor of an incomplete last cycle."""
     count = int(done.cycles_done + 1e-9)
     if not count or count >= len(done.amplitudes):
@@ -240,7 +240,7 @@ def without_part_of_cycle(done):
 
 
 def joined_runs(parts, each: float):
-    """Join successive runs of `each` [s] to a single EventRun or PieceRun.
+    """Join successive runs of `each` [s] to a single one.
 
     Window and loop are those of the last run.
     """
@@ -261,7 +261,7 @@ def joined_runs(parts, each: float):
         if name not in ("time", "extra")
     }
     time = np.concatenate(
-        [_later(p.response.time, t)[part] for p, part, t in zip(parts, rows, shift)]
+        [_shift_times(p.response.time, t)[part] for p, part, t in zip(parts, rows, shift)]
     )
     extra = {
         name: column(lambda p, name=name: p.response.extra[name])
@@ -271,7 +271,7 @@ def joined_runs(parts, each: float):
     if "ledger" in last.response.extra:
         extra["ledger"] = column(lambda p: p.response.extra["ledger"].T).T
     response = replace(last.response, time=time, extra=extra, **columns)
-    window = replace(last.window, time=_later(last.window.time, shift[-1]))
+    window = replace(last.window, time=_shift_times(last.window.time, shift[-1]))
     ledger = {name: sum(p.ledger[name] for p in parts) for name in last.ledger}
     ledger["peak_stored"] = max(p.ledger["peak_stored"] for p in parts)
     return replace(
@@ -286,7 +286,7 @@ def joined_runs(parts, each: float):
     )
 
 
-def _later(time, shift: float):
+def _shift_times(time, shift: float):
     """Return times shifted by `shift` [s], with the two sides of an event still distinct."""
     moved = time + shift
     before = np.flatnonzero(moved[1:] <= moved[:-1])

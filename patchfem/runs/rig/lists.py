@@ -1,6 +1,6 @@
 """Sum over the bonds of a rig, and the cost of a list of them.
 
-In: a Model and its Numerics. Out: the Choice of a method for the sum (`quadrature_of`), and the
+In: a Model and its Numerics. Out: the Choice of a method for the sum (`choose_quadrature`), and the
 predicted length and CPU seconds of a list. A law without stiffness, the printed one and that of
 order 0, keeps a block from sliding by a reversal in almost every step. Each reversal adds a
 strip to the list, so that its cost grows with the square of the steps.
@@ -31,7 +31,7 @@ from .numerics import Numerics
 DECAYED_FRACTION = 1e-2
 # stroke of a block that the printed law keeps from sliding, over the stroke of the drive (measured:
 # 1e-2 to 1e-4)
-HELD = 1e-4
+STICKING_STROKE_RATIO = 1e-4
 # CPU seconds per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
 GROWING_STEP = 1e-6
 # limit over drive force (D) from which a block is stuck: 0.6 and more strips per step, against 0.06
@@ -49,21 +49,21 @@ MOVES, MOST_HALVINGS = (
     2,
 )
 # lists of a patch with shear compliance, times the passes of Newton's method over those of secants
-SHEARED = 256.0
+SHEAR_COST_FACTOR = 256.0
 MOST_SWING = 2.0  # largest phase of the vibration of the block on its bonds in a step [rad]
 
 
 @lru_cache(maxsize=8)
-def quadrature_of(model: Model, numerics: Numerics):
+def choose_quadrature(model: Model, numerics: Numerics):
     """Return the method of the sum over the bonds of a nonlocal law, as a Choice.
 
     The stroke is taken as four times the amplitude that follows from speed over frequency of the
     drive, or from the stiffness of the bonds of a block that they hold. The stroke of a motion that
     is released, or excited once, decreases, and a list of all its bonds would need too much memory:
     it is taken as DECAYED_FRACTION of that of the start. That of a block that the printed law keeps
-    from sliding is HELD times that of the drive.
+    from sliding is STICKING_STROKE_RATIO times that of the drive.
     """
-    return numerics.choice or _summed_by(
+    return numerics.choice or _choose_for_engine(
         model, numerics, _stretch(model), bench_engine.requested_engine(model)
     )
 
@@ -74,18 +74,18 @@ def has_list(model: Model, numerics: Numerics) -> bool:
     return (
         f is not None
         and law_has_trait(f.law, "bonds")
-        and quadrature_of(model, numerics).engine != "recursion"
+        and choose_quadrature(model, numerics).engine != "recursion"
     )
 
 
-def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
-    """Return the Choice of `quadrature_of` for an engine, or "auto".
+def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
+    """Return the Choice of `choose_quadrature` for an engine, or "auto".
 
     stretch: bond lengths by which a block moves on its bonds.
     """
     law, accuracy = model.bonds, model.accuracy
     once = model.rig.drive.kind == "free" or model.rig.drive.waveform.is_step
-    left = HELD if chatters(model) else DECAYED_FRACTION if once else 1.0
+    left = STICKING_STROKE_RATIO if chatters(model) else DECAYED_FRACTION if once else 1.0
     stroke = max(
         4
         * left
@@ -318,15 +318,15 @@ def list_cost(model: Model, numerics: Numerics) -> tuple[float, float]:
     steps = numerics.cycles * numerics.steps
     if lists_grow(model):
         return steps, GROWING_STEP * steps**2 / 2
-    found = quadrature_of(model, numerics)
+    found = choose_quadrature(model, numerics)
     if found.engine != "recursion" and numerics.choice is None:
-        found = _summed_by(model, numerics, _stretch(model, 1.0), found.engine)
+        found = _choose_for_engine(model, numerics, _stretch(model, 1.0), found.engine)
     strips = (
         min(found.strips, 2 * steps * max(1.0, found.strips))
         if found.tail
         else min(found.strips, 8 * steps)
     )
-    lists = SHEARED if model.partial_slip else 1.0
+    lists = SHEAR_COST_FACTOR if model.partial_slip else 1.0
     return strips, lists * steps * found.seconds * (strips / found.strips if found.strips else 1.0)
 
 

@@ -25,8 +25,8 @@ from ...structure.drive_sizes import (
 )
 from . import levels as rig_levels
 from . import strips
-from .interface import contact_of
-from .lists import ListGuard, has_list, quadrature_of
+from .interface import make_contact
+from .lists import ListGuard, choose_quadrature, has_list
 from .reading import Reader
 from .solution import Solution, normal_load, sampled_loop
 
@@ -56,7 +56,7 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
     The seconds of the preparation are a dict by name. The parameters are those of `run_march`.
     """
     rig, begin = model.rig, perf_counter()
-    contact = contact_of(model, numerics, patch)
+    contact = make_contact(model, numerics, patch)
     reduced = perf_counter() - begin
     engine.warm_up(rig.modes, rig.drive.signal, contact, say)
     loaded = perf_counter() - begin - reduced
@@ -148,7 +148,7 @@ class MarchReader(Reader):
         """Return the Choice for the sum over bonds; None for other laws."""
         f = self.model.friction
         return (
-            quadrature_of(self.model, self.numerics)
+            choose_quadrature(self.model, self.numerics)
             if f is not None and law_has_trait(f.law, "bonds")
             else None
         )

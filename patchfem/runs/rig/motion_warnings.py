@@ -37,7 +37,7 @@ AS_ONE_POINT = (
 )
 
 
-def warnings_of(run) -> list:
+def collect_warnings(run) -> list:
     """Return the warnings of a `rig.Coupled`."""
     model, patch, raw, found = run.model, run.patch, run.raw, run.measures
     book, harmonics = raw.book, raw.extra.get("harmonics")
@@ -84,7 +84,7 @@ def warnings_of(run) -> list:
         if not model.has_interface_patches
         else [
             *out,
-            *faces.together(
+            *faces.merge_sentences(
                 model,
                 lambda face: [
                     *([] if face.partial_slip else [AS_ONE_POINT]),
@@ -102,7 +102,7 @@ def peak_at_an_end(run, modes) -> list:
     ----------
     run : rig.Coupled
     modes : callable
-        Returns the modes, as `plan.modes_of` does.
+        Returns the modes, as `plan.mode_frequencies` does.
     """
     found, drive = run.measures.get("peak_frequency"), run.model.rig.drive.signal
     at = (
@@ -114,7 +114,7 @@ def peak_at_an_end(run, modes) -> list:
         return []
     upper, key = at == max(drive.low, drive.high), "drive.from" if at == drive.low else "drive.to"
     side, move = ("above", "raise") if upper else ("below", "lower")
-    known = _beside(modes(), at, upper)
+    known = _nearest_resonance(modes(), at, upper)
     beyond = (
         f"a resonance may lie {side} this frequency: {known[0]}; {move} {key} to include it"
         if known
@@ -131,13 +131,13 @@ def nearest_sweep_end(frequency: float, *ends: float) -> float | None:
     return next((end for end in ends if abs(frequency - end) <= AT * end), None)
 
 
-def _beside(modes: list, at: float, upper: bool) -> list:
+def _nearest_resonance(modes: list, at: float, upper: bool) -> list:
     """Return a list with a phrase on the mode whose resonance is nearest to a frequency.
 
     Parameters
     ----------
     modes : list of dict
-        See `plan.modes_of`.
+        See `plan.mode_frequencies`.
     at : float
         Frequency [Hz].
     upper : bool
@@ -158,11 +158,11 @@ def _beside(modes: list, at: float, upper: bool) -> list:
     return [min(near)[1]] if near else []
 
 
-def notes_of(run) -> list:
+def collect_notes(run) -> list:
     """Return the notes of a `rig.Coupled` on its law, engine, fields and the end of its motion."""
     model, raw, rig = run.model, run.raw, run.model.rig
     ended = [
-        *_across(run),
+        *_lateral_motion_sentence(run),
         *([raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else []),
     ]
     if run.patch is not None and run.patch.strips is not None and model.partial_slip:
@@ -213,7 +213,7 @@ def _release_sentence(run) -> list:
     ]
 
 
-def _across(run) -> list:
+def _lateral_motion_sentence(run) -> list:
     """Return the sentence on the neglected lateral motion of strips that yaw."""
     if (
         not run.model.rig.friction.strips_slide_apart

@@ -12,11 +12,11 @@ from ...effects import law_has_trait
 from ...model.model import Model
 from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, is_sinusoidal
 from .costs import count_merges, steps_per_cycle
-from .engines import engine_of
+from .engines import choose_engine
 
 # fraction of a cycle by which a run may differ from whole cycles: a record of 30 periods has 30
-WHOLE = 1e-6
-SETTLED = 3.0  # decay times after which the mean square of the start has fallen to e^-6
+WHOLE_CYCLE_TOL = 1e-6
+N_DECAY_TIMES = 3.0  # decay times after which the mean square of the start has fallen to e^-6
 LEAST_KEPT = 100  # smallest number of samples of a run without cycles
 
 
@@ -86,18 +86,18 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
         For a method that cannot do it.
     """
     accuracy, rig = model.accuracy, model.rig
-    engine = engine_of(model, per_point)
-    window = int(max(1, min(10, (rig.drive.cycles + WHOLE) // 10)))
+    engine = choose_engine(model, per_point)
+    window = int(max(1, min(10, (rig.drive.cycles + WHOLE_CYCLE_TOL) // 10)))
     # the window is the whole record except the transient at its start
     if rig.drive.waveform.is_random:
         rate = find_min_decay_rate(rig.modes) * rig.drive.signal.period
-        start = min(rig.drive.cycles / 4, SETTLED / rate if rate else np.inf)
-        window = int(max(1, rig.drive.cycles - start + WHOLE))
+        start = min(rig.drive.cycles / 4, N_DECAY_TIMES / rate if rate else np.inf)
+        window = int(max(1, rig.drive.cycles - start + WHOLE_CYCLE_TOL))
     beat = count_repeat_cycles(rig.drive.signal) or 0.0
     if 1 < beat <= rig.drive.cycles:  # the window contains whole beats
-        window = int(beat * max(1, min(10, rig.drive.cycles // (10 * beat))) + WHOLE)
+        window = int(beat * max(1, min(10, rig.drive.cycles // (10 * beat))) + WHOLE_CYCLE_TOL)
     if rig.drive.levels.amplitudes:
-        window = min(window, int(rig.drive.levels.cycles + WHOLE))
+        window = min(window, int(rig.drive.levels.cycles + WHOLE_CYCLE_TOL))
     steps = steps_per_cycle(model)
     if not is_sinusoidal(rig.drive.signal) and accuracy.steps_per_cycle is None:
         steps = max(steps, int(np.ceil(LEAST_KEPT / rig.drive.cycles)))
@@ -129,7 +129,7 @@ def march_numerics(model: Model, found: Numerics) -> Numerics:
 
 def smooth_numerics(model: Model, found: Numerics) -> Numerics:
     """Return the settings of the smooth engine: the error of a step."""
-    return replace(found, local=local_of(model.accuracy.tolerance))
+    return replace(found, local=step_tolerance(model.accuracy.tolerance))
 
 
 def yield_numerics(model: Model, found: Numerics) -> Numerics:
@@ -137,7 +137,7 @@ def yield_numerics(model: Model, found: Numerics) -> Numerics:
     return replace(found, pairs=count_merges(model))
 
 
-def local_of(tolerance: float) -> float:
+def step_tolerance(tolerance: float) -> float:
     """Return the relative error of a step of the smooth engine.
 
     The energy balance requires 1e-9 if the tolerance does not require less.

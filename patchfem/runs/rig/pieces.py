@@ -31,7 +31,7 @@ from ...structure.drive_sizes import (
 )
 from ..bench import averaged
 from . import interface, strips
-from .levels import run_levels, without_part_of_cycle
+from .levels import remove_incomplete_cycle, run_levels
 from .reading import Reader
 from .solution import Solution, mode_stiffness, normal_load
 
@@ -124,7 +124,7 @@ def _run(reader, frames: int, say, progress) -> Solution:
     if rig.drive.levels.amplitudes:
         done, more = run_levels(reader, go, (rig.start, None), lambda run: run.end, progress)
     else:
-        done = without_part_of_cycle(
+        done = remove_incomplete_cycle(
             go(rig.drive.signal, (rig.start, None), progress, True, numerics.cycles)
         )
     more |= {} if reader.rigid else {"prepare": prepare}

@@ -1,6 +1,6 @@
 """Predicted sizes, cost and dimensionless groups of a coupled run.
 
-In: a Model. Out: `Cost` of the engine that `engines.engine_of` chooses, the stiffness chain,
+In: a Model. Out: `Cost` of the engine that `engines.choose_engine` chooses, the stiffness chain,
 frequencies with free and stuck interface, groups, and sentences for the plan.
 """
 
@@ -36,7 +36,7 @@ from .costs import (
     ringing_and_events,
     steps_per_cycle,
 )
-from .engines import ENGINES, PIECES, steady_by
+from .engines import ENGINES, PIECES, choose_steady_method
 from .numerics import choose
 
 # bytes per pair of coordinates: matrices, shapes and workspace of the eigenvalue solver
@@ -56,7 +56,7 @@ CURVE = (
     160,
     250,
 )
-MARCHED = 400.0  # cycles of all marches until a motion repeats
+N_MARCHED_CYCLES = 400.0  # cycles of all marches until a motion repeats
 # relative distance from the frequency of a mode within which a sine excites a resonance
 RESONANT = 0.02
 STIFF = 10.0  # stiffness over that of the mode, from which a link holds the block
@@ -107,7 +107,7 @@ def stuck_stiffness(rig, chain: dict) -> np.ndarray:
     )
 
 
-def without_expected_joint(rig, links: dict):
+def remove_expected_joint(rig, links: dict):
     """Return a Rig without the joint that was present when its modes were measured.
 
     The patch that forms the joint is not pressed yet, so that its stiffness follows from the links
@@ -121,7 +121,7 @@ def without_expected_joint(rig, links: dict):
         return rig
 
 
-def modes_of(rig, chain: dict) -> list:
+def mode_frequencies(rig, chain: dict) -> list:
     """Return name, free and stuck frequency [Hz] of each mode.
 
     The stuck frequency is that with the contact held by the links of a chain; None if no link is
@@ -361,14 +361,14 @@ def _sliding(d: float) -> str:
 
 def steady_words(model: Model, numerics) -> list:
     """Return the sentence on how a steady motion is found, as a list."""
-    return [f"the steady motion is found by {steady_by(model).words}"]
+    return [f"the steady motion is found by {choose_steady_method(model).words}"]
 
 
 def bond_sum_sentences(model: Model, numerics) -> list:
     """Return sentences on the sum over bonds of law 'nonlocal', or on the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
-    found = lists.quadrature_of(model, numerics)
+    found = lists.choose_quadrature(model, numerics)
     out = ["method of the sum over bonds: " + found.describe()]
     if found.engine == "recursion":
         return out
@@ -416,7 +416,7 @@ def steady_cost(model: Model, numerics, points: int) -> Cost:
     points : int
         Nodes of the interface; not used.
     """
-    rig, finder = model.rig, steady_by(model)
+    rig, finder = model.rig, choose_steady_method(model)
     places = max(1, len(rig.drive.levels.amplitudes))
     if rig.drive.waveform.is_swept:
         places = CURVE[finder.name == "balance"]
@@ -445,7 +445,7 @@ def _steady_point(model: Model, by: str) -> float:
             + _smooth_laws(rig)
         )
     if by == "march":
-        return MARCHED * steps_per_cycle(model) * cost_model.GROOVE_STEP_SECONDS
+        return N_MARCHED_CYCLES * steps_per_cycle(model) * cost_model.GROOVE_STEP_SECONDS
     if not rig.friction.interfaces:
         return cost_model.CLOSED_POINT_SECONDS
     ringing, events = ringing_and_events(model)

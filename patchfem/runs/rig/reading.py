@@ -70,7 +70,7 @@ class Reader:
         stuck : bool
             Whether the interface sticks.
         ledger : (4, k), optional
-            See `Seen`.
+            See `LastCycles`.
         """
         drive = drive or self.model.rig.drive.signal
         given = {"own": self.integrated(run, drive), "run": self.whole_run(run, drive)} | self.more(

@@ -21,19 +21,22 @@ from ...response.rows import NEEDS_RUN, set_final_floors
 from ...response.settling import slip_period
 from ...structure.drive_sizes import find_decay_rate, is_periodic
 from ..patch import faces
-from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
+from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, remove_unknown_errors
 from ..results.travel import outcome_on_piece
 from . import decays, flutter, levels, lists, motion_warnings
 from .costs import MOST_STEPS
 from .engines import ENGINES, Variant, describe_balance_error
-from .fields import fields_of
+from .fields import collect_frames
 from .numerics import choose
 from .solution import Solution, curve_measures
 
-ENDED = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)  # outcomes of a run that ended early
+EARLY_OUTCOMES = (
+    Outcome.EXCEEDS_TRAVEL,
+    Outcome.LEAVES_GROOVES,
+)  # outcomes of a run that ended early
 # relative difference from the amplitude of a coarse run, above which it may belong to another peak
-OTHER = 0.1
-FINEST = 1e-12  # error of a step [1] below which round-off dominates
+OTHER_PEAK_RATIO = 0.1
+MIN_STEP_ERROR = 1e-12  # error of a step [1] below which round-off dominates
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -97,18 +100,18 @@ def run_coupled(
         run = go(run)
     run, decay, left_out = _add_decay(run, coarse[0])
     warned = [
-        *motion_warnings.warnings_of(run),
+        *motion_warnings.collect_warnings(run),
         *motion_warnings.peak_at_an_end(run, lambda: what.modes(what.chain)),
     ]
-    notes = [*motion_warnings.notes_of(run), *left_out]
+    notes = [*motion_warnings.collect_notes(run), *left_out]
     if find_decay_rate(rig.modes) < 0 and run.rubs:
-        fluttering, more = flutter.flutter_of(run)
+        fluttering, more = flutter.find_limit_cycles(run)
         run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]
     run = _set_floors(run)
     outcome = outcome_on_piece(run.outcome, model.patch, patch, raw.response.slide)
-    for face in faces.faces_of(model) if model.has_interface_patches else ():
+    for face in faces.press_faces(model) if model.has_interface_patches else ():
         outcome = outcome_on_piece(outcome, face.model.patch, face.patch, face.slide(raw.response))
-    fields = {} if patch is None else fields_of(model, numerics, patch, raw)
+    fields = {} if patch is None else collect_frames(model, numerics, patch, raw)
     return Result(
         what,
         outcome,
@@ -139,7 +142,9 @@ def _add_level_measures(run: Coupled) -> Coupled:
 
 def _add_outcome(run: Coupled) -> Coupled:
     """Return the run with its outcome, and errors that include those the run itself states."""
-    found = without_errors(run_events.add_uncertainty(run.measures, run.raw.own), run.estimated)
+    found = remove_unknown_errors(
+        run_events.add_uncertainty(run.measures, run.raw.own), run.estimated
+    )
     rig = run.model.rig
     outcome, found = judge_outcome(
         run.raw,
@@ -186,7 +191,9 @@ def _add_decay(run: Coupled, coarse) -> tuple:
     included.
     """
     found, raw = (
-        decays.decay_of(run.raw) if run.model.rig.drive.kind == "free" and run.estimated else None,
+        decays.compute_decay(run.raw)
+        if run.model.rig.drive.kind == "free" and run.estimated
+        else None,
         run.raw,
     )
     if (
@@ -219,7 +226,7 @@ def _add_decay(run: Coupled, coarse) -> tuple:
     return (
         run,
         found,
-        decays.without_slip_between_nodes(
+        decays.slip_sentences(
             whys,
             lambda: ENGINES[run.numerics.engine].in_space(
                 run.model, run.numerics, run.patch, coarse, raw
@@ -396,7 +403,7 @@ def _rerun_around_peak(model, found: Solution, go) -> Solution | None:
         is not None
     ):
         return None
-    return near if abs(near.values[name] / found.values[name] - 1) <= OTHER else None
+    return near if abs(near.values[name] / found.values[name] - 1) <= OTHER_PEAK_RATIO else None
 
 
 class Passes:
@@ -478,7 +485,7 @@ def _enough(model, numerics, found, measures, bars) -> bool:
     main, again = measures["relative_displacement_amplitude"], numerics.steps * 2
     met = main.error_ratio(model.accuracy.tolerance) <= 1
     if numerics.local:
-        return met or numerics.local < FINEST
+        return met or numerics.local < MIN_STEP_ERROR
     return (
         met
         or "steps_per_cycle" in numerics.pinned
@@ -486,5 +493,5 @@ def _enough(model, numerics, found, measures, bars) -> bool:
         or again * numerics.cycles > 1e7
         or lists.is_list_too_long(model, numerics, found.book)
         or lists.doubling_does_not_help(found.book, bars)
-        or found.outcome in ENDED
+        or found.outcome in EARLY_OUTCOMES
     )

@@ -11,7 +11,7 @@ from ...core import IntegratedMeasures
 from ...dynamics.smooth import run as engine
 from ...response.measures import slip_round_off
 from ...response.rows import NEEDS_RUN, find_row
-from .interface import contact_of
+from .interface import make_contact
 from .reading import Reader, thin_samples
 from .solution import Solution
 
@@ -19,7 +19,7 @@ from .solution import Solution
 CLEAR = 1e3
 # error of the instant at which this fraction crosses a limit: the extension of a step is less
 # accurate than its end
-LOCATED = 1e-7
+CROSSING_FRACTION_ERROR = 1e-7
 
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -45,7 +45,7 @@ def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None)
     The parameters are those of `run_smooth`.
     """
     rig, begin = model.rig, perf_counter()
-    contact = contact_of(model, numerics, patch)
+    contact = make_contact(model, numerics, patch)
     engine.load_loop(contact.element.kernels, say)
     loaded = perf_counter() - begin
     begin = perf_counter()
@@ -110,7 +110,7 @@ class SmoothReader(Reader):
         size = values.get("relative_displacement_amplitude", 0.0)
         for name in ("stick_fraction", "slip_start_phase"):
             found[name] = (
-                LOCATED
+                CROSSING_FRACTION_ERROR
                 if _clear(run)
                 else found.get(name, find_row(name).sample_error / self.steps)
             )

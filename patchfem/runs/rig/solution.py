@@ -156,7 +156,7 @@ def last_cycles(model, patch, window, extremes, book: dict, **more) -> LastCycle
 def mode_stiffness(model, window) -> float:
     """Return the stiffness [N/m] of the first mode as seen by the contact.
 
-    It is 0 if other modes carry more than SHARED of the slide.
+    It is 0 if other modes carry more than MAX_OTHER_MODES_FRACTION of the slide.
     """
     first_mode = model.rig.first_mode
     if first_mode.fraction_of_other_modes(window.modal) > MAX_OTHER_MODES_FRACTION:
@@ -165,7 +165,7 @@ def mode_stiffness(model, window) -> float:
 
 
 def sampled_loop(window, drive, work: float, force: complex | None = None) -> tuple | None:
-    """Return the loop of equally spaced samples by the trapezoidal rule (`Seen.loop`).
+    """Return the loop of equally spaced samples by the trapezoidal rule (`LastCycles.loop`).
 
     Parameters
     ----------

@@ -7,11 +7,11 @@ In: a Model, its Numerics and its pressed patch. Out: a VaryingLoadModel of
 from ...dynamics.march import varying_load as march
 from ...effects import is_bond_list
 from ...model.model import Model
-from .lists import quadrature_of
+from .lists import choose_quadrature
 from .numerics import Numerics
 
 
-def rubbing_of(model: Model, numerics: Numerics):
+def make_rubbing(model: Model, numerics: Numerics):
     """Return the friction law of a model as a `dynamics.march.varying_load.Rubbing`."""
     f = model.friction
     if f.law == "coulomb":
@@ -22,7 +22,7 @@ def rubbing_of(model: Model, numerics: Numerics):
         return march.plastic(f.static, f.bond_length)
     if not is_bond_list(f):
         return march.bonds(model.bonds)
-    found = quadrature_of(model, numerics)
+    found = choose_quadrature(model, numerics)
     return march.lists(model.bonds, found.reach(f.order), found.merge)
 
 
@@ -41,7 +41,7 @@ def varying_load_model(model: Model, numerics: Numerics, patch):
         if patch is None
         else (None, march.contact_sets_of(patch, model.patch.loading.rotational_stiffness))
     )
-    law, shear = rubbing_of(model, numerics), None
+    law, shear = make_rubbing(model, numerics), None
     if model.partial_slip:
         weight = patch.pieces.interface.weight
         shear = march.shear_of(

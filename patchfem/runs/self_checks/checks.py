@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from ...core import Outcome
-from ..results.result import Result, without_errors
+from ..results.result import Result, remove_unknown_errors
 from . import motion, patch, structure
 from .evidence import Evidence
 from .finding import Finding
@@ -46,6 +46,6 @@ def with_self_checks(result: Result) -> Result:
     return replace(
         result,
         outcome=Outcome.NOT_CONVERGED,
-        measures=without_errors(result.measures, False),
+        measures=remove_unknown_errors(result.measures, False),
         warnings=[*(finding.sentence for finding in failed), *result.warnings],
     )

@@ -159,7 +159,7 @@ class Evidence:
         if size is None and force is None:
             return None
         drive = force / modes.mass if size is None else size
-        return balance_of(modes, window, drive, 2 * np.pi * self.frequency)
+        return energy_balance(modes, window, drive, 2 * np.pi * self.frequency)
 
 
 class LastCycle(NamedTuple):
@@ -236,7 +236,7 @@ def cubic_harmonic(time, value, rate, omega: float) -> complex:
     return complex(2 / (time[-1] - time[0]) * total)
 
 
-def balance_of(modes: SceneModes, window, acceleration: float, omega: float) -> ForceBalance:
+def energy_balance(modes: SceneModes, window, acceleration: float, omega: float) -> ForceBalance:
     """Compute the first harmonic of the friction force by two methods.
 
     The equation of motion times exp(-i omega t) is integrated by parts over the window: the

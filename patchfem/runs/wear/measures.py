@@ -15,14 +15,14 @@ from ...response.errors import convergence_errors, error_of_change
 from ..patch.measures import other_strips
 from ..patch.press import areas, press_patch
 from ..patch.values import values
-from ..results.patch_rows import TABLE, WORN
+from ..results.patch_rows import TABLE, WORN_SOURCE
 from .evolve import THIN, mean_depth, worn_through
-from .slip import UNBOUNDED, slip_path_of_point
+from .slip import UNBOUNDED_OUTCOMES, slip_path_of_point
 
 FRAMES = 24  # frames of the interface during the wear
 # name of the peak at an edge of the contact in the history; nodes next to an edge that count as the
 # edge
-EDGE_PEAK, BESIDE = (
+EDGE_PEAK, N_EDGE_NODES = (
     "pressure_peak_at_edge",
     2,
 )
@@ -41,7 +41,7 @@ def add_wear_measures(result, found, estimate: bool = True):
         Whether errors are computed.
     """
     model = result.plan.model
-    if found is None and result.outcome in UNBOUNDED:
+    if found is None and result.outcome in UNBOUNDED_OUTCOMES:
         return replace(
             result, warnings=[*result.warnings, f"nothing was worn: {result.outcome.sentence}"]
         )
@@ -51,25 +51,29 @@ def add_wear_measures(result, found, estimate: bool = True):
     warnings = [*result.warnings, *([found.stopped] if found.stopped else [])]
     if found.state is None:
         return replace(result, seconds=seconds, warnings=warnings)
-    period = period_of(model, result)
+    period = find_period(model, result)
     fields = frames(found, result.fields, period)
     shown = {"period": period, "states": len(fields["time"]) - len(result.fields["time"])}
     static = widen_by_jumps(model, found, result.measures) if estimate else {}
     lost = measure_patch_wear(model, found, result.measures, estimate)
     if model.wear.friction is not None:
-        lost |= friction_of(model, found, result.measures, lost["worn_volume"].error)
+        lost |= worn_friction(model, found, result.measures, lost["worn_volume"].error)
     gone, notes = (
         _worn_through_cycle(model, found, lost["worn_depth_max"].error),
         result.extra.get("notes", []),
     )
-    outcome = Outcome.WORN_THROUGH if gone and result.outcome not in UNBOUNDED else result.outcome
+    outcome = (
+        Outcome.WORN_THROUGH
+        if gone and result.outcome not in UNBOUNDED_OUTCOMES
+        else result.outcome
+    )
     return replace(
         result,
         outcome=outcome,
         measures=result.measures | static | lost | gone,
         fields=fields,
         seconds=seconds,
-        warnings=[*warnings, *_warn_of_depth(model, found), *_beyond_table(model, found)],
+        warnings=[*warnings, *_warn_of_depth(model, found), *_beyond_table_sentence(model, found)],
         extra=result.extra
         | {
             "wear": history(found),
@@ -154,7 +158,7 @@ def widen_by_jumps(model, found, measures: dict) -> dict:
     }
 
 
-def period_of(model, result) -> float:
+def find_period(model, result) -> float:
     """Return the duration of one cycle of wear [s].
 
     It is the period of the drive or of the slide, or the duration of a path that does not repeat.
@@ -207,11 +211,11 @@ def measure_patch_wear(model, found, motion: dict, estimate: bool = True) -> dic
     state, area = found.state, areas(model.patch, found.patch.pieces.interface)
     share = found.miss + slip_miss(motion) + _coarser(found, motion)
     mine, *others = [
-        _lost(model.patch, *one)
+        _worn_measures(model.patch, *one)
         for one in [(found.patch, state.depth), *zip(found.coarse, found.depths)]
     ]
     asked, ratio = other_strips(model.patch)
-    strips = _lost(asked, *found.stripped) if found.stripped else mine
+    strips = _worn_measures(asked, *found.stripped) if found.stripped else mine
     jumps = {
         "worn_volume": float(np.vdot(np.abs(state.depth - state.coarse_depth), area))
         + state.path_error * float(area.sum()),
@@ -230,7 +234,7 @@ def measure_patch_wear(model, found, motion: dict, estimate: bool = True) -> dic
                 + more
                 + float(error_of_change(strips[name] - value, ratio))
             )
-        out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor, engine=WORN)
+        out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor, engine=WORN_SOURCE)
     left = found.moments[-1].values.get("groove_amplitude")
     if left is not None:
         lost, row = out["worn_volume"].error, TABLE["groove_amplitude"]
@@ -239,12 +243,12 @@ def measure_patch_wear(model, found, motion: dict, estimate: bool = True) -> dic
             row.unit,
             None if lost is None else lost / float(area.sum()),
             row.floor,
-            engine=WORN,
+            engine=WORN_SOURCE,
         )
     return out
 
 
-def friction_of(model, found, motion: dict, error: float | None) -> dict:
+def worn_friction(model, found, motion: dict, error: float | None) -> dict:
     """Return the parameters of the friction law after wear, and measures with wider errors.
 
     The error of the mean depth changes the measures of the motion, at the rate of the last two
@@ -290,7 +294,7 @@ def friction_of(model, found, motion: dict, error: float | None) -> dict:
     return out
 
 
-def _beyond_table(model, found) -> list:
+def _beyond_table_sentence(model, found) -> list:
     """Return warnings of wear beyond the table of friction, and of jumps past its rows."""
     change = model.wear.friction
     if change is None:
@@ -315,7 +319,7 @@ def _beyond_table(model, found) -> list:
     return out
 
 
-def _lost(asked, patch, depth) -> dict:
+def _worn_measures(asked, patch, depth) -> dict:
     """Return worn volume [m3] and largest depth [m] of a `PatchModel` by name."""
     return {
         "worn_volume": float(np.vdot(depth, areas(asked, patch.pieces.interface))),
@@ -353,7 +357,7 @@ def volume_of_point(model, result, estimate: bool = True) -> dict:
     error = (miss + slip_miss(result.measures) + 1e-12) * value if estimate else None
     return {
         "worn_volume": Measure(
-            value, TABLE["worn_volume"].unit, error, TABLE["worn_volume"].floor, engine=WORN
+            value, TABLE["worn_volume"].unit, error, TABLE["worn_volume"].floor, engine=WORN_SOURCE
         )
     }
 
@@ -422,7 +426,8 @@ def edge_peak(pressure) -> float:
     """
     bears, top = np.asarray(pressure) > 0, int(np.argmax(pressure))
     inside = (
-        np.convolve(np.pad(bears, BESIDE, "edge"), np.ones(2 * BESIDE + 1), "valid") > 2 * BESIDE
+        np.convolve(np.pad(bears, N_EDGE_NODES, "edge"), np.ones(2 * N_EDGE_NODES + 1), "valid")
+        > 2 * N_EDGE_NODES
     )
     if inside[top] or not (bears & inside).any():
         return 0.0

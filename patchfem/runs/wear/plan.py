@@ -30,7 +30,7 @@ INNER_THICKNESS, END_THICKNESS = (
     0.44,
 )
 SMOOTH = 8  # jumps of a patch whose asperities touch everywhere
-MOST = 1500  # most jumps that are counted
+MAX_COUNTED_JUMPS = 1500  # most jumps that are counted
 
 
 def jumps_about(model) -> int:
@@ -70,7 +70,7 @@ def jumps_about(model) -> int:
     )
     row = WearProblem(press, slides, area, wear.coefficient, wear.cycles)
     state, count = start_wear(row, wear.compute_earlier_depth(x, area)), 0
-    while state.cycle < wear.cycles and count < MOST:
+    while state.cycle < wear.cycles and count < MAX_COUNTED_JUMPS:
         state, count = (
             take_jump(row, state, model.accuracy.tolerance, until=next_row(wear, row, state)),
             count + 1,

@@ -12,12 +12,17 @@ from ...core import Measure, Outcome
 from ...response.outcome import judge_outcome
 from ..bench import bench
 from ..bench.closed import integrate_steps
-from ..bench.engine import steps_of
+from ..bench.engine import steps_per_cycle
 from ..patch.press import areas
 from ..results.travel import outcome_on_piece
 from ..rig import engines, fields, numerics
 
-UNBOUNDED = (Outcome.GROWS, Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
+UNBOUNDED_OUTCOMES = (
+    Outcome.GROWS,
+    Outcome.EXCEEDS_TRAVEL,
+    Outcome.LEAVES_GROOVES,
+    Outcome.NOT_CONVERGED,
+)
 LEAST_FRAMES, MOST_FRAMES = 64, 800
 
 
@@ -71,7 +76,7 @@ def slip_of_cycle(model, patch, frames: int) -> CycleSlip:
 def _bench(model, patch, frames: int) -> CycleSlip:
     """Return the slip of the last cycle of a bench."""
     cycles = max(1, round(model.slide.cycles or 1))
-    steps = steps_of(model)
+    steps = steps_per_cycle(model)
     shaped = not slips_uniformly(model)
     found = bench.run(model, patch, steps, frames * cycles if shaped else 0)
     outcome = outcome_on_piece(None, model.patch, patch, found.slide)
@@ -86,7 +91,7 @@ def _bench(model, patch, frames: int) -> CycleSlip:
             if model.grooves is not None:  # at the start the load rests on the flank of a groove
                 tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
         if model.grooves is not None:
-            local, tau = slip_path_of(
+            local, tau = slip_path(
                 model, patch, slide, np.full(slide.size, patch.pressure.load), local, tau
             )
         return _read(model, patch, local, tau, False, found.values, outcome)
@@ -107,10 +112,10 @@ def _rig(model, patch, frames: int) -> CycleSlip:
     last = _last_cycle(model, found.window, patch.pressure.load)
     beat = _beat(found.values, last[1])
     outcome = outcome_on_piece(
-        settled if settled in UNBOUNDED else None, model.patch, patch, found.response.slide
+        settled if settled in UNBOUNDED_OUTCOMES else None, model.patch, patch, found.response.slide
     )
     if shaped:
-        slip_frames = fields.fields_of(model, chosen, patch, found)
+        slip_frames = fields.collect_frames(model, chosen, patch, found)
         local, tau = slip_frames["slip"][1:], slip_frames["shear_stress"][1:]
         if model.grooves is not None:
             slide, time, window = (
@@ -123,7 +128,7 @@ def _rig(model, patch, frames: int) -> CycleSlip:
                 window.time,
                 window.extra.get("normal_load", np.full(window.time.size, patch.pressure.load)),
             )
-            local, tau = slip_path_of(model, patch, slide, lifted, local, tau)
+            local, tau = slip_path(model, patch, slide, lifted, local, tau)
         out = _read(model, patch, local, tau, True, found.values, outcome)
     elif strips_slide_independently(model):
         out = _slip_of_strips(model, patch, found, outcome)
@@ -262,7 +267,7 @@ def along_flanks(model, slide, force, load) -> np.ndarray:
     return np.maximum(load + force * t, 0.0)
 
 
-def slip_path_of(model, patch, slide, vertical, local, tau) -> tuple:
+def slip_path(model, patch, slide, vertical, local, tau) -> tuple:
     """Return slip along the flank [m] and wearing stress [Pa] (f, m) of points over grooves.
 
     The slip is s - e, with the path s along the flank and its elastic part e. A point of pressure
@@ -296,7 +301,7 @@ def slip_path_of(model, patch, slide, vertical, local, tau) -> tuple:
 def _read(model, patch, local, tau, closed: bool, values: dict, outcome) -> CycleSlip:
     """Return the slip path of every node from frames of local slip and shear stress.
 
-    Over grooves, the frames are those of `slip_path_of`. A reversal between two frames hides f(d)
+    Over grooves, the frames are those of `slip_path`. A reversal between two frames hides f(d)
     of the path, d <= 1/2 of their distance. Every third frame hides f(d), f(1 - d) or f(1 + d), for
     the first, second or third choice: 3/2 of the mean excess contains f(d) for any d, for a corner
     f = c d as well as for a smooth reversal f = c d^2.

@@ -23,7 +23,7 @@ from patchfem.campaigns.sweeps.parse_request import Request, read_sweep
 from patchfem.campaigns.sweeps.sweep import MAX_DEATHS, Chunks, RemainingTime, Work, iterate_chunks
 from patchfem.core import Missing, PatchfemError
 from patchfem.export.sweeps.run import SweepTarget, sweep_into
-from patchfem.runs.batch.case_results import FAILED, CaseResults, join_case_results
+from patchfem.runs.batch.case_results import FAILED_OUTCOME, CaseResults, join_case_results
 from patchfem.scene.axes import read_axes
 
 SUPPORT = Path(__file__).parents[2] / "support"
@@ -83,7 +83,7 @@ def one_case_only(tmp_path: Path, once: bool, executor) -> None:
             [1] if once else [MAX_DEATHS, MAX_DEATHS + 1]
         )
     for number in lost:
-        assert found.outcome[number] == FAILED and "died" in found.messages[number]
+        assert found.outcome[number] == FAILED_OUTCOME and "died" in found.messages[number]
 
 
 def test_exact_chunks_hand_out_every_case_once():

@@ -213,7 +213,7 @@ def test_exact_columns_of_models_are_the_numbers_of_each(name):
         smooth = name in ("tanh", "nonlocal", "bouc-wen", "lugre")
         for row in (numbers_of_rig, numbers_of_contact, *([lanes.law_numbers] if smooth else [])):
             np.testing.assert_array_equal(collect_columns(alike, row), collect_columns(single, row))
-        for mine, theirs in zip(columns.sizes_of(alike), columns.sizes_of(single)):
+        for mine, theirs in zip(columns.collect_sizes(alike), columns.collect_sizes(single)):
             np.testing.assert_array_equal(mine, theirs)
         few = collect_columns(alike.select([4, 2]), numbers_of_contact)
         np.testing.assert_array_equal(few, collect_columns(single, numbers_of_contact)[:, [4, 2]])

@@ -209,7 +209,7 @@ def test_a_sweep_without_room_for_its_first_case_leaves_no_folder_but_what_was_t
 
 
 def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monkeypatch):
-    monkeypatch.setattr(kept, "MANY", 10)
+    monkeypatch.setattr(kept, "MIN_CASES_ON_DISK", 10)
     monkeypatch.setattr(chunks, "MOST", 16)
     monkeypatch.setattr(sweep, "MOST", 16)
     out = tmp_path / "out"

@@ -16,7 +16,7 @@ from patchfem.friction.bonds.engines import ENGINES, choose_engine, unsupported_
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.runs.rig.interface import contact_model
-from patchfem.runs.rig.lists import quadrature_of
+from patchfem.runs.rig.lists import choose_quadrature
 from patchfem.runs.rig.motion_warnings import created_warning
 from patchfem.runs.rig.numerics import choose as settings_of
 from patchfem.scene import scene
@@ -216,7 +216,7 @@ def test_exact_engine_of_a_scene(tmp_path):
         found = build(rig(tmp_path, engine, reading, order))
         numerics = settings_of(found)
         assert contact_model(found, numerics, None).contact == f"dynamics.interfaces.{kind}_kernels"
-        used = quadrature_of(found, numerics).engine
+        used = choose_quadrature(found, numerics).engine
         assert used == engine or engine == "auto"
         assert any(f"method of the sum over bonds: {used}" in line for line in plan(found).verdict)
 

@@ -94,5 +94,5 @@ def test_exact_many_are_runs_of_their_own(kind):
 
 
 def test_exact_benches_that_stay_as_they_are_pressed_share_that():
-    taken = {kind: batches.batch_of(cases(kind, 1, 2)[0]) for kind in ("bench", "bench wear")}
+    taken = {kind: batches.choose_batch(cases(kind, 1, 2)[0]) for kind in ("bench", "bench wear")}
     assert taken["bench"].name == "benches" and taken["bench wear"] is None

@@ -69,7 +69,7 @@ def beside(found, real) -> tuple:
 def held(seed: int, count: int) -> tuple:
     cases = models(seed, count)
     assert all(
-        batches.batch_of(one, 32).name == "gathered" and batches.batch_of(one, 31) is None
+        batches.choose_batch(one, 32).name == "gathered" and batches.choose_batch(one, 31) is None
         for one in cases
     )
     found, real = gathered.solve(cases), one_by_one.solve(cases)

@@ -72,8 +72,8 @@ def test_always_97_of_100_measures_lie_within_both_errors(law):
 
 def test_exact_few_cases_are_those_of_single_runs():
     cases = models("coulomb", 3, 31)
-    assert all(batches.batch_of(one, 31).name == "lumped.lumped" for one in cases)
-    assert all(batches.batch_of(one, 64).name == "lumped.lanes" for one in cases)
+    assert all(batches.choose_batch(one, 31).name == "lumped.lumped" for one in cases)
+    assert all(batches.choose_batch(one, 64).name == "lumped.lanes" for one in cases)
     found, ones = batches.solve_models(cases), lumped_answers(cases)
     for name, values in ones.values.items():
         np.testing.assert_array_equal(found.values[name], values)
@@ -96,14 +96,14 @@ def test_exact_chunks_of_a_study_are_its_whole():
 def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     """Where the exact engine finds another motion in a case that it checks, all are its, and say so."""
     cases = models("coulomb", 5, 64)
-    real = lanes.runs_of
+    real = lanes.collect_runs
 
     def wrong(models, *given):
         runs, *rest = real(models, *given)
         runs.values["loop_area"][:] *= 1.01
         return runs, *rest
 
-    monkeypatch.setattr(lanes, "runs_of", wrong)
+    monkeypatch.setattr(lanes, "collect_runs", wrong)
     found, ones = batches.solve_models(cases), lumped_answers(cases)
     assert all(one["engine"] == "exact" for one in found.numerics.values())
     assert all(
@@ -118,10 +118,10 @@ def test_always_only_the_case_that_is_contradicted_is_exact(monkeypatch):
     """A single wrong case among those that are checked is computed anew, and the others stay as they are."""
     cases = models("coulomb", 7, 96)
     untouched = batches.solve_models(cases)
-    numbers = np.column_stack(lanes.cases_of(cases)[0])
+    numbers = np.column_stack(lanes.make_cases(cases)[0])
     is_fast = np.array([untouched.numerics[case]["engine"] == "lanes" for case in range(96)])
     checked = lanes.select_checked_cases(numbers, is_fast)[0]
-    real = lanes.runs_of
+    real = lanes.collect_runs
 
     def wrong(models, *given):
         runs, *rest = real(models, *given)
@@ -129,7 +129,7 @@ def test_always_only_the_case_that_is_contradicted_is_exact(monkeypatch):
         runs.values["loop_area"][is_checked] *= 1.01
         return runs, *rest
 
-    monkeypatch.setattr(lanes, "runs_of", wrong)
+    monkeypatch.setattr(lanes, "collect_runs", wrong)
     found = batches.solve_models(cases)
     assert found.numerics[checked]["engine"] == "exact"
     assert "differed from it in 1, in loop_area of this case" in found.notes[checked][-1]

@@ -7,7 +7,7 @@ from scene_texts import BENCH, COULOMB, PLASTIC, POINT, SHORT
 import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.runs.batch import batches
-from patchfem.runs.batch.case_results import FAILED, CaseResults
+from patchfem.runs.batch.case_results import FAILED_OUTCOME, CaseResults
 
 RIG = POINT + COULOMB + SHORT
 
@@ -42,7 +42,9 @@ def test_exact_cases_are_single_runs_in_the_order_they_were_asked():
     models = [pf.build(text) for text in texts]
     models.insert(1, PatchfemError("friction.static: refused here"))
     found = batches.solve_models(models)
-    assert found.outcome[1] == FAILED and found.messages == {1: "friction.static: refused here"}
+    assert found.outcome[1] == FAILED_OUTCOME and found.messages == {
+        1: "friction.static: refused here"
+    }
     for case, text in zip((0, 2, 3, 4), texts):
         single = pf.run(text)
         same(found, case, single)
@@ -126,5 +128,5 @@ def test_always_a_fault_of_one_case_leaves_the_others(monkeypatch):
         lambda what, say, **more: 1 / 0 if what.kind == "bench" else real(what, say, **more),
     )
     found = batches.solve_models([pf.build(BENCH), pf.build(RIG)])
-    assert found.outcome.tolist()[0] == FAILED and "ZeroDivisionError" in found.messages[0]
+    assert found.outcome.tolist()[0] == FAILED_OUTCOME and "ZeroDivisionError" in found.messages[0]
     same(found, 1, pf.run(RIG))

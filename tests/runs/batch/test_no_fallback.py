@@ -59,7 +59,7 @@ def test_exact_every_batch_is_asked():
 def test_always_a_batch_computes_its_cases_together(name, monkeypatch):
     monkeypatch.chdir(STUDIES / "rig")
     models = MODELS[name]()
-    batch = batches.batch_of(models[0], len(models))
+    batch = batches.choose_batch(models[0], len(models))
     assert batch.name == name
     counts = []
 

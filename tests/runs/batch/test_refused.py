@@ -131,7 +131,7 @@ def test_exact_a_case_of_any_kind_is_its_single_run(kind):
 
 @pytest.mark.parametrize("kind", MARCHED)
 def test_refuses_what_is_marched(kind):
-    assert batches.batch_of(build(MARCHED[kind])) is None
+    assert batches.choose_batch(build(MARCHED[kind])) is None
 
 
 @pytest.mark.parametrize("end", ENDS)
@@ -139,7 +139,7 @@ def test_exact_a_batch_ends_as_single_runs_do(end):
     pairs, outcome, estimated = ENDS[end]
     model = build(changed(*pairs))
     found = alike(model)
-    assert batches.batch_of(model) is not None and found.outcome[0] == outcome
+    assert batches.choose_batch(model) is not None and found.outcome[0] == outcome
     assert ("relative_displacement_amplitude_steady" in found.values) == estimated
     assert bool(found.warnings) == (end == "remarked on")
 
@@ -149,5 +149,5 @@ def test_exact_a_batch_of_elements_ends_as_single_runs_do(end):
     """The same cases behind an elastic-plastic element, however they end."""
     text = changed(*ENDS[end][0])
     model = build(text.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"'))
-    assert batches.batch_of(model) is not None
+    assert batches.choose_batch(model) is not None
     alike(model)

@@ -44,7 +44,7 @@ def models(law: str, seed: int, count: int) -> list:
 def held(law: str, seed: int, count: int) -> int:
     """Cases held against runs of their own; how many the batch answered itself."""
     cases, alone, real = models(law, seed, count), [], one_by_one.solve
-    assert all(batches.batch_of(one).name == "lumped.sheared" for one in cases)
+    assert all(batches.choose_batch(one).name == "lumped.sheared" for one in cases)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(
             one_by_one,

@@ -58,7 +58,7 @@ def models(kind: str, seed: int, count: int) -> list:
 def held(kind: str, seed: int, count: int) -> tuple:
     """(measures compared, those outside, cases with one outside or another outcome)."""
     cases = models(kind, seed, count)
-    assert all(batches.batch_of(one, 64).name == BATCHES[kind] for one in cases)
+    assert all(batches.choose_batch(one, 64).name == BATCHES[kind] for one in cases)
     found, ones = batches.solve_models(cases, study=max(count, 64)), one_by_one.solve(cases)
     assert not found.messages and not ones.messages
     compared, outside, apart = 0, 0, found.outcome != ones.outcome

@@ -17,8 +17,8 @@ from patchfem.scene.sets import format_assignments
 def missed(family: str, seed: int, count: int) -> tuple:
     """(Answers of random cases in lanes, measures beyond the sum of both bars, all that were compared)."""
     models = meshes.with_shared_meshes(draw_patches(family, seed, count))
-    assert all(batches.batch_of(one, 64).name == "lumped.tabled" for one in models)
-    assert all(batches.batch_of(one, 63).name == "lumped.sheared" for one in models)
+    assert all(batches.choose_batch(one, 64).name == "lumped.tabled" for one in models)
+    assert all(batches.choose_batch(one, 63).name == "lumped.sheared" for one in models)
     found, ones = tabled.solve(models), sheared.solve(models)
     assert list(found.outcome) == list(ones.outcome) and not found.messages
     pairs = [row for some in rows(found, ones) for row in some]

@@ -3,7 +3,7 @@
 import re
 from importlib import import_module
 
-from patchfem.runs.patch.result import COUPLED, SMALL
+from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_COUPLING_RATIO
 from patchfem.scene.keys.types import DIVISOR_KINDS, MAX_MAGNITUDE
 
 from .keys import FOLDER, bounds, grid
@@ -49,14 +49,14 @@ patch gives the difference between plane strain and plane stress. Effects at the
 Each strip of `[contact.strips]` is such a section; the strips lie side by side, without elastic coupling between them.
 
 **Small strains, linear elasticity.** The pieces are isotropic; plasticity, creep and heat are neglected. The coating is
-bonded, and the far faces are fixed to rigid holders. A note appears if strains exceed {SMALL:g}. The line of action of
-the load is assumed not to shift along x when a tall piece bends; a note appears if this shift would change the result
-noticeably.
+bonded, and the far faces are fixed to rigid holders. A note appears if strains exceed {MAX_SMALL_STRAIN:g}.
+The line of action of the load is assumed not to shift along x when a tall piece bends; a note
+appears if this shift would change the result noticeably.
 
 **No friction in the static patch.** The pressure is computed without shear stress at the interface. If both pieces have
 the same elastic constants, shear stress does not change the pressure. For pieces of different materials, the effect of
-shear stress on the pressure is neglected in runs with motion; a note appears if this coupling exceeds {100 * COUPLED:g}
-% of the compliance.
+shear stress on the pressure is neglected in runs with motion; a note appears if this coupling exceeds
+{100 * MIN_COUPLING_RATIO:g} % of the compliance.
 
 **Quasi-static pieces.** The pieces have no mass, so waves in the pieces are neglected. Only the modes of the rig have
 inertia.

@@ -42,13 +42,13 @@ from ....response.settling import (
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...accuracy_warnings import Finding, tolerance_warnings
 from ...results.notes import BOOKS
-from ...results.result import without_folders
+from ...results.result import shorten_file_names
 from ...rig.engines import unused_settings
 from ...rig.motion_warnings import law_warnings
 from ..case_results import CaseResults
 
 ENDS = 5  # last windows whose phasors determine a steady motion (response.settling)
-MAIN, PHASE = "relative_displacement_amplitude", "slip_start_phase"
+MAIN_MEASURE, PHASE_MEASURE = "relative_displacement_amplitude", "slip_start_phase"
 
 
 class Sizes(NamedTuple):
@@ -68,7 +68,7 @@ class Sizes(NamedTuple):
     decay: np.ndarray
 
 
-def sizes_of(models) -> Sizes:
+def collect_sizes(models) -> Sizes:
     """Return the Sizes of models."""
     return Sizes(
         *collect_columns(
@@ -150,14 +150,16 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         that of the steady estimate, within the tolerance.
     """
     n, values = len(models), dict(runs.values)
-    values[MAIN] = runs.values.get(MAIN, runs.amplitudes)
+    values[MAIN_MEASURE] = runs.values.get(MAIN_MEASURE, runs.amplitudes)
     values["energy_balance"] = energy_balance(runs.book)
     nothing = np.zeros(n)
     errors = {
-        name: total_error(name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN])
+        name: total_error(
+            name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN_MEASURE]
+        )
         for name, value in values.items()
     }
-    sizes = sizes_of(models)
+    sizes = collect_sizes(models)
     tolerance, moved = sizes.tolerance, sizes.moved
     outcome, (steady, error) = _outcome(
         sizes,
@@ -165,7 +167,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         is_drifting(
             values["drift_per_cycle"],
             errors["drift_per_cycle"],
-            values[MAIN],
+            values[MAIN_MEASURE],
             tolerance,
             error_floor("drift_per_cycle", moved),
         ),
@@ -175,7 +177,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     alone = runs.lost | (values["energy_balance"] > runs.closes) | (values["work_check"] > BOOKS)
     grows = np.array([one is Outcome.GROWS for one in outcome])
     with np.errstate(invalid="ignore"):
-        on = is_still_changing(steady, error, values[MAIN], tolerance) & np.array(
+        on = is_still_changing(steady, error, values[MAIN_MEASURE], tolerance) & np.array(
             [one is Outcome.STEADY for one in outcome]
         )
     still = (
@@ -184,7 +186,9 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         & ~runs.stuck
     )
     values[STEADY_AMPLITUDE] = np.where(still, steady, np.nan)
-    errors[STEADY_AMPLITUDE] = error_of_steady(steady, error, values[MAIN], errors[MAIN])
+    errors[STEADY_AMPLITUDE] = error_of_steady(
+        steady, error, values[MAIN_MEASURE], errors[MAIN_MEASURE]
+    )
     resolved, wide_of = np.ones(n, bool), np.zeros(n, bool)
     for name, value in values.items():
         there = ~np.isnan(value)
@@ -194,7 +198,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         wide = there & (errors[name] > tolerance * np.abs(value) + floor)
         floor = np.fmax(floor, tolerance * larger_term(name, values))
         wide_of |= wide & (errors[name] > tolerance * np.abs(value) + floor) & ~grows
-        if name == MAIN and runs.again:
+        if name == MAIN_MEASURE and runs.again:
             alone |= wide & ~grows
         if not name.endswith("_steady"):
             resolved &= ~wide
@@ -223,7 +227,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     wide_of &= True if again is None else ~again(found)
     alike = isinstance(models, SimilarModels)
     remarks = _remarks(models[0], numerics["engine"]) if alike else ()
-    rings = _rings(sizes, runs, outcome, values[MAIN])
+    rings = _rings(sizes, runs, outcome, values[MAIN_MEASURE])
     told = wide_of | _by_law(models, found) if alike else wide_of
     told = told | np.isin(np.arange(n), list(rings))
     for case in range(n) if remarks or not alike else np.flatnonzero(told).tolist():
@@ -235,7 +239,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
                 model, outcome[case], found, case, wide_of[case], rings.get(case, ())
             ),
         ]:
-            found.warnings[case] = without_folders(warnings, model.source.path)
+            found.warnings[case] = shorten_file_names(warnings, model.source.path)
     return found, alone, resolved
 
 
@@ -278,14 +282,18 @@ def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
 
 
 def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
-    """Return the warnings of `rings_on` for the cases that stick but still vibrate, by case."""
+    """Return the warnings of `warn_of_ringing` for the cases that stick but still vibrate, by case."""
     n, cases = (
         len(amplitude),
         np.flatnonzero([one is Outcome.STUCK for one in outcome] & (amplitude != 0)),
     )
     tolerance, decay, floor = (
         np.broadcast_to(one, n)[cases]
-        for one in (sizes.tolerance, sizes.decay * sizes.period, error_floor(MAIN, sizes.moved))
+        for one in (
+            sizes.tolerance,
+            sizes.decay * sizes.period,
+            error_floor(MAIN_MEASURE, sizes.moved),
+        )
     )
     left = remaining_ringing(runs.extremes[cases], runs.window, decay)
     columns = zip(
@@ -326,7 +334,7 @@ def _stops(found: CaseResults) -> None:
 
 def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
     """Add the reasons why cases have no value of measures that they could have."""
-    names = [*CYCLE_MEASURES, PHASE]
+    names = [*CYCLE_MEASURES, PHASE_MEASURE]
     for name in names:
         found.measure(name, TABLE[name].unit)
     lacking = np.array([np.isnan(found.values[name]) for name in names])
@@ -371,11 +379,11 @@ def warnings_of_case(model, outcome, found: CaseResults, case: int, wide: bool, 
     wide : bool
         Whether an error exceeds the tolerance.
     rings : sequence of str
-        Warnings of `rings_on`.
+        Warnings of `warn_of_ringing`.
     """
     if not wide and not law_has_trait(model.friction.law, "bonds"):
         return list(rings)
-    known = known_of(found, case)
+    known = known_measures(found, case)
     drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
     return [
         *law_warnings(model, outcome, drift, 0.0),
@@ -400,7 +408,7 @@ def _by_law(models: SimilarModels, found: CaseResults) -> np.ndarray:
     return (np.abs(drift) > np.nan_to_num(error)) & (found.outcome != str(Outcome.TRANSIENT))
 
 
-def known_of(found: CaseResults, case: int) -> dict:
+def known_measures(found: CaseResults, case: int) -> dict:
     """Return the measures of a case whose errors are known, by name."""
     return {
         name: Measure(

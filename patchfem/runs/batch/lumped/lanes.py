@@ -51,9 +51,9 @@ from .columns import ENDS, Runs, batch_answers
 from .pieces import LONGEST, SHORTEST
 
 AMPLITUDE = "relative_displacement_amplitude"
-LEAST = 64  # smallest number of cases of a study that lanes take
+MIN_CASES = 64  # smallest number of cases of a study that lanes take
 TIGHTEST = 1e-4  # smallest tolerance that lanes can meet
-TOGETHER = 4096  # number of cases in one compiled call
+MAX_CASES_PER_CALL = 4096  # number of cases in one compiled call
 # friction law in `dynamics.lanes` by the law of the scene
 KINDS = {
     "coulomb": "rigid",
@@ -122,7 +122,7 @@ RING = "ring_frequency", "ring_damping"
 # may be completely uncertain.
 WILD = ("relative_displacement_amplitude", 0.1), ("friction_force_peak", 0.1), ("loop_area", 10.0)
 # fraction of a loop by which a loop that is forgotten for lack of memory may be larger
-DROPPED = 1e-2
+DROPPED_LOOP_RATIO = 1e-2
 # One of this many cases is checked with the exact engine, and at least this many of a batch.
 CHECKED, FEWEST = (
     200,
@@ -142,7 +142,7 @@ def refuses(model: Model) -> str:
     """Return why lanes do not take a model; "" if they do."""
     return no_lanes(model) or (
         ""
-        if steps_of([model])[0]
+        if steps_per_cycle([model])[0]
         else "its free vibration is too fast for the time steps of its drive"
     )
 
@@ -211,14 +211,14 @@ def law_numbers(model: Model) -> tuple:
     )
 
 
-def steps_of(models: Sequence[Model]) -> np.ndarray:
+def steps_per_cycle(models: Sequence[Model]) -> np.ndarray:
     """Return the steps per cycle (n,) of models of one law; 0 if there would be too many."""
     smooth = march.has_one_stretch(KINDS[models[0].friction.law])
     ends = [(CALM * steps / (2 * np.pi), steps) for steps in SMOOTH] if smooth else RATES
-    return steps_at(collect_columns(models, _rate)[0], ends)
+    return steps_at_rate(collect_columns(models, _rate)[0], ends)
 
 
-def steps_at(rate, ends) -> np.ndarray:
+def steps_at_rate(rate, ends) -> np.ndarray:
     """Return the steps per cycle (n,) at fastest rates (n,) over that of the drive.
 
     ends: sequence of (largest rate, steps).
@@ -228,7 +228,7 @@ def steps_at(rate, ends) -> np.ndarray:
     ]
 
 
-def rate_of(model: Model, stiffness):
+def fastest_rate(model: Model, stiffness):
     """Return the fastest rate of a model with a contact stiffness [N/m], over that of its drive."""
     modes = model.rig.modes
     return (
@@ -247,7 +247,7 @@ def _rate(model: Model) -> tuple:
     scale = modes.slide[0] ** 2 / modes.mass
     stiff = _contact(model)[0] * scale
     if not march.has_one_stretch(KINDS[model.friction.law]):
-        return (rate_of(model, _contact(model)[0]),)
+        return (fastest_rate(model, _contact(model)[0]),)
     rate = damper
     if model.friction.law == "tanh":
         rate = (
@@ -307,7 +307,7 @@ def parts(models: Sequence) -> dict[tuple, list]:
         for case, model in enumerate(models):
             if isinstance(model, Model) and not no_lanes(model):
                 places.setdefault(group(model), []).append(case)
-    steps = {key: steps_of(select_models(models, cases)) for key, cases in places.items()}
+    steps = {key: steps_per_cycle(select_models(models, cases)) for key, cases in places.items()}
     return {
         key: np.array(cases)[steps[key] > 0].tolist()
         for key, cases in places.items()
@@ -318,8 +318,8 @@ def parts(models: Sequence) -> dict[tuple, list]:
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Return the case results of models of one group."""
     found = CaseResults.blank(len(models))
-    for first in range(0, len(models), TOGETHER):
-        part = select_models(models, range(first, min(first + TOGETHER, len(models))))
+    for first in range(0, len(models), MAX_CASES_PER_CALL):
+        part = select_models(models, range(first, min(first + MAX_CASES_PER_CALL, len(models))))
         found.place(range(first, first + len(part)), _solve_cases(part, say))
     return found
 
@@ -334,7 +334,9 @@ def _solve_cases(models: Sequence[Model], say) -> CaseResults:
             select_models(models, places), say, FINER_CELLS if law == "iwan" and check else 0
         )
 
-    found, others, _ = solve_and_check(models, (*cases_of(models), None), steps_of(models), exact)
+    found, others, _ = solve_and_check(
+        models, (*make_cases(models), None), steps_per_cycle(models), exact
+    )
     if law == "tanh":
         speeds, first = (
             collect_columns(models, lambda model: (model.friction.reference_speed,))[0],
@@ -358,7 +360,7 @@ def solve_and_check(models: Sequence[Model], cases: tuple, steps, exactly: Calla
     ----------
     models : sequence of Model
     cases : tuple
-        From `cases_of`, and the same on a coarser mesh or None.
+        From `make_cases`, and the same on a coarser mesh or None.
     steps : (n,)
         Steps per cycle.
     exactly : callable
@@ -369,7 +371,7 @@ def solve_and_check(models: Sequence[Model], cases: tuple, steps, exactly: Calla
     tuple
         CaseResults; which (n,) were not computed by lanes; largest output (n,) [m].
     """
-    begin, law = perf_counter(), kind_of(models[0])
+    begin, law = perf_counter(), lane_kind(models[0])
     found, exact, steps, reach = _side_by_side(models, cases, steps)
     found.seconds[:] = (perf_counter() - begin) / len(models)
     marks = np.column_stack(cases[0])
@@ -437,7 +439,7 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     """
     found, exact, steps = CaseResults.blank(len(models)), np.zeros(len(models), bool), steps.copy()
     reach = np.zeros(len(models))
-    law, cycles, meshed = kind_of(models[0]), group(models[0])[0], {}
+    law, cycles, meshed = lane_kind(models[0]), group(models[0])[0], {}
     fewest, known, flows = steps // 2, {}, march.has_one_stretch(law)
     now, smooth = int(fewest.min()), flows or law in march.MASING
     finest = (SMOOTH if smooth else RATES[-1])[-1]
@@ -520,13 +522,13 @@ def _march_cases(
     """Return the results of models from a march with `steps` per cycle.
 
     Also returns which cases (n,) must be run otherwise, and which need more steps. The parameters
-    are those of `runs_of`.
+    are those of `collect_runs`.
     """
     window, wide_of = (
-        window_of(group(models[0])[0]),
+        count_evaluated_cycles(group(models[0])[0]),
         partial(has_large_error, models, meshed=cases[2]),
     )
-    runs, exact, lost = runs_of(models, cases, steps, seen, coarser)
+    runs, exact, lost = collect_runs(models, cases, steps, seen, coarser)
     found, alone, _ = batch_answers(
         models, runs, {"engine": "exact", "window_cycles": window}, wide_of
     )
@@ -580,7 +582,7 @@ def has_large_error(models, found: CaseResults, meshed: dict | None = None) -> n
     for name, values in found.values.items():
         if name in RING:  # the fit of a single run is no more accurate
             continue
-        if name.endswith("_steady") and kind_of(models[0]) not in MARCH_ON:
+        if name.endswith("_steady") and lane_kind(models[0]) not in MARCH_ON:
             # an extrapolation has the same error with finer steps, and with the exact engine
             continue
         of_mesh = (meshed or {}).get(name.removesuffix("_steady"), 0.0)
@@ -649,14 +651,14 @@ def find_differences(
     return wrong
 
 
-def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
+def collect_runs(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
     """Return the Runs of models of a group from their march.
 
     Parameters
     ----------
     models : sequence of Model
     cases : tuple
-        From `cases_of`, and the errors by the mesh.
+        From `make_cases`, and the errors by the mesh.
     steps : int
         Steps per cycle.
     seen : tuple
@@ -670,12 +672,12 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
         Runs; which cases (n,) must be run otherwise; which (n,) need more steps.
     """
     law, cycles, (cases, c, meshed), (values, book, found, extremes, rise) = (
-        kind_of(models[0]),
+        lane_kind(models[0]),
         group(models[0])[0],
         cases,
         seen,
     )
-    window = window_of(cycles)
+    window = count_evaluated_cycles(cycles)
     errors = step_errors(values, coarser)
     errors |= {
         name: errors[name] + error for name, error in (meshed or {}).items() if name in errors
@@ -696,7 +698,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
         )
         steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | open_ones
     if law in march.MASING:
-        exact |= march.law_state(law, found.motion, "MAX_DROPPED_GAP") > DROPPED
+        exact |= march.law_state(law, found.motion, "MAX_DROPPED_GAP") > DROPPED_LOOP_RATIO
     phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
     nowhere = np.zeros(len(models), bool)  # lost cases are returned separately
@@ -751,7 +753,7 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     law : str
     cases : Cases
     c : dict
-        Other numbers from `cases_of`.
+        Other numbers from `make_cases`.
     found : Marched
     read : tuple
         Which cases (n,) stick, evaluated cycles of a motion that is not periodic, steps per cycle.
@@ -878,7 +880,7 @@ def _march_until_settled(law: str, cases, found, steps: int, amplitudes, free) -
         more, motion = march.continue_march(law, here, before, max(1, int(share * part)), steps)
         history = np.concatenate([history, more], axis=1)
         late = history.shape[1] > MORE * part
-        least = _left(here, before, motion, more.shape[1])
+        least = _bound_free_motion(here, before, motion, more.shape[1])
         value, error = _steady_half_range(history, part, least, (LATE if late else 1) * SETTLED)
         near = (LATE if late else 2) * SETTLED
         ranges = np.ptp(history[:, -part:, :2], axis=2) / 2
@@ -911,7 +913,7 @@ def _slips_until_steady(ranges, length, value, error) -> np.ndarray:
     return (least > length) | (most < length)
 
 
-def _left(cases, before, motion, cycles: int) -> np.ndarray:
+def _bound_free_motion(cases, before, motion, cycles: int) -> np.ndarray:
     """Return an upper bound of the remaining free motion (n,) [m].
 
     It follows from the change in `cycles` cycles, and from the smallest decay by the damper in
@@ -954,7 +956,9 @@ def _steady_half_range(history, part: int, least, near: float) -> tuple:
     last, left = ranges[:, -1], 2 * np.ptp(ranges[:, -part:], axis=1)
     before = 2 * np.ptp(ranges[:, -2 * part : -part], axis=1) if count >= 2 * part else np.inf
     closes = (np.maximum(left, least) < near * last) & (left <= np.maximum(before, 1e-9 * last))
-    ends = np.arange(count - 1, 0, -(part if count > MORE * part else window_of(part)))[::-1]
+    ends = np.arange(
+        count - 1, 0, -(part if count > MORE * part else count_evaluated_cycles(part))
+    )[::-1]
     with np.errstate(all="ignore"):
         value, error = extrapolate_steady_amplitudes(
             ranges[:, ends], history[:, ends, 2:] @ [1, 1j]
@@ -965,7 +969,7 @@ def _steady_half_range(history, part: int, least, near: float) -> tuple:
     )
 
 
-def cases_of(models, contacts=None) -> tuple:
+def make_cases(models, contacts=None) -> tuple:
     """Return the Cases of models, and further numbers (n,) by name in SI units.
 
     contacts: numbers (m, n) of the contacts as from `_contact_numbers`; None: those of single points.
@@ -976,7 +980,7 @@ def cases_of(models, contacts=None) -> tuple:
     static, kinetic, load, spring, length, *numbers = (
         collect_columns(models, _contact_numbers) if contacts is None else contacts
     )
-    law, scale, numbers = kind_of(models[0]), slide**2 / (mass * w**2), np.array(numbers).T
+    law, scale, numbers = lane_kind(models[0]), slide**2 / (mass * w**2), np.array(numbers).T
     numbers = (
         numbers * march.number_scales(law, scale, w)
         if march.has_one_stretch(law)
@@ -1008,7 +1012,7 @@ def cases_of(models, contacts=None) -> tuple:
 
 
 def _rig_numbers(model: Model) -> tuple:
-    """Return the numbers of a model, except its contact, for `cases_of`."""
+    """Return the numbers of a model, except its contact, for `make_cases`."""
     modes, drive, start = model.rig.modes, model.rig.drive.signal, model.rig.start
     return (
         modes.omega[0],
@@ -1027,18 +1031,18 @@ def _rig_numbers(model: Model) -> tuple:
 
 
 def _contact_numbers(model: Model) -> tuple:
-    """Return the numbers of the contact of a model for `cases_of`.
+    """Return the numbers of the contact of a model for `make_cases`.
 
     They are static and kinetic friction [N], load [N], and those of `_contact`.
     """
     static, kinetic = model.friction_limits(model.point.load)
     kinetic = (
-        kinetic if kind_of(model) == "rigid" and model.friction.kinetic is not None else static
+        kinetic if lane_kind(model) == "rigid" and model.friction.kinetic is not None else static
     )
     return static, kinetic, model.point.load, *_contact(model)
 
 
-def kind_of(model: Model) -> str:
+def lane_kind(model: Model) -> str:
     """Return the law of a model in `dynamics.lanes`; for a patch, the table of its elements."""
     return KINDS[model.friction.law] if model.patch is None else "table"
 
@@ -1055,7 +1059,7 @@ def _mesh_errors(fine: dict, rough: dict) -> dict:
         }
 
 
-def window_of(cycles: int) -> int:
+def count_evaluated_cycles(cycles: int) -> int:
     """Return the number of last cycles that are evaluated."""
     return min(10, cycles // 10)
 
@@ -1066,7 +1070,10 @@ def _march_and_measure(law: str, cases, c: dict, cycles: int, steps: int) -> tup
     Returns the measures by name, energies [J], Marched, extremes of the output (n, c, 2) [m], and
     the increase of the friction force [N].
     """
-    found, window = march.march(law, cases, cycles, window_of(cycles), steps), window_of(cycles)
+    found, window = (
+        march.march(law, cases, cycles, count_evaluated_cycles(cycles), steps),
+        count_evaluated_cycles(cycles),
+    )
     extremes = found.history[:, :, :2] * c["ratio"][:, None, None]
     extremes[c["ratio"] < 0] = extremes[c["ratio"] < 0, :, ::-1]
     book = reading.run_energies(law, cases, found, c["energy"])

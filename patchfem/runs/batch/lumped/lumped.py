@@ -10,13 +10,13 @@ import numpy as np
 
 from ....core import SineDrive
 from ....model.model import Model
-from ...rig.engines import engine_of
+from ...rig.engines import choose_engine
 from .. import one_by_one
 from ..case_results import CaseResults, has_unreadable_table
 from . import pieces
 from .columns import batch_answers
 
-TOGETHER = 1024  # cases of one compiled call, which limits the memory of their histories
+MAX_CASES_PER_CALL = 1024  # cases of one compiled call, which limits the memory of their histories
 
 
 def refuses(model: Model) -> str:
@@ -88,20 +88,20 @@ def solve(models: Sequence[Model], say=None, finer: int = 0) -> CaseResults:
         and does not use more cells if errors are too large.
     """
     found = CaseResults.blank(len(models))
-    for first in range(0, len(models), TOGETHER):
-        part = models[first : first + TOGETHER]
+    for first in range(0, len(models), MAX_CASES_PER_CALL):
+        part = models[first : first + MAX_CASES_PER_CALL]
         pairs = max(0, pieces.count_first_merges(part[0]) - finer)
         found.place(range(first, first + len(part)), _solve_cases(part, say, pairs, finer > 0))
     return found
 
 
 def _solve_cases(models, say, pairs: int, check: bool = False) -> CaseResults:
-    """Return the case results of at most TOGETHER models."""
+    """Return the case results of at most MAX_CASES_PER_CALL models."""
     begin, cycles = perf_counter(), int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)
-    runs = pieces.runs_of(models, cycles, window, say, pairs)
+    runs = pieces.run_pieces(models, cycles, window, say, pairs)
     found, alone, resolved = batch_answers(
-        models, runs, {"engine": engine_of(models[0]).name, "window_cycles": window}
+        models, runs, {"engine": choose_engine(models[0]).name, "window_cycles": window}
     )
     found.seconds[:] = (perf_counter() - begin) / len(models)
     finer = ~resolved & ~runs.lost if pairs else np.zeros(len(models), bool)

@@ -20,7 +20,7 @@ from ....response.measures import COORDINATE_ROUND_OFF, energy_balance
 from ....response.ringing import make_ring
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...rig.costs import count_merges
-from ...rig.engines import EXACT, PIECES, engine_of
+from ...rig.engines import EXACT, PIECES, choose_engine
 from ...rig.pieces import (
     RigidElements,
     elements_of_law,
@@ -28,7 +28,7 @@ from ...rig.pieces import (
     measures_of_reading,
     still_changes,
 )
-from .columns import ENDS, MAIN, Runs
+from .columns import ENDS, MAIN_MEASURE, Runs
 from .threads import in_threads
 
 CYCLES = 3  # cycles that contain every stick of a cycle completely
@@ -62,7 +62,7 @@ def refuses(model) -> str:
         return "nothing rubs"
     return (
         ""
-        if engine_of(model) is (EXACT if _holds(model) else PIECES)
+        if choose_engine(model) is (EXACT if _holds(model) else PIECES)
         else "the case is not computed by the engine from yield to yield"
     )
 
@@ -79,7 +79,7 @@ def count_first_merges(model) -> int:
     return 0 if _holds(model) else count_merges(model)
 
 
-def case_of(model, pairs: int = 0) -> Case:
+def make_case(model, pairs: int = 0) -> Case:
     """Return the Case of a model with a single point; pairs: see `Numerics`."""
     if _holds(model):
         return Case(model, RigidElements(model, None, None).groups, 0.0, model.point.load)
@@ -90,7 +90,7 @@ def case_of(model, pairs: int = 0) -> Case:
     return Case(model, (group,), 1e-3 * element.length, model.point.load)
 
 
-def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
+def run_pieces(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     """Run models of this kind, each for `cycles` cycles from its initial state.
 
     Parameters
@@ -107,7 +107,7 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
     -------
     Runs
     """
-    cases = [case_of(model, pairs) for model in models]
+    cases = [make_case(model, pairs) for model in models]
     out = runs_of_cases(cases, cycles, window, say)
     if law_has_trait(models[0].friction.law, "cells"):
         fewer = [
@@ -283,7 +283,7 @@ def with_coarser_errors(fine: Runs, coarser: list, told_by) -> Runs:
     told_by: function (fine, *coarse) of values by name that returns errors by name.
     """
     whole = [
-        one.values | {MAIN: one.amplitudes, "energy_balance": energy_balance(one.book)}
+        one.values | {MAIN_MEASURE: one.amplitudes, "energy_balance": energy_balance(one.book)}
         for one in (fine, *coarser)
     ]
     for case in range(len(fine.stuck)):

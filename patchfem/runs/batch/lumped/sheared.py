@@ -20,20 +20,22 @@ from ....model.source import locate_errors
 from ....response.errors import coarser_errors
 from ...accuracy_warnings import Finding, tolerance_warnings
 from ...patch import result as of_patch
-from ...results.result import without_folders
+from ...results.result import shorten_file_names
 from ...results.travel import outcome_on_piece, warn_of_large_slide
-from ...rig.engines import PIECES, engine_of
+from ...rig.engines import PIECES, choose_engine
 from ...rig.numerics import choose
 from ...rig.pieces import YieldingElements
 from .. import one_by_one, patches
 from ..case_results import CaseResults, has_unreadable_table
 from . import pieces
-from .columns import batch_answers, known_of
+from .columns import batch_answers, known_measures
 from .lumped import not_one_sine, take_out
 
 # cases of one compiled call, whose elements and histories of cycles are in memory together
-TOGETHER = 128
-LEAST = 2  # cases of a thread: a single one takes as long as hundreds of single points
+MAX_CASES_PER_CALL = 128
+MIN_CASES_PER_THREAD = (
+    2  # cases of a thread: a single one takes as long as hundreds of single points
+)
 
 
 class PressedCase(NamedTuple):
@@ -74,7 +76,7 @@ def refuses(model: Model) -> str:
         return "the case has too few or too many cycles"
     return (
         ""
-        if engine_of(model) is PIECES
+        if choose_engine(model) is PIECES
         else "the case is not computed by the engine from yield to yield"
     )
 
@@ -86,7 +88,7 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Return the case results of models of one group; cases that need it are run by themselves."""
-    return solve_cases(models, say, move_cases, TOGETHER)
+    return solve_cases(models, say, move_cases, MAX_CASES_PER_CALL)
 
 
 def solve_cases(models: Sequence[Model], say, move: Callable, together: int) -> CaseResults:
@@ -167,9 +169,9 @@ def move_cases(models, held: list, say) -> tuple:
         pieces.Case(model, one.fine.groups, one.fine.held, one.patch.pressure.load)
         for model, one in zip(models, held)
     ]
-    fine = pieces.runs_of_cases(cases, cycles, window, say, LEAST)
+    fine = pieces.runs_of_cases(cases, cycles, window, say, MIN_CASES_PER_THREAD)
     coarser = [case._replace(groups=one.coarse.groups) for case, one in zip(cases, held)]
-    coarse = pieces.runs_of_cases(coarser, cycles, window, say, LEAST, steady=False)
+    coarse = pieces.runs_of_cases(coarser, cycles, window, say, MIN_CASES_PER_THREAD, steady=False)
     chosen = tuple(
         {
             "elements": int(one.fine.contact.reduction.stiffness.size),
@@ -206,14 +208,14 @@ def add_patch_results(
     found.outcome[case] = str(
         outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, slide)
     )
-    known = known_of(found, case)
+    known = known_measures(found, case)
     found.fill(case, one.measures)
     seen = Finding(
         model,
         one.measures | {name: m for name, m in known.items() if name != "normal_load"},
         one.patch,
     )
-    warned = without_folders(
+    warned = shorten_file_names(
         [
             *one.warnings,
             *model.rig.structure.notes,
@@ -225,5 +227,5 @@ def add_patch_results(
     found.warnings.pop(case, None)
     if warned:
         found.warnings[case] = warned
-    if noted := without_folders(one.notes, model.source.path):
+    if noted := shorten_file_names(one.notes, model.source.path):
         found.notes[case] = noted

@@ -17,7 +17,7 @@ from .. import one_by_one
 from ..case_results import CaseResults
 from . import lanes, sheared
 
-TOGETHER = 512  # cases of one compiled call, whose tables are in memory together
+MAX_CASES_PER_CALL = 512  # cases of one compiled call, whose tables are in memory together
 
 
 def refuses(model: Model) -> str:
@@ -32,7 +32,7 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Return the case results of models of one group."""
-    return sheared.solve_cases(models, say, move_cases, TOGETHER)
+    return sheared.solve_cases(models, say, move_cases, MAX_CASES_PER_CALL)
 
 
 def move_cases(models, held: list, say) -> tuple:
@@ -46,8 +46,10 @@ def move_cases(models, held: list, say) -> tuple:
         Callback for a line of text.
     """
     sets = [[one.groups[0] for one in (pressed.fine, pressed.coarse)] for pressed in held]
-    rates = [lanes.rate_of(model, fine.stiffness.sum()) for model, (fine, _) in zip(models, sets)]
-    steps = lanes.steps_at(rates, lanes.OF_TABLE)
+    rates = [
+        lanes.fastest_rate(model, fine.stiffness.sum()) for model, (fine, _) in zip(models, sets)
+    ]
+    steps = lanes.steps_at_rate(rates, lanes.OF_TABLE)
     most = load(f"{march.HERE}.table_curve_kernels").N_YIELDS - 1
     fit = (steps > 0) & [max(one.stiffness.size for one in pair) < most for pair in sets]
     found, lost = CaseResults.blank(len(models)), np.zeros(len(models), bool)
@@ -68,7 +70,9 @@ def move_cases(models, held: list, say) -> tuple:
     if here := np.flatnonzero(fit).tolist():
         these = [models[k] for k in here]
         cases = [
-            lanes.cases_of(these, _contacts([sets[k][mesh] for k in here], [held[k] for k in here]))
+            lanes.make_cases(
+                these, _contacts([sets[k][mesh] for k in here], [held[k] for k in here])
+            )
             for mesh in range(2)
         ]
         answers, exact, reach = lanes.solve_and_check(
@@ -89,7 +93,7 @@ def move_cases(models, held: list, say) -> tuple:
 
 
 def _contacts(sets: list, held: list) -> np.ndarray:
-    """Return the numbers (m, n) of the contacts of patches, as `lanes.cases_of` takes them."""
+    """Return the numbers (m, n) of the contacts of patches, as `lanes.make_cases` takes them."""
     rows = [
         (
             one.limit,

@@ -11,7 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
 
-LEAST = 32  # cases of a thread: fewer are finished before a thread has started
+MIN_CASES_PER_THREAD = 32  # cases of a thread: fewer are finished before a thread has started
 
 
 def in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> None:
@@ -24,9 +24,9 @@ def in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> Non
     count : int
         Number of cases.
     least : int
-        Smallest number of cases of a thread; 0 for LEAST.
+        Smallest number of cases of a thread; 0 for MIN_CASES_PER_THREAD.
     """
-    parts = max(1, min(cores(), count // (least or LEAST)))
+    parts = max(1, min(cores(), count // (least or MIN_CASES_PER_THREAD)))
     ends = [count * k // parts for k in range(parts + 1)]
     pieces = [slice(*pair) for pair in pairwise(ends)]
     work(pieces[0]) if parts == 1 else list(_pool().map(work, pieces))

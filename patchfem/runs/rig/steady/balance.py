@@ -27,7 +27,7 @@ from ....response.spectrum import odd_harmonics, wave_measures
 from ..interface import contact_model
 from ..reading import Reader, friction_works
 from ..solution import Solution, sampled_loop
-from .curves import LAST, SHOWN, CurvePoint, describe_instability
+from .curves import COLUMN_MEASURES, LAST, CurvePoint, describe_instability
 
 SAMPLES = 4096  # samples of the cycle from which measures are computed
 
@@ -223,8 +223,8 @@ class BalanceFinder:
         response = periodic_response(found, self.modes, drive, SAMPLES)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
-            SHOWN["amplitude"]: found.amplitude(row),
-            SHOWN["acceleration_peak"]: compute_acceleration_peak(response),
+            COLUMN_MEASURES["amplitude"]: found.amplitude(row),
+            COLUMN_MEASURES["acceleration_peak"]: compute_acceleration_peak(response),
             **wave_measures(*odd_harmonics(response, drive)),
         }
         return {name: value for name, value in values.items() if value is not None}

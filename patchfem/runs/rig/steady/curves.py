@@ -15,7 +15,7 @@ from ....response.levels import LEVEL_MEASURES, Level
 from ..solution import seen_by_gauge
 
 # measure of each column of a curve
-SHOWN = {
+COLUMN_MEASURES = {
     "amplitude": "relative_displacement_amplitude",
     "acceleration_peak": "absolute_acceleration_peak",
     "acceleration_fundamental": "absolute_acceleration_fundamental",
@@ -28,7 +28,7 @@ POINTS = 121  # points of a curve over frequency before its refinement
 # The neighbourhood of a peak ends at this fraction of the peak, and no other peak may be higher
 # than this fraction. It is computed alone if it is at most this fraction of the curve. Its curve
 # starts with this many points.
-FALLEN, NARROW, FEW = (
+PEAK_END_RATIO, MAX_PEAK_FRACTION, N_START_POINTS = (
     0.8,
     0.75,
     7,
@@ -63,7 +63,7 @@ class CurvePoint(NamedTuple):
         values = (
             {name: self.values.get(name) for name in LEVEL_MEASURES}
             if self.values
-            else {SHOWN["amplitude"]: np.nan}
+            else {COLUMN_MEASURES["amplitude"]: np.nan}
         )
         kept = {name: value for name, value in values.items() if value is not None}
         errors = {name: self.errors[name] for name in kept if name in self.errors}
@@ -160,12 +160,12 @@ def trace_curve(modes, drive, find) -> list:
             SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving),
             before and before[1].near,
         )
-        return one.values.get(SHOWN["amplitude"], np.nan), one
+        return one.values.get(COLUMN_MEASURES["amplitude"], np.nan), one
 
-    return [one for _, one in sample_adaptively(found, starts_of(modes, drive), SHARE)[1]]
+    return [one for _, one in sample_adaptively(found, start_frequencies(modes, drive), SHARE)[1]]
 
 
-def starts_of(modes, drive) -> np.ndarray:
+def start_frequencies(modes, drive) -> np.ndarray:
     """Return the frequencies [Hz] with which the curve of a sweep starts.
 
     They are POINTS frequencies over the range, and the frequencies of the modes in it, where a peak
@@ -183,7 +183,7 @@ def starts_of(modes, drive) -> np.ndarray:
 def sweep_around_peak(drive, curve: dict, at: float):
     """Return a sweep over the neighbourhood of the largest amplitude of a curve.
 
-    The neighbourhood ends where the curve has fallen to FALLEN of the largest amplitude, plus a
+    The neighbourhood ends where the curve has fallen to PEAK_END_RATIO of the largest amplitude, plus a
     quarter of its width on both sides.
 
     Parameters
@@ -202,29 +202,29 @@ def sweep_around_peak(drive, curve: dict, at: float):
     order = np.argsort(curve["frequency"], kind="stable")
     places, heights = curve["frequency"][order], np.nan_to_num(curve["amplitude"][order])
     best = int(np.argmin(np.abs(places - at)))
-    low = heights < FALLEN * heights[best]
+    low = heights < PEAK_END_RATIO * heights[best]
     before, after = np.flatnonzero(low[:best]), np.flatnonzero(low[best:])
     first, last = (
         (before[-1] if before.size else 0),
         (best + after[0] if after.size else len(places) - 1),
     )
     outside = np.delete(heights, slice(first, last + 1))
-    if heights[best] <= 0 or outside.max(initial=0.0) > FALLEN * heights[best]:
+    if heights[best] <= 0 or outside.max(initial=0.0) > PEAK_END_RATIO * heights[best]:
         return None
     a, b = places[first], places[last]
     ends = np.clip([a - (b - a) / 4, b + (b - a) / 4], places[0], places[-1])
-    if not 0 < ends[1] - ends[0] < NARROW * (places[-1] - places[0]):
+    if not 0 < ends[1] - ends[0] < MAX_PEAK_FRACTION * (places[-1] - places[0]):
         return None
     low, high = ends if drive.low < drive.high else ends[::-1]
-    return replace(drive, low=float(low), high=float(high), starts=FEW)
+    return replace(drive, low=float(low), high=float(high), starts=N_START_POINTS)
 
 
-def largest_of(points) -> int:
+def index_of_largest(points) -> int:
     """Return the index of the point with the largest amplitude.
 
     Only stable points count, if there are any.
     """
-    sizes = np.array([one.values.get(SHOWN["amplitude"], -1.0) for one in points])
+    sizes = np.array([one.values.get(COLUMN_MEASURES["amplitude"], -1.0) for one in points])
     lasting = np.array([one.stable for one in points])
     return int(np.argmax(np.where(lasting | ~lasting.any(), sizes, -2.0)))
 
@@ -232,14 +232,14 @@ def largest_of(points) -> int:
 def curve_columns(points, folds=()) -> dict:
     """Return the columns (c,) of a curve by name; NaN where no bounded motion exists.
 
-    They are frequency [Hz], level [m s-2], regime, multiplier, and each of SHOWN with its error.
+    They are frequency [Hz], level [m s-2], regime, multiplier, and each of COLUMN_MEASURES with its error.
     folds: frequencies [Hz] at which the curve turns back.
     """
     out = {
         "frequency": np.array([one.drive.omega / (2 * np.pi) for one in points]),
         "level": np.array([one.drive.acceleration for one in points]),
     }
-    for column, name in SHOWN.items():
+    for column, name in COLUMN_MEASURES.items():
         out[column] = np.array([one.values.get(name, np.nan) for one in points])
         out[f"{column}_error"] = np.array([one.errors.get(name, np.nan) for one in points])
     return out | {
@@ -274,7 +274,7 @@ def motion_at_levels(finder, drive):
             said.append(why)
             continue
         points.append(curve_point(sine, seen_by_gauge(finder.model, raw), near))
-        if best is None or largest_of(points) == len(points) - 1:
+        if best is None or index_of_largest(points) == len(points) - 1:
             best = raw, sine
         said += [raw.message] if raw.message else []
     if best is None:

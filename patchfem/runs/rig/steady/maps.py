@@ -22,7 +22,14 @@ from ....response.spectrum import wave_measures
 from ....structure.drive_sizes import find_max_acceleration
 from ....structure.response import compute_receptance
 from ..pieces import PieceReader, RigidElements, YieldingElements
-from .curves import SHOWN, CurvePoint, Followed, describe_instability, exact_errors, trace_curve
+from .curves import (
+    COLUMN_MEASURES,
+    CurvePoint,
+    Followed,
+    describe_instability,
+    exact_errors,
+    trace_curve,
+)
 
 
 class PeriodicMotion(NamedTuple):
@@ -178,7 +185,11 @@ class Maps(Followed):
 
 def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
     """Return the measures of a curve, by name."""
-    values = {SHOWN["amplitude"]: amplitude, SHOWN["acceleration_peak"]: acceleration, **waves}
+    values = {
+        COLUMN_MEASURES["amplitude"]: amplitude,
+        COLUMN_MEASURES["acceleration_peak"]: acceleration,
+        **waves,
+    }
     return {name: value for name, value in values.items() if value is not None}
 
 

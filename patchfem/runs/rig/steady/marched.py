@@ -15,12 +15,12 @@ from ....dynamics.march import march as engine
 from ....effects import SINE_WAVEFORM
 from ....model.rig import DriveLevels
 from ....response.measures import peak_sampling_errors
-from ..interface import contact_of
+from ..interface import make_contact
 from ..march import MarchReader
 from ..solution import Solution
 from .curves import CurvePoint, Followed, curve_point, describe_instability, trace_curve
 
-STEPS, MOST = 256, 4096  # steps per cycle at the start, and at most
+START_STEPS, MAX_STEPS = 256, 4096  # steps per cycle at the start, and at most
 EXACT = 1024  # samples per cycle for a law without memory, whose steps are chosen by their error
 LEAD = 30  # cycles after which a lifted mass counts as staying in its grooves
 READ = 1e-9  # relative error of the end of a step
@@ -49,7 +49,7 @@ def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
         return None
     begin, found = perf_counter(), []
     rig = model.rig.with_signal(drive, levels=DriveLevels(), waveform=SINE_WAVEFORM)
-    for steps in (STEPS, STEPS // 2):
+    for steps in (START_STEPS, START_STEPS // 2):
         done = engine.march(
             rig.modes, drive, contact, LEAD, steps, 1, rig.springs.travel, whole=False
         )
@@ -74,9 +74,9 @@ class MarchFinder(Followed):
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         self.model, self.patch, self.frames = model, patch, frames
-        self.contact = contact_of(model, numerics, patch)
+        self.contact = make_contact(model, numerics, patch)
         exact = self.contact.set_valued
-        self.steps = model.accuracy.steps_per_cycle or (EXACT if exact else STEPS)
+        self.steps = model.accuracy.steps_per_cycle or (EXACT if exact else START_STEPS)
         self.numerics = replace(numerics, cycles=1.0, window=1)
         engine.warm_up(model.rig.modes, model.rig.drive.signal, self.contact, say)
 
@@ -132,7 +132,7 @@ class MarchFinder(Followed):
         half = self._read(self._run(drive, run, self.steps // 2)[0], self.steps // 2)[0]
         steps, read = self.steps, self._read(run, self.steps, self.frames)
         while self._rough(read[0][name], half[name]) and run.outcome is None:
-            if 2 * steps > MOST or self.model.accuracy.steps_per_cycle is not None:
+            if 2 * steps > MAX_STEPS or self.model.accuracy.steps_per_cycle is not None:
                 break
             steps, half = 2 * steps, read[0]
             run, left = self._run(drive, run, steps)

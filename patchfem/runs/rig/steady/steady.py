@@ -8,7 +8,7 @@ harmonic balance (`balance`).
 """
 
 from ....core import NotConverged, SineDrive
-from ..engines import FINDERS, PIECES, function_of, steady_by
+from ..engines import FINDERS, PIECES, choose_steady_method, import_function
 from ..solution import Solution
 from .curves import motion_at_levels
 from .top import solve_peak
@@ -34,16 +34,18 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
     -------
     Solution
     """
-    by = steady_by(model)
+    by = choose_steady_method(model)
     try:
-        return _found(function_of(by.solve)(model, numerics, patch, frames, say), model)
+        return _solve_steady(import_function(by.solve)(model, numerics, patch, frames, say), model)
     except NotConverged:
         if by.like != PIECES.name or len(model.rig.friction.interfaces) > 1:
             raise
-    return _found(function_of(FINDERS["balance"].solve)(model, numerics, patch, frames, say), model)
+    return _solve_steady(
+        import_function(FINDERS["balance"].solve)(model, numerics, patch, frames, say), model
+    )
 
 
-def _found(finder, model) -> Solution:
+def _solve_steady(finder, model) -> Solution:
     """Return the Solution of a finder under the drive of a model."""
     drive = model.rig.drive.signal
     if isinstance(drive, SineDrive):

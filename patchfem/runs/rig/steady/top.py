@@ -16,14 +16,14 @@ import numpy as np
 from ....core import NotConverged
 from ....response.errors import absolute_change
 from ..solution import Solution, seen_by_gauge
-from .curves import SHOWN, curve_columns, largest_of
+from .curves import COLUMN_MEASURES, curve_columns, index_of_largest
 
-AMPLITUDE = SHOWN["amplitude"]
-MOST = 40  # most points that are added
+AMPLITUDE = COLUMN_MEASURES["amplitude"]
+MAX_ADDED_POINTS = 40  # most points that are added
 # fraction of the largest amplitude above which the curve of a single mode is concave (from 0.816
 # on)
 CAP = 0.8
-CLOSE = 3e-4  # accuracy of the position of a peak that round-off allows, over its width
+POSITION_TOL = 3e-4  # accuracy of the position of a peak that round-off allows, over its width
 NEAREST = 1e-9  # fraction of the length of the curve; closer points are identical
 TENTH = 0.9  # fraction of a peak at which its width is measured
 SHIFT = 10.0  # shift of a peak over (its width times the relative error of the heights):
@@ -60,13 +60,13 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
     Returns
     -------
     RefinedPeak
-        At the latest after MOST points.
+        At the latest after MAX_ADDED_POINTS points.
     """
     points = list(points)
-    for left in range(MOST, -1, -1):
+    for left in range(MAX_ADDED_POINTS, -1, -1):
         s = np.cumsum([0.0, *(finder.apart(a, b) for a, b in pairwise(points))])
         y, lasting = _heights(points), np.array([one.stable for one in points])
-        best, (reach, at) = largest_of(points), concave_bounds(s, y)
+        best, (reach, at) = index_of_largest(points), concave_bounds(s, y)
         if not y[best] > 0 or not reach.size:
             return RefinedPeak(points, best, 0.0)
         if lasting.any():
@@ -78,7 +78,10 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         reach[np.diff(s) <= NEAREST * s[-1]] = 0.0
         k = int(np.argmax(reach))
         if reach[k] <= y[best] * (1 + finder.leaves[0] * tolerance):
-            k, at[k] = _closer(s, y, best, max(finder.leaves[1] * tolerance, CLOSE)) or (-1, 0.0)
+            k, at[k] = _closer(s, y, best, max(finder.leaves[1] * tolerance, POSITION_TOL)) or (
+                -1,
+                0.0,
+            )
         if not left or k < 0:
             return RefinedPeak(points, best, above)
         try:
